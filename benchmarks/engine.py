@@ -19,6 +19,7 @@ import numpy as np
 from common import ROOT, Row, beside_yardstick, interleaved
 
 from elastocal.campaigns.importers import FOLDER_VARIABLE, importer
+from elastocal.campaigns.writing import write_campaign
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.parameters import parameters
 from elastocal.fitting.registration import registered
@@ -26,16 +27,25 @@ from elastocal.fitting.tolerances import estimated_noise
 from elastocal.io.documents import read_document
 from elastocal.loop.whole import cases_in
 from elastocal_proof.blind.cases import cases_of, make_case
-from elastocal_proof.blind.folders import write_dynamic_campaign
+from elastocal_proof.blind.folders import campaign_document, write_robot
 from elastocal_proof.plant.arm import arm_from_file
+from elastocal_proof.plant.campaigns import FLANGE, Design, measured_table, schedule_of
 from elastocal_proof.plant.kinds import Defect, with_defects
 from elastocal_proof.plant.physical_robot import specimen
-from elastocal_proof.plant.weights import declared_masses
 
 ROBOTS = ROOT / "config" / "robots"
 SEED = 2026
 # Laws that do not depend on the estimate, as most of a measured robot's, of which a fit has many.
 FITTED = ("joint_offset", "transmission_harmonic", "bearing_runout", "link_weight")
+LARGE = Design(
+    held_out=0,
+    ladder=(0.0,),
+    repeats=1,
+    points=(FLANGE,),
+    measured="position",
+    covariates=("time",),
+    declared=("joint_offset", "link_geometry"),
+)
 FIT_TARGET, GROWTH_TARGET = 8.0, 1.2
 CASE_S, SERIES_A_S, SERIES_A_GB, MILLION_S, MILLION_GB = 0.85, 45.0, 0.7, 120.0, 2.0
 SCRIPT = """
@@ -81,7 +91,7 @@ def rows(work: Path, setting: Setting) -> Iterator[Row]:
     """
     yield _fit(work, setting.fitted, setting.repetitions)
     yield _case(work, setting.cases)
-    few, many = (_run([_dynamic(work, measurements)]) for measurements in setting.growth)
+    few, many = (_run([_large(work, measurements)]) for measurements in setting.growth)
     (small,), (large,) = few["seconds"], many["seconds"]
     exponent = float(np.log(large / small) / np.log(many["measurements"] / few["measurements"]))
     how = f"exponent of the CPU time in the rows: {many['measurements']} against {few['measurements']}, from file to verdict"
@@ -95,13 +105,13 @@ def rows(work: Path, setting: Setting) -> Iterator[Row]:
         series.write_campaign([work / "series_a.csv"], work / "series_a", "config/robots", "ur10_series_a")
         how = f"UR10 Series A, {len(kept):,} poses, from its folder to its verdict, one thread as in a job of the workflow"
         yield from _limits("engine ur10_series_a", work / "series_a", SERIES_A_S, SERIES_A_GB, how)
-    how = f"{setting.million:,} measurements of a tracker's dynamic mode, from file to verdict, one thread as in a job"
-    yield from _limits("engine million", _dynamic(work, setting.million), MILLION_S, MILLION_GB, how)
+    how = f"{setting.million:,} measurements, each a pose of its own, from file to verdict, one thread as in a job"
+    yield from _limits("engine million", _large(work, setting.million), MILLION_S, MILLION_GB, how)
 
 
 def _fit(work: Path, measurements: int, repetitions: int) -> Row:
     """A robust fit of many effects, to its end, against one dense least-squares problem of as many rows and columns."""
-    case, _ = cases_in(_dynamic(work, measurements), ROBOTS)
+    case, _ = cases_in(_large(work, measurements), ROBOTS)
     effects = tuple(each for each in case.candidates.values() if each.effect in FITTED and not each.shapes)
     model = replace(case.model, effects=(*case.model.effects, *effects))
     noise, start = estimated_noise(case)[0], registered(model, case.observations)
@@ -135,12 +145,17 @@ def _limits(name: str, folder: Path, allowed_s: float, allowed_gb: float, how: s
     yield Row(f"{name} memory", None, None, peak / allowed_gb, "<= 1", peak <= allowed_gb, memory)
 
 
-def _dynamic(work: Path, measurements: int) -> Path:
-    folder = work / f"dynamic{measurements}"
+def _large(work: Path, measurements: int) -> Path:
+    """A campaign of a robot without loads, each measurement a pose of its own, one reflector on the flange."""
+    folder = work / f"large{measurements}"
     if not folder.is_dir():
-        arm = arm_from_file(ROBOTS / "fanuc.yaml")
+        file = ROBOTS / "fanuc.yaml"
+        arm = arm_from_file(file)
         robot = with_defects(specimen(arm, 4), [Defect("transmission_harmonic", (2,), 1e-4, 1)])
-        write_dynamic_campaign(folder, "dynamic", ROBOTS / "fanuc.yaml", robot, measurements, 4, declared_masses(arm))
+        document = campaign_document("large", arm, LARGE) | {"compliance": "nominal", "holdout": {"fraction": 0.3, "seed": 1}}
+        table, _ = measured_table(robot, LARGE, schedule_of(arm, replace(LARGE, poses=measurements), 4))
+        write_campaign(folder, document | {"noise": {"position_m": robot.tracker.sigma_m}}, table, arm.joints, "parquet")
+        write_robot(folder, file, robot, arm.masses)
     return folder
 
 

@@ -7,8 +7,7 @@ from elastocal.io.provenance import provenance as written_by
 from elastocal.io.records import recorded
 from elastocal.io.storage import write_table
 from elastocal.study.simulation import INITIAL
-from elastocal_proof.audit.audited import Audited
-from elastocal_proof.audit.findings import Finding
+from elastocal_proof.audit.audited import Audited, Finding
 from elastocal_proof.audit.whole import CHECKS, as_table, audit, intact, page_of, provenance
 
 FILE = "results/initial/two.parquet"

@@ -10,17 +10,7 @@ from analysed_robots import ROBOTS
 from made_blind_documents import PLAN
 
 from elastocal.campaigns.reading import read_campaign
-from elastocal_proof.blind.cases import (
-    FOREIGN,
-    NAMED,
-    PROOF,
-    Case,
-    block_of,
-    cases_of,
-    defects_of,
-    make_case,
-    yardstick_of,
-)
+from elastocal_proof.blind.cases import FOREIGN, NAMED, PROOF, Case, cases_of, defects_of, make_case, yardstick_of
 from elastocal_proof.plant.kinds import KINDS
 
 SETTINGS = PLAN["settings"]
@@ -74,7 +64,7 @@ def test_only_the_full_size_shows_the_robots_of_the_proof_and_cases_to_develop_o
     assert not developed & {case.seed for size in ("quick", "full") for case in cases_of(PLAN, size, 1)}
 
 
-def test_names_and_seeds_follow_from_seed_and_key_and_blocks_share_all_cases():
+def test_names_and_seeds_follow_from_seed_and_key_alone():
     cases = cases_of(PLAN, "quick", 1)
     assert cases == cases_of(PLAN, "quick", 1) == sorted(cases, key=lambda case: case.name)
     # Pinned: sealed documents of earlier runs hold what follows from these.
@@ -82,20 +72,13 @@ def test_names_and_seeds_follow_from_seed_and_key_and_blocks_share_all_cases():
     digest = hashlib.sha256(" ".join(f"{case.name} {case.seed}" for case in of_old).encode()).hexdigest()
     assert digest[:12] == NAMES
     assert not {case.name for case in cases} & {case.name for case in cases_of(PLAN, "quick", 2)}
-    blocks = [block_of(cases, number, 10) for number in range(1, 11)]
-    assert sorted((case for block in blocks for case in block), key=lambda case: case.name) == cases
 
 
-def test_a_single_case_has_its_effect_at_its_non_centrality(tmp_path):
-    _, truth = made(a_case(("lost_motion",), (50.0,)), tmp_path)
-    (defect,) = truth["defects"]
-    assert (defect["effect"], defect["of"], truth["seed"]) == ("lost_motion", "retained", 5)
-    assert defect["signal"]["retained"] == pytest.approx(50.0, rel=0.011)
-    assert defect["signal"]["raw"] > defect["signal"]["retained"] and defect["signal"]["rms_m"] > 0
-
-
-def test_what_no_size_makes_so_visible_is_told_to_be_absorbed_at_the_largest_that_means_anything():
-    """The force of a load cell that is off by a tenth shows less than a non-centrality of 10,000."""
+def test_a_case_has_its_effect_at_its_non_centrality_or_is_told_to_be_absorbed_at_the_largest_that_means_anything():
+    _, ((_, sizing),) = sized(a_case(("lost_motion",), (50.0,)))
+    assert sizing["of"] == "retained" and sizing["signal"]["retained"] == pytest.approx(50.0, rel=0.011)
+    assert sizing["signal"]["raw"] > sizing["signal"]["retained"] and sizing["signal"]["rms_m"] > 0
+    # The force of a load cell that is off by a tenth shows less than a non-centrality of 10,000.
     _, ((_, sizing),) = sized(a_case(("force_scale",), (50.0,)))
     assert sizing["of"] == "raw" and sizing["signal"]["retained"] < 0.1
     _, ((defect, sizing),) = sized(a_case(("force_scale",), (1e4,)))

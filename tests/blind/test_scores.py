@@ -5,11 +5,12 @@ import pytest
 from made_blind_documents import PLAN, effect, frame, oracle, said, silence, truth, verdict
 from scipy.stats import binomtest
 
-from elastocal_proof.blind.scores import intervals_of, is_true, outcome, rate, score, stated
+from elastocal_proof.blind.scores import intervals_of, is_true, rate, score, stated
 
 TILTED = {"misplaced": {"shift_m": [0.0, 0.0, 2e-4], "turn_rad": [3e-4, 0.0, 0.0]}}
 PAYLOAD, NOTHING = truth(("payload",)), truth()
 PAIR = truth(("payload",), ("joint_tilt", 2), group="pair")
+COUNTED = ("detected", "exact", "named_right", "holds_truth", "wrong_name", "remains")
 RIGHT = {"detected", "exact", "named_right", "holds_truth"}
 OUTCOMES = {
     "a base that is misplaced": (truth(group="setting") | TILTED, said("named", "base_placement"), set()),
@@ -43,11 +44,12 @@ OUTCOMES = {
 @pytest.mark.parametrize("name", OUTCOMES)
 def test_outcome_is(name):
     sealed, found, expected = OUTCOMES[name]
-    assert {key for key, value in outcome(PLAN, sealed, found).items() if value is True} == expected
+    row = score(PLAN, sealed, found)
+    assert {key for key in COUNTED if row[key] is True} == expected
 
 
 def test_robots_of_the_plan_that_were_tuned_on_prove_nothing():
-    assert [outcome(PLAN, truth(robot=robot), silence())["robots"] for robot in ("kuka", "irb7600")] == ["tuned", "proof"]
+    assert [score(PLAN, truth(robot=robot), silence())["robots"] for robot in ("kuka", "irb7600")] == ["tuned", "proof"]
 
 
 @pytest.mark.parametrize("hits, cases", [(0, 10), (1, 3), (7, 20), (59, 59), (150, 400)])

@@ -42,18 +42,6 @@ def test_false_alarms_are_held_against_their_upper_limit_and_hard_settings_are_a
     assert many.loc[("proof", "false alarms with no effect")].holds
 
 
-def test_effects_that_make_held_out_errors_worse_count_against_all_that_were_adopted():
-    worse = verdict("named", effect("payload"), before=1e-4, after=1.2e-4, reduction=(-0.22, -0.18), warnings=["held-out grew"])
-    quantity = ("proof", "effect adopted and held-out RMS worse by over two standard errors")
-    fine = [(ONE, PAYLOAD, oracle())] * 98
-    # What was found and not adopted is neither.
-    unsure = verdict("class", effect("payload", adopted=False), before=1e-4, after=1.2e-4, reduction=(-0.22, -0.18))
-    silent = [(truth(), silence(), oracle(1.0))] * 50 + [(ONE, unsure, oracle())] * 5
-    row = summary(*fine, *silent).loc[quantity]
-    assert (row.hits, row.cases, row.holds) == (0, 98, True)
-    assert not summary(*fine, *silent, *[(ONE, worse, oracle())] * 2).loc[quantity].holds
-
-
 @pytest.mark.parametrize(("right", "holds"), [(36, True), (35, True), (34, False), (20, False)])
 def test_pairs_are_held_against_what_the_best_analyst_finds_of_the_same_cases(right, holds):
     """34 of 36 are 94.4 %; cases for which the limit was not worked out take no part."""
@@ -67,25 +55,6 @@ def test_pairs_are_held_against_what_the_best_analyst_finds_of_the_same_cases(ri
     assert row.cases == 40 and row.rate == pytest.approx(right / 36) and row.holds == holds
     assert row.low < row.rate < row.high or right == 36
     assert table.loc["both of two effects at 200 each, by the best analyst"].hits == 36
-
-
-def test_stated_probabilities_are_held_against_how_often_they_are_so():
-    sets = [{"mechanisms": ["payload"], "probability": 1.0}]
-    sure = PAYLOAD | {"probabilities": {"sets": sets, "nothing": 0.0, "alarm_p_value": 0.001}}
-    entries = [(ONE, sure, oracle())] * 98 + [(truth(("joint_tilt", 2)), sure, oracle())] * 2
-    table = summary(*entries, (ONE, silence(), oracle())).loc["proof"]
-    row = table.loc["stated probability of the most probable mechanisms: expected calibration error"]
-    assert (row.cases, row.rate, row.holds) == (100, pytest.approx(0.02), True)
-    row = table.loc["95 % sets of hypotheses that hold the truth"]
-    assert (row.hits, row.cases, row.holds) == (98, 100, True)
-
-
-def test_the_error_is_the_mean_distance_in_bins_weighted_by_their_cases():
-    probability = np.array([0.95] * 10 + [0.55] * 5)
-    correct = np.array([True] * 9 + [False] + [True] * 4 + [False])
-    assert calibration_error(probability, correct) == pytest.approx((10 * 0.05 + 5 * 0.25) / 15)
-    # A certain statement belongs to the last bin.
-    assert calibration_error(np.ones(4), np.array([True] * 4)) == 0.0
 
 
 def test_calibrated_statements_have_the_error_of_chance_and_overconfident_ones_more():

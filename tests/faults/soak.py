@@ -1,4 +1,4 @@
-"""Kills, full disks and two runs at once: a plain `snakemake -j2` has to get over each.
+"""Kills, and two runs at once: a plain `snakemake -j2` has to get over each.
 
 `make soak` runs it with forty kills; tests/workflow/test_soak.py with one. After each fault a plain run has to finish, and
 every file that the pipeline makes has to be, byte for byte, that of a run that nothing disturbed. No moment is a time, by which
@@ -114,46 +114,6 @@ def killed_for_sure(study, victim, moments, draws):
             return files
 
 
-def refused_in_one_line(study):
-    """The last line of a plain run that cannot finish; no traceback."""
-    # What is told of a configuration is the first line of a log, for which there may be no space.
-    done = study.snakemake("-j2", "--config", f"data_sets={CHANGES['data_sets']}")
-    said = (done.stdout + done.stderr).strip().splitlines()
-    assert done.returncode != 0 and "Traceback" not in done.stdout + done.stderr, "\n".join(said[-30:])
-    assert len(said[-1]) <= 500 and "allowed:" in said[-1], "\n".join(said[-30:])
-    return said[-1]
-
-
-def on_a_small_disk(reference, megabytes, options=()):
-    """A file system in memory with the sources; to be unmounted by whoever asked for it."""
-    folder = Path(tempfile.mkdtemp())
-    subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={megabytes}m", "tmpfs", folder], check=True)
-    for name in ("Snakefile", "config.yaml", "config", "workflow", "profiles", "src", "README.md"):
-        source = reference.path(name)
-        (shutil.copytree if source.is_dir() else shutil.copy2)(source, folder / name)
-    return Study(folder)
-
-
-def full_disk(reference, expected):
-    """Refused in a line while the disk is full, and finished once there is room."""
-    study = on_a_small_disk(reference, 40)
-    try:
-        said = []
-        # What is left, from nothing on, so that it runs out before the first job and during later ones.
-        for left in (0, 30_000, 300_000, 1_000_000):
-            filler = study.path("filler")
-            space = shutil.disk_usage(study.folder).free
-            with open(filler, "wb") as file:
-                file.write(bytes(max(0, space - left)))
-            said.append(refused_in_one_line(study))
-            filler.unlink()
-        ended_by_itself(study)
-        assert contents(study) == expected
-        return said
-    finally:
-        subprocess.run(["umount", "-l", study.folder], check=True)
-
-
 def two_at_once(study, expected, files):
     """The second starts when the first has made so many files. One of them may be refused; what they leave is that of one."""
     cleared(study)
@@ -183,10 +143,6 @@ def soak(folder, kills, seed):
         print(f"{number + 1}: {victim} killed at {at} files, finished, identical", flush=True)
     for apart in (0, 1, files // 2):
         print(f"two runs {apart} files apart: exit codes {two_at_once(study, expected, apart)}, identical", flush=True)
-    if os.geteuid() == 0:
-        for line in full_disk(study, expected):
-            print(line)
-        print("full disk: one line each, finished later, identical", flush=True)
     print(f"kills survived: {counts}")
 
 

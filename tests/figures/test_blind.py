@@ -3,9 +3,10 @@
 import numpy as np
 import pandas as pd
 import pytest
-from drawn_figures import row_labels, texts_in_axes
+from drawn_figures import legend_entries, row_labels, texts_in_axes
 
-from elastocal_proof.figures.blind import power_map, rates_and_targets, reliability_diagram
+from elastocal_proof.blind.closed_loop import MODELS, PARTS
+from elastocal_proof.figures.blind import closed_loop, power_map, rates_and_targets, reliability_diagram
 
 
 def summary_row(quantity, rate, low, high, target, robots="proof"):
@@ -62,3 +63,20 @@ def test_the_reliability_diagram_shows_shares_with_their_intervals_against_what_
     assert ends == [pytest.approx([0.9, 0.99]), pytest.approx([0.0, 0.8])]
     assert [patch.get_height() for patch in counts.patches] == [100, 4, 9]
     assert "No verdict" in texts_in_axes(reliability_diagram(table.iloc[:0]))[0]
+
+
+def test_every_error_is_drawn_where_its_model_stands():
+    rows = [
+        {"robot": robot, "part": part, "model": model, "rms_mm": 1.0 + number, "rms_mm_low": 0.9, "rms_mm_high": 6.0}
+        for robot in ("gp180", "kuka", "all")
+        for part in PARTS
+        for number, model in enumerate(MODELS)
+    ]
+    figure = closed_loop(pd.DataFrame(rows))
+    assert [axis.get_title() for axis in figure.axes] == ["unloaded", "under loads", "milling path"]
+    assert legend_entries(figure) == ["gp180", "kuka"]
+    words = row_labels(figure.axes[0])
+    assert words[0] == "uncorrected" and words[-1].startswith("true model")
+    drawn = figure.axes[0].containers[0].lines[0]
+    assert drawn.get_xdata().tolist() == [1.0, 2.0, 3.0, 4.0, 5.0]
+    assert (pd.Series(drawn.get_ydata()).diff().dropna() < 0).all()

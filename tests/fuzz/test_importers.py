@@ -160,12 +160,6 @@ def test_measurements_of_other_programs(folder, data):
     quietly(path, drawn, lambda: imports_again(folder, path, options))
 
 
-@given(changed_table(), st.sampled_from([None, "A"]))
-def test_headers_and_cells_of_other_programs(folder, content, target):
-    path = folder / "tracker.csv"
-    quietly(path, content, lambda: imports_again(folder, path, ImportOptions(units=UNITS, target=target)))
-
-
 @given(any_document(EARLIER | {"rotation": "none"}))
 def test_options_of_an_earlier_import(folder, content):
     table, path = folder / "earlier.csv", folder / "options.yaml"

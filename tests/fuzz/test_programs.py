@@ -10,20 +10,10 @@ from made_targets import made_targets
 
 from elastocal.exchange.controllers import CONTROLLERS
 
-EVIL = st.sampled_from(
-    [*"\r\n\v\f\x1c\x85\u2028\u2029\0\x1b\"'`;!#%&{}[]()*/\\:=@$", "\r\n", "END", "ENDPROC", "end", "/POS", "/END", "*/", "//"]
-)
-CODE = st.sampled_from(
-    [
-        "PTP {A1 0}",
-        "MoveAbsJ target_1, v5000, fine, tool0;",
-        "J P[1] 100% FINE ;",
-        "movej([0,0,0,0,0,0])",
-        "INT k",
-        "$OV_PRO=100",
-    ]
-)
-NOTES = st.lists(st.lists(EVIL | CODE | st.text(max_size=9), max_size=9).map("".join), max_size=5)
+WORDS = ["\r\n", "END", "ENDPROC", "end", "/POS", "/END", "*/", "//", "PTP {A1 0}", "MoveAbsJ target_1, v5000, fine, tool0;"]
+WORDS += ["J P[1] 100% FINE ;", "movej([0,0,0,0,0,0])", "INT k", "$OV_PRO=100"]
+EVIL = st.sampled_from([*"\r\n\v\f\x1c\x85\u2028\u2029\0\x1b\"'`;!#%&{}[]()*/\\:=@$", *WORDS])
+NOTES = st.lists(st.lists(EVIL | st.text(max_size=9), max_size=9).map("".join), max_size=5)
 # What a controller's own parser takes for a remark: KRL from ; and RAPID from ! to the end of the line, URScript from #, TP an
 # instruction that begins with !. All end a line at a carriage return as well.
 REMARK = {"krl": r";[^\r\n]*", "rapid": r"![^\r\n]*", "urscript": r"#[^\r\n]*", "tp": r"(?m)^ *\d+: *![^;\r\n]*;"}

@@ -6,7 +6,7 @@ from made_remainders import smoothly_wrong_folder
 
 from elastocal.campaigns.campaign import columns_of
 from elastocal.loop.loading import load_whole_campaign
-from elastocal_proof.league.folds import DataSet, dealt
+from elastocal_proof.league.methods import DataSet, dealt
 
 
 def made_data_set(folder, robot, robots_folder, poses=24, **changes):

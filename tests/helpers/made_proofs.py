@@ -19,7 +19,7 @@ from elastocal_proof.blind.closed_loop import MODELS, PARTS, case_errors, goals,
 from elastocal_proof.blind.scores import intervals_of
 from elastocal_proof.blind.summary import rates, reliability
 from elastocal_proof.blind.summary import summarize as summarize_cases
-from elastocal_proof.league.folds import dealt
+from elastocal_proof.league.methods import dealt
 from elastocal_proof.league.schemas import ENTRIES, FOLDS, MECHANISMS
 from elastocal_proof.league.table import league_table, mechanism_table
 

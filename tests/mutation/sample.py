@@ -9,6 +9,7 @@ Usage: python tests/mutation/sample.py [SEED SIZE [ROOM ...]], from the top of t
 import random
 import re
 import sys
+from itertools import islice
 from pathlib import Path
 
 import pandas as pd
@@ -25,14 +26,7 @@ from statsmodels.stats.proportion import proportion_confint
 
 SECONDS = 20.0
 PACKAGE = Path("src/elastocal")
-# The first group that names a module counts.
-GROUPS = {
-    "elastostatics": ["mechanics/elastostatics.py"],
-    "mechanics": ["mechanics/*.py"],
-    "identification": ["study/equation_11.py", "study/strategies.py"],
-    "metrics": ["study/metrics.py", "study/evaluation.py", "study/simulation.py"],
-    **{room: [f"{room}/**/*.py"] for room in ("effects", "fitting", "data_checks", "diagnosis", "campaigns", "validation")},
-}
+ROOMS = ("mechanics", "study", "effects", "fitting", "data_checks", "diagnosis", "campaigns", "validation")
 _STRING = re.compile(r""""[^"]*"|'[^']*'""")
 
 
@@ -69,15 +63,12 @@ def described(mutant, path):
 
 
 def draw(seed, size):
-    """Draw `size` mutants of each group without replacement: a table of one row a mutant."""
-    rows, seen = [], set()
-    for group, patterns in GROUPS.items():
-        paths = sorted({path for pattern in patterns for path in PACKAGE.glob(pattern)} - seen)
-        seen |= set(paths)
-        population = [(mutant, path) for path in paths for mutant in exit_codes(path)]
-        random.Random(f"{seed} {group}").shuffle(population)
-        drawn = (described(mutant, path) for mutant, path in population)
-        rows += [{"group": group} | row for row, _ in zip(filter(None, drawn), range(size), strict=False)]
+    """Draw `size` mutants of each room without replacement: a table of one row a mutant."""
+    rows = []
+    for room in ROOMS:
+        population = [(mutant, path) for path in sorted(PACKAGE.glob(f"{room}/**/*.py")) for mutant in exit_codes(path)]
+        random.Random(f"{seed} {room}").shuffle(population)
+        rows += islice(filter(None, (described(mutant, path) for mutant, path in population)), size)
     return pd.DataFrame(rows)
 
 
@@ -97,13 +88,13 @@ def run(mutants, room):
 
 
 def scores(sample):
-    """Share of mutants that the tests notice, with Wilson's 95 % interval, of each group and of all."""
+    """Share of mutants that the tests notice, with Wilson's 95 % interval, of each room and of all."""
     rows = []
-    for group, part in [*sample.groupby("group", sort=False), ("all", sample)]:
+    for room, part in [*sample.groupby("room", sort=False), ("all", sample)]:
         noticed = part["status"].isin(["killed", "timeout"]).sum()
         low, high = proportion_confint(noticed, len(part), method="wilson")
         counts = {status: (part["status"] == status).sum() for status in sample["status"].unique()}
-        rows.append({"group": group} | counts | {"score": noticed / len(part), "low": low, "high": high})
+        rows.append({"room": room} | counts | {"score": noticed / len(part), "low": low, "high": high})
     return pd.DataFrame(rows)
 
 

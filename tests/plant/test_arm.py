@@ -1,11 +1,20 @@
 """Robot files as the plant reads them, by hand and against pinocchio."""
 
+import arms_at_rest
 import numpy as np
 import pinocchio as pin
 import pytest
+from analysed_robots import ROBOTS
 from support import refused
 
-from elastocal_proof.plant.arm import arm_from_document, arm_from_file, rotation_vector, turned
+from elastocal_proof.plant.arm import (
+    LinkMass,
+    arm_from_document,
+    arm_from_file,
+    off_the_line,
+    rotation_vector,
+    turned,
+)
 
 CHAIN = "Tz(l1) Rz(q1) Tx(-l2) [A] Rx(90deg) Ty(0.5) Ry(-q2) Tz(0.3) [B]"
 
@@ -66,7 +75,13 @@ def test_masses_and_gravity_are_as_the_file_declares_them_or_of_the_usual_kind()
         (2, 7.5, (0.1, 0.2, 0.3), 0.02),
     ]
     assert arm.gravity_m_s2 == (9.8, 0.0, 0.0)
-    assert arm_of().masses == () and arm_of().gravity_m_s2 == (0.0, 0.0, -9.80665)
+    assert arm_of().gravity_m_s2 == (0.0, 0.0, -9.80665) and (arm.compensated, arm_of().compensated) == (False, True)
+    # Of the arm in the foot and in the carousel with its motors; each link behind it weighs half of the one before.
+    usual = arm_from_file(ROBOTS / "kuka.yaml").masses
+    mass = np.array([m.mass_kg for m in usual])
+    assert [m.link for m in usual] == list(range(7)) and {m.relative_std for m in usual} == {0.1}
+    np.testing.assert_allclose(mass[3:] / mass[2:-1], 0.5, rtol=5e-3)
+    np.testing.assert_allclose(mass[:2] / mass.sum(), [0.18, 0.27], rtol=1e-3)
 
 
 def test_rotations_are_pinocchios_and_survive_the_way_there_and_back_up_to_a_half_turn(rng):
@@ -76,14 +91,6 @@ def test_rotations_are_pinocchios_and_survive_the_way_there_and_back_up_to_a_hal
     vector = angle[:, None] * axis
     np.testing.assert_allclose(turned(vector), [pin.exp3(v) for v in vector], atol=1e-12)
     np.testing.assert_allclose(rotation_vector(turned(vector)), vector, atol=1e-9)
-
-
-def test_a_file_is_read_as_its_document(tmp_path):
-    (tmp_path / "arm.yaml").write_text(str(document()), encoding="utf-8")
-    np.testing.assert_array_equal(arm_from_file(tmp_path / "arm.yaml").axes, arm_of().axes)
-    (tmp_path / "arm.yaml").write_text(str(document("Rz(q1)", 1)), encoding="utf-8")
-    with refused((tmp_path / "arm.yaml").as_posix(), "chain"):
-        arm_from_file(tmp_path / "arm.yaml")
 
 
 def test_a_file_without_compliances_and_limits_is_of_an_arm_of_usual_ones():
@@ -101,3 +108,24 @@ def test_a_file_without_compliances_and_limits_is_of_an_arm_of_usual_ones():
 def test_drives_that_the_plant_cannot_move_are_refused(chain):
     with refused("my.yaml", "chain", "R.("):
         arm_from_document(document(chain), "my.yaml")
+
+
+@pytest.mark.parametrize(
+    "centre, std, allowed", [((0.0, 0.3, 0.4), 0.01, 0.01), ((0.0, 0.0, 0.0), 0.002, 0.006), ((0.2, 0.0, 0.0), 0.004, 0.006)]
+)
+def test_a_centre_is_known_as_a_share_of_its_distance_and_no_better_than_a_short_lever(centre, std, allowed):
+    mass = LinkMass(1, 10.0, centre, 0.02)
+    assert mass.centre_std_m() == pytest.approx(std)
+    assert mass.allowed_centre_std_m(3.0) == pytest.approx(allowed)
+
+
+def test_centres_off_the_line_move_across_it_alone_and_weights_stay():
+    arm, largest = arms_at_rest.arm_of("Tz(0.4) Ry(q1) Tx(2) Ry(q2) [elbow] Tx(1) [hand]"), 0.02
+    masses = (LinkMass(0, 9.0, (0.0, 0.0, 0.1), 0.1), LinkMass(1, 8.0, (0.5, 0.0, 0.0), 0.1)) * 100
+    moved = off_the_line(masses, arm, largest, np.random.default_rng(4))
+    shift = np.array([m.centre_m for m in moved]) - np.array([m.centre_m for m in masses])
+    assert [(m.link, m.mass_kg) for m in moved] == [(m.link, m.mass_kg) for m in masses]
+    for link, along, across in ((0, [2], [0, 1]), (1, [0], [1, 2])):
+        mine = shift[link::2]
+        np.testing.assert_allclose(mine[:, along], 0.0, atol=1e-15)
+        assert (np.abs(mine[:, across]) <= largest).all() and (np.abs(mine[:, across]).max(axis=0) > 0.8 * largest).all()

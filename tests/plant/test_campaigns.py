@@ -4,10 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from elastocal_proof.plant.campaigns import Design, dynamic_table, measured_table, schedule_of
-from elastocal_proof.plant.instruments import Tracker
+from elastocal_proof.plant.campaigns import Design, measured_table, schedule_of
 from elastocal_proof.plant.kinds import Defect, with_defects
-from elastocal_proof.plant.physical_robot import Schedule, seen_poses
+from elastocal_proof.plant.physical_robot import Tracker
 
 
 def test_the_default_design_is_a_ladder_at_thirty_poses_with_repeats_on_ten(fanuc_arm):
@@ -54,23 +53,3 @@ def test_in_the_trackers_frame_all_measurements_are_moved_as_one_body(fanuc_spec
     distances = [np.linalg.norm(points[:, None] - points, axis=-1) for points in (one, other)]
     np.testing.assert_allclose(*distances, atol=1e-12)
     assert np.abs(one - other).max() > 1.0
-
-
-def test_the_dynamic_mode_reads_the_arm_at_rest_along_a_slow_path_within_the_limits(fanuc_specimen):
-    """Of gears with play and errors of their teeth too, one target, each measurement a pose of its own."""
-    defects = [Defect("lost_motion", (3,), 1e-4, 1), Defect("transmission_harmonic", (2,), 1e-4, 1)]
-    robot = replace(with_defects(fanuc_specimen, defects), tracker=Tracker(sigma_m=0.0, sigma_rad=0.0))
-    low, high = robot.arm.limits.T
-    table = dynamic_table(robot, 2000, 4, rate_hz=2.0)
-    angle = np.column_stack([table[f"q{joint}"] for joint in range(1, 7)])
-    assert (angle >= low).all() and (angle <= high).all() and (np.ptp(angle, axis=0) > 0.4 * (high - low)).all()
-    # Rad/s^2: at two metres less than a sixteenth of what weight does.
-    assert np.abs(np.diff(angle, 2, axis=0)).max() * 2.0**2 < 0.3
-    some, still = slice(None, None, 97), np.zeros((21, 3))
-    nothing = np.zeros(21, int)
-    states = Schedule(
-        angle[some], still, still, *[nothing] * 4, nothing[:, None] + 1, nothing - 1, table["time_s"][some], nothing == 0, 4
-    )
-    found = np.column_stack([table[axis] for axis in "xyz"])[some]
-    np.testing.assert_allclose(found, seen_poses(robot, states)[0][:, -1], atol=1e-9)
-    assert set(table["target"]) == {robot.arm.points[-1]} and len(np.unique(table["pose"])) == 2000

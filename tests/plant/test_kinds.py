@@ -17,7 +17,6 @@ from elastocal_proof.plant.kinds import KINDS, OUTSIDE, Defect, drawn_defect, tr
 from elastocal_proof.plant.physical_robot import seen_poses
 
 NAMED = sorted(kind for kind in KINDS if not kind.startswith(OUTSIDE))
-FOREIGN = sorted(set(KINDS) - set(NAMED))
 # Their first order is what the catalogue's law says it is, to so much of its root mean square.
 COMPARABLE = {
     "joint_offset": 0.02,
@@ -40,11 +39,8 @@ COMPARABLE = {
 def test_every_effect_of_the_catalogue_can_be_a_defect():
     # A base that stands elsewhere than declared is none of the robot: the tracker of a setting sees it there.
     assert {*NAMED, "base_placement"} == set(effects())
-
-
-def test_no_kind_outside_of_the_catalogue_bears_a_name_of_it():
-    """Else what the catalogue finds rightly would count as a wrong name."""
-    assert not {kind.removeprefix(OUTSIDE) for kind in FOREIGN} & set(effects())
+    # Else what the catalogue finds rightly would count as a wrong name.
+    assert not {kind.removeprefix(OUTSIDE) for kind in set(KINDS) - set(NAMED)} & set(effects())
 
 
 def states_of(schedule):
@@ -119,15 +115,6 @@ def test_a_defect_is_refused_where_it_cannot_be_or_is_too_large(fanuc_specimen):
     for wrong in (Defect("joint_offset", (7,), 1e-3), Defect("nonsense", (), 1.0), Defect("stiffening", (1,), 1.5)):
         with pytest.raises(InputError):
             with_defects(fanuc_specimen, [wrong])
-
-
-def test_a_kind_is_where_the_arm_has_its_part(arm):
-    joints = range(1, arm.joints + 1)
-    assert KINDS["joint_offset"].locations(arm) == [(joint,) for joint in joints]
-    assert KINDS["payload"].locations(arm) == [()]
-    assert len(KINDS["cross_compliance"].locations(arm)) == arm.joints * (arm.joints - 1) // 2
-    assert KINDS["compensator_torque"].locations(arm) == ([(2,)] if arm.compensated else [])
-    assert all(arm.lengths_m[link] > 0.1 for (link,) in KINDS["link_elasticity"].locations(arm))
 
 
 def test_weight_is_of_the_upper_arm_of_the_forearm_or_of_all_links_by_the_joints_that_it_turns(fanuc_arm):

@@ -9,8 +9,6 @@ import pinocchio as pin
 import pytest
 from analysed_robots import ROBOTS, analysed
 from arms_at_rest import STATES, angles_and_wrenches, arm_of, at_rest, forces_at
-from scipy.integrate import quad
-from scipy.optimize import brentq
 from support import OTHER_CHAINS, robot_of
 
 from elastocal.errors import InputError
@@ -30,7 +28,6 @@ from elastocal_proof.plant.machine import (
 
 # One joint about y, its link forwards along x, and a measuring point at its end.
 LEVER = arm_of("Ry(q1) Tx(1.0) [A]", compliance_urad_per_Nm=[50.0])
-TWO = arm_of("Tz(0.4) Rz(q1) Tx(1) [A] Ry(q2) Tx(0.5) [B]")
 
 
 def everything(arm):
@@ -69,12 +66,6 @@ def assert_unloaded_poses_alike(arm, robot, angles):
         wanted = poses(robot.chain, angles, point)
         np.testing.assert_allclose(position[:, number], wanted[0], atol=1e-12)
         np.testing.assert_allclose(rotation[:, number], wanted[1], atol=1e-12)
-
-
-@pytest.mark.parametrize("key", ["kuka", "fanuc", "abb", "ur10", "gp180", "iiwa14"])
-def test_poses_without_load_are_those_of_the_analysis(key):
-    arm = arm_from_file(ROBOTS / f"{key}.yaml")
-    assert_unloaded_poses_alike(arm, analysed(key), angles_and_wrenches(arm)[0])
 
 
 @pytest.mark.parametrize("name_of_chain", sorted(OTHER_CHAINS))
@@ -156,26 +147,7 @@ def test_an_arm_with_everything_is_in_equilibrium_by_mujocos_inverse_dynamics(ar
         assert np.abs(left).max() < 1e-9 * np.abs(force).max()
 
 
-def test_a_lever_comes_to_rest_where_its_spring_carries_its_weight():
-    mass, angles = 200.0, np.array([[-1.0], [0.0], [0.7], [np.pi / 2]])
-    machine, found = at_rest(LEVER, angles, np.zeros((4, 6)), Structure(masses=(Mass(1, mass, 0.8),)))
-    moment = mass * 9.80665 * 0.8
-    # theta = C m g l cos(q + theta), to all orders; seven degrees at most.
-    wanted = [brentq(lambda t, q=q: t - 50e-6 * moment * np.cos(q + t), -1.0, 1.0, xtol=1e-15) for q in angles[:, 0]]
-    np.testing.assert_allclose(found.coordinates[:, machine.gear[0]], wanted, atol=1e-11)
-    np.testing.assert_allclose(found.position[:, 0, 2], -np.sin(angles[:, 0] + wanted), atol=1e-11)
-
-
-def test_a_structural_spring_yields_by_its_compliance_its_law_and_its_offset():
-    machine = machine_of(LEVER, Structure(base=(0.0, 0.0, 2e-8, 0.0, 0.0, 0.0)))
-    index, wrench = machine.springs["base_z"], np.array([[0.0, 0.0, 1000.0, 0.0, 0.0, 0.0], [0.0, 0.0, -500.0, 0.0, 0.0, 0.0]])
-    loading, offsets = (np.full((2, 1), np.pi / 2), wrench, np.zeros((2, 2))), {index: np.array([1e-5, 3e-5])}
-    laws = [("base_z", lambda force: 1e-11 * force**2), ("nothing", lambda force: force)]
-    found = equilibrium(machine, *loading, lambda torque, unloaded: 0.0 * torque, laws, offsets)
-    np.testing.assert_allclose(found.coordinates[:, index], [2e-5 + 1e-5 + 1e-5, -1e-5 + 0.25e-5 + 3e-5], rtol=1e-9)
-
-
-def test_an_arm_that_finds_no_rest_is_an_error_and_a_start_near_it_saves_sweeps():
+def test_an_arm_that_finds_no_rest_is_an_error_and_a_start_near_it_changes_nothing():
     signs, loading = cycle([0.01, -0.01]), (np.zeros((1, 1)), np.zeros((1, 6)), np.zeros((1, 2)))
     with pytest.raises(RuntimeError, match=r"^no equilibrium after 60 sweeps: the last moved by 0\.02$"):
         equilibrium(machine_of(LEVER, Structure()), *loading, lambda torque, _: 0 * torque + next(signs))
@@ -184,66 +156,11 @@ def test_an_arm_that_finds_no_rest_is_an_error_and_a_start_near_it_saves_sweeps(
     loading, start = (np.array([[0.9]]), wrench, np.zeros((1, 2))), first.coordinates[:, machine.gear]
     again = equilibrium(machine, *loading, lambda torque, _: LEVER.compliance * torque, start=start)
     np.testing.assert_allclose(again.coordinates, first.coordinates, atol=1e-12)
-    assert again.sweeps == 1 < first.sweeps
-
-
-def at(machine, **coordinates):
-    """MuJoCo's kinematics with some coordinates by their names, all others zero."""
-    data = mujoco.MjData(machine.model)
-    for name, value in coordinates.items():
-        data.qpos[machine.model.joint(name).qposadr[0]] = value
-    mujoco.mj_kinematics(machine.model, data)
-    return data
-
-
-def test_springs_have_their_axes_and_compliances_in_order_and_gears_turn_about_their_drives():
-    structure = Structure(base=(1e-8, 2e-8, 3e-8, 4e-8, 5e-8, 6e-8), tilt={2: (3e-7, 4e-7)}, loose=(2,))
-    machine = machine_of(TWO, structure)
-    wanted = {f"base_{kind}{axis}": ("xyz".index(axis), 1e-8) for kind in ("", "r") for axis in "xyz"}
-    wanted = {name: (axis, 1e-8 * number) for number, (name, (axis, _)) in enumerate(wanted.items(), 1)}
-    wanted |= {"tilt2_0": (0, 3e-7), "tilt2_1": (2, 4e-7), "shift2_0": (0, 0.0), "shift2_1": (2, 0.0)}
-    assert set(machine.springs) == set(wanted)
-    for name, (axis, compliance) in wanted.items():
-        index = machine.springs[name]
-        np.testing.assert_array_equal(machine.model.jnt_axis[index], np.eye(3)[axis])
-        assert machine.compliance[index] == pytest.approx(compliance)
-    both, one = at(machine, drive1=0.3, gear1=0.2, drive2=-1.0, gear2=0.1), at(machine, drive1=0.5, drive2=-0.9)
-    np.testing.assert_allclose(both.site_xpos, one.site_xpos, atol=1e-14)
-
-
-@pytest.mark.parametrize("flange", [(), (1e-9,) * 6])
-def test_a_load_counts_from_the_flange_and_turns_with_it(flange):
-    arm = arm_of("Tz(0.4) Rz(q1) Tx(1) Ry(q2) Tx(0.5) Rx(90deg) [B]")
-    machine = machine_of(arm, Structure(payload=Mass(2, 20.0, 1.0, (0.1, 0.2, 0.3)), flange=flange))
-    body = machine.model.body("flange" if flange else "arm2").id
-    # y of the flange is z of the link, and z its -y; the forearm points down: its x is -z of the base and its z is x.
-    wanted = [1.0 + 0.2, -0.3, 0.4 - 0.5 - 0.1]
-    np.testing.assert_allclose(at(machine, drive2=0.5 * np.pi).xipos[body], wanted, atol=1e-9)
-
-
-def test_a_tube_that_gets_thinner_yields_as_the_integrals_along_it():
-    tube, count = TaperedTube(2e6, 1e6, 3e7, 4e7, 0.3), 40
-    machine = machine_of(TWO, Structure(tubes={1: tube}, segments=count))
-
-    def total(kind, power=0):
-        middle = (np.arange(count) + 0.5) / count
-        springs = [machine.compliance[machine.springs[f"link1_{segment}_{kind}"]] for segment in range(count)]
-        return np.array(springs) @ (1.0 - middle) ** power
-
-    def integral(stiffness, thinning, power=0):
-        return quad(lambda x: (1.0 - x) ** power / (stiffness * (1.0 - 0.3 * x) ** thinning), 0.0, 1.0)[0]
-
-    # The tip under a force across, which bends by its lever squared; E I and G J go with the cube of the width, areas with it.
-    for which in (0, 1):
-        assert total(f"bend{which}", 2) == pytest.approx(integral(2e6, 3, 2), rel=1e-3)
-        assert total(f"shear{which}") == pytest.approx(integral(4e7, 1), rel=1e-3)
-    assert total("twist") == pytest.approx(integral(1e6, 3), rel=1e-3)
-    assert total("axial") == pytest.approx(integral(3e7, 1), rel=1e-3)
 
 
 def test_a_point_inside_a_link_of_wrong_length_keeps_its_place_and_none_may_be_inside_an_elastic_one():
     arm = arm_of("Rz(q1) Tx(0.4) [inner] Tx(0.6) Ry(q2) Tx(0.5) [B]")
-    data = at(machine_of(arm, Structure(wrong_vectors_m={1: (0.0, 0.02, 0.0)}, wrong_turns={1: (0.0, 0.0, 0.1)})))
-    np.testing.assert_allclose(data.site("inner").xpos, [0.4, 0.0, 0.0], atol=1e-14)
+    machine = machine_of(arm, Structure(wrong_vectors_m={1: (0.0, 0.02, 0.0)}, wrong_turns={1: (0.0, 0.0, 0.1)}))
+    np.testing.assert_allclose(forces_at(machine, np.zeros((1, 2)))[1][0, 0], [0.4, 0.0, 0.0], atol=1e-14)
     with pytest.raises(InputError, match="inner"):
         machine_of(arm, Structure(tubes={1: TaperedTube(1e6, 1e6)}))

@@ -1,44 +1,34 @@
-"""A robot with its instruments: its gears and weights, its warmth, and what a tracker without noise reads."""
+"""A robot with its instruments: gears, weights, warmth, its chance, what its tracker reads and its load cell shows."""
 
 from dataclasses import replace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
-from elastocal_proof.plant.arm import rotation_vector
+from elastocal_proof.plant.arm import rotation_vector, turned
 from elastocal_proof.plant.campaigns import Design, schedule_of
-from elastocal_proof.plant.machine import machine_of
-from elastocal_proof.plant.physical_robot import Warmth, driven, seen_poses, specimen
+from elastocal_proof.plant.physical_robot import (
+    LoadCell,
+    Motion,
+    Tracker,
+    driven,
+    logged_temperature,
+    specimen,
+    stream,
+    warmth_of_castings,
+)
 
 
 def test_castings_warm_up_behind_the_thermometer_and_reach_it():
-    warmth, time = Warmth(10.0, 3000.0, 1200.0), np.linspace(0, 40000, 400)
-    shown, castings = warmth.shown(time), 20.0 + warmth.of_castings(time)
+    time = np.linspace(0, 40000, 400)
+    shown, castings = logged_temperature(time), 20.0 + warmth_of_castings(time)
     assert (castings[1:] < shown[1:]).all()
     assert castings[0] == shown[0] == 20.0
     np.testing.assert_allclose([shown[-1], castings[-1]], 30.0, atol=1e-3)
     # T_lag dT/dt = shown - castings.
     slope = np.gradient(castings, time)
     np.testing.assert_allclose(1200.0 * slope[5:-5], (shown - castings)[5:-5], atol=0.02)
-
-
-def test_links_grow_in_proportion_to_their_castings_warmth(weightless, small):
-    schedule = schedule_of(weightless.arm, small, 2)
-    grown = seen_poses(replace(weightless, expansion_per_K=1e-5), schedule)
-    nominal = seen_poses(weightless, schedule)
-    unloaded = schedule.load == 0
-    share = 1e-5 * weightless.warmth.of_castings(schedule.time_s)
-    np.testing.assert_allclose(grown[0][unloaded], (nominal[0] * (1 + share)[:, None, None])[unloaded], atol=1e-12)
-    assert np.abs(rotation_vector(grown[1] @ np.swapaxes(nominal[1], -1, -2))[unloaded]).max() < 1e-12
-
-
-def test_gears_of_a_series_differ_by_no_more_than_their_spread_and_each_by_its_own(fanuc_arm):
-    shares = np.array([specimen(fanuc_arm, seed, 0.1, weighs=False).compliance for seed in range(200)]) / fanuc_arm.compliance
-    assert (np.abs(shares - 1.0) <= 0.1).all()
-    # Even over the spread: 200 draws miss an end by a tenth of the range in one of 1e9 cases, a mean by four standard errors.
-    assert (np.ptp(shares, axis=0) > 0.18).all()
-    np.testing.assert_allclose(shares.mean(axis=0), 1.0, atol=4 * 0.1 / np.sqrt(3 * 200))
-    assert np.abs(np.corrcoef(shares.T) - np.eye(6)).max() < 4 / np.sqrt(200)
 
 
 def test_a_specimen_follows_from_its_seed_and_its_weights_change_no_gear(fanuc_arm):
@@ -54,15 +44,82 @@ def test_a_specimen_follows_from_its_seed_and_its_weights_change_no_gear(fanuc_a
 @pytest.mark.parametrize(("kind", "group"), [("repeatability_rad", "approach"), ("pose_rad", "pose")])
 def test_chance_of_the_drives_is_drawn_afresh_for_each_approach_or_pose_by_the_seed(weightless, fanuc_arm, kind, group):
     done = schedule_of(fanuc_arm, Design(poses=60, approach_each_load=False), 2)
-    robot, machine = (
-        replace(weightless, **{kind: (2e-5, 0.0, 1e-5, 0.0, 0.0, 0.0)}),
-        machine_of(fanuc_arm, weightless.structure),
-    )
+    robot = replace(weightless, **{kind: (2e-5, 0.0, 1e-5, 0.0, 0.0, 0.0)})
     error, again, other = (
-        driven(robot, replace(done, seed=seed), machine)[0] - done.angle for seed in (done.seed, done.seed, done.seed + 1)
+        driven(robot, replace(done, seed=seed)) - done.angle for seed in (done.seed, done.seed, done.seed + 1)
     )
     first = np.unique(getattr(done, group), return_index=True)[1]
     np.testing.assert_allclose(error, error[first][getattr(done, group)], atol=1e-15)
     np.testing.assert_array_equal(error, again)
     assert np.abs(error - other)[:, 0].min() > 0
     np.testing.assert_allclose(error[first].std(axis=0), [2e-5, 0.0, 1e-5, 0.0, 0.0, 0.0], rtol=0.35, atol=1e-15)
+
+
+@pytest.fixture
+def targets(rng):
+    """Poses of four targets in many states, one an hour."""
+    position = rng.uniform(-2, 2, (500, 4, 3))
+    rotation = turned(rng.uniform(-2, 2, (500, 4, 3)))
+    return position, rotation, 3600.0 * np.arange(500)
+
+
+def test_noise_has_the_stated_deviation_and_grows_with_range(targets, rng):
+    tracker = Tracker(sigma_m=2e-5, sigma_m_per_m=1e-5, sigma_rad=5e-5)
+    position, rotation, outlier = tracker.read(*targets[:2], rng)
+    off = position - targets[0]
+    far = np.linalg.norm(targets[0] - np.array(tracker.stand_m), axis=-1)
+    # Of 6,000 values a standard deviation is known to 0.9 %: 3 % are a level of 0.1 %, 5 % are seen with a power of 0.98.
+    # Of the 2,000 turns about each axis it is known to 1.6 %, and 9 % are seen with 0.99.
+    np.testing.assert_allclose((off / (2e-5 + 1e-5 * far)[..., None]).std(), 1.0, rtol=0.03)
+    turn = rotation_vector(rotation @ np.swapaxes(targets[1], -1, -2))
+    np.testing.assert_allclose(turn.std(axis=(0, 1)), 5e-5, rtol=0.05)
+    assert not outlier.any()
+
+
+def test_a_stand_that_is_knocked_turns_all_later_measurements_about_itself(targets):
+    move = Motion((1e-3, 0.0, -2e-3), (0.0, 0.0, 1e-4), lambda time_s: time_s > 2.0)
+    tracker, (position, rotation, time_s) = Tracker(move=move), targets
+    found = tracker.seen(position, rotation, time_s, time_s)[0]
+    later = time_s > 2.0
+    np.testing.assert_allclose(found[~later], position[~later], atol=1e-14)
+    lever = position[later] - np.array(tracker.stand_m)
+    wanted = np.array([1e-3, 0.0, -2e-3]) + np.cross([0.0, 0.0, 1e-4], lever)
+    np.testing.assert_allclose(found[later] - position[later], wanted, atol=1e-7)
+
+
+def test_the_trackers_own_frame_keeps_distances_and_turns_all_alike(targets):
+    tracker = Tracker(frame_turn=(0.3, -0.2, 1.1))
+    position, rotation = tracker.in_own_frame(*targets[:2])
+    own = pin.exp3(np.array(tracker.frame_turn))
+    np.testing.assert_allclose(position @ own.T + np.array(tracker.stand_m), targets[0], atol=1e-12)
+    np.testing.assert_allclose(own @ rotation, targets[1], atol=1e-12)
+
+
+@pytest.fixture
+def pull(rng):
+    """Forces with one row of none, levers, and orientations of the flange."""
+    force = 500.0 * rng.standard_normal((5, 3))
+    force[2] = 0.0
+    lever = np.broadcast_to([0.0, 0.5, 0.0], (5, 3))
+    return force, lever, np.array([pin.exp3(v) for v in rng.standard_normal((5, 3))])
+
+
+@pytest.mark.parametrize("in_flange", [(), ("turn",), ("bias",), ("turn", "bias")])
+def test_what_is_felt_is_what_the_cell_would_show_as_planned(pull, in_flange):
+    force, _, facing = pull
+    cell = LoadCell(0.03, (0.01, -0.02, 0.03), (5.0, -3.0, 2.0), (0.0, 0.0, 0.0), 2e-5, in_flange)
+    shown = cell.shown(cell.felt(*pull)[:, :3], facing)
+    loaded = force.any(axis=1)
+    np.testing.assert_allclose(shown[loaded], force[loaded], atol=1e-9)
+
+
+# Sealed records of earlier runs hold what follows from these.
+PINNED = {
+    (1, "schedule"): [6947743043283990654, 571286321805599877],
+    (7, "weights"): [9496632730487175662, 14987622419449238340],
+}
+
+
+def test_a_seed_and_a_purpose_give_the_same_numbers_in_every_version():
+    for (seed, purpose), raw in PINNED.items():
+        assert stream(seed, purpose).bit_generator.random_raw(2).tolist() == raw

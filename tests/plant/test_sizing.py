@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from elastocal_proof.plant.campaigns import Design, schedule_of
-from elastocal_proof.plant.instruments import Move
 from elastocal_proof.plant.kinds import KINDS, Defect, drawn_defect, with_defects
+from elastocal_proof.plant.machine import on_stretches
+from elastocal_proof.plant.physical_robot import Motion
 from elastocal_proof.plant.sizing import Yardstick, size_for
-from elastocal_proof.plant.weights import declared_masses, on_stretches
 
 
 @pytest.mark.parametrize("target", [10.0, 200.0])
@@ -32,14 +32,14 @@ def test_a_wrong_force_scale_is_absorbed_at_any_size_but_for_what_the_weights_te
 
     with pytest.raises(ValueError, match="no size found"):
         size_for(Yardstick(weightless, schedule), scaled(weightless), 0.02, 50.0, largest=KINDS["force_scale"].largest)
-    yardstick = Yardstick(fanuc_specimen, schedule, declared=declared_masses(fanuc_specimen.arm))
+    yardstick = Yardstick(fanuc_specimen, schedule, declared=fanuc_specimen.arm.masses)
     with pytest.raises(ValueError, match="no size found"):
         size_for(yardstick, scaled(fanuc_specimen), 0.02, 50.0, largest=KINDS["force_scale"].largest)
     # Weights that are known without error would tell the compliances, and these the scale; by poses enough.
     longer = schedule_of(fanuc_specimen.arm, Design(poses=20), 2)
     exact, open_weights = (
         Yardstick(fanuc_specimen, longer, declared=masses).signal(scaled(fanuc_specimen)(0.02)).retained
-        for masses in ((), declared_masses(fanuc_specimen.arm))
+        for masses in ((), fanuc_specimen.arm.masses)
     )
     assert exact > 100 * open_weights
 
@@ -47,7 +47,7 @@ def test_a_wrong_force_scale_is_absorbed_at_any_size_but_for_what_the_weights_te
 def test_weights_that_differ_as_declared_are_absorbed_up_to_their_own_cost(fanuc_specimen, schedule):
     """A mass that is two standard deviations off: four, or two where a centre one off and a mass one off do the same."""
     arm = fanuc_specimen.arm
-    declared = declared_masses(arm)
+    declared = arm.masses
     heavier = replace(declared[2], mass_kg=declared[2].mass_kg * 1.2)
     nominal, off = (
         replace(fanuc_specimen, structure=replace(fanuc_specimen.structure, masses=on_stretches(masses, arm)))
@@ -75,14 +75,14 @@ def test_the_retained_signal_is_what_a_fit_of_the_compliances_leaves(fanuc_speci
 
 def shifted(robot, *shift, turn=(0.0, 0.0, 0.0)):
     """All that the tracker reads is moved as one body."""
-    return replace(robot, tracker=replace(robot.tracker, move=Move(-1.0, shift, turn)))
+    return replace(robot, tracker=replace(robot.tracker, move=Motion(shift, turn)))
 
 
 def test_a_tracker_farther_away_makes_the_same_shift_weigh_less(weightless, schedule):
     tracker = replace(weightless.tracker, sigma_m=0.0, sigma_m_per_m=1e-5)
     robot = replace(weightless, tracker=tracker)
-    yardstick = Yardstick(robot, schedule, targets=[0], orientation=False)
-    change = yardstick.seen_and_left(shifted(robot, 1e-4, 0.0, 0.0))[0].reshape(-1, 3)[:, 0]
+    yardstick = Yardstick(robot, schedule, targets=[0])
+    change = yardstick.seen_and_left(shifted(robot, 1e-4, 0.0, 0.0))[0].reshape(-1, 6)[:, 0]
     distance = np.linalg.norm(yardstick.poses[0][:, 0] - np.array(tracker.stand_m), axis=-1)
     np.testing.assert_allclose(change, 10.0 / distance[schedule.training])
 

@@ -10,6 +10,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from durations import HUNG_S
 from study_folder import REPOSITORY, Study
@@ -19,6 +20,8 @@ pytestmark = pytest.mark.slow
 OVER_FLOOR = 1.2
 TARGETS = {"A": "0.06,0,0.02", "B": "-0.05,0.05,0", "C": "-0.03,-0.06,0.04"}
 REHEARSED = ["--seed", "3", "--misplaced-base"]
+# A row in which the beam was lost.
+LOST = 40
 
 
 # Six axes on a stand, with masses, limits and a gripper of two fingers, of which one follows the other; sizes are invented.
@@ -52,7 +55,10 @@ class Walk:
         reflectors = [word for name, at in TARGETS.items() for word in ("--target", f"{name}:tool0={at}")]
         load = ["--force", 200, "--pull", "--base-known", "--measured", "position", *reflectors]
         self.run("plan", robot, "--folder", self.cell, "--poses", 25, "--candidates", 2000, "--tracker", "3,1,1.5", *load)
-        self.run("measure", self.cell, "--lost-beam", *REHEARSED)
+        self.run("measure", self.cell, *REHEARSED)
+        sheet = pd.read_csv(self.cell / "measurements.csv")
+        sheet.loc[LOST, ["x", "y", "z"]] = 0.0
+        sheet.to_csv(self.cell / "measurements.csv", index=False)
         self.run("check", self.cell)
         self.run("diagnose", self.cell)
         self.run("path", self.cell, path, *REHEARSED)
@@ -79,9 +85,8 @@ def test_the_corrected_robot_is_as_near_as_noise_and_repeatability_allow(walk):
 
 @pytest.mark.parametrize("command", ["check", "diagnose"])
 def test_the_lost_beam_is_named_with_its_line(walk, command):
-    line = re.search(r"lost in line (\d+)", walk.printed["measure"])[1]
     verdict = next(walk.study.folder.glob("reports/loop/*/verdict.json")).read_text(encoding="utf-8")
-    assert re.search(rf"line {line}\b", walk.printed["check"] if command == "check" else verdict)
+    assert re.search(rf"line {LOST + 2}\b", walk.printed["check"] if command == "check" else verdict)
 
 
 def test_the_command_and_snakemake_are_one_way_however_the_campaign_is_spelled(walk):

@@ -22,7 +22,6 @@ from elastocal_proof.blind.rehearsal import (
     fill_sheet,
     hidden_robot,
     hidden_words,
-    lose_beam,
     measured_errors,
     with_misplaced_base,
     write_milling_path,
@@ -34,8 +33,6 @@ ROBOTS = Path("config/robots")
 def measure(given, robot, document):
     path = given.folder / CSV
     print(f"{fill_sheet(path, document, robot, given.seed)} measurements in {path}")
-    if given.lost_beam:
-        print(f"the beam is lost in line {lose_beam(path, given.seed)}")
 
 
 def path(given, robot, document):
@@ -60,8 +57,6 @@ if __name__ == "__main__":
         command.add_argument("folder", type=Path)
         if run is not measure:
             command.add_argument("path", type=Path)
-        if run is measure:
-            command.add_argument("--lost-beam", action="store_true", help="one row, which is drawn, reads zeros")
         if run is move:
             command.add_argument("targets", type=Path)
         command.add_argument("--seed", type=int, default=1)

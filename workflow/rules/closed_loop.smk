@@ -56,7 +56,7 @@ rule summarize_closed_loop:
 rule draw_closed_loop:
     input:
         summary=rules.summarize_closed_loop.output.summary,
-        sources=sources("elastocal_proof.figures.closed_loop.draw_closed_loop"),
+        sources=sources("elastocal_proof.figures.blind.draw_closed_loop"),
     output:
         figure="reports/closed_loop/closed_loop.pdf",
         picture=shown(
@@ -71,7 +71,7 @@ rule draw_closed_loop:
     benchmark:
         "results/timings/draw_closed_loop.tsv"
     params:
-        step="elastocal_proof.figures.closed_loop.draw_closed_loop",
+        step="elastocal_proof.figures.blind.draw_closed_loop",
     script:
         "../scripts/run_step.py"
 

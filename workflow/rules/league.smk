@@ -16,7 +16,7 @@ wildcard_constraints:
 rule deal_league_folds:
     input:
         files=lambda wildcards: files_of_campaign(wildcards.data),
-        sources=sources("elastocal_proof.league.folds.deal_league_folds"),
+        sources=sources("elastocal_proof.league.methods.deal_league_folds"),
     output:
         descriptions="results/league/{data}/campaign.json",
         measurements="results/league/{data}/measurements.parquet",
@@ -26,7 +26,7 @@ rule deal_league_folds:
     benchmark:
         "results/timings/deal_league_folds/{data}.tsv"
     params:
-        step="elastocal_proof.league.folds.deal_league_folds",
+        step="elastocal_proof.league.methods.deal_league_folds",
         folder="data/campaigns/{data}",
         robots=f"{CONFIG}/robots",
         folds=LEAGUE["folds"],
@@ -84,7 +84,6 @@ rule tabulate_league:
         mechanisms=lambda wildcards: of_rounds(
             rules.diagnose_league_folds.output.mechanisms, [key for key in rounds_of(wildcards.league) if key[1] == "random"]
         ),
-        published=f"{CONFIG}/league/published.csv",
         sources=sources("elastocal_proof.figures.league.tabulate_league"),
     output:
         league=shown("reports/league/{league}/league.csv", "league", "League", shows="Errors of all methods", kind="table"),

@@ -34,8 +34,8 @@ class Step(NamedTuple):
 def steps_of(document: Mapping[str, Any]) -> tuple[list[Step], list[np.ndarray]]:
     """Words of a robot file's chain, and its rigid stretches as vectors (m).
 
-    Behind each stretch of an arm with elastic links stand six springs (equation 5): coordinates 0 to n - 1 are the joints, then
-    come six for each link. A point at the end of a link moves with it.
+    Behind each stretch of an arm with elastic links stand six springs (equation 5): their coordinates follow those of the
+    joints. A point at the end of a link moves with it.
     """
     joints, lengths, vector = len({*_JOINT.findall(document["chain"])}), document.get("lengths_m", {}), np.zeros(3)
     found: list[Step] = []

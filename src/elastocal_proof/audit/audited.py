@@ -1,10 +1,11 @@
-"""What an audit has at hand: the finished run's folder and what was configured; tables are read by pyarrow and pandas alone."""
+"""What an audit has at hand, by pyarrow and pandas alone, and what it finds: each check of a file is one row."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import zlib
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -15,10 +16,11 @@ import pyarrow.parquet as pq
 from elastocal_proof.audit.arm import Arm
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
     from pathlib import Path
 
     _Document = Mapping[str, Any]
+    _Documents = Mapping[str, _Document]
 
 POSITION, WRENCH = ("x", "y", "z"), ("fx", "fy", "fz", "mx", "my", "mz")
 COMPONENTS = ("dx", "dy", "dz", "rx", "ry", "rz")
@@ -30,14 +32,7 @@ class Audited:
     Files, arms and deflections are kept once they have been read.
     """
 
-    def __init__(
-        self,
-        folder: Path,
-        configuration: _Document,
-        robots: Mapping[str, _Document],
-        strategies: Mapping[str, _Document],
-        sample: int,
-    ) -> None:
+    def __init__(self, folder: Path, configuration: _Document, robots: _Documents, strategies: _Documents, sample: int) -> None:
         self.folder, self.configuration, self.sample = folder, configuration, sample
         self.robots, self.strategies, self.seed = robots, strategies, int(configuration["seed"])
         read = configuration["interpretations"]
@@ -93,3 +88,60 @@ def numbers(seed: int, robot: str, purpose: str, data_set: int = 0) -> np.random
     words = [int.from_bytes(key[start : start + 8], "little") for start in (0, 8)]
     use = int.from_bytes(hashlib.sha256(purpose.encode()).digest()[:8], "little")
     return np.random.Generator(np.random.Philox(key=np.array(words, np.uint64), counter=[0, 0, data_set, use]))
+
+
+# Two programs that do the same in double precision, in another order.
+ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One check of one file, by an independent path.
+
+    `compared`: how many values. `worst`: largest difference over what is allowed; a check holds up to 1. `note`: where it does
+    not hold: what was found and what was expected.
+    """
+
+    checked: str
+    by: str
+    compared: int
+    worst: float
+    note: str = ""
+    file: str = ""
+
+    @property
+    def holds(self) -> bool:
+        """Whether no value is further off than allowed."""
+        return bool(self.worst <= 1.0)
+
+
+def compare(
+    checked: str, by: str, found: object, expected: object, relative: float = ROUNDING, absolute: float = 0.0
+) -> Finding:
+    """Values of a file beside those of an independent path; allowed: `relative` to the largest expected one, and `absolute`."""
+    left, right = (np.asarray(each, float).ravel() for each in (found, expected))
+    if left.shape != right.shape:
+        return Finding(checked, by, len(right), np.inf, f"found {len(left)} values, expected {len(right)}")
+    if not len(left):
+        return Finding(checked, by, 0, 0.0)
+    same = (left == right) | (np.isnan(left) & np.isnan(right))
+    allowed = absolute + relative * np.max(np.abs(right[np.isfinite(right)]), initial=0.0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        off = np.where(same, 0.0, np.abs(left - right) / allowed)
+    # Not a number beside a number, or a difference where none is allowed.
+    off = np.where(np.isnan(off), np.inf, off)
+    place = int(np.argmax(off))
+    note = "" if off[place] <= 1 else f"value {place}: found {left[place]:.9g}, expected {right[place]:.9g}"
+    return Finding(checked, by, len(left), float(off[place]), note)
+
+
+def require(checked: str, by: str, holds: Any, note: str = "", count: int = 1) -> Finding:
+    """A statement about so many values that holds or does not; the note is for where it does not."""
+    return Finding(checked, by, count, 0.0 if holds else np.inf, "" if holds else note)
+
+
+def require_each_once(frame: pd.DataFrame, **ranges: Iterable[int]) -> Finding:
+    """Whether rows are numbered by all combinations of ranges, the last one changing fastest."""
+    expected = pd.MultiIndex.from_product([*ranges.values()]).to_frame()
+    checked = f"each {' and '.join(ranges).replace('_', ' ')} once"
+    return compare(checked, "counting", frame[list(ranges)], expected, 0.0)

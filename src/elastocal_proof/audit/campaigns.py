@@ -11,13 +11,10 @@ import pinocchio as pin
 import yaml
 
 from elastocal_proof.audit.arm import Arm
-from elastocal_proof.audit.audited import POSITION, WRENCH, numbers
-from elastocal_proof.audit.findings import Finding, compare, require
+from elastocal_proof.audit.audited import POSITION, WRENCH, Audited, Finding, compare, numbers, require
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-    from elastocal_proof.audit.audited import Audited
 
 # Positions are some metres, rotations some radians; near half a turn rotation vectors lose digits.
 _DIGITS = 1e-10

@@ -1,8 +1,8 @@
 """Fits of a campaign: statsmodels' least squares on pinocchio's kinematics at the estimates that a file states, and residuals
 from where the robot stands by MuJoCo.
 
-Estimates must be where iteratively reweighted least squares stand still. Steps with other effects than joint springs and links
-of one section, and campaigns with fitted frames or targets, declared effects or masses, are left out.
+Steps with other effects than joint springs and links of one section, and campaigns with fitted frames or targets, declared
+effects or masses, are left out.
 """
 
 from __future__ import annotations
@@ -21,13 +21,10 @@ from scipy.spatial.transform import Rotation
 from statsmodels.robust.norms import HuberT
 
 from elastocal_proof.audit.arm import Arm, cantilever
-from elastocal_proof.audit.audited import COMPONENTS, POSITION, WRENCH
-from elastocal_proof.audit.findings import Finding, compare
+from elastocal_proof.audit.audited import COMPONENTS, POSITION, WRENCH, Audited, Finding, compare
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
-
-    from elastocal_proof.audit.audited import Audited
 
 _STATE, _TURN = ["session", "pose", "load"], ["rx", "ry", "rz"]
 # Steps of a fit end at so many standard errors of the scatter that is there; standard errors belong to the step before.
@@ -60,10 +57,8 @@ class Step:
 
 @dataclass(frozen=True)
 class Campaign:
-    """A campaign of stated springs: `mounts` are rotations of its targets, none where positions alone are measured.
-
-    `steps`: in the order of the files; None where a step has what is not written down here.
-    """
+    """A campaign of stated springs: rotations of its targets, none where positions alone are measured, and its steps, None
+    where one has what is not written down here."""
 
     arm: Arm
     mounts: list[np.ndarray]
@@ -145,10 +140,8 @@ def predicted(known: Campaign, springs: np.ndarray, rows: pd.DataFrame) -> tuple
 
 
 def least_squares(known: Campaign, step: Step, training: pd.DataFrame) -> tuple[Any, np.ndarray]:
-    """One robust least-squares step (Huber) of a model from its estimates, rows of variance one and priors below.
-
-    Returns the fit of all free parameters, and how far those that can move still do, in standard errors of the scatter.
-    """
+    """One robust least-squares step (Huber) of a model from its estimates: the fit of all free parameters, and how far those
+    that can move still do, in standard errors of the scatter."""
     seen = averaged(known, training)
     residual, jacobian, forces = predicted(known, step.springs, seen)
     slopes = np.einsum("mrc,pcd,md->mrp", jacobian, step.units, forces, optimize=True)

@@ -7,14 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
-from elastocal_proof.audit.audited import numbers
-from elastocal_proof.audit.findings import ROUNDING, Finding, compare, require_each_once
+from elastocal_proof.audit.audited import ROUNDING, Audited, Finding, compare, numbers, require_each_once
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
     from typing import Any
-
-    from elastocal_proof.audit.audited import Audited
 
 # Deflections are differences of positions of metres; so much is lost of their digits (m, rad).
 _DIGITS = 1e-14

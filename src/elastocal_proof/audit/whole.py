@@ -17,12 +17,10 @@ from jinja2 import Environment
 from elastocal import __version__
 from elastocal.io.records import RECORDS, recorded
 from elastocal_proof.audit import campaigns, fits, study
-from elastocal_proof.audit.findings import Finding, require
+from elastocal_proof.audit.audited import Audited, Finding, require
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-
-    from elastocal_proof.audit.audited import Audited
 
 _SHA, _OWN_WORDS = "hashlib, SHA-256", "its own metadata"
 # By what every file is checked, whatever it holds; other checks work something out again.

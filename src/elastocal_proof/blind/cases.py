@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from itertools import combinations, product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,19 +20,16 @@ from elastocal_proof.blind.folders import write_blind_campaign, write_truth
 from elastocal_proof.plant.arm import Arm, LinkMass, arm_from_file
 from elastocal_proof.plant.bad_rows import possible_kinds, with_bad_rows
 from elastocal_proof.plant.campaigns import Design, schedule_of
-from elastocal_proof.plant.instruments import Tracker, misplaced_base
 from elastocal_proof.plant.kinds import KINDS, OUTSIDE, Defect, drawn_defect, truth_of, with_defects
-from elastocal_proof.plant.physical_robot import PhysicalRobot, specimen
-from elastocal_proof.plant.random_numbers import stream
+from elastocal_proof.plant.machine import on_stretches, usual_gravity_torque
+from elastocal_proof.plant.physical_robot import PhysicalRobot, Tracker, misplaced_base, specimen, stream
 from elastocal_proof.plant.sizing import Yardstick, size_for
-from elastocal_proof.plant.weights import declared_masses, on_stretches, usual_gravity_torque
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Iterator, Mapping
 
-    from elastocal_proof.plant.bad_rows import BadReading
+    from elastocal_proof.plant.bad_rows import Slip
     from elastocal_proof.plant.campaigns import Table
-    from elastocal_proof.plant.physical_robot import Schedule
 
     Plan = Mapping[str, Any]
     Sized = tuple[Defect, dict[str, Any]]
@@ -67,10 +65,9 @@ _IMPLAUSIBLE = 3.0
 class Case:
     """One case, from which its campaign and its ground truth follow.
 
-    `key`: what it is; sealed. `group`: such as "none", "single", "pair" or "moved". `robot`: robot file in config/robots.
-    `robots`: `PROOF` or `TUNED`. `effects`: keys of `KINDS`. `levels`: non-centrality of each effect alone, on the poses that
-    are not held out, after the compliances and the weights have absorbed theirs; of one mechanism at several joints that of all
-    together. `setting`: its name, and `changes`, what is other than usual in it, as in the plan.
+    `key`: what it is; sealed. `robot`: robot file in config/robots. `robots`: `PROOF` or `TUNED`. `effects`: keys of `KINDS`.
+    `levels`: non-centrality of each effect alone, after absorption; of one mechanism at several joints that of all together.
+    `setting`: its name, and `changes`, what is other than usual in it, as in the plan.
     """
 
     key: str
@@ -92,19 +89,17 @@ class Case:
     def design(self) -> Design:
         """How its campaign is made."""
         changed: dict[str, Any] = {
-            key: tuple(value) if isinstance(value, list) else value for key, value in self._of("design").items()
+            key: tuple(value) if isinstance(value, list) else value for key, value in self.changes.get("design", {}).items()
         }
-        design = replace(Design(), **changed)
         if ratio := self.changes.get("declared_ratio"):
-            noise = ratio * self.tracker.sigma_m, ratio * self.tracker.sigma_rad
-            design = replace(design, repeats=1, declared_noise=noise)
-        return design
+            changed |= {"repeats": 1, "declared_noise": (ratio * self.tracker.sigma_m, ratio * self.tracker.sigma_rad)}
+        return replace(Design(), **changed)
 
     @property
     def tracker(self) -> Tracker:
         """Its tracker, where nothing is wrong with it."""
-        misplaced = misplaced_base(stream(self.seed, "tilted base")) if self.changes.get("tilted") else None
-        return replace(Tracker(), misplaced=misplaced, **self._of("tracker"))
+        misplaced = misplaced_base(self.seed) if self.changes.get("tilted") else None
+        return replace(Tracker(), misplaced=misplaced, **self.changes.get("tracker", {}))
 
     @property
     def weighs(self) -> bool:
@@ -113,24 +108,21 @@ class Case:
 
     def declared(self, arm: Arm) -> tuple[LinkMass, ...]:
         """Weights declared to the analyst: none where they are what is hidden, or compensated."""
-        return declared_masses(arm) if self.weighs else ()
+        return arm.masses if self.weighs else ()
 
     def specimen(self, robots_folder: str | Path) -> PhysicalRobot:
         """Its robot before anything is wrong with it; its weights, its tracker and its drives are the setting's."""
         arm = arm_from_file(self.robot_file(robots_folder))
         arm = replace(arm, gravity_m_s2=tuple(self.changes.get("gravity_m_s2", arm.gravity_m_s2)))
         robot = specimen(arm, self.seed, weighs=self.weighs, off_line_m=self.changes.get("off_line_m", 0.0))
-        robot = replace(robot, tracker=self.tracker, pose_rad=(self.changes.get("pose_rad", 0.0),) * arm.joints)
         # Repeatabilities differ from joint to joint, errors of a pose do not.
-        spread = stream(self.seed, "repeatability").uniform(0.5, 1.5, arm.joints)
-        return replace(robot, repeatability_rad=tuple(self.changes.get("joint_rad", 0.0) * spread))
+        spread = self.changes.get("joint_rad", 0.0) * stream(self.seed, "repeatability").uniform(0.5, 1.5, arm.joints)
+        alike = (self.changes.get("pose_rad", 0.0),) * arm.joints
+        return replace(robot, tracker=self.tracker, pose_rad=alike, repeatability_rad=tuple(spread))
 
     def robot_file(self, robots_folder: str | Path) -> Path:
         """Of which its robot is a specimen."""
         return Path(robots_folder) / f"{self.robot}.yaml"
-
-    def _of(self, part: str) -> dict[str, Any]:
-        return dict(self.changes.get(part, {}))
 
 
 def cases_of(plan: Plan, size: str, seed: int) -> list[Case]:
@@ -152,11 +144,6 @@ def cases_of(plan: Plan, size: str, seed: int) -> list[Case]:
 def absent_on(plan: Plan, robot: str) -> tuple[str, ...]:
     """Effects that a robot cannot have."""
     return tuple(plan["absent"].get(robot, ()))
-
-
-def block_of(cases: list[Case], number: int, of: int) -> list[Case]:
-    """Every `of`-th case from `number` on, both counted from 1 as people do: a share for one job of a cluster."""
-    return cases[number - 1 :: of]
 
 
 def _listed(plan: Plan, part: Mapping[str, Any], robot: str, seed: int) -> Iterator[tuple[Any, ...]]:
@@ -202,10 +189,7 @@ def _drawn_pair(plan: Plan, seed: int, robot: str, level: float | str, number: i
 
 
 def defects_of(case: Case, robot: PhysicalRobot, yardstick: Yardstick) -> list[Sized]:
-    """The defects of a case at the sizes that give their non-centralities.
-
-    `robot`: faultless; `yardstick`: of it. Returns (Defect, dict): each with its size as in the ground truth: target, quantity,
-    signal, which draw. Of one mechanism at several joints each has its own signal; the target is that of all together.
+    """The defects of a case at the sizes that give their non-centralities, each with its size as in the ground truth.
 
     Where a location has no size of the wanted non-centrality at which the arm finds rest, or one beyond three times the
     plausible, the next one is drawn; of eight that are all implausible the least is taken. Where none has a size at all, as
@@ -239,7 +223,7 @@ def _drawn(case: Case, robot: PhysicalRobot, effect: str, seed: int) -> list[Def
         # The last of its locations: of all links.
         return [replace(defect, joints=locations[-1])]
     if case.group == GEAR_GRAVITY:
-        torque = usual_gravity_torque(arm, on_stretches(declared_masses(arm), arm), arm.gravity_m_s2)
+        torque = usual_gravity_torque(arm, on_stretches(arm.masses, arm), arm.gravity_m_s2)
         defect = replace(defect, joints=(int(draws.choice(np.flatnonzero(torque > _CARRIES * torque.max()))) + 1,))
     return [defect]
 
@@ -258,22 +242,16 @@ def _first_plausible(
     """The first of the drawn defects that need no implausible size, or else the least implausible; None where none have any."""
     least: tuple[float, list[Defect], int] | None = None
     for number, defects in enumerate(drawn, 1):
-
-        def times(factor: float, defects: list[Defect] = defects) -> list[Defect]:
-            return [replace(defect, size=factor * defect.size) for defect in defects]
-
-        def robot_of(factor: float, times: Callable[[float], list[Defect]] = times) -> PhysicalRobot:
-            return with_defects(robot, times(factor))
-
         largest = min(KINDS[defect.effect].largest / defect.size for defect in defects)
         try:
-            factor = size_for(yardstick, robot_of, 1.0, level, quantity, largest)
+            factor = size_for(yardstick, partial(with_defects, robot, defects), 1.0, level, quantity, largest)
         except (ValueError, RuntimeError):
             # No size has it, or on the way to it the arm finds no rest.
             continue
-        share = max(_share_of_plausible(robot, defect) for defect in times(factor))
+        sized = [replace(defect, size=factor * defect.size) for defect in defects]
+        share = max(_share_of_plausible(robot, defect) for defect in sized)
         if least is None or share < least[0]:
-            least = share, times(factor), number
+            least = share, sized, number
         if share <= _IMPLAUSIBLE:
             break
     return None if least is None else _stated(yardstick, robot, least[1], level, quantity, least[2])
@@ -285,9 +263,9 @@ def _stated(
     """Defects with their sizes as in the ground truth, each with its own signal."""
     found: list[Sized] = []
     for defect in defects:
-        signal = asdict(yardstick.signal(with_defects(robot, [defect])))
-        sizing = {"non_centrality": level, "of": quantity, "draw": draw, "signal": signal}
-        found.append((defect, sizing | {"share_of_plausible": _share_of_plausible(robot, defect)}))
+        signal, share = asdict(yardstick.signal(with_defects(robot, [defect]))), _share_of_plausible(robot, defect)
+        sizing = {"non_centrality": level, "of": quantity, "draw": draw, "signal": signal, "share_of_plausible": share}
+        found.append((defect, sizing))
     return found
 
 
@@ -296,36 +274,25 @@ def _share_of_plausible(robot: PhysicalRobot, defect: Defect) -> float:
 
 
 def make_case(case: Case, blind_folder: str | Path, sealed_folder: str | Path, robots_folder: str | Path) -> str:
-    """Make the campaign and the ground truth of a case.
-
-    `blind_folder`, `sealed_folder`: the campaign goes to ``blind_folder/<name>/``, the ground truth to
-    ``sealed_folder/<name>.json``. Returns SHA-256 of the ground truth.
-    """
+    """Make the campaign of a case and its sealed truth, by its name in each folder; returns the SHA-256 of the truth."""
     robot, design = case.specimen(robots_folder), case.design
     yardstick = yardstick_of(case, robot) if case.effects else None
     sized = defects_of(case, robot, yardstick) if yardstick else []
     bad = with_defects(robot, [defect for defect, _ in sized])
     folder, schedule = Path(blind_folder) / case.name, schedule_of(robot.arm, design, case.seed)
 
-    def slipped(table: Table) -> tuple[Table, list[BadReading]]:
-        return drawn_slips(table, bad, schedule, case.changes["bad_rows"], stream(case.seed, "bad rows"))
+    def slipped(table: Table) -> tuple[Table, list[Slip]]:
+        """One to so many bad rows, of one kind."""
+        draws = stream(case.seed, "bad rows")
+        kind, count = str(draws.choice(possible_kinds(table))), int(draws.integers(1, case.changes["bad_rows"] + 1))
+        return with_bad_rows(table, bad, schedule, kind, count, draws)
 
-    file, declared = case.robot_file(robots_folder), case.declared(robot.arm)
-    made = write_blind_campaign(
-        folder, case.name, file, bad, design, schedule, declared, slipped=slipped if "bad_rows" in case.changes else None
-    )
+    file, slips = case.robot_file(robots_folder), slipped if "bad_rows" in case.changes else None
+    made = write_blind_campaign(folder, case.name, file, bad, design, schedule, case.declared(robot.arm), slips)
     truth = {"case": asdict(case), "defects": [truth_of(robot, defect) | sizing for defect, sizing in sized]}
     if misplaced := robot.tracker.misplaced:
         truth["misplaced"] = {"shift_m": list(misplaced.shift_m), "turn_rad": list(misplaced.turn_rad)}
     return write_truth(Path(sealed_folder) / f"{case.name}.json", truth | made, folder)
-
-
-def drawn_slips(
-    table: Table, robot: PhysicalRobot, schedule: Schedule, most: int, draws: np.random.Generator
-) -> tuple[Table, list[BadReading]]:
-    """A measured table with one to so many bad rows, of one kind."""
-    kind, count = draws.choice(possible_kinds(table)), draws.integers(1, most + 1)
-    return with_bad_rows(table, robot, schedule, str(kind), int(count), draws)
 
 
 def make_cases(job: Any) -> None:
@@ -333,5 +300,6 @@ def make_cases(job: Any) -> None:
     asked, robots = job.params, Path(job.input.robots[0]).parent
     for folder in (job.output.blind, job.output.sealed):
         Path(folder).mkdir(parents=True, exist_ok=True)
-    for case in block_of(cases_of(asked.plan, asked.size, asked.seed), asked.number, asked.plan["sizes"][asked.size]["blocks"]):
+    cases, blocks = cases_of(asked.plan, asked.size, asked.seed), asked.plan["sizes"][asked.size]["blocks"]
+    for case in cases[asked.number - 1 :: blocks]:
         make_case(case, job.output.blind, job.output.sealed, robots)

@@ -1,10 +1,8 @@
 """The loop closed on the plant: a robot with a hidden defect is measured, diagnosed, commanded by the result, measured again.
 
-Each wanted pose is commanded five times: as the robot file has the arm, by a calibration of the geometry alone, by the declared
-model (geometry and springs), by the model that the diagnosis found, and by the plant itself, whose equilibrium is inverted by
-Newton's method as `compensation` inverts a model. What the last leaves is the floor: noise of the tracker and repeatability.
-Nobody's model has seen any of these poses. Beside it stands what is stated of the corrected robot's accuracy, and whether the
-plant keeps it.
+Each wanted pose, which nobody's model has seen, is commanded five times: as the robot file has the arm, by a calibration of the
+geometry alone, by the declared model (geometry and springs), by the model that the diagnosis found, and by the plant itself,
+which leaves noise and repeatability. Beside it stands what is stated of the corrected robot's accuracy.
 """
 
 from __future__ import annotations
@@ -45,8 +43,7 @@ from elastocal_proof.blind.rehearsal import ERRORS_OF_GEOMETRY, bow, hidden_robo
 from elastocal_proof.plant.bad_rows import HELD_POINT, ZEROS, with_bad_rows
 from elastocal_proof.plant.campaigns import Design, schedule_of, usual_force_N
 from elastocal_proof.plant.kinds import KINDS
-from elastocal_proof.plant.random_numbers import stream
-from elastocal_proof.plant.weights import declared_masses
+from elastocal_proof.plant.physical_robot import stream
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -57,7 +54,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
     from elastocal.mechanics.robot import Robot
-    from elastocal_proof.plant.bad_rows import BadReading
+    from elastocal_proof.plant.bad_rows import Slip
     from elastocal_proof.plant.campaigns import Table
     from elastocal_proof.plant.physical_robot import PhysicalRobot
 
@@ -75,8 +72,6 @@ _REACH = 0.8
 _MILLING_SHARE, _PATH_SHARE = 0.5, 0.2
 # Newton's steps on the plant: each leaves a hundredth or less.
 _STEPS = 5
-# Effects by the approach, which no command of a path states.
-_BY_APPROACH = ("hysteresis",)
 CAMPAIGN = Design(declared=ERRORS_OF_GEOMETRY)
 # Tolerances that a shop floor asks for, evenly on the logarithm: some robots keep them and some do not.
 _TOLERANCES_M = (1.5e-5, 6e-5)
@@ -107,10 +102,7 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Measured:
-    """A robot with one hidden defect, measured and diagnosed, and what it shall reach.
-
-    `plant`: with its defects. `declared`: as the analyst knows it. `training`: what was fitted; `held_out`: what was not.
-    """
+    """A robot with one hidden defect, as its analyst knows it, what was fitted and what was not, and what it shall reach."""
 
     plant: PhysicalRobot
     declared: Robot
@@ -123,21 +115,20 @@ class Measured:
 def cases(robot_file: str | Path, seed: int, each: int) -> Iterator[tuple[str, int]]:
     """Hidden effects and seeds of all cases on one robot, `each` of every effect that the loop can be closed with.
 
-    These move the robot, need no covariate and can be on this arm.
+    These move the robot, need no covariate, such as the approach, which no path states, and can be on this arm.
     """
     arm, known = hidden_robot(robot_file, seed)[0].arm, catalogue()
     for effect, kind in sorted(KINDS.items()):
         moves = effect in known and known[effect].moves_robot and not kind.needs and kind.locations(arm)
-        for number in range(each if moves and effect not in (*ERRORS_OF_GEOMETRY, *_BY_APPROACH) else 0):
+        for number in range(each if moves and effect not in ERRORS_OF_GEOMETRY else 0):
             yield effect, int(stream(seed, f"closed loop {Path(robot_file).stem} {effect} {number}").integers(2**31))
 
 
 def measure(robot_file: Path, effect: str, seed: int, frame: str = "base", slips: bool = False) -> Measured:
     """Measure and diagnose one robot.
 
-    `robot_file`: its folder holds those that a campaign may name. `effect`: hidden, of plausible size at a joint that is drawn,
-    beside errors of geometry, gears and weights. `slips`: whether the base is a little tilted against where it is declared, and
-    the beam was lost in one fitted row.
+    `effect`: hidden, of plausible size at a joint that is drawn, beside errors of geometry, gears and weights. `slips`: whether
+    the base is a little tilted against where it is declared, and the beam was lost in one fitted row.
     """
     plant, design, draws = (
         hidden_robot(robot_file, seed, [effect])[0],
@@ -146,16 +137,16 @@ def measure(robot_file: Path, effect: str, seed: int, frame: str = "base", slips
     )
     if slips:
         plant = with_misplaced_base(plant, seed)
-    schedule, declared = schedule_of(plant.arm, design, seed), declared_masses(plant.arm)
+    schedule = schedule_of(plant.arm, design, seed)
 
-    def lost(table: Table) -> tuple[Table, list[BadReading]]:
+    def lost(table: Table) -> tuple[Table, list[Slip]]:
         kind, fitted = str(draws.choice([ZEROS, HELD_POINT])), design.poses - design.held_out
         tries = iter(lambda: with_bad_rows(table, plant, schedule, kind, 1, draws), None)
-        return next((bad, slip) for bad, slip in tries if table["pose"][slip[0].rows[0]] < fitted)
+        return next((bad, slip) for bad, slip in tries if table["pose"][slip[0]["rows"][0]] < fitted)
 
     with tempfile.TemporaryDirectory() as folder:
         slipped = lost if slips else None
-        write_blind_campaign(folder, "closed_loop", robot_file, plant, design, schedule, declared, slipped=slipped)
+        write_blind_campaign(folder, "closed_loop", robot_file, plant, design, schedule, plant.arm.masses, slipped)
         training, held_out = cases_in(folder, robot_file.parent)
     robot = training.campaign.robot
     return Measured(plant, robot, training, held_out, diagnose(training, Settings(), seed), wanted_poses(robot, plant, seed))
@@ -168,29 +159,24 @@ def wanted_poses(robot: Robot, plant: PhysicalRobot, seed: int) -> Wanted:
     force = usual_force_N(plant.arm)
     angles = low + (high - low) * (0.5 + _REACH * (draws.random((2 * _POSES, robot.joints)) - 0.5))
     shown = robot.reported_angles(angles)
-    position, rotation = nominal_forward(robot, shown)
-    wrench = np.zeros((2 * _POSES, 6))
     direction = draws.standard_normal((_POSES, 3))
-    wrench[_POSES:, :3] = force * direction / np.linalg.norm(direction, axis=1, keepdims=True)
-    path_position, path_rotation, path_shown = bow(robot, _PATH_SHARE * plant.arm.reach_m, _PATH, draws)
-    along = np.gradient(path_position, axis=0)
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    path = bow(robot, _PATH_SHARE * plant.arm.reach_m, _PATH, draws)
+    along = np.gradient(path[0], axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     # Half against the feed and the rest upwards off the part.
     process = force * _MILLING_SHARE * (-np.sqrt(0.5) * along + np.sqrt(0.5) * np.array([0.0, 0.0, 1.0]))
-    return Wanted(
-        np.repeat(PARTS, (_POSES, _POSES, _PATH)),
-        np.concatenate([position, path_position]),
-        np.concatenate([rotation, path_rotation]),
-        np.concatenate([wrench, np.pad(process, ((0, 0), (0, 3)))]),
-        np.concatenate([shown, path_shown]),
-    )
+    forces = np.concatenate([np.zeros((_POSES, 3)), force * direction, process])
+    random = (*nominal_forward(robot, shown), shown)
+    position, rotation, start = (np.concatenate(both) for both in zip(random, path, strict=True))
+    part = np.repeat(PARTS, (_POSES, _POSES, _PATH))
+    return Wanted(part, position, rotation, np.pad(forces, ((0, 0), (0, 3))), start)
 
 
 def closed_loop(robot_file: Path, effect: str, seed: int, slips: bool = False) -> dict[str, np.ndarray]:
-    """One robot, from campaign to corrected targets that were measured; arguments as of `measure`.
+    """One robot, from campaign to corrected targets that were measured; arguments as of `measure`, base declared.
 
-    What is wanted, and whether the robot reached it, is of the declared base. Returns one row for each wanted pose and model,
-    columns as `schemas.closed_loop` has them.
+    Returns one row for each wanted pose and model, columns as `schemas.closed_loop` has them.
     """
     made = measure(robot_file, effect, seed, slips=slips)
     robot, wanted, count = made.declared, made.wanted, len(made.wanted.part)
@@ -261,10 +247,9 @@ def _moved(made: Measured, commands: np.ndarray, seed: int) -> dict[str, Any]:
 
 
 def stated_accuracy(robot_file: Path, effect: str, seed: int, frame: str) -> list[dict[str, Any]]:
-    """For each of `STATED_OF` what is predicted, bounded and decided of one corrected robot's error, and what it is.
+    """For each of `STATED_OF` what is predicted, bounded and decided of one corrected robot's error, and what the plant's is.
 
-    True errors are those of the plant at corrected targets, without the tracker's noise: in the base's frame where the campaign
-    knew it, else after the best rigid placement over the random poses.
+    In the base's frame where the campaign knew it, else after the best rigid placement over the random poses.
     """
     made = measure(robot_file, effect, seed, frame)
     plant, wanted, operating = made.plant, made.wanted, OperatingConditions(made.wanted.wrench)
@@ -309,10 +294,9 @@ def state_accuracy(job: Any) -> None:
 
 
 def case_errors(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
-    """RMS errors of each case.
+    """RMS errors of each case and part, of rows of `closed_loop` by robot.
 
-    `tables`: rows of `closed_loop` by robot. Returns one row for each case and part: ``robot, effect, seed, verdict, named,
-    part``, the measured RMS of each model (m), the same as the robot reached it, without the tracker's noise (``.._reached``),
+    Columns: the measured RMS of each model (m), the same as the robot reached it, without the tracker's noise (``.._reached``),
     that of the model found over that of the true one (``over_floor``), and ``calibration``: mean square error reached over mean
     square predicted. Poses that some model could not correct are left out for all.
     """
@@ -327,10 +311,9 @@ def case_errors(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
 
 
 def summary(errors: pd.DataFrame, seed: int) -> pd.DataFrame:
-    """Errors of all cases together.
+    """`case_errors` together, with 95 % limits by a bootstrap over cases: one row for each robot (and "all"), part and model.
 
-    `errors`: of `case_errors`. `seed`: of the bootstrap over cases. Returns one row for each robot (and "all"), part and model:
-    ``cases, rms_mm`` with 95 % limits, ``over_floor`` with limits, and ``reached_mm``, without the tracker's noise.
+    ``reached_mm`` is without the tracker's noise.
     """
     rows = []
     for robot in (*dict.fromkeys(errors["robot"]), "all"):
@@ -353,10 +336,9 @@ def summary(errors: pd.DataFrame, seed: int) -> pd.DataFrame:
 
 
 def goals(errors: pd.DataFrame) -> pd.DataFrame:
-    """How many cases reach the goal, where the effect was named and where not.
+    """How many of `case_errors` are within `GOAL` of the floor, by part, where the effect was named and where not.
 
-    `errors`: of `case_errors`. Returns one row for each part, named and not: ``cases``, those within `GOAL` of the floor, their
-    share with 95 % limits [1], the median of ``over_floor`` and of ``calibration``.
+    Shares with 95 % limits [1]; medians of ``over_floor`` and of ``calibration``.
 
     [1] Wilson, E. B., Probable inference, the law of succession, and statistical inference, Journal of the American Statistical
         Association 22, 1927.
@@ -377,10 +359,10 @@ def goals(errors: pd.DataFrame) -> pd.DataFrame:
 
 
 def coverage(rows: pd.DataFrame) -> pd.DataFrame:
-    """How often the truth is below the stated bounds, and how often it denies a decision, with Clopper-Pearson intervals.
+    """How often the truth is below the bounds of `stated_accuracy`, and denies a decision, with Clopper-Pearson intervals.
 
-    `rows`: of `stated_accuracy`. Returns one row for each frame (and all), part, kind of verdict (and all) and question:
-    ``cases, hits, share, low, high``, and the root of mean true over mean predicted squares.
+    One row for each frame (and all), part, kind of verdict (and all) and question, with the root of mean true over mean
+    predicted squares.
     """
     settled, always = rows["verdict"].isin(_SETTLED), rows["verdict"].notna()
     questions = {

@@ -17,17 +17,17 @@ from elastocal.campaigns.writing import write_campaign
 from elastocal.errors import InputError
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.json_files import read_json
-from elastocal_proof.plant.campaigns import DYNAMIC, Design, dynamic_table, measured_table
+from elastocal_proof.plant.campaigns import Design, measured_table
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from elastocal_proof.plant.arm import Arm, LinkMass
-    from elastocal_proof.plant.bad_rows import BadReading
+    from elastocal_proof.plant.bad_rows import Slip
     from elastocal_proof.plant.campaigns import Table
     from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule
 
-    Slip = Callable[[Table], tuple[Table, list[BadReading]]]
+    Slipped = Callable[[Table], tuple[Table, list[Slip]]]
 
 ROBOT_FILE = "robot.yaml"
 
@@ -58,19 +58,16 @@ def write_blind_campaign(
     design: Design,
     schedule: Schedule,
     declared: Sequence[LinkMass] = (),
-    kind: str = "parquet",
-    slipped: Slip | None = None,
+    slipped: Slipped | None = None,
 ) -> dict[str, Any]:
-    """Measure, and write what the analyst gets.
+    """Measure, and write what the analyst gets; returns how the data were made, for the ground truth of the case.
 
     `folder`: the campaign's own. `name`: of the campaign; must not give the ground truth away. `robot_file`: of which the robot
-    is a specimen. `declared`: weights as they are declared to the analyst. `kind`: one of "parquet", "csv". `slipped`: from a
-    measured table to the same with what went wrong in the file, and a list of that. Returns how the data were made, for the
-    ground truth of the case.
+    is a specimen. `declared`: weights as they are declared to the analyst. `slipped`: what goes wrong in the file.
     """
     table, outliers = measured_table(robot, design, schedule)
     table, slips = slipped(table) if slipped else (table, [])
-    write_campaign(folder, campaign_document(name, robot.arm, design), table, robot.arm.joints, kind)
+    write_campaign(folder, campaign_document(name, robot.arm, design), table, robot.arm.joints, "parquet")
     write_robot(folder, robot_file, robot, declared, design.undeclared)
     return {
         "campaign": name,
@@ -84,30 +81,7 @@ def write_blind_campaign(
         "outliers": [list(outlier) for outlier in outliers],
         "measurements": len(table["pose"]),
         "made_with": {"mujoco": mujoco.__version__, "numpy": np.__version__, "python": platform.python_version()},
-    } | ({"bad_rows": [asdict(slip) for slip in slips]} if slipped else {})
-
-
-def write_dynamic_campaign(
-    folder: str | Path,
-    name: str,
-    robot_file: str | Path,
-    robot: PhysicalRobot,
-    measurements: int,
-    seed: int,
-    declared: Sequence[LinkMass] = (),
-) -> None:
-    """Measure a robot by a tracker in its dynamic mode, without a load; arguments as in `write_blind_campaign`.
-
-    Compliances are held at those of the robot file, beside errors of geometry, and random poses held out.
-    """
-    document = campaign_document(name, robot.arm, DYNAMIC) | {
-        "compliance": "nominal",
-        "declared": ["joint_offset", "link_geometry"],
-        "noise": {"position_m": robot.tracker.sigma_m},
-        "holdout": {"fraction": 0.3, "seed": 1},
-    }
-    write_campaign(folder, document, dynamic_table(robot, measurements, seed), robot.arm.joints, "parquet")
-    write_robot(folder, robot_file, robot, declared)
+    } | ({"bad_rows": slips} if slipped else {})
 
 
 def write_robot(
@@ -117,11 +91,7 @@ def write_robot(
     declared: Sequence[LinkMass],
     undeclared: Sequence[str] = (),
 ) -> None:
-    """Write the campaign's own robot file.
-
-    `robot_file`: of which this is a specimen. `declared`: weights as they are declared to the analyst; where there are none,
-    the file has no masses. `undeclared`: keys that it lacks.
-    """
+    """Write the campaign's own robot file: without masses where none are declared, and without the keys that are undeclared."""
     arm, nominal = robot.arm, yaml.safe_load(Path(robot_file).read_text(encoding="utf-8"))
     absent = ("masses", "gravity_m_s2", "compensator", "payload_kg", *undeclared)
     document = {key: value for key, value in nominal.items() if key not in absent}
@@ -135,10 +105,9 @@ def write_robot(
 
 
 def write_truth(path: str | Path, truth: Mapping[str, Any], campaign_folder: str | Path) -> str:
-    """Seal the ground truth of a case: sorted JSON, outside of the campaign's folder.
+    """Seal the ground truth of a case as sorted JSON; returns its SHA-256, to be published before any diagnosis.
 
-    Returns SHA-256 of the file, to be published before any diagnosis. Raises `ValueError`: the file would lie in the campaign's
-    folder.
+    Raises `ValueError`: the file would lie in the campaign's folder.
     """
     path, folder = Path(path), Path(campaign_folder)
     if folder.resolve() in path.resolve().parents:
@@ -157,10 +126,9 @@ def seal_cases(job: Any) -> None:
 
 
 def load_ground_truth(folders: Iterable[str | Path], manifest: str | Path) -> dict[str, dict[str, Any]]:
-    """Read sealed files, for the scores and the oracle only, whose hashes are those that were published.
+    """Sealed documents by the name of the case, in its order, for the scores and the oracle only.
 
-    Returns sealed documents by the name of the case, in its order. Raises `InputError`: a file is not the one whose hash was
-    published.
+    Raises `InputError`: a file is not the one whose hash was published.
     """
     lines = Path(manifest).read_text(encoding="utf-8").splitlines()
     published = {name: digest for digest, name in map(str.split, lines)}

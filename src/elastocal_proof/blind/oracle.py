@@ -1,16 +1,13 @@
 """The oracle and the limit: what the same fit does when it is given the effects, and what the best analyst finds.
 
-The oracle has the measurements, the noise and the held-out poses of the diagnosis, and is given which effects there are and at
-which joints, so that what it does better is worth what the search for the effect has cost. It gets the effect by its name in
-the catalogue, not the plant's law; nor which variant of it (axes, by time or by temperature): of these it takes the one that
-the residual of the declared model speaks for.
+The oracle has all that the diagnosis has, and is given which effects of the catalogue there are and at which joints; of their
+variants (axes, by time or by temperature) it takes the one that the residual of the declared model speaks for.
 
 The best analyst knows the plant's laws, how often each mechanism occurs, and how large it is. Of each mechanism at each
 location some defects are drawn as the plant draws them. With S (M, m) what their measurements show after absorption, each of
-the non-centrality of the case, an unknown defect of that kind is taken for a random vector of the second moments S S'/m: the
-residual is then normal with covariance I + S S'/m, and the most probable mechanism is the Bayes rule of linear Gaussian models
-[1]. An alarm is the likelihood-ratio test of the average over all of them, which no test exceeds on average [2], with its null
-distribution simulated.
+the non-centrality of the case, the residual under an unknown defect of that kind is taken for normal with covariance
+I + S S'/m, and the most probable mechanism is the Bayes rule of linear Gaussian models [1]. An alarm is the likelihood-ratio
+test of the average over all of them, which no test exceeds on average [2], with its null distribution simulated.
 
 [1] Bishop, C. M., Pattern Recognition and Machine Learning, chapter 3, Springer, 2006.
 [2] Lehmann, E. L. and Romano, J. P., Testing Statistical Hypotheses, section 3.8, Springer, 2005.
@@ -18,7 +15,6 @@ distribution simulated.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
@@ -41,7 +37,7 @@ from elastocal_proof.blind.cases import NAMED, absent_on, defects_of, yardstick_
 from elastocal_proof.blind.cases import Case as BlindCase
 from elastocal_proof.blind.folders import load_ground_truth
 from elastocal_proof.plant.kinds import KINDS, OUTSIDE, Defect, with_defects
-from elastocal_proof.plant.random_numbers import stream
+from elastocal_proof.plant.physical_robot import stream
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -67,14 +63,13 @@ _ABSORBED = 1e-4
 def oracle(
     truth: Mapping[str, Any], verdict: Mapping[str, Any], folder: str | Path, robots_folder: str | Path, seed: int
 ) -> dict[str, Any] | None:
-    """What knowing the effects is worth in one case.
+    """What knowing the effects is worth in one case, by its sealed document and its verdict, whose noise is used again.
 
-    `truth`: a sealed document. `verdict`: of the same case; its noise is used again. `folder`, `robots_folder`: as in
-    `reading.read_campaign`. Returns ``candidates`` that the model was given; ``p_value`` of a Wald test [1] of all their
-    coefficients at once (chi-squared, with the covariance of the fit at its shapes; a fitted shape counts as one more degree of
-    freedom, and the p-value is multiplied by the number of variants, a Bonferroni correction [2]), 1 where these data identify
-    none of them; ``detected`` at 5 %; ``heldout``, errors on the held-out poses as in verdict.json. None where an effect is
-    outside of the catalogue: no model of it has that effect.
+    Returns ``candidates`` that the model was given; ``p_value`` of a Wald test [1] of all their coefficients at once
+    (chi-squared, with the covariance of the fit at its shapes; a fitted shape counts as one more degree of freedom, and the
+    p-value is multiplied by the number of variants, a Bonferroni correction [2]), 1 where these data identify none of them;
+    ``detected`` at 5 %; ``heldout``, errors on the held-out poses as in verdict.json. None where an effect is outside of the
+    catalogue: no model of it has that effect.
 
     [1] Wald, A., Tests of statistical hypotheses concerning several parameters when the number of observations is large,
         Transactions of the American Mathematical Society 54, 1943.
@@ -96,15 +91,9 @@ def oracle(
 
 
 def members_of(effect: str, joints: Sequence[int], candidates: Iterable[Candidate]) -> list[list[Candidate]]:
-    """Candidates that an effect at some joints consists of, for each of its variants.
-
-    `joints`: from 1; empty where the effect is no joint's. Returns one variant each. Bands of orders of one joint are no
-    variants but parts.
-    """
+    """Candidates that an effect at some joints, from 1, consists of, for each of its variants; bands of orders are parts."""
     mine = [c for c in candidates if c.effect == effect and bool(c.joints) == bool(joints) and set(c.joints) <= set(joints)]
-    if joints:
-        return [mine] if mine else []
-    return [[candidate] for candidate in mine]
+    return [mine] * bool(mine) if joints else [[candidate] for candidate in mine]
 
 
 def _with_effects(
@@ -148,27 +137,12 @@ def _wald(fitted: Fit, members: Sequence[Candidate]) -> float:
 
 
 def _outcome(members: Iterable[Candidate], p_value: float, heldout: Mapping[str, Any]) -> dict[str, Any]:
-    return {
-        "candidates": [member.key for member in members],
-        "p_value": p_value,
-        "detected": p_value < LEVEL,
-        "heldout": heldout,
-    }
-
-
-@dataclass(frozen=True)
-class Signals:
-    """What unit defects show in one campaign.
-
-    `kinds`: of each location that anything can be seen of. `units` (M, locations, draws): of length one, after absorption.
-    """
-
-    kinds: tuple[str, ...]
-    units: np.ndarray
+    keys = [member.key for member in members]
+    return {"candidates": keys, "p_value": p_value, "detected": p_value < LEVEL, "heldout": heldout}
 
 
 def limit_of_sample(plan: Plan, truth: Mapping[str, Any], robots_folder: str | Path) -> dict[str, Any] | None:
-    """As `limit`, of a case that is in the sample; None of others. `truth`: a sealed document."""
+    """As `limit`, of a case that is in the sample; None of others."""
     stated, asked = truth["case"], plan["limit"]
     case = BlindCase(**stated | {name: tuple(stated[name]) for name in ("effects", "levels")})
     drawn = stream(case.seed, "sample of the limit").random() < 1 / asked["one_in"]
@@ -186,10 +160,11 @@ def limit(plan: Plan, case: BlindCase, robots_folder: str | Path) -> dict[str, A
     robot = case.specimen(robots_folder)
     yardstick = yardstick_of(case, robot)
     bad = with_defects(robot, [defect for defect, _ in defects_of(case, robot, yardstick)])
-    signals = signals_of(yardstick, robot, [kind for kind in NAMED if kind not in absent_on(plan, case.robot)], case.seed)
-    sets, columns = _hypotheses(case, signals)
+    kinds = [kind for kind in NAMED if kind not in absent_on(plan, case.robot)]
+    located, units = signals_of(yardstick, robot, kinds, case.seed)
+    sets, columns = _hypotheses(located, len(case.effects))
     residual = yardstick.residual(bad)
-    flat = signals.units.reshape(len(residual), -1)
+    flat = units.reshape(len(residual), -1)
     gram, along = flat.T @ flat, flat.T @ residual
     draws = stream(case.seed, "null distribution of the limit")
     # Of noise alone, the products with all signals.
@@ -210,8 +185,13 @@ def limit(plan: Plan, case: BlindCase, robots_folder: str | Path) -> dict[str, A
     }
 
 
-def signals_of(yardstick: Yardstick, robot: PhysicalRobot, kinds: Iterable[str], seed: int) -> Signals:
-    """Draw defects of each kind at each of its locations, and see what they show."""
+def signals_of(
+    yardstick: Yardstick, robot: PhysicalRobot, kinds: Iterable[str], seed: int
+) -> tuple[tuple[str, ...], np.ndarray]:
+    """What drawn defects of each kind show at each of its locations.
+
+    Returns the kind of each location that anything can be seen of, and (M, locations, draws) of length one, after absorption.
+    """
     named, units = [], []
     for kind in kinds:
         size = KINDS[kind].plausible_on(robot.arm)
@@ -226,14 +206,14 @@ def signals_of(yardstick: Yardstick, robot: PhysicalRobot, kinds: Iterable[str],
                 # Gears that no torque of this campaign brings to where they yield show nothing: the others stand for these.
                 some = np.resize(np.flatnonzero(visible), _DRAWS)
                 units.append((np.array(left)[some] / remaining[some, None]).T)
-    return Signals(tuple(named), np.stack(units, axis=1))
+    return tuple(named), np.stack(units, axis=1)
 
 
 def log_bayes_factors(gram: np.ndarray, along: np.ndarray, columns: np.ndarray, level: float) -> np.ndarray:
-    """Log Bayes factors against nothing of normal vectors with the second moments of some columns.
+    """Log Bayes factors (H, N) against nothing of normal vectors with the second moments of some columns.
 
     `gram` (K, K): of all columns, of length one. `along` (K, N): products with N residuals. `columns` (H, m) of int: of each
-    hypothesis, as many for each of its defects. `level`: mean square length of what a defect shows. Returns (H, N).
+    hypothesis, as many for each of its defects. `level`: mean square length of what a defect shows.
     """
     share = level / _DRAWS
     found = np.empty((len(columns), along.shape[1]))
@@ -246,11 +226,11 @@ def log_bayes_factors(gram: np.ndarray, along: np.ndarray, columns: np.ndarray, 
     return found
 
 
-def _hypotheses(case: BlindCase, signals: Signals) -> tuple[np.ndarray, np.ndarray]:
-    """Sets of as many mechanisms as a case has, one for each location of each, and the columns of each."""
-    kinds, locations = np.array(signals.kinds), np.arange(len(signals.kinds) * _DRAWS).reshape(-1, _DRAWS)
-    chosen = np.array(list(combinations(range(len(kinds)), len(case.effects))))
-    sets = np.sort(kinds[chosen], axis=1)
+def _hypotheses(located: Sequence[str], count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Sets of as many mechanisms, one for each location of each, and the columns of each."""
+    locations = np.arange(len(located) * _DRAWS).reshape(-1, _DRAWS)
+    chosen = np.array(list(combinations(range(len(located)), count)))
+    sets = np.sort(np.array(located)[chosen], axis=1)
     distinct = [len(set(names)) == len(names) for names in sets]
     return sets[distinct], locations[chosen[distinct]].reshape(sum(distinct), -1)
 

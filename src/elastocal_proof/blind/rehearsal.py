@@ -25,10 +25,8 @@ from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.report.words import at_joints, listed, physical_name
 from elastocal_proof.plant.arm import arm_from_file, rotation_vector
 from elastocal_proof.plant.campaigns import SECONDS_PER_STATE, lever_of, usual_force_N
-from elastocal_proof.plant.instruments import misplaced_base
 from elastocal_proof.plant.kinds import KINDS, OUTSIDE, Defect, drawn_defect, with_defects
-from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, seen_poses, specimen
-from elastocal_proof.plant.random_numbers import stream
+from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, misplaced_base, seen_poses, specimen, stream
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -48,11 +46,10 @@ _BOW, _BOW_POSES, _TRIES = 0.2, 50, 200
 
 
 def hidden_robot(robot_file: str | Path, seed: int, effects: Sequence[str] = ()) -> tuple[PhysicalRobot, list[Defect]]:
-    """The robot that stands in.
+    """The robot that stands in, and its defects.
 
-    `robot_file`: of which it is a specimen. `effects`: keys of `KINDS`, each at a joint that is drawn; one effect that is drawn
-    by default. Returns `defects`: for whoever wants to compare them with the verdict afterwards. Raises `InputError`: an effect
-    that this arm cannot have.
+    `effects`: keys of `KINDS`, each at a joint that is drawn; one that is drawn by default. Raises `InputError`: an effect that
+    this arm cannot have.
     """
     arm = arm_from_file(robot_file)
     possible = sorted(
@@ -87,30 +84,29 @@ def hidden_words(defects: Sequence[Defect], effects: Sequence[str]) -> str:
 
 def with_misplaced_base(robot: PhysicalRobot, seed: int) -> PhysicalRobot:
     """The robot beside a tracker whose frame of the base is off by some 0.3 mrad and 0.2 mm."""
-    return replace(robot, tracker=replace(robot.tracker, misplaced=misplaced_base(stream(seed, "tilted base"))))
+    return replace(robot, tracker=replace(robot.tracker, misplaced=misplaced_base(seed)))
 
 
-def filled_sheet(
-    sheet: pd.DataFrame, document: Mapping[str, Any], robot: PhysicalRobot, seed: int, source: str = "measurements.csv"
-) -> pd.DataFrame:
-    """A measurement sheet with what a tracker reads.
+def fill_sheet(path: Path, document: Mapping[str, Any], robot: PhysicalRobot, seed: int) -> int:
+    """Fill the measurement sheet at `path` with what a tracker reads; returns how many measurements it has now.
 
-    `sheet`: columns of measurements.csv but for those of the tracker, which may be there and empty. `document`: of
-    campaign.yaml. `seed`: of the noise, and of where reflectors sit whose offset or rotation is unknown. `source`: named in
-    errors. Returns the same rows. Raises `InputError`: a column that is missing or no number, a target that the campaign does
-    not have, or a moment that is not that of the row's force at a lever.
+    Its columns are those of measurements.csv; those of the tracker may be missing or empty. `document`: of campaign.yaml.
+    `seed`: of the noise, and of where reflectors sit whose offset or rotation is unknown. Raises `InputError`: a column that is
+    missing or no number, a target that the campaign does not have, or a moment that is not that of the row's force at a lever.
     """
+    check_places(path)
+    sheet, source, targets = _read_table(path), path.as_posix(), document["targets"]
     require_numbers(sheet, [*_STATE, *(f"q{j + 1}" for j in range(robot.arm.joints)), *WRENCH_NAMES], source)
     if "target" not in sheet:
         raise InputError(source, "columns", "no 'target'", "the target of each row")
-    strangers = sheet[~sheet["target"].isin(list(document["targets"]))]
+    strangers = sheet[~sheet["target"].isin(list(targets))]
     if len(strangers):
-        found = repr(strangers["target"].iloc[0])
-        raise InputError(source, f"target, line {strangers.index[0] + 2}", found, ", ".join(document["targets"]))
+        raise InputError(
+            source, f"target, line {strangers.index[0] + 2}", repr(strangers["target"].iloc[0]), ", ".join(targets)
+        )
     states = sheet.drop_duplicates(_STATE)
     number = pd.MultiIndex.from_frame(states[_STATE]).get_indexer(pd.MultiIndex.from_frame(sheet[_STATE]))
     position, rotation = seen_poses(robot, _schedule(robot.arm, states, seed, source))
-    targets = document["targets"]
     at = [robot.arm.points.index(target["point"]) for target in targets.values()]
 
     def where(value: str | Sequence[float], name: str, within: float) -> np.ndarray:
@@ -128,24 +124,8 @@ def filled_sheet(
     measured = dict(zip("xyz", position[seen].T, strict=True))
     if document["measured"] == "pose":
         measured |= dict(zip(("rx", "ry", "rz"), rotation_vector(rotation[seen]).T, strict=True))
-    return sheet.assign(**measured)
-
-
-def fill_sheet(path: Path, document: Mapping[str, Any], robot: PhysicalRobot, seed: int) -> int:
-    """Fill the measurement sheet at `path` as `filled_sheet` does; returns how many measurements it has now."""
-    check_places(path)
-    filled = filled_sheet(_read_table(path), document, robot, seed, path.as_posix())
-    _write_table(path, filled)
-    return len(filled)
-
-
-def lose_beam(path: Path, seed: int) -> int:
-    """Read zeros, as after a lost beam, in one row of a filled sheet, which is drawn; returns its line."""
-    sheet = _read_table(path)
-    row = int(stream(seed, "lost beam").integers(len(sheet)))
-    sheet.loc[row, [name for name in ("x", "y", "z", "rx", "ry", "rz") if name in sheet]] = 0.0
-    _write_table(path, sheet)
-    return row + 2
+    _write_table(path, sheet.assign(**measured))
+    return len(sheet)
 
 
 def write_milling_path(path: Path, declared: Robot, robot: PhysicalRobot, seed: int) -> int:
@@ -162,8 +142,7 @@ def write_milling_path(path: Path, declared: Robot, robot: PhysicalRobot, seed: 
 def measured_errors(path: Path, targets: Path, robot: PhysicalRobot, seed: int) -> dict[str, np.ndarray]:
     """Distances (N,), m, of where the tracker sees the robot from the wanted poses, in the campaign's frame of the base.
 
-    Commanded by "uncorrected" and by "corrected" targets; "noise alone" is what the tracker's noise and the robot's
-    repeatability leave of an exact model. `path`: the wanted poses. `targets`: what `elastocal correct` wrote for them.
+    By "uncorrected" and "corrected" `targets`, as `elastocal correct` wrote them for `path`; "noise alone": of an exact model.
     """
     wanted, table, source = read_target_path(path, robot.arm.joints), _read_table(targets), targets.as_posix()
     if len(table) != len(wanted):
@@ -186,12 +165,10 @@ def measured_errors(path: Path, targets: Path, robot: PhysicalRobot, seed: int) 
 def reached(
     robot: PhysicalRobot, shown: np.ndarray, wrench: np.ndarray, seed: int, source: str = "commands"
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where the end effector comes to rest.
+    """Where the end effector comes to rest, (N, 3), m, and (N, 3, 3), in the frame that is declared as the base's; no noise.
 
     `shown` (N, n): commanded joint angles as the controller shows them, rad; each is approached afresh. `wrench` (N, 6): at the
-    last measuring point, base axes; N, N m. `seed`: of the repeatability of the drives. `source`: named in errors. Returns
-    `position` (N, 3): m, in the frame that is declared as the base's; without the tracker's noise; `rotation` (N, 3, 3). Raises
-    `InputError`: as in `filled_sheet`.
+    last measuring point, base axes. `seed`: of the repeatability of the drives.
     """
     columns = dict(zip([*(f"q{j + 1}" for j in range(shown.shape[1])), *WRENCH_NAMES], [*shown.T, *wrench.T], strict=True))
     rows = pd.DataFrame(columns | {"pose": np.arange(len(shown)), "load": 0, "repeat": 0})
@@ -202,8 +179,7 @@ def reached(
 def bow(robot: Robot, length_m: float, count: int, draws: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """A path in a level plane at one orientation, in a posture that keeps within the limits, as for milling.
 
-    `count`: of its poses. `draws`: of where it lies. Returns `position`, `rotation` (count, 3), (count, 3, 3): m, base axes;
-    `reported_angles` (count, n): of the rigid robot, rad.
+    Returns so many positions and rotations, m, base axes, and reported angles of the rigid robot, rad.
     """
     low, high = robot.joint_limits.T
     share = np.linspace(-0.5, 0.5, count)[:, None]

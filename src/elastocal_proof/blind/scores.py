@@ -50,10 +50,7 @@ _COVARIATES = {need for kind in KINDS.values() for need in kind.needs}
 
 
 def rate(hits: Iterable[bool]) -> dict[str, float]:
-    """A share with its Clopper-Pearson interval [1] of 95 %.
-
-    `hits`: one a case. Returns ``hits``, ``cases``, ``rate``, ``low``, ``high``; without cases the rate is not a number and the
-    interval all there is.
+    """A share with its Clopper-Pearson interval [1] of 95 %; without cases not a number, and the interval all there is.
 
     [1] Clopper, C. J. and Pearson, E. S., The use of confidence or fiducial limits illustrated in the case of the binomial,
         Biometrika 26, 1934.
@@ -77,24 +74,52 @@ def leading(kinds: Iterable[str]) -> str:
     return PROOF if PROOF in set(kinds) else TUNED
 
 
+def robots_of(plan: Plan, case: Document) -> str:
+    """Kind of robots to which the robot of a case belongs."""
+    return TUNED if case["robot"] in plan["tuned"] else PROOF
+
+
 def score(
     plan: Plan, truth: Document, verdict: Document, oracle: Document | None = None, limit: Document | None = None
 ) -> dict[str, Any]:
-    """One row of cases.csv: what the verdict is worth, how large the effect was, which errors were left, what was stated.
+    """One row of cases.csv: where a case belongs, what was true and found, sizes, errors that were left, what was stated.
 
     `truth`: a sealed document. `verdict`: as verdict.json. `oracle`, `limit`: of `oracle.oracle` and `limit.limit`, where the
-    case has one.
+    case has one. ``exact``: the names found are the true ones; ``named_right``: so, and the verdict states no other name beside
+    it; ``holds_truth``: as many effects were found as were made, and each true one is the name of another of them or among its
+    alternatives, which is an assignment problem [1]; ``wrong_name``: one wrong name is stated alone; ``remains``: something
+    repeatable is said to remain; ``exact_alias``: within another effect that the robot can have, by the ground truth alone.
+
+    [1] Kuhn, H. W., The Hungarian method for the assignment problem, Naval Research Logistics Quarterly 2, 1955.
     """
-    defects, robot, (_, effects) = truth["defects"], truth["case"]["robot"], _apart_from_setup(truth, verdict)
-    unrecorded = _COVARIATES - set(truth["design"]["covariates"])
+    case, defects, (kind, effects) = truth["case"], truth["defects"], _apart_from_setup(truth, verdict)
+    names, true = [effect["name"] for effect in effects], list(case["effects"])
+    claims = bool(true) and kind in (NAMED, CLASS, SEVERAL)
+    right = claims and sorted(names) == sorted(true)
+    meant = [{effect["name"], *map(effect_of, effect["alternatives"])} for effect in effects]
+    held = np.array([[name in each for each in meant] for name in true], bool)
     aliases = [EXACT_ALIASES.get((defect["effect"], tuple(defect["joints"]))) for defect in defects]
+    unrecorded = _COVARIATES - set(truth["design"]["covariates"])
     return (
-        outcome(plan, truth, verdict)
-        | {
+        {
+            "case": truth["campaign"],
+            "group": case["group"],
+            "robot": case["robot"],
+            "robots": robots_of(plan, case),
+            "setting": case["setting"],
+            "truth": " + ".join(true) or NONE,
+            "level": max(case["levels"], default=0.0),
+            "verdict": kind,
+            "found": " + ".join(names) or NONE,
+            "detected": kind not in (ADEQUATE, NOT_TESTABLE),
+            "exact": right,
+            "named_right": right and kind == NAMED,
+            "holds_truth": claims and len(true) == len(names) and bool(held[linear_sum_assignment(~held)].all()),
+            "wrong_name": kind == NAMED and names != true,
+            "remains": bool((verdict.get("repeatable") or {}).get("remains")),
             "joints": " + ".join("-".join(map(str, defect["joints"])) for defect in defects),
             "right_place": places(defects, "effect") == places(effects, "name"),
-            # Within another one that the robot can have, by the ground truth alone.
-            "exact_alias": any(alias and alias not in absent_on(plan, robot) for alias in aliases),
+            "exact_alias": any(alias and alias not in absent_on(plan, case["robot"]) for alias in aliases),
             "hidden": any(set(KINDS[defect["effect"]].needs) & unrecorded for defect in defects),
         }
         | _size(truth)
@@ -107,41 +132,6 @@ def score(
         | {f"limit_{name}": np.nan if limit is None else float(limit[name]) for name in ("detected", "right")}
         | stated(truth, verdict)
     )
-
-
-def outcome(plan: Plan, truth: Document, verdict: Document) -> dict[str, Any]:
-    """Where a case belongs, what was true, what the verdict was.
-
-    Returns ``exact``: the names found are the true ones; ``named_right``: so, and the verdict states no other name beside it;
-    ``holds_truth``: as many effects were found as were made, and each true one is the name of another of them or among its
-    alternatives, which is an assignment problem [1]; ``wrong_name``: one wrong name is stated alone; ``remains``: something
-    repeatable is said to remain.
-
-    [1] Kuhn, H. W., The Hungarian method for the assignment problem, Naval Research Logistics Quarterly 2, 1955.
-    """
-    case, (kind, effects) = truth["case"], _apart_from_setup(truth, verdict)
-    names, true = [effect["name"] for effect in effects], list(case["effects"])
-    claims = bool(true) and kind in (NAMED, CLASS, SEVERAL)
-    right = claims and sorted(names) == sorted(true)
-    meant = [{effect["name"], *map(effect_of, effect["alternatives"])} for effect in effects]
-    held = np.array([[name in each for each in meant] for name in true], bool)
-    return {
-        "case": truth["campaign"],
-        "group": case["group"],
-        "robot": case["robot"],
-        "robots": TUNED if case["robot"] in plan["tuned"] else PROOF,
-        "setting": case["setting"],
-        "truth": " + ".join(true) or NONE,
-        "level": max(case["levels"], default=0.0),
-        "verdict": kind,
-        "found": " + ".join(names) or NONE,
-        "detected": kind not in (ADEQUATE, NOT_TESTABLE),
-        "exact": right,
-        "named_right": right and kind == NAMED,
-        "holds_truth": claims and len(true) == len(names) and bool(held[linear_sum_assignment(~held)].all()),
-        "wrong_name": kind == NAMED and names != true,
-        "remains": bool((verdict.get("repeatable") or {}).get("remains")),
-    }
 
 
 def _wrong_setup(truth: Document) -> set[str]:
@@ -211,13 +201,11 @@ def _errors(verdict: Document) -> dict[str, Any]:
 
 
 def stated(truth: Document, verdict: Document) -> dict[str, Any]:
-    """What was stated of a case in probabilities, and whether it is so.
+    """What was stated of a case in probabilities, and whether it is so; not a number where nothing was, as with faulty data.
 
-    A hypothesis is a set of mechanisms, as in ``verdict.json``; the empty set is "nothing". Returns ``stated``, probability of
-    the most probable set of mechanisms; ``top``, that set; ``correct``, whether it is the true one; ``held``, whether the
-    smallest set of hypotheses that reaches 95 %, or all of them where they do not, holds the true one; ``set_size``, of how
-    many these are, and ``set_probability``, what they reach; ``nothing``; ``alarm_p_value``. All not a number where nothing was
-    stated, as with a fault of the data.
+    A hypothesis is a set of mechanisms, as in ``verdict.json``; the empty set is "nothing". ``stated``: probability of the most
+    probable set, ``top``; ``correct``: whether that is the true one; ``held``: whether the smallest set of hypotheses that
+    reaches 95 %, or all of them where they do not, holds the true one; ``set_size``, ``set_probability``: of these.
     """
     probabilities = verdict.get("probabilities")
     if not probabilities or not probabilities["sets"]:
@@ -254,9 +242,8 @@ def is_true(mechanisms: Collection[str], truth: Document) -> bool:
 def intervals_of(plan: Plan, truth: Document, verdict: Document) -> list[dict[str, Any]]:
     """Every interval of 95 % of a verdict that has a true value to hold, in the usual setting.
 
-    Wald intervals, with quantiles of Student's t where the noise has degrees of freedom. Returns joint compliances, whatever
-    was found; parameters of an effect that was found at the right joints, whatever was found beside it. A parameter that the
-    data do not identify has no interval.
+    Wald intervals, with quantiles of Student's t where the noise has degrees of freedom: of joint compliances, and of
+    parameters of an effect that was found at the right joints. A parameter that the data do not identify has no interval.
     """
     case = truth["case"]
     if case["setting"] != "usual":
@@ -270,14 +257,9 @@ def intervals_of(plan: Plan, truth: Document, verdict: Document) -> list[dict[st
         for effect in verdict["effects"]:
             if effect["name"] == defect["effect"]:
                 values += _comparable(defect, effect)
-    head: dict[str, Any] = {
-        "robots": TUNED if case["robot"] in plan["tuned"] else PROOF,
-        "truth": " + ".join(case["effects"]) or NONE,
-    }
-    head |= {
-        "foreign": any(effect.startswith(OUTSIDE) for effect in case["effects"]),
-        "level": max(case["levels"], default=0.0),
-    }
+    head: dict[str, Any] = {"robots": robots_of(plan, case), "truth": " + ".join(case["effects"]) or NONE}
+    head |= {"foreign": any(effect.startswith(OUTSIDE) for effect in case["effects"])}
+    head |= {"level": max(case["levels"], default=0.0)}
     return [
         head
         | {"effect": effect, "parameter": name, "true": true, "value": value, "std_error": error}

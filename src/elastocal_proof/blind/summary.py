@@ -44,12 +44,10 @@ def rows_of(table: pd.DataFrame) -> Iterator[Any]:
 
 
 def summarize(plan: Plan, cases: pd.DataFrame, intervals: pd.DataFrame, seed: int) -> pd.DataFrame:
-    """Every figure of the plan beside its target.
+    """Every figure of the plan beside its target, for each kind of robots, of rows of `scores.score` and `scores.intervals_of`.
 
-    `cases`: of `scores.score`. `intervals`: of `scores.intervals_of`. `seed`: of the bootstrap. Returns one row for each kind
-    of robots and figure: rates with Clopper-Pearson intervals, ratios with percentile bootstrap intervals [1] over cases.
-    ``target_low`` and ``target_high`` are the range that the target leaves; ``holds`` is empty where there is no target or no
-    case.
+    Rates have Clopper-Pearson intervals, ratios percentile bootstrap intervals [1] over cases. ``target_low`` and
+    ``target_high`` are the range that the target leaves; ``holds`` is empty where there is no target or no case.
 
     [1] Efron, B. and Tibshirani, R. J., An Introduction to the Bootstrap, section 13.3, Chapman and Hall, 1993.
     """
@@ -143,25 +141,21 @@ def _bootstrapped(
     value = float(statistic(*samples)) if len(samples[0]) else np.nan
     low = high = np.nan
     if len(samples[0]) > 1 and np.isfinite(value):
-        found = bootstrap(
-            samples,
-            statistic,
-            n_resamples=_RESAMPLES,
-            batch=_SEVERAL_AT_ONCE,
-            vectorized=True,
-            paired=True,
-            method="percentile",
-            rng=draws,
-        ).confidence_interval
-        low, high = found.low, found.high
+        how: dict[str, Any] = {
+            "n_resamples": _RESAMPLES,
+            "batch": _SEVERAL_AT_ONCE,
+            "vectorized": True,
+            "paired": True,
+            "rng": draws,
+        }
+        low, high = bootstrap(samples, statistic, method="percentile", **how).confidence_interval
     return {"hits": None, "cases": len(samples[0]), "rate": value, "low": float(low), "high": float(high)}
 
 
 def calibration_error(probability: np.ndarray, correct: np.ndarray) -> np.ndarray:
-    """Expected calibration error: sum over bins of n_b / n |mean stated - share correct|.
+    """Expected calibration error [1] [2] (...,) of (..., n): sum over bins of n_b / n |mean stated - share correct|.
 
-    `probability` (..., n): stated, 0 to 1. `correct` (..., n) of bool. Returns (...,). As defined in [1] and [2]. Even of
-    verdicts that are calibrated it is not 0, for the share of few cases scatters.
+    Even of verdicts that are calibrated it is not 0, for the share of few cases scatters.
 
     [1] Naeini, M. P., Cooper, G. F. and Hauskrecht, M., Obtaining well calibrated probabilities using Bayesian binning, AAAI
         Conference on Artificial Intelligence, 2015.
@@ -176,10 +170,9 @@ def calibration_error(probability: np.ndarray, correct: np.ndarray) -> np.ndarra
 
 
 def calibration(rows: pd.DataFrame, seed: int) -> dict[str, dict[str, Any]]:
-    """The expected calibration error, and its mean for verdicts that are calibrated, at the same stated probabilities.
+    """The expected calibration error of stated cases, with a basic bootstrap interval [1] of 95 % over cases.
 
-    `rows`: cases of which something was stated. Returns ``calibration_error`` with a basic bootstrap interval [1] of 95 % over
-    cases; ``by_chance``, outcomes drawn by what is stated, as in consistency resampling [2], where what is stated is drawn too.
+    ``by_chance``: its mean with outcomes drawn by what is stated, as in consistency resampling [2], which draws that too.
 
     [1] Davison, A. C. and Hinkley, D. V., Bootstrap Methods and their Application, section 5.2, Cambridge University Press,
         1997.
@@ -199,10 +192,7 @@ def calibration(rows: pd.DataFrame, seed: int) -> dict[str, dict[str, Any]]:
 
 
 def reliability(cases: pd.DataFrame) -> pd.DataFrame:
-    """Data of the reliability diagram [1].
-
-    Returns one row for each kind of robots, group of cases (``all`` for all of them) and bin that has a case: its ends, the
-    mean of what was stated and the share that was so, with a Clopper-Pearson interval.
+    """Data of the reliability diagram [1], for each kind of robots, group of cases, or ``all``, and bin that has a case.
 
     [1] Murphy, A. H. and Winkler, R. L., Reliability of subjective probability forecasts of precipitation and temperature,
         Applied Statistics 26, 1977.
@@ -225,11 +215,9 @@ def _bin_of(probability: np.ndarray) -> np.ndarray:
 
 
 def rates(cases: pd.DataFrame) -> pd.DataFrame:
-    """Shares of what came of the cases, with their intervals, and medians of their sizes.
+    """Shares of what came of the cases, and medians of their sizes, by kind of robots, group, truth, setting and level.
 
-    Returns one row for each kind of robots, group, truth, setting and level, and for ``all`` truths of a group together but
-    those of which the model absorbs everything. What an oracle would do is empty where no model of the catalogue has the
-    effect.
+    Also for ``all`` truths of a group together but those of which the model absorbs everything.
     """
     keys, found = ["robots", "group", "truth", "setting", "level", "hidden"], []
     together = cases[cases.level_of == "retained"].assign(truth="all")

@@ -1,4 +1,4 @@
-"""Pictures of the blind proof: every figure against its target, stated probabilities against frequencies, power by size."""
+"""Pictures of the blind proof: figures against targets, probabilities against frequencies, power; and of the closed loop."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import pandas as pd
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import StrMethodFormatter
 
 from elastocal.figures.style import PALETTE, ink_on, note, panels, save, styled
 from elastocal.io.origin import Origin
@@ -40,12 +41,19 @@ _LEAST_WRITTEN = 0.045
 _ALL = "all"
 
 
+_MODELS = {
+    "uncorrected": "uncorrected",
+    "geometry": "geometry alone",
+    "declared": "geometry and springs",
+    "found": "with the effects found",
+    "true": "true model (floor)",
+}
+_PARTS = {"unloaded": "unloaded", "loaded": "under loads", "milling": "milling path"}
+
+
 @styled
 def rates_and_targets(summary: pd.DataFrame) -> Figure:
-    """Every figure that has a target, with its interval and the range that the target leaves.
-
-    `summary`: of reports/blind/summary.csv.
-    """
+    """Every figure of summary.csv that has a target, with its interval and the range that the target leaves."""
     aimed = with_target(summary)
     ratio = aimed.quantity.str.contains("over the oracle")
     names = [list(dict.fromkeys(part.quantity)) for part in (aimed[~ratio], aimed[ratio])]
@@ -94,10 +102,7 @@ def _dots(axis: Axes, rows: pd.DataFrame, names: list[str], scaled: Callable[[fl
 
 @styled
 def reliability_diagram(reliability: pd.DataFrame) -> Figure:
-    """Shares of cases whose most probable set of mechanisms is true, against what was stated, and numbers of cases.
-
-    `reliability`: of reports/blind/reliability.csv.
-    """
+    """Shares of cases whose most probable set of mechanisms is true, against what was stated, and numbers of cases."""
     rows = reliability[reliability.group == _ALL]
     if rows.empty:
         return note("No verdict of this run states a probability.")
@@ -121,10 +126,7 @@ def reliability_diagram(reliability: pd.DataFrame) -> Figure:
 
 @styled
 def power_map(rates: pd.DataFrame) -> Figure:
-    """Shares detected and named for each effect and size, beside the oracle that knows the effect.
-
-    `rates`: of reports/blind/rates.csv.
-    """
+    """Shares of rates.csv detected and named for each effect and size, beside the oracle that knows the effect."""
     single = rates[(rates.robots == leading(rates.robots)) & (rates.group == "single")]
     if single.empty:
         return note("This run has no case with one effect.")
@@ -163,11 +165,36 @@ def _heat(axis: Axes, shares: np.ndarray) -> None:
 
 def draw_blind(job: Any) -> None:
     """All pictures of the proof, by their names."""
-    drawn: dict[str, tuple[Callable[[Any], Figure], str]] = {
-        "targets": (rates_and_targets, "summary"),
-        "reliability": (reliability_diagram, "reliability"),
-        "power": (power_map, "rates"),
-    }
-    for name, (draw, table) in drawn.items():
+    for name, draw, table in (
+        ("targets", rates_and_targets, "summary"),
+        ("reliability", reliability_diagram, "reliability"),
+        ("power", power_map, "rates"),
+    ):
         figure = draw(pd.read_csv(job.input[table]))
         save(figure, job.output[f"{name}_pdf"], job.output[name], Origin(**job.config["origin"]))
+
+
+@styled
+def closed_loop(table: pd.DataFrame) -> Figure:
+    """What a robot misses after its targets were corrected, by part and by the model that corrected them."""
+    robots = [robot for robot in dict.fromkeys(table["robot"]) if robot != "all"]
+    figure, axes = panels(1, len(_PARTS), 62, sharey=True, sharex=True)
+    for axis, (part, words) in zip(axes[0], _PARTS.items(), strict=True):
+        for number, robot in enumerate(robots):
+            mine = table[(table["part"] == part) & (table["robot"] == robot)].set_index("model").loc[list(_MODELS)]
+            place = np.arange(len(_MODELS))[::-1] + 0.22 * (0.5 * (len(robots) - 1) - number)
+            limits = np.abs(mine[["rms_mm_low", "rms_mm_high"]].to_numpy().T - mine["rms_mm"].to_numpy())
+            axis.errorbar(mine["rms_mm"], place, xerr=limits, fmt="o", ms=3.5, lw=1.2, color=PALETTE[number], label=robot)
+        axis.set_xscale("log")
+        axis.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        axis.set_title(words)
+        axis.set_xlabel("position error, RMS (mm)")
+    axes[0, 0].set_yticks(np.arange(len(_MODELS))[::-1], list(_MODELS.values()))
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=max(len(robots), 1))
+    return figure
+
+
+def draw_closed_loop(job: Any) -> None:
+    """The picture, from reports/closed_loop/closed_loop.csv."""
+    save(closed_loop(pd.read_csv(job.input.summary)), job.output.figure, job.output.picture, Origin(**job.config["origin"]))

@@ -6,7 +6,6 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from matplotlib.ticker import FixedLocator, NullFormatter, NullLocator, StrMethodFormatter
 
 from elastocal.diagnosis.hypotheses import OTHER
@@ -15,14 +14,14 @@ from elastocal.io.atomic_writes import write_text
 from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.io.origin import Origin
 from elastocal.report.words import physical_name
-from elastocal_proof.league.folds import RANDOM
-from elastocal_proof.league.methods import Method
+from elastocal_proof.league.methods import RANDOM, Method
 from elastocal_proof.league.schemas import ENTRIES, MECHANISMS
 from elastocal_proof.league.table import league_page, league_table, mechanism_table
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    import pandas as pd
     from matplotlib.figure import Figure
 
 _SPLITS = {"random": "random poses", "blocks": "blocks of joint space", "session": "another session"}
@@ -37,10 +36,7 @@ _UNKNOWN = "not in the catalogue"
 
 @styled
 def league_picture(table: pd.DataFrame, methods: Mapping[str, Method]) -> Figure:
-    """RMS of every method over that of geometry alone, a panel for each split, a row for each data set.
-
-    `table`: of `table.league_table`.
-    """
+    """RMS of every method over that of geometry alone, a panel for each split, a row for each data set."""
     names = list(dict.fromkeys(table["data"]))
     splits = [split for split in _SPLITS if split in set(table["split"])]
     figure, axes = panels(1, len(splits), 30 + 11 * len(names), sharey=True)
@@ -72,10 +68,7 @@ def league_picture(table: pd.DataFrame, methods: Mapping[str, Method]) -> Figure
 
 @styled
 def mechanism_picture(table: pd.DataFrame) -> Figure:
-    """Mechanisms by data set: the area of a circle is the share of the error, its colour the probability.
-
-    `table`: of `table.mechanism_table`.
-    """
+    """Mechanisms by data set: the area of a circle is the share of the error, its colour the probability."""
     strongest = table.groupby("mechanism")["probability"].max()
     kept = [name for name in strongest.index if strongest[name] >= _LEAST_PROBABLE]
     if not kept:
@@ -123,7 +116,7 @@ def tabulate_league(job: Any) -> None:
     mechanisms = mechanism_table(found, asked.robots, asked.folds)
     for path, one in ((output.league, table), (output.mechanisms, mechanisms)):
         write_csv(path, one)
-    page = league_page(table, mechanisms, pd.read_csv(job.input.published), methods, asked.missing)
+    page = league_page(table, mechanisms, methods, asked.missing)
     write_text(output.page, page)
     for name, file in asked.missing.items():
         print(f"left out of the league: {name}, as {file} is missing in ELASTOCAL_DATA", file=sys.stderr)

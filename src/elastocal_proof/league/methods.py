@@ -1,4 +1,4 @@
-"""A method of the league: a physical model, and perhaps a regression on what it leaves; what is kept of each of its folds."""
+"""Methods of the league on the same folds: a physical model, and perhaps a regression on what it leaves of poses not seen."""
 
 from __future__ import annotations
 
@@ -7,34 +7,55 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from elastocal.campaigns.campaign import columns_of, measurements_from
+from elastocal.campaigns.holdout import blocks_of_poses, configurations, measured_poses
 from elastocal.diagnosis.averaging import squares_explained
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.settings import Settings
 from elastocal.errors import InputError
+from elastocal.fitting.case import Case, case_from
 from elastocal.fitting.tolerances import estimated_noise, fit_declared
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_table, write_table
 from elastocal.loop.diagnosis_tables import diagnosis_facts, parameter_columns, step_fit
+from elastocal.loop.loading import load_whole_campaign
+from elastocal.loop.schemas import measurements
+from elastocal.mechanics.robot_file import joint_count
+from elastocal.random_streams import stream
 from elastocal.remainder.corrected import Plan, corrected, regressions
 from elastocal.validation.fitted_range import outside_poses
 from elastocal.validation.held_out import position_residuals
 from elastocal.validation.placing import placed
-from elastocal_proof.league.folds import RANDOM, load_data_set, rounds
-from elastocal_proof.league.schemas import ENTRIES, FITS, MECHANISMS
+from elastocal_proof.league.schemas import ENTRIES, FITS, FOLDS, MECHANISMS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping, Sequence
+    from pathlib import Path
 
+    from elastocal.campaigns.campaign import Measurements
     from elastocal.diagnosis.diagnose import Diagnosis
-    from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
-    from elastocal.fitting.observations import Observations
-    from elastocal.remainder.protocol import Setting
 
+    Columns = Mapping[str, np.ndarray]
+
+RANDOM, BLOCKS, SESSION = "random", "blocks", "session"
 FRAMES, GEOMETRY, DIAGNOSIS = "frames", "geometry", "diagnosis"
 # Of the steps of a diagnosis only the last is kept.
 _KEPT = 0
+
+
+@dataclass(frozen=True)
+class DataSet:
+    """A data set as its tables hold it: descriptions of the campaign, columns of all measurements (N,), and `dealt` (P,)."""
+
+    descriptions: Mapping[str, Any]
+    columns: Columns
+    dealt: Columns
+
+    def case(self, chosen: np.ndarray | slice = slice(None)) -> Case:
+        """A case of some of the measurements, or of all."""
+        return case_from(self.descriptions, {name: values[chosen] for name, values in self.columns.items()})
 
 
 @dataclass(frozen=True)
@@ -42,9 +63,8 @@ class Method:
     """A method of the league.
 
     `physics`: what is fitted first: frames and targets alone; what the campaign declares too, such as geometry; or what a
-    diagnosis of the training poses finds. `regression`: name of a regression of `remainder`: fitted to what the physical model
-    leaves. `within_range`: whether the regression is left out where a pose lies outside the range of those fitted. `words`:
-    what tables and pictures call it.
+    diagnosis of the training poses finds. `regression`: of `remainder`, fitted to what that leaves. `within_range`: whether it
+    is left out where a pose lies outside the range of those fitted. `words`: what tables and pictures call the method.
     """
 
     physics: str
@@ -53,41 +73,44 @@ class Method:
     words: str = ""
 
 
-@dataclass(frozen=True)
-class Entry:
-    """What a method predicts of poses that it has not seen; arrays of M.
+def load_data_set(descriptions_path: str | Path, measurements_path: str | Path, folds_path: str | Path) -> DataSet:
+    """Read a data set from files as `deal_league_folds` wrote them."""
+    descriptions = read_json(descriptions_path)
+    joints = joint_count(descriptions["robot"], descriptions["source"])
+    return DataSet(descriptions, read_table(measurements_path, measurements(joints)), read_table(folds_path, FOLDS))
 
-    `residual` (M, 3): measured less predicted positions, m, base axes. `std` (M, 3): standard deviation that the method states
-    for them, m; not a number where it states none. `outside` (M,) of bool: whether the pose lies outside the range of the
-    training poses. `setting`: of the regression, as chosen; None without one, or where none helped.
+
+def dealt(seen: Measurements, count: int, draws: np.random.Generator) -> dict[str, np.ndarray]:
+    """Columns (P,) of poses dealt into folds from 1, those of a configuration into one, at random and by blocks of joint space.
+
+    Random folds have neighbours among the poses fitted, so they ask how well a method interpolates; blocks of joint space ask
+    how well it extrapolates [1].
+
+    [1] Roberts, D. R. et al., Cross-validation strategies for data with temporal, spatial, hierarchical, or phylogenetic
+        structure, Ecography 40, 2017.
     """
+    pairs, index = measured_poses(seen)
+    configuration = configurations(seen.joint_angles, index)
+    shuffled = draws.permutation(configuration.max() + 1)[configuration] % count + 1
+    blocks = blocks_of_poses(seen.joint_angles, index, count) + 1
+    return {"session": pairs[:, 0], "pose": pairs[:, 1], RANDOM: shuffled, BLOCKS: blocks}
 
-    observations: Observations
-    residual: np.ndarray
-    std: np.ndarray
-    outside: np.ndarray
-    setting: Setting | None
 
-    def columns(self, fold: int, other: int) -> dict[str, np.ndarray]:
-        """Columns of the entries table (M,) of one fold; `other`: number of the data set that is the test, 0 for the same."""
-        seen, states = self.observations, self.observations.states
-        columns = {"fold": np.full(len(seen), fold), "set": np.full(len(seen), other)}
-        columns |= {name: getattr(states, name)[seen.state] for name in ("session", "pose", "load")}
-        columns |= {"target": seen.target, "outside_range": self.outside}
-        columns |= {f"d{axis}": self.residual[:, number] for number, axis in enumerate("xyz")}
-        return columns | {f"std_{axis}": self.std[:, number] for number, axis in enumerate("xyz")}
+def rounds(split: str, data: DataSet, others: Sequence[DataSet] = ()) -> Iterator[tuple[int, Case, list[Case]]]:
+    """Number, from 1, training poses, and held-out poses of each fold; of `SESSION` these are the robot's other data sets."""
+    if split == SESSION:
+        yield 1, data.case(), [other.case() for other in others]
+        return
+    fold = np.asarray(data.dealt[split])[measured_poses(measurements_from(data.columns))[1]]
+    for number in np.unique(fold):
+        yield int(number), data.case(fold != number), [data.case(fold == number)]
 
 
 def method_from(described: Mapping[str, Any], name: str, source: str) -> Method:
-    """A method as a configuration describes it.
-
-    `described`: ``physics`` and perhaps ``regression`` and ``within_range``. `name`, `source`: named in errors. Raises
-    `InputError`: a regression that the catalogue does not have.
-    """
+    """A method as a configuration describes it. Raises `InputError`: a regression that the catalogue does not have."""
     method = Method(**described)
     if method.regression is not None and method.regression not in regressions():
-        allowed = ", ".join(regressions())
-        raise InputError(source, f"league.methods.{name}.regression", repr(method.regression), allowed)
+        raise InputError(source, f"league.methods.{name}.regression", repr(method.regression), ", ".join(regressions()))
     return method
 
 
@@ -97,22 +120,26 @@ def fitted_physics(physics: str, case: Case) -> Fit:
     return fit_declared(model, case.observations, estimated_noise(case)[0])
 
 
-def entered(method: Method, fitted: Fit, case: Case, held_out: Case, split: str, seed: int) -> Entry:
-    """Predict held-out poses.
+def entered(
+    method: Method, fitted: Fit, case: Case, held_out: Case, split: str, seed: int
+) -> tuple[dict[str, np.ndarray], Any]:
+    """Columns (M,) of what a method, fitted to the poses of a case, predicts of held-out ones, and the regression's setting.
 
-    A regression is tuned by the same kind of split that judges, within the training poses, see `remainder.corrected`. Poses of
-    another campaign have their frames and targets fitted to them, whatever the method.
-
-    `fitted`: its physical model, fitted to the training poses. `case`: of the training poses.
+    A regression is tuned within the training poses by the same kind of split that judges, see `remainder.corrected`; frames and
+    targets of another campaign are fitted to it, whatever the method. What a method does not state is not a number.
     """
-    beyond, there = outside_poses(fitted, case, held_out), held_out.observations
-    if method.regression is not None:
+    seen, setting, std = held_out.observations, None, None
+    if method.regression is None:
+        residual = position_residuals(*placed(fitted, case, held_out), seen)
+    else:
         plan = Plan(method.regression, blocks=split != RANDOM, within_range=method.within_range, seed=seed)
         found = corrected(plan, fitted, case, held_out)
-        std = np.full_like(found.residual, np.nan) if found.std is None else found.std
-        return Entry(there, found.residual, std, beyond[there.cluster], found.chosen.setting)
-    residual = position_residuals(*placed(fitted, case, held_out), there)
-    return Entry(there, residual, np.full_like(residual, np.nan), beyond[there.cluster], None)
+        residual, std, setting = found.residual, found.std, found.chosen.setting
+    columns = {name: getattr(seen.states, name)[seen.state] for name in ("session", "pose", "load")}
+    columns |= {"target": seen.target, "outside_range": outside_poses(fitted, case, held_out)[seen.cluster]}
+    for head, values in (("d", residual), ("std_", np.full_like(residual, np.nan) if std is None else std)):
+        columns |= {f"{head}{axis}": values[:, number] for number, axis in enumerate("xyz")}
+    return columns, setting
 
 
 def fold_tables(diagnosis: Diagnosis, fold: int) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -132,8 +159,7 @@ def mechanism_columns(diagnosis: Diagnosis, fold: int) -> dict[str, np.ndarray |
     """Columns of the mechanisms table (K,) of one fold; none where the data are at fault.
 
     The share of a mechanism is the sum of squares that it displaces the measurements by, beyond what geometry and frames take
-    up, over that of the residual which these leave; all in units of the noise. Mechanisms that resemble each other share, so
-    shares need not add up to that of all together.
+    up, over that of the residual which these leave, in units of the noise. Mechanisms that resemble each other share it.
     """
     mechanisms: Mapping[str, float] = {}
     shares: list[float] = []
@@ -141,12 +167,18 @@ def mechanism_columns(diagnosis: Diagnosis, fold: int) -> dict[str, np.ndarray |
         mechanisms, best, problem = evidence.conclusion.mechanisms, evidence.conclusion.best, evidence.linearized.problem
         explained = squares_explained(problem, evidence.posterior.models[best.model]) if best.named else {}
         shares = [explained.get(name, 0.0) / float(problem.statistics.squares[0]) for name in mechanisms]
-    return {
-        "fold": np.full(len(mechanisms), fold),
-        "mechanism": [*mechanisms],
-        "probability": np.array([*mechanisms.values()], float),
-        "share": np.array(shares, float),
-    }
+    columns: dict[str, np.ndarray | list[str]] = {"fold": np.full(len(mechanisms), fold), "mechanism": [*mechanisms]}
+    return columns | {"probability": np.array([*mechanisms.values()], float), "share": np.array(shares, float)}
+
+
+def deal_league_folds(job: Any) -> None:
+    """A data set of the league, checked, with its poses dealt into folds."""
+    descriptions, seen = load_whole_campaign(job.params.folder, job.params.robots)
+    origin = provenance(job.params, **job.wildcards)
+    draws = stream(job.params.seed, job.wildcards.data, "league folds", 0)
+    write_table(job.output.measurements, measurements(seen.joint_angles.shape[1]), [columns_of(seen)], origin)
+    write_table(job.output.folds, FOLDS, [dealt(seen, job.params.folds, draws)], origin)
+    write_json(job.output.descriptions, descriptions)
 
 
 def diagnose_league_folds(job: Any) -> None:
@@ -176,7 +208,7 @@ def enter_league(job: Any) -> None:
         else:
             fitted = fitted_physics(method.physics, training)
         for number, held_out in enumerate(tests, 1 if others else 0):
-            entry = entered(method, fitted, training, held_out, split, job.params.seed)
-            blocks.append(entry.columns(fold, number))
-            settings[str(fold)] = entry.setting
+            columns, settings[str(fold)] = entered(method, fitted, training, held_out, split, job.params.seed)
+            count = len(columns["pose"])
+            blocks.append({"fold": np.full(count, fold), "set": np.full(count, number)} | columns)
     write_table(job.output.entries, ENTRIES, blocks, provenance(job.params, chosen=settings, **job.wildcards))

@@ -12,8 +12,7 @@ from elastocal.counting import counted
 from elastocal.random_streams import stream
 from elastocal.remainder.tuning import NORMAL_WIDTH
 from elastocal.validation.held_out import Errors, intervals, share_below_largest, summary
-from elastocal_proof.league.folds import BLOCKS, RANDOM, SESSION
-from elastocal_proof.league.methods import DIAGNOSIS
+from elastocal_proof.league.methods import BLOCKS, DIAGNOSIS, RANDOM, SESSION
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -39,14 +38,12 @@ _LEAST_PROBABLE = 0.05
 
 
 def league_table(entries: Entries, robots: Mapping[str, Sequence[str]], reference: str, seed: int) -> pd.DataFrame:
-    """One row for each data set, split and method.
+    """One row for each data set, split and method, all of whose methods predict the same poses.
 
-    `entries`: all methods of a data set and split predict the same poses. `robots`: data sets by the names of their robots.
-    `reference`: method whose RMS the others' are divided by. `seed`: of the bootstrap over poses. Returns ``robot, data, split,
-    method, poses``; ``rms_mm`` with 95 % limits over poses, ``p95_mm``, ``max_mm`` and the share of all poses that stay below
-    it at 95 % confidence; ``ratio``, the RMS over that of the reference on the same poses, with 95 % limits; ``ratio_to_best``
-    the same over the best of the row's data set and split; ``covered``, the share of coordinates inside the 95 % intervals that
-    the method states; ``outside``, the share of poses outside the range of the training poses.
+    `robots`: data sets by the names of their robots. RMS with 95 % limits by a bootstrap over poses; ``share_below_max``: of
+    all such poses, at 95 % confidence; ``ratio``: RMS over that of the reference, ``ratio_to_best``: over the best of the row's
+    data set and split; ``covered``: coordinates inside the 95 % intervals that the method states; ``outside``: poses outside
+    the range of the training poses.
     """
     robot_of = {data: robot for robot, names in robots.items() for data in names}
     rows: list[dict[str, Any]] = []
@@ -60,12 +57,8 @@ def league_table(entries: Entries, robots: Mapping[str, Sequence[str]], referenc
         for number, (method, part) in enumerate(mine.items()):
             figures, (low, high) = summary(errors[number].distance), limits[number]["rms_m"]
             row: dict[str, Any] = {"robot": robot_of[data], "data": data, "split": split, "method": method}
-            row |= {
-                "poses": errors[number].poses,
-                "rms_mm": 1e3 * rms[number],
-                "rms_low_mm": 1e3 * low,
-                "rms_high_mm": 1e3 * high,
-            }
+            row |= {"poses": errors[number].poses, "rms_mm": 1e3 * rms[number]}
+            row |= {"rms_low_mm": 1e3 * low, "rms_high_mm": 1e3 * high}
             row |= {"p95_mm": 1e3 * figures["p95_m"], "max_mm": 1e3 * figures["max_m"]}
             row |= {"share_below_max": share_below_largest(errors[number].poses)}
             for (name, place), reduction in zip(places.items(), (over, to_best), strict=True):
@@ -77,11 +70,9 @@ def league_table(entries: Entries, robots: Mapping[str, Sequence[str]], referenc
 
 
 def mechanism_table(found: Mapping[str, pd.DataFrame], robots: Mapping[str, Sequence[str]], folds: int) -> pd.DataFrame:
-    """Mechanisms of each data set over the diagnoses of its folds.
+    """Mechanisms of each data set over the diagnoses of its folds: mean, least and largest probability and share.
 
-    `found`: rows of the mechanisms table of the random split, by data set. `robots`: data sets by the names of their robots.
-    Returns ``robot, data, mechanism``, and of ``probability`` and ``share`` the mean over folds, the least and the largest. A
-    fold that does not list a mechanism counts as probability and share 0.
+    `found`: rows of the mechanisms table of the random split, by data set. A fold that does not list a mechanism counts as 0.
     """
     rows = []
     for robot, data in ((robot, data) for robot, names in robots.items() for data in names):
@@ -106,26 +97,15 @@ def _covered(entries: pd.DataFrame) -> float:
 
 
 def league_page(
-    table: pd.DataFrame,
-    mechanisms: pd.DataFrame,
-    published: pd.DataFrame,
-    methods: Mapping[str, Method],
-    missing: Mapping[str, str],
+    table: pd.DataFrame, mechanisms: pd.DataFrame, methods: Mapping[str, Method], missing: Mapping[str, str]
 ) -> str:
-    """Tables of the league as Markdown.
-
-    `published`: Figures of other people: ``data, rms_mm, what, source, why``. `missing`: data sets that were left out, with the
-    file that each lacks.
-    """
+    """Tables of the league as Markdown; `missing`: data sets that were left out, with the file that each lacks."""
     words = {name: method.words or name for name, method in methods.items()}
     table = table.assign(best=table.groupby(["data", "split"])["rms_mm"].transform("min"))
 
     def error(each: Row) -> str:
         rms, low, high, most = (_shown(each[key], each["rms_mm"]) for key in ("rms_mm", "rms_low_mm", "rms_high_mm", "max_mm"))
         return f"{f'**{rms}**' if each['rms_mm'] == each['best'] else rms} ({low}–{high}), {most}"
-
-    def covered(each: Row) -> str:
-        return f"{100 * each['covered']:.1f} %"
 
     parts = [f"Left out: {_words(name)}, as {file} is missing." for name, file in missing.items()]
     parts.append(_lead(table, {name for name, method in methods.items() if method.physics == DIAGNOSIS}))
@@ -137,9 +117,13 @@ def league_page(
             winners = f"Smallest RMS error of {counted(int(counts.sum()), 'data set')}: {each}."
             parts += [f"## {title}", winners, folded(_ERRORS, _wide(mine, ["data", "poses"], words, error))]
     stated = table.dropna(subset="covered")
-    parts += ["## Intervals", _coverage_sentence(stated, words)]
-    parts += [folded(_COVERED, _wide(stated, ["data", "split"], words, covered))]
-    parts += ["## Published figures", _published(published, table)]
+    # The middle of the coverages of each method, and their range.
+    medians = [
+        f"{words[str(name)]} {100 * part.median():.0f} % (from {100 * part.min():.0f} to {100 * part.max():.0f})"
+        for name, part in stated.groupby("method", sort=False)["covered"]
+    ]
+    parts += ["## Intervals", f"Median over data sets and splits: {'; '.join(medians)}."]
+    parts += [folded(_COVERED, _wide(stated, ["data", "split"], words, lambda each: f"{100 * each['covered']:.1f} %"))]
     parts += ["## Mechanisms", folded(_FOUND, _mechanisms(mechanisms))]
     return "\n\n".join(parts) + "\n"
 
@@ -176,25 +160,6 @@ def _lead(table: pd.DataFrame, ours: set[str]) -> str:
         f"A method that diagnoses has the smallest RMS error in {len(won)} of {len(won) + len(lost)} rows, in {sum(won)} with"
         f" 95 % confidence against each other method; another has it in {len(lost)}, in {sum(lost)} with that confidence."
     )
-
-
-def _coverage_sentence(stated: pd.DataFrame, words: Mapping[str, str]) -> str:
-    """The middle of the coverages of each method, and their range."""
-    each = [
-        f"{words[str(name)]} {100 * part.median():.0f} % (from {100 * part.min():.0f} to {100 * part.max():.0f})"
-        for name, part in stated.groupby("method", sort=False)["covered"]
-    ]
-    return f"Median over data sets and splits: {'; '.join(each)}."
-
-
-def _published(published: pd.DataFrame, table: pd.DataFrame) -> str:
-    ours = table[table["split"] == RANDOM].groupby("data")["rms_mm"].min().to_dict()
-    rows = []
-    for each in published[published["data"].isin(list(ours))].to_dict("records"):
-        best = ours[each["data"]]
-        row = {"data": _words(each["data"]), "published, mm": each["rms_mm"], "what": each["what"], "source": each["source"]}
-        rows.append(row | {"best here, RMS of unseen poses, mm": _shown(best, best), "why": each["why"]})
-    return markdown(rows)
 
 
 def _mechanisms(table: pd.DataFrame) -> str:

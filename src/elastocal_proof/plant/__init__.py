@@ -1,8 +1,7 @@
 """A physical robot to be blind about: MuJoCo statics with defects, its tracker, its load cell, and the campaigns made with it.
 
-Nothing here shares kinematic, elastic or statistical code with the analysis. Of elastocal only `errors` is imported, so that an
-agreement of the two is a finding and not the same line of code run twice. The
-laws of the defects are on purpose not those of the catalogue: what the analysis fits is never exactly what was done.
+Of elastocal only `errors` is imported, and the laws of the defects are on purpose not those of the catalogue, so that an
+agreement of the two is a finding and not the same line of code run twice.
 """
 
-from elastocal_proof.plant import catalogued, outside  # noqa: F401 - they enter their defects into the table of kinds
+from elastocal_proof.plant import laws  # noqa: F401 - it enters its defects into the table of kinds

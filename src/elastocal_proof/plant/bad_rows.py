@@ -6,20 +6,21 @@ stood, in the median row, from where it was read had it been as the row says.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from elastocal_proof.plant.arm import rotation_vector, turned
 from elastocal_proof.plant.campaigns import WRENCH
-from elastocal_proof.plant.kinds import direction
+from elastocal_proof.plant.laws import direction, sign
 from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, seen_poses
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from elastocal_proof.plant.campaigns import Table
+
+    # Its kind, and of the table, from 0, the rows in which something wrong stands.
+    Slip = dict[str, Any]
 
 POSITION, ROTATION, JOINT_ANGLE, LOAD = "position", "rotation", "joint_angle", "load"
 HELD_POINT, ZEROS, SWAPPED = "held_point", "zeros", "swapped"
@@ -31,15 +32,8 @@ SMALLEST, LARGEST = 5.0, 1e5
 _OF_ONE_ROW_RAD = 0.019
 # A wrong load is at most so many times the largest one; a joint is drawn among those that move a point by more than this.
 _LARGEST_LOAD, _LEVER_M, _STEP_RAD = 100.0, 0.01, 1e-4
-_XYZ, _TURN = ("x", "y", "z"), ("rx", "ry", "rz")
-
-
-@dataclass(frozen=True)
-class BadReading:
-    """One slip; `rows`: of the table, from 0, in which something wrong stands."""
-
-    kind: str
-    rows: tuple[int, ...]
+# A wrong angle, its opposite, or as much as leaves the joints within their limits: a controller shows no others.
+_SHARES = np.outer(2.0 ** -np.arange(40), [1.0, -1.0]).ravel()
 
 
 def possible_kinds(table: Table) -> tuple[str, ...]:
@@ -50,7 +44,7 @@ def possible_kinds(table: Table) -> tuple[str, ...]:
 
 def with_bad_rows(
     table: Table, robot: PhysicalRobot, schedule: Schedule, kind: str, count: int, draws: np.random.Generator
-) -> tuple[Table, list[BadReading]]:
+) -> tuple[Table, list[Slip]]:
     """A measured table in which some rows, of different poses, are wrong; of swapped ones always two.
 
     `table`: as `campaigns.measured_table` gives it for this robot and schedule. `kind`: of `possible_kinds`.
@@ -64,19 +58,19 @@ def with_bad_rows(
     sizes = SMALLEST * (LARGEST / SMALLEST) ** draws.random(len(rows))
     if kind in (JOINT_ANGLE, LOAD):
         wrong = _wrong_angles if kind == JOINT_ANGLE else _wrong_loads
-        return bad, [BadReading(kind, found) for found in wrong(bad, table, robot, schedule, rows, sizes, draws)]
-    read, tracker = [name for name in (*_XYZ, *_TURN) if name in table], robot.tracker
+        return bad, [{"kind": kind, "rows": found} for found in wrong(bad, robot, schedule, rows, sizes, draws)]
+    read = [name for name in ("x", "y", "z", "rx", "ry", "rz") if name in table]
+    before = np.array([table[name] for name in read])
+    after = before.copy()
     for row, other, size in zip(rows, rows[::-1], sizes, strict=True):
         if kind == POSITION:
-            _put(bad, _XYZ, row, _at(table, _XYZ, row) + size * tracker.sigma_m * direction(draws))
+            after[:3, row] += size * robot.tracker.sigma_m * direction(draws)
         elif kind == ROTATION:
-            turn = min(size * tracker.sigma_rad, np.pi) * direction(draws)
-            _put(bad, _TURN, row, rotation_vector(turned(turn) @ turned(_at(table, _TURN, row))))
-        elif kind == ZEROS:
-            _put(bad, read, row, np.zeros(len(read)))
+            turn = min(size * robot.tracker.sigma_rad, np.pi) * direction(draws)
+            after[3:, row] = rotation_vector(turned(turn) @ turned(before[3:, row]))
         else:
-            _put(bad, read, row, _at(table, read, row - 1 if kind == HELD_POINT else other))
-    return bad, [BadReading(kind, (row,)) for row in rows]
+            after[:, row] = 0.0 if kind == ZEROS else before[:, row - 1 if kind == HELD_POINT else other]
+    return bad | dict(zip(read, after, strict=True)), [{"kind": kind, "rows": (row,)} for row in rows]
 
 
 def _seen(table: Table, robot: PhysicalRobot, schedule: Schedule, **changes: Any) -> np.ndarray:
@@ -88,67 +82,43 @@ def _seen(table: Table, robot: PhysicalRobot, schedule: Schedule, **changes: Any
 
 
 def _wrong_angles(
-    bad: Table,
-    table: Table,
-    robot: PhysicalRobot,
-    schedule: Schedule,
-    rows: Sequence[int],
-    sizes: np.ndarray,
-    draws: np.random.Generator,
+    bad: Table, robot: PhysicalRobot, schedule: Schedule, rows: list[int], sizes: np.ndarray, draws: np.random.Generator
 ) -> list[tuple[int, ...]]:
     arm, names, found = robot.arm, [f"q{joint}" for joint in range(1, robot.arm.joints + 1)], []
-    before, levers = _seen(table, robot, schedule), dict[int, float]()
+    before, levers = _seen(bad, robot, schedule), dict[int, float]()
     for row, size in zip(rows, sizes, strict=True):
         for joint in draws.permutation(arm.joints):
             if joint not in levers:
                 # By how much the joint, as the controller shows it, moves a measured point in the median row.
                 step = arm.reported_matrix[:, joint] * _STEP_RAD
-                moved = np.linalg.norm(_seen(table, robot, schedule, angle=schedule.angle + step) - before, axis=1)
+                moved = np.linalg.norm(_seen(bad, robot, schedule, angle=schedule.angle + step) - before, axis=1)
                 levers[joint] = float(np.median(moved)) / _STEP_RAD
             if levers[joint] > _LEVER_M:
                 break
-        off = min(size * robot.tracker.sigma_m / levers[joint], np.pi) * draws.choice([-1.0, 1.0])
-        shown, turn = _at(table, names, row), (np.arange(arm.joints) == joint).astype(float)
-        # Or its opposite, or as much as leaves the joints within their limits: a controller shows no others.
-        for share in (1.0, -1.0, *(sign * 2.0**-power for power in range(1, 40) for sign in (1.0, -1.0))):
-            angles = arm.angles_shown_as((shown + share * off * turn)[None])[0]
-            if ((angles >= arm.limits[:, 0]) & (angles <= arm.limits[:, 1])).all():
-                break
-        off = share * off
-        found.append(_rows_of_slip(table, row, abs(off) > _OF_ONE_ROW_RAD, draws))
-        bad[names[joint]][list(found[-1])] += off
+        off = _SHARES * min(size * robot.tracker.sigma_m / levers[joint], np.pi) * sign(draws)
+        shown = np.tile([bad[name][row] for name in names], (len(off), 1))
+        shown[:, joint] += off
+        angles = arm.angles_shown_as(shown)
+        chosen = off[np.argmax(((angles >= arm.limits[:, 0]) & (angles <= arm.limits[:, 1])).all(axis=1))]
+        found.append(_rows_of_slip(bad, row, abs(chosen) > _OF_ONE_ROW_RAD, draws))
+        bad[names[joint]][list(found[-1])] += chosen
     return found
 
 
 def _wrong_loads(
-    bad: Table,
-    table: Table,
-    robot: PhysicalRobot,
-    schedule: Schedule,
-    rows: Sequence[int],
-    sizes: np.ndarray,
-    draws: np.random.Generator,
+    bad: Table, robot: PhysicalRobot, schedule: Schedule, rows: list[int], sizes: np.ndarray, draws: np.random.Generator
 ) -> list[tuple[int, ...]]:
     """Loads of the same line and another size, as by a slipped decimal point or a wrong unit."""
-    force, targets, found = np.linalg.norm(schedule.force, axis=1), len(np.unique(table["target"])), []
-    without = _seen(table, robot, schedule, force=np.zeros_like(schedule.force))
-    usual_m = float(np.median(np.linalg.norm(_seen(table, robot, schedule) - without, axis=1)[table["load"] != 0]))
+    force, targets, found = np.linalg.norm(schedule.force, axis=1), len(np.unique(bad["target"])), []
+    without = _seen(bad, robot, schedule, force=np.zeros_like(schedule.force))
+    usual_m = float(np.median(np.linalg.norm(_seen(bad, robot, schedule) - without, axis=1)[bad["load"] != 0]))
     for row, size in zip(rows, sizes, strict=True):
         most = _LARGEST_LOAD * force.max() / force[row // targets]
-        share = min(size * robot.tracker.sigma_m / usual_m, most) * draws.choice([-1.0, 1.0])
-        found.append(_rows_of_slip(table, row, False, draws))
+        share = min(size * robot.tracker.sigma_m / usual_m, most) * sign(draws)
+        found.append(_rows_of_slip(bad, row, False, draws))
         for name in WRENCH:
             bad[name][list(found[-1])] *= 1.0 + share
     return found
-
-
-def _at(table: Table, names: Sequence[str], row: int) -> np.ndarray:
-    return np.array([table[name][row] for name in names])
-
-
-def _put(table: Table, names: Sequence[str], row: int, values: np.ndarray) -> None:
-    for name, value in zip(names, values, strict=True):
-        table[name][row] = value
 
 
 def _rows_of_slip(table: Table, row: int, whole_pose: bool, draws: np.random.Generator) -> tuple[int, ...]:

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal_proof.plant.arm import rotation_vector
-from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, read_poses, seen_poses
-from elastocal_proof.plant.random_numbers import stream
+from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, logged_temperature, read_poses, stream
 
 if TYPE_CHECKING:
     from elastocal_proof.plant.arm import Arm
@@ -23,25 +22,20 @@ FLANGE = "flange"
 SECONDS_PER_STATE = 25.0
 # On arms of such a reach a lever of half a metre is usual.
 _LONG_M = 2.5
-# Waves of each joint's path in the tracker's dynamic mode: how many, and between which periods.
-_WAVES, _PERIODS_S = 5, (30.0, 240.0)
-_AT_ONCE = 20_000
 
 
 @dataclass(frozen=True)
 class Design:
     """How a campaign is made, and what is written down of it.
 
-    `held_out`: the last poses, which no step of the analysis may see before its last. `force_N`: largest force; its direction
-    is random in each pose. None: what suits the arm, `usual_force_N`. `force_times`: how many times that force is really meant.
-    `ladder`: shares of it, 0 first: each is a load. `lever_m`: from the flange to where the force acts, base axes; shorter in
-    proportion on an arm of less than 2.5 m. `repeats`, `repeated_poses`: how often loads 0 and 1 of the first poses are read.
-    `approach_each_load`: whether each load is approached afresh; otherwise loads of one pose follow each other without a move.
-    `points`: measuring points with a target each, or `FLANGE`; empty for all. `covariates`: which of `COVARIATES` are written
-    down. `declared_noise` (float, float): standard deviations that the campaign claims, m and rad; right or wrong. `declared`:
-    effects that the campaign says its model has. `measured`: one of "pose", "position". `frame`: one of "base", "tracker".
-    `reach`: share of the joint limits, about their middle, that poses are drawn from. `undeclared`: keys of the robot file that
-    the analyst's lacks.
+    `held_out`: the last poses. `force_N`: largest force, of a random direction in each pose; None: what suits the arm;
+    `force_times`: how many times that is really meant. `ladder`: shares of it, 0 first: each is a load. `lever_m`: from the
+    flange to where the force acts, base axes; shorter in proportion on an arm of less than 2.5 m. `repeats`, `repeated_poses`:
+    how often loads 0 and 1 of the first poses are read. `approach_each_load`: whether each load is approached afresh; otherwise
+    loads of one pose follow each other without a move. `points`: measuring points with a target each, or `FLANGE`; empty for
+    all. `covariates`: which are written down. `declared_noise`: standard deviations that the campaign claims, m and rad.
+    `declared`: effects that its model has. `measured`: "pose" or "position". `frame`: "base" or "tracker". `reach`: share of
+    the joint limits, about their middle, that poses are drawn from. `undeclared`: keys that the analyst's robot file lacks.
     """
 
     poses: int = 30
@@ -66,9 +60,6 @@ class Design:
     def targets_on(self, arm: Arm) -> tuple[str, ...]:
         """Names of the measuring points that have a target."""
         return tuple(arm.points[-1] if point == FLANGE else point for point in self.points) or arm.points
-
-
-DYNAMIC = Design(points=(FLANGE,), measured="position", covariates=("time",))
 
 
 def usual_force_N(arm: Arm) -> float:  # noqa: N802 - units in names keep their case
@@ -141,55 +132,10 @@ def measured_table(robot: PhysicalRobot, design: Design, schedule: Schedule) -> 
     covariates = {
         "approach": dict(zip([f"approach{j}" for j in joints], each(schedule.sense.astype(float)).T, strict=True)),
         "time": {"time_s": each(schedule.time_s)},
-        "temperature": {"temperature_c": each(robot.warmth.shown(schedule.time_s))},
+        "temperature": {"temperature_c": each(logged_temperature(schedule.time_s))},
     }
     for covariate in design.covariates:
         table |= covariates[covariate]
     # Minus zeros are products of the ladder's zero and mean nothing.
     table = {name: column + 0.0 if column.dtype.kind == "f" else column for name, column in table.items()}
     return table, [(int(state), arm.points[target]) for state, target in np.argwhere(outlier) if target in at]
-
-
-def dynamic_table(robot: PhysicalRobot, measurements: int, seed: int, rate_hz: float = 1000.0) -> Table:
-    """Columns (measurements,) of the file of a tracker in its dynamic mode, as `measured_table` has them.
-
-    One target on the flange is read while the arm moves without a load, each measurement a pose of its own. Quasi-static: the
-    arm yields under its own weight and to its drives' errors as at rest, and what acceleration does is left out; so the path is
-    slow: a few waves of incommensurable periods of each joint within its limits.
-    """
-    arm, time = robot.arm, np.arange(1, measurements + 1) / rate_hz
-    draws, shape = stream(seed, "moving path"), (_WAVES, robot.arm.joints)
-    frequency = 2.0 * np.pi / np.exp(draws.uniform(np.log(_PERIODS_S[0]), np.log(_PERIODS_S[1]), shape))
-    phase, weight = draws.uniform(0.0, 2.0 * np.pi, shape), draws.uniform(0.5, 1.0, shape)
-    # Slower waves are the larger ones, so that no joint hurries.
-    weight = weight / frequency
-    low, high = arm.limits.T
-    size = 0.5 * (high - low) * weight / weight.sum(axis=0)
-    angle, position = np.empty((measurements, arm.joints)), np.empty((measurements, 1, 3))
-    for start in range(0, measurements, _AT_ONCE):
-        part = slice(start, start + _AT_ONCE)
-        turns = time[part, None, None] * frequency + phase
-        angle[part] = 0.5 * (low + high) + (size * np.sin(turns)).sum(axis=1)
-        sense = np.sign((size * frequency * np.cos(turns)).sum(axis=1)).astype(int)
-        still, nothing = np.zeros((len(turns), 3)), np.zeros(len(turns), int)
-        moving = Schedule(
-            angle[part],
-            still,
-            still,
-            nothing,
-            nothing,
-            nothing,
-            approach=nothing,
-            sense=sense,
-            previous=nothing - 1,
-            time_s=time[part],
-            training=nothing == 0,
-            seed=seed,
-        )
-        position[part] = seen_poses(robot, moving)[0][:, -1:]
-    facing = np.broadcast_to(np.eye(3), (measurements, 1, 3, 3))
-    read, shown, count = robot.tracker.read(position, facing, stream(seed, "readings"))[0], arm.shown_angles(angle), len(time)
-    table = {"pose": np.arange(count), "load": np.zeros(count, int), "repeat": np.zeros(count, int)}
-    table |= {"target": np.full(count, arm.points[-1])} | {f"q{j + 1}": shown[:, j] for j in range(arm.joints)}
-    table |= {name: np.zeros(count) for name in WRENCH}
-    return table | dict(zip("xyz", read[:, 0].T, strict=True)) | {"time_s": time}

@@ -1,8 +1,7 @@
 """Defects: all that can be wrong with a physical robot, named as in the catalogue, or ``outside:...`` where it is not there.
 
-The table of their kinds, which `catalogued` and `outside` fill, the joints at which they can be, and what they change. A defect
-has one size, which scales it, and a seed, from which its other details (directions, phases, thresholds) are drawn; they do not
-change with the size.
+The table of their kinds, which `laws` fills, and the joints at which they can be. A defect has one size, which scales it, and a
+seed, from which its other details (directions, phases, thresholds) are drawn; they do not change with the size.
 """
 
 from __future__ import annotations
@@ -17,20 +16,16 @@ from scipy.constants import g as standard_gravity
 
 from elastocal.errors import InputError
 from elastocal_proof.plant.arm import Arm
-from elastocal_proof.plant.machine import Mass
-from elastocal_proof.plant.physical_robot import DriveLaw, PhysicalRobot, Schedule
-from elastocal_proof.plant.random_numbers import stream
-from elastocal_proof.plant.weights import declared_masses, on_stretches, usual_gravity_torque
+from elastocal_proof.plant.machine import Mass, on_stretches, usual_gravity_torque
+from elastocal_proof.plant.physical_robot import PhysicalRobot, stream
 
 OUTSIDE = "outside:"
-TURN = 2 * np.pi
 Draws = np.random.Generator
 Location = tuple[int, ...]
 # The defective robot, and those parameters that the catalogue's law of this effect has in common with what was done, by the
 # catalogue's names; exactly or to first order in the size.
 Applied = tuple[PhysicalRobot, dict[str, float]]
 _SHORTEST_LINK_M = 0.1
-_HEAVY_REACH_M = 2.5
 # Share of the largest torque below which a weight does not turn a joint.
 _NO_TORQUE = 0.003
 
@@ -79,6 +74,11 @@ def each_joint(arm: Arm) -> list[Location]:
     return [(joint,) for joint in range(1, arm.joints + 1)]
 
 
+def joints_from(first: int) -> Callable[[Arm], list[Location]]:
+    """But for the last."""
+    return lambda arm: [(joint,) for joint in range(first, arm.joints)]
+
+
 def each_pair(arm: Arm) -> list[Location]:
     return list(combinations(range(1, arm.joints + 1), 2))
 
@@ -110,80 +110,8 @@ def weighing_links(arm: Arm) -> dict[Location, int]:
 
 
 def weighed(arm: Arm) -> list[Location]:
-    everything = turned_by(arm, on_stretches(declared_masses(arm), arm))
+    everything = turned_by(arm, on_stretches(arm.masses, arm))
     return list(dict.fromkeys([*weighing_links(arm), everything]))
-
-
-# What defects do
-
-
-def direction(draws: Draws) -> np.ndarray:
-    vector = draws.standard_normal(3)
-    return vector / np.linalg.norm(vector)
-
-
-def named(start: str, vector: Iterable[float], axes: Iterable[str] = "xyz") -> dict[str, float]:
-    return {f"{start}{axis}": value for axis, value in zip(axes, vector, strict=True)}
-
-
-def sign(draws: Draws) -> float:
-    return float(draws.choice([-1.0, 1.0]))
-
-
-def driven(robot: PhysicalRobot, joint: int, law: DriveLaw) -> PhysicalRobot:
-    return replace(robot, drives=(*robot.drives, (joint, law)))
-
-
-def geared(robot: PhysicalRobot, joint: int, law: Callable[[Schedule, np.ndarray], np.ndarray]) -> PhysicalRobot:
-    """With a law of the torque on this joint alone."""
-    return replace(robot, gears=(*robot.gears, (joint, lambda done, torque, _: law(done, torque[:, joint]))))
-
-
-def built(robot: PhysicalRobot, **changes: Any) -> PhysicalRobot:
-    return replace(robot, structure=replace(robot.structure, **changes))
-
-
-def waving(robot: PhysicalRobot, joint: int, *waves: tuple[float, float, float]) -> PhysicalRobot:
-    """Teeth and eccentric wheels: the sum of a_k sin(k q + phase_k); `waves`: order k, perhaps no integer, a_k, phase_k."""
-
-    def turn(done: Schedule) -> np.ndarray:
-        q = done.angle[:, joint]
-        return sum((size * np.sin(order * q + phase) for order, size, phase in waves), np.zeros_like(q))
-
-    return driven(robot, joint, turn)
-
-
-def stiff_by_angle(robot: PhysicalRobot, joint: int, of: int, size: float, phase: float) -> PhysicalRobot:
-    """The stiffness, not the compliance, is a cosine of an angle: theta = c (1 / (1 + e cos(q_of - phase)) - 1) tau."""
-    compliance = robot.compliance[joint]
-    return geared(
-        robot, joint, lambda done, torque: compliance * (1 / (1 + size * np.cos(done.angle[:, of] - phase)) - 1) * torque
-    )
-
-
-def usual_torque_Nm(robot: PhysicalRobot, joint: int) -> float:  # noqa: N802 - units in names keep their case
-    """Torque on a joint as its gear is made for: that of the weight it carries, and of a usual load on top.
-
-    Of a kilonewton at a heavy arm: 1500 N m by the arm's reach before the wrist, 450 N m by the tool's half metre behind it.
-    """
-    arm, structure = robot.arm, robot.structure
-    load = (1500.0 if joint < arm.joints - 3 else 450.0) * arm.load_share * min(1.0, arm.reach_m / _HEAVY_REACH_M)
-    return load + float(usual_gravity_torque(arm, structure.masses, structure.gravity_m_s2)[joint])
-
-
-def drawn_frame(robot: PhysicalRobot, error: str, draws: Draws) -> tuple[str, ...]:
-    """In the flange's axes or not, beside the errors of the load cell that are so already."""
-    return (*robot.cell.in_flange, error) if draws.integers(2) else robot.cell.in_flange
-
-
-def wrong_cell(robot: PhysicalRobot, error: str, draws: Draws, parameters: dict[str, float], **changes: Any) -> Applied:
-    """The error in a frame that is drawn, of a cell at a location that is drawn.
-
-    The catalogue's laws leave the moment as stated; those of a cell in the pull are not comparable.
-    """
-    frame, mount = drawn_frame(robot, error, draws), ("pull", "flange")[draws.integers(2)]
-    wrong = replace(robot, cell=replace(robot.cell, in_flange=frame, mount=mount, **changes))
-    return wrong, parameters if mount == "flange" else {}
 
 
 @dataclass(frozen=True)
@@ -200,10 +128,10 @@ class Defect:
     seed: int = 0
 
 
-def with_defects(robot: PhysicalRobot, defects: Iterable[Defect]) -> PhysicalRobot:
-    """A robot with defects, one after another."""
+def with_defects(robot: PhysicalRobot, defects: Iterable[Defect], times: float = 1.0) -> PhysicalRobot:
+    """A robot with defects, one after another, each so many times as large."""
     for defect in defects:
-        robot = _applied(robot, defect)[0]
+        robot = _applied(robot, replace(defect, size=times * defect.size))[0]
     return robot
 
 

@@ -1,8 +1,7 @@
 """An arm as a MuJoCo model [1], and where it comes to rest.
 
 Each drive is a commanded hinge and, in series, a hinge that springs; foot, bearings and flange spring too, and elastic links
-are Timoshenko beams [2] lumped into segments. Kinematics and the forces on all coordinates are MuJoCo's; what a spring yields
-under its force is the plant's own law, so the model itself has no joint stiffness.
+are Timoshenko beams [2] lumped into segments. Kinematics and forces are MuJoCo's; what springs yield is the plant's own law.
 
 [1] Todorov, E., Erez, T. and Tassa, Y., MuJoCo: a physics engine for model-based control, IEEE/RSJ International Conference on
     Intelligent Robots and Systems, 2012.
@@ -12,9 +11,9 @@ under its force is the plant's own law, so the model itself has no joint stiffne
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from types import MappingProxyType
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -22,13 +21,13 @@ from scipy.constants import g as standard_gravity
 from scipy.spatial.transform import Rotation
 
 from elastocal.errors import InputError
-from elastocal_proof.plant.arm import Arm, Stretch, turned
+from elastocal_proof.plant.arm import Arm, LinkMass, Stretch, turned
 
 # Start of the names of some structural springs, and what they deflect by, beyond their compliance, under a force (S,).
 StructureLaw = tuple[str, Callable[[np.ndarray], np.ndarray]]
 # MuJoCo wants mass in each moving body; this weighs nothing beside a load of newtons.
-_NOTHING_KG = 1e-12
-_SWEEPS = 60
+_NOTHING = {"ipos": (0.0, 0.0, 0.0), "mass": 1e-12, "inertia": [1e-12] * 3, "explicitinertial": True}
+_SWEEPS, _POSES = 60, 64
 # Of the largest deflection: a hundredth of a picometre of millimetres.
 _TOLERANCE = 1e-11
 _NOWHERE = (0.0, 0.0, 0.0)
@@ -38,9 +37,8 @@ _NOWHERE = (0.0, 0.0, 0.0)
 class TaperedTube:
     """An elastic link: a thin-walled tube that gets thinner towards its far end.
 
-    `bending_Nm2`, `torsion_Nm2`: E I and G J at its near end. `axial_N`, `shear_N`: E A and k G A; inf where the link does not
-    stretch or shear. `taper`: share of the diameter that is lost at the far end; E I and G J go with its third power, E A and k
-    G A with itself.
+    E I, G J, E A and k G A at its near end; of the last two inf where it does not stretch or shear. `taper`: share of the
+    diameter that is lost at the far end; E I and G J go with its third power, E A and k G A with itself.
     """
 
     bending_Nm2: float
@@ -52,10 +50,9 @@ class TaperedTube:
 
 @dataclass(frozen=True)
 class Mass:
-    """A weight on a stretch.
+    """A weight on a stretch: 0 is the column, n the flange.
 
-    `stretch`: 0 is the column, n the flange. `along`: where on the stretch, 0 at its near end, 1 at its far end. `aside_m`: and
-    how far off the line, in the frame at the near end.
+    `along`: where on the stretch, 0 at its near end, 1 at its far end. `aside_m`: off its line, in the frame at the near end.
     """
 
     stretch: int
@@ -68,8 +65,7 @@ class Mass:
 class Compensator:
     """A coil spring from the carousel to the upper arm: pull = stiffness (length - free length).
 
-    `anchor_m`: fixed end, from the shoulder, in the frame that turns with joint 1. `crank_m`: moving end, from the shoulder, in
-    the frame of the upper arm.
+    Its fixed end `anchor_m` and its moving end `crank_m` count from the shoulder, in the frames that turn with joints 1 and 2.
     """
 
     anchor_m: tuple[float, ...]
@@ -83,12 +79,11 @@ class Structure:
     """Everything of an arm that its robot file does not declare. The default is an arm of drives alone.
 
     `base`: compliances of the foot along x, y, z (m/N) and about x, y, z (rad/(N m)). `flange`: the same between the last
-    stretch and the flange, in the flange's frame. `tilt` (float, float): of a joint, from 1: compliances across its axis,
-    rad/(N m), in the order of the remaining axes. `loose`: joints, from 1, whose bearings let the arm shift across the axis, by
-    what `PhysicalRobot.offsets` say. `tubes`: elastic stretches. `segments`: into how many rigid pieces an elastic stretch is
-    cut. `payload`: its place counts from the flange: ``aside_m`` in the flange's frame. `wrong_vectors_m`, `wrong_turns`: of a
-    stretch: by how much its vector and its far end's rotation vector (rad) differ from the robot file. `gravity_m_s2`: in the
-    axes of the base.
+    stretch and the flange, in the flange's frame. `tilt`: of a joint, from 1: compliances across its axis, rad/(N m), in the
+    order of the remaining axes. `loose`: joints, from 1, whose bearings let the arm shift across the axis as a law says.
+    `tubes`: elastic stretches, each cut into so many `segments`. `payload`: ``aside_m`` counts from the flange, in its frame.
+    `wrong_vectors_m`, `wrong_turns`: by how much a stretch's vector and its far end's rotation vector (rad) differ from the
+    robot file. `gravity_m_s2`: in the axes of the base.
     """
 
     base: tuple[float, ...] = ()
@@ -111,9 +106,8 @@ class Machine:
 
     `drive`, `gear` (n,) of int: coordinates that are commanded, and those that spring behind them. `springs`: structural
     coordinates by name, such as ``base_x``, ``tilt2_0``, ``link3_4_bend0``. `compliance` (coordinates,): of structural springs,
-    m/N or rad/(N m); zero elsewhere. `sites` (points,) of int: measuring points, the flange last. `links` (n + 1,) of int:
-    bodies of the foot and of the links behind the drives. `body_stretch`, `site_stretch` (bodies,) of int, (all sites,):
-    stretch of whose vector the place of each body and site is a part.
+    m/N or rad/(N m); zero elsewhere. `sites` (points,) of int: measuring points, the flange last. `body_stretch`,
+    `site_stretch` (bodies,), (all sites,) of int: of whose vector the place of each body and site is a part.
     """
 
     model: mujoco.MjModel
@@ -122,7 +116,6 @@ class Machine:
     springs: dict[str, int]
     compliance: np.ndarray
     sites: np.ndarray
-    links: np.ndarray
     body_stretch: np.ndarray
     site_stretch: np.ndarray
 
@@ -176,9 +169,8 @@ class _Tree:
 
     def descend(self, name: str) -> None:
         """New body at the current frame."""
-        x, y, z, w = Rotation.from_matrix(self.rotation).as_quat()
-        nothing = {"ipos": _NOWHERE, "mass": _NOTHING_KG, "inertia": [_NOTHING_KG] * 3, "explicitinertial": True}
-        self.body = self.body.add_body(name=name, pos=self.position, quat=[w, x, y, z], **nothing)
+        turn = Rotation.from_matrix(self.rotation).as_quat(scalar_first=True)
+        self.body = self.body.add_body(name=name, pos=self.position, quat=turn, **_NOTHING)
         self.position, self.rotation = np.zeros(3), np.eye(3)
 
     def joint(self, name: str, axis: np.ndarray, compliance: float | None = None, slides: bool = False) -> None:
@@ -190,9 +182,9 @@ class _Tree:
 
     def six_springs(self, name: str, compliances: Iterable[float]) -> None:
         """Along and about x, y and z of the current body."""
-        names = [f"{name}_{kind}{axis}" for kind in ("", "r") for axis in "xyz"]
         for number, compliance in enumerate(compliances):
-            self.joint(names[number], np.eye(3)[number % 3], compliance, slides=number < 3)
+            words = f"{name}_{'r' * (number // 3)}{'xyz'[number % 3]}"
+            self.joint(words, np.eye(3)[number % 3], compliance, slides=number < 3)
 
     def weigh(self, mass: float, place: np.ndarray) -> None:
         """Put a mass on the current body, in its frame; masses add up at their common centre."""
@@ -202,8 +194,7 @@ class _Tree:
 
     def mark(self, name: str, position: np.ndarray, rotation: np.ndarray) -> None:
         """A measuring point, in the frame of the current body."""
-        x, y, z, w = Rotation.from_matrix(rotation).as_quat()
-        self.body.add_site(name=name, pos=position, quat=[w, x, y, z])
+        self.body.add_site(name=name, pos=position, quat=Rotation.from_matrix(rotation).as_quat(scalar_first=True))
 
     def walk(self, number: int, stretch: Stretch, structure: Structure, elsewhere: str) -> None:
         """From the near to the far end of a stretch; one measuring point may be put elsewhere."""
@@ -287,33 +278,19 @@ def machine_of(arm: Arm, structure: Structure) -> Machine:
         for body, name, place in (("arm1", "anchor", anchor), ("arm2", "crank", spring.crank_m)):
             tree.spec.body(body).add_site(name=name, pos=place)
             tendon.wrap_site(name)
-    return _indexed(arm, tree)
-
-
-def _indexed(arm: Arm, tree: _Tree) -> Machine:
-    model, numbers = tree.spec.compile(), range(1, arm.joints + 1)
-    place = {model.joint(j).name: int(model.jnt_qposadr[j]) for j in range(model.njnt)}
-    compliance = np.zeros(model.nq)
-    for name, value in tree.compliance.items():
-        compliance[place[name]] = value
+    model = tree.spec.compile()
+    at = {model.joint(j).name: int(model.jnt_qposadr[j]) for j in range(model.njnt)}
+    drive, gear = (np.array([at[f"{name}{j + 1}"] for j in range(arm.joints)]) for name in ("drive", "gear"))
+    springs, sites = {name: at[name] for name in tree.compliance}, np.array([model.site(name).id for name in arm.points])
+    yields = np.zeros(model.nq)
+    yields[[*springs.values()]] = [*tree.compliance.values()]
     # A body behind a drive is placed by the stretch before it.
     behind_drive = np.array([model.body(number).name.startswith("arm") for number in range(model.nbody)], int)
     within = behind_drive.cumsum()
-    return Machine(
-        model,
-        np.array([place[f"drive{j}"] for j in numbers]),
-        np.array([place[f"gear{j}"] for j in numbers]),
-        {name: place[name] for name in tree.compliance},
-        compliance,
-        np.array([model.site(name).id for name in arm.points]),
-        np.array([model.body(name).id for name in ("foot", *(f"arm{j}" for j in numbers))]),
-        within - behind_drive,
-        within[model.site_bodyid],
-    )
+    return Machine(model, drive, gear, springs, yields, sites, within - behind_drive, within[model.site_bodyid])
 
 
-@dataclass(frozen=True)
-class Equilibrium:
+class Equilibrium(NamedTuple):
     """Where an arm came to rest, in S states.
 
     `coordinates` (S, coordinates): rad, m. `force` (S, coordinates): generalized force that each coordinate's spring transmits,
@@ -324,7 +301,6 @@ class Equilibrium:
     force: np.ndarray
     position: np.ndarray
     rotation: np.ndarray
-    sweeps: int
 
 
 def equilibrium(
@@ -333,44 +309,59 @@ def equilibrium(
     wrench: np.ndarray,
     growth: np.ndarray,
     gear_deflection: Callable[[np.ndarray, np.ndarray], np.ndarray],
-    structure_laws: Iterable[StructureLaw] = (),
-    offsets: Mapping[int, np.ndarray] = MappingProxyType({}),
+    laws: Iterable[StructureLaw] = (),
     start: np.ndarray | None = None,
 ) -> Equilibrium:
     """Where the arm comes to rest in S states, by fixed-point iteration.
 
     `drive` (S, n): angles at which the drives really stand, rad. `wrench` (S, 6): that the flange really feels, at its
-    deflected origin, base axes; N, N m. `growth` (S, n + 1): relative growth of all lengths of each stretch. `offsets` (S,): by
-    which structural coordinates are off beside what their springs do, rad or m.
+    deflected origin, base axes; N, N m. `growth` (S, n + 1): relative growth of all lengths of each stretch. `gear_deflection`:
+    of the torques on the gears now and before the wrench came on, (S, n), N m: their deflections (S, n), rad. `start` (S, n):
+    deflections of the gears to begin with, such as those of a robot that differs little.
 
     The forces depend on the deflections only through the geometry, by the share (force times arm) / stiffness, a thousandth or
     so, so that each sweep gains about three digits. With linear springs it is the modified Newton method with their stiffness
-    as tangent. `gear_deflection`: ``gear_deflection(torque, unloaded)``, ndarray (S, n) each in N m, gives the deflections (S,
-    n) of the gears in rad; `unloaded` is the torque before the external wrench came on. `structure_laws` (str, callable): start
-    of the names of structural springs, and what they deflect by, beyond their compliance, under a force (S,). `start` (S, n):
-    deflections of the gears to begin with, rad, such as those of a robot that differs little. Raises `RuntimeError` where the
-    iteration does not settle to 1e-11 of the largest deflection.
+    as tangent. Raises `RuntimeError` where the iteration does not settle to 1e-11 of the largest deflection.
     """
     gear = machine.gear
-    extra = [(index, law) for start, law in structure_laws for name, index in machine.springs.items() if name.startswith(start)]
+    beyond = [(index, law) for start, law in laws for name, index in machine.springs.items() if name.startswith(start)]
     coordinates = np.zeros((len(drive), machine.model.nq))
     coordinates[:, machine.drive] = drive
     unloaded = machine.forces(coordinates, growth)[0][:, gear]
     if start is not None:
         coordinates[:, gear] = start
-    for sweep in range(1, _SWEEPS + 1):
+    for _ in range(_SWEEPS):
         force, position, rotation = machine.forces(coordinates, growth, wrench)
         following = force * machine.compliance
         following[:, machine.drive] = drive
         following[:, gear] = gear_deflection(force[:, gear], unloaded)
-        for index, law in extra:
+        for index, law in beyond:
             following[:, index] += law(force[:, index])
-        for index, offset in offsets.items():
-            following[:, index] += offset
         change, size = np.abs(following - coordinates), np.abs(following)
         change[:, machine.drive] = size[:, machine.drive] = 0.0
         # The poses are those of `coordinates`; once the next would be the same they need no further sweep.
         if change.max(initial=0.0) <= _TOLERANCE * max(size.max(initial=0.0), 1e-9):
-            return Equilibrium(coordinates, force, position, rotation, sweep)
+            return Equilibrium(coordinates, force, position, rotation)
         coordinates = following
     raise RuntimeError(f"no equilibrium after {_SWEEPS} sweeps: the last moved by {change.max():.3g}")
+
+
+def on_stretches(masses: Iterable[LinkMass], arm: Arm) -> tuple[Mass, ...]:
+    """The same weights as a structure has them: along the line of the stretch, and aside of it."""
+    found = []
+    for mass in masses:
+        centre, vector = np.array(mass.centre_m), arm.stretches[mass.link].vector_m
+        along = float(np.clip(centre @ vector / (vector @ vector), 0.0, 1.0)) if vector.any() else 0.0
+        found.append(Mass(mass.link, mass.mass_kg, along, tuple((centre - along * vector).tolist())))
+    return tuple(found)
+
+
+def usual_gravity_torque(arm: Arm, masses: Iterable[Mass], gravity_m_s2: tuple[float, ...]) -> np.ndarray:
+    """Root mean square torque of the links' weight on each drive over the arm's range of angles, (n,), N m."""
+    low, high = arm.limits.T
+    machine = machine_of(arm, Structure(masses=tuple(masses), gravity_m_s2=gravity_m_s2))
+    coordinates = np.zeros((_POSES, machine.model.nq))
+    # The same poses for all, of no campaign.
+    coordinates[:, machine.drive] = low + (high - low) * np.random.default_rng(0).random((_POSES, arm.joints))
+    torque = machine.forces(coordinates, np.zeros((_POSES, arm.joints + 1)))[0][:, machine.gear]
+    return np.sqrt((torque**2).mean(axis=0))

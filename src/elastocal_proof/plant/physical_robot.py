@@ -2,20 +2,172 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
-from elastocal_proof.plant.arm import Arm
-from elastocal_proof.plant.instruments import LoadCell, Tracker
-from elastocal_proof.plant.machine import Equilibrium, Machine, Structure, StructureLaw, equilibrium, machine_of
-from elastocal_proof.plant.random_numbers import stream
-from elastocal_proof.plant.weights import declared_masses, off_the_line, on_stretches, true_masses
+from elastocal_proof.plant.arm import Arm, off_the_line, true_masses, turned
+from elastocal_proof.plant.machine import Equilibrium, Machine, Structure, equilibrium, machine_of, on_stretches
 
 _REFERENCE_C = 20.0
+# A thermometer on a motor shows a rise by RISE (1 - exp(-t / MOTOR)); the castings follow it by a first-order lag.
+_RISE_K, _MOTOR_S, _LAG_S = 10.0, 3000.0, 1200.0
 # Of what is random about the drives, by the seed of what is done.
 _EACH_APPROACH, _EACH_POSE = 11, 13
+# Of one axis, so that the whole is 0.3 mrad and 0.2 mm in the mean square.
+_TILT_RAD, _SHIFT_M = 3e-4 / np.sqrt(3.0), 2e-4 / np.sqrt(3.0)
+_PULLS, _SETTLED_N = 40, 1e-9
+# Largest share by which a gear of a specimen is softer or stiffer than the robot file says.
+_SPREAD = 0.15
+
+
+def stream(seed: int, purpose: str) -> np.random.Generator:
+    """Random numbers for one purpose: numpy Generator that depends on the two alone."""
+    digest = hashlib.sha256(f"plant/{seed}/{purpose}".encode()).digest()
+    return np.random.Generator(np.random.PCG64(int.from_bytes(digest[:16], "little")))
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Of all measurements as one body, along and about the base axes, by its course over times (S,), s."""
+
+    shift_m: tuple[float, ...]
+    turn_rad: tuple[float, ...]
+    course: Callable[[np.ndarray], np.ndarray] = np.ones_like
+
+    def moved(self, time_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Shift (S, 3) in m and rotation (S, 3, 3) of the measurements at times (S,)."""
+        course = self.course(np.asarray(time_s, float))[:, None]
+        return course * np.array(self.shift_m), turned(course * np.array(self.turn_rad))
+
+
+def misplaced_base(seed: int) -> Motion:
+    """A base frame that was found badly: tilted by about 0.3 mrad and shifted by about 0.2 mm, all measurements alike."""
+    draws = stream(seed, "tilted base")
+    return Motion(tuple(_SHIFT_M * draws.standard_normal(3)), tuple(_TILT_RAD * draws.standard_normal(3)))
+
+
+@dataclass(frozen=True)
+class Tracker:
+    """A laser tracker; the default only has noise.
+
+    `sigma_m`, `sigma_m_per_m`: standard deviation of a coordinate is sigma_m + sigma_m_per_m * range. `stand_m`: where it
+    stands, base frame. `frame_turn`: rotation vector of its own axes in the base's. `drift`, `misplaced`: of the base frame as
+    the tracker has it, about its origin; `move`: of the stand, about itself. `refraction_per_m`: bent light: a target at range
+    r is read at r + k r^2. `scale`: a wrong wavelength, at which the frame of the base was measured too: a target at x is read
+    at (1 + s) x. `outliers`: share of the measurements that are off by `outlier_sigmas`. `nest`: (m, axis) of the flange's
+    target whose centre circles twice a turn of the tool, e (cos 2 q_n, sin 2 q_n) across an axis of its frame: from the next
+    axis to the one after that.
+    """
+
+    sigma_m: float = 60e-6
+    sigma_m_per_m: float = 0.0
+    sigma_rad: float = 60e-6
+    stand_m: tuple[float, ...] = (6.0, -2.0, 1.5)
+    frame_turn: tuple[float, ...] = (0.0, 0.0, 0.0)
+    drift: Motion | None = None
+    move: Motion | None = None
+    misplaced: Motion | None = None
+    refraction_per_m: float = 0.0
+    scale: float = 0.0
+    outliers: float = 0.0
+    outlier_sigmas: float = 8.0
+    nest: tuple[float, int] | None = None
+
+    def seen(
+        self, position: np.ndarray, rotation: np.ndarray, time_s: np.ndarray, tool_angle: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Poses (S, targets, 3), (S, targets, 3, 3) as read without noise, base frame, m; the flange's last."""
+        if self.nest:
+            radius, axis = self.nest
+            circle = np.stack([np.zeros_like(tool_angle), np.cos(2 * tool_angle), np.sin(2 * tool_angle)], axis=-1)
+            position = position.copy()
+            position[:, -1] += radius * np.einsum("sij,sj->si", rotation[:, -1], np.roll(circle, axis, axis=-1))
+        stand, base = np.array(self.stand_m), np.zeros(3)
+        sight = position - stand
+        far = np.linalg.norm(sight, axis=-1, keepdims=True)
+        position = (1.0 + self.scale) * position + self.refraction_per_m * far * sight
+        for motion, about in ((self.drift, base), (self.move, stand), (self.misplaced, base)):
+            if motion is not None:
+                shift, turn = motion.moved(time_s)
+                position = np.einsum("sij,stj->sti", turn, position - about) + about + shift[:, None]
+                rotation = turn[:, None] @ rotation
+        return position, rotation
+
+    def read(
+        self, position: np.ndarray, rotation: np.ndarray, draws: np.random.Generator
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Poses as seen with noise and outliers, and (S, targets) of bool which are outliers."""
+        # A generator each, so that measurements that come later change none that are there.
+        chance, metres, radians = draws.spawn(3)
+        sigma = self.sigma_at(position)[..., None]
+        outlier = chance.random(position.shape[:2]) < self.outliers
+        large = np.where(outlier, self.outlier_sigmas, 1.0)[..., None]
+        position = position + large * sigma * metres.standard_normal(position.shape)
+        turn = turned(large * self.sigma_rad * radians.standard_normal(position.shape))
+        return position, turn @ rotation, outlier
+
+    def sigma_at(self, position: np.ndarray) -> np.ndarray:
+        """Standard deviation (...) of a coordinate at positions (..., 3), m."""
+        return self.sigma_m + self.sigma_m_per_m * np.linalg.norm(position - np.array(self.stand_m), axis=-1)
+
+    def in_own_frame(self, position: np.ndarray, rotation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Poses of the base frame, positions (..., 3) in m and rotations (..., 3, 3), in the tracker's."""
+        own = turned(self.frame_turn)
+        return (position - np.array(self.stand_m)) @ own, own.T @ rotation
+
+
+@dataclass(frozen=True)
+class LoadCell:
+    """A cell between the pull and the flange, and where it pulls. The default is perfect.
+
+    The experimenter pulls until the display shows what the plan says; a cell that errs makes the flange feel something else. So
+    the campaign holds what was shown, and the arm deflects by what was felt. `scale`: shown = (1 + scale) felt. `turn_rad`:
+    rotation vector by which the cell is mounted askew: it shows R(turn)^T felt. `bias_N`: shown without a force. `shift_m`:
+    where the force really acts, from where the plan says. `crosstalk_per_N`: quadratic: shown x gets k F_y F_z, and so on round
+    the axes. `in_flange`: which of "turn", "bias" and "shift" are fixed in the flange's axes rather than in the base's.
+    `mount`: in the line of "pull" one number is measured: a force that is wrong acts at the same lever and brings a wrong
+    moment. Between "flange" and tool six are: the forces may be wrong where the moments are right.
+    """
+
+    scale: float = 0.0
+    turn_rad: tuple[float, ...] = (0.0, 0.0, 0.0)
+    bias_N: tuple[float, ...] = (0.0, 0.0, 0.0)
+    shift_m: tuple[float, ...] = (0.0, 0.0, 0.0)
+    crosstalk_per_N: float = 0.0
+    in_flange: tuple[str, ...] = ()
+    mount: str = "pull"
+
+    def shown(self, felt: np.ndarray, flange_rotation: np.ndarray) -> np.ndarray:
+        """Force on the display for the force that is felt, both (S, 3), N, base axes."""
+        turn, bias = (self._in_base(name, flange_rotation) for name in ("turn", "bias"))
+        askew = np.einsum("sji,sj->si", turned(turn), felt)
+        crossed = self.crosstalk_per_N * np.roll(felt, -1, axis=1) * np.roll(felt, -2, axis=1)
+        return (1.0 + self.scale) * askew + bias + crossed
+
+    def felt(self, force: np.ndarray, lever: np.ndarray, flange_rotation: np.ndarray) -> np.ndarray:
+        """Wrench on the flange (S, 6), which solves shown = cell(felt) by fixed-point iteration: what lacks is pulled more.
+
+        `force` (S, 3): as shown, N; zeros where nothing pulls. `lever` (S, 3): from the flange's origin to where the plan lets
+        the force act, m. All in base axes.
+        """
+        found = force.copy()
+        for _ in range(_PULLS):
+            missing = force - self.shown(found, flange_rotation)
+            found += missing
+            if np.abs(missing).max() < _SETTLED_N:
+                break
+        felt = np.where(force.any(axis=1, keepdims=True), found, 0.0)
+        moment = np.cross(lever, felt if self.mount == "pull" else force)
+        return np.concatenate([felt, moment + np.cross(self._in_base("shift", flange_rotation), felt)], axis=1)
+
+    def _in_base(self, name: str, flange_rotation: np.ndarray) -> np.ndarray:
+        """An error in base axes, (S, 3)."""
+        error = np.array({"turn": self.turn_rad, "bias": self.bias_N, "shift": self.shift_m}[name])
+        return flange_rotation @ error if name in self.in_flange else np.tile(error, (len(flange_rotation), 1))
 
 
 @dataclass(frozen=True)
@@ -47,45 +199,34 @@ class Schedule:
         return np.concatenate([self.force, np.cross(self.lever, self.force)], axis=1)
 
 
-# What a drive errs by, (S,), rad, or a structural coordinate, rad or m, by what was done.
+# What a drive errs by, (S,), rad, by what was done.
 DriveLaw = Callable[[Schedule], np.ndarray]
 # What a gear turns by beyond its linear spring, (S,), rad: by what was done and the torques on all gears (S, n), N m, now and
 # before the external load came on.
 GearLaw = Callable[[Schedule, np.ndarray, np.ndarray], np.ndarray]
+# What a structural spring yields beyond its compliance, (S,), rad or m: by what was done and its force (S,), N m or N.
+SpringLaw = Callable[[Schedule, np.ndarray], np.ndarray]
 
 
-@dataclass(frozen=True)
-class Warmth:
-    """How the robot warms up: the thermometer on a motor first, the castings after it.
+def logged_temperature(time_s: np.ndarray) -> np.ndarray:
+    """Of the thermometer at times (S,), °C."""
+    return _REFERENCE_C - _RISE_K * np.expm1(-time_s / _MOTOR_S)
 
-    `motor_s`, `lag_s`: time constant of the thermometer, dT_m = rise (1 - exp(-t / T_m)), and by which the castings follow it.
-    """
 
-    rise_K: float = 10.0
-    motor_s: float = 3000.0
-    lag_s: float = 1200.0
-
-    def shown(self, time_s: np.ndarray) -> np.ndarray:
-        """Temperature (S,) that is logged at times (S,), °C."""
-        return _REFERENCE_C - self.rise_K * np.expm1(-time_s / self.motor_s)
-
-    def of_castings(self, time_s: np.ndarray) -> np.ndarray:
-        """By how much the links are warmer than 20 °C at times (S,), K: the logged rise behind a first-order lag."""
-        fast, slow = self.lag_s, self.motor_s
-        rest = (slow * np.exp(-time_s / slow) - fast * np.exp(-time_s / fast)) / (slow - fast)
-        return self.rise_K * (1.0 - rest)
+def warmth_of_castings(time_s: np.ndarray) -> np.ndarray:
+    """By how much the links are warmer than 20 °C at times (S,), K."""
+    rest = (_MOTOR_S * np.exp(-time_s / _MOTOR_S) - _LAG_S * np.exp(-time_s / _LAG_S)) / (_MOTOR_S - _LAG_S)
+    return _RISE_K * (1.0 - rest)
 
 
 @dataclass(frozen=True)
 class PhysicalRobot:
     """All that is true of a robot and its instruments; the default is faultless.
 
-    `compliance` (n,): the gears' own, rad/(N m). `drives`, `gears`: errors of angle and laws beside the linear springs, each of
-    a joint from 0. `structure_laws` (str, callable): laws of structural springs by the start of their names. `offsets` (str,
-    callable): by what structural coordinates are off, beside what their springs do. `gradient_per_K` (float, float): further
-    expansion of the column and of the flange; in between it changes evenly from stretch to stretch. No defects, as every arm
-    has them: `repeatability_rad` (n,): each approach ends a little elsewhere; `pose_rad` (n,): an error of the angles common to
-    all measurements of a pose.
+    `compliance` (n,): the gears' own, rad/(N m). `drives`, `gears`: laws, each of a joint from 0; `springs`: of structural
+    springs, by the start of their names. `gradient_per_K` (float, float): further expansion of the column and of the flange; in
+    between it changes evenly from stretch to stretch. No defects, as every arm has them: `repeatability_rad` (n,): each
+    approach ends a little elsewhere; `pose_rad` (n,): an error of the angles common to all measurements of a pose.
     """
 
     arm: Arm
@@ -93,37 +234,31 @@ class PhysicalRobot:
     structure: Structure = field(default_factory=Structure)
     gears: tuple[tuple[int, GearLaw], ...] = ()
     drives: tuple[tuple[int, DriveLaw], ...] = ()
-    structure_laws: tuple[StructureLaw, ...] = ()
-    offsets: tuple[tuple[str, DriveLaw], ...] = ()
+    springs: tuple[tuple[str, SpringLaw], ...] = ()
     expansion_per_K: float = 0.0
     gradient_per_K: tuple[float, float] = (0.0, 0.0)
-    warmth: Warmth = field(default_factory=Warmth)
     cell: LoadCell = field(default_factory=LoadCell)
     tracker: Tracker = field(default_factory=Tracker)
     repeatability_rad: tuple[float, ...] = ()
     pose_rad: tuple[float, ...] = ()
 
 
-def specimen(arm: Arm, seed: int, spread: float = 0.15, weighs: bool = True, off_line_m: float = 0.0) -> PhysicalRobot:
-    """One faultless robot of a series: other gears than the robot file says, and other weights.
+def specimen(arm: Arm, seed: int, weighs: bool = True, off_line_m: float = 0.0) -> PhysicalRobot:
+    """One faultless robot of a series: other gears than the robot file says, and other weights, or none that it feels.
 
-    `spread`: largest share by which a gear is softer or stiffer, evenly drawn. `weighs`: False: an arm whose controller takes
-    care of its weight. `off_line_m`: by how much centres of mass lie off the lines of their links at most, across each, beyond
-    what is declared.
+    `off_line_m`: by how much centres of mass lie off the lines of their links at most, across each, beyond what is declared.
     """
-    compliance = arm.compliance * stream(seed, "specimen").uniform(1.0 - spread, 1.0 + spread, arm.joints)
-    masses = true_masses(declared_masses(arm), stream(seed, "weights")) if weighs else ()
+    compliance = arm.compliance * stream(seed, "specimen").uniform(1.0 - _SPREAD, 1.0 + _SPREAD, arm.joints)
+    masses = true_masses(arm.masses, stream(seed, "weights")) if weighs else ()
     if off_line_m:
         masses = off_the_line(masses, arm, off_line_m, stream(seed, "centres off the line"))
-    structure = Structure(masses=on_stretches(masses, arm), gravity_m_s2=arm.gravity_m_s2)
-    return PhysicalRobot(arm, compliance, structure)
+    return PhysicalRobot(arm, compliance, Structure(masses=on_stretches(masses, arm), gravity_m_s2=arm.gravity_m_s2))
 
 
 def seen_poses(robot: PhysicalRobot, schedule: Schedule, start: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Poses of all targets as a tracker without noise reads them.
+    """Poses of all targets (S, targets, 3), (S, targets, 3, 3) as a tracker without noise reads them, base frame, m.
 
-    `start` (S, n): deflections of the gears of a robot that differs little; saves time. Returns `position` (S, targets, 3): m,
-    base frame; targets as in ``robot.arm.points``; `rotation` (S, targets, 3, 3).
+    `start` (S, n): deflections of the gears of a robot that differs little; saves time.
     """
     rest = at_rest(robot, schedule, start)[1]
     return robot.tracker.seen(rest.position, rest.rotation, schedule.time_s, schedule.angle[:, -1])
@@ -138,8 +273,9 @@ def read_poses(
 
 def at_rest(robot: PhysicalRobot, schedule: Schedule, start: np.ndarray | None = None) -> tuple[Machine, Equilibrium]:
     """The arm in equilibrium; arguments as of `seen_poses`."""
-    machine = machine_of(robot.arm, robot.structure)
-    drive, growth, offsets = driven(robot, schedule, machine)
+    machine, drive = machine_of(robot.arm, robot.structure), driven(robot, schedule)
+    per_kelvin = robot.expansion_per_K + np.linspace(*robot.gradient_per_K, robot.arm.joints + 1)
+    growth = warmth_of_castings(schedule.time_s)[:, None] * per_kelvin
     facing = np.broadcast_to(np.eye(3), (len(drive), 3, 3))
     if robot.cell.in_flange:
         coordinates = np.zeros((len(drive), machine.model.nq))
@@ -153,12 +289,12 @@ def at_rest(robot: PhysicalRobot, schedule: Schedule, start: np.ndarray | None =
             turn[:, joint] += law(schedule, torque, unloaded)
         return turn
 
-    return machine, equilibrium(machine, drive, wrench, growth, gear_deflection, robot.structure_laws, offsets, start)
+    springs = [(name, partial(law, schedule)) for name, law in robot.springs]
+    return machine, equilibrium(machine, drive, wrench, growth, gear_deflection, springs, start)
 
 
-def driven(robot: PhysicalRobot, schedule: Schedule, machine: Machine) -> tuple[np.ndarray, np.ndarray, dict[int, np.ndarray]]:
-    """Where the drives really stand (S, n), rad; relative growth of all lengths of each stretch (S, n + 1); and by what
-    structural coordinates are off, (S,) by their places."""
+def driven(robot: PhysicalRobot, schedule: Schedule) -> np.ndarray:
+    """Where the drives really stand (S, n), rad."""
     drive = schedule.angle.copy()
     for joint, law in robot.drives:
         drive[:, joint] += law(schedule)
@@ -169,10 +305,4 @@ def driven(robot: PhysicalRobot, schedule: Schedule, machine: Machine) -> tuple[
         if any(sigma):
             draws = np.random.default_rng([schedule.seed, number])
             drive += np.array(sigma) * draws.standard_normal((int(group.max()) + 1, robot.arm.joints))[group]
-    per_kelvin = robot.expansion_per_K + np.linspace(*robot.gradient_per_K, robot.arm.joints + 1)
-    growth = robot.warmth.of_castings(schedule.time_s)[:, None] * per_kelvin
-    offsets: dict[int, np.ndarray] = {}
-    for name, law in robot.offsets:
-        index = machine.springs[name]
-        offsets[index] = offsets.get(index, 0.0) + law(schedule)
-    return drive, growth, offsets
+    return drive

@@ -1,14 +1,9 @@
 """How large a defect is to the eye of a tracker, and how large it must be to have a given non-centrality.
 
 With d the change that a defect makes in the measurements, noise free, of the poses that are not held out, in standard
-deviations, the raw non-centrality is |d|^2: the signal before anything has absorbed it. What the declared model cannot absorb
-by other compliances X of its joints (and, where the frame is unknown, by a motion of the frame) and by other weights V,
-declared with a standard deviation each, is
-
-    min over b, w of |d - X b - V w|^2 + |w|^2,
-
-V in its standard deviations: what a test can find where the weights are known so well and no better. The weights come in as
-prior information of mixed estimation [1] does.
+deviations, the raw non-centrality is |d|^2. What the declared model cannot absorb by other compliances X of its joints (and,
+where the frame is unknown, by a motion of the frame) and by other weights V, in standard deviations of their declarations, is
+min over b, w of |d - X b - V w|^2 + |w|^2: the weights come in as prior information of mixed estimation [1] does.
 
 [1] Theil, H. and Goldberger, A. S., On pure and mixed statistical estimation in economics, International Economic Review 2,
     1961.
@@ -24,7 +19,6 @@ import numpy as np
 
 from elastocal_proof.plant.arm import rotation_vector
 from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, at_rest, read_poses, seen_poses
-from elastocal_proof.plant.weights import allowed_centre_std_m
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -37,11 +31,7 @@ _ROUNDS = 12
 
 @dataclass(frozen=True)
 class Signal:
-    """What a defect does to the measurements.
-
-    `raw`, `retained`: non-centralities before and after absorption. `rms_m`, `rms_rad`: root mean square over all measurements
-    of the length of the change of position, and of orientation.
-    """
+    """Of a defect: non-centralities before and after absorption, and RMS lengths of the changes of position and orientation."""
 
     raw: float
     retained: float
@@ -52,8 +42,8 @@ class Signal:
 class Yardstick:
     """The faultless robot at a schedule, to which defective ones are compared.
 
-    `targets`: which measuring points are read; all by default. `orientation`: whether orientations are read too. `free_frame`:
-    whether the analysis fits the tracker's frame. `declared`: weights as they are declared to the analysis.
+    `targets`: which measuring points are read; all by default. `free_frame`: whether the analysis fits the tracker's frame.
+    `declared`: weights as they are declared to the analysis.
     """
 
     def __init__(
@@ -61,11 +51,10 @@ class Yardstick:
         robot: PhysicalRobot,
         schedule: Schedule,
         targets: Iterable[int] | None = None,
-        orientation: bool = True,
         free_frame: bool = False,
         declared: Sequence[LinkMass] = (),
     ) -> None:
-        self.robot, self.schedule, self.orientation = robot, schedule, orientation
+        self.robot, self.schedule = robot, schedule
         self.targets = list(range(len(robot.arm.points)) if targets is None else targets)
         machine, rest = at_rest(robot, schedule)
         self._start = rest.coordinates[:, machine.gear]
@@ -76,12 +65,11 @@ class Yardstick:
             [self._flat(np.einsum("stij,sj->sti", jacobian[:, self.targets], turn)) for turn in turns]
             for turns in (springs, [robot.compliance * torque for torque in torques])
         )
-        if free_frame:
-            position = self.poses[0][:, self.targets]
-            for axis in np.eye(3):
-                along, nothing = np.broadcast_to(axis, position.shape), np.zeros_like(position)
-                columns.append(self._flat(np.concatenate([along, nothing], axis=-1)))
-                columns.append(self._flat(np.concatenate([np.cross(axis, position), along], axis=-1)))
+        position = self.poses[0][:, self.targets]
+        for axis in np.eye(3) if free_frame else ():
+            along, nothing = np.broadcast_to(axis, position.shape), np.zeros_like(position)
+            columns.append(self._flat(np.concatenate([along, nothing], axis=-1)))
+            columns.append(self._flat(np.concatenate([np.cross(axis, position), along], axis=-1)))
         height = len(columns[0])
         # A column of nothing, such as the compliance of a joint that no load turns, absorbs nothing.
         columns = [column / np.linalg.norm(column) for column in columns if column.any()]
@@ -118,9 +106,8 @@ class Yardstick:
         """Changes (S, targets, 6) as the analysis counts them: in standard deviations, of the poses that are not held out."""
         tracker = self.robot.tracker
         metres = apart[..., :3] / tracker.sigma_at(self.poses[0])[:, self.targets, None]
-        radians = apart[..., 3:] / tracker.sigma_rad
-        kept = np.concatenate([metres, radians], axis=-1) if self.orientation else metres
-        return kept[self.schedule.training].ravel()
+        counted = np.concatenate([metres, apart[..., 3:] / tracker.sigma_rad], axis=-1)
+        return counted[self.schedule.training].ravel()
 
     def _with_left(self, apart: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         seen = self._flat(apart)
@@ -136,9 +123,7 @@ def _responses(
     model, data, gear = machine.model, mujoco.MjData(machine.model), machine.gear
     shift, turn, count = np.empty((3, model.nv)), np.empty((3, model.nv)), len(coordinates)
     jacobian = np.empty((count, len(machine.sites), 6, len(gear)))
-    # Of the centres of mass.
-    moves, turns = np.empty((2, len(declared), count, 3, len(gear)))
-    axes = np.empty((len(declared), count, 3, 3))
+    torques = np.empty((len(declared), 4, count, len(gear)))
     for state, row in enumerate(coordinates):
         data.qpos[:] = row
         mujoco.mj_kinematics(model, data)
@@ -147,17 +132,13 @@ def _responses(
             mujoco.mj_jacSite(model, data, shift, turn, site)
             jacobian[state, point, :3], jacobian[state, point, 3:] = shift[:, gear], turn[:, gear]
         for number, mass in enumerate(declared):
-            link = machine.links[mass.link]
-            axes[number, state] = data.xmat[link].reshape(3, 3)
-            mujoco.mj_jac(model, data, shift, turn, data.xpos[link] + axes[number, state] @ mass.centre_m, link)
-            moves[number, state], turns[number, state] = shift[:, gear], turn[:, gear]
-    torques = []
-    for number, mass in enumerate(declared):
-        weight = mass.mass_kg * np.array(model.opt.gravity)
-        torques.append(mass.relative_std * (weight @ moves[number]))
-        moment = np.cross(axes[number], weight, axisa=1, axisc=1) * allowed_centre_std_m(mass, robot.arm.reach_m)
-        torques += [np.einsum("si,sij->sj", moment[..., axis], turns[number]) for axis in range(3)]
-    return jacobian, torques
+            link, weight = model.body(f"arm{mass.link}" if mass.link else "foot").id, mass.mass_kg * np.array(model.opt.gravity)
+            axes = data.xmat[link].reshape(3, 3)
+            mujoco.mj_jac(model, data, shift, turn, data.xpos[link] + axes @ mass.centre_m, link)
+            torques[number, 0, state] = mass.relative_std * (weight @ shift[:, gear])
+            moments = np.cross(axes.T, weight) * mass.allowed_centre_std_m(robot.arm.reach_m)
+            torques[number, 1:, state] = moments @ turn[:, gear]
+    return jacobian, [*torques.reshape(-1, count, len(gear))]
 
 
 def size_for(
@@ -168,11 +149,10 @@ def size_for(
     quantity: str = "retained",
     largest: float = np.inf,
 ) -> float:
-    """Size of a defect at which its non-centrality is as wanted.
+    """Size of a defect at which its non-centrality, "retained" or "raw", is the target to one per cent.
 
-    `robot_of_size`: robot with the defect of a given size. `start`: a size to begin with. `target`: non-centrality. `quantity`:
-    one of "retained", "raw". `largest`: no larger size is tried. Raises `ValueError`: no size has it to one per cent: the
-    defect is absorbed whatever its size, saturates, or would be larger than allowed.
+    `robot_of_size`: robot with the defect of a given size. Raises `ValueError`: no size up to the largest has it: the defect is
+    absorbed whatever its size, saturates, or would be larger than allowed.
 
     The non-centrality of a linear effect grows with the square of its size; the secant of the logarithms allows for others.
     """

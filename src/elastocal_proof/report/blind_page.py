@@ -26,10 +26,7 @@ _OUTCOMES = {"True": "reached", "False": "missed"}
 
 
 def targets_page(plan: Plan, summary: pd.DataFrame, of_each: Mapping[str, pd.DataFrame], size: str, seed: int) -> str:
-    """Every quantity beside its target.
-
-    `summary`: of reports/blind/. `of_each`: of `summary.of_each_robot`, by what the robots are called.
-    """
+    """Every quantity of a summary beside its target; `of_each`: of `summary.of_each_robot`, by what the robots are called."""
     return f"""# Targets of the blind proof
 
 Written by `snakemake -j2 blind_pictures --config blind={size} seed={seed}`; [what it means](blind_proof.md). "At 50" is at a

@@ -1,6 +1,6 @@
 """What each defect does to a campaign stays what it was: other libraries agreed with these numbers before they were kept.
 
-Where a law is meant to change, write them anew: `GOLDEN=write python -m pytest tests/plant/test_catalogued.py`.
+Where a law is meant to change, write them anew: `GOLDEN=write python -m pytest tests/plant/test_laws.py`.
 """
 
 import os
@@ -13,8 +13,8 @@ from analysed_robots import ROBOTS
 
 from elastocal_proof.plant.arm import arm_from_file, rotation_vector
 from elastocal_proof.plant.campaigns import Design, schedule_of
-from elastocal_proof.plant.catalogued import wound
 from elastocal_proof.plant.kinds import KINDS, drawn_defect, truth_of, with_defects
+from elastocal_proof.plant.laws import wound
 from elastocal_proof.plant.physical_robot import seen_poses, specimen
 
 GOLDEN = ROBOTS.parents[1] / "tests/golden/plant_defects.csv"
