@@ -2,8 +2,7 @@
 
 import pytest
 from drawn_figures import texts
-from made_loop_facts import plainly
-from made_loop_tables import candidate_table
+from made_loop_tables import candidate_table, plainly
 from made_loop_tables import probabilities as stated
 
 from elastocal.figures.candidates import probabilities

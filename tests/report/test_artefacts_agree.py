@@ -12,8 +12,7 @@ from pathlib import Path
 
 import pytest
 from drawn_figures import empty_pictures
-from made_loop_facts import CAMPAIGNS, facts_of, plainly
-from made_loop_tables import residual_table
+from made_loop_tables import CAMPAIGNS, facts_of, plainly, residual_table
 
 from elastocal.report.loop_facts import write_loop_report
 from elastocal.report.loop_page import loop_page, write_loop_page

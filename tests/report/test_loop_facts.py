@@ -6,10 +6,14 @@ import shutil
 
 import pytest
 from compiled_pages import assert_within_margins, pages_of
-from made_loop_facts import CAMPAIGNS, HARMONICS, WAVES, facts_of, plainly
 from made_loop_tables import (
+    CAMPAIGNS,
+    HARMONICS,
+    WAVES,
     effect_entry,
     experiment_rows,
+    facts_of,
+    plainly,
     step_rows,
     verdict_document,
 )
