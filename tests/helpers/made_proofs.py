@@ -1,4 +1,4 @@
-"""Tables of a blind proof, a closed loop and a league, made by the functions of the pipeline from documents that never change."""
+"""Tables of a blind proof, a closed loop and a league, by the functions of the pipeline from documents that never change."""
 
 from itertools import product
 from types import SimpleNamespace
