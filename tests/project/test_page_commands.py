@@ -122,7 +122,7 @@ def test_targets_of_snakemake_are_rules():
     known = {rule for text in rules for rule in re.findall(r"^rule (\w+):", text, re.MULTILINE)}
     asked = (text.partition(" --")[0].split()[1:] for text, _ in every_command() if text.startswith("snakemake "))
     targets = {word for words in asked for word in words if re.fullmatch(r"[a-z_]+", word)}
-    assert len(targets) > 5 and targets <= known | {"store"}, targets - known
+    assert len(targets) > 5 and targets <= known, targets - known
 
 
 @pytest.mark.slow
