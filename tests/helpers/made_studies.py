@@ -4,8 +4,8 @@ import pandas as pd
 from made_metrics import LENGTHS
 from made_study_blocks import PAPER
 
+from elastocal.study.evaluation import repeated_blocks
 from elastocal.study.in_memory import Interpretation, Size, StudyInMemory
-from elastocal.study.repeated import repeated_blocks
 
 USUAL = Interpretation(PAPER, 6, "end_effector", "stiffness")
 SIZE = Size(data_sets=4, configurations=5, tests=30, noise=1e-5)

@@ -4,7 +4,8 @@ import numpy as np
 from support import PinocchioPoint, without_tool
 
 from elastocal.study.equation_11 import identified_blocks, paired_blocks
-from elastocal.study.evaluation import evaluate_strategy, judge_from
+from elastocal.study.evaluation import evaluate_strategy
+from elastocal.study.metrics import make_judge
 from elastocal.study.simulation import (
     Loading,
     blocks_of_sets,
@@ -12,6 +13,8 @@ from elastocal.study.simulation import (
     ideal_blocks,
     measured_blocks,
     random_experiments,
+    to_deflections,
+    to_experiments,
     weight_blocks,
 )
 
@@ -62,7 +65,8 @@ def compliances(table, length):
 
 def judge(robot, at="end_effector"):
     experiments = experiments_of(robot, 1, CONFIGURATIONS_OF_THE_TEST, purpose="test")
-    return judge_from(robot, experiments[0], deflections_of(robot, experiments, at=at)[robot.chain.end_effector.name][0], at)
+    (seen,) = deflections_of(robot, experiments, at=at)[robot.chain.end_effector.name]
+    return make_judge(robot, to_experiments(experiments[0]), to_deflections(seen), at)
 
 
 def evaluated_in_one_block(table, scores, fixed_joints, method, replicates):

@@ -17,7 +17,7 @@ _OF_STUDY = _NEVER | _BY_DOCUMENTS | {"pandas", "scipy.spatial", "scipy.linalg",
 # Scripts of the rules, or modules whose functions are steps of rules, and the packages that none of them loads.
 SCRIPTS = {
     "study": ("elastocal.study.equation_11 elastocal.study.evaluation elastocal.study.simulation", _OF_STUDY | {"scipy"}),
-    "questions": ("elastocal.study.ladder elastocal.study.points elastocal.study.repeated", _OF_STUDY | {"scipy"}),
+    "questions": ("elastocal.study.ladder elastocal.study.points", _OF_STUDY | {"scipy"}),
     "reading": ("elastocal.loop.loading", _NEVER | {"jsonschema", "pandas", "rich", "typer", "scipy"}),
     "loop": ("elastocal.loop.diagnosis_tables elastocal.loop.whole", _NEVER | _BY_DOCUMENTS | {"pandas"}),
     "blind": ("elastocal_proof.blind.verdicts", _NEVER | _BY_DOCUMENTS | {"pandas"}),

@@ -20,7 +20,7 @@ from made_loop_tables import (
 from selected import slow_but
 
 from elastocal.diagnosis.verdict import NAMED
-from elastocal.figures.residuals import before_after
+from elastocal.figures.loop import before_after
 from elastocal.figures.style import save
 from elastocal.report.loop_facts import (
     AT_FAULT,

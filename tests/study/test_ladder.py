@@ -72,8 +72,6 @@ def test_the_ladder_of_a_robot_with_elastic_links_falls_and_flattens(kuka_extend
     # Joints alone leave tenths of a millimetre, all springs what linearisation leaves.
     assert rms[0] > 1e-4 and rms[5] < 0.1 * rms[0]
     assert (table.groupby("data_set").chosen.sum() == 1).all()
-    assert (table[table.link_springs == 0].added_link == 0).all()
-    assert sorted(table[(table.data_set == 0) & (table.link_springs > 0)].added_link) == [1, 2, 3, 4, 5]
 
 
 def test_joints_alone_leave_what_the_reduced_model_leaves(kuka_extended, strategies):

@@ -16,7 +16,6 @@ from elastocal.study.metrics import (
     make_judge,
     mean_deviation,
     position_errors,
-    squared_error_bounds,
 )
 from elastocal.study.simulation import true_deflections
 
@@ -103,20 +102,3 @@ def test_lengths_follow_a_bias_over_the_length_to_any_limit(bias, limit, sign, l
     reached = whole <= lengths
     assert first_length_below(values, limit) == (whole if reached else np.inf)
     assert length_to_reach(values, limit) == pytest.approx(whole if reached else crossing, rel=1e-12)
-
-
-def test_bound_is_the_trace_with_the_explicit_inverse():
-    rng = np.random.default_rng(1)
-    rows, half = rng.standard_normal((4, 3, 9, 6)), rng.standard_normal((6, 6))
-    information, moment = np.swapaxes(rows, -1, -2) @ rows, half @ half.T
-    found = squared_error_bounds(information, moment)
-    for index in np.ndindex(4, 3):
-        assert found[index] == pytest.approx(np.trace(moment @ np.linalg.inv(information[index])), rel=1e-10)
-
-
-def test_bound_is_infinite_where_the_information_is_singular_and_nowhere_else():
-    rows = np.random.default_rng(2).standard_normal((2, 1, 4, 6))  # four measurements of six unknowns
-    information = np.swapaxes(rows, -1, -2) @ rows
-    information = np.concatenate([information, np.zeros((1, 1, 6, 6))])
-    information[1, 0] = np.eye(6)
-    np.testing.assert_allclose(squared_error_bounds(information, np.eye(6))[:, 0], [np.inf, 6.0, np.inf])

@@ -26,10 +26,9 @@ import pandas as pd
 from scipy.special import stdtr
 
 from elastocal.io.data_frames import read_long, read_studies
-from elastocal.study.evaluation import metrics
+from elastocal.study.evaluation import metrics, repeated
 from elastocal.study.jobs import MICRO, MILLI, Job, frames, read_reference, write_csvs
 from elastocal.study.metrics import length_to_reach
-from elastocal.study.repeated import repeated
 from elastocal.study.simulation import INITIAL, find_statistics
 from elastocal.study.tables import COMPLIANCE, deviation_ratio, read_replicates, share_compensated
 
@@ -149,17 +148,13 @@ class Predicted:
         variance = self.values.var(ddof=1) * (1 + 1 / count) + digit**2 / 12
         return float(2 * stdtr(count - 1, -abs((value - self.values.mean()) / np.sqrt(variance))))
 
-    def leave_out_each(self) -> list[Predicted]:
-        """The same by all studies but one, for each of them."""
-        return [replace(self, values=np.delete(self.values, place)) for place in range(len(self.values))]
-
 
 def predict_scatter(
     studies: pd.DataFrame, robot: str, strategy: str, quantity: str, length: int, fixed_joints: bool = True
 ) -> Predicted | None:
     """How one figure of Table 3 or 4 scatters between studies.
 
-    `studies`: robot and the columns of `repeated.repeated`. `quantity`: c1.., k_sigma_20, dev_20, n_k_sigma_1_percent,
+    `studies`: robot and the columns of `evaluation.repeated`. `quantity`: c1.., k_sigma_20, dev_20, n_k_sigma_1_percent,
     n_dev_2_um: with its length or its limit. `length`: data set length of figures that name none. `fixed_joints`: whether
     k_sigma counts the joints fixed in the last stage alone (interpretation R10). Returns None where the studies do not have it.
     """
@@ -251,7 +246,7 @@ def _judge_by_others(scatter: Predicted) -> list[float]:
     """p value of each study by the others."""
     some = scatter.values  # noqa: PD011 (of a dataclass)
     printed = np.exp(some) if scatter.logarithmic else some
-    return [others.p_value(value) for others, value in zip(scatter.leave_out_each(), printed, strict=True)]
+    return [replace(scatter, values=np.delete(some, place)).p_value(value) for place, value in enumerate(printed)]
 
 
 def _rank(name: str, value: float, others: np.ndarray) -> dict[str, float]:
