@@ -4,7 +4,6 @@ import numpy as np
 from support import PinocchioPoint, without_tool
 
 from elastocal.study.equation_11 import identified_blocks, paired_blocks
-from elastocal.study.evaluation import evaluate_strategy
 from elastocal.study.metrics import make_judge
 from elastocal.study.simulation import (
     Loading,
@@ -15,7 +14,6 @@ from elastocal.study.simulation import (
     random_experiments,
     to_deflections,
     to_experiments,
-    weight_blocks,
 )
 
 PAPER = Loading(1000.0, (0.0, 0.5, 0.0), "base", "full_turn")
@@ -67,12 +65,6 @@ def judge(robot, at="end_effector"):
     experiments = experiments_of(robot, 1, CONFIGURATIONS_OF_THE_TEST, purpose="test")
     (seen,) = deflections_of(robot, experiments, at=at)[robot.chain.end_effector.name]
     return make_judge(robot, to_experiments(experiments[0]), to_deflections(seen), at)
-
-
-def evaluated_in_one_block(table, scores, fixed_joints, method, replicates):
-    sets = int(table["data_set"].max()) + 1
-    *counts, tests = weight_blocks("kuka", 1, sets, CONFIGURATIONS_OF_THE_TEST, replicates)
-    return evaluate_strategy([table], counts, tests, scores, fixed_joints, method)
 
 
 def pinocchio_regressors(chain, block, name, at="end_effector", rows=6):

@@ -1,7 +1,4 @@
-"""What stands in several artefacts of a campaign is the same in all: PDF, HTML, verdict.json and the terminal.
-
-Of made campaigns of every verdict, and of all campaigns that this checkout has diagnosed: after `make` all that are shipped.
-"""
+"""What stands in several artefacts of a campaign is the same in all: PDF, HTML, verdict.json and the terminal."""
 
 import html
 import json
@@ -19,7 +16,6 @@ from elastocal.report.loop_page import loop_page, write_loop_page
 from elastocal.report.outcome import outcome
 
 PICTURES = ["arrows", "before_after", "candidates"]
-DIAGNOSED = sorted(Path("reports/loop").glob("*/report.html"))
 
 
 @pytest.fixture(scope="module")

@@ -1,14 +1,10 @@
 """Averages over data sets and their Monte Carlo errors."""
 
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
-from made_studies import USUAL, studies_of
-from made_studies import blocks_of as studied_blocks
-from made_study_blocks import deflections_of, evaluated_in_one_block, experiments_of, identified
-from made_study_blocks import judge as judge_made
+from made_studies import studies_of
 from support import random_loads
 
 from elastocal.study.evaluation import average, find_length, metrics_table, over_studies_table, replicates_table, to_weights
@@ -80,15 +76,6 @@ def test_share_of_nonpositive_compliances_counts_data_sets_and_takes_trust_away(
     np.testing.assert_array_equal(table["trustworthy"], [True, False, True])
 
 
-def test_prefixes_without_estimates_stay_not_a_number_and_are_not_trusted(judge, estimates, weights, counts):
-    short = estimates.copy()
-    short[:, 0] = np.nan
-    table = metrics_table(average(blocks_of(short, weights), judge, "stiffness", counts), judge.reference, (0,))
-    for name in ("compliance_1", "delta_k_6", "k_sigma", "deviation"):
-        assert np.isnan(table[name][0]) and np.isfinite(table[name][1:]).all()
-    np.testing.assert_array_equal(table["trustworthy"], [False, True, True])
-
-
 def test_metrics_are_equations_13_and_14_of_the_averages(judge, estimates, weights, counts):
     averages = average(blocks_of(estimates, weights), judge, "stiffness", counts)
     table = metrics_table(averages, judge.reference, (0, 1))
@@ -134,40 +121,6 @@ def test_a_length_comes_with_the_spread_of_replicates_that_go_on_beyond_their_cu
     replicates = np.column_stack([[3.0, 3.0, 2.0], [0.9, 2.6, 0.9], ends])
     found, error = find_length(np.array([3.0, 0.9, 0.5]), replicates, limit)
     assert found == length and error == pytest.approx(np.std(lengths, ddof=1))
-
-
-@pytest.fixture(scope="module")
-def some(strategies):
-    return [strategies[name] for name in ("6DoF", "6DoF-after-3DoF", "4-6DoF-after-3DoF")]
-
-
-def test_each_study_has_a_block_for_each_strategy(kuka, some):
-    blocks = studied_blocks(kuka, some)
-    names = [strategy.name for strategy in some]
-    assert [(block["study"][0], block["strategy"]) for block in blocks] == [(n, name) for n in (1, 2) for name in names]
-    assert (blocks[0]["length"] == np.arange(1, 6)).all()
-
-
-@pytest.mark.parametrize("average", ["stiffness", "compliance"])
-def test_scores_are_those_of_the_pipeline_for_the_same_data_sets(kuka, some, average):
-    """Study number 0, which is that of the pipeline."""
-    found = studied_blocks(kuka, some, replace(USUAL, average=average), studies=[0])
-    experiments = experiments_of(kuka, sets=4, configurations=5)
-    deflections, scores = deflections_of(kuka, experiments, 1e-5), judge_made(kuka)
-    for strategy, block in zip(some, found, strict=True):
-        table = identified(kuka, strategy, experiments, deflections)
-        metrics = evaluated_in_one_block(table, scores, strategy.fixed_joints, average, 10)[0]
-        for name in ("compliance_1", "compliance_6", "k_sigma", "k_sigma_fixed_joints", "deviation"):
-            np.testing.assert_allclose(block[name][1:], metrics[name][1:], rtol=1e-6, err_msg=name)
-
-
-def test_averages_of_compliances_and_errors_of_single_data_sets_stand_beside_the_scores(kuka, some):
-    (usual,) = studied_blocks(kuka, some[:1], studies=[0])
-    (plain,) = studied_blocks(kuka, some[:1], replace(USUAL, average="compliance"), studies=[0])
-    for name in ("k_sigma", "k_sigma_fixed_joints", "deviation"):
-        np.testing.assert_array_equal(usual[f"{name}_mean_compliance"][1:], plain[name][1:])
-    # A single data set has all of its noise.
-    assert (np.sqrt(usual["mean_square"][1:]) > usual["deviation_mean_compliance"][1:]).all()
 
 
 def test_table_4_over_studies_is_their_median_with_a_spread_that_one_outlier_does_not_move():

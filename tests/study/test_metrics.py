@@ -6,9 +6,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from support import random_loads, without_tool
 
-from elastocal.mechanics.elastostatics import exact_deflections, joint_torques, regressor
-from elastocal.mechanics.kinematics import poses_and_jacobians
-from elastocal.study import metrics
+from elastocal.mechanics.elastostatics import exact_deflections, joint_torques
 from elastocal.study.metrics import (
     first_length_below,
     k_sigma,
@@ -57,25 +55,6 @@ def test_mean_deviation_counts_each_test_configuration_as_often_as_it_weighs(kuk
     for group in range(2):
         expected = np.repeat(position_errors(judge, models[group]), counts[group], axis=1).mean(axis=1)
         np.testing.assert_allclose(found[group], expected, rtol=1e-12)
-
-
-@pytest.mark.parametrize("models", [1, 4, 5, 6])
-def test_scores_do_not_depend_on_how_many_models_are_scored_at_a_time(kuka, monkeypatch, models):
-    rng, judge = np.random.default_rng(4), judge_of(kuka)
-    compliance = kuka.compliance * rng.uniform(0.8, 1.2, (7, 2, 6))
-    counts = rng.integers(1, 4, (7, len(judge.initial_errors)))
-    whole = mean_deviation(judge, compliance, counts)
-    monkeypatch.setattr(metrics, "MODELS_AT_A_TIME", models)
-    np.testing.assert_allclose(mean_deviation(judge, compliance, counts), whole, rtol=1e-9)
-
-
-def test_error_moment_is_the_mean_of_the_squared_regressor(robot):
-    loads = random_loads(robot, 1, 40)
-    jacobian = poses_and_jacobians(robot.chain, loads.joint_angles, robot.chain.end_effector)[2]
-    torques = joint_torques(robot.chain, loads.joint_angles, loads.wrench, robot.chain.end_effector)
-    rows = regressor(jacobian, torques)[..., :3, :].reshape(-1, 6)
-    expected = rows.T @ rows / 40
-    np.testing.assert_allclose(judge_of(robot, loads).form[:-1, :-1], expected, rtol=0, atol=1e-12 * expected.max())
 
 
 def test_k_sigma_is_the_signed_sum_over_all_joints_or_some():

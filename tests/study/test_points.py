@@ -64,25 +64,14 @@ def test_a_length_counts_where_the_accuracy_is_kept_for_good():
     assert lengths_table({"arm": frame}, {"E": ["E"]}, [40.0]).configurations[0] == 10
 
 
-POINT_SETS_OF_COSTS = {"one": ["A"], "two": ["A", "B"], "useless": ["A", "A"]}
-LENGTHS_OF_COSTS = np.arange(1, 101)
+POINT_SETS_OF_COSTS, LONG = {"one": ["A"], "two": ["A", "B"], "useless": ["A", "A"]}, np.arange(1, 101)
 
 
 def frame(sizes=(300.0, 200.0, 300.0)):
     """Errors in µm of one configuration by set, the same in each of ten data sets."""
-    parts = [
-        pd.DataFrame(
-            {
-                "points": name,
-                "data_set": number,
-                "length": LENGTHS_OF_COSTS,
-                "mean_square": (1e-6 * size) ** 2 / LENGTHS_OF_COSTS,
-            }
-        )
-        for name, size in zip(POINT_SETS_OF_COSTS, sizes, strict=True)
-        for number in range(10)
-    ]
-    return pd.concat(parts, ignore_index=True)
+    sets = [(name, number, size) for name, size in zip(POINT_SETS_OF_COSTS, sizes, strict=True) for number in range(10)]
+    squares = [{"points": n, "data_set": k, "length": LONG, "mean_square": (1e-6 * size) ** 2 / LONG} for n, k, size in sets]
+    return pd.concat(map(pd.DataFrame, squares), ignore_index=True)
 
 
 @pytest.fixture
@@ -92,7 +81,7 @@ def weights():
 
 
 def test_the_length_is_where_the_curve_crosses_the_accuracy():
-    squares = (300.0**2) / LENGTHS_OF_COSTS
+    squares = (300.0**2) / LONG
     assert configurations_needed(squares, 60.0) == pytest.approx(25.0)
     assert configurations_needed(squares, 59.0) == pytest.approx((300 / 59) ** 2, rel=1e-3)
     assert configurations_needed(squares, 1.0) == np.inf and configurations_needed(squares, 400.0) == 1.0

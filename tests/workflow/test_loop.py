@@ -65,20 +65,14 @@ COMMANDS = {
     "correct": ["path.csv", "--output", "targets.csv"],
     "export": ["--output", "out"],
 }
-# Texts for people, and what no job of this campaign has read or written.
-UNREAD = ("results/logs/", "results/timings/")
-
-
-def files_behind_the_report(study):
-    """Of a finished campaign: its folder, tables, reports and records, the robot file and one of the modules."""
-    own = study.files(f"{CELL}/**/*", "results/**/made/**/*", "reports/**/made/**/*", "results/**/*made*")
-    files = {name for name in own if study.path(name).is_file() and not name.startswith(UNREAD)}
-    return [*sorted(files), "src/elastocal/diagnosis/search.py", "config/robots/kuka.yaml"]
 
 
 def test_each_file_behind_a_report_that_was_changed_is_found_by_every_command(cell, monkeypatch):
     """In one line, before it writes: edited and deleted, and by the commands, in turn."""
-    files = files_behind_the_report(cell)
+    own = cell.files(f"{CELL}/**/*", "results/**/made/**/*", "reports/**/made/**/*", "results/**/*made*")
+    # Texts for people are read by no job.
+    files = [name for name in own if cell.path(name).is_file() and not name.startswith(("results/logs/", "results/timings/"))]
+    files = [*sorted({*files}), "src/elastocal/diagnosis/search.py", "config/robots/kuka.yaml"]
     assert {name.split("/")[0] for name in files} == {"cells", "results", "reports", "src", "config"} and len(files) > 40
     monkeypatch.chdir(cell.folder)
     assert diagnosed_campaign(Path(CELL)).name == "made"
