@@ -61,7 +61,9 @@ def arrows(table: Mapping[str, np.ndarray], arm: np.ndarray | None = None) -> Fi
     `table`: columns of the residuals table. `arm` (K, 3): corners of the robot in one pose, m. Repeats are averaged; where
     states are still many, one of each cell of a grid is drawn.
     """
-    place, off, stages = *_states(table), _stages(table)
+    place, off = _states(table)
+    # The first alone where nothing was found that changes a residual.
+    stages = tuple(STAGES)[: 1 if np.allclose(off["before"], off["after"], rtol=0, atol=1e-9) else 2]
     size = np.linalg.norm(off["before"], axis=1)
     largest = max(np.quantile(size, 0.95), 1e-9)
     extent = np.maximum(np.ptp(place, axis=0), 1e-3)
@@ -107,12 +109,6 @@ def middle_of_cells(at: np.ndarray, size: np.ndarray, side: float) -> np.ndarray
     order = np.lexsort((size, cell.ravel()))
     counts = np.bincount(cell.ravel())
     return order[np.cumsum(counts) - counts + (counts - 1) // 2]
-
-
-def _stages(table: Mapping[str, np.ndarray]) -> tuple[str, ...]:
-    """Both stages, or the first alone where nothing was found that changes a residual."""
-    same = all(np.allclose(table[f"before_d{axis}"], table[f"after_d{axis}"], rtol=0, atol=1e-9) for axis in "xyz")
-    return tuple(STAGES)[: 1 if same else 2]
 
 
 def _states(table: Mapping[str, np.ndarray]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
@@ -221,7 +217,10 @@ def probabilities(stated: Mapping[str, Any] | None, table: Mapping[str, np.ndarr
     """
     order = rank_candidates(table)
     if stated is None or not len(order):
-        return _note_nothing_tested(table)
+        count = len(set(table["candidate"]))
+        faulty = count and set(table["note"]) == {_AT_FAULT}
+        nothing = f"None of {count} candidate causes can be tested with these measurements."
+        return note("The data are at fault: no cause in the robot was looked for." if faulty else nothing)
     sets, named = stated["sets"][:_HYPOTHESES], order[:_NAMED]
     labels = [textwrap.fill(capital(words), _LABEL) for words in hypotheses_words(sets)]
     values = [entry["probability"] for entry in sets]
@@ -298,13 +297,6 @@ def short_name(key: str) -> str:
     words = capital(candidate_words(key))
     words = words if len(words) <= _LONGEST else f"{words[: _LONGEST // 2]} … {words[-(_LONGEST // 2 - 2) :]}"
     return textwrap.fill(words, 48)
-
-
-def _note_nothing_tested(table: Mapping[str, np.ndarray]) -> Figure:
-    count = len(set(table["candidate"]))
-    if count and set(table["note"]) == {_AT_FAULT}:
-        return note("The data are at fault: no cause in the robot was looked for.")
-    return note(f"None of {count} candidate causes can be tested with these measurements.")
 
 
 @styled

@@ -198,29 +198,6 @@ def _replicated_scores(averages: Averages, true_compliance: np.ndarray, fixed_jo
     return scores | {"initial_deviation": averages.initial_deviation}
 
 
-def evaluate_strategy(
-    identified_blocks: Iterable[Mapping[str, np.ndarray]],
-    weight_blocks: Iterable[Mapping[str, np.ndarray]],
-    test_weights: Mapping[str, np.ndarray],
-    judge: Judge,
-    fixed_joints: Sequence[int],
-    method: str,
-) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Tables of metrics and bootstrap replicates of one strategy from blocks of its estimates and of the weights.
-
-    `method`: interpretation R7, see `average`.
-    """
-
-    def weigh() -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        for block, counts in zip(identified_blocks, weight_blocks, strict=True):
-            columns = [block[f"compliance_{j + 1}"] for j in range(len(judge.reference))]
-            compliance = np.stack([column.reshape(len(data_sets(block)), -1) for column in columns], axis=-1)
-            yield compliance, to_weights(counts)
-
-    averages = average(weigh(), judge, method, to_weights(test_weights))
-    return metrics_table(averages, judge.reference, fixed_joints), replicates_table(averages, judge.reference, fixed_joints)
-
-
 def find_length(values: np.ndarray, replicate_values: np.ndarray, limit: float) -> tuple[float, float]:
     """First length at which a metric is at most `limit`, infinite where none is, with its Monte Carlo standard error.
 
@@ -309,17 +286,19 @@ def identify(job: Job) -> None:
     ideal = read_table(job.input.test_ideal, DEFLECTIONS, point=robot.chain.end_effector.name)
     counts = ["replicate", "count"]
     # Read again, so that any number of data sets is worked off in the same memory.
-    tables = evaluate_strategy(
-        read_blocks(job.output.identified, identified(n), ["data_set", *(f"compliance_{j + 1}" for j in range(n))]),
-        read_blocks(job.input.weights, WEIGHTS, counts, members=DATA_SETS),
-        read_table(job.input.weights, WEIGHTS, counts, members=TESTS),
-        make_judge(robot, to_experiments(tested), to_deflections(ideal), asked.wrench_at),
-        strategy.fixed_joints,
-        asked.average,
+    columns = [f"compliance_{j + 1}" for j in range(n)]
+    estimated = (
+        np.stack([block[name].reshape(len(data_sets(block)), -1) for name in columns], axis=-1)
+        for block in read_blocks(job.output.identified, identified(n), ["data_set", *columns])
     )
+    weights = map(to_weights, read_blocks(job.input.weights, WEIGHTS, counts, members=DATA_SETS))
+    of_tests = to_weights(read_table(job.input.weights, WEIGHTS, counts, members=TESTS))
+    judge = make_judge(robot, to_experiments(tested), to_deflections(ideal), asked.wrench_at)
+    averages = average(zip(estimated, weights, strict=True), judge, asked.average, of_tests)
+    tables = [make(averages, judge.reference, strategy.fixed_joints) for make in (metrics_table, replicates_table)]
     scores = (job.output.metrics, metrics(n)), (job.output.replicates, REPLICATES)
-    for (path, schema), columns in zip(scores, tables, strict=True):
-        write_table(path, schema, [columns], origin(job))
+    for (path, schema), found in zip(scores, tables, strict=True):
+        write_table(path, schema, [found], origin(job))
 
 
 def repeat_studies(job: Job) -> None:

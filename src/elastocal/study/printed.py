@@ -17,7 +17,7 @@ how figures depend on one another [4]; of k studies it is no smaller than 1/(k +
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -174,17 +174,6 @@ def predict_scatter(
     return Predicted(np.log(length_to_reach(curves, limit)), True, digit) if len(curves) > 1 else None
 
 
-def predicted_cells(
-    printed: pd.DataFrame, studies: pd.DataFrame, length: int, fixed_joints: bool
-) -> Iterator[tuple[Predicted, float]]:
-    """The figures of Tables 3 and 4 that the studies have: how they scatter, and what is printed."""
-    figure: Any
-    for figure in printed[printed.table.isin(["3", "4"])].itertuples():
-        found = predict_scatter(studies, figure.robot, figure.strategy, figure.quantity, length, fixed_joints)
-        if found is not None:
-            yield found, figure.value
-
-
 def holm(p_values: np.ndarray) -> np.ndarray:
     """p values corrected for their number, ndarray (N,); not a number where there is none."""
     order = np.argsort(p_values)[: np.count_nonzero(~np.isnan(p_values))]
@@ -227,19 +216,20 @@ def joint_table(studies: pd.DataFrame, reference: pd.DataFrame, length: int) -> 
     Returns joints (fixed joints or all joints), cells, differ (after Holm's correction), studies; below (p below the level) and
     statistic (Fisher's), each with the median and the largest of the studies and the p value.
     """
-    return pd.DataFrame([_joint_row(studies, reference, length, fixed) for fixed in (True, False)])
-
-
-def _joint_row(studies: pd.DataFrame, printed: pd.DataFrame, length: int, fixed_joints: bool) -> dict[str, Any]:
-    found = [*predicted_cells(printed, studies, length, fixed_joints)]
-    paper = np.array([scatter.p_value(value) for scatter, value in found])
-    others = np.array([_judge_by_others(scatter) for scatter, *_ in found]).T
-    row: dict[str, Any] = {"joints": "fixed joints" if fixed_joints else "all joints", "cells": len(paper)}
-    if not found:
-        paper, others = np.full(1, np.nan), np.full((1, 1), np.nan)
-    row |= {"differ": int((holm(paper) < LEVEL).sum()), "studies": len(others)}
-    row |= _rank("below", int((paper < LEVEL).sum()), (others < LEVEL).sum(axis=1))
-    return row | _rank("statistic", float(-2 * np.log(paper).sum()), -2 * np.log(others).sum(axis=1))
+    rows, printed = [], [*reference[reference.table.isin(["3", "4"])].itertuples()]
+    for joints in ("fixed joints", "all joints"):
+        fixed = joints == "fixed joints"
+        found = [(predict_scatter(studies, f.robot, f.strategy, f.quantity, length, fixed), f.value) for f in printed]
+        # p values of the paper by all studies, and of each study by the others.
+        paper = np.array([scatter.p_value(value) for scatter, value in found if scatter])
+        others = np.array([_judge_by_others(scatter) for scatter, _ in found if scatter]).T
+        row: dict[str, Any] = {"joints": joints, "cells": len(paper)}
+        if not len(paper):
+            paper, others = np.full(1, np.nan), np.full((1, 1), np.nan)
+        row |= {"differ": int((holm(paper) < LEVEL).sum()), "studies": len(others)}
+        row |= _rank("below", int((paper < LEVEL).sum()), (others < LEVEL).sum(axis=1))
+        rows.append(row | _rank("statistic", float(-2 * np.log(paper).sum()), -2 * np.log(others).sum(axis=1)))
+    return pd.DataFrame(rows)
 
 
 def _judge_by_others(scatter: Predicted) -> list[float]:
