@@ -17,7 +17,6 @@ from elastocal.study.simulation import (
 )
 
 PAPER = Loading(1000.0, (0.0, 0.5, 0.0), "base", "full_turn")
-OFFSET = (0.1, 0.05, 0.2)
 AT = ("end_effector", "measuring_point")
 CONFIGURATIONS_OF_THE_TEST = 30
 WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
