@@ -28,7 +28,6 @@ include: "workflow/rules/league_files.smk"
 include: "workflow/rules/league.smk"
 include: "workflow/rules/signatures.smk"
 include: "workflow/rules/audit.smk"
-include: "workflow/rules/store.smk"
 
 
 complete_rules()

@@ -1,6 +1,6 @@
 """Kills, and two runs at once: a plain `snakemake -j2` has to get over each.
 
-`make soak` runs it with forty kills; tests/workflow/test_soak.py with one. After each fault a plain run has to finish, and
+`make soak` runs it with forty kills. After each fault a plain run has to finish, and
 every file that the pipeline makes has to be, byte for byte, that of a run that nothing disturbed. No moment is a time, by which
 a fast machine may have ended: kills come when a run has made so many files, of as many as the undisturbed one made.
 

@@ -4,13 +4,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from drawn_figures import assert_nothing_cut_off, legend_entries, row_labels
-from made_study_tables import TITLES, comparison
 from matplotlib.colors import to_hex
 
 from elastocal.figures.study import noise_impact, scores, stiffness_errors
 from elastocal.figures.style import PALETTE
 
-LENGTHS = np.arange(1, 6)
+LENGTHS, TITLES = np.arange(1, 6), {"kuka": "Kuka", "fanuc": "Fanuc"}
 ORDER = ["6DoF", "2DoF+6DoF"]
 
 
@@ -92,7 +91,10 @@ def find_points(axis, marker):
 
 
 def test_each_printed_figure_of_table_4_stands_among_the_studies_of_its_robot():
-    figure = scores(comparison(), TITLES)
+    columns = ["robot", "quantity", "paper", "studies_mean", "studies_std", "p_holm"]
+    rows = [("kuka", "k_sigma_20", 1.5, 1.75, 0.1, 0.002), ("kuka", "dev_20", 1.0, 1.2, 0.08, 0.16)]
+    table = pd.DataFrame([*rows, ("fanuc", "n_dev_2_um", 30.0, 110.0, 40.0, 0.18)], columns=columns)
+    figure = scores(table.assign(table="4", strategy="6DoF"), TITLES)
     heads = [axis.get_title() for axis in figure.axes[:3]]
     assert heads == ["$k_\\Sigma$ at 20 (%)", "dev at 20 (µm)", "length until 2 µm"]
     assert row_labels(figure.axes[0]) == ["6DoF"]

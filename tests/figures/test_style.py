@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 from PIL import Image
 
 from elastocal.figures.style import WIDTH_MM, note, panels, save, save_svg
@@ -36,16 +35,6 @@ def test_the_same_figure_gives_the_same_bytes_without_a_date_and_letters_of_an_s
     assert b"CreationDate" not in (tmp_path / "a.pdf").read_bytes()
     assert "Software" not in Image.open(tmp_path / "a.png").info
     assert "angle (°)" in (tmp_path / "a.svg").read_text(encoding="utf-8")
-
-
-def test_a_figure_that_cannot_be_drawn_leaves_the_earlier_file_as_it_was(tmp_path):
-    (tmp_path / "figure.pdf").write_text("earlier", encoding="utf-8")
-    figure = Figure()
-    figure.text(0.5, 0.5, r"$\unknowncommand$")
-    with pytest.raises(ValueError):
-        save_both(figure, tmp_path)
-    assert [path.name for path in tmp_path.iterdir()] == ["figure.pdf"]
-    assert (tmp_path / "figure.pdf").read_text(encoding="utf-8") == "earlier"
 
 
 def test_a_figure_names_commit_configuration_and_seed_in_both_files(tmp_path):

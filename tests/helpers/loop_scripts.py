@@ -3,6 +3,7 @@
 import runpy
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 SCRIPTS = Path(__file__).resolve().parents[2] / "workflow" / "scripts"
 CONFIG = {"origin": {"commit": "c0ffee", "configuration_sha256": "d16e57", "seed": 1}}
@@ -42,11 +43,6 @@ class _Named(dict):
         return iter(())
 
 
-class _Job:
-    def __init__(self, **parts):
-        self.__dict__.update(parts)
-
-
 def run_loop(folder, robots, out, steps=STEPS):
     """Run every step from a campaign's folder to its report; results stand in `out`.
 
@@ -54,7 +50,7 @@ def run_loop(folder, robots, out, steps=STEPS):
     """
     out.mkdir(parents=True, exist_ok=True)
     for script in steps:
-        job = _Job(
+        job = SimpleNamespace(
             input=Files(out),
             output=Files(out),
             params=_Named(PARAMS | {"folder": folder.as_posix(), "robots": robots.as_posix()}),

@@ -2,36 +2,22 @@
 
 import contextlib
 import json
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pinocchio as pin
 import pyarrow as pa
 import pyarrow.parquet as pq
+import yaml
 
 from elastocal.io.origin import Origin
 from elastocal.io.records import JobRecord, write_records
 from elastocal_proof.audit.arm import Arm
 from elastocal_proof.audit.audited import COMPONENTS, WRENCH, Audited, numbers
 
-ROBOT = {
-    "name": "two joints",
-    "chain": "Tz(0.4) Rz(q1) Tx(0.1) Ry(q2) Tx(0.7) [hand]",
-    "joint_limits_deg": [[-90, 90], [-90, 90]],
-    "compliance_urad_per_Nm": [0.5, 0.8],
-}
-STRATEGY = {"name": "hand alone", "stages": [{"points": ["hand"], "joints": [1, 2]}]}
-CONFIGURATION = {
-    "seed": 1,
-    "data_sets": 4,
-    "configurations": 5,
-    "test_configurations": 6,
-    "loading": {"force_N": 500.0, "offset_m": [0, 0.5, 0]},
-    "interpretations": {
-        **{"joint_range": "full_turn", "offset_frame": "base", "measured": "pose", "tool_offset_m": [0, 0, 0]},
-        "wrench_at": "end_effector",
-    },
-}
+_MADE = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8"))
+ROBOT, STRATEGY, CONFIGURATION = (_MADE[name] for name in ("robot", "strategy", "configuration"))
 
 
 def made_run(folder):

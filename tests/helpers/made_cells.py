@@ -2,6 +2,7 @@
 
 import csv
 from dataclasses import fields
+from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
@@ -11,19 +12,7 @@ import yaml
 from elastocal.campaigns.campaign import Measurements
 from elastocal.campaigns.reading import read_campaign
 
-ARM = {
-    "name": "three joints",
-    "chain": "Tz(0.4) Rz(q1) Tx(0.1) Ry(q2) Tx(0.7) [elbow] Ry(q3) Tx(0.6) [hand]",
-    "joint_limits_deg": [[-180, 180], [-100, 45], [-120, 120]],
-    "compliance_urad_per_Nm": [1, 2, 3],
-}
-DOCUMENT = {
-    "campaign": "cell7",
-    "robot": "arm.yaml",
-    "measured": "pose",
-    "frame": "base",
-    "targets": {"A": {"point": "elbow", "offset_m": [0, 0, 0.1]}, "B": {"point": "hand", "offset_m": "unknown"}},
-}
+ARM, DOCUMENT = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8")).values()
 WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 POSES, LOADS, REPEATS = 10, 2, 2
 

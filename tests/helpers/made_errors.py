@@ -5,12 +5,6 @@ import numpy as np
 from elastocal.validation.held_out import Errors
 
 INTERPRETATIONS = 6
-KINDS = {
-    "common": "half of the variance common to the measurements of a pose",
-    "uneven": "the same, 2 to 10 measurements a pose",
-    "skewed": "the same, and the error of a pose log-normal, with 0.5 in the logarithm",
-    "far off": "the same, and one pose in twenty 4 times as far off",
-}
 _MANY = 400_000
 
 

@@ -1,4 +1,4 @@
-"""Tables of the loop made up for figures and reports: their columns, no robot behind them."""
+"""Tables and verdicts of the loop made up for figures and reports, no robot behind them, and what a report states of them."""
 
 from copy import deepcopy
 from pathlib import Path
@@ -8,19 +8,21 @@ import yaml
 
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.settings import Settings
+from elastocal.diagnosis.verdict import ADEQUATE, CLASS, NAMED, NOT_TESTABLE, SEVERAL, UNEXPLAINED
+from elastocal.report.loop_facts import loop_facts
 
 # What of verdict.json is always the same.
 DATA = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8"))
 FAMILIES = ("geometry", "gravity", "transmission", "elastic", "gearbox", "load", "drift")
 
 
-def residual_table(poses=30, targets=2, loaded=True, timed=True, found=True, repeats=1, seed=0):
+def residual_table(poses=30, repeats=1):
     """Columns of a residuals table; joint 2 makes a sine of 300 µm in the vertical that goes with what is found."""
-    rng = np.random.default_rng(seed)
+    rng, targets = np.random.default_rng(0), 2
     count = poses * targets * repeats * 2
     pose = np.repeat(np.arange(poses), targets * repeats * 2)
     angles = rng.uniform(-2, 2, (poses, 6))[pose]
-    load = np.tile(np.repeat([0, 1], targets * repeats), poses) if loaded else np.zeros(count, int)
+    load = np.tile(np.repeat([0, 1], targets * repeats), poses)
     table = {
         "session": np.zeros(count, int),
         "pose": pose,
@@ -31,7 +33,7 @@ def residual_table(poses=30, targets=2, loaded=True, timed=True, found=True, rep
         "held_out": pose % 3 == 0,
         "gross_error": np.zeros(len(pose), bool),
         "outside_range": pose == 0,
-        "time_s": 60.0 * np.arange(count) if timed else np.full(count, np.nan),
+        "time_s": 60.0 * np.arange(count),
     }
     table |= {f"q{joint}": angles[:, joint - 1] for joint in range(1, 7)}
     table |= {name: 500.0 * load * (name == "fz") for name in ("fx", "fy", "fz", "mx", "my", "mz")}
@@ -39,16 +41,16 @@ def residual_table(poses=30, targets=2, loaded=True, timed=True, found=True, rep
     table |= dict(zip("xyz", place.T, strict=True))
     noise = 20e-6 * rng.normal(size=(count, 3))
     wave = 300e-6 * np.sin(angles[:, 1])
-    for stage, size in (("before", 1.0), ("after", 0.0 if found else 1.0)):
+    for stage, size in (("before", 1.0), ("after", 0.0)):
         off = noise + size * wave[:, None] * [0, 0, 1]
         table |= {f"{stage}_d{axis}": off[:, number] for number, axis in enumerate("xyz")}
         table |= {f"{stage}_r{axis}": np.full(count, np.nan) for axis in "xyz"}
     return table
 
 
-def candidate_table(count=30, untestable=5, chosen=1, note="no time in the data"):
+def candidate_table(count=30, chosen=1):
     """Columns of a candidates table: by falling Bayes factor, the last cannot be tested."""
-    total = count + untestable
+    total = count + 5
     names = [f"effect_{number}@{number % 6 + 1}" for number in range(total)]
     tested = np.arange(total) < count
     rank = np.arange(total, dtype=float)
@@ -66,7 +68,7 @@ def candidate_table(count=30, untestable=5, chosen=1, note="no time in the data"
         "log_bayes_factor": where_tested(100.0 - 7 * rank),
         "probability": where_tested(np.where(rank < chosen, 0.94, 0.01)),
         "chosen": rank < chosen,
-        "note": np.where(tested, "", note).astype(object),
+        "note": np.where(tested, "", "no time in the data").astype(object),
     }
 
 
@@ -101,28 +103,21 @@ def step_rows(effects=("lost_motion",), largest_m=3e-4):
     return rows
 
 
-def split_rows(changed=True, blocks=4):
-    """Rows of splits.csv: the held-out poses, and blocks of joint space."""
-    rows = []
-    for split, block in [("held out", "all"), ("joint space", "all"), *(("joint space", k + 1) for k in range(blocks))]:
-        row = {"split": split, "block": block, "poses": 10}
-        for stage, size in (("before", 1.2e-4), ("after", 0.8e-4 if changed else 1.2e-4)):
+def split_rows(changed):
+    """Rows of splits.csv: the held-out poses, and four blocks of joint space."""
+    rows, sizes = [], {"before": 1.2e-4, "after": 0.8e-4 if changed else 1.2e-4}
+    fall = 1 - sizes["after"] / sizes["before"]
+    for split, block in [("held out", "all"), ("joint space", "all"), *(("joint space", k) for k in range(1, 5))]:
+        row = {"split": split, "block": block, "poses": 10, "reduction": fall, "reduction_std_error": 0.05}
+        for stage, size in sizes.items():
             row |= {f"{stage}_rms_m": size, f"{stage}_rms_m_low": 0.8 * size, f"{stage}_rms_m_high": 1.3 * size}
-        fall = 1 - row["after_rms_m"] / row["before_rms_m"]
-        row |= {"reduction": fall, "reduction_low": fall - 0.1, "reduction_high": fall + 0.1, "reduction_std_error": 0.05}
-        rows.append(row)
+        rows.append(row | {"reduction_low": fall - 0.1, "reduction_high": fall + 0.1})
     return rows
 
 
-def experiment_rows(effect="link_elasticity", count=10):
+def experiment_rows(count=10):
     """Rows of next_experiment.csv."""
-    rows = []
-    for number in range(count):
-        row = {"effect": effect, "pose": number, "load": 1, "point": "6DoF"}
-        row |= {f"q{joint}": -0.1 * joint for joint in range(1, 7)}
-        row |= {"fx": 910.1, "fy": -0.2, "fz": -411.8, "mx": -205.9, "my": 0.0, "mz": 455.1}
-        rows.append(row | {"separation": 10.0 + number, "resolved": 0.5 + 0.04 * number})
-    return rows
+    return [DATA["experiment"] | {"pose": n, "separation": 10.0 + n, "resolved": 0.5 + 0.04 * n} for n in range(count)]
 
 
 def effect_entry(
@@ -145,40 +140,18 @@ def effect_entry(
     return DATA["effect"] | given | judged | {"cost_m": cost_m if adopted else None}
 
 
-def fault_entry():
-    """A fault of the data among the effects of verdict.json."""
-    return effect_entry(adopted=False) | DATA["fault"]
-
-
-def remainder_facts(outside=0):
-    """What verdict.json says of a regression on the remainder."""
-    widths = {"within": 1.0e-4, "outside": 4.0e-4 if outside else None}
-    return DATA["remainder"] | {"outside": outside, "half_width_m": widths}
-
-
 def verdict_document(
-    word,
-    effects=(),
-    warnings=(),
-    noise="repeats",
-    campaign="made_up",
-    held=(),
-    sets=None,
-    outside=0,
-    reduction=(0.15, 0.32),
-    next_experiment=None,
-    remainder=None,
+    word, effects=(), warnings=(), noise="repeats", sets=None, outside=0, reduction=(0.15, 0.32), remainder=None
 ):
     """Contents of verdict.json."""
     faulty, adopted = data_at_fault({"effects": effects}), any(effect["adopted"] for effect in effects)
     before = DATA["errors"]
     after = {name: (0.7 if adopted else 1.0) * value for name, value in before.items()}
     both = {"before": before, "after": after}
-    found = deepcopy(DATA["verdict"]) | {"campaign": campaign, "verdict": word, "effects": list(effects)}
-    found |= {"warnings": list(warnings), "held": list(held), "remainder": remainder, "settings": Settings().document()}
+    found = deepcopy(DATA["verdict"]) | {"campaign": "made_up", "verdict": word, "effects": list(effects)}
+    found |= {"warnings": list(warnings), "held": [], "remainder": remainder, "settings": Settings().document()}
     found |= {"kept": "effect" if adopted else "declared", "probabilities": None if faulty else probabilities(sets)}
     found |= {"misfit": None, "candidates_tested": 0} if faulty else {}
-    found |= {"next_experiment": next_experiment} if next_experiment else {}
     found["noise"] |= {"source": noise, "degrees_of_freedom": 1008 if noise == "repeats" else 0}
     heldout = found["heldout"]
     heldout |= both | {"delivered": remainder["errors"] if remainder else after}
@@ -189,31 +162,45 @@ def verdict_document(
     return found
 
 
-def parameter_table(declared=("joint_offset@2 offset",), held=(), by_prior=()):
-    """Columns of a parameters table: a frame, the compliances and those named, some of which only their priors determine."""
-    named = [f"frame 0 {axis}" for axis in ("dx", "dy", "dz")] + [f"joint_compliance c{joint}" for joint in range(1, 7)]
-    named += declared
-    count = len(named)
-    return {
-        "owner": np.array([name.rsplit(" ", 1)[0] for name in named], object),
-        "parameter": np.array([name.rsplit(" ", 1)[1] for name in named], object),
-        "unit": np.array(["rad"] * count, object),
-        "value": np.full(count, 3e-4),
-        "std_error": np.full(count, 2e-5),
-        "held": np.isin(named, held),
-        "prior_std": np.where(np.isin(named, by_prior), 2.1e-5, np.nan),
-    }
+HARMONICS = [f"transmission_harmonic@{joint}[orders {band}]" for joint in range(1, 7) for band in ("1-2", "3-6", "7-12")]
+WAVES = [f"{wave}_{order}q" for order in range(1, 7) for wave in ("cos", "sin")]
+REMAINDER = DATA["remainder"] | {"outside": 3, "half_width_m": {"within": 1.0e-4, "outside": 4.0e-4}}
+TWO_PLACES = [("joint 3", 0.8), ("joint 5", 0.2)]
+CAMPAIGNS = {
+    "adequate": verdict_document(ADEQUATE, sets=[({}, 0.97), ({"lost_motion": ["joint 3"]}, 0.02)]),
+    "named": verdict_document(NAMED, [effect_entry()]),
+    "named, location uncertain": verdict_document(NAMED, [effect_entry(locations=TWO_PLACES)]),
+    "class": verdict_document(CLASS, [effect_entry(alternatives=["joint_tilt", "link_elasticity"])]),
+    "class with a related mechanism": verdict_document(CLASS, [effect_entry(alternatives=["other"])]),
+    "several": verdict_document(SEVERAL, [effect_entry(), effect_entry("payload", ["payload"], (), ["mass"])]),
+    "named, not adopted": verdict_document(NAMED, [effect_entry(adopted=False)]),
+    "class, not adopted": verdict_document(CLASS, [effect_entry(alternatives=["joint_tilt"], adopted=False)]),
+    "unexplained": verdict_document(UNEXPLAINED, sets=[({"other": ["joint 2"]}, 0.9), ({}, 0.1)]),
+    "not_testable": verdict_document(NOT_TESTABLE, sets=[({}, 1.0)]),
+    "fault of the data": verdict_document(
+        NAMED, [effect_entry(adopted=False) | DATA["fault"]], ["the fit of the final model did not converge"]
+    ),
+    "noise not known": verdict_document(ADEQUATE, noise="residual", warnings=["no repeats and no declared noise"]),
+    "hundreds of parameters": verdict_document(SEVERAL, [effect_entry("transmission_harmonic", HARMONICS, range(1, 7), WAVES)]),
+    "with a remainder": verdict_document(NAMED, [effect_entry()], outside=3, remainder=REMAINDER),
+    "poses outside the range": verdict_document(NAMED, [effect_entry()], outside=3),
+}
 
 
-def campaign_descriptions(name="made_up", robot="A robot", held_out=None, declared=("joint_offset",), targets=("A", "B")):
-    """Contents of campaign.json, as far as a report reads them."""
-    campaign = {
-        "campaign": name,
-        "measured": "position",
-        "frame": "tracker",
-        "targets": {target: {"point": "6DoF", "offset_m": "unknown"} for target in targets},
-        "compliance": "identify",
-        "declared": list(declared),
+def facts_of(verdict, **changed):
+    """Facts of the report of a verdict, with tables that fit it where none are given."""
+    found = [effect["name"] for effect in verdict["effects"] if effect["adopted"]]
+    given = {
+        "steps": step_rows(effects=found),
+        "splits": split_rows(changed=bool(found)),
+        "experiment": [],
+        "table": residual_table(),
+        "descriptions": DATA["descriptions"],
+        "parameters": {name: np.array(values) for name, values in DATA["parameters"].items()},
     }
-    other = {"campaign": campaign | {"campaign": held_out}} if held_out else None
-    return {"campaign": campaign, "robot": {"name": robot}, "held_out": other}
+    return loop_facts(verdict, **given | changed)
+
+
+def plainly(text):
+    """A text with plain blanks where lines must not end."""
+    return text.replace("\u00a0", " ")

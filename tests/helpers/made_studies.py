@@ -1,12 +1,12 @@
-"""Scores of further studies, made up, and a few from the study's own steps."""
+"""Metrics, replicates and scores of further studies, made up, and small studies in memory."""
 
+import numpy as np
 import pandas as pd
-from made_metrics import LENGTHS
 from made_study_blocks import PAPER
 
 from elastocal.study.in_memory import Interpretation, Size, StudyInMemory
-from elastocal.study.repeated import repeated_blocks
 
+LENGTHS = np.arange(1, 101)
 USUAL = Interpretation(PAPER, 6, "end_effector", "stiffness")
 SIZE = Size(data_sets=4, configurations=5, tests=30, noise=1e-5)
 
@@ -22,10 +22,23 @@ def studies_of(robot="arm", strategy="A", biases=(20.0, 22.0, 24.0)):
     return pd.concat(parts, ignore_index=True)
 
 
-def blocks_of(robot, strategies, interpretation=USUAL, size=SIZE, studies=(1, 2)):
-    return list(repeated_blocks(StudyInMemory(robot, "kuka", 1, interpretation, size), studies, strategies))
-
-
 def few_of(robot, key="kuka"):
     """A study of six data sets of 20 configurations."""
     return StudyInMemory(robot, key, 1, USUAL, Size(data_sets=6, configurations=20, tests=30, noise=1e-5))
+
+
+def metrics_of(strategy, bias=100.0, robot="arm"):
+    """Metrics whose k_sigma and deviation fall as bias / length: percent and µm."""
+    frame = pd.DataFrame({"robot": robot, "noise_um": 200.0, "strategy": strategy, "length": LENGTHS})
+    for name, scale in (("k_sigma", 1.0), ("k_sigma_fixed_joints", 0.5), ("deviation", 1e-6)):
+        frame[name], frame[f"{name}_std_error"] = scale * bias / LENGTHS, scale
+    frame["initial_deviation"], frame["initial_deviation_std_error"] = 1e-3, 1e-5
+    return frame
+
+
+def replicates_of(strategy, bias=100.0, robot="arm", spread=(-0.1, 0.0, 0.1)):
+    parts = []
+    for number, relative in enumerate(spread, 1):
+        frame = metrics_of(strategy, bias * (1 + relative), robot)
+        parts.append(frame.assign(replicate=number))
+    return pd.concat(parts, ignore_index=True)

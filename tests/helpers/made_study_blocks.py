@@ -4,7 +4,7 @@ import numpy as np
 from support import PinocchioPoint, without_tool
 
 from elastocal.study.equation_11 import identified_blocks, paired_blocks
-from elastocal.study.evaluation import evaluate_strategy, judge_from
+from elastocal.study.metrics import make_judge
 from elastocal.study.simulation import (
     Loading,
     blocks_of_sets,
@@ -12,11 +12,11 @@ from elastocal.study.simulation import (
     ideal_blocks,
     measured_blocks,
     random_experiments,
-    weight_blocks,
+    to_deflections,
+    to_experiments,
 )
 
 PAPER = Loading(1000.0, (0.0, 0.5, 0.0), "base", "full_turn")
-OFFSET = (0.1, 0.05, 0.2)
 AT = ("end_effector", "measuring_point")
 CONFIGURATIONS_OF_THE_TEST = 30
 WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
@@ -62,13 +62,8 @@ def compliances(table, length):
 
 def judge(robot, at="end_effector"):
     experiments = experiments_of(robot, 1, CONFIGURATIONS_OF_THE_TEST, purpose="test")
-    return judge_from(robot, experiments[0], deflections_of(robot, experiments, at=at)[robot.chain.end_effector.name][0], at)
-
-
-def evaluated_in_one_block(table, scores, fixed_joints, method, replicates):
-    sets = int(table["data_set"].max()) + 1
-    *counts, tests = weight_blocks("kuka", 1, sets, CONFIGURATIONS_OF_THE_TEST, replicates)
-    return evaluate_strategy([table], counts, tests, scores, fixed_joints, method)
+    (seen,) = deflections_of(robot, experiments, at=at)[robot.chain.end_effector.name]
+    return make_judge(robot, to_experiments(experiments[0]), to_deflections(seen), at)
 
 
 def pinocchio_regressors(chain, block, name, at="end_effector", rows=6):

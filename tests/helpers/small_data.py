@@ -1,6 +1,7 @@
 """A few poses of an arm of seven joints on a lift, as a service robot has it: wrong zeros and lengths, drives with play."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import yaml
@@ -9,14 +10,7 @@ from made_folders import made_folder
 from elastocal.campaigns.simulation import Plan, draw_measurements
 from elastocal.mechanics.robot_file import robot_from_document
 
-SERVICE_ARM = {
-    "name": "service arm on a lift",
-    "chain": "Tx(l0) Tz(q1) Tx(l1) Rz(q2) Tx(l2) Rx(90deg) Rz(q3) [3DoF] Ty(l3) Rx(90deg) Rz(q4) Tx(l4) Rx(-90deg) Rz(q5)"
-    " Tx(l5) Ry(90deg) Rz(q6) Tz(l6) Ry(-90deg) Rz(q7) Rx(90deg) Rz(q8) Tz(l7) [8DoF]",
-    "lengths_m": {"l0": -0.05, "l1": 0.16, "l2": 0.125, "l3": -0.03, "l4": 0.23, "l5": -0.02, "l6": 0.24, "l7": 0.15},
-    "joint_limits_deg": [[0, 0.35], [5, 155], [-85, 60], [-200, 85], [-20, 135], [-115, 115], [-80, 80], [-120, 120]],
-    "payload_kg": 3,
-}
+SERVICE_ARM = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8"))
 # rad; of the lift m.
 _PLAY = 5e-3 * np.array([0.2, 1, 1, 1, 1, 1, 1, 1])
 

@@ -16,21 +16,8 @@ from elastocal.command.main import app
 
 ROOT = Path(__file__).resolve().parents[2]
 SHELLS = ("sh", "bash", "console")
-PROGRAMS = [
-    "make",
-    "snakemake",
-    "elastocal",
-    "python",
-    "pip",
-    "uv",
-    "apt-get",
-    "mkdir",
-    "cp",
-    "find",
-    "sed",
-    "git",
-    "pre-commit",
-]
+PROGRAMS = ["make", "snakemake", "elastocal", "python", "pip", "uv", "apt-get"]
+PROGRAMS += ["mkdir", "cp", "find", "sed", "git", "pre-commit"]
 # How-to pages are run from top to bottom, each in a folder of its own, up to a command of these: they need a diagnosis,
 # which the scripts have.
 AFTER_A_DIAGNOSIS = ("elastocal certificate", "elastocal correct", "elastocal export", "elastocal diagnose")
@@ -64,18 +51,14 @@ def commands(page):
     """Commands of a page with their lines: of blocks, and those within sentences that have more than a name."""
     found = []
     for token in MarkdownIt("commonmark").parse(page.read_text(encoding="utf-8")):
+        lines = []
         if token.type in ("fence", "code_block") and token.info.strip() in ("", *SHELLS):
-            lines = shell_lines(token.content)
-            certain = token.info.strip() in SHELLS
-            found += [
-                (as_typed(line), token.map[0])
-                for line in lines
-                if line.strip() and (certain or begins_a_command(as_typed(line)))
-            ]
-        for child in token.children or ():
-            if child.type == "code_inline" and begins_a_command(as_typed(child.content)) and "=…" not in child.content:
-                found.append((as_typed(child.content), token.map[0]))
-    return [(text, f"{page.relative_to(ROOT)}:{line + 1}") for text, line in found if text and not text.startswith("#")]
+            typed = [as_typed(line) for line in shell_lines(token.content)]
+            lines = [line for line in typed if token.info.strip() in SHELLS or begins_a_command(line)]
+        inline = [as_typed(child.content) for child in token.children or () if child.type == "code_inline"]
+        lines += [line for line in inline if begins_a_command(line) and "=…" not in line]
+        found += [(line, f"{page.relative_to(ROOT)}:{token.map[0] + 1}") for line in lines if line and not line.startswith("#")]
+    return found
 
 
 def every_command():
@@ -86,11 +69,8 @@ def story(page):
     """What a how-to page types, until something needs a diagnosed campaign; None of another page."""
     if "how_to" not in page.parts:
         return None
-    blocks = [
-        t.content
-        for t in MarkdownIt("commonmark").parse(page.read_text(encoding="utf-8"))
-        if t.type == "fence" and t.info == "sh"
-    ]
+    tokens = MarkdownIt("commonmark").parse(page.read_text(encoding="utf-8"))
+    blocks = [token.content for token in tokens if token.type == "fence" and token.info == "sh"]
     return [block for block in blocks if not block.startswith(AFTER_A_DIAGNOSIS)]
 
 
@@ -122,7 +102,7 @@ def test_targets_of_snakemake_are_rules():
     known = {rule for text in rules for rule in re.findall(r"^rule (\w+):", text, re.MULTILINE)}
     asked = (text.partition(" --")[0].split()[1:] for text, _ in every_command() if text.startswith("snakemake "))
     targets = {word for words in asked for word in words if re.fullmatch(r"[a-z_]+", word)}
-    assert len(targets) > 5 and targets <= known | {"store"}, targets - known
+    assert len(targets) > 5 and targets <= known, targets - known
 
 
 @pytest.mark.slow

@@ -81,11 +81,6 @@ def test_a_job_may_read_alone_but_for_the_one_that_signs_and_runs_nothing_else()
     ]
 
 
-def test_a_checkout_leaves_no_credentials_behind():
-    checkouts = [step for _, step in steps() if step.get("uses", "").startswith("actions/checkout@")]
-    assert len(checkouts) == 3 and all(step["with"] == {"persist-credentials": False} for step in checkouts)
-
-
 def test_a_wheel_is_made_after_the_check_for_vulnerabilities_and_signed_with_the_list_of_packages():
     commands = [step["run"] for step in JOBS["wheel"]["steps"] if "run" in step]
     assert commands[0] == "make supply" and " pip wheel " in commands[1]

@@ -68,31 +68,19 @@ def files_of(folder):
 
 
 @pytest.mark.slow
-def test_the_wheel_holds_every_file_of_the_package_and_of_its_pipeline(wheel):
+def test_the_wheel_holds_every_file_of_the_package_and_of_its_pipeline_and_says_whose_it_is(wheel):
     packages = {name.removeprefix("src/") for name in files_of("src") if ".egg-info/" not in name}
-    pipeline = (
-        {"Snakefile", "config.yaml", "paper/paper.bib", "CITATION.cff"}
-        | files_of("config")
-        | files_of("data/measured")
-        | files_of("profiles")
-        | files_of("workflow")
-    )
+    pipeline = {"Snakefile", "config.yaml", "paper/paper.bib", "CITATION.cff"}
+    pipeline |= {name for folder in ("config", "data/measured", "profiles", "workflow") for name in files_of(folder)}
     pipeline = {name for name in pipeline if not name.startswith(LEFT_OUT)}
     with zipfile.ZipFile(wheel) as archive:
         names = {name for name in archive.namelist() if not name.endswith("/")}
+        (stated,) = (name for name in names if name.endswith(".dist-info/METADATA"))
+        metadata = archive.read(stated).decode()
     held = {name.rpartition(".data/data/share/elastocal/")[2] for name in names if ".dist-info/" not in name}
-    assert held == packages | pipeline
-
-
-@pytest.mark.slow
-def test_the_wheel_says_whose_it_is_and_which(wheel):
-    with zipfile.ZipFile(wheel) as archive:
-        (name,) = (name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
-        metadata = archive.read(name).decode()
-        assert any(name.endswith(".dist-info/licenses/LICENSE") for name in archive.namelist())
-    assert f"\nVersion: {elastocal.__version__}\n" in metadata
-    assert "\nAuthor: the elastocal developers\n" in metadata
-    assert "\nLicense-Expression: MIT\n" in metadata
+    assert held == packages | pipeline and any(name.endswith(".dist-info/licenses/LICENSE") for name in names)
+    for line in (f"Version: {elastocal.__version__}", "Author: the elastocal developers", "License-Expression: MIT"):
+        assert f"\n{line}\n" in metadata
 
 
 @pytest.mark.slow

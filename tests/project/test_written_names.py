@@ -30,17 +30,12 @@ PLAN = ("plan", "arm.yaml", "--candidates", "60", "--poses", "18", "--held-out",
 CSV = ("import", "csv", "t.csv", "--angles", "deg", "--lengths", "mm", "--target", "smr", "--folder")
 CERTIFICATE = ("certificate", "made", "--tolerance", "0.5mm")
 # What each is called with, and the folder in which it writes; all names are relative to a checkout with a diagnosed campaign.
+IMPORTED = ("import", "urdf", "arm.urdf", "--base", "base", "--tip", "hand", "-o", "out/arm.yaml")
 COMMANDS = {
-    "init": (("init", "out"), "out"),
-    "init of a robot": (("init", "out", "--robot", "arm.yaml"), "out"),
-    "import urdf": (("import", "urdf", "arm.urdf", "--base", "base", "--tip", "hand", "-o", "out/arm.yaml"), "out"),
-    "import urdf again": (
-        ("import", "urdf", "arm.urdf", "--base", "base", "--tip", "hand", "-o", "out/arm.yaml", "--force"),
-        "out",
-    ),
+    "init": (("init", "out", "--robot", "arm.yaml"), "out"),
+    "import urdf": ((*IMPORTED, "--force"), "out"),
     "import dh": (("import", "dh", "arm.csv", "-o", "out/arm.yaml", "--force"), "out"),
-    "import csv": ((*CSV, "out"), "out"),
-    "import csv again": ((*CSV, "out", "--force"), "out"),
+    "import csv": ((*CSV, "out", "--force"), "out"),
     "plan": ((*PLAN, "--folder", "out/cell"), "out"),
     "correct": (("correct", "made", "path.csv", "--output", "out/targets.csv"), "out"),
     "export": (("export", "made", "--output", "out"), "out"),
@@ -95,34 +90,26 @@ def run(*words):
 
 def listed(top):
     """Name, kind and contents of all that is there."""
-    found = {}
-    for path in sorted(top.rglob("*")):
-        status = path.lstat()
-        found[path.relative_to(top).as_posix()] = (
-            status.st_mode,
-            path.read_bytes() if path.is_file() and not path.is_symlink() else os.readlink(path) if path.is_symlink() else None,
-        )
-    return found
+
+    def contents(path):
+        return os.readlink(path) if path.is_symlink() else path.read_bytes() if path.is_file() else None
+
+    return {path.relative_to(top).as_posix(): (path.lstat().st_mode, contents(path)) for path in sorted(top.rglob("*"))}
 
 
 def plant(path, kind, victim):
     if path.is_file() or path.is_symlink():
         path.unlink()
-    if kind == "link":
-        path.symlink_to(victim)
-    elif kind == "dangling link":
-        path.symlink_to(victim.with_name("none"))
-    elif kind == "link to a folder":
-        path.symlink_to(victim.parent)
-    elif kind == "pipe":
-        os.mkfifo(path)
+    if "link" in kind:
+        ends = {"link": victim, "dangling link": victim.with_name("none"), "link to a folder": victim.parent}
+        path.symlink_to(ends[kind])
     elif kind == "socket":
         with socket.socket(socket.AF_UNIX) as one:
             one.bind(os.path.relpath(path))
     elif kind == "device":
         os.mknod(path, 0o666 | 0o020000, os.makedev(1, 7))
     else:
-        path.mkdir()
+        (os.mkfifo if kind == "pipe" else os.mkdir)(path)
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,4 @@
-"""What stands in several artefacts of a campaign is the same in all: PDF, HTML, verdict.json and the terminal.
-
-Of made campaigns of every verdict, and of all campaigns that this checkout has diagnosed: after `make` all that are shipped.
-"""
+"""What stands in several artefacts of a campaign is the same in all: PDF, HTML, verdict.json and the terminal."""
 
 import html
 import json
@@ -12,15 +9,13 @@ from pathlib import Path
 
 import pytest
 from drawn_figures import empty_pictures
-from made_loop_facts import CAMPAIGNS, facts_of, plainly
-from made_loop_tables import residual_table
+from made_loop_tables import CAMPAIGNS, facts_of, plainly, residual_table
 
 from elastocal.report.loop_facts import write_loop_report
 from elastocal.report.loop_page import loop_page, write_loop_page
 from elastocal.report.outcome import outcome
 
 PICTURES = ["arrows", "before_after", "candidates"]
-DIAGNOSED = sorted(Path("reports/loop").glob("*/report.html"))
 
 
 @pytest.fixture(scope="module")

@@ -2,22 +2,21 @@
 
 import json
 import re
-import shutil
 
 import pytest
-from compiled_pages import assert_within_margins, pages_of
-from made_loop_facts import CAMPAIGNS, HARMONICS, WAVES, facts_of, plainly
 from made_loop_tables import (
+    CAMPAIGNS,
+    HARMONICS,
+    WAVES,
     effect_entry,
     experiment_rows,
+    facts_of,
+    plainly,
     step_rows,
     verdict_document,
 )
-from selected import slow_but
 
 from elastocal.diagnosis.verdict import NAMED
-from elastocal.figures.residuals import before_after
-from elastocal.figures.style import save
 from elastocal.report.loop_facts import (
     AT_FAULT,
     campaign_sentences,
@@ -25,7 +24,6 @@ from elastocal.report.loop_facts import (
     compliance_rows,
     cost_words,
     effect_facts,
-    write_loop_report,
 )
 from elastocal.report.loop_facts import step_rows as table_rows
 
@@ -130,28 +128,6 @@ def test_parameters_stand_in_readable_units_with_what_determines_them_and_of_who
     assert names[0] == "largest sag" and names[1].startswith("joint 2: ")
     many = effect_facts(CAMPAIGNS["hundreds of parameters"]["effects"][0], heldout)
     assert len(many["parameters"]) == 10 and many["left_out"] == str(len(HARMONICS) * len(WAVES)) and many["with_angle"]
-
-
-@pytest.fixture(scope="module")
-def pictures(tmp_path_factory):
-    """One in the place of each."""
-    folder = tmp_path_factory.mktemp("figures")
-    names = [str(folder / f"{name}.pdf") for name in ("before_after", "arrows", "candidates")]
-    save(before_after(step_rows(), 5e-5), names[0], str(folder / "before_after.png"))
-    return [names[0], *(shutil.copy(names[0], name) for name in names[1:])]
-
-
-@pytest.fixture
-def pages(monkeypatch):
-    return pages_of(monkeypatch)
-
-
-@pytest.mark.parametrize("campaign", slow_but(["named", "fault of the data"], CAMPAIGNS))
-def test_every_verdict_compiles_within_its_margins(campaign, pictures, pages, tmp_path):
-    path = tmp_path / "report.pdf"
-    write_loop_report(str(path), facts_of(CAMPAIGNS[campaign]), pictures)
-    assert path.read_bytes().startswith(b"%PDF")
-    assert_within_margins(pages)
 
 
 def test_before_and_after_have_intervals_and_multiples():

@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from durations import HUNG_S
-from made_loop_facts import CAMPAIGNS, facts_of
-from made_loop_tables import residual_table
+from made_loop_tables import CAMPAIGNS, facts_of, residual_table
 
 from elastocal.io.origin import Origin
 from elastocal.loop.schemas import angles_of

@@ -2,7 +2,7 @@
 
 import json
 
-from made_loop_facts import CAMPAIGNS
+from made_loop_tables import CAMPAIGNS
 
 from elastocal.report.outcome import outcome
 

@@ -5,9 +5,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from made_study_blocks import AT, OFFSET, compliances, deflections_of, experiments_of, identified, pinocchio_regressors
+from made_study_blocks import AT, deflections_of, experiments_of, identified, pinocchio_regressors
 from support import OTHER_CHAINS, random_loads, robot_of, without_tool
 
 from elastocal.mechanics.elastostatics import joint_torques, regressor
@@ -18,11 +16,10 @@ from elastocal.study.equation_11 import (
     Measurements,
     estimate_compliance,
     first_solvable_length,
-    prefix_triangles,
     regressors_of,
     undetermined,
 )
-from elastocal.study.simulation import to_deflections, to_experiments, true_deflections
+from elastocal.study.simulation import to_experiments, true_deflections
 from elastocal.study.strategies import Stage, Strategy
 
 SETS, CONFIGURATIONS = 3, 5
@@ -131,23 +128,6 @@ def test_a_prefix_that_has_measurements_enough_but_not_the_right_ones_is_undeter
     assert np.isnan(compliance[0, 3:]).all()
 
 
-systems = st.tuples(st.integers(1, 5), st.integers(0, 2), st.integers(1, 4), st.integers(1, 7), st.integers(0, 2**32 - 1))
-
-
-@given(systems)
-def test_triangles_carry_the_normal_equations_of_every_prefix(shape):
-    pivots, more, configurations, rows, seed = shape
-    system = np.random.default_rng(seed).standard_normal((configurations, rows, pivots + more, 2))
-    triangles = prefix_triangles(system.copy(), np.zeros((pivots, pivots + more, 2)))
-    for k, s in np.ndindex(configurations, 2):
-        stacked = system[: k + 1, ..., s].reshape(-1, pivots + more)
-        triangle = triangles[k, :, :pivots, s]
-        if len(stacked) >= pivots:
-            np.testing.assert_array_equal(np.tril(triangle, -1), 0)
-            expected = stacked[:, :pivots].T @ stacked
-            np.testing.assert_allclose(triangle.T @ triangles[k, ..., s], expected, rtol=0, atol=1e-12 * rows * configurations)
-
-
 def test_undetermined_are_the_prefixes_beyond_the_largest_condition():
     rng = np.random.default_rng(5)
     strategy, sets = Strategy("A", (Stage(("A",), (0, 1, 2)),)), 200
@@ -161,21 +141,6 @@ def test_undetermined_are_the_prefixes_beyond_the_largest_condition():
         clear = np.abs(np.log(conditions / LARGEST_CONDITION)) > 0.1
         np.testing.assert_array_equal(found[length - 1][clear], (conditions > LARGEST_CONDITION)[clear])
         assert 0 < found[length - 1].sum() < sets
-
-
-@pytest.mark.parametrize("rows", [3, 6])
-def test_estimates_of_every_prefix_are_numpy_least_squares_of_its_measurements(kuka, strategies, rows):
-    moved, experiments = with_target_offset(kuka, OFFSET), experiments_of(kuka, sets=3)
-    deflections = deflections_of(moved, experiments, noise=2e-4)
-    table = identified(moved, strategies["3+6DoF-comb"], experiments, deflections, rows)
-    matrices = {name: pinocchio_regressors(moved.chain, experiments[0], name, rows=rows) for name in ("3DoF", "6DoF")}
-    matrices = {name: matrix.reshape(3, 4, rows, 6) for name, matrix in matrices.items()}
-    measured = {name: to_deflections(deflections[name][0])[..., :rows] for name in matrices}
-    for length in (3, 4):
-        for number, found in enumerate(compliances(table, length)):
-            matrix = np.concatenate([matrices[name][number, :length].reshape(-1, 6) for name in matrices])
-            seen = np.concatenate([measured[name][number, :length].ravel() for name in matrices])
-            np.testing.assert_allclose(found, np.linalg.lstsq(matrix, seen, rcond=None)[0], rtol=1e-7)
 
 
 def test_nothing_is_identified_before_anything_loads_the_robot_and_everything_after(kuka, strategies):

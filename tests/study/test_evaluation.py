@@ -4,9 +4,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from made_studies import studies_of
 from support import random_loads
 
-from elastocal.study.evaluation import average, find_length, metrics_table, replicates_table, to_weights
+from elastocal.study.evaluation import average, find_length, metrics_table, over_studies_table, replicates_table, to_weights
 from elastocal.study.metrics import make_judge, position_errors
 from elastocal.study.simulation import bootstrap_weights, true_deflections, weight_blocks
 
@@ -75,15 +76,6 @@ def test_share_of_nonpositive_compliances_counts_data_sets_and_takes_trust_away(
     np.testing.assert_array_equal(table["trustworthy"], [True, False, True])
 
 
-def test_prefixes_without_estimates_stay_not_a_number_and_are_not_trusted(judge, estimates, weights, counts):
-    short = estimates.copy()
-    short[:, 0] = np.nan
-    table = metrics_table(average(blocks_of(short, weights), judge, "stiffness", counts), judge.reference, (0,))
-    for name in ("compliance_1", "delta_k_6", "k_sigma", "deviation"):
-        assert np.isnan(table[name][0]) and np.isfinite(table[name][1:]).all()
-    np.testing.assert_array_equal(table["trustworthy"], [False, True, True])
-
-
 def test_metrics_are_equations_13_and_14_of_the_averages(judge, estimates, weights, counts):
     averages = average(blocks_of(estimates, weights), judge, "stiffness", counts)
     table = metrics_table(averages, judge.reference, (0, 1))
@@ -129,3 +121,15 @@ def test_a_length_comes_with_the_spread_of_replicates_that_go_on_beyond_their_cu
     replicates = np.column_stack([[3.0, 3.0, 2.0], [0.9, 2.6, 0.9], ends])
     found, error = find_length(np.array([3.0, 0.9, 0.5]), replicates, limit)
     assert found == length and error == pytest.approx(np.std(lengths, ddof=1))
+
+
+def test_table_4_over_studies_is_their_median_with_a_spread_that_one_outlier_does_not_move():
+    """Biases of 20, 22 and 24, then one far out, over the length: percent and µm."""
+    frame = studies_of(biases=(20.0, 22.0, 24.0, 22.0, 900.0)).assign(mean_square=25e-12)
+    for name in ("k_sigma", "k_sigma_fixed_joints", "deviation"):
+        frame[f"{name}_mean_compliance"] = frame[name] / 10
+    usual, averaged = over_studies_table(frame, 20, {"k_sigma": 2.0, "deviation": 4.0}).to_dict("records")
+    assert [usual["average"], averaged["average"]] == ["stiffness", "compliance"]
+    assert usual["dev_20_um"] == pytest.approx(1.1) and usual["dev_20_um_std"] == pytest.approx(1.4826 * 0.1)
+    assert (usual["n_k_sigma_2_percent"], usual["n_k_sigma_fixed_joints_2_percent"], usual["n_dev_4_um"]) == (11, 6, 6)
+    assert averaged["k_sigma_20_percent"] == pytest.approx(0.11) and usual["rms_20_um"] == pytest.approx(5.0)

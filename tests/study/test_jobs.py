@@ -9,9 +9,8 @@ import pytest
 from elastocal import study
 from elastocal.io.storage import TableSchema, read_provenance, write_table
 from elastocal.study.equation_11 import identified
-from elastocal.study.evaluation import metrics
+from elastocal.study.evaluation import metrics, repeated
 from elastocal.study.jobs import ERROR, SET, frames, origin, table, write_csvs
-from elastocal.study.repeated import repeated
 from elastocal.study.simulation import experiments
 
 MODULES = [import_module(f"elastocal.study.{path.stem}") for path in Path(study.__file__).parent.glob("[a-z]*.py")]

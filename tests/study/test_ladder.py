@@ -1,15 +1,12 @@
 """The ladder of models: against dense least squares, and on a robot whose links yield."""
 
 import numpy as np
-import pandas as pd
 import pytest
-from made_studies import few_of
-from made_study_blocks import PAPER, compliances, deflections_of, experiments_of, identified, judge
+from made_study_blocks import PAPER
 
 from elastocal.mechanics.elastostatics import extended_chain, generalized_forces, spring_compliance
 from elastocal.mechanics.kinematics import jacobians
-from elastocal.study.ladder import ladder, ladder_blocks, products_of, spring_columns
-from elastocal.study.metrics import position_errors
+from elastocal.study.ladder import ladder, products_of, spring_columns
 from elastocal.study.simulation import random_experiments, true_deflections
 
 FOLDS = 4
@@ -62,25 +59,3 @@ def test_a_robot_with_one_yielding_link_gets_that_spring_first_and_nothing_of_wo
     assert (found.order[:, 0] == 2).all() and (found.chosen >= 1).all()
     assert (found.cross_validated[:, 0] > 100 * found.cross_validated[:, 1]).all()
     assert (found.cross_validated[:, 1] < 1.1 * found.cross_validated.min(axis=1)).all()
-
-
-def test_the_ladder_of_a_robot_with_elastic_links_falls_and_flattens(kuka_extended):
-    blocks = list(ladder_blocks(few_of(kuka_extended), lengths=[10, 20], noises=[1e-6]))
-    assert [(block["length"][0], len(block["length"])) for block in blocks] == [(10, 36), (20, 36)]
-    table = pd.DataFrame(blocks[1])
-    rms = np.sqrt(table.groupby("link_springs").mean_square.mean())
-    # Joints alone leave tenths of a millimetre, all springs what linearisation leaves.
-    assert rms[0] > 1e-4 and rms[5] < 0.1 * rms[0]
-    assert (table.groupby("data_set").chosen.sum() == 1).all()
-    assert (table[table.link_springs == 0].added_link == 0).all()
-    assert sorted(table[(table.data_set == 0) & (table.link_springs > 0)].added_link) == [1, 2, 3, 4, 5]
-
-
-def test_joints_alone_leave_what_the_reduced_model_leaves(kuka_extended, strategies):
-    """The first rung is equation 11 with poses of the end-effector."""
-    experiments = experiments_of(kuka_extended, 6, 20)
-    table = identified(kuka_extended, strategies["6DoF"], experiments, deflections_of(kuka_extended, experiments))
-    expected = (position_errors(judge(kuka_extended), compliances(table, 20)) ** 2).mean(axis=1)
-    (block,) = ladder_blocks(few_of(kuka_extended), lengths=[20], noises=[0.0])
-    # The judge predicts with exact kinematics, the ladder by the linear equation: percents of a percent.
-    np.testing.assert_allclose(block["mean_square"][block["link_springs"] == 0], expected, rtol=0.02)

@@ -6,9 +6,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from support import random_loads, without_tool
 
-from elastocal.mechanics.elastostatics import exact_deflections, joint_torques, regressor
-from elastocal.mechanics.kinematics import poses_and_jacobians
-from elastocal.study import metrics
+from elastocal.mechanics.elastostatics import exact_deflections, joint_torques
 from elastocal.study.metrics import (
     first_length_below,
     k_sigma,
@@ -16,7 +14,6 @@ from elastocal.study.metrics import (
     make_judge,
     mean_deviation,
     position_errors,
-    squared_error_bounds,
 )
 from elastocal.study.simulation import true_deflections
 
@@ -60,25 +57,6 @@ def test_mean_deviation_counts_each_test_configuration_as_often_as_it_weighs(kuk
         np.testing.assert_allclose(found[group], expected, rtol=1e-12)
 
 
-@pytest.mark.parametrize("models", [1, 4, 5, 6])
-def test_scores_do_not_depend_on_how_many_models_are_scored_at_a_time(kuka, monkeypatch, models):
-    rng, judge = np.random.default_rng(4), judge_of(kuka)
-    compliance = kuka.compliance * rng.uniform(0.8, 1.2, (7, 2, 6))
-    counts = rng.integers(1, 4, (7, len(judge.initial_errors)))
-    whole = mean_deviation(judge, compliance, counts)
-    monkeypatch.setattr(metrics, "MODELS_AT_A_TIME", models)
-    np.testing.assert_allclose(mean_deviation(judge, compliance, counts), whole, rtol=1e-9)
-
-
-def test_error_moment_is_the_mean_of_the_squared_regressor(robot):
-    loads = random_loads(robot, 1, 40)
-    jacobian = poses_and_jacobians(robot.chain, loads.joint_angles, robot.chain.end_effector)[2]
-    torques = joint_torques(robot.chain, loads.joint_angles, loads.wrench, robot.chain.end_effector)
-    rows = regressor(jacobian, torques)[..., :3, :].reshape(-1, 6)
-    expected = rows.T @ rows / 40
-    np.testing.assert_allclose(judge_of(robot, loads).form[:-1, :-1], expected, rtol=0, atol=1e-12 * expected.max())
-
-
 def test_k_sigma_is_the_signed_sum_over_all_joints_or_some():
     true_compliance = np.array([1.0, 2.0, 4.0])
     compliance = true_compliance / [1.01, 0.97, 1.05]
@@ -103,20 +81,3 @@ def test_lengths_follow_a_bias_over_the_length_to_any_limit(bias, limit, sign, l
     reached = whole <= lengths
     assert first_length_below(values, limit) == (whole if reached else np.inf)
     assert length_to_reach(values, limit) == pytest.approx(whole if reached else crossing, rel=1e-12)
-
-
-def test_bound_is_the_trace_with_the_explicit_inverse():
-    rng = np.random.default_rng(1)
-    rows, half = rng.standard_normal((4, 3, 9, 6)), rng.standard_normal((6, 6))
-    information, moment = np.swapaxes(rows, -1, -2) @ rows, half @ half.T
-    found = squared_error_bounds(information, moment)
-    for index in np.ndindex(4, 3):
-        assert found[index] == pytest.approx(np.trace(moment @ np.linalg.inv(information[index])), rel=1e-10)
-
-
-def test_bound_is_infinite_where_the_information_is_singular_and_nowhere_else():
-    rows = np.random.default_rng(2).standard_normal((2, 1, 4, 6))  # four measurements of six unknowns
-    information = np.swapaxes(rows, -1, -2) @ rows
-    information = np.concatenate([information, np.zeros((1, 1, 6, 6))])
-    information[1, 0] = np.eye(6)
-    np.testing.assert_allclose(squared_error_bounds(information, np.eye(6))[:, 0], [np.inf, 6.0, np.inf])

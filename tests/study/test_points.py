@@ -4,7 +4,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from made_studies import USUAL
-from made_study_blocks import experiments_of, judge, pinocchio_regressors
 
 from elastocal.study.in_memory import Size, StudyInMemory
 from elastocal.study.points import (
@@ -14,7 +13,6 @@ from elastocal.study.points import (
     lengths_table,
     paired_table,
     ratio_of_roots,
-    root_mean,
 )
 
 POINT_SETS = {"E": ["E"], "E twice": ["E", "E"], "three": ["A", "B", "E"]}
@@ -29,8 +27,7 @@ def frame_of(scatter=0.2):
         for length in range(1, LENGTHS + 1):
             square = 1e-8 * common / (size * length)
             parts.append(pd.DataFrame({"points": label, "data_set": range(SETS), "length": length, "mean_square": square}))
-    frame = pd.concat(parts, ignore_index=True)
-    return frame.assign(bound=0.9 * frame.mean_square)
+    return pd.concat(parts, ignore_index=True)
 
 
 def test_pairs_are_compared_data_set_by_data_set():
@@ -40,8 +37,6 @@ def test_pairs_are_compared_data_set_by_data_set():
     assert table.measurements.tolist() == [12, 12] and table.configurations_against.tolist() == [12, 12]
     assert table.ratio.tolist() == pytest.approx([np.sqrt(12 / 13.2), np.sqrt(12 / 10)])
     np.testing.assert_allclose(table.ratio_high / table.ratio_low, 1.0, atol=1e-9)
-    alone = root_mean(frame_of().query("points == 'three' and length == 4").mean_square.to_numpy())[1]
-    assert (table.difference_um_std_error < 0.2 * 1e6 * alone).all()
 
 
 def test_the_interval_of_a_ratio_is_that_of_the_bootstrap_over_data_sets():
@@ -60,7 +55,6 @@ def test_lengths_are_exact_with_an_interval():
     mean = frame_of().query("points == 'E' and length == 1").mean_square.mean()
     assert row.configurations == np.ceil(mean / 40e-6**2) == row.measurements
     assert row.configurations_low <= row.configurations <= row.configurations_high
-    assert row.configurations_by_bound <= row.configurations
     assert np.isinf(table[table.accuracy_um == 1].configurations).all()
 
 
@@ -70,25 +64,14 @@ def test_a_length_counts_where_the_accuracy_is_kept_for_good():
     assert lengths_table({"arm": frame}, {"E": ["E"]}, [40.0]).configurations[0] == 10
 
 
-POINT_SETS_OF_COSTS = {"one": ["A"], "two": ["A", "B"], "useless": ["A", "A"]}
-LENGTHS_OF_COSTS = np.arange(1, 101)
+POINT_SETS_OF_COSTS, LONG = {"one": ["A"], "two": ["A", "B"], "useless": ["A", "A"]}, np.arange(1, 101)
 
 
 def frame(sizes=(300.0, 200.0, 300.0)):
     """Errors in µm of one configuration by set, the same in each of ten data sets."""
-    parts = [
-        pd.DataFrame(
-            {
-                "points": name,
-                "data_set": number,
-                "length": LENGTHS_OF_COSTS,
-                "mean_square": (1e-6 * size) ** 2 / LENGTHS_OF_COSTS,
-            }
-        )
-        for name, size in zip(POINT_SETS_OF_COSTS, sizes, strict=True)
-        for number in range(10)
-    ]
-    return pd.concat(parts, ignore_index=True)
+    sets = [(name, number, size) for name, size in zip(POINT_SETS_OF_COSTS, sizes, strict=True) for number in range(10)]
+    squares = [{"points": n, "data_set": k, "length": LONG, "mean_square": (1e-6 * size) ** 2 / LONG} for n, k, size in sets]
+    return pd.concat(map(pd.DataFrame, squares), ignore_index=True)
 
 
 @pytest.fixture
@@ -98,7 +81,7 @@ def weights():
 
 
 def test_the_length_is_where_the_curve_crosses_the_accuracy():
-    squares = (300.0**2) / LENGTHS_OF_COSTS
+    squares = (300.0**2) / LONG
     assert configurations_needed(squares, 60.0) == pytest.approx(25.0)
     assert configurations_needed(squares, 59.0) == pytest.approx((300 / 59) ** 2, rel=1e-3)
     assert configurations_needed(squares, 1.0) == np.inf and configurations_needed(squares, 400.0) == 1.0
@@ -117,31 +100,12 @@ def test_a_set_pays_from_the_cost_on_at_which_both_cost_the_same(weights):
     assert costly.break_even_low["two"] <= costly.break_even["two"] <= costly.break_even_high["two"]
 
 
-POINT_SETS_OF_BUDGET = {"6DoF": ["6DoF"], "6DoF twice": ["6DoF", "6DoF"], "3+6DoF": ["3DoF", "6DoF"]}
+POINT_SETS_OF_BUDGET = {"6DoF": ["6DoF"], "6DoF twice": ["6DoF", "6DoF"]}
 SIZE = Size(data_sets=40, configurations=6, tests=30, noise=1e-5)
 
 
-@pytest.fixture(scope="module")
-def found(kuka):
+def test_a_point_measured_twice_has_noise_of_its_own(kuka):
     blocks = list(budget_blocks(StudyInMemory(kuka, "kuka", 1, USUAL, SIZE), POINT_SETS_OF_BUDGET))
-    return {block["points"]: {name: block[name].reshape(40, 6) for name in ("mean_square", "bound")} for block in blocks}
-
-
-@pytest.mark.parametrize(("points", "names"), [("6DoF", ["6DoF"]), ("3+6DoF", ["3DoF", "6DoF"])])
-def test_bounds_are_traces_with_inverses_of_pinocchios_information(kuka, found, points, names):
-    (block,) = experiments_of(kuka, 40, 6)
-    moment = judge(kuka).form[:-1, :-1]
-    parts = [pinocchio_regressors(kuka.chain, block, name).reshape(40, 6, 6, 6) for name in names]
-    for number, length in ((0, 6), (7, 3), (39, 1)):
-        matrix = np.concatenate([part[number, :length].reshape(-1, 6) for part in parts])
-        expected = 1e-10 * np.trace(moment @ np.linalg.inv(matrix.T @ matrix))
-        assert found[points]["bound"][number, length - 1] == pytest.approx(expected, rel=1e-5)
-
-
-def test_a_point_measured_twice_has_half_the_variance_and_noise_of_its_own(found):
-    np.testing.assert_allclose(found["6DoF twice"]["bound"], found["6DoF"]["bound"] / 2, rtol=1e-9)
-    ratio = found["6DoF twice"]["mean_square"][:, 5] / found["6DoF"]["mean_square"][:, 5]
-    # 40 data sets: the mean of the ratio of means has an error of about 15 %.
-    assert (ratio.std() > 0.1) and 0.3 < (
-        found["6DoF twice"]["mean_square"][:, 5].mean() / found["6DoF"]["mean_square"][:, 5].mean()
-    ) < 0.8
+    once, twice = (block["mean_square"].reshape(40, 6)[:, 5] for block in blocks[:2])
+    # 40 data sets: the mean of the ratio of means, a half, has an error of about 15 %.
+    assert ((twice / once).std() > 0.1) and 0.3 < twice.mean() / once.mean() < 0.8

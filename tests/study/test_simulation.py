@@ -14,13 +14,10 @@ from elastocal.study import simulation
 from elastocal.study.evaluation import to_weights
 from elastocal.study.simulation import (
     DATA_SETS,
-    DEFLECTIONS,
     TESTS,
     Loading,
     bending,
     bootstrap_weights,
-    data_sets,
-    deflection_columns,
     ideal_blocks,
     measurement_noise,
     random_experiments,
@@ -120,16 +117,6 @@ def test_measurements_are_ideal_plus_scaled_noise_of_each_point(kuka):
             error = to_deflections(measured[name][0]) - to_deflections(ideal[name][0])
             expected = noise * measurement_noise(1, "kuka", name, range(5), 4)
             np.testing.assert_allclose(error, expected, rtol=0, atol=1e-15)
-
-
-def test_deflections_come_back_as_they_were():
-    deflections = np.random.default_rng(1).standard_normal((2, 3, 6))
-    columns = deflection_columns("3DoF", [4, 7], deflections)
-    assert set(columns) == {column.name for column in DEFLECTIONS.columns} and columns["point"] == "3DoF"
-    assert columns["data_set"].tolist() == [4, 4, 4, 7, 7, 7] and columns["configuration"].tolist() == [0, 1, 2] * 2
-    assert data_sets(columns).tolist() == [4, 7]
-    assert columns["dy"][4] == deflections[1, 1, 1] and columns["rz"][2] == deflections[0, 2, 5]
-    np.testing.assert_array_equal(to_deflections(columns), deflections)
 
 
 def test_statistics_are_of_the_lengths_of_the_displacements_set_by_set():

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from made_metrics import metrics_of, replicates_of
+from made_studies import metrics_of, replicates_of
 
 from elastocal.study.tables import merge_errors, table4, word_value
 

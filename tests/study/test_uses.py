@@ -3,14 +3,10 @@
 import numpy as np
 import pandas as pd
 import pytest
-from made_studies import USUAL
-from made_study_blocks import compliances, deflections_of, experiments_of, identified, judge
 
 from elastocal.application.inverse_kinematics import find_beyond_limits
 from elastocal.mechanics.kinematics import poses
-from elastocal.study.in_memory import Size, StudyInMemory
-from elastocal.study.metrics import position_errors
-from elastocal.study.uses import REFERENCE, iso_9283, milling_path, pairs_table, ranks_table, scores, use_blocks
+from elastocal.study.uses import REFERENCE, iso_9283, milling_path, pairs_table, ranks_table, scores
 
 CENTRE = (1.6, 0.0, 1.0)
 
@@ -117,25 +113,3 @@ def test_metrics_at_places_that_a_robot_does_not_reach_are_left_out():
     uses = uses_of("A", 50.0).assign(iso_9283=np.nan)
     found = scores(uses, *average("A", 4.0, 4.0), LENGTH)
     assert "iso_9283_um" not in found and {REFERENCE, "path_rms_um"} < set(found)
-
-
-USES = {"centre_m": (1.6, 0.0, 1.0), "edge_m": 1.0, "weight_N": 1000, "path_m": 0.5, "cutting_N": 500}
-NAMES = ("6DoF", "6DoF-after-3DoF", "3-6DoF-after-2DoF")
-
-
-@pytest.fixture(scope="module")
-def tables(kuka, strategies):
-    study = StudyInMemory(kuka, "kuka", 1, USUAL, Size(data_sets=40, configurations=10, tests=30, noise=1e-5))
-    blocks = use_blocks(study, [strategies[name] for name in NAMES], USES)
-    return {block["strategy"]: pd.DataFrame(block) for block in blocks}
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_errors_are_those_of_the_pipelines_estimates(kuka, strategies, tables, name):
-    experiments = experiments_of(kuka, 40, 10)
-    table = identified(kuka, strategies[name], experiments, deflections_of(kuka, experiments, 1e-5))
-    errors = position_errors(judge(kuka), compliances(table, 10))
-    found = tables[strategies[name].name]
-    np.testing.assert_allclose(found["mean"], errors.mean(axis=1), rtol=1e-6)
-    np.testing.assert_allclose(found["mean_square"], (errors**2).mean(axis=1), rtol=1e-6)
-    assert found.pooled_p95.unique() == pytest.approx([np.quantile(errors, 0.95)], rel=1e-6)

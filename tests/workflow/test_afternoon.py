@@ -63,11 +63,3 @@ def test_the_whole_way_ends_with_a_certificate(campaign, tmp_path):
     reports = tmp_path / "reports" / "loop" / campaign
     assert all((reports / name).stat().st_size for name in ("report.pdf", "certificate.pdf"))
     assert json.loads((reports / "verdict.json").read_text(encoding="utf-8"))["effects"]
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not Path(os.environ.get("ELASTOCAL_DATA", "nowhere")).is_dir(), reason="no measured data: ELASTOCAL_DATA")
-def test_a_campaign_of_other_people_and_a_sample_of_the_league(tmp_path):
-    study = Study.of_links(tmp_path)
-    study.run("reports/loop/fanuc_cpa/report.pdf", "league_small", "--config", "league={folds: 2}")
-    assert study.path("reports/league/small/league.csv").stat().st_size

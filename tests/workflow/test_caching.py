@@ -8,7 +8,6 @@ import sys
 
 import pytest
 from durations import HUNG_S
-from snakemake_starts import SHARED
 from study_folder import LEVEL, PAPER, REPOSITORY, ROBOT
 
 from import_closure import closure
@@ -62,8 +61,9 @@ def _another_numpy(study):
     study.path("src/numpy-1.0.dist-info/METADATA").write_text("Name: numpy\nVersion: 1.0\n", encoding="utf-8")
 
 
-def _dated_back(study):
-    """As from an archive, a copy that keeps dates, or a clock that was set back: what counts is what the file holds."""
+def _figures_and_a_script(study):
+    """Dated back, as from an archive or a clock that was set back: what counts is what the file holds."""
+    study.edit("src/elastocal/figures/study.py")
     study.replace("workflow/scripts/typeset_table.py", "\nrun(", "\nEDITED = True\nrun(")
     os.utime(study.path("workflow/scripts/typeset_table.py"), (1e9, 1e9))
 
@@ -92,7 +92,7 @@ EDITS = {
         {"draw_scheme", "draw_weights"},
     ),
     "figures, and a script that seems older than its results": (
-        lambda study: (study.edit("src/elastocal/figures/study.py"), _dated_back(study)),
+        _figures_and_a_script,
         set(),
         {"draw_noise_impact", "draw_stiffness_errors", "draw_deviations", "typeset_table"},
         {"tabulate_strategies", "tabulate_initial", "draw_scheme"},
@@ -137,36 +137,22 @@ def test_every_script_is_of_a_rule_and_a_rule_watches_the_sources_of_its_own():
     assert sorted(set(seen) | {RUN_STEP}) == SCRIPTS
 
 
-# Forks before it imports anything of the package, so that every script starts without it; other people's modules may be there.
-_LOADED = (
-    f"import {', '.join(SHARED)}"
-    + """
-import ast, json, os, sys
+# Imports of a script, or of a step, in a process of its own: files of the sources that are loaded then.
+_LOADED = """
+import ast, json, sys
 from pathlib import Path
-root = Path(sys.argv[1])
+root, script, step = Path(sys.argv[1]), *sys.argv[2].split(":")
 sys.path.insert(0, str(root / "workflow" / "scripts"))
-for each in sys.argv[2:]:
-    script, _, step = each.partition(":")
-    read, write = os.pipe()
-    if not os.fork():
-        body = ast.parse((root / "workflow" / "scripts" / script).read_text()).body
-        imports = [node for node in body if isinstance(node, (ast.Import, ast.ImportFrom))]
-        exec(compile(ast.Module(imports, []), script, "exec"), {})
-        exec(f"import {step}" if step else "")
-        # What is a catalogue looks up the modules beside it when it is asked.
-        found = [name for name, module in sys.modules.items() if {"modules_with", "module_names"} & {*vars(module)}]
-        for name in set(found) - {"elastocal.io.modules"}:
-            package = sys.modules[name.rpartition(".")[0]]
-            sys.modules["elastocal.io.modules"].modules_with("__name__", package)
-        files = [Path(m.__file__) for m in list(sys.modules.values()) if getattr(m, "__file__", None)]
-        own = sorted(f.relative_to(root).as_posix() for f in files if f.is_relative_to(root))
-        os.write(write, json.dumps(own).encode())
-        os._exit(0)
-    os.close(write)
-    print(each, os.fdopen(read).read())
-    assert os.wait()[1] == 0
+body = ast.parse((root / "workflow" / "scripts" / script).read_text()).body
+exec(compile(ast.Module([node for node in body if isinstance(node, (ast.Import, ast.ImportFrom))], []), script, "exec"), {})
+exec(f"import {step}" if step else "")
+# What is a catalogue looks up the modules beside it when it is asked.
+for name in [name for name, module in sys.modules.items() if {"modules_with", "module_names"} & {*vars(module)}]:
+    if name != "elastocal.io.modules":
+        sys.modules["elastocal.io.modules"].modules_with("__name__", sys.modules[name.rpartition(".")[0]])
+files = [Path(m.__file__) for m in list(sys.modules.values()) if getattr(m, "__file__", None)]
+print(json.dumps(sorted(f.relative_to(root).as_posix() for f in files if f.is_relative_to(root))))
 """
-)
 
 
 # Each twelfth has scripts of every kind: data, questions, the loop, proofs.
@@ -174,13 +160,13 @@ for each in sys.argv[2:]:
     "scripts", [[*SCRIPTS[::12], *STEPS[::8]], pytest.param([*SCRIPTS, *STEPS], marks=pytest.mark.slow)], ids=["some", "all"]
 )
 def test_the_import_closure_is_what_a_script_loads(scripts, unstarted):
-    command = [sys.executable, "-c", _LOADED, str(unstarted.folder), *scripts]
-    environment = unstarted.command()["env"]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True, timeout=HUNG_S)
-    for each, loaded in (line.split(" ", 1) for line in done.stdout.splitlines()):
+    for each in scripts:
         script, _, step = each.partition(":")
+        command = [sys.executable, "-c", _LOADED, str(unstarted.folder), f"{script}:{step}"]
+        environment = unstarted.command()["env"]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True, timeout=HUNG_S)
         found = closure(unstarted.path("workflow/scripts") / script, unstarted.path("src"), *([step] if step else []))
         names = [file.relative_to(unstarted.folder).as_posix() for file in found]
         # Steps load what reads tables into frames when they are called.
         later = {"src/elastocal/io/data_frames.py"} if step else set()
-        assert sorted({*json.loads(loaded)} | (later & {*names})) == names, each
+        assert sorted({*json.loads(done.stdout)} | (later & {*names})) == names, each

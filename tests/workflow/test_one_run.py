@@ -31,20 +31,15 @@ def holding(path):
     return process
 
 
-def test_locks_of_a_run_that_was_killed_are_taken_away(folder):
+@pytest.mark.parametrize("living", [False, True])
+def test_locks_of_a_run_that_was_killed_are_taken_away_and_those_of_a_living_one_stay(folder, living):
     run = holding(folder / RUNS)
-    run.kill()
-    run.wait()
+    if not living:
+        run.kill()
+        run.wait()
     with begin(folder, []):
-        assert list((folder / "locks").iterdir()) == []
-
-
-def test_locks_of_a_living_run_stay(folder):
-    run = holding(folder / RUNS)
-    with begin(folder, []):
-        assert len(list((folder / "locks").iterdir())) == 1
+        assert len(list((folder / "locks").iterdir())) == living
     run.kill()
-    run.wait()
 
 
 def test_jobs_that_a_killed_run_left_behind_are_waited_for(folder, capfd, monkeypatch):

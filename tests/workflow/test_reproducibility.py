@@ -7,12 +7,9 @@ import pyarrow.parquet as pq
 import pytest
 from durations import HUNG_S
 from PIL import Image
-from study_folder import SMALL, TINY, Study
+from study_folder import TINY, Study
 
 REPORTS = ("reports/**/*.csv", "reports/**/*.md", "reports/**/*.tex", "reports/**/*.json", "reports/**/*.pdf")
-KEYS = [(name, "ascending") for name in ("point", "data_set", "configuration")]
-
-
 # All data, estimates and scores of a robot, and of what follows a table in two formats, and a figure.
 SOME = ("reports/tables/table4.tex", "reports/tables/table4.md", "reports/figures/figure4.pdf")
 
@@ -32,13 +29,6 @@ def contents(path):
         name: (str(column.type), column.to_pylist() if "string" in str(column.type) else column.to_numpy().tobytes())
         for name, column in zip(table.column_names, table.columns, strict=True)
     }
-
-
-def first_data_sets(path):
-    """Rows of the data sets that the small study has, in an order of their own."""
-    table = pq.ParquetFile(path).read()
-    table = table.set_column(0, "point", table.column("point").cast("string")).sort_by(KEYS)
-    return table.filter([number < TINY["data_sets"] for number in table.column("data_set").to_pylist()])
 
 
 @pytest.mark.slow
@@ -61,14 +51,3 @@ def test_every_figure_and_table_has_a_record_that_names_commit_configuration_and
     for name in figures:
         words = Image.open(paper.path(name)).text["Description"]
         assert all(str(value) in words for value in dict(origin).values()), name
-
-
-def test_existing_rows_stay_with_more_data_sets_another_order_and_other_blocks(unstarted, paper):
-    unstarted.configure({"robots": ["fanuc", "kuka"], "noise_um": [0, 200], "data_sets": TINY["data_sets"] + 3})
-    unstarted.replace("src/elastocal/study/simulation.py", "SETS_PER_BLOCK = 500", "SETS_PER_BLOCK = 5")
-    name = "data/simulated/kuka/200um/measured.parquet"
-    unstarted.run(name)
-    assert pq.ParquetFile(unstarted.path("data/simulated/kuka/experiments.parquet")).num_row_groups == 5
-    before, after = first_data_sets(paper.path(name)), first_data_sets(unstarted.path(name))
-    assert before.num_rows == 4 * TINY["data_sets"] * SMALL["configurations"]
-    assert after.equals(before)

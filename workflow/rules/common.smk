@@ -83,10 +83,9 @@ try:
 except InputError as error:
     sys.exit(str(error))
 
-# All that decides what the results hold, but for code and measured data; which campaign of a user is asked for, what is put on
-# which store decides nothing.
+# All that decides what the results hold, but for code and measured data; which campaign of a user is asked for decides nothing.
 RESOLVED = {
-    "config": {key: value for key, value in config.items() if key not in ("campaign", "store", "store_of", "origin")},
+    "config": {key: value for key, value in config.items() if key not in ("campaign", "origin")},
     "robots": STUDY.robots,
     "strategies": STUDY.strategies,
     "campaigns": SOURCES,
@@ -195,8 +194,8 @@ def watch_sources():
         each.set_params(**{SOURCES_DIGEST: f"{digest_of(files)} {environment_sha256}"})
 
 
-def outputs_behind(targets):
-    """All files and folders that the jobs behind some targets write, as their rules have them."""
+def files_behind(targets):
+    """All that the jobs behind some targets write, by names: one that was deleted is made again although later ones are there."""
     found, left = set(), [target for target in targets if isinstance(target, str)]
     while left:
         path = left.pop()
@@ -209,27 +208,7 @@ def outputs_behind(targets):
         wildcards = Wildcards(fromdict=maker.get_wildcards(path))
         found.update(maker.expand_output(wildcards)[0])
         left += map(str, maker.expand_input(wildcards)[0])
-    return sorted(found)
-
-
-def files_behind(targets):
-    """The names of these: one that was deleted is made again although later ones are there."""
-    return [str(output) for output in outputs_behind(targets)]
-
-
-def stored_targets():
-    """Inputs of the targets that are put on an object store."""
-    named = config.get("store_of", ["study", "loop"])
-    return [file for target in named for file in getattr(rules, target).input]
-
-
-def in_store(file):
-    """A file's object on the object store, which the configuration names."""
-    if "store" not in config:
-        sys.exit("store: found no object store; allowed: snakemake -j2 store --config store=s3://BUCKET/FOLDER")
-    if find_spec("snakemake_storage_plugin_s3") is None:
-        sys.exit("store: found no snakemake-storage-plugin-s3; allowed: after make .venv/ready-for-cluster")
-    return storage.s3(f"{config['store']}/{file}")
+    return sorted(map(str, found))
 
 
 def robot_document(wildcards):

@@ -38,7 +38,6 @@ ASKED = {
             "candidates": QUESTIONS["candidates"],
             "sizes": QUESTIONS["simulated_designs"]["sizes"],
             "loads": QUESTIONS["simulated_designs"]["loads"],
-            "uses": QUESTIONS["uses"],
         },
     ),
 }

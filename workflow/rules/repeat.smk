@@ -8,7 +8,7 @@ rule repeat_studies:
     output:
         repeated="results/studies/{robot}.parquet",
     params:
-        step="elastocal.study.repeated.repeat_studies",
+        step="elastocal.study.evaluation.repeat_studies",
         study=study_in_memory(),
         strategies=list(STUDY.strategies.values()),
         studies=config["evaluation"]["studies"],
@@ -19,7 +19,7 @@ rule repeat_studies:
 ONE_STUDY = {"studies": expand(rules.repeat_studies.output.repeated, robot=REDUCED)}
 STUDY_TABLES |= {
     "tabulate_studies": (
-        "repeated",
+        "evaluation",
         ONE_STUDY,
         {"table": table_of("strategies_over_studies", PAPER, "strategies_over_studies", "Table 4 over studies")},
         {

@@ -4,8 +4,7 @@ from job import Job, origin_of, run
 
 import pandas as pd
 
-from elastocal.figures.candidates import probabilities
-from elastocal.figures.residuals import arrows, before_after
+from elastocal.figures.loop import arrows, before_after, probabilities
 from elastocal.figures.style import save
 from elastocal.io.json_files import read_json
 from elastocal.io.storage import read_table

@@ -4,7 +4,7 @@ from job import Job, origin_of, run
 
 import pandas as pd
 
-from elastocal.figures.residuals import campaign_errors
+from elastocal.figures.loop import campaign_errors
 from elastocal.figures.style import save
 
 

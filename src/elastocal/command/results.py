@@ -45,7 +45,7 @@ def certificate(
 
     from elastocal.campaigns.reading import read_descriptions
     from elastocal.data_checks.protocol import data_at_fault
-    from elastocal.figures.certificate import budget_bars
+    from elastocal.figures.loop import budget_bars
     from elastocal.figures.style import save_all
     from elastocal.io.atomic_writes import check_places, write_together
     from elastocal.io.json_files import write_json

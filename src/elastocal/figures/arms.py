@@ -55,12 +55,6 @@ def draw_arm(axis: Axes, links: np.ndarray, width: float) -> None:
         axis.plot(*project_view(links).T, color=color, lw=share * width, zorder=1, **round_ends)
 
 
-def draw_links(axis: Axes, plane: np.ndarray) -> None:
-    """The corners (K, 2) of an arm joined, behind all else."""
-    style: dict[str, Any] = {"solid_capstyle": "round", "solid_joinstyle": "round", "gid": "arm"}
-    axis.plot(*plane.T, color="#c8c8c8", linewidth=6, zorder=1, **style)
-
-
 @styled
 def arm_with_errors(robot: Robot, table: Mapping[str, np.ndarray], heldout: Mapping[str, Any]) -> Figure:
     """Two panels, before and after: the arm in one of the held-out poses, and an arrow for each of their errors.

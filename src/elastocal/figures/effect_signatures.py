@@ -62,7 +62,7 @@ def signature(name: str, robot: Robot) -> Signature:
     `name`: of an effect of the catalogue. `robot`: with compliances, and with a compensator for the effects of one. What its
     links weigh is left aside, since the weight of links is an effect only where it is not declared.
     """
-    offered = list_candidates(name, robot)
+    offered, sites = list_candidates(name, robot), _sites(name, robot)
     candidate = next((each for each in offered if each.joints[:1] == (_SHOWN_AT,)), offered[0])
     joint = (*candidate.joints, *candidate.turning, _SHOWN_AT)[0]
     limits = np.clip(np.degrees(robot.joint_limits[joint - 1]), -_WIDEST_SWEEP_DEG, _WIDEST_SWEEP_DEG)
@@ -70,19 +70,32 @@ def signature(name: str, robot: Robot) -> Signature:
     still = np.tile(np.radians(_POSE_DEG[: robot.joints]), (_SAMPLES, 1))
     turned = still.copy()
     turned[:, joint - 1] = np.radians(angle)
-    # Angles, pull, approach and time of each experiment; what one does not vary is as in the middle of the campaign.
-    middle, pulled = np.full(_SAMPLES, _HOURS / 2), np.full(_SAMPLES, _PULL_N)
-    experiments: dict[str, Any] = {
-        "by angle": (turned, 0 * pulled, 1.0, middle),
-        "by angle, loaded": (turned, pulled, 1.0, middle),
-        "by force": (still, _FORCE_N, 1.0, middle),
-        "by force, falling": (still, _FORCE_N, -1.0, middle),
-        "by time": (still, 0 * pulled, 1.0, _TIME_H),
-    }
-    around = _sites(name, robot), robot.compliance
-    return Signature(
-        candidate, joint, angle, {name: _moved_mm(candidate, *around, *each) for name, each in experiments.items()}
-    )
+    sizes = np.array([(parameter.sign or 1) * parameter.plausible for parameter in candidate.parameters])
+    point = replace(sites.chain.end_effector, offset_m=_REFLECTOR_M)
+
+    def moved_mm(angles: np.ndarray, newtons: Any = 0.0, approach: float = 1.0, time_h: Any = _HOURS / 2) -> np.ndarray:
+        """Displacement (S, 3); what an experiment does not vary is as in the middle of the campaign."""
+        once, share = np.ones(_SAMPLES, int), np.broadcast_to(time_h, _SAMPLES) / _HOURS
+        states = States(
+            session=0 * once,
+            pose=np.arange(_SAMPLES),
+            load=once,
+            joint_angles=angles,
+            wrench=np.pad(np.outer(np.broadcast_to(newtons, _SAMPLES), _PULL), ((0, 0), (0, 3))),
+            repeats=once,
+            approach=np.full(angles.shape, approach),
+            time_s=_HOUR_S * _HOURS * share,
+            temperature_c=_LOWEST_C + _RISE_K * share,
+            row=share,
+        )
+        around, commanded = conditions_of(sites, robot.compliance, states, row_span=(0, 1)), sites.chain.at(angles)
+        displaced = commanded.copy()
+        displace(displaced, candidate, sizes, [shape.start for shape in candidate.shapes], around)
+        return 1e3 * (poses(sites.chain, displaced, point)[0] - poses(sites.chain, commanded, point)[0])
+
+    moved = {"by angle": moved_mm(turned), "by angle, loaded": moved_mm(turned, _PULL_N), "by force": moved_mm(still, _FORCE_N)}
+    moved |= {"by force, falling": moved_mm(still, _FORCE_N, -1.0), "by time": moved_mm(still, time_h=_TIME_H)}
+    return Signature(candidate, joint, angle, moved)
 
 
 def list_candidates(name: str, robot: Robot) -> list[Candidate]:
@@ -95,39 +108,6 @@ def _sites(name: str, robot: Robot) -> Sites:
     weighed = replace(sites_of(robot), gear_ratio=(_GEAR_RATIO,) * robot.joints)
     bare = replace(weighed, masses=())
     return bare if effects()[name].candidates(bare) else weighed
-
-
-def _moved_mm(
-    candidate: Candidate,
-    sites: Sites,
-    compliance: np.ndarray,
-    angles: np.ndarray,
-    newtons: np.ndarray,
-    approach: float,
-    time_h: np.ndarray,
-) -> np.ndarray:
-    """Displacement of the reflector, ndarray (S, 3)."""
-    once, share = np.ones(_SAMPLES, int), time_h / _HOURS
-    wrench = np.column_stack([np.outer(newtons, _PULL), np.zeros((_SAMPLES, 3))])
-    states = States(
-        session=0 * once,
-        pose=np.arange(_SAMPLES),
-        load=once,
-        joint_angles=angles,
-        wrench=wrench,
-        repeats=once,
-        approach=np.full(angles.shape, approach),
-        time_s=_HOUR_S * time_h,
-        temperature_c=_LOWEST_C + _RISE_K * share,
-        row=share,
-    )
-    around = conditions_of(sites, compliance, states, row_span=(0, 1))
-    point = replace(sites.chain.end_effector, offset_m=_REFLECTOR_M)
-    commanded = sites.chain.at(states.joint_angles)
-    displaced = commanded.copy()
-    sizes = np.array([(parameter.sign or 1) * parameter.plausible for parameter in candidate.parameters])
-    displace(displaced, candidate, sizes, [shape.start for shape in candidate.shapes], around)
-    return 1e3 * (poses(sites.chain, displaced, point)[0] - poses(sites.chain, commanded, point)[0])
 
 
 @styled

@@ -46,6 +46,12 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
     """
     spoken = {"accuracy_sentence": accuracy_sentence(accuracy_from(document["accuracy"])), "title": title_of(document)}
     stated = sentences("certificate.txt", say.FILTERS, document=document, **spoken)
+    budget = []
+    for line in document["budget"]:
+        below = 0.0 < line["rms_m"] < _NOTHING_M
+        hidden = line["name"] == "repeatability" and not line["rms_m"]
+        size = f"below {say.length(_NOTHING_M, 1)}" if below else say.length(line["rms_m"])
+        budget.append([share_name(line["name"]), "hidden by the tracker's noise" if hidden else size])
     return {
         **{name: lines if name in _LISTS else " ".join(lines) for name, lines in stated.items()},
         "campaign": document["campaign"],
@@ -53,7 +59,7 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
         "decision": document["conformity"]["decision"],
         "errors": document["errors"],
         "floor": say.length(document["noise_floor_rms_m"]),
-        "budget": [[share_name(line["name"]), _share(line)] for line in document["budget"]],
+        "budget": budget,
         "budget_states": counted(document["budget_states"], "state"),
     }
 
@@ -61,11 +67,3 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
 def share_name(name: str) -> str:
     """A line of the error budget in words."""
     return _SHARES.get(name) or say.physical_name(name)
-
-
-def _share(line: Mapping[str, Any]) -> str:
-    """A line of the error budget: its RMS."""
-    rms = line["rms_m"]
-    if 0.0 < rms < _NOTHING_M:
-        return f"below {say.length(_NOTHING_M, 1)}"
-    return "hidden by the tracker's noise" if line["name"] == "repeatability" and not rms else say.length(rms)

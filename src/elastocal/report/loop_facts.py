@@ -169,45 +169,32 @@ def cause_rows(verdict: Mapping[str, Any]) -> list[dict[str, Any]]:
     stated, found = verdict["probabilities"], {effect["name"]: effect for effect in verdict["effects"]}
     if stated is None:
         return []
-
-    def row(name: str, probability: float, cost: str = "", gain: float | None = None) -> dict[str, Any]:
-        share = {"probability": probability, "words": say.probability_words(probability)}
-        return {
+    rows: list[tuple[str, float, str, float | None]] = []
+    for name, each in found.items():
+        cost = cost_words(each, verdict["heldout"])
+        rows.append((say.found_words(name, each["members"]), each["probability"], cost, each["heldout_gain"]))
+    # Beside a mechanism that was found, what is unknown is a related one.
+    unknown, mechanisms = say.RELATED if found else say.UNKNOWN, stated["mechanisms"].items()
+    others = [(unknown if name == OTHER else say.physical_name(name), p) for name, p in mechanisms if name not in found]
+    shown = [each for each in [*others, (say.NOTHING, stated["nothing"])] if each[1] >= _LEAST_SHOWN]
+    rows += [(*each, "", None) for each in sorted(shown, key=lambda each: -each[1])[:_MOST_CAUSES]]
+    return [
+        {
             "name": say.capital(name),
-            **share,
+            "probability": probability,
+            "words": say.probability_words(probability),
             "cost": cost,
             "gain": "" if gain is None else say.minus(f"{-100 * gain:+.0f} %"),
         }
-
-    rows = [
-        row(
-            say.found_words(name, each["members"]),
-            each["probability"],
-            cost_words(each, verdict["heldout"]),
-            each["heldout_gain"],
-        )
-        for name, each in found.items()
+        for name, probability, cost, gain in sorted(rows, key=lambda row: -row[1])
     ]
-    # Beside a mechanism that was found, what is unknown is a related one.
-    unknown = say.RELATED if found else say.UNKNOWN
-    others = [
-        row(unknown if name == OTHER else say.physical_name(name), p)
-        for name, p in stated["mechanisms"].items()
-        if name not in found
-    ]
-    others = [each for each in [*others, row(say.NOTHING, stated["nothing"])] if each["probability"] >= _LEAST_SHOWN]
-    others = sorted(others, key=lambda each: -each["probability"])[:_MOST_CAUSES]
-    return sorted([*rows, *others], key=lambda each: -each["probability"])
 
 
 def effect_facts(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> dict[str, Any]:
     """Facts of one effect or fault of the data; `heldout`: of verdict.json."""
     known = [entry for entry in effect["parameters"] if entry.get("identifiable", not entry.get("held"))]
-    shown = known
-    if len(known) > _MOST_PARAMETERS:
-        shown = sorted(known, key=lambda e: abs(e["value"]) / e["std_error"] if e["std_error"] else 0.0, reverse=True)[
-            :_SHOWN_PARAMETERS
-        ]
+    ranked = sorted(known, key=lambda entry: -abs(entry["value"]) / entry["std_error"] if entry["std_error"] else 0.0)
+    shown = ranked[:_SHOWN_PARAMETERS] if len(known) > _MOST_PARAMETERS else known
     name, members, of_data = effect["name"], effect["members"], effect["family"] == OF_DATA
     rows, joints = [_parameter_row(entry, members) for entry in shown], effect["joints"] if of_data else ()
     at = [entry for entry in effect["locations"] if entry["probability"] >= _LEAST_SHOWN]
@@ -247,11 +234,8 @@ def _with_interval(step: Mapping[str, Any]) -> str:
     """RMS error of a step on validation poses with its 95 % interval, in one unit."""
     number, unit = say.length(step["heldout_rms_m"]).split("\u00a0")
     ends = [(say.MICRO if unit == "µm" else say.MILLI) * step[f"heldout_rms_m_{end}"] for end in ("low", "high")]
-    return (
-        f"{number} [{say.plain(ends[0])}, {say.plain(ends[1])}]\u00a0{unit}"
-        if np.isfinite(ends).all()
-        else f"{number}\u00a0{unit}"
-    )
+    interval = f" [{say.plain(ends[0])}, {say.plain(ends[1])}]" if np.isfinite(ends).all() else ""
+    return f"{number}{interval}\u00a0{unit}"
 
 
 def description(effect: str) -> str:

@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 
 from elastocal.report.typesetting import sentences
-from elastocal.study.designs import TEST_POSE
 from elastocal.study.ladder import CHOSEN
 from elastocal.study.printed import LEVEL
 from elastocal.study.tables import column_head, list_rows, merge_errors, word_value
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
 # The repeatability that the paper names for both robots, in µm.
 REPEATABILITY_UM = 60.0
 # Designs in the order of the tables.
-_DESIGNS = ("random", "D", "A", "I", TEST_POSE)
+_DESIGNS = ("random", "D", "A", "I")
 # Beyond so many configurations nothing is known of a length.
 _LONGEST = 1000
 _CONTINUED = "†"

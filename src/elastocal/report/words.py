@@ -119,11 +119,6 @@ def _gathered(found: Iterable[re.Match[str] | None]) -> dict[tuple[int, ...], li
     return details
 
 
-def _detail(effect: str, detail: str) -> str:
-    """Which variant of an effect, in words where it has some."""
-    return getattr(effects().get(effect), "detail_words", {}).get(detail, detail)
-
-
 def _where(effect: str, details: Mapping[tuple[int, ...], Sequence[str]]) -> str:
     """Where an effect acts, by joints or links and details: " of joint 4 (orders 1-2)"."""
     singles = len(details) > 1 and all(len(numbers) == 1 for numbers in details)
@@ -131,7 +126,9 @@ def _where(effect: str, details: Mapping[tuple[int, ...], Sequence[str]]) -> str
         return at_joints(effect, sorted(numbers[0] for numbers in details))
     parts = []
     for numbers, which in details.items():
-        detail = _detail(effect, ", ".join(filter(None, which)))
+        detail = ", ".join(filter(None, which))
+        # A variant in words, where it has some.
+        detail = getattr(effects().get(effect), "detail_words", {}).get(detail, detail)
         # What is no joint's needs a place of its own only in a list with those that are.
         where = at_joints(effect, numbers) or (" of the whole arm" if len(details) > 1 else "")
         in_place = f" of the {detail}" if not numbers and detail in _PARTS else where + (f" ({detail})" if detail else "")

@@ -1,18 +1,7 @@
-"""Which configurations (RQ3): random against chosen ones, by their bound and simulated, and which index tells their worth.
+"""Which configurations (RQ3): random against chosen ones, by their bound and simulated.
 
 Candidates are random configurations with their loads; a design is some of them. Its worth is the Cramér-Rao bound of the RMS
-end-effector error, or the error that simulated data sets of it leave. Beside D, A and I stands the test-pose criterion: the
-accuracy at one pose under the load of its task [1], [2].
-
-Observability indices are numbers of the singular values s_1 >= ... >= s_m of the identification Jacobian of k configurations
-[3]: O1 = (s_1 ... s_m)^(1/m) / sqrt(k), O2 = s_m / s_1, O3 = s_m, O4 = s_m^2 / s_1, O5 = 1 / sum 1/s_i.
-
-[1] Klimchik, A., Wu, Y., Pashkevich, A., Caro, S. and Furet, B., Optimal selection of measurement configurations for stiffness
-    model calibration of anthropomorphic manipulators, Applied Mechanics and Materials 162, 2012.
-[2] Wu, Y., Klimchik, A., Caro, S., Furet, B. and Pashkevich, A., Geometric calibration of industrial robots using enhanced
-    partial pose measurements and design of experiments, Robotics and Computer-Integrated Manufacturing 35, 2015.
-[3] Sun, Y. and Hollerbach, J. M., Observability index selection for robot calibration, IEEE International Conference on
-    Robotics and Automation, 2008.
+end-effector error, or the error that simulated data sets of it leave.
 """
 
 from __future__ import annotations
@@ -32,25 +21,24 @@ from elastocal.application.planning.designs import (
     matrix_of,
     mean_squares,
 )
+from elastocal.io.storage import Column
 from elastocal.random_streams import stream
 from elastocal.study.in_memory import ask
-from elastocal.study.jobs import MICRO, below, real, table, tabulate, text, whole
+from elastocal.study.jobs import MICRO, below, real, table, tabulate, whole
 from elastocal.study.metrics import make_judge, mean_square_errors
-from elastocal.study.uses import iso_9283
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
-    from typing import Any
 
     import pandas as pd
 
     from elastocal.study.in_memory import StudyInMemory
 
-RANDOM, CONTINUOUS, TEST_POSE = "random", "bound", "test pose"
+RANDOM, CONTINUOUS = "random", "bound"
 DESIGNS = table(
     "designs",
-    text("joint_range", "of candidates and validation configurations: full_turn or limits"),
-    text("design", "criterion by which the configurations are chosen, random, or the bound of all designs"),
+    Column("joint_range", "text", "", "of candidates and validation configurations: full_turn or limits"),
+    Column("design", "text", "", "criterion by which the configurations are chosen, random, or the bound of all designs"),
     whole("configurations", "configurations of the design", 1),
     real("rms", "m", "Cramér-Rao bound of the RMS end-effector error"),
     real("low", "m", "5 % of random designs"),
@@ -58,13 +46,12 @@ DESIGNS = table(
 )
 SIMULATED_DESIGNS = table(
     "simulated_designs",
-    text("load", "kind of load: random directions, or one direction in every configuration"),
-    text("design", "criterion by which the configurations are chosen, or random"),
+    Column("load", "text", "", "kind of load: random directions, or one direction in every configuration"),
+    Column("design", "text", "", "criterion by which the configurations are chosen, or random"),
     whole("configurations", "configurations of the design", 1),
-    text("unobservable", "joints that the loads do not move, from 1, with commas between them"),
+    Column("unobservable", "text", "", "joints that the loads do not move, from 1, with commas between them"),
     real("rms", "m", "RMS end-effector error over simulated data sets on test configurations"),
     real("std_error", "m", "Monte Carlo standard error of the same"),
-    real("there", "m", "RMS end-effector error at the test pose"),
 )
 # Interpretation R3 both ways: a robot on the floor cannot turn its joints fully.
 _JOINT_RANGES = ("full_turn", "limits")
@@ -122,36 +109,31 @@ class Candidates:
     """Configurations under loads of one kind, among which is chosen.
 
     `rows` (N, rows, n): regressors, m per rad/(N m). `deflections` (N, rows): without noise. `observable` (n,): joints that the
-    loads move. `forms`: mean squared error over the test configurations, and at the test pose, as quadratic forms.
+    loads move. `form`: mean squared error over the test configurations as a quadratic form.
     """
 
     rows: np.ndarray
     deflections: np.ndarray
     observable: np.ndarray
-    forms: list[np.ndarray]
+    form: np.ndarray
 
 
 def simulated_design_blocks(
-    study: StudyInMemory,
-    candidates: int,
-    sizes: Sequence[int],
-    loads: Mapping[str, Sequence[float] | None],
-    uses: Mapping[str, Any],
+    study: StudyInMemory, candidates: int, sizes: Sequence[int], loads: Mapping[str, Sequence[float] | None]
 ) -> Iterator[dict[str, np.ndarray]]:
     """Errors that designs leave in simulated data sets of their configurations, kind of load by kind.
 
     `candidates`: how many. `loads`: direction of the force by the name of its kind, base axes; None for one that is random in
-    each configuration. `uses`: of which the cube and its weight give the test pose. Where the loads do not move a joint, it is
-    left out, and the test configurations have the loads of the candidates.
+    each configuration. Where the loads do not move a joint, it is left out, and the test configurations have the loads of the
+    candidates.
     """
     for load, direction in loads.items():
-        made = _candidates(study, candidates, direction, uses)
+        made = _candidates(study, candidates, direction)
         of = made.observable
         scale = study.robot.compliance[of]
         rows = made.rows[..., of] * scale / study.size.noise
-        # Both forms are of the squared error in all compliances and 1.
-        weights = dict(zip(("I", TEST_POSE), made.forms, strict=True))
-        rules = {kind: Criterion(weights[kind][np.ix_(of, of)] * np.outer(scale, scale)) for kind in weights}
+        # The form is of the squared error in all compliances and 1.
+        rules = {"I": Criterion(made.form[np.ix_(of, of)] * np.outer(scale, scale))}
         rules |= {kind: criterion(kind, rows[:, :3]) for kind in CRITERIA if kind != "I"}
         found: list[tuple[str, int, Sequence[np.ndarray] | np.ndarray | list[int]]] = []
         for kind, rule in rules.items():
@@ -167,27 +149,24 @@ def simulated_design_blocks(
             "design": np.array([kind for kind, _, _ in found], object),
             "configurations": np.array([size for _, size, _ in found]),
             "unobservable": np.full(len(found), hidden, object),
-            **dict(zip(("rms", "std_error", "there"), errors.T, strict=True)),
+            **dict(zip(("rms", "std_error"), errors.T, strict=True)),
         }
 
 
-def _candidates(study: StudyInMemory, count: int, direction: Sequence[float] | None, uses: Mapping[str, Any]) -> Candidates:
-    robot, read = study.robot, study.interpretation
+def _candidates(study: StudyInMemory, count: int, direction: Sequence[float] | None) -> Candidates:
+    read = study.interpretation
     within = study if direction is None else study.under(direction=tuple(direction))
     drawn = within.experiments([0], count, "candidates of designs")
     rows = within.regressor(drawn)[0, :, : read.rows]
     size = np.abs(rows).max(axis=(0, 1))
     observable = size > _MOVED * size.max()
     tests = study.tests() if observable.all() else within.tests()
-    pose = iso_9283(robot, uses["centre_m"], uses["edge_m"], uses["weight_N"])
-    # The first of the five poses is the centre of the cube; a robot that does not reach it has its first test configuration.
-    centre = (pose or tests).first(1)
-    forms = [make_judge(robot, each, within.deflections(each), read.wrench_at).form for each in (tests, centre)]
-    return Candidates(rows, within.deflections(drawn)[0, :, : read.rows], observable, forms)
+    form = make_judge(study.robot, tests, within.deflections(tests), read.wrench_at).form
+    return Candidates(rows, within.deflections(drawn)[0, :, : read.rows], observable, form)
 
 
-def _simulate(study: StudyInMemory, candidates: Candidates, designs: np.ndarray) -> tuple[float, float, float]:
-    """RMS error with its standard error, and RMS error at the test pose, of noisy data sets by designs (D, size)."""
+def _simulate(study: StudyInMemory, candidates: Candidates, designs: np.ndarray) -> tuple[float, float]:
+    """RMS error with its standard error of noisy data sets by designs (D, size)."""
     repeats = -(-study.size.data_sets // len(designs))
     draws = stream(study.seed, study.key, f"noise of designs/{designs.shape[1]}", 0)
     of = candidates.observable
@@ -198,12 +177,12 @@ def _simulate(study: StudyInMemory, candidates: Candidates, designs: np.ndarray)
     error = np.zeros((len(of), len(designs) * repeats))
     estimates = np.linalg.solve(across @ rows, across @ measured)
     error[of] = np.moveaxis(estimates, 1, 0).reshape(of.sum(), -1) - study.robot.compliance[of][:, None]
-    squares, there = (mean_square_errors(form, error) for form in candidates.forms)
+    squares = mean_square_errors(candidates.form, error)
     rms = np.sqrt(squares.mean())
     # Data sets of one design go together.
     each = squares.reshape(len(designs), repeats)
     groups = each.mean(axis=1) if len(designs) > 1 else each[0]
-    return float(rms), float(groups.std(ddof=1) / np.sqrt(len(groups)) / (2 * rms)), float(np.sqrt(there.mean()))
+    return float(rms), float(groups.std(ddof=1) / np.sqrt(len(groups)) / (2 * rms))
 
 
 def designs_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
@@ -219,7 +198,7 @@ def simulated_designs_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     gain: the error of random designs of the size over that of the design.
     """
     frame = below(found)
-    names = {"rms": "rms_um", "std_error": "rms_um_std_error", "there": "at_test_pose_um"}
+    names = {"rms": "rms_um", "std_error": "rms_um_std_error"}
     errors = MICRO * frame[[*names]].rename(columns=names)
     part = frame[["robot", "load", "design", "configurations", "unobservable"]].join(errors)
     size = ["robot", "load", "configurations"]

@@ -138,14 +138,6 @@ def prefix_triangles(equations: Iterable[np.ndarray], start: np.ndarray) -> np.n
     return np.array(found)
 
 
-def prefix_information(regressor: np.ndarray) -> np.ndarray:
-    """Sum of A^T A over the first k configurations, for every k.
-
-    `regressor` (rows, n, configurations, sets). Returns (configurations, sets, n, n).
-    """
-    return np.cumsum(np.einsum("rics,rjcs->csij", regressor, regressor), axis=0)
-
-
 def _equations(stage: Stage, measurements: Mapping[str, Measurements]) -> Iterator[np.ndarray]:
     """Equations of a stage, configuration by configuration; columns: joints identified, joints fixed, measured deflection."""
     order, points = [*stage.identified, *stage.fixed], [measurements[name] for name in stage.points]
@@ -213,19 +205,6 @@ def stacked(matrix: np.ndarray, deflections: np.ndarray) -> Measurements:
     return Measurements(matrix, np.moveaxis(configuration_first(deflections)[..., : len(matrix)], -1, 0))
 
 
-def measurements_of(
-    experiments: Mapping[str, np.ndarray],
-    deflections: Mapping[str, Mapping[str, np.ndarray]],
-    chain: Chain,
-    strategy: Strategy,
-    rows: int,
-    wrench_at: str,
-) -> dict[str, Measurements]:
-    """What each measuring point of a strategy contributes, from a block of the experiments and those of the deflections."""
-    regressors = regressors_of(to_experiments(experiments), chain, strategy.points, rows, wrench_at)
-    return {name: stacked(regressors[name], to_deflections(deflections[name])) for name in strategy.points}
-
-
 def identified_blocks(
     blocks: Blocks, chain: Chain, strategy: Strategy, rows: int, wrench_at: str
 ) -> Iterator[dict[str, np.ndarray]]:
@@ -234,7 +213,8 @@ def identified_blocks(
     `rows`: 6 where poses are measured, 3 where positions are. `wrench_at`: interpretation R6.
     """
     for block, deflections in blocks:
-        measurements = measurements_of(block, deflections, chain, strategy, rows, wrench_at)
+        regressors = regressors_of(to_experiments(block), chain, strategy.points, rows, wrench_at)
+        measurements = {name: stacked(regressors[name], to_deflections(deflections[name])) for name in strategy.points}
         compliance, triangles = estimate_compliance(strategy, measurements, chain.coordinates)
         np.moveaxis(compliance, 1, -1)[undetermined(strategy, rows, triangles)] = np.nan
         columns = prefix_index_columns(data_sets(block), len(compliance))

@@ -1,20 +1,35 @@
-"""Each strategy on each robot at each noise level: from measured data sets to the figures that judge it.
+"""Each strategy on each robot at each noise level: from measured data sets to the figures that judge it, in studies over again.
 
 As the paper does, which averages the stiffness over all data sets before it looks at the error (equations 12-15). All work
-goes block of data sets by block.
+goes block of data sets by block. Further studies have data sets that no other one has, and nothing of these is kept.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from elastocal.io.storage import Column, TableSchema, read_blocks, read_table, write_table
 from elastocal.study.equation_11 import identified, identified_blocks, read_measured
-from elastocal.study.jobs import LENGTH, Job, origin, real, robot_of, table
+from elastocal.study.in_memory import study_of
+from elastocal.study.jobs import (
+    LENGTH,
+    MICRO,
+    STRATEGY,
+    Job,
+    add_slugs,
+    origin,
+    real,
+    robot_of,
+    rows_as_frame,
+    strategies_of,
+    table,
+    whole,
+    write_csvs,
+)
 from elastocal.study.metrics import (
     Judge,
     first_length_below,
@@ -38,9 +53,18 @@ from elastocal.study.simulation import (
 from elastocal.study.strategies import drop_forgotten_stages, strategy_from_document
 
 if TYPE_CHECKING:
-    from elastocal.mechanics.robot import Robot
+    import pandas as pd
+
+    from elastocal.study.in_memory import StudyInMemory
+    from elastocal.study.strategies import Strategy
 
 LARGEST_TRUSTED_SPREAD = 0.25
+# Those of Table 4: name, column, factor, unit, key of the limit.
+_FIGURES = (
+    ("k_sigma", "k_sigma", 1.0, "percent", "k_sigma"),
+    ("k_sigma_fixed_joints", "k_sigma_fixed_joints", 1.0, "percent", "k_sigma"),
+    ("dev", "deviation", MICRO, "um", "deviation"),
+)
 
 SCORES = (
     real("k_sigma", "percent", "as in the metrics", missing=True),
@@ -64,17 +88,18 @@ def metrics(joints: int) -> TableSchema:
     return table(
         "metrics",
         LENGTH,
-        *_with_errors(quantities, "data sets and test configurations"),
+        *(
+            real(name + end, unit, words + meaning, missing=True)
+            for name, unit, meaning in quantities
+            for end, words in (
+                ("", ""),
+                ("_std_error", "Monte Carlo error over data sets and test configurations of: "),
+            )
+        ),
         real("nonpositive_share", "", "share of data sets with a compliance that is not positive"),
         real("relative_spread", "", "largest standard deviation over mean of an identified compliance", missing=True),
         Column("trustworthy", "bool", "", "whether the mean of 1/c exists in practice: none <= 0 and relative spread <= 0.25"),
     )
-
-
-def _with_errors(quantities: Iterable[tuple[str, str, str]], over: str) -> Iterator[Column]:
-    for name, unit, meaning in quantities:
-        yield real(name, unit, meaning, missing=True)
-        yield real(f"{name}_std_error", unit, f"Monte Carlo standard error of {name} over {over}", missing=True)
 
 
 def to_weights(columns: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -173,29 +198,6 @@ def _replicated_scores(averages: Averages, true_compliance: np.ndarray, fixed_jo
     return scores | {"initial_deviation": averages.initial_deviation}
 
 
-def evaluate_strategy(
-    identified_blocks: Iterable[Mapping[str, np.ndarray]],
-    weight_blocks: Iterable[Mapping[str, np.ndarray]],
-    test_weights: Mapping[str, np.ndarray],
-    judge: Judge,
-    fixed_joints: Sequence[int],
-    method: str,
-) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Tables of metrics and bootstrap replicates of one strategy from blocks of its estimates and of the weights.
-
-    `method`: interpretation R7, see `average`.
-    """
-
-    def weigh() -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        for block, counts in zip(identified_blocks, weight_blocks, strict=True):
-            columns = [block[f"compliance_{j + 1}"] for j in range(len(judge.reference))]
-            compliance = np.stack([column.reshape(len(data_sets(block)), -1) for column in columns], axis=-1)
-            yield compliance, to_weights(counts)
-
-    averages = average(weigh(), judge, method, to_weights(test_weights))
-    return metrics_table(averages, judge.reference, fixed_joints), replicates_table(averages, judge.reference, fixed_joints)
-
-
 def find_length(values: np.ndarray, replicate_values: np.ndarray, limit: float) -> tuple[float, float]:
     """First length at which a metric is at most `limit`, infinite where none is, with its Monte Carlo standard error.
 
@@ -205,18 +207,71 @@ def find_length(values: np.ndarray, replicate_values: np.ndarray, limit: float) 
     return float(first_length_below(values, limit)), float(np.std(length_to_reach(replicate_values, limit), ddof=1))
 
 
-def judge_from(
-    robot: Robot, test_experiments: Mapping[str, np.ndarray], test_deflections: Mapping[str, np.ndarray], wrench_at: str
-) -> Judge:
-    """Score sheet from the tables of the test configurations; see `metrics.make_judge`."""
-    return make_judge(robot, to_experiments(test_experiments), to_deflections(test_deflections), wrench_at)
+def repeated(joints: int) -> TableSchema:
+    """Scores of further studies of the same size; one row for each study, strategy and length."""
+    other = "by the mean of the compliances where the metrics have that of the stiffnesses"
+    return table(
+        "repeated",
+        whole("study", "number of the study, from 1; that of the tables is number 0", 1),
+        STRATEGY,
+        LENGTH,
+        *(real(f"compliance_{j}", "rad/(N m)", f"as in the metrics, of joint {j}", missing=True) for j in range(1, joints + 1)),
+        *SCORES,
+        real("k_sigma_mean_compliance", "percent", f"sum of delta_k over all joints, {other}", missing=True),
+        real("k_sigma_fixed_joints_mean_compliance", "percent", f"the same of the fixed joints, {other}", missing=True),
+        real("deviation_mean_compliance", "m", f"deviation {other}", missing=True),
+        real("mean_square", "m^2", "mean square end-effector error of single data sets", missing=True),
+    )
 
 
-def judge_of(job: Job, robot: Robot) -> Judge:
-    """The same from the files of a job."""
-    tested = read_table(job.input.test_experiments, experiments(robot.joints))
-    ideal = read_table(job.input.test_ideal, DEFLECTIONS, point=robot.chain.end_effector.name)
-    return judge_from(robot, tested, ideal, job.params.wrench_at)
+def repeated_blocks(
+    study: StudyInMemory, studies: Iterable[int], strategies: Sequence[Strategy]
+) -> Iterator[dict[str, np.ndarray | str]]:
+    """Scores of studies of these numbers, block by block one strategy in one study."""
+    robot, read, tests = study.robot, study.interpretation, np.ones((1, study.size.tests))
+    for number in studies:
+        judge, found = study.judge(number), study.estimates(strategies, number)
+        for strategy in strategies:
+            blocks = [(compliance, np.ones((1, len(compliance)))) for compliance in found[strategy.name]]
+            averages = average(blocks, judge, read.average, tests)
+            plain = average(blocks, judge, "compliance", tests)
+            fixed = strategy.fixed_joints
+            others = score_columns(plain.compliance[0], plain.deviation[0], robot.compliance, fixed)
+            squares = [judge.mean_square(np.moveaxis(each, 0, -1)) for each, _ in blocks]
+            yield {
+                "length": np.arange(1, len(squares[0]) + 1),
+                **{f"compliance_{j + 1}": column for j, column in enumerate(averages.compliance[0].T)},
+                **score_columns(averages.compliance[0], averages.deviation[0], robot.compliance, fixed),
+                **{f"{name}_mean_compliance": values for name, values in others.items()},
+                "mean_square": np.concatenate(squares, axis=1).mean(axis=1),
+                "study": np.full(len(squares[0]), number),
+                "strategy": strategy.name,
+            }
+
+
+def over_studies_table(studies: pd.DataFrame, length: int, limits: Mapping[str, float]) -> pd.DataFrame:
+    """Table 4 over studies, by what is averaged (stiffness or compliance).
+
+    `studies`: robot and the columns of `repeated`. `limits`: k_sigma in percent and deviation in µm whose lengths are given.
+    Each figure is the median over studies with a robust standard deviation between them (1.4826 times the median absolute
+    deviation); rms: of one data set.
+    """
+    rows = []
+    for (robot, strategy), cell in studies.groupby(["robot", "strategy"], sort=False):
+        for averaged, end in (("stiffness", ""), ("compliance", "_mean_compliance")):
+            row: dict[str, Any] = {"robot": robot, "strategy": strategy, "average": averaged}
+            for name, column, factor, unit, key in _FIGURES:
+                curves = factor * cell.pivot(index="study", columns="length", values=f"{column}{end}").to_numpy()
+                row |= _middle(f"{name}_{length}_{unit}", curves[:, length - 1])
+                row |= _middle(f"n_{name}_{limits[key]:g}_{unit}", length_to_reach(curves, limits[key]))
+            rows.append(row | _middle(f"rms_{length}_um", MICRO * np.sqrt(cell.mean_square[cell.length == length])))
+    return rows_as_frame(rows)
+
+
+def _middle(name: str, values: np.ndarray | pd.Series) -> dict[str, float]:
+    """Median, and a standard deviation that outlying studies do not move."""
+    middle = float(np.median(values))
+    return {name: middle, f"{name}_std": float(1.4826 * np.median(np.abs(values - middle)))}
 
 
 def identify(job: Job) -> None:
@@ -227,16 +282,36 @@ def identify(job: Job) -> None:
     solved = identified_blocks(blocks, robot.chain, drop_forgotten_stages(strategy, n), asked.rows, asked.wrench_at)
     write_table(job.output.identified, identified(n), solved, origin(job))
 
+    tested = read_table(job.input.test_experiments, experiments(n))
+    ideal = read_table(job.input.test_ideal, DEFLECTIONS, point=robot.chain.end_effector.name)
     counts = ["replicate", "count"]
     # Read again, so that any number of data sets is worked off in the same memory.
-    tables = evaluate_strategy(
-        read_blocks(job.output.identified, identified(n), ["data_set", *(f"compliance_{j + 1}" for j in range(n))]),
-        read_blocks(job.input.weights, WEIGHTS, counts, members=DATA_SETS),
-        read_table(job.input.weights, WEIGHTS, counts, members=TESTS),
-        judge_of(job, robot),
-        strategy.fixed_joints,
-        asked.average,
+    columns = [f"compliance_{j + 1}" for j in range(n)]
+    estimated = (
+        np.stack([block[name].reshape(len(data_sets(block)), -1) for name in columns], axis=-1)
+        for block in read_blocks(job.output.identified, identified(n), ["data_set", *columns])
     )
+    weights = map(to_weights, read_blocks(job.input.weights, WEIGHTS, counts, members=DATA_SETS))
+    of_tests = to_weights(read_table(job.input.weights, WEIGHTS, counts, members=TESTS))
+    judge = make_judge(robot, to_experiments(tested), to_deflections(ideal), asked.wrench_at)
+    averages = average(zip(estimated, weights, strict=True), judge, asked.average, of_tests)
+    tables = [make(averages, judge.reference, strategy.fixed_joints) for make in (metrics_table, replicates_table)]
     scores = (job.output.metrics, metrics(n)), (job.output.replicates, REPLICATES)
-    for (path, schema), columns in zip(scores, tables, strict=True):
-        write_table(path, schema, [columns], origin(job))
+    for (path, schema), found in zip(scores, tables, strict=True):
+        write_table(path, schema, [found], origin(job))
+
+
+def repeat_studies(job: Job) -> None:
+    """Further studies of one robot."""
+    study = study_of(job)
+    blocks = repeated_blocks(study, range(1, job.params.studies + 1), strategies_of(job))
+    write_table(job.output.repeated, repeated(study.robot.joints), blocks, origin(job))
+
+
+def tabulate_studies(job: Job) -> None:
+    """Table 4 over studies."""
+    from elastocal.io.data_frames import read_studies
+
+    asked = job.params
+    found = over_studies_table(read_studies(job.input.studies, repeated), asked.length, asked.limits)
+    write_csvs(job, table=add_slugs(found, asked.slugs))

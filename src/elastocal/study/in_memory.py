@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from elastocal.io.storage import TableSchema
-    from elastocal.mechanics.chain import MeasuringPoint
     from elastocal.study.jobs import Job
     from elastocal.study.strategies import Stage
 
@@ -100,21 +99,15 @@ class StudyInMemory:
 
     def deflections(self, experiments: Experiments, point: str | None = None) -> np.ndarray:
         """Deflections (sets, configurations, 6) of a measuring point, of the end-effector where none is named."""
-        return true_deflections(self.robot, experiments, self._point(point), self.interpretation.wrench_at)
+        chain = self.robot.chain
+        named = chain.point(point) if point else chain.end_effector
+        return true_deflections(self.robot, experiments, named, self.interpretation.wrench_at)
 
-    def noise(
-        self, sets: Sequence[int] | np.ndarray, point: str | None = None, configurations: int | None = None
-    ) -> np.ndarray:
-        """Standard normal noise (sets, configurations, 6) of the measurements of a point."""
-        name = point or self.robot.chain.end_effector.name
-        return measurement_noise(self.seed, self.key, name, sets, configurations or self.size.configurations)
-
-    def regressor(self, experiments: Experiments, point: MeasuringPoint | None = None) -> np.ndarray:
-        """Regressors (sets, configurations, 6, n) of poses of a point of the arm, of the end-effector without."""
+    def regressor(self, experiments: Experiments) -> np.ndarray:
+        """Regressors (sets, configurations, 6, n) of poses of the end-effector."""
         chain, angles = self.robot.chain, experiments.joint_angles
-        point = point or chain.end_effector
-        torques = joint_torques(chain, angles, experiments.wrench, loaded_point(chain, point, self.interpretation.wrench_at))
-        return regressor(jacobians(chain, angles, point), torques)
+        at = loaded_point(chain, chain.end_effector, self.interpretation.wrench_at)
+        return regressor(jacobians(chain, angles, chain.end_effector), joint_torques(chain, angles, experiments.wrench, at))
 
     def judge(self, number: int = 0) -> Judge:
         """Score sheet of the test configurations of a study."""
@@ -128,11 +121,11 @@ class StudyInMemory:
         by which measurements of the same configurations differ.
         """
         drawn, read = self.experiments(sets), self.interpretation
-        regressors = regressors_of(drawn, self.robot.chain, points, read.rows, read.wrench_at)
-        return {
-            name: stacked(regressors[name], self.deflections(drawn, name) + self.size.noise * self.noise(sets, name + repeat))
-            for name in points
-        }
+        regressors, found = regressors_of(drawn, self.robot.chain, points, read.rows, read.wrench_at), {}
+        for name in points:
+            noise = measurement_noise(self.seed, self.key, name + repeat, sets, self.size.configurations)
+            found[name] = stacked(regressors[name], self.deflections(drawn, name) + self.size.noise * noise)
+        return found
 
     def estimate(self, strategy: Strategy, measurements: Mapping[str, Measurements]) -> np.ndarray:
         """Compliances (lengths, n, sets), rad/(N m), not a number where a length does not determine them."""
@@ -154,9 +147,6 @@ class StudyInMemory:
                 compliance = self.estimate(Strategy("", estimator), measurements)
                 found.setdefault(estimator, []).append(np.moveaxis(compliance, -1, 0))
         return {name: found[estimator] for name, estimator in stages.items()}
-
-    def _point(self, name: str | None) -> MeasuringPoint:
-        return self.robot.chain.point(name) if name else self.robot.chain.end_effector
 
 
 def study_of(job: Job) -> StudyInMemory:

@@ -44,11 +44,6 @@ def group(name: str, meaning: str) -> Column:
     return Column(name, "string", "", meaning)
 
 
-def text(name: str, meaning: str) -> Column:
-    """A word of its own in each row."""
-    return Column(name, "text", "", meaning)
-
-
 SET = whole("data_set", "number of the data set, from 0", 0)
 CONFIGURATION = whole("configuration", "number of the configuration in its data set, from 0", 0)
 LENGTH = whole("length", "data set length ds: how many configurations, from the first, were used", 1)

@@ -23,6 +23,7 @@ from elastocal.mechanics.kinematics import jacobians
 from elastocal.study.in_memory import ask
 from elastocal.study.jobs import LENGTH, MICRO, ON_TESTS, SET, real, rows_as_frame, table, tabulate, whole
 from elastocal.study.points import root_mean
+from elastocal.study.simulation import measurement_noise
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -39,7 +40,6 @@ LADDER = table(
     LENGTH,
     SET,
     whole("link_springs", "number of link springs in the model", 0),
-    whole("added_link", "link whose spring came last, from 1; 0 where there is none", 0),
     Column("chosen", "bool", "", "whether cross-validation stops here"),
     real("mean_square", "m^2", ON_TESTS),
 )
@@ -173,7 +173,8 @@ def ladder_blocks(study: StudyInMemory, lengths: Sequence[int], noises: Sequence
     longest, count = max(lengths), len(robot.links)
     for sets in study.blocks():
         drawn = study.experiments(sets, longest)
-        columns, ideal, normal = spring_columns(robot, drawn), study.deflections(drawn), study.noise(sets, None, longest)
+        columns, ideal = spring_columns(robot, drawn), study.deflections(drawn)
+        normal = measurement_noise(study.seed, study.key, robot.chain.end_effector.name, sets, longest)
         for noise, length in ((noise, length) for noise in noises for length in lengths):
             deflection = ideal + noise * normal
             folds = [products_of(columns[:, fold:length:FOLDS], deflection[:, fold:length:FOLDS]) for fold in range(FOLDS)]
@@ -184,7 +185,6 @@ def ladder_blocks(study: StudyInMemory, lengths: Sequence[int], noises: Sequence
                 "length": np.full(errors.size, length),
                 "data_set": np.repeat(sets, count + 1),
                 "link_springs": np.tile(np.arange(count + 1), len(sets)),
-                "added_link": np.pad(found.order + 1, ((0, 0), (1, 0))).ravel(),
                 "chosen": (np.arange(count + 1) == found.chosen[:, None]).ravel(),
                 "mean_square": errors.ravel() / study.size.tests,
             }
@@ -194,7 +194,7 @@ def ladder_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """Error of one data set on configurations that it has not seen, by number of link springs, or `CHOSEN`.
 
     `found`: the ladder table of each robot with links. chosen_percent: share of data sets in which cross-validation stops
-    there; usual_link: the link added most often at this step, from 1.
+    there.
     """
     rows = []
     for robot, frame in found.items():
@@ -203,11 +203,10 @@ def ladder_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
             for name, some in [*steps, (CHOSEN, cell[cell.chosen])]:
                 rms, error = root_mean(some.mean_square.to_numpy())
                 chosen = 100 * some.chosen.mean() if name != CHOSEN else np.nan
-                usual = int(some.added_link.mode().iloc[0]) if name not in ("0", CHOSEN) else np.nan
                 noise_um = round(MICRO * float(str(noise)), 6)
-                rows.append((robot, noise_um, length, name, MICRO * rms, MICRO * error, chosen, usual))
+                rows.append((robot, noise_um, length, name, MICRO * rms, MICRO * error, chosen))
     head = ("robot", "noise_um", "length", "link_springs")
-    return rows_as_frame(rows, (*head, "rms_um", "rms_um_std_error", "chosen_percent", "usual_link"))
+    return rows_as_frame(rows, (*head, "rms_um", "rms_um_std_error", "chosen_percent"))
 
 
 climb_ladder = ask(LADDER, ladder_blocks)

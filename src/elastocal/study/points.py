@@ -1,7 +1,7 @@
 """Which points to measure, and what an accuracy costs (RQ2): sets of points over as many measurements and over their costs.
 
-One least-squares problem over each set of points, beside its bound. Sets share their configurations and noise, so that they
-are compared data set by data set. In units of one measurement, n configurations with m measurements each cost n (r + m), where
+One least-squares problem over each set of points. Sets share their configurations and noise, so that they are compared data
+set by data set. In units of one measurement, n configurations with m measurements each cost n (r + m), where
 going to a configuration costs r. A set of points that needs fewer configurations pays from the cost on at which both are equal:
 its break-even.
 """
@@ -12,12 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.study.equation_11 import prefix_information
 from elastocal.study.in_memory import ask
-from elastocal.study.jobs import ERROR, LENGTH, MICRO, SET, Job, frames, group, real, rows_as_frame, table, write_csvs
-from elastocal.study.metrics import squared_error_bounds
+from elastocal.study.jobs import ERROR, LENGTH, MICRO, SET, Job, frames, group, rows_as_frame, table, write_csvs
 from elastocal.study.simulation import bootstrap_weights, prefix_index_columns
-from elastocal.study.strategies import all_at_once
+from elastocal.study.strategies import Stage, Strategy
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -35,7 +33,6 @@ BUDGET = table(
     SET,
     LENGTH,
     ERROR,
-    real("bound", "m^2", "Cramér-Rao bound of the same", missing=True),
 )
 # A point that is measured twice in a configuration has noise of its own the second time.
 _AGAIN = "/again"
@@ -46,7 +43,7 @@ _CONFIGURATION_COSTS = (0.0, *np.logspace(-2, 1.5, 43).round(4).tolist())
 
 
 def budget_blocks(study: StudyInMemory, point_sets: PointSets) -> Iterator[dict[str, np.ndarray | str]]:
-    """Squared error of each data set at every length, and the least that an unbiased estimator could have.
+    """Squared error of each data set at every length.
 
     `point_sets`: measuring points by the names of sets; a point may stand in a set twice. Sets with a point that the robot
     lacks are left out.
@@ -59,18 +56,10 @@ def budget_blocks(study: StudyInMemory, point_sets: PointSets) -> Iterator[dict[
         measurements = study.measure(sets, names)
         again = study.measure(sets, twice, _AGAIN) if twice else {}
         measurements |= {name + _AGAIN: found for name, found in again.items()}
-        information = {name: prefix_information(measurements[name].regressor) for name in names}
         for label, points in point_sets.items():
             read = tuple(name + _AGAIN * (name in points[:place]) for place, name in enumerate(points))
-            squares = judge.mean_square(study.estimate(all_at_once(read, n), measurements))
-            together = sum((information[name] for name in points), np.zeros(()))
-            bounds = squared_error_bounds(together, judge.form[:-1, :-1])
-            yield {
-                **prefix_index_columns(sets, len(squares)),
-                "points": label,
-                "mean_square": squares.T.ravel(),
-                "bound": np.where(np.isfinite(bounds), study.size.noise**2 * bounds, np.nan).T.ravel(),
-            }
+            squares = judge.mean_square(study.estimate(Strategy("", (Stage(read, tuple(range(n))),)), measurements))
+            yield {**prefix_index_columns(sets, len(squares)), "points": label, "mean_square": squares.T.ravel()}
 
 
 def root_mean(squares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -100,16 +89,15 @@ def budget_table(found: Frames, point_sets: PointSets, length: int) -> pd.DataFr
                 at = _at(frame, points, configurations)
                 if len(at):
                     rms, error = root_mean(at.mean_square.to_numpy())
-                    head = (robot, points, len(names), configurations)
-                    rows.append((*head, MICRO * np.sqrt(at.bound.mean()), MICRO * rms, MICRO * error))
+                    rows.append((robot, points, len(names), configurations, MICRO * rms, MICRO * error))
     columns = ("robot", "points", "measurements_per_configuration", "configurations")
-    return rows_as_frame(rows, (*columns, "crlb_rms_um", "rms_um", "std_error_um"))
+    return rows_as_frame(rows, (*columns, "rms_um", "std_error_um"))
 
 
 def paired_table(found: Frames, point_sets: PointSets, length: int) -> pd.DataFrame:
     """Sets of points against the first one, at a budget of twice `length` measurements, paired by data set.
 
-    The ratio has its 95 % interval; the difference its standard error by the delta method.
+    The ratio has its 95 % interval.
     """
     rows = []
     against = next(iter(point_sets))
@@ -121,14 +109,10 @@ def paired_table(found: Frames, point_sets: PointSets, length: int) -> pd.DataFr
             ours = _at(frame, points, configurations).mean_square.to_numpy()
             if points == against or not len(ours) or not len(theirs):
                 continue
-            roots = np.sqrt([ours.mean(), theirs.mean()])
-            # Deviations of both roots data set by data set.
-            each = np.stack([ours, theirs]) / (2 * roots[:, None])
-            error = (each[0] - each[1]).std(ddof=1) / np.sqrt(len(ours))
             head = (robot, points, against, configurations * len(names), configurations, theirs_at)
-            rows.append((*head, MICRO * (roots[0] - roots[1]), MICRO * error, *ratio_of_roots(ours, theirs)))
+            rows.append((*head, *ratio_of_roots(ours, theirs)))
     columns = ("robot", "points", "against", "measurements", "configurations", "configurations_against")
-    return rows_as_frame(rows, (*columns, "difference_um", "difference_um_std_error", "ratio", "ratio_low", "ratio_high"))
+    return rows_as_frame(rows, (*columns, "ratio", "ratio_low", "ratio_high"))
 
 
 def lengths_table(found: Frames, point_sets: PointSets, accuracies_um: Sequence[float]) -> pd.DataFrame:
@@ -149,7 +133,6 @@ def lengths_table(found: Frames, point_sets: PointSets, accuracies_um: Sequence[
                 "configurations": rms,
                 "configurations_low": rms - QUANTILE * error,
                 "configurations_high": rms + QUANTILE * error,
-                "configurations_by_bound": np.sqrt(mine.groupby("length").bound.mean().reindex(lengths).to_numpy()),
             }
             for accuracy in accuracies_um:
                 needed = {name: _first(lengths, MICRO * values <= accuracy) for name, values in curves.items()}
@@ -229,9 +212,9 @@ def break_even_table(
 
 
 def cost_table(found: Frames, point_sets: PointSets, accuracy_um: float, weights: Mapping[str, np.ndarray]) -> pd.DataFrame:
-    """What an accuracy costs by each set of points over the first one, by the cost of a configuration, and which is cheapest.
+    """What an accuracy costs by each set of points over the first one, by the cost of a configuration.
 
-    `weights`: as in `break_even_table`. The cost is in measurements, the ratio to the first set has its 95 % interval.
+    `weights`: as in `break_even_table`. Costs are in measurements, the ratio to the first set has its 95 % interval.
     """
     rows: list[tuple[Any, ...]] = []
     against = next(iter(point_sets))
@@ -239,12 +222,10 @@ def cost_table(found: Frames, point_sets: PointSets, accuracy_um: float, weights
         needed = find_needed_by_set(frame, point_sets, accuracy_um, weights[robot])
         for each in _CONFIGURATION_COSTS:
             costs = {points: n * (each + len(point_sets[points])) for points, n in needed.items() if np.isfinite(n[0])}
-            cheapest = min(costs, key=lambda points: costs[points][0], default="")
             for points, cost in costs.items():
                 ratio = cost / costs[against] if against in costs else np.full_like(cost, np.nan)
-                rows.append((robot, points, each, cost[0], *_interval(ratio), points == cheapest))
-    columns = ("robot", "points", "configuration_cost", "cost")
-    return rows_as_frame(rows, (*columns, "ratio", "ratio_low", "ratio_high", "cheapest"))
+                rows.append((robot, points, each, *_interval(ratio)))
+    return rows_as_frame(rows, ("robot", "points", "configuration_cost", "ratio", "ratio_low", "ratio_high"))
 
 
 def _interval(values: np.ndarray) -> tuple[float, float, float]:

@@ -17,7 +17,7 @@ how figures depend on one another [4]; of k studies it is no smaller than 1/(k +
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -26,10 +26,9 @@ import pandas as pd
 from scipy.special import stdtr
 
 from elastocal.io.data_frames import read_long, read_studies
-from elastocal.study.evaluation import metrics
+from elastocal.study.evaluation import metrics, repeated
 from elastocal.study.jobs import MICRO, MILLI, Job, frames, read_reference, write_csvs
 from elastocal.study.metrics import length_to_reach
-from elastocal.study.repeated import repeated
 from elastocal.study.simulation import INITIAL, find_statistics
 from elastocal.study.tables import COMPLIANCE, deviation_ratio, read_replicates, share_compensated
 
@@ -149,17 +148,13 @@ class Predicted:
         variance = self.values.var(ddof=1) * (1 + 1 / count) + digit**2 / 12
         return float(2 * stdtr(count - 1, -abs((value - self.values.mean()) / np.sqrt(variance))))
 
-    def leave_out_each(self) -> list[Predicted]:
-        """The same by all studies but one, for each of them."""
-        return [replace(self, values=np.delete(self.values, place)) for place in range(len(self.values))]
-
 
 def predict_scatter(
     studies: pd.DataFrame, robot: str, strategy: str, quantity: str, length: int, fixed_joints: bool = True
 ) -> Predicted | None:
     """How one figure of Table 3 or 4 scatters between studies.
 
-    `studies`: robot and the columns of `repeated.repeated`. `quantity`: c1.., k_sigma_20, dev_20, n_k_sigma_1_percent,
+    `studies`: robot and the columns of `evaluation.repeated`. `quantity`: c1.., k_sigma_20, dev_20, n_k_sigma_1_percent,
     n_dev_2_um: with its length or its limit. `length`: data set length of figures that name none. `fixed_joints`: whether
     k_sigma counts the joints fixed in the last stage alone (interpretation R10). Returns None where the studies do not have it.
     """
@@ -177,17 +172,6 @@ def predict_scatter(
     curves = rows.pivot(index="study", columns="length", values=column).to_numpy()
     limit = float(quantity.split("_")[-2]) / scale
     return Predicted(np.log(length_to_reach(curves, limit)), True, digit) if len(curves) > 1 else None
-
-
-def predicted_cells(
-    printed: pd.DataFrame, studies: pd.DataFrame, length: int, fixed_joints: bool
-) -> Iterator[tuple[Predicted, float]]:
-    """The figures of Tables 3 and 4 that the studies have: how they scatter, and what is printed."""
-    figure: Any
-    for figure in printed[printed.table.isin(["3", "4"])].itertuples():
-        found = predict_scatter(studies, figure.robot, figure.strategy, figure.quantity, length, fixed_joints)
-        if found is not None:
-            yield found, figure.value
 
 
 def holm(p_values: np.ndarray) -> np.ndarray:
@@ -232,26 +216,27 @@ def joint_table(studies: pd.DataFrame, reference: pd.DataFrame, length: int) -> 
     Returns joints (fixed joints or all joints), cells, differ (after Holm's correction), studies; below (p below the level) and
     statistic (Fisher's), each with the median and the largest of the studies and the p value.
     """
-    return pd.DataFrame([_joint_row(studies, reference, length, fixed) for fixed in (True, False)])
-
-
-def _joint_row(studies: pd.DataFrame, printed: pd.DataFrame, length: int, fixed_joints: bool) -> dict[str, Any]:
-    found = [*predicted_cells(printed, studies, length, fixed_joints)]
-    paper = np.array([scatter.p_value(value) for scatter, value in found])
-    others = np.array([_judge_by_others(scatter) for scatter, *_ in found]).T
-    row: dict[str, Any] = {"joints": "fixed joints" if fixed_joints else "all joints", "cells": len(paper)}
-    if not found:
-        paper, others = np.full(1, np.nan), np.full((1, 1), np.nan)
-    row |= {"differ": int((holm(paper) < LEVEL).sum()), "studies": len(others)}
-    row |= _rank("below", int((paper < LEVEL).sum()), (others < LEVEL).sum(axis=1))
-    return row | _rank("statistic", float(-2 * np.log(paper).sum()), -2 * np.log(others).sum(axis=1))
+    rows, printed = [], [*reference[reference.table.isin(["3", "4"])].itertuples()]
+    for joints in ("fixed joints", "all joints"):
+        fixed = joints == "fixed joints"
+        found = [(predict_scatter(studies, f.robot, f.strategy, f.quantity, length, fixed), f.value) for f in printed]
+        # p values of the paper by all studies, and of each study by the others.
+        paper = np.array([scatter.p_value(value) for scatter, value in found if scatter])
+        others = np.array([_judge_by_others(scatter) for scatter, _ in found if scatter]).T
+        row: dict[str, Any] = {"joints": joints, "cells": len(paper)}
+        if not len(paper):
+            paper, others = np.full(1, np.nan), np.full((1, 1), np.nan)
+        row |= {"differ": int((holm(paper) < LEVEL).sum()), "studies": len(others)}
+        row |= _rank("below", int((paper < LEVEL).sum()), (others < LEVEL).sum(axis=1))
+        rows.append(row | _rank("statistic", float(-2 * np.log(paper).sum()), -2 * np.log(others).sum(axis=1)))
+    return pd.DataFrame(rows)
 
 
 def _judge_by_others(scatter: Predicted) -> list[float]:
     """p value of each study by the others."""
     some = scatter.values  # noqa: PD011 (of a dataclass)
     printed = np.exp(some) if scatter.logarithmic else some
-    return [others.p_value(value) for others, value in zip(scatter.leave_out_each(), printed, strict=True)]
+    return [replace(scatter, values=np.delete(some, place)).p_value(value) for place, value in enumerate(printed)]
 
 
 def _rank(name: str, value: float, others: np.ndarray) -> dict[str, float]:

@@ -86,10 +86,6 @@ class Experiments:
     joint_angles: np.ndarray
     wrench: np.ndarray
 
-    def first(self, configurations: int) -> Experiments:
-        """The first configurations of each data set."""
-        return Experiments(self.joint_angles[:, :configurations], self.wrench[:, :configurations])
-
 
 @dataclass(frozen=True)
 class Loading:

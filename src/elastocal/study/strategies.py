@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Mapping
 
     from elastocal.mechanics.chain import Chain
 
@@ -50,11 +50,6 @@ class Strategy:
         """
         last = self.stages[-1]
         return last.fixed or tuple(sorted({joint for stage in self.stages for joint in stage.identified}))
-
-
-def all_at_once(points: Sequence[str], joints: int) -> Strategy:
-    """The strategy without a name that estimates every joint from some points in one stage."""
-    return Strategy("", (Stage(tuple(points), tuple(range(joints))),))
 
 
 def strategy_from_document(document: Mapping[str, Any]) -> Strategy:

@@ -1,4 +1,4 @@
-"""Errors of a campaign, before and after: as arrows where the robot stood, and model by model."""
+"""Figures of a campaign: errors as arrows and model by model, hypotheses and candidates one by one, what each effect costs."""
 
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -13,9 +13,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from elastocal.counting import counted, first_names
-from elastocal.figures.arms import draw_links
-from elastocal.figures.style import MICRO, MILLI, STAGES, label_decades, legend_below, panels, styled
-from elastocal.report.words import in_words
+from elastocal.figures.style import MICRO, MILLI, PALETTE, STAGES, label_decades, legend_below, note, panels, styled
+from elastocal.report.words import candidate_words, capital, hypotheses_words, in_words, probability_words
 
 # Of more states than this only one is drawn in each cell of a grid of so many columns.
 _MOST_ARROWS = 320
@@ -34,6 +33,25 @@ LOOKS = {
 _LARGEST_RATIO = 25
 _LINE, _NAMES = 26, 3
 _DIAMOND: dict[str, Any] = {"linestyle": "", "marker": "D", "color": "white", "markeredgecolor": "black", "markersize": 3.4}
+FAMILIES = dict(zip(("geometry", "gravity", "transmission", "elastic", "gearbox", "load", "drift"), PALETTE, strict=False))
+# Hypotheses and candidates with a bar of their own.
+_HYPOTHESES, _NAMED = 8, 15
+_ALL_ELSE = "Everything else"
+# Letters in a line of a label, and in the longest label.
+_LABEL, _LONGEST = 44, 80
+# Height of a row of one line, and of each further line.
+_ROW_MM, _LINE_MM = 4.6, 3.0
+# Why nothing is tested where the data are at fault, as tables.candidate_columns notes it.
+_AT_FAULT = "the measurements are at fault"
+# What is left however well the robot is corrected.
+_REST = ("uncertainty of the parameters", "repeatability", "form of the model", "not commanded", "left by the regression")
+TRACKER = "tracker"
+_SHARES = {
+    "uncorrected": ("#b9b9b9", "without any correction"),
+    "effect": (PALETTE[0], "if this alone were left out"),
+    "rest": (PALETTE[2], "left after correction"),
+    TRACKER: ("#ffffff", "in no robot: noise of a single measurement"),
+}
 
 
 @styled
@@ -43,7 +61,9 @@ def arrows(table: Mapping[str, np.ndarray], arm: np.ndarray | None = None) -> Fi
     `table`: columns of the residuals table. `arm` (K, 3): corners of the robot in one pose, m. Repeats are averaged; where
     states are still many, one of each cell of a grid is drawn.
     """
-    place, off, stages = *_states(table), _stages(table)
+    place, off = _states(table)
+    # The first alone where nothing was found that changes a residual.
+    stages = tuple(STAGES)[: 1 if np.allclose(off["before"], off["after"], rtol=0, atol=1e-9) else 2]
     size = np.linalg.norm(off["before"], axis=1)
     largest = max(np.quantile(size, 0.95), 1e-9)
     extent = np.maximum(np.ptp(place, axis=0), 1e-3)
@@ -63,7 +83,8 @@ def arrows(table: Mapping[str, np.ndarray], arm: np.ndarray | None = None) -> Fi
             arrow.set(zorder=3 + order, gid=stage)
             axis.update_datalim(tips)
         if arm is not None:
-            draw_links(axis, arm[:, seen])
+            ends: dict[str, Any] = {"solid_capstyle": "round", "solid_joinstyle": "round", "gid": "arm"}
+            axis.plot(*arm[:, seen].T, color="#c8c8c8", linewidth=6, zorder=1, **ends)
         axis.plot(0, 0, "+", color="black", markersize=8, gid="base")
         axis.annotate("base", (0, 0), (4, 4), textcoords="offset points", fontsize=7)
         axis.set_title(title, loc="left")
@@ -88,12 +109,6 @@ def middle_of_cells(at: np.ndarray, size: np.ndarray, side: float) -> np.ndarray
     order = np.lexsort((size, cell.ravel()))
     counts = np.bincount(cell.ravel())
     return order[np.cumsum(counts) - counts + (counts - 1) // 2]
-
-
-def _stages(table: Mapping[str, np.ndarray]) -> tuple[str, ...]:
-    """Both stages, or the first alone where nothing was found that changes a residual."""
-    same = all(np.allclose(table[f"before_d{axis}"], table[f"after_d{axis}"], rtol=0, atol=1e-9) for axis in "xyz")
-    return tuple(STAGES)[: 1 if same else 2]
 
 
 def _states(table: Mapping[str, np.ndarray]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
@@ -191,4 +206,127 @@ def campaign_errors(table: pd.DataFrame) -> Figure:
     label_decades(axis.xaxis)
     axis.grid(visible=False, axis="y")
     legend_below(figure, 2)
+    return figure
+
+
+@styled
+def probabilities(stated: Mapping[str, Any] | None, table: Mapping[str, np.ndarray]) -> Figure:
+    """Posterior probabilities of the leading hypotheses, and Bayes factors of the leading candidates alone.
+
+    `stated`: ``probabilities`` of a diagnosis; None where the data are at fault. `table`: columns of the candidates table.
+    """
+    order = rank_candidates(table)
+    if stated is None or not len(order):
+        count = len(set(table["candidate"]))
+        faulty = count and set(table["note"]) == {_AT_FAULT}
+        nothing = f"None of {count} candidate causes can be tested with these measurements."
+        return note("The data are at fault: no cause in the robot was looked for." if faulty else nothing)
+    sets, named = stated["sets"][:_HYPOTHESES], order[:_NAMED]
+    labels = [textwrap.fill(capital(words), _LABEL) for words in hypotheses_words(sets)]
+    values = [entry["probability"] for entry in sets]
+    if (rest := 1.0 - sum(values)) > 0.001:
+        labels, values = [*labels, _ALL_ELSE], [*values, rest]
+    names = [short_name(table["candidate"][index]) for index in named]
+    upper, lower = _heights_mm(labels), _heights_mm(names)
+    sizes = [34 + upper.sum(), 22 + lower.sum()]
+    figure, axes = panels(2, 1, sum(sizes), height_ratios=sizes)
+    colours = [PALETTE[0] if label != _ALL_ELSE else "#d9d9d9" for label in labels]
+    rows = _label_rows(axes[0, 0], labels, upper)
+    axes[0, 0].barh(rows, 100 * np.array(values), height=0.62 * upper, color=colours, zorder=2)
+    for row, value in zip(rows, values, strict=True):
+        place = {"xytext": (3, 0), "textcoords": "offset points", "va": "center", "fontsize": 7.5}
+        axes[0, 0].annotate(probability_words(value), (100 * value, row), **place)
+    axes[0, 0].set(xlim=(0, 112), xticks=range(0, 101, 20), xlabel="posterior probability (%)")
+    axes[0, 0].set_title("What is missing in the declared model", loc="left")
+    _factors(axes[1, 0], table, named, _label_rows(axes[1, 0], names, lower))
+    present = [family for family in FAMILIES if family in set(table["family"][named])]
+    handles = [Patch(color=FAMILIES[family], label=family) for family in present]
+    if table["chosen"].any():
+        handles.append(Patch(facecolor="none", edgecolor="black", linewidth=1.3, label="in the most probable model"))
+    untestable = len(set(table["candidate"])) - len(order)
+    words = f"{len(order)} candidate causes tested; {untestable} more cannot be tested with these measurements"
+    figure.legend(handles=handles, title=words, loc="outside lower center", ncols=4)
+    return figure
+
+
+def _factors(axis: Axes, table: Mapping[str, np.ndarray], named: np.ndarray, rows: np.ndarray) -> None:
+    """Bayes factors of single candidates, coloured by family."""
+    factors, chosen = table["log_bayes_factor"][named], table["chosen"][named].astype(bool)
+    colours = [FAMILIES.get(family, PALETTE[-1]) for family in table["family"][named]]
+    axis.barh(rows, factors, color=colours, height=2.6, zorder=2)
+    if chosen.any():
+        style: dict[str, Any] = {"facecolor": "none", "edgecolor": "black", "linewidth": 1.3, "zorder": 3, "gid": "chosen"}
+        axis.barh(rows[chosen], factors[chosen], height=2.6, **style)
+    # Roots keep the small ones in sight; symmetric, since a factor may be below zero.
+    axis.set_xscale("function", functions=(lambda x: np.sign(x) * np.sqrt(np.abs(x)), lambda x: np.sign(x) * np.square(x)))
+    low, high = min(factors.min(), 0.0), max(factors.max(), 2.0)
+    # Squares of evenly spaced roots.
+    ends = np.linspace(-np.sqrt(-low), np.sqrt(high), 7)
+    ticks = {float(f"{root * abs(root):.2g}") for root in ends} | {0.0}
+    axis.set(xlim=(1.08 * low, 1.06 * high), xticks=sorted(tick for tick in ticks if low <= tick <= high))
+    axis.xaxis.set_major_formatter("{x:g}")
+    axis.set_xlabel("Bayes factor against the declared model\n(natural logarithm; above 0 it explains more)")
+    axis.axvline(0, color="black", linewidth=0.8, zorder=4)
+    axis.set_title("Each candidate cause alone", loc="left")
+
+
+def _heights_mm(labels: Sequence[str]) -> np.ndarray:
+    """Heights of rows in which labels of one or more lines fit."""
+    return np.array([_ROW_MM + _LINE_MM * label.count("\n") for label in labels])
+
+
+def _label_rows(axis: Axes, labels: Sequence[str], heights_mm: np.ndarray) -> np.ndarray:
+    """Label rows from above, in an axis whose unit is a millimetre; returns their middles."""
+    rows = np.cumsum(heights_mm) - heights_mm / 2
+    axis.set(yticks=rows, ylim=(heights_mm.sum(), 0))
+    axis.set_yticklabels(labels, fontsize=7, linespacing=1.0)
+    axis.grid(visible=False, axis="y")
+    return rows
+
+
+def rank_candidates(table: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Indices (tested,) of the tested candidates by falling Bayes factor; each at the best value of its shape."""
+    tested = np.flatnonzero(np.isfinite(table["log_bayes_factor"]))
+    order = tested[np.argsort(-table["log_bayes_factor"][tested], kind="stable")]
+    _, first = np.unique(table["candidate"][order].astype(str), return_index=True)
+    return order[np.sort(first)]
+
+
+def short_name(key: str) -> str:
+    """A candidate's key as words, in two lines where it is long and cut in the middle where it is very long."""
+    words = capital(candidate_words(key))
+    words = words if len(words) <= _LONGEST else f"{words[: _LONGEST // 2]} … {words[-(_LONGEST // 2 - 2) :]}"
+    return textwrap.fill(words, 48)
+
+
+@styled
+def budget_bars(budget: Sequence[Mapping[str, Any]], names: Sequence[str], tolerance_m: float, tracker_m: float) -> Figure:
+    """Lines of an error budget as bars, the largest first, against the tolerance.
+
+    `budget`: ``name, rms_m``. `names`: of the lines, in words. `tracker_m`: RMS position error that the
+    tracker's noise alone shows.
+    """
+    own = {"name": TRACKER, "rms_m": tracker_m}
+    lines = [*zip(names, budget, strict=True), ("noise of the tracker alone", own)]
+    shown = sorted((line for line in lines if line[1]["rms_m"] > 0.0), key=lambda line: -line[1]["rms_m"])
+    figure, axes = panels(1, 1, 26 + 6.5 * len(shown))
+    axis, kinds = axes[0, 0], []
+    for row, (_, line) in enumerate(shown):
+        kind = line["name"] if line["name"] in _SHARES else "rest" if line["name"] in _REST else "effect"
+        kinds.append(kind)
+        size = MILLI * line["rms_m"]
+        axis.barh(row, size, height=0.6, color=_SHARES[kind][0], edgecolor="black" if kind == TRACKER else None, linewidth=0.6)
+        style: dict[str, Any] = {"fontsize": 7, "bbox": {"facecolor": "white", "edgecolor": "none", "pad": 0.6}}
+        axis.annotate(f"{size:.3f}", (size, row), (4, 0), textcoords="offset points", va="center", **style)
+    axis.axvline(MILLI * tolerance_m, color=PALETTE[1], ls="--", zorder=0, label=f"tolerance {MILLI * tolerance_m:g} mm")
+    axis.set(xlim=(0, 1.1 * max(axis.get_xlim()[1], MILLI * tolerance_m)), xlabel="predicted RMS position error (mm)")
+    axis.set_yticks(range(len(shown)), [name for name, _ in shown])
+    axis.invert_yaxis()
+    axis.grid(visible=False, axis="y")
+    handles: list[Artist] = [
+        Patch(facecolor=color, edgecolor="black" if kind == TRACKER else color, linewidth=0.6, label=label)
+        for kind, (color, label) in _SHARES.items()
+        if kind in kinds
+    ]
+    figure.legend(handles=[*handles, *axis.get_legend_handles_labels()[0]], loc="outside lower center", ncols=3)
     return figure

@@ -1,13 +1,43 @@
-"""Errors of campaigns, as arrows and bars: what is drawn is what the table holds."""
+"""Figures of a campaign: what is drawn is what the tables hold, and nothing is cut off."""
 
 import numpy as np
 import pandas as pd
 import pytest
-from drawn_figures import row_labels
-from made_loop_tables import residual_table, step_rows
+from drawn_figures import assert_nothing_cut_off, legend_entries, row_labels, texts
+from made_certificates import made_document
+from made_loop_tables import candidate_table, plainly, residual_table, step_rows
+from made_loop_tables import probabilities as stated
 from matplotlib.quiver import Quiver, QuiverKey
 
-from elastocal.figures.residuals import METRICS, arrows, before_after, campaign_errors
+from elastocal.figures.loop import METRICS, arrows, before_after, budget_bars, campaign_errors, probabilities
+
+LONG = ("link_elasticity@1+2+3+6[one section]", "force_misalignment[flange axes]", "transmission_harmonic@1[orders 31-36]")
+LONG_SETS = [
+    ({"link_elasticity": ["links 1 and 2 and 3 and 6 one section"]}, 0.7),
+    ({"joint_dependent_stiffness": ["joint 5"], "transmission_harmonic": ["joint 1 orders 1-2", "joint 1 orders 3-6"]}, 0.2),
+    ({"other": ["base"]}, 0.1),
+]
+
+
+def of_the_catalogue():
+    """A candidates table with the longest names that there are."""
+    table = candidate_table()
+    table["candidate"][: len(LONG)] = LONG
+    return table
+
+
+FIGURES = {
+    "arrows": lambda: arrows(residual_table()),
+    "candidates": lambda: probabilities(stated(LONG_SETS), of_the_catalogue()),
+    "before_after": lambda: before_after(
+        step_rows(effects=("transmission_harmonic@1[orders 31-36], transmission_ratio@2",)), 5e-6
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_nothing_is_cut_off(name):
+    assert_nothing_cut_off(FIGURES[name]())
 
 
 def quivers(axis):
@@ -92,3 +122,48 @@ def test_each_campaign_has_both_errors_at_their_values():
         "FANUC joint, 24 poses",
         "FANUC joint, 1 pose",
     ]
+
+
+def test_each_hypothesis_has_a_bar_as_long_as_its_probability():
+    figure = probabilities(stated(), candidate_table())
+    axis = figure.axes[0]
+    assert axis.get_xlabel() == "posterior probability (%)"
+    named = [label.get_text().replace("\n", " ") for label in axis.get_yticklabels()]
+    assert named == [
+        "Lost motion (backlash) of joint 3",
+        "Bearing tilt of joint 2",
+        "Nothing is missing",
+        "Everything else",
+    ]
+    assert [bar.get_width() for bar in axis.patches] == pytest.approx([94, 5, 0.4, 0.6])
+    assert [plainly(text.get_text()) for text in axis.texts] == ["94 %", "5 %", "< 1 %", "1 %"]
+    certain = probabilities(stated([({"lost_motion": ["joint 3"]}, 0.9961), ({}, 0.0039)]), candidate_table(count=3)).axes[0]
+    assert [plainly(text.get_text()) for text in certain.texts] == ["> 99 %", "< 1 %"]
+
+
+def test_of_many_hypotheses_the_leading_have_bars_and_the_rest_has_one():
+    sets = [({f"effect_{number}": []}, 0.1) for number in range(10)]
+    axis = probabilities(stated(sets), candidate_table()).axes[0]
+    assert [bar.get_width() for bar in axis.patches] == pytest.approx([10] * 8 + [20])
+
+
+def test_where_nothing_can_be_tested_the_figure_says_so():
+    figure = probabilities(stated([({}, 1.0)]), candidate_table(count=0, chosen=0))
+    assert texts(figure) == ["None of 5 candidate causes can be tested with these measurements."]
+
+
+def test_the_budget_has_a_bar_for_each_line_that_is_not_zero_the_largest_first_from_zero_on():
+    budget = made_document()["budget"]
+    figure = budget_bars(budget, [line["name"] for line in budget], 2e-4, 1.5e-4)
+    axis = figure.axes[0]
+    assert row_labels(axis) == [
+        "uncorrected",
+        "joint_compliance",
+        "lost_motion",
+        "noise of the tracker alone",
+        "uncertainty of the parameters",
+    ]
+    np.testing.assert_allclose([patch.get_width() for patch in axis.patches], [1.5, 1.0, 0.2, 0.15, 0.02])
+    assert axis.get_xscale() == "linear" and axis.get_xlim()[0] == 0.0
+    assert "tolerance 0.2 mm" in legend_entries(figure)
+    assert_nothing_cut_off(figure)
