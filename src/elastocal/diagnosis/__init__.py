@@ -4,7 +4,7 @@ Read from top to bottom: `settings`; `hypotheses` (mechanisms at locations) and 
 `linearize`, the one object of a fit and all that it might lack, and `statistics` of it (all that the measurements say, in a
 few hundred numbers); `gross_errors`; `evidence` (Bayes factors), `search` (posterior), `alarm`, `verdict`; `refit` and
 `averaging` of parameters; `findings`; and the two calls `diagnose` and `judge`. Then
-the next experiment: `alternatives`, `next_experiment`.
+the `next_experiment`.
 
 Imports `fitting`, `data_checks`, `validation` and what these import.
 """

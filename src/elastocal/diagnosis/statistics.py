@@ -163,16 +163,6 @@ def products_of(rows: WhiteRows, prior_std: np.ndarray, present: np.ndarray) -> 
     return Products(rows, beside, count, gram, freedom, into_basis, projected, inside)
 
 
-def rows_alike(products: Products, declared: np.ndarray, candidates: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Whitened rows at other states in the parameters of some products.
-
-    `declared` (..., P). `candidates` (..., U): sensitivities to some of the candidates, in units of their plausible sizes.
-    `columns` (U,) of int: which of them. Returns (..., P + U).
-    """
-    basis = declared @ products.into_basis
-    return np.concatenate([basis, candidates - basis @ products.projected[:, columns]], axis=-1)
-
-
 @dataclass(frozen=True)
 class Statistics:
     """Sufficient statistics at T sizes of the pose error, for K columns.
