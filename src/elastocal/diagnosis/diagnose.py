@@ -45,8 +45,6 @@ from elastocal.effects.catalogue import effects
 from elastocal.fitting.case import noise_facts
 from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.least_squares import ON_THE_WAY, fit
-from elastocal.fitting.observations import sample_of
-from elastocal.fitting.parameters import parameter_values
 from elastocal.fitting.robust import SETTLED
 from elastocal.fitting.tolerances import effective_parameters
 from elastocal.random_streams import stream
@@ -58,7 +56,6 @@ if TYPE_CHECKING:
 
     from elastocal.campaigns.campaign import Measurements
     from elastocal.data_checks.protocol import Fault
-    from elastocal.diagnosis.gross_errors import Yardstick
     from elastocal.diagnosis.kept_rows import Kept
     from elastocal.diagnosis.settings import Settings
     from elastocal.diagnosis.verdict import Hypothesis
@@ -70,8 +67,6 @@ if TYPE_CHECKING:
 
 # Mechanisms that are added one at a time, each by a fit; of more, only the first.
 _MOST_STEPS = 4
-# Standard errors by which parameters move where nothing else is found: they change a log likelihood by 0.03 each.
-_HARDLY = 0.25
 
 
 @dataclass(frozen=True)
@@ -92,8 +87,7 @@ class Diagnosis:
     """What training poses say of a campaign.
 
     `steps`: the last is the final model. `document`: contents of verdict.json, but for what held-out poses say. `left_out`:
-    gross errors, which are no part of the case. `yardstick`: by which the training rows were judged; None where they were not
-    all judged by the final model.
+    gross errors, which are no part of the case.
     """
 
     case: Case
@@ -101,7 +95,6 @@ class Diagnosis:
     evidence: Evidence | None
     document: dict[str, Any] = field(repr=False)
     left_out: Measurements
-    yardstick: Yardstick | None = None
 
     @property
     def declared(self) -> Fit:
@@ -144,49 +137,30 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         case = replace(case, model=part.case.model)
     tell(f"declared model fitted to {counted(len(part.case.observations), 'measurement')}")
     found: Evidence | None = None
-    about, near, most_pose_error_rad = part.declared, None, np.inf
-    explained: Fit | None = None
-    tested: tuple[Fit, Repeatable | None] | None = None
+    start, most_pose_error_rad = None, np.inf
     errors = Deviations.none(len(part.kept), case.model.rows)
     good = np.zeros(len(part.kept), bool)
     for number in range(0 if decisive else settings.gross_error_rounds):
-        if not found:
-            found, about, tested = _explained(part, settings, seed, tell, near, most_pose_error_rad)
-            explained = about
-        errors = gross_errors(about, part.noise, case.campaign.measurements, part.kept, settings)
+        found = _explained(part, settings, seed, tell, start, most_pose_error_rad)
+        errors = gross_errors(found.fitted, part.noise, case.campaign.measurements, part.kept, settings)
         # A row that a model without it explains stays, whatever the next model says of it: no set of rows comes back.
         good |= ~part.kept & ~errors.gross
         remaining = ~errors.gross | good
         if (remaining == part.kept).all() or number + 1 == settings.gross_error_rounds:
             break
-        # The model found looks at all rows once more, without these, before another search is made.
-        like = None if (remaining & ~part.kept).any() else part.searched
-        some = sample_of(case.select(remaining).observations, settings.searched_observations, like)
-        about = fit(about.model, some, about.noise, about.estimate, True, ON_THE_WAY)
-        errors = gross_errors(about, part.noise, case.campaign.measurements, remaining, settings)
-        good |= ~remaining & ~errors.gross
-        last, part = part, fitted_to(case, ~errors.gross | good, settings, part)
-        if part is last:
-            break
+        part = fitted_to(case, remaining, settings, part)
         tell(f"{counted((~part.kept).sum(), 'gross error')} in {counted(len(good), 'row')}: once more without")
-        if noise_facts(part.noise) == noise_facts(last.noise) and explained:
-            again = fit(explained.model, part.searched, about.noise, about.estimate, True, ON_THE_WAY)
-            if _near(again, explained):
-                # Rows of so little weight that the search would find the same.
-                about = again
-                continue
         # What was linearised about a model found is so again: from the declared one the way is the same and twice as long.
         relinearized = len(found.linearized.about.model.effects) > len(part.declared.model.effects)
-        near = (about, found.conclusion.best.named) if relinearized else None
+        start = (found.fitted, found.conclusion.best.named) if relinearized else None
         most_pose_error_rad = found.linearized.most_pose_error_rad
         # Its statistics make room for those of the next search.
         found = None
-    yardstick = errors.yardstick if part.kept.all() else None
     errors = replace(errors, gross=~part.kept)
     case, noise, declared = part.case, part.noise, part.declared_to_all()
-    final = about if found else declared
-    if found and (about is not explained or part.searched is not case.observations):
-        final = fit(about.model, case.observations, about.noise, about.estimate, reweighted=True)
+    final = found.fitted if found else declared
+    if part.searched is not case.observations:
+        final = fit(final.model, case.observations, final.noise, final.estimate, reweighted=True)
     bare = fit(replace(case.model, effects=()), case.observations, noise, settled=ON_THE_WAY)
     steps = [Step("frames and targets", "frames", bare), Step("declared model", "declared", declared)]
     lost: list[str] = []
@@ -204,9 +178,10 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
             kept = fit(bare.model, case.observations, steps[-1].fitted.noise, bare.estimate)
             steps.append(Step("frames and targets, kept", "kept", kept))
     kept = steps[-1].fitted
-    repeatable = (
-        tested[1] if tested and tested[0] is kept else repeatable_part(kept, case.observations, seed) if found else None
-    )
+    repeatable = None
+    if found:
+        asked, left = found.tested or (None, None)
+        repeatable = left if asked is kept else repeatable_part(kept, case.observations, seed)
     unnamed, contradicting = remainder_sentences(repeatable), list[str]()
     if found and found.conclusion.verdict == ADEQUATE:
         contradicting = unnamed or contradictions(final, noise, settings)
@@ -222,8 +197,7 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
     warnings = [*document["warnings"], *warnings_of(left_out)]
     document |= {"contradictions": contradicting, "gross_errors": left_out, "warnings": warnings}
     document["repeatable"] = repeatable and asdict(repeatable)
-    yardstick = yardstick if kept is about else None
-    return Diagnosis(case, tuple(steps), found, document, whole.measurements.select(errors.gross), yardstick)
+    return Diagnosis(case, tuple(steps), found, document, whole.measurements.select(errors.gross))
 
 
 def _with_noise_left(case: Case, declared: Fit, found: Evidence) -> Fit:
@@ -260,12 +234,10 @@ def _explained(
     tell: Callable[[str], None],
     start: tuple[Fit, tuple[str, ...]] | None,
     most_pose_error_rad: float,
-) -> tuple[Evidence, Fit, tuple[Fit, Repeatable | None] | None]:
+) -> Evidence:
     """Evidence about the declared model, and again about the model found where that, or its noise, is far from it.
 
-    At once about a model, with the mechanisms that it has beyond the declared one, where the search is to ``start``. With it
-    the fit of the model found to what the search looks at; and the last fit of which it was asked what it leaves, with that.
-    What an error common to the measurements of a pose takes beyond what robots repeat to must be chance: where it is a function
+    At once about a model, with the mechanisms that it has beyond the declared one, where the search is to ``start``. What an error common to the measurements of a pose takes beyond what robots repeat to must be chance: where it is a function
     of the joints no more of it is thought of. And where what is left is one, the search goes on about each model that is new.
     """
     candidates, searched = list(part.case.candidates.values()), part.searched
@@ -319,13 +291,7 @@ def _explained(
     else:
         settled = False
     adopted = bool(named) and expected_to_help(problem.problem, found, model)
-    return Evidence(problem, found, alarm, conclusion, adopted, settled), about, tested
-
-
-def _near(fitted: Fit, other: Fit) -> bool:
-    """Whether no parameter of a model moved by more than `_HARDLY` from one fit to another."""
-    moved = parameter_values(fitted.model, fitted.estimate) - parameter_values(other.model, other.estimate)
-    return bool((np.abs(moved) <= _HARDLY * np.sqrt(np.diag(other.covariance))).all())
+    return Evidence(problem, found, alarm, conclusion, adopted, settled, about, tested)
 
 
 def _effect_steps(case: Case, declared: Fit, final: Fit, found: Evidence) -> list[Step]:

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.model import Model
     from elastocal.fitting.observations import Observations
+    from elastocal.remainder.repeatable import Repeatable
 
 # Hypotheses and locations with less than this are not listed.
 _LEAST_LISTED = 0.001
@@ -44,6 +45,7 @@ class Evidence:
     """What the last linearisation of a diagnosis says; None of it where the data are at fault.
 
     `adopted`: whether the effects found enter the model. `settled`: whether a further linearisation would find the same.
+    `fitted`: the model found, to what the search looks at. `tested`: the last fit of which it was asked what it leaves, and that.
     """
 
     linearized: Linearized
@@ -52,6 +54,8 @@ class Evidence:
     conclusion: Conclusion
     adopted: bool
     settled: bool
+    fitted: Fit
+    tested: tuple[Fit, Repeatable | None] | None
 
 
 def location_words(mechanism: str, location: Sequence[int | str]) -> str:

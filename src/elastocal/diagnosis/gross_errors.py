@@ -57,13 +57,12 @@ class Deviations:
     """Rows beside a model.
 
     `residual` (N, rows): m and rad, base axes. `distance` (N,): from what the other rows predict, in robust standard
-    deviations. `gross` (N,) of bool. `yardstick`: by which they were judged, where they are those of a fit.
+    deviations. `gross` (N,) of bool.
     """
 
     residual: np.ndarray
     distance: np.ndarray
     gross: np.ndarray
-    yardstick: Yardstick | None = None
 
     @classmethod
     def none(cls, count: int, rows: int) -> Deviations:
@@ -214,7 +213,7 @@ def gross_errors(fitted: Fit, noise: Noise, measurements: Measurements, kept: np
     rows = _Beside.of(fitted.model, fitted.estimate, measurements, noise, kept)
     yardstick = rows.yardstick(fitted, noise, kept)
     distance = rows.distances(yardstick, kept)
-    return Deviations(rows.residual, *beyond_chance(distance, fitted.model.rows, kept, settings), yardstick)
+    return Deviations(rows.residual, *beyond_chance(distance, fitted.model.rows, kept, settings))
 
 
 def held_out_gross_errors(

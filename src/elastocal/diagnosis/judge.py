@@ -127,7 +127,7 @@ def without_gross_errors(diagnosis: Diagnosis, held_out: Case) -> tuple[Deviatio
     part, settings = held_out, Settings()
     errors = Deviations.none(len(measurements), held_out.model.rows)
     noise = noise_from(diagnosis.document).of_measurements
-    yardstick = diagnosis.yardstick or yardstick_of(final, noise, diagnosis.case.campaign.measurements)
+    yardstick = yardstick_of(final, noise, diagnosis.case.campaign.measurements)
     outside = poses[state_clusters(measurements)]
     for _ in range(settings.gross_error_rounds):
         # Frames of another campaign are fitted to what is kept of it.
