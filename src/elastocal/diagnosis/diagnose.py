@@ -58,7 +58,6 @@ if TYPE_CHECKING:
     from elastocal.data_checks.protocol import Fault
     from elastocal.diagnosis.kept_rows import Kept
     from elastocal.diagnosis.settings import Settings
-    from elastocal.diagnosis.verdict import Hypothesis
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.noise import Noise
@@ -110,19 +109,7 @@ class Diagnosis:
 def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str], None] | None = None) -> Diagnosis:
     """Find what the declared model of a campaign lacks.
 
-    Parameters
-    ----------
-    case : Case
-        Of training poses.
-    settings : Settings
-    seed : int
-        Of the simulated null distribution.
-    progress : callable, optional
-        Gets a line after each stage.
-
-    Returns
-    -------
-    Diagnosis
+    `case`: of training poses. `seed`: of the simulated null distribution. `progress`: gets a line after each stage.
     """
     whole = case.campaign
     tell = progress or (lambda line: None)
@@ -158,17 +145,17 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         found = None
     errors = replace(errors, gross=~part.kept)
     case, noise, declared = part.case, part.noise, part.declared_to_all()
-    final = found.fitted if found else declared
-    if part.searched is not case.observations:
-        final = fit(final.model, case.observations, final.noise, final.estimate, reweighted=True)
     bare = fit(replace(case.model, effects=()), case.observations, noise, settled=ON_THE_WAY)
     steps = [Step("frames and targets", "frames", bare), Step("declared model", "declared", declared)]
-    lost: list[str] = []
+    final, lost, contradicting, repeatable = declared, list[str](), list[str](), None
+    warnings = [*part.warnings]
     if found:
-        doubted = findings.oversized(final, found.conclusion.best.named)
-        found = replace(found, conclusion=with_related(found.conclusion, doubted))
+        final = found.fitted
+        if part.searched is not case.observations:
+            final = fit(final.model, case.observations, final.noise, final.estimate, reweighted=True)
+        named, verdict = found.conclusion.best.named, found.conclusion.verdict
+        found = replace(found, conclusion=with_related(found.conclusion, findings.oversized(final, named)))
         if not found.adopted:
-            named = found.conclusion.best.named
             steps[-1] = replace(steps[-1], fitted=_with_noise_left(case, declared, found) if named else final)
         lost = _losses(bare, [steps[-1].fitted, *([final] if found.adopted else [])], case.observations, settings)
         found = replace(found, adopted=found.adopted and not lost)
@@ -177,26 +164,20 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         elif lost and lost[0]:
             kept = fit(bare.model, case.observations, steps[-1].fitted.noise, bare.estimate)
             steps.append(Step("frames and targets, kept", "kept", kept))
-    kept = steps[-1].fitted
-    repeatable = None
-    if found:
-        asked, left = found.tested or (None, None)
-        repeatable = left if asked is kept else repeatable_part(kept, case.observations, seed)
-    unnamed, contradicting = remainder_sentences(repeatable), list[str]()
-    if found and found.conclusion.verdict == ADEQUATE:
-        contradicting = unnamed or contradictions(final, noise, settings)
-    elif found and found.conclusion.verdict == NOT_TESTABLE:
-        contradicting = unnamed
-    if found and contradicting:
-        found = replace(found, conclusion=replace(found.conclusion, verdict=UNEXPLAINED))
-    warnings = [*contradicting, *part.warnings, *filter(None, lost)]
-    if found and not unnamed:
-        warnings += pose_error_warnings(kept.noise, found.linearized.pose_std_error_rad)
-    document = _document(case, noise, steps, final, found, known, settings, warnings)
+        kept, (asked, repeatable) = steps[-1].fitted, found.tested or (None, None)
+        if asked is not kept:
+            repeatable = repeatable_part(kept, case.observations, seed)
+        unnamed = remainder_sentences(repeatable)
+        if verdict in (ADEQUATE, NOT_TESTABLE):
+            contradicting = unnamed or (contradictions(final, noise, settings) if verdict == ADEQUATE else [])
+        if contradicting:
+            found = replace(found, conclusion=replace(found.conclusion, verdict=UNEXPLAINED))
+        warnings = [*contradicting, *warnings, *filter(None, lost)]
+        warnings += [] if unnamed else pose_error_warnings(kept.noise, found.linearized.pose_std_error_rad)
     left_out = entries_of(errors, whole, held_out=False)
-    warnings = [*document["warnings"], *warnings_of(left_out)]
-    document |= {"contradictions": contradicting, "gross_errors": left_out, "warnings": warnings}
-    document["repeatable"] = repeatable and asdict(repeatable)
+    document = _document(case, noise, steps, final, found, known, settings, warnings)
+    document |= {"contradictions": contradicting, "gross_errors": left_out, "repeatable": repeatable and asdict(repeatable)}
+    document["warnings"] += warnings_of(left_out)
     return Diagnosis(case, tuple(steps), found, document, whole.measurements.select(errors.gross))
 
 
@@ -211,17 +192,16 @@ def _losses(bare: Fit, models: Sequence[Fit], observations: Observations, settin
 
     Of the declared model and, if it is given, that with effects; nothing where the last holds.
     """
-    found: list[str] = []
+    found = []
     for fitted, name in zip(models, ("declared model", "model with the effects found"), strict=False):
-        numbers, words = fitted.residual.size, ""
-        if numbers < settings.numbers_a_parameter * effective_parameters(fitted):
+        effective, words = effective_parameters(fitted), ""
+        if fitted.residual.size < settings.numbers_a_parameter * effective:
             mine, others = (left_out_squares(each, observations) for each in (fitted, bare))
             if certain_loss(mine, others):
                 rms = [f"{1e3 * np.sqrt(each.mean()):.2f} mm" for each in (mine, others)]
                 words = (
                     f"training poses left out in turn are off by {rms[0]} RMS by the {name}, by {rms[1]} with frames and"
-                    f" targets alone: {len(mine)} poses are too few for {effective_parameters(fitted):.0f} parameters, and the"
-                    f" {name} is not kept"
+                    f" targets alone: {len(mine)} poses are too few for {effective:.0f} parameters, and the {name} is not kept"
                 )
         found.append(words)
     return found if found[-1] else []
@@ -237,18 +217,17 @@ def _explained(
 ) -> Evidence:
     """Evidence about the declared model, and again about the model found where that, or its noise, is far from it.
 
-    At once about a model, with the mechanisms that it has beyond the declared one, where the search is to ``start``. What an error common to the measurements of a pose takes beyond what robots repeat to must be chance: where it is a function
-    of the joints no more of it is thought of. And where what is left is one, the search goes on about each model that is new.
+    At once about a model, with the mechanisms that it has beyond the declared one, where the search is to ``start``. What an
+    error common to the measurements of a pose takes beyond what robots repeat to must be chance: where it is a function of the
+    joints no more of it is thought of. And where what is left is one, the search goes on about each model that is new.
     """
-    candidates, searched = list(part.case.candidates.values()), part.searched
-    about = declared = part.declared
-    before, settled = None, True
+    candidates, searched, declared = list(part.case.candidates.values()), part.searched, part.declared
+    about, before = start or (declared, None)
     tested: tuple[Fit, Repeatable | None] | None = None
     # The fit to all measurements starts where that to some ends.
     enough = SETTLED if searched is part.case.observations else ON_THE_WAY
     if start:
-        found_before, before = start
-        about = fit(found_before.model, searched, found_before.noise, found_before.estimate, True, ON_THE_WAY)
+        about = fit(about.model, searched, about.noise, about.estimate, True, ON_THE_WAY)
     for round_number in range(1 if start else 0, settings.linearizations):
         problem, near = linearized(about, searched, candidates, settings, most_pose_error_rad), about if before else None
         nothing, alone = initial_screening(problem.problem)
@@ -273,11 +252,15 @@ def _explained(
         small = not named or alarm.statistic < settings.relinearize_above
         ends = not off and (small or named == before or abs(mean_square(about) - 1.0) < settings.linear_misfit)
         # What is a function of the joints is no error of poses, and about a model that is new the problem is another one.
-        large = model.pose_error_rad > settings.pose_repeatability_rad
+        large, left = model.pose_error_rad > settings.pose_repeatability_rad, None
         if large or (ends and named not in (before, ())):
-            tested = about, repeatable_part(about, searched, seed)
-        remains = tested is not None and tested[0] is about and tested[1] is not None and tested[1].remains
-        if ends and not remains:
+            left = repeatable_part(about, searched, seed)
+            tested = about, left
+        remains = left is not None and left.remains
+        settled = ends and not remains
+        adopted = bool(named) and expected_to_help(problem.problem, found, model)
+        evidence = Evidence(problem, found, alarm, conclusion, adopted, settled, about, tested)
+        if settled:
             break
         if remains:
             most_pose_error_rad = settings.pose_repeatability_rad
@@ -287,11 +270,8 @@ def _explained(
         before = named
         if round_number + 1 < settings.linearizations:
             # The next problem takes the room of this one.
-            del problem, found, conclusion
-    else:
-        settled = False
-    adopted = bool(named) and expected_to_help(problem.problem, found, model)
-    return Evidence(problem, found, alarm, conclusion, adopted, settled, about, tested)
+            del problem, found, conclusion, evidence
+    return replace(evidence, fitted=about)
 
 
 def _effect_steps(case: Case, declared: Fit, final: Fit, found: Evidence) -> list[Step]:
@@ -323,70 +303,56 @@ def _document(
 ) -> dict[str, Any]:
     declared, final = steps[1].fitted, steps[-1].fitted
     decisive = [fault for fault in known if fault.decisive]
-    springs = Averaged({}, {})
-    entries = [findings.fault_entry(fault) for fault in decisive]
-    probabilities: dict[str, Any] | None = None
+    springs, tested = Averaged({}, {}), set[str]()
+    stated: dict[str, Any] = {
+        "verdict": NAMED if len(decisive) == 1 else SEVERAL,
+        "effects": [findings.fault_entry(fault) for fault in decisive],
+    } | dict.fromkeys(("probabilities", "misfit", "other_models_m"))
     untestable: dict[str, str] = {}
-    misfit: dict[str, float] | None = None
-    other_m: float | None = None
-    verdict = NAMED if len(decisive) == 1 else SEVERAL
     remarks = [*warnings, *(f"{fault.name}: {fault.detail}" for fault in known if not fault.decisive)]
     if found:
         problem, conclusion = found.linearized.problem, found.conclusion
-        verdict, untestable = conclusion.verdict, found.linearized.untestable
-        probabilities = findings.probability_facts(found)
-        named = conclusion.best if conclusion.best.named else None
-        averages = _averages(declared, found, named)
-        springs = _averages(declared, found, None) if named and not found.adopted else averages
+        models, nothing = found.posterior.models, found.posterior.nothing
+        best = models[conclusion.best.model] if conclusion.best.mechanisms else nothing
+        chosen = best if conclusion.best.named else nothing
+        kept = chosen if found.adopted else nothing
+        owners = [(owner, parameter.name) for owner, parameter in declared.parameters]
+        averages = averaged(found.linearized, found.posterior, chosen, owners)
+        springs = averages if kept is chosen else averaged(found.linearized, found.posterior, nothing, owners)
         entries = findings.effect_entries(found, with_effects, averages, case.observations)
+        numbers, untestable = found.linearized.products.freedom, found.linearized.untestable
+        tested = {unit.candidate.key for unit in problem.units if unit.candidate}
+        stated = {
+            "verdict": conclusion.verdict,
+            "effects": entries,
+            "probabilities": findings.probability_facts(found),
+            "misfit": {"before": mean_square_left(problem, nothing), "after": mean_square_left(problem, best)},
+            # Root mean square by which positions may be elsewhere by other models than the one that is kept.
+            "other_models_m": float(np.sqrt(3.0 * other_predictions(problem, found.posterior, kept) / numbers))
+            * noise.position_m,
+        }
         if entries and not found.adopted:
             remarks.append("what was found is too uncertain to make predictions better: the model stays as declared")
         remarks += findings.implausible(with_effects, entries, case.campaign.robot.payload_kg)
         if not found.settled:
             often = f"linearised {settings.linearizations} times"
             remarks.append(f"the problem was {often}, and each time another model was found: more may be missing")
-        misfit = _misfit(found)
-        kept = found.posterior.models[conclusion.best.model] if found.adopted else found.posterior.nothing
-        numbers = found.linearized.products.freedom
-        other_m = float(np.sqrt(3.0 * other_predictions(problem, found.posterior, kept) / numbers)) * noise.position_m
     remarks += fitted_compliance_warnings(final) + scatter_warnings(final.noise, noise, settings.relinearize_noise)
     for name, fitted in (("declared", declared), ("final", final)):
         if not fitted.converged:
             remarks.append(f"the fit of the {name} model did not converge: its parameters are not to be relied on")
-    tested = {unit.candidate.key for unit in found.linearized.problem.units if unit.candidate} if found else set()
-    return {
+    return stated | {
         "campaign": case.campaign.name,
-        "verdict": verdict,
-        "effects": entries,
-        "probabilities": probabilities,
         "noise": noise_facts(noise) | {"pose_rad": final.noise.pose_rad, "factor": final.noise.position_m / noise.position_m},
-        "misfit": misfit,
-        # Root mean square by which positions may be elsewhere by other models than the one that is kept.
-        "other_models_m": other_m,
         "heldout": None,
         "kept": steps[-1].kind.replace("kept", "frames"),
         "compliance_urad_per_Nm": _compliances(declared, final, springs, settings.prior_share),
         "held": sorted({f"{o} {p.name}" for (o, p), held in zip(final.parameters, final.held, strict=True) if held}),
         "candidates_tested": len(tested),
         "untestable": untestable,
-        "converged": {"declared": declared.converged, "final": final.converged},
         "warnings": list(dict.fromkeys(remarks)),
         "settings": settings.document(),
     }
-
-
-def _misfit(found: Evidence) -> dict[str, float]:
-    """Mean square of the residual over that of the noise: declared, and with the most probable model."""
-    problem, models = found.linearized.problem, found.posterior.models
-    best = models[found.conclusion.best.model] if found.conclusion.best.mechanisms else found.posterior.nothing
-    return {"before": mean_square_left(problem, found.posterior.nothing), "after": mean_square_left(problem, best)}
-
-
-def _averages(declared: Fit, found: Evidence, best: Hypothesis | None) -> Averaged:
-    """Averages beside the exact fit of a hypothesis, or of the declared model."""
-    model = found.posterior.models[best.model] if best else found.posterior.nothing
-    owners = [(owner, parameter.name) for owner, parameter in declared.parameters]
-    return averaged(found.linearized, found.posterior, model, owners)
 
 
 def _compliances(declared: Fit, final: Fit, springs: Averaged, prior_share: float) -> dict[str, list[float]]:

@@ -45,7 +45,7 @@ class Evidence:
     """What the last linearisation of a diagnosis says; None of it where the data are at fault.
 
     `adopted`: whether the effects found enter the model. `settled`: whether a further linearisation would find the same.
-    `fitted`: the model found, to what the search looks at. `tested`: the last fit of which it was asked what it leaves, and that.
+    `fitted`: the model found, to what the search looks at. `tested`: the last fit asked for what it leaves, and that.
     """
 
     linearized: Linearized
