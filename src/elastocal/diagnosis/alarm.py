@@ -1,18 +1,14 @@
 """Is anything missing at all? One Monte Carlo test.
 
 The statistic is the log of the average Bayes factor, over all units and all whole mechanisms, against "nothing": a Bayes factor
-as the statistic of a test, the Bayes/non-Bayes compromise [1]. Its null distribution is that of simulated measurements of the
-same design, at the pose error that fits best, with the pose error averaged over anew in each draw; the p-value counts how many
-draws reach the statistic of the measurements. With noise and pose error known that is exact; with a fitted pose error it is a
-parametric bootstrap [2]. No Bonferroni correction and no choice of a test: competitors that the measurements cannot show have
-a Bayes factor of one in every draw. Sizes begin a step below those of the posterior: what lies between may be seen, and its
-probability does not matter to a test. Where nothing is missing a Bayes factor has a mean of one, so that it exceeds b with a
-probability of at most 1/b (Markov's inequality [3]): where b is far beyond the number of draws none of them reaches it, and
-none is made.
-
-[1] Good, I. J., The Bayes/non-Bayes compromise: a brief review, Journal of the American Statistical Association 87, 1992.
-[2] Davison, A. C. and Hinkley, D. V., Bootstrap Methods and their Application, section 4.2, Cambridge University Press, 1997.
-[3] Kass, R. E. and Raftery, A. E., Bayes factors, Journal of the American Statistical Association 90, 1995.
+as the statistic of a test (Good, The Bayes/non-Bayes compromise, JASA 1992). Its null distribution is that of simulated
+measurements of the same design, at the pose error that fits best, with the pose error averaged over anew in each draw; the
+p-value counts how many draws reach the statistic of the measurements. With noise and pose error known that is exact; with a
+fitted pose error it is a parametric bootstrap (Davison and Hinkley, Bootstrap Methods, 1997, 4.2). No Bonferroni correction and
+no choice of a test: competitors that the measurements cannot show have a Bayes factor of one in every draw. Sizes begin a step
+below those of the posterior: what lies between may be seen, and its probability does not matter to a test. Where nothing is
+missing a Bayes factor has a mean of one, so that it exceeds b with a probability of at most 1/b (Markov's inequality): where b
+is far beyond the number of draws none of them reaches it, and none is made.
 """
 
 from __future__ import annotations
@@ -23,13 +19,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.diagnosis.evidence import condition, log_likelihood, log_sum_exp
-from elastocal.diagnosis.search import REACH
-from elastocal.diagnosis.statistics import null_draws
+from elastocal.diagnosis.search import REACH, Problem
+from elastocal.diagnosis.statistics import Products, Statistics, null_draws
 
 if TYPE_CHECKING:
     from elastocal.diagnosis.hypotheses import Unit
-    from elastocal.diagnosis.search import Problem
-    from elastocal.diagnosis.statistics import Products, Statistics
 
 # Bayes factor over the number of draws, the measurements' own included, beyond which none is made. The mean of one is that over
 # the prior of the pose error; at the fitted one it is larger by at most the inverse of that one's prior probability.

@@ -1,12 +1,9 @@
 """Parameters averaged over models, so that values and intervals are honest after selection.
 
-Bayesian model averaging [1]. The exact fit is that of the most probable model at its most probable sizes. What the others say
-differently is taken from the linearised problem: the mean over models moves the estimate, and their spread widens its standard
-error (law of total variance). Parameters of the declared model are averaged over all models; those of an effect over its sizes
-and the models that have it, so that they answer how large it is if it is there.
-
-[1] Hoeting, J. A., Madigan, D., Raftery, A. E. and Volinsky, C. T., Bayesian model averaging: a tutorial, Statistical Science
-    14, 1999.
+Bayesian model averaging (Hoeting et al., Statistical Science 1999). The exact fit is that of the most probable model at its
+most probable sizes. What the others say differently is taken from the linearised problem: the mean over models moves the
+estimate, and their spread widens its standard error (law of total variance). Parameters of the declared model are averaged over
+all models; those of an effect over its sizes and the models that have it, so that they answer how large it is if it is there.
 """
 
 from __future__ import annotations
@@ -19,15 +16,13 @@ from scipy.linalg import solve
 
 from elastocal.diagnosis.evidence import Joint, inverses
 from elastocal.diagnosis.refit import mean_square_left
-from elastocal.diagnosis.search import UNLIKELY
-from elastocal.diagnosis.statistics import normal_equations
+from elastocal.diagnosis.search import UNLIKELY, Model, Posterior, Problem
+from elastocal.diagnosis.statistics import Statistics, normal_equations
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
     from elastocal.diagnosis.linearize import Linearized
-    from elastocal.diagnosis.search import Model, Posterior, Problem
-    from elastocal.diagnosis.statistics import Statistics
 
 # Models that hold less than this move no digit that is reported.
 _LEAST_PROBABILITY = 0.002

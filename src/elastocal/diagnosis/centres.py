@@ -2,9 +2,7 @@
 
 Most files state centres as well as masses; of some nobody ever asked. Priors as wide as the links' girth for all robots would
 hide a payload, narrow ones would take a centre off its link for one. So both are hypotheses, equally probable beforehand, and
-the measurements choose by the evidence of each [1], whatever single mechanism there may be beside it.
-
-[1] Kass, R. E. and Raftery, A. E., Bayes factors, Journal of the American Statistical Association 90, 1995.
+the measurements choose by the evidence of each, whatever single mechanism there may be beside it.
 """
 
 from __future__ import annotations
@@ -16,17 +14,15 @@ import numpy as np
 
 from elastocal.diagnosis.evidence import log_sum_exp
 from elastocal.diagnosis.hypotheses import Prior
-from elastocal.diagnosis.linearize import linearized
+from elastocal.diagnosis.linearize import Linearized, linearized
 from elastocal.diagnosis.search import Problem
-from elastocal.diagnosis.statistics import products_of, statistics_of
+from elastocal.diagnosis.statistics import Products, products_of, statistics_of
 from elastocal.effects.gravity import DECLARED_WEIGHT
 from elastocal.fitting.least_squares import fit
 
 if TYPE_CHECKING:
     from elastocal.diagnosis.kept_rows import Kept
-    from elastocal.diagnosis.linearize import Linearized
     from elastocal.diagnosis.settings import Settings
-    from elastocal.diagnosis.statistics import Products
     from elastocal.fitting.model import Model
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.counting import counted
-from elastocal.data_checks.protocol import faults
+from elastocal.data_checks.protocol import Fault, faults
 from elastocal.data_checks.warnings import fitted_compliance_warnings
 from elastocal.diagnosis import findings
 from elastocal.diagnosis.alarm import alarm_of
@@ -16,7 +16,7 @@ from elastocal.diagnosis.averaging import Averaged, averaged, expected_to_help, 
 from elastocal.diagnosis.centres import with_probable_centres
 from elastocal.diagnosis.findings import Evidence
 from elastocal.diagnosis.gross_errors import Deviations, entries_of, gross_errors, warnings_of
-from elastocal.diagnosis.kept_rows import first_kept, fitted_to
+from elastocal.diagnosis.kept_rows import Kept, first_kept, fitted_to
 from elastocal.diagnosis.linearize import linearized, shapes_looked_at_closely
 from elastocal.diagnosis.refit import (
     fit_with_sizes,
@@ -42,27 +42,23 @@ from elastocal.diagnosis.verdict import (
     with_related,
 )
 from elastocal.effects.catalogue import effects
-from elastocal.fitting.case import noise_facts
+from elastocal.fitting.case import Case, noise_facts
 from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.least_squares import ON_THE_WAY, fit
 from elastocal.fitting.robust import SETTLED
 from elastocal.fitting.tolerances import effective_parameters
 from elastocal.random_streams import stream
-from elastocal.remainder.repeatable import repeatable_part
+from elastocal.remainder.repeatable import Repeatable, repeatable_part
 from elastocal.validation.left_out import certain_loss, left_out_squares
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from elastocal.campaigns.campaign import Measurements
-    from elastocal.data_checks.protocol import Fault
-    from elastocal.diagnosis.kept_rows import Kept
     from elastocal.diagnosis.settings import Settings
-    from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import Observations
-    from elastocal.remainder.repeatable import Repeatable
 
 # Mechanisms that are added one at a time, each by a fit; of more, only the first.
 _MOST_STEPS = 4

@@ -1,28 +1,18 @@
-"""Bayes factors of models [1] from sufficient statistics.
+"""Bayes factors of models (Kass and Raftery, JASA 1995) from sufficient statistics.
 
 Coefficients of a unit are normal about zero with standard deviation s times their plausible size, one size s for the unit: a
-local prior [2] beside the probability that the unit is not there, spike and slab [3]. With D the diagonal of all s^2,
+local prior beside the probability that the unit is not there, spike and slab (Mitchell and Beauchamp, JASA 1988). With D the
+diagonal of all s^2,
 
     ln p(y | model, s, tau) = -1/2 ln |I + D^1/2 G D^1/2| + l(y'My - b'(G + D^-1)^-1 b),
 
 where l(rss) = -nu/2 ln sigma^2 - rss / (2 sigma^2) at sigma^2 = max(rss / nu, 1): the noise is at least what repeats or the
-campaign say, or else a smooth competitor could interpolate. Above one it is profiled [4], and the priors widen with it as
-conjugate ones do. Sizes and tau are averaged over, never maximised, as g is in mixtures of g priors [5].
+campaign say, or else a smooth competitor could interpolate. Above one it is profiled, and the priors widen with it as conjugate
+ones do. Sizes and tau are averaged over, never maximised, as g is in mixtures of g priors (Liang et al., JASA 2008).
 
 Where physics gives a coefficient its sign, the prior is half-normal: the Bayes factor of the normal one times twice the
-posterior probability of that sign, as against an encompassing model [6]; of several such coefficients as if they were
-independent.
-
-[1] Kass, R. E. and Raftery, A. E., Bayes factors, Journal of the American Statistical Association 90, 1995.
-[2] Johnson, V. E. and Rossell, D., On the use of non-local prior densities in Bayesian hypothesis tests, Journal of the Royal
-    Statistical Society B 72, 2010.
-[3] Mitchell, T. J. and Beauchamp, J. J., Bayesian variable selection in linear regression, Journal of the American Statistical
-    Association 83, 1988.
-[4] Murphy, S. A. and van der Vaart, A. W., On profile likelihood, Journal of the American Statistical Association 95, 2000.
-[5] Liang, F. et al., Mixtures of g priors for Bayesian variable selection, Journal of the American Statistical Association 103,
-    2008.
-[6] Klugkist, I., Laudy, O. and Hoijtink, H., Inequality constrained analysis of variance: a Bayesian approach, Psychological
-    Methods 10, 2005.
+posterior probability of that sign, as against an encompassing model (Klugkist et al., Psychological Methods 2005); of several
+such coefficients as if they were independent.
 """
 
 from __future__ import annotations
@@ -221,13 +211,12 @@ def evaluate(
 
     The sum over all combinations of sizes is taken as the product of the sums over each size about the mode; exact for one
     unit, and where sizes are independent given the measurements. The mode is found by coordinate ascent (iterated conditional
-    modes [1]), all units at once where that raises the density and else those that gain most. One inverse gives what every
-    unit sees given all others: with C the posterior covariance of the scaled coefficients, C_uu^-1 = I + s^2 G_uu|rest.
+    modes; Besag, JRSS B 1986), all units at once where that raises the density and else those that gain most. One inverse gives
+    what every unit sees given all others: with C the posterior covariance of the scaled coefficients, C_uu^-1 = I + s^2
+    G_uu|rest.
 
     `log_pose` (T,): logarithm of the prior weight of each size of the pose error. `start`: sizes from which the search for the
     mode starts; each in its grid.
-
-    [1] Besag, J., On the statistical analysis of dirty pictures, Journal of the Royal Statistical Society B 48, 1986.
     """
     off = [np.where(np.isfinite(grid.of(u)), np.abs(grid.scales - size), np.inf) for size, u in zip(start, units, strict=True)]
     places = np.array([np.argmin(distances) for distances in off], int)

@@ -8,24 +8,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.counting import plural
-from elastocal.data_checks.protocol import OF_DATA
+from elastocal.data_checks.protocol import OF_DATA, Fault
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.diagnosis.verdict import location_probabilities, locations_of
+from elastocal.diagnosis.verdict import Conclusion, location_probabilities, locations_of
 from elastocal.effects.catalogue import effects
-from elastocal.effects.protocol import Shape
+from elastocal.effects.protocol import Candidate, Parameter, Shape
 from elastocal.effects.sizes import lever_m
 from elastocal.fitting.linearization import effect_columns
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
-    from elastocal.data_checks.protocol import Fault
     from elastocal.diagnosis.alarm import Alarm
     from elastocal.diagnosis.averaging import Averaged
     from elastocal.diagnosis.linearize import Linearized
     from elastocal.diagnosis.search import Posterior
-    from elastocal.diagnosis.verdict import Conclusion
-    from elastocal.effects.protocol import Candidate, Parameter
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.model import Model
     from elastocal.fitting.observations import Observations

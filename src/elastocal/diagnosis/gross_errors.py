@@ -1,16 +1,14 @@
 """Rows that no model of the robot explains: a lost beam, a held point, a mistyped angle. They are found, named and left out.
 
-A row is judged by its deletion residual: its distance from what the other rows predict, in standard deviations (the externally
-studentized residual [1]). Rows are a gross error beyond the distance that the largest of so many good rows exceeds with a
-small probability (a test of mean-shift outliers with Bonferroni's bound [2]). The unit is one standard deviation or, where
-that is more, what the rows that do not stand out scatter: a model that does not fit makes no row stand out.
+A row is judged by its deletion residual: its distance from what the other rows predict, in standard deviations (externally
+studentized; Cook and Weisberg, Residuals and Influence in Regression, 1982). Rows are a gross error beyond the distance that
+the largest of so many good rows exceeds with a small probability (a test of mean-shift outliers with Bonferroni's bound;
+Barnett and Lewis, Outliers in Statistical Data, 1994). The unit is one standard deviation or, where that is more, what the rows
+that do not stand out scatter: a model that does not fit makes no row stand out.
 
 Before it is known what the model lacks, the rows are predicted by everything that it might lack at once: the Gaussian process
 whose covariance is that of all candidates at their prior sizes. The worst row is taken out, the others are predicted again, and
 so on. Rows that the final model explains after all are taken back.
-
-[1] Cook, R. D. and Weisberg, S., Residuals and Influence in Regression, section 2.2, Chapman and Hall, 1982.
-[2] Barnett, V. and Lewis, T., Outliers in Statistical Data, section 8.2, Wiley, 1994.
 """
 
 from __future__ import annotations
@@ -23,8 +21,8 @@ from scipy.special import chdtri, fdtri, gammaincinv
 
 from elastocal.counting import counted
 from elastocal.fitting.displacement import conditions, observations_at_once
-from elastocal.fitting.linearization import linearize
-from elastocal.fitting.noise import measurement_covariances
+from elastocal.fitting.linearization import Linearization, linearize
+from elastocal.fitting.noise import Noise, measurement_covariances
 from elastocal.fitting.observations import part_at, parts_of, select_states, single_observations, spread_poses
 from elastocal.fitting.parameters import parameters
 from elastocal.fitting.prediction import residuals
@@ -34,9 +32,7 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.settings import Settings
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
-    from elastocal.fitting.linearization import Linearization
     from elastocal.fitting.model import Estimate, Model
-    from elastocal.fitting.noise import Noise
 
 # Shares of the distances from which the scale is estimated: the second sees tails that are heavier than normal ones.
 _SCALE_QUANTILES = (0.5, 0.75)
@@ -170,10 +166,8 @@ def yardstick_of(fitted: Fit, noise: Noise, measurements: Measurements) -> Yards
     """What the rows that a model was fitted to say of themselves, beside the noise that was declared or repeats show.
 
     Of the error common to a pose that the fit states the share counts that makes the generalized variance of most rows smallest
-    (an S-estimate [1]): the rest may be that of the very errors that are looked for, or of a law that is not linear.
-
-    [1] Davies, P. L., Asymptotic behaviour of S-estimates of multivariate location parameters and dispersion matrices, Annals
-        of Statistics 15, 1987.
+    (an S-estimate; Davies, Annals of Statistics 1987): the rest may be that of the very errors that are looked for, or of a law
+    that is not linear.
     """
     every = np.ones(len(measurements), bool)
     return _Beside.of(fitted.model, fitted.estimate, measurements, noise, every).yardstick(fitted, noise, every)

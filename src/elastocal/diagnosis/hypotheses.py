@@ -14,14 +14,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import gammaln, logit, logsumexp
 
-from elastocal.effects.protocol import at_shapes, require_unique
+from elastocal.effects.protocol import Candidate, at_shapes, require_unique
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from elastocal.diagnosis.other import Law
     from elastocal.diagnosis.settings import Settings
-    from elastocal.effects.protocol import Candidate
 
 OTHER = "other"
 
@@ -67,13 +66,10 @@ class Prior:
     """Prior probability of every model: a set of units.
 
     A mechanism is there with a small probability; given that, the number of its locations is geometric and all sets of so many
-    locations are equally likely, which allows for their multiplicity [1].
+    locations are equally likely, which allows for their multiplicity (Scott and Berger, Annals of Statistics 2010).
 
     `log_odds`: of each mechanism. `log_counts` (L + 1,): logarithm of the probability of one given set of k locations of a
     mechanism that has L, given that it is there.
-
-    [1] Scott, J. G. and Berger, J. O., Bayes and empirical-Bayes multiplicity adjustment in the variable-selection problem,
-        Annals of Statistics 38, 2010.
     """
 
     log_odds: dict[str, float]

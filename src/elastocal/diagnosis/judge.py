@@ -8,21 +8,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.campaigns.campaign import NO_REMAINDER
+from elastocal.campaigns.campaign import NO_REMAINDER, Measurements
 from elastocal.campaigns.columns import residual_columns
 from elastocal.counting import counted
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.gross_errors import Deviations, entries_of, held_out_gross_errors, warnings_of, yardstick_of
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.case import noise_from
+from elastocal.fitting.case import Case, noise_from
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.observations import single_observations, state_clusters
 from elastocal.fitting.prediction import measured_in_base, residuals
 from elastocal.random_streams import stream
-from elastocal.remainder.corrected import Plan, corrected, remainder_facts
+from elastocal.remainder.corrected import Corrected, Plan, corrected, remainder_facts
 from elastocal.validation.fitted_range import outside_poses, repeat_warnings
 from elastocal.validation.held_out import (
     METRICS,
+    Errors,
     errors_by_range,
     grown,
     intervals,
@@ -38,12 +39,8 @@ from elastocal.validation.span import count_configurations, joint_ranges
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from elastocal.campaigns.campaign import Measurements
     from elastocal.diagnosis.diagnose import Diagnosis, Step
-    from elastocal.fitting.case import Case
     from elastocal.fitting.model import Estimate, Model
-    from elastocal.remainder.corrected import Corrected
-    from elastocal.validation.held_out import Errors
 
 _REPLICATES = 1000
 # What warnings of errors that grew are known by.

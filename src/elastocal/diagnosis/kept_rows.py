@@ -10,21 +10,25 @@ from scipy.linalg import lapack, solve_triangular
 
 from elastocal.diagnosis.evidence import scale_weights
 from elastocal.diagnosis.gross_errors import beyond_chance, gross_errors, most_by_chance
-from elastocal.diagnosis.linearize import linearized
-from elastocal.diagnosis.statistics import mirror
+from elastocal.diagnosis.linearize import Linearized, linearized
+from elastocal.diagnosis.statistics import WhiteRows, mirror
 from elastocal.fitting.least_squares import evaluated, fit
-from elastocal.fitting.observations import measured_in, sample_of, select_states, spread_poses, without_outlying_repeats
+from elastocal.fitting.observations import (
+    Observations,
+    measured_in,
+    sample_of,
+    select_states,
+    spread_poses,
+    without_outlying_repeats,
+)
 from elastocal.fitting.tolerances import estimated_noise, fit_declared
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Measurements
-    from elastocal.diagnosis.linearize import Linearized
     from elastocal.diagnosis.settings import Settings
-    from elastocal.diagnosis.statistics import WhiteRows
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.noise import Noise
-    from elastocal.fitting.observations import Observations
 
 
 @dataclass(frozen=True)

@@ -8,34 +8,30 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.special import chdtri
 
 from elastocal.diagnosis import other
-from elastocal.diagnosis.hypotheses import prior_of, units_of
+from elastocal.diagnosis.hypotheses import Unit, prior_of, units_of
 from elastocal.diagnosis.search import Problem, likely_pose_errors, pose_errors_within_reach
-from elastocal.diagnosis.statistics import Products, WhiteRows, products_of, statistics_of
+from elastocal.diagnosis.statistics import Products, Statistics, WhiteRows, products_of, statistics_of
 from elastocal.errors import InputError
 from elastocal.fitting.factored import Displacements, Factored
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.observations import spread_poses
+from elastocal.fitting.observations import Observations, spread_poses
 from elastocal.fitting.parameters import nonlinear_parameters, parameter_values
 from elastocal.fitting.whitening import whitening
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from typing import Any
 
-    from elastocal.diagnosis.hypotheses import Unit
     from elastocal.diagnosis.settings import Settings
-    from elastocal.diagnosis.statistics import Statistics
     from elastocal.effects.conditions import Conditions
     from elastocal.effects.protocol import Candidate, Displacing
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.model import Model
-    from elastocal.fitting.observations import Observations
 
     Shapes = tuple[float, ...]
 

@@ -11,12 +11,9 @@ then on average
     -2 ln p_j = u'G u - u'G_j (P_j + G_jj)^-1 G_j'u + tr((P_j + G_jj)^-1 P_j) + ln |P_j + G_jj| - ln |P_j| - d_j + const,
 
 with u = t - m_j and d_j coefficients. Of random entries those are chosen, one after the other, that leave the least entropy
-between the hypotheses [1], by pairwise Bhattacharyya coefficients [2]. What is promised of them is simulated with coefficients
-from the posterior: preposterior analysis [3].
-
-[1] Lindley, D. V., On a measure of the information provided by an experiment, Annals of Mathematical Statistics 27, 1956.
-[2] Kolchinsky, A. and Tracey, B. D., Estimating mixture entropy with pairwise distances, Entropy 19, 2017.
-[3] Raiffa, H. and Schlaifer, R., Applied Statistical Decision Theory, Harvard University, 1961.
+between the hypotheses (Lindley, Annals of Mathematical Statistics 1956), by pairwise Bhattacharyya coefficients (Kolchinsky and
+Tracey, Entropy 2017). What is promised of them is simulated with coefficients from the posterior: preposterior analysis (Raiffa
+and Schlaifer, Applied Statistical Decision Theory, 1961).
 """
 
 from __future__ import annotations

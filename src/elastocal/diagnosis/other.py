@@ -1,23 +1,16 @@
 """A competitor for effects that the catalogue does not have: smooth random displacements of each joint and of the base.
 
 A displacement is a random function of a few inputs, an approximate Gaussian process: the principal components over the states
-of a campaign (Karhunen-Loeve) of a sum of random Fourier features [1] with normal coefficients. Such a discrepancy [2] should
-leave to the model what the model explains [3]: what is constant of it, or at a joint straight in its angle, is taken off, for a
-zero offset, a compliance and a transmission ratio have names. What comes with time at a joint begins at nothing, as a zero
-that slips; what goes by the place of the end keeps its constant part. A function of everything at once would fit nothing better
-than chance does, so that each law has the inputs of one cause, as terms of an additive Gaussian process have [4]: a joint's own
-angle, torque and approach; the angles of the joints beside it; time and temperature; the load on the base along each of its
-axes; the place of the end. At a joint each acts in proportion to the load or without it: what yields turns nothing that is not
-loaded, and one law for both would be charged for what it does not do. Alone it means that the residual is *unexplained*; beside
-a mechanism, that a *related* one acts. It names nothing and is not used to predict.
-
-[1] Rahimi, A. and Recht, B., Random features for large-scale kernel machines, Advances in Neural Information Processing Systems
-    20, 2007.
-[2] Kennedy, M. C. and O'Hagan, A., Bayesian calibration of computer models, Journal of the Royal Statistical Society B 63,
-    2001.
-[3] Plumlee, M., Bayesian calibration of inexact computer models, Journal of the American Statistical Association 112, 2017.
-[4] Duvenaud, D., Nickisch, H. and Rasmussen, C. E., Additive Gaussian processes, Advances in Neural Information Processing
-    Systems 24, 2011.
+of a campaign (Karhunen-Loeve) of a sum of random Fourier features (Rahimi and Recht, NIPS 2007) with normal coefficients. Such
+a discrepancy (Kennedy and O'Hagan, JRSS B 2001) should leave to the model what the model explains (Plumlee, JASA 2017): what is
+constant of it, or at a joint straight in its angle, is taken off, for a zero offset, a compliance and a transmission ratio have
+names. What comes with time at a joint begins at nothing, as a zero that slips; what goes by the place of the end keeps its
+constant part. A function of everything at once would fit nothing better than chance does, so that each law has the inputs of
+one cause, as terms of an additive Gaussian process have (Duvenaud et al., NIPS 2011): a joint's own angle, torque and approach;
+the angles of the joints beside it; time and temperature; the load on the base along each of its axes; the place of the end. At
+a joint each acts in proportion to the load or without it: what yields turns nothing that is not loaded, and one law for both
+would be charged for what it does not do. Alone it means that the residual is *unexplained*; beside a mechanism, that a
+*related* one acts. It names nothing and is not used to predict.
 """
 
 from __future__ import annotations

@@ -1,11 +1,9 @@
 """The exact fit of a selected model: same priors, exact kinematics.
 
-Maximum a posteriori, a generalized ridge regression [1]: coefficients keep the normal priors under which they were selected,
-half-normal ones as normal, so that what the measurements do not determine stays at zero; the noise is that which the selected
-model leaves. No prior is wider than all sizes of the effect together made it before the measurements: what asks for more is
-often something else beside the law, which fits where poses are and not between them.
-
-[1] Hoerl, A. E. and Kennard, R. W., Ridge regression: biased estimation for nonorthogonal problems, Technometrics 12, 1970.
+Maximum a posteriori, a generalized ridge regression (Hoerl and Kennard, Technometrics 1970): coefficients keep the normal
+priors under which they were selected, half-normal ones as normal, so that what the measurements do not determine stays at zero;
+the noise is that which the selected model leaves. No prior is wider than all sizes of the effect together made it before the
+measurements: what asks for more is often something else beside the law, which fits where poses are and not between them.
 """
 
 from __future__ import annotations

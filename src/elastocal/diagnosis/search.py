@@ -1,13 +1,9 @@
 """Posterior over models: extend the best, drop what is not needed, weigh all that were met.
 
 A model is a set of units. From the declared model on, and from each mechanism at all its locations, the best few models met are
-extended by every unit and shrunk by each of theirs: a beam search over the neighbours of shotgun stochastic search [1],
-without its draws and its exchanges. What lies in Occam's window [2] is evaluated in full.
-
-[1] Hans, C., Dobra, A. and West, M., Shotgun stochastic search for "large p" regression, Journal of the American Statistical
-    Association 102, 2007.
-[2] Madigan, D. and Raftery, A. E., Model selection and accounting for model uncertainty in graphical models using Occam's
-    window, Journal of the American Statistical Association 89, 1994.
+extended by every unit and shrunk by each of theirs: a beam search over the neighbours of shotgun stochastic search (Hans, Dobra
+and West, JASA 2007), without its draws and its exchanges. What lies in Occam's window (Madigan and Raftery, JASA 1994) is
+evaluated in full.
 """
 
 from __future__ import annotations
@@ -34,12 +30,11 @@ from elastocal.diagnosis.evidence import (
     pose_weights,
     scale_weights,
 )
-from elastocal.diagnosis.hypotheses import OTHER, Prior
+from elastocal.diagnosis.hypotheses import OTHER, Prior, Unit
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Sequence
 
-    from elastocal.diagnosis.hypotheses import Unit
     from elastocal.diagnosis.settings import Settings
     from elastocal.diagnosis.statistics import Statistics
 

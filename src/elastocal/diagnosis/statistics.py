@@ -2,17 +2,13 @@
 
 Measurements y = X beta + W gamma + e, with X the declared model's sensitivities and W those of all candidates, both whitened by
 the noise of the measurements. The measurements of a pose may have an error in common as well: that of the joints when the pose
-was taken, of variance tau^2 I, seen through the Jacobian. By the matrix inversion lemma (Woodbury's identity [1])
+was taken, of variance tau^2 I, seen through the Jacobian. By the matrix inversion lemma (Hager, SIAM Review 1989)
 
     Z' Sigma(tau)^-1 Z = Z'Z - sum over poses B_p' (I / tau^2 + C_p)^-1 B_p,   B_p = J_p' Z_p,   C_p = J_p' J_p,   Z = [X W y],
 
 so that one pass over the poses serves every tau. Columns are first made orthogonal to X by a QR decomposition of the scaled
 rows: the condition number of X is not squared. Marginalising beta gives W'MW, W'My, y'My with M = Sigma^-1 - Sigma^-1 X
-(X'Sigma^-1 X)^-1 X'Sigma^-1 and the determinants of restricted maximum likelihood (REML [2]).
-
-[1] Hager, W. W., Updating the inverse of a matrix, SIAM Review 31, 1989.
-[2] Harville, D. A., Maximum likelihood approaches to variance component estimation and to related problems, Journal of the
-    American Statistical Association 72, 1977.
+(X'Sigma^-1 X)^-1 X'Sigma^-1 and the determinants of restricted maximum likelihood (REML; Harville, JASA 1977).
 """
 
 from __future__ import annotations
@@ -85,15 +81,10 @@ class Products:
     @property
     def without_candidates(self) -> Products:
         """Of the declared model alone."""
-        kept = np.append(np.arange(self.declared), self.gram.shape[0] - 1)
+        kept = np.append(np.arange(self.declared), -1)
         rows = replace(self.rows, candidates=self.rows.candidates.of_columns(np.zeros(len(self.inside), bool)))
-        few: dict[str, Any] = {
-            "met": {},
-            "gram": self.gram[np.ix_(kept, kept)],
-            "projected": self.projected[:, -1:],
-            "inside": self.inside[:0],
-        }
-        return replace(self, rows=rows, **few)
+        some: dict[str, Any] = {"gram": self.gram[np.ix_(kept, kept)], "projected": self.projected[:, -1:]}
+        return replace(self, rows=rows, inside=self.inside[:0], met={}, **some)
 
     @property
     def without_rows(self) -> Products:
@@ -135,9 +126,8 @@ def products_of(rows: WhiteRows, prior_std: np.ndarray, present: np.ndarray) -> 
 
     The declared columns are made orthonormal by QR of the scaled rows, so that no condition number is squared; what candidates
     have in them is taken off their products by Pythagoras' theorem, which costs 1e-16 of the square of a candidate: nothing
-    beside noise of one. What the declared model fits are its effective degrees of freedom, the trace of its hat matrix [1].
-
-    [1] Hastie, T. J. and Tibshirani, R. J., Generalized Additive Models, Chapman and Hall, 1990.
+    beside noise of one. What the declared model fits are its effective degrees of freedom, the trace of its hat matrix (Hastie
+    and Tibshirani, Generalized Additive Models, 1990).
     """
     observed, components, count = rows.declared.shape
     declared = rows.declared.reshape(observed * components, count)
@@ -240,13 +230,10 @@ def mirror(matrix: np.ndarray) -> None:
 def null_draws(
     products: Products, tau: float, pose_error_rad: np.ndarray, count: int, stream: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Statistics of simulated measurements of the declared model, in which nothing is missing: a parametric bootstrap [1].
+    """Statistics of simulated measurements of the declared model, in which nothing is missing: a parametric bootstrap.
 
     `tau`: pose error with which to simulate, rad. `pose_error_rad` (T,): at which the statistics are wanted. Returns `along`
     (T, K, N); `squares` (T, N): as in `Statistics`, for N draws of unit variance.
-
-    [1] Davison, A. C. and Hinkley, D. V., Bootstrap Methods and their Application, section 4.2, Cambridge University Press,
-        1997.
     """
     rows, declared = products.rows, products.declared
     joints, sizes = rows.jacobian.shape[2], np.asarray(pose_error_rad)

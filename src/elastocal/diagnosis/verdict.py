@@ -3,11 +3,9 @@
 A hypothesis is a set of mechanisms, whatever their locations. `OTHER` beside a mechanism means that a related mechanism acts;
 `OTHER` alone, that the catalogue does not have what acts.
 
-The probability of a mechanism is its posterior inclusion probability [1], summed over hypotheses. A law is never quite that of
-the machine: what the smooth error adds to a mechanism counts as the mechanism itself while it is small beside it.
-
-[1] Barbieri, M. M. and Berger, J. O., Optimal predictive model selection, Annals of Statistics 32, 2004.
-[2] Berger, J. O., Statistical Decision Theory and Bayesian Analysis, section 1.3, Springer, 1985.
+The probability of a mechanism is its posterior inclusion probability (Barbieri and Berger, Annals of Statistics 2004), summed
+over hypotheses. A law is never quite that of the machine: what the smooth error adds to a mechanism counts as the mechanism
+itself while it is small beside it.
 """
 
 from __future__ import annotations
@@ -125,7 +123,7 @@ def with_related(conclusion: Conclusion, doubted: Collection[str]) -> Conclusion
 
 
 def _least_expected_loss(ranked: Sequence[Hypothesis], settings: Settings) -> tuple[bool, Sequence[Hypothesis]]:
-    """Whether to state the first of some hypotheses alone, and which to state where not: a Bayes decision [2].
+    """Whether to state the first of some hypotheses alone, and which to state where not: a Bayes decision.
 
     A wrong name costs one, and so does a class that does not hold what is so; a class costs something by itself, and for each
     line. To state none costs what a missed effect does. `ranked`: without "nothing", which a class leaves open.
