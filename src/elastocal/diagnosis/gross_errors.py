@@ -79,29 +79,26 @@ class _Beside:
     """Rows of measurements beside a model, of which a sample and all that lie far off are looked at closely.
 
     `residual` (N, rows). `far` (N,): whole distance in standard deviations of the sensor, no less than that in those of a row.
-    `sample`, `closely` (N,) of bool: poses spread over those kept; these, and what is as far off as a quarter of all. `parts`:
-    which of the latter; their linearisation; variance (m, rows, rows) of each, and that of a radian in each joint.
+    `near`, `closely` (N,) of bool: poses spread over all; these, and what is as far off as a quarter of them. `parts`: which of
+    the latter; their linearisation; variance (m, rows, rows) of each, and that of a radian in each joint. `noise`: of one row.
     """
 
     residual: np.ndarray
     far: np.ndarray
-    sample: np.ndarray
+    near: np.ndarray
     closely: np.ndarray
     parts: list[tuple[slice, Linearization, np.ndarray, np.ndarray]]
+    noise: Noise
 
     @classmethod
-    def of(cls, model: Model, estimate: Estimate, measurements: Measurements, noise: Noise, kept: np.ndarray) -> _Beside:
-        single, sample = single_observations(measurements), kept.copy()
-        sample[kept] = spread_poses(select_states(single, kept), _MOST)
+    def of(cls, model: Model, estimate: Estimate, measurements: Measurements, noise: Noise) -> _Beside:
+        single = single_observations(measurements)
         near, residual = spread_poses(single, _MOST), np.empty((len(single), model.rows))
-        if near.all():
-            closely, far = near, np.zeros(len(single))
-        else:
-            for states, seen in parts_of(single, observations_at_once(model.rows, 0)):
-                part = part_at(single, states, seen)
-                residual[seen] = residuals(model, estimate, part, conditions(model, estimate, part.states))
-            far = np.linalg.norm(residual / np.repeat([noise.position_m, noise.orientation_rad], 3)[: model.rows], axis=1)
-            closely = near | sample | (far > np.quantile(far[near], _SCALE_QUANTILES[-1]))
+        for edges in parts_of(single, observations_at_once(model.rows, 0)):
+            part = part_at(single, *edges)
+            residual[edges[1]] = residuals(model, estimate, part, conditions(model, estimate, part.states))
+        far = np.linalg.norm(residual / np.repeat([noise.position_m, noise.orientation_rad], 3)[: model.rows], axis=1)
+        closely = near | (far > np.quantile(far[near], _SCALE_QUANTILES[-1]))
         some, parts = select_states(single, closely), []
         for edges in parts_of(some, observations_at_once(model.rows, len(parameters(model, estimate)))):
             part = part_at(some, *edges)
@@ -109,31 +106,29 @@ class _Beside:
             jacobian = line.coordinate_jacobian[..., : model.sites.joints]
             own = measurement_covariances(noise, jacobian[:, None], model.rows, None if spread is None else spread[:, None])
             parts.append((edges[1], line, own, jacobian @ jacobian.transpose(0, 2, 1)))
-        residual[closely] = np.concatenate([line.residual for _, line, _, _ in parts])
-        return cls(residual, far, sample, closely, parts)
+        return cls(residual, far, near, closely, parts, noise)
 
-    def yardstick(self, fitted: Fit, noise: Noise, kept: np.ndarray) -> Yardstick:
+    def yardstick(self, fitted: Fit, kept: np.ndarray) -> Yardstick:
         """As `yardstick_of`, by the rows that were fitted, (N,) of bool."""
-        free, mine = ~fitted.held, self.sample[self.closely]
-        negligible = self.sample.sum() < kept.sum() or not free.any()
+        free, mine, rows = ~fitted.held, (self.near & kept)[self.closely], fitted.model.rows
+        negligible = not (self.near | ~kept).all() or not free.any()
         sizes = np.array([p.plausible for _, p in fitted.parameters])[free]
-        best = (np.inf, Yardstick(noise, None))
+        best = (np.inf, Yardstick(self.noise, None))
         for share in _POSE_SHARES if fitted.noise.pose_rad else (0.0,):
-            pose_rad, covariance = share * fitted.noise.pose_rad, None
-            white = [np.linalg.inv(np.linalg.cholesky(own + pose_rad**2 * common)) for _, _, own, common in self.parts]
+            covariance, white = None, self._white(share * fitted.noise.pose_rad)
             if not negligible:
                 information = np.diag((sizes / fitted.prior_std[free]) ** 2)
                 for (seen, line, _, _), each in zip(self.parts, white, strict=True):
-                    rows = (each @ (line.sensitivities[..., free] * sizes))[mine[seen]].reshape(-1, len(sizes))
-                    information += rows.T @ rows
+                    seen_by = (each @ (line.sensitivities[..., free] * sizes))[mine[seen]].reshape(-1, len(sizes))
+                    information += seen_by.T @ seen_by
                 covariance = np.zeros((len(free), len(free)))
                 covariance[np.ix_(free, free)] = np.linalg.pinv(information, hermitian=True) * np.outer(sizes, sizes)
             distance = self._distances(white, covariance, np.ones(len(mine), bool))[mine]
             volume = -np.concatenate([np.log(np.diagonal(each, axis1=1, axis2=2)).sum(axis=1) for each in white])[mine].mean()
-            rows = fitted.model.rows
             # Rows do not scatter less than the noise that is known of them: a share that says so is too large.
             spread = volume + rows * np.log(max(np.median(distance) / np.sqrt(2 * gammaincinv(rows / 2, 0.5)), 1.0))
-            best = min(best, (spread, Yardstick(replace(noise, pose_rad=pose_rad), covariance)), key=lambda each: each[0])
+            found = Yardstick(replace(self.noise, pose_rad=share * fitted.noise.pose_rad), covariance)
+            best = min(best, (spread, found), key=lambda each: each[0])
         return best[1]
 
     def distances(self, yardstick: Yardstick, fitted: np.ndarray) -> np.ndarray:
@@ -141,10 +136,12 @@ class _Beside:
 
         ``fitted`` says which rows the parameters were fitted to, (N,): residuals of these are smaller, those of others larger.
         """
-        found, pose_rad = self.far.copy(), yardstick.noise.pose_rad
-        white = [np.linalg.inv(np.linalg.cholesky(own + pose_rad**2 * common)) for _, _, own, common in self.parts]
+        found, white = self.far.copy(), self._white(yardstick.noise.pose_rad)
         found[self.closely] = self._distances(white, yardstick.covariance, fitted[self.closely])
         return found
+
+    def _white(self, pose_rad: float) -> list[np.ndarray]:
+        return [np.linalg.inv(np.linalg.cholesky(own + pose_rad**2 * common)) for _, _, own, common in self.parts]
 
     def _distances(self, white: list[np.ndarray], covariance: np.ndarray | None, fitted: np.ndarray) -> np.ndarray:
         found = np.empty(len(fitted))
@@ -169,8 +166,7 @@ def yardstick_of(fitted: Fit, noise: Noise, measurements: Measurements) -> Yards
     (an S-estimate; Davies, Annals of Statistics 1987): the rest may be that of the very errors that are looked for, or of a law
     that is not linear.
     """
-    every = np.ones(len(measurements), bool)
-    return _Beside.of(fitted.model, fitted.estimate, measurements, noise, every).yardstick(fitted, noise, every)
+    return _Beside.of(fitted.model, fitted.estimate, measurements, noise).yardstick(fitted, np.ones(len(measurements), bool))
 
 
 def beyond_chance(distance: np.ndarray, rows: int, kept: np.ndarray, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
@@ -204,9 +200,8 @@ def most_by_chance(count: int, rows: int, settings: Settings, freedom: float = n
 
 def gross_errors(fitted: Fit, noise: Noise, measurements: Measurements, kept: np.ndarray, settings: Settings) -> Deviations:
     """Judge the rows of a campaign by a fit to those that are ``kept``, (N,), and the noise declared or shown by repeats."""
-    rows = _Beside.of(fitted.model, fitted.estimate, measurements, noise, kept)
-    yardstick = rows.yardstick(fitted, noise, kept)
-    distance = rows.distances(yardstick, kept)
+    rows = _Beside.of(fitted.model, fitted.estimate, measurements, noise)
+    distance = rows.distances(rows.yardstick(fitted, kept), kept)
     return Deviations(rows.residual, *beyond_chance(distance, fitted.model.rows, kept, settings))
 
 
@@ -223,7 +218,7 @@ def held_out_gross_errors(
     if model is not fitted.model or estimate is not fitted.estimate:
         yardstick = replace(yardstick, covariance=None)
     every = np.ones(len(measurements), bool)
-    rows = _Beside.of(model, estimate, measurements, yardstick.noise, every)
+    rows = _Beside.of(model, estimate, measurements, yardstick.noise)
     distance, gross = beyond_chance(rows.distances(yardstick, ~every), model.rows, every, settings)
     least = settings.extrapolated_error
     if outside.sum() >= _FEWEST_TO_COMPARE:
