@@ -8,9 +8,9 @@ import pytest
 from made_problems import made_problem, made_rows, made_unit
 from scipy.stats import binom
 
-from elastocal.diagnosis.alarm import alarm_of
 from elastocal.diagnosis.evidence import evaluate, log_sum_exp
 from elastocal.diagnosis.hypotheses import OTHER
+from elastocal.diagnosis.search import alarm_of
 from elastocal.diagnosis.settings import Settings
 
 UNITS = (

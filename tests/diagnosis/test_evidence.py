@@ -18,14 +18,13 @@ from elastocal.diagnosis.evidence import (
     evaluate,
     log_likelihood,
     pose_weights,
-    scale_weights,
 )
 from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.statistics import statistics_of
 
 TAU = np.array([0.0, 0.3, 0.9])
 SETTINGS = Settings()
-GRID = Grid(np.array(SETTINGS.scales), scale_weights(SETTINGS))
+GRID = Grid.of_settings(SETTINGS)
 LOG_POSE = pose_weights(TAU, SETTINGS)
 # Residuals of a little less than the noise, so that its size is at its floor and everything is normal.
 QUIET = 0.5
@@ -172,7 +171,7 @@ def test_half_normal_priors_are_exact_of_one_coefficient_and_taken_one_by_one_of
 
 def test_weights_of_sizes_are_log_normal_about_the_center_and_sum_to_one():
     settings = replace(SETTINGS, scales=(0.01, 0.1, 1.0), scale_center=0.1, scale_spread=(3.0, 0.7))
-    weights = np.exp(scale_weights(settings))
+    weights = np.exp(Grid.of_settings(settings).log_weights)
     assert weights.sum() == pytest.approx(1.0)
     ratio = np.log(10.0)
     assert weights[0] / weights[1] == pytest.approx(np.exp(-0.5 * (ratio / 3.0) ** 2))

@@ -12,7 +12,6 @@ from scipy.stats import norm
 
 from elastocal.campaigns.campaign import Target
 from elastocal.diagnosis import next_experiment, verdict
-from elastocal.diagnosis.alarm import Alarm
 from elastocal.diagnosis.linearize import linearized
 from elastocal.diagnosis.next_experiment import (
     DATA_AT_FAULT,
@@ -26,7 +25,7 @@ from elastocal.diagnosis.next_experiment import (
     drawn,
     propose,
 )
-from elastocal.diagnosis.search import Model, posterior
+from elastocal.diagnosis.search import Alarm, Model, posterior
 from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.verdict import concluded, mechanisms_of_models
 

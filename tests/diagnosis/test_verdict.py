@@ -8,10 +8,9 @@ import pytest
 from made_problems import made_problem, made_rows, made_unit
 from planted import planted
 
-from elastocal.diagnosis.alarm import Alarm
 from elastocal.diagnosis.averaging import squares_beyond
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.diagnosis.search import Model, Posterior
+from elastocal.diagnosis.search import Alarm, Model, Posterior
 from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.verdict import (
     ADEQUATE,

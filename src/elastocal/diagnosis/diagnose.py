@@ -11,7 +11,6 @@ from elastocal.counting import counted
 from elastocal.data_checks.protocol import Fault, faults
 from elastocal.data_checks.warnings import fitted_compliance_warnings
 from elastocal.diagnosis import findings
-from elastocal.diagnosis.alarm import alarm_of
 from elastocal.diagnosis.averaging import Averaged, averaged, expected_to_help, other_predictions, squares_explained
 from elastocal.diagnosis.centres import with_probable_centres
 from elastocal.diagnosis.findings import Evidence
@@ -27,7 +26,7 @@ from elastocal.diagnosis.refit import (
     selected,
     with_shapes_of,
 )
-from elastocal.diagnosis.search import initial_screening, posterior
+from elastocal.diagnosis.search import alarm_of, initial_screening, posterior
 from elastocal.diagnosis.verdict import (
     ADEQUATE,
     NAMED,

@@ -55,6 +55,13 @@ class Grid:
     scales: np.ndarray
     log_weights: np.ndarray
 
+    @classmethod
+    def of_settings(cls, settings: Settings) -> Grid:
+        """Sizes whose logarithms have normal pieces below and above the most likely size."""
+        off = np.log(np.asarray(settings.scales) / settings.scale_center)
+        log_weights = -0.5 * (off / np.where(off < 0, *settings.scale_spread)) ** 2
+        return cls(np.array(settings.scales), log_weights - log_sum_exp(log_weights))
+
     def of(self, unit: Unit) -> np.ndarray:
         """Logarithms of the weights for one unit: sizes from its smallest to its largest share them, ndarray (S,)."""
         return self.between(unit.smallest, unit.largest)
@@ -77,29 +84,15 @@ class Grid:
             return weights - log_sum_exp(weights, axis=2)[..., None]
 
 
-def scale_weights(settings: Settings) -> np.ndarray:
-    """Logarithms of the prior weights of the sizes, (S,): log-normal pieces below and above the most likely size."""
-    off = np.log(np.asarray(settings.scales) / settings.scale_center)
-    spread = np.where(off < 0, *settings.scale_spread)
-    log_weights = -0.5 * (off / spread) ** 2
-    return log_weights - log_sum_exp(log_weights)
-
-
 def pose_weights(pose_error_rad: np.ndarray, settings: Settings) -> np.ndarray:
-    """Logarithms of the prior weights of sizes of the pose error, one of which is zero.
-
-    `pose_error_rad` (T,). Returns (T,).
-    """
+    """Logarithms of the prior weights of sizes of the pose error, one of which is zero, (T,)."""
     there = pose_error_rad > 0
     share = settings.pose_error_probability / max(there.sum(), 1)
     return np.log(np.where(there, share, 1.0 - settings.pose_error_probability))
 
 
 def log_likelihood(squares: np.ndarray, freedom: int) -> np.ndarray:
-    """l(rss): the profiled likelihood of the noise, which is at least one.
-
-    `squares`: of any shape. Returns of the same shape.
-    """
+    """l(rss): the profiled likelihood of the noise, which is at least one."""
     variance = np.maximum(squares / freedom, 1.0)
     return -0.5 * freedom * np.log(variance) - 0.5 * squares / variance
 

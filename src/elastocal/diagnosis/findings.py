@@ -19,10 +19,9 @@ from elastocal.fitting.linearization import effect_columns
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
-    from elastocal.diagnosis.alarm import Alarm
     from elastocal.diagnosis.averaging import Averaged
     from elastocal.diagnosis.linearize import Linearized
-    from elastocal.diagnosis.search import Posterior
+    from elastocal.diagnosis.search import Alarm, Posterior
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.model import Model
     from elastocal.fitting.observations import Observations

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import lapack, solve_triangular
 
-from elastocal.diagnosis.evidence import scale_weights
+from elastocal.diagnosis.evidence import Grid
 from elastocal.diagnosis.gross_errors import beyond_chance, gross_errors, most_by_chance
 from elastocal.diagnosis.linearize import Linearized, linearized
 from elastocal.diagnosis.statistics import WhiteRows, mirror
@@ -115,7 +115,8 @@ def improbable(line: Linearized) -> np.ndarray:
     rows, settings = line.rows, line.settings
     observed, own = rows.residual.shape
     kept = np.ones(observed, bool)
-    sizes = np.sqrt(np.exp(scale_weights(settings)) @ np.array(settings.scales) ** 2)
+    grid = Grid.of_settings(settings)
+    sizes = np.sqrt(np.exp(grid.log_weights) @ grid.scales**2)
     declared = (rows.declared * line.priors[0]).reshape(rows.residual.size, -1)
     columns = (sizes * rows.candidates.dense()).reshape(rows.residual.size, -1)
     covariance, residual = np.eye(len(columns)) + columns @ columns.T, rows.residual.ravel()

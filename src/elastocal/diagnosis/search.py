@@ -4,6 +4,16 @@ A model is a set of units. From the declared model on, and from each mechanism a
 extended by every unit and shrunk by each of theirs: a beam search over the neighbours of shotgun stochastic search (Hans, Dobra
 and West, JASA 2007), without its draws and its exchanges. What lies in Occam's window (Madigan and Raftery, JASA 1994) is
 evaluated in full.
+
+Whether anything is missing at all is one Monte Carlo test (`alarm_of`). Its statistic is the log of the average Bayes factor,
+over all units and all whole mechanisms, against "nothing": a Bayes factor as the statistic of a test (Good, The
+Bayes/non-Bayes compromise, JASA 1992). Its null distribution is that of simulated measurements of the same design, at the pose
+error that fits best, with the pose error averaged over anew in each draw: exact with noise and pose error known, a parametric
+bootstrap with a fitted pose error (Davison and Hinkley, Bootstrap Methods, 1997, 4.2). No Bonferroni correction and no choice
+of a test: competitors that the measurements cannot show have a Bayes factor of one in every draw. Sizes begin a step below
+those of the posterior: what lies between may be seen, and its probability does not matter to a test. Where nothing is missing a
+Bayes factor has a mean of one, so that it exceeds b with a probability of at most 1/b (Markov's inequality): where b is far
+beyond the number of draws none of them reaches it, and none is made.
 """
 
 from __future__ import annotations
@@ -11,7 +21,7 @@ from __future__ import annotations
 from bisect import bisect
 from collections import Counter
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from heapq import nlargest
 from typing import TYPE_CHECKING
@@ -28,15 +38,14 @@ from elastocal.diagnosis.evidence import (
     log_likelihood,
     log_sum_exp,
     pose_weights,
-    scale_weights,
 )
 from elastocal.diagnosis.hypotheses import OTHER, Prior, Unit
+from elastocal.diagnosis.statistics import Products, Statistics, null_draws
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Sequence
 
     from elastocal.diagnosis.settings import Settings
-    from elastocal.diagnosis.statistics import Statistics
 
 # Models below the best by more than this, in log odds, hold nothing.
 _NEGLIGIBLE = 9.0
@@ -48,7 +57,10 @@ UNLIKELY, _TELLING_UNITS = -9.0, 10
 # from it by a few units, which over a hundred orders of magnitude do not hang on.
 _OUT_OF_QUESTION = -300.0
 # Steps of the grid of the pose error to either side that measurements simulated with one size can make likely.
-REACH = 2
+_REACH = 2
+# Bayes factor over the number of draws, the measurements' own included, beyond which none is made. The mean of one is that over
+# the prior of the pose error; at the fitted one it is larger by at most the inverse of that one's prior probability.
+_BEYOND_DRAWS = 1e4
 
 
 @dataclass(frozen=True)
@@ -63,7 +75,7 @@ class Problem:
     @cached_property
     def grid(self) -> Grid:
         """Sizes of a unit."""
-        return Grid(np.array(self.settings.scales), scale_weights(self.settings))
+        return Grid.of_settings(self.settings)
 
     @property
     def log_pose(self) -> np.ndarray:
@@ -86,10 +98,8 @@ class Problem:
         place = self.statistics.nearest(model.pose_error_rad)
         inner = deviations[:, None] * self.statistics.gram[place][np.ix_(columns, columns)] * deviations + np.eye(len(columns))
         along = deviations * self.statistics.along[place, columns]
-        solved = (
-            cho_solve(cho_factor(inner, lower=True, check_finite=False), along, check_finite=False) if len(along) else along
-        )
-        return columns, deviations * solved, place
+        factor = cho_factor(inner, lower=True, check_finite=False) if len(along) else None
+        return columns, deviations * cho_solve(factor, along, check_finite=False) if factor else along, place
 
 
 @dataclass(frozen=True)
@@ -137,9 +147,14 @@ def posterior(problem: Problem, known: Collection[str] = ()) -> Posterior:
 
     `known`: keys of the candidates of a good model, from which the search starts, too.
     """
-    searcher = problem.started.copy()
-    searcher.start_from_whole_mechanisms()
-    searcher.start_from(known)
+    searcher, units = problem.started.copy(), problem.units
+    # Each mechanism at all its locations, and the model that is known, each with the best variant at each place.
+    mechanisms = dict.fromkeys(unit.mechanism for unit in units if unit.mechanism != OTHER)
+    starts = [searcher.best_variants(n for n, unit in enumerate(units) if unit.mechanism == name) for name in mechanisms]
+    starts = [start for start in starts if 1 < len(start) <= problem.settings.largest_model]
+    starts.append(searcher.best_variants(n for n, unit in enumerate(units) if unit.candidate and unit.candidate.key in known))
+    for start in filter(None, starts):
+        searcher.measure(start)
     searcher.grow()
     return searcher.weigh()
 
@@ -147,13 +162,14 @@ def posterior(problem: Problem, known: Collection[str] = ()) -> Posterior:
 def pose_errors_within_reach(statistics: Statistics, settings: Settings) -> np.ndarray:
     """Sizes of the pose error up to the largest that "nothing" makes likely: what a model adds leaves no more to it.
 
-    And up to `REACH` steps beyond the most likely, for measurements that are simulated with that may look like more.
+    And up to `_REACH` steps beyond the most likely, for measurements that are simulated with that may look like more.
 
     `statistics`: of the declared model alone. Returns (T,) of bool.
     """
-    problem = Problem(statistics, (), Prior({}, {}), settings)
-    weights = evaluate(statistics, [], problem.grid, problem.log_pose, ()).log_pose
-    largest = max(np.flatnonzero(weights > weights.max() + UNLIKELY)[-1], np.argmax(weights) + REACH)
+    weights = evaluate(
+        statistics, [], Grid.of_settings(settings), pose_weights(statistics.pose_error_rad, settings), ()
+    ).log_pose
+    largest = max(np.flatnonzero(weights > weights.max() + UNLIKELY)[-1], np.argmax(weights) + _REACH)
     return np.arange(len(weights)) <= largest
 
 
@@ -162,11 +178,10 @@ def likely_pose_errors(statistics: Statistics, units: Sequence[Unit], settings: 
 
     `statistics`: of zero first. Returns (T,) of bool.
     """
-    problem = Problem(statistics, tuple(units), Prior({}, {}), settings)
-    conditioned = condition(statistics, np.zeros(0, int), np.zeros(0), problem.log_pose)
-    found = added_evidence(conditioned, units, range(len(units)), problem.grid, statistics.freedom)
-    empty = evaluate(statistics, [], problem.grid, problem.log_pose, ())
-    likely = _likely(found, log_sum_exp(log_sum_exp(found, axis=0), axis=1), empty)
+    grid, log_pose = Grid.of_settings(settings), pose_weights(statistics.pose_error_rad, settings)
+    conditioned = condition(statistics, np.zeros(0, int), np.zeros(0), log_pose)
+    found = added_evidence(conditioned, units, range(len(units)), grid, statistics.freedom)
+    likely = _likely(found, log_sum_exp(found, axis=(0, 2)), evaluate(statistics, [], grid, log_pose, ()))
     likely[0] = True
     return likely
 
@@ -260,21 +275,6 @@ class _Searcher:
                 self.sizes[smaller] = np.delete(found.scales, place)
         return self.measured[model]
 
-    def start_from_whole_mechanisms(self) -> None:
-        """Meet each mechanism at all its locations, with the best variant at each."""
-        units = self.problem.units
-        for mechanism in dict.fromkeys(unit.mechanism for unit in units if unit.mechanism != OTHER):
-            whole = self.best_variants(number for number, unit in enumerate(units) if unit.mechanism == mechanism)
-            if 1 < len(whole) <= self.problem.settings.largest_model:
-                self.measure(whole)
-
-    def start_from(self, known: Collection[str]) -> None:
-        """Meet the model of some candidates, each with the best of its shapes."""
-        units = enumerate(self.problem.units)
-        model = self.best_variants(number for number, unit in units if unit.candidate and unit.candidate.key in known)
-        if model:
-            self.measure(model)
-
     def best_variants(self, numbers: Iterable[int]) -> tuple[int, ...]:
         """Of some units the best at each place, rising."""
         best: dict[tuple[str, tuple[int | str, ...], str], tuple[int]] = {}
@@ -317,3 +317,75 @@ class _Searcher:
         models.sort(key=lambda model: -model.log_odds)
         odds = np.array([model.log_odds for model in models])
         return Posterior(tuple(models), np.exp(odds - log_sum_exp(odds)))
+
+
+@dataclass(frozen=True)
+class Alarm:
+    """Outcome of the test; `statistic`: log of the average Bayes factor against "nothing"."""
+
+    p_value: float
+    statistic: float
+    raised: bool
+
+
+def alarm_of(problem: Problem, products: Products, pose_error_rad: float, stream: np.random.Generator) -> Alarm:
+    """Test whether the declared model lacks anything.
+
+    `pose_error_rad`: pose error of the declared model at which measurements are simulated.
+    """
+    settings, statistics = problem.settings, problem.statistics
+    # Sizes that draws of the fitted one can make likely: its own, and some to either side.
+    place = statistics.nearest(pose_error_rad)
+    chosen = slice(max(place - _REACH, 0), place + _REACH + 1)
+    statistics, log_pose = statistics.at(chosen), problem.log_pose[chosen]
+    own = statistics.along[..., None], statistics.squares[:, None]
+    statistic = float(_average_bayes_factors(problem, statistics, log_pose, *own)[0])
+    reached = 0
+    if statistic <= np.log(_BEYOND_DRAWS * (1 + settings.alarm_draws)):
+        drawn = null_draws(products, pose_error_rad, statistics.pose_error_rad, settings.alarm_draws, stream)
+        reached = int((_average_bayes_factors(problem, statistics, log_pose, *drawn) >= statistic).sum())
+    p_value = (1 + reached) / (1 + settings.alarm_draws)
+    return Alarm(p_value, statistic, p_value <= settings.alarm_level)
+
+
+def _average_bayes_factors(
+    problem: Problem, statistics: Statistics, log_pose: np.ndarray, along: np.ndarray, squares: np.ndarray
+) -> np.ndarray:
+    """Log of the average Bayes factor for N sets of measurements, ndarray (N,).
+
+    `along` (T, K, N), `squares` (T, N).
+    """
+    grid, given_nothing = problem.grid, condition(statistics, np.zeros(0, int), np.zeros(0), log_pose)
+    start = given_nothing.log_occam[:, None]
+    nothing = log_sum_exp(start + log_likelihood(squares, statistics.freedom), axis=0)
+    tested, log_priors = _alternatives(problem)
+    total = np.full(len(nothing), -np.inf)
+    for members, values, vectors, columns in given_nothing.blocks_of(tested, range(len(tested))):
+        for place, number in enumerate(members):
+            turned = (vectors[:, place].transpose(0, 2, 1) @ along[:, columns[place]]) ** 2
+            unit = tested[number]
+            first = max(unit.smallest - 1, 0)
+            variances = grid.scales[first:, None] ** 2
+            weights = grid.between(first, unit.largest)[first:]
+            widened = 1.0 + variances * values[:, None, place]
+            left = squares[:, None] - (variances / widened) @ turned
+            known = weights + start - 0.5 * np.log(widened).sum(axis=2)
+            terms = log_likelihood(left, statistics.freedom) + known[..., None]
+            total = np.logaddexp(total, log_priors[number] + log_sum_exp(terms, axis=(0, 1)))
+    return total - nothing
+
+
+def _alternatives(problem: Problem) -> tuple[list[Unit], list[float]]:
+    """Every unit, and every mechanism with one law at all its locations in one size; with their log prior odds."""
+    prior = problem.prior
+    alternatives, log_priors = list(problem.units), [prior.log_odds_of([unit]) for unit in problem.units]
+    laws: dict[tuple[str, str, tuple[float, ...]], list[Unit]] = {}
+    for unit in problem.units:
+        if unit.candidate:
+            laws.setdefault((unit.mechanism, unit.candidate.detail, unit.shapes), []).append(unit)
+    for units in laws.values():
+        if len({unit.location for unit in units}) == len(units) > 1:
+            columns, smallest = np.concatenate([unit.columns for unit in units]), min(unit.smallest for unit in units)
+            alternatives.append(replace(units[0], columns=columns, smallest=smallest))
+            log_priors.append(prior.log_odds_of(units) - (len(units) - 1) * units[0].log_prior)
+    return alternatives, log_priors

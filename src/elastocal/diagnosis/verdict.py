@@ -22,8 +22,7 @@ from elastocal.fitting.displacement import joint_compliances
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Sequence
 
-    from elastocal.diagnosis.alarm import Alarm
-    from elastocal.diagnosis.search import Model, Posterior, Problem
+    from elastocal.diagnosis.search import Alarm, Model, Posterior, Problem
     from elastocal.diagnosis.settings import Settings
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.noise import Noise
