@@ -8,8 +8,8 @@ import pytest
 from made_problems import made_problem, made_rows, made_unit
 from scipy.optimize import minimize
 
-from elastocal.diagnosis.averaging import averaged, expected_to_help, other_predictions, squares_beyond, squares_explained
 from elastocal.diagnosis.evidence import Joint
+from elastocal.diagnosis.refit import averaged, expected_to_help, other_predictions, squares_beyond, squares_explained
 from elastocal.diagnosis.search import Model, Posterior
 
 TAU = np.array([0.0, 0.3, 0.9])

@@ -8,8 +8,8 @@ import pytest
 from made_problems import made_problem, made_rows, made_unit
 from planted import planted
 
-from elastocal.diagnosis.averaging import squares_beyond
 from elastocal.diagnosis.hypotheses import OTHER
+from elastocal.diagnosis.refit import squares_beyond
 from elastocal.diagnosis.search import Alarm, Model, Posterior
 from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.verdict import (

@@ -11,20 +11,22 @@ from elastocal.counting import counted
 from elastocal.data_checks.protocol import Fault, faults
 from elastocal.data_checks.warnings import fitted_compliance_warnings
 from elastocal.diagnosis import findings
-from elastocal.diagnosis.averaging import Averaged, averaged, expected_to_help, other_predictions, squares_explained
-from elastocal.diagnosis.centres import with_probable_centres
 from elastocal.diagnosis.findings import Evidence
 from elastocal.diagnosis.gross_errors import Deviations, entries_of, gross_errors, warnings_of
 from elastocal.diagnosis.kept_rows import Kept, first_kept, fitted_to
-from elastocal.diagnosis.linearize import linearized, shapes_looked_at_closely
+from elastocal.diagnosis.linearize import linearized, looked_at_closely, with_probable_centres
 from elastocal.diagnosis.refit import (
+    Averaged,
+    averaged,
+    expected_to_help,
     fit_with_sizes,
     mean_square,
     mean_square_left,
     noise_beside,
+    other_predictions,
     remaining_noise,
     selected,
-    with_shapes_of,
+    squares_explained,
 )
 from elastocal.diagnosis.search import alarm_of, initial_screening, posterior
 from elastocal.diagnosis.verdict import (
@@ -230,7 +232,7 @@ def _explained(
         alarm = alarm_of(problem.problem, problem.products, nothing.pose_error_rad, draws)
         # The alarm comes before the measurements choose at which shapes to look more closely: it would no longer be exact.
         if alarm.raised:
-            problem = problem.with_shapes(shapes_looked_at_closely(problem.problem, alone))
+            problem = looked_at_closely(problem, alone)
         found = posterior(problem.problem, {effect.key for effect in about.model.effects})
         conclusion = concluded(problem.problem, found, alarm)
         # Rows of a long campaign make room for the fit, and for those of the next linearisation.
@@ -272,7 +274,7 @@ def _explained(
 def _effect_steps(case: Case, declared: Fit, final: Fit, found: Evidence) -> list[Step]:
     """One step for each mechanism, that which explains most first, each with those before it; of many, the rest together."""
     model = found.posterior.models[found.conclusion.best.model]
-    chosen = with_shapes_of(selected(found.linearized, model), final)
+    chosen = [(effect, final.values_of(effect.key)[1]) for effect, _ in selected(found.linearized, model)]
     explained = squares_explained(found.linearized.problem, model)
     names = sorted(found.conclusion.best.named, key=lambda name: -explained[name])
     alone = names[:-1] if len(names) <= _MOST_STEPS else names[:1]

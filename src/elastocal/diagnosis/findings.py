@@ -19,7 +19,7 @@ from elastocal.fitting.linearization import effect_columns
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
-    from elastocal.diagnosis.averaging import Averaged
+    from elastocal.diagnosis.refit import Averaged
     from elastocal.diagnosis.linearize import Linearized
     from elastocal.diagnosis.search import Alarm, Posterior
     from elastocal.fitting.fit_result import Fit

@@ -14,11 +14,14 @@ import numpy as np
 from scipy.special import chdtri
 
 from elastocal.diagnosis import other
-from elastocal.diagnosis.hypotheses import Unit, prior_of, units_of
+from elastocal.diagnosis.evidence import log_sum_exp
+from elastocal.diagnosis.hypotheses import Prior, Unit, prior_of, units_of
 from elastocal.diagnosis.search import Problem, likely_pose_errors, pose_errors_within_reach
 from elastocal.diagnosis.statistics import Products, Statistics, WhiteRows, products_of, statistics_of
+from elastocal.effects.gravity import DECLARED_WEIGHT
 from elastocal.errors import InputError
 from elastocal.fitting.factored import Displacements, Factored
+from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.observations import Observations, spread_poses
 from elastocal.fitting.parameters import nonlinear_parameters, parameter_values
@@ -27,9 +30,10 @@ from elastocal.fitting.whitening import whitening
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from elastocal.diagnosis.kept_rows import Kept
     from elastocal.diagnosis.settings import Settings
     from elastocal.effects.conditions import Conditions
-    from elastocal.effects.protocol import Candidate, Displacing
+    from elastocal.effects.protocol import Candidate
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.model import Model
 
@@ -75,18 +79,7 @@ class Linearized:
     against: list[other.Law]
     most_pose_error_rad: float
 
-    def with_shapes(self, closer: dict[str, list[Shapes]]) -> Linearized:
-        """The same with other values of the shapes of some candidates, by their keys, such as of a closer look."""
-        if not closer:
-            return self
-        tried = {key: (candidate, closer.get(key, shapes)) for key, (candidate, shapes) in self.tried.items()}
-        return self._with_the_same_fit(tried=tried)
-
-    def under(self, model: Model) -> Linearized:
-        """The same under other priors of the declared parameters, those of a model that is alike in all else."""
-        return self._with_the_same_fit(about=replace(self.about, model=model))
-
-    def _with_the_same_fit(self, **changes: Any) -> Linearized:
+    def alike(self, **changes: Any) -> Linearized:
         """The same but for what does not change the whitened rows of the fit, which are not made again."""
         found = replace(self, **changes)
         vars(found).update({"_fitted": self._fitted})
@@ -141,18 +134,12 @@ class Linearized:
         return rows, line.conditions
 
     @property
-    def declared_rows(self) -> WhiteRows:
-        """Whitened rows without candidates."""
-        return self._fitted[0]
-
-    @property
     def rows(self) -> WhiteRows:
         """Whitened rows, candidates in the order of the units."""
         rows, conditions = self._fitted
-        effects: list[tuple[Displacing, Shapes]] = []
-        effects += [(candidate, each) for candidate, shapes in self.tried.values() for each in shapes]
-        effects += [(law, ()) for law in self.against]
-        laws = [law for effect, shapes in effects for law in effect.displacement(conditions, *shapes)]
+        tried = [(candidate, each) for candidate, shapes in self.tried.values() for each in shapes]
+        laws = [law for candidate, shapes in tried for law in candidate.displacement(conditions, *shapes)]
+        laws += [law for against in self.against for law in against.displacement(conditions)]
         sizes = np.concatenate([unit.sizes for unit in self.units])
         displacements = Displacements.of(laws, sizes, len(self.observations.states))
         return replace(rows, candidates=replace(rows.candidates, displacements=displacements))
@@ -254,27 +241,25 @@ def shapes_tried(candidate: Candidate, fitted: Fit) -> list[Shapes]:
     return [(float(value),) for value in values]
 
 
-def shapes_looked_at_closely(problem: Problem, alone: np.ndarray) -> dict[str, list[Shapes]]:
-    """Values of the shapes of the best candidates, by their keys, closer to each other about the best value of each.
+def looked_at_closely(line: Linearized, alone: np.ndarray) -> Linearized:
+    """The same with more shapes of the best candidates, closer to each other about the best value of each.
 
-    `alone` (number of units,): log Bayes factor of each unit alone. Returns empty where no shape matters.
+    `alone` (number of units,): log Bayes factor of each unit alone. Returns itself where no shape matters.
     """
-    units = problem.units
-    odds = alone + [problem.prior.log_odds_of([unit]) for unit in units]
-    found: dict[str, list[Shapes]] = {}
-    for number in np.argsort(-odds):
-        unit = units[number]
-        near = odds[number] > odds.max() - _NEAR_THE_BEST and alone[number] > _WORTH_A_LOOK
-        if near and unit.shapes and unit.candidate and unit.candidate.key not in found:
-            (shape,), (best,) = unit.candidate.shapes, unit.shapes
-            tried = sorted(other.shapes[0] for other in units if other.candidate and other.candidate.key == unit.candidate.key)
-            place = tried.index(best)
-            below, above = [shape.lowest, *tried][place], [*tried, shape.highest][place + 1]
+    units, tried = line.problem.units, dict(line.tried)
+    odds = alone + [line.problem.prior.log_odds_of([unit]) for unit in units]
+    near = (odds > odds.max() - _NEAR_THE_BEST) & (alone > _WORTH_A_LOOK) if len(units) else []
+    for unit in (units[number] for number in np.argsort(-odds) if near[number]):
+        if unit.shapes and unit.candidate and tried[unit.candidate.key] is line.tried[unit.candidate.key]:
+            (shape,), (best,), key = unit.candidate.shapes, unit.shapes, unit.candidate.key
+            known = sorted(each.shapes[0] for each in units if each.candidate and each.candidate.key == key)
+            place = known.index(best)
+            below, above = [shape.lowest, *known][place], [*known, shape.highest][place + 1]
             # The best may lie at an end of the range.
             sides = [edges for edges in ((below, best), (best, above)) if edges[0] < edges[1]]
             closer = [value for edges in sides for value in shape.between(*edges, _SHAPES_CLOSER)]
-            found[unit.candidate.key] = [(float(value),) for value in sorted({*tried, *closer})]
-    return found
+            tried[key] = unit.candidate, [(float(value),) for value in sorted({*known, *closer})]
+    return line if tried == line.tried else line.alike(tried=tried)
 
 
 def lacking(candidate: Candidate, there: frozenset[str], joint_angles: np.ndarray) -> str:
@@ -289,3 +274,45 @@ def lacking(candidate: Candidate, there: frozenset[str], joint_angles: np.ndarra
         if angles < candidate.distinct_angles:
             return f"joint {joint} stood still" if angles == 1 else "too few different angles of a joint"
     return ""
+
+
+def with_probable_centres(part: Kept, settings: Settings) -> Kept:
+    """The kept part of a case, fitted with the prior of its centres of mass that is more probable; itself without masses.
+
+    Most robot files state centres of mass as well as masses; of some nobody ever asked. Priors as wide as the links' girth for
+    all robots would hide a payload, narrow ones would take a centre off its link for one. So both are hypotheses, equally
+    probable beforehand, and the measurements choose by the evidence of each, whatever single mechanism may be beside it.
+
+    `part`: with the wide prior.
+    """
+    stated = with_stated_centres(part.declared.model)
+    if stated is part.declared.model:
+        return part
+    line = linearized(part.declared, part.searched, list(part.case.candidates.values()), settings)
+    lines = [line, line.alike(about=replace(line.about, model=stated))]
+    wide, narrow = (_log_evidence(each, products_of(each._fitted[0], *each.priors)) for each in lines)
+    # A prior that is better without any mechanism is not worse with one, for a mechanism explains what it leaves.
+    if wide > narrow:
+        wide, narrow = (_log_evidence(each, each.products, each.problem) for each in lines)
+        if wide > narrow:
+            return part
+    fitted = fit(stated, part.searched, part.noise, part.declared.estimate, reweighted=True)
+    return replace(part, case=replace(part.case, model=with_stated_centres(part.case.model)), declared=fitted)
+
+
+def with_stated_centres(model: Model) -> Model:
+    """A declared model whose first moments are known as well as the robot file says; itself without declared masses."""
+    weight = next((effect for effect in model.effects if effect.effect == DECLARED_WEIGHT), None)
+    if weight is None:
+        return model
+    stated = replace(weight, parameters=tuple(replace(p, prior_std=p.plausible) for p in weight.parameters))
+    return replace(model, effects=tuple(stated if effect is weight else effect for effect in model.effects))
+
+
+def _log_evidence(line: Linearized, products: Products, problem: Problem | None = None) -> float:
+    """Of the measurements, up to what any prior of the declared parameters shares; with none or one mechanism of a problem."""
+    if problem is None:
+        problem = Problem(statistics_of(products, line.pose_errors_rad), (), Prior({}, {}), line.settings)
+    of_declared = np.linalg.slogdet(products.into_basis)[1] - np.log(line.priors[0]).sum()
+    met = np.array(list(problem.started.met.values()))
+    return float(of_declared + problem.started.empty.log_evidence + log_sum_exp(met))

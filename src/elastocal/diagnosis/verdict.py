@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.diagnosis.averaging import squares_beyond
 from elastocal.diagnosis.hypotheses import OTHER
+from elastocal.diagnosis.refit import squares_beyond
 from elastocal.fitting.displacement import joint_compliances
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.diagnosis.averaging import squares_explained
 from elastocal.diagnosis.diagnose import diagnose
+from elastocal.diagnosis.refit import squares_explained
 from elastocal.diagnosis.settings import Settings
 from elastocal.errors import InputError
 from elastocal.fitting.tolerances import estimated_noise, fit_declared
