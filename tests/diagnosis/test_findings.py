@@ -7,9 +7,9 @@ import pytest
 from planted import planted
 
 from elastocal.data_checks.protocol import Fault, Value
-from elastocal.diagnosis.refit import Averaged
-from elastocal.diagnosis.findings import fault_entry, implausible, location_words, oversized, parameter_entries, sag_entries
 from elastocal.diagnosis.hypotheses import OTHER
+from elastocal.diagnosis.refit import Averaged
+from elastocal.diagnosis.verdict import fault_entry, implausible, location_words, oversized, parameter_entries, sag_entries
 from elastocal.fitting.prediction import predict
 
 WORDS = {

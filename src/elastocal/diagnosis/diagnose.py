@@ -10,8 +10,6 @@ import numpy as np
 from elastocal.counting import counted
 from elastocal.data_checks.protocol import Fault, faults
 from elastocal.data_checks.warnings import fitted_compliance_warnings
-from elastocal.diagnosis import findings
-from elastocal.diagnosis.findings import Evidence
 from elastocal.diagnosis.gross_errors import Deviations, entries_of, gross_errors, warnings_of
 from elastocal.diagnosis.kept_rows import Kept, first_kept, fitted_to
 from elastocal.diagnosis.linearize import linearized, looked_at_closely, with_probable_centres
@@ -35,9 +33,15 @@ from elastocal.diagnosis.verdict import (
     NOT_TESTABLE,
     SEVERAL,
     UNEXPLAINED,
+    Evidence,
     concluded,
     contradictions,
+    effect_entries,
+    fault_entry,
+    implausible,
+    oversized,
     pose_error_warnings,
+    probability_facts,
     remainder_sentences,
     scatter_warnings,
     with_related,
@@ -151,7 +155,7 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         if part.searched is not case.observations:
             final = fit(final.model, case.observations, final.noise, final.estimate, reweighted=True)
         named, verdict = found.conclusion.best.named, found.conclusion.verdict
-        found = replace(found, conclusion=with_related(found.conclusion, findings.oversized(final, named)))
+        found = replace(found, conclusion=with_related(found.conclusion, oversized(final, named)))
         if not found.adopted:
             steps[-1] = replace(steps[-1], fitted=_with_noise_left(case, declared, found) if named else final)
         lost = _losses(bare, [steps[-1].fitted, *([final] if found.adopted else [])], case.observations, settings)
@@ -303,7 +307,7 @@ def _document(
     springs, tested = Averaged({}, {}), set[str]()
     stated: dict[str, Any] = {
         "verdict": NAMED if len(decisive) == 1 else SEVERAL,
-        "effects": [findings.fault_entry(fault) for fault in decisive],
+        "effects": [fault_entry(fault) for fault in decisive],
     } | dict.fromkeys(("probabilities", "misfit", "other_models_m"))
     untestable: dict[str, str] = {}
     remarks = [*warnings, *(f"{fault.name}: {fault.detail}" for fault in known if not fault.decisive)]
@@ -316,13 +320,13 @@ def _document(
         owners = [(owner, parameter.name) for owner, parameter in declared.parameters]
         averages = averaged(found.linearized, found.posterior, chosen, owners)
         springs = averages if kept is chosen else averaged(found.linearized, found.posterior, nothing, owners)
-        entries = findings.effect_entries(found, with_effects, averages, case.observations)
+        entries = effect_entries(found, with_effects, averages, case.observations)
         numbers, untestable = found.linearized.products.freedom, found.linearized.untestable
         tested = {unit.candidate.key for unit in problem.units if unit.candidate}
         stated = {
             "verdict": conclusion.verdict,
             "effects": entries,
-            "probabilities": findings.probability_facts(found),
+            "probabilities": probability_facts(found),
             "misfit": {"before": mean_square_left(problem, nothing), "after": mean_square_left(problem, best)},
             # Root mean square by which positions may be elsewhere by other models than the one that is kept.
             "other_models_m": float(np.sqrt(3.0 * other_predictions(problem, found.posterior, kept) / numbers))
@@ -330,7 +334,7 @@ def _document(
         }
         if entries and not found.adopted:
             remarks.append("what was found is too uncertain to make predictions better: the model stays as declared")
-        remarks += findings.implausible(with_effects, entries, case.campaign.robot.payload_kg)
+        remarks += implausible(with_effects, entries, case.campaign.robot.payload_kg)
         if not found.settled:
             often = f"linearised {settings.linearizations} times"
             remarks.append(f"the problem was {often}, and each time another model was found: more may be missing")

@@ -75,15 +75,14 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     errors, part, outside = without_gross_errors(diagnosis, held_out)
     left_out = entries_of(errors, held_out.campaign, held_out=True)
     rows, heldout, warnings = heldout_errors(steps, case, part, outside, seed)
-    of_all = [row["heldout_rms_m"] for row in rows]
-    heldout["with_gross_errors"] = None
+    of_all, heldout["with_gross_errors"] = [row["heldout_rms_m"] for row in rows], None
     if left_out:
         whole = [_summary(error) for error in _errors(steps, case, held_out)[1]]
         of_all = [error["rms_m"] for error in whole]
         heldout["with_gross_errors"] = {"before": whole[_declared(steps)], "after": whole[-1]}
-        without, with_them, count = 1e3 * heldout["after"]["rms_m"], 1e3 * of_all[-1], counted(len(left_out), "gross error")
         warnings.append(
-            f"held-out errors are without {count}: with all rows the RMS is {with_them:.3g} mm instead of {without:.3g} mm"
+            f"held-out errors are without {counted(len(left_out), 'gross error')}: with all rows the RMS is"
+            f" {1e3 * of_all[-1]:.3g} mm instead of {1e3 * heldout['after']['rms_m']:.3g} mm"
         )
     rows = [row | {"heldout_rms_all_rows_m": rms} for row, rms in zip(rows, of_all, strict=True)]
     # By what share each step lowers the held-out RMS.
@@ -119,11 +118,10 @@ def without_gross_errors(diagnosis: Diagnosis, held_out: Case) -> tuple[Deviatio
     its poses lie outside the range of the fitted ones, (P,)."""
     final, measurements = diagnosis.final, held_out.campaign.measurements
     poses = outside_poses(final, diagnosis.case, held_out)
+    part, errors = held_out, Deviations.none(len(measurements), held_out.model.rows)
     if data_at_fault(diagnosis.document):
-        return Deviations.none(len(measurements), held_out.model.rows), held_out, poses
-    part, settings = held_out, Settings()
-    errors = Deviations.none(len(measurements), held_out.model.rows)
-    noise = noise_from(diagnosis.document).of_measurements
+        return errors, part, poses
+    settings, noise = Settings(), noise_from(diagnosis.document).of_measurements
     yardstick = yardstick_of(final, noise, diagnosis.case.campaign.measurements)
     outside = poses[state_clusters(measurements)]
     for _ in range(settings.gross_error_rounds):
@@ -156,22 +154,20 @@ def heldout_errors(
         row: dict[str, Any] = {"step": step.name, "kind": step.kind, "parameters": int((~step.fitted.held).sum())}
         row |= {f"train_{name}": training[name] for name in METRICS}
         for name in METRICS:
-            row |= {f"heldout_{name}": tested[name]}
-            row |= {f"heldout_{name}_low": limit[name][0], f"heldout_{name}_high": limit[name][1]}
-        row |= {f"heldout_{name.removesuffix('_m')}_over_floor": tested[name] / floor for name in METRICS}
-        rows.append(row)
+            low, high = limit[name]
+            row |= {f"heldout_{name}": tested[name], f"heldout_{name}_low": low, f"heldout_{name}_high": high}
+        rows.append(row | {f"heldout_{name.removesuffix('_m')}_over_floor": tested[name] / floor for name in METRICS})
     for name in grown(summary(errors[before].distance), summary(errors[after].distance)):
         low, high = (1e3 * rows[number][f"heldout_{name}"] for number in (before, after))
         warnings.append(f"the {_ERRORS[name]} {ABOUT_ERRORS} grew from {low:.3f} to {high:.3f} mm")
     for last, row in pairwise(rows[before:]):
         if row["heldout_rms_m"] > last["heldout_rms_m"]:
             warnings.append(f"the step '{row['step']}' raised the RMS error {ABOUT_ERRORS}")
-    ends = [_summary(errors[number]) for number in (0, before, after)]
     by_range = errors_by_range({"before": errors[before], "after": errors[after]}, outside)
     heldout = {
-        "uncalibrated": ends[0] | {"reduction_ci95": [of_calibration.low, of_calibration.high]},
-        "before": ends[1],
-        "after": ends[2],
+        "uncalibrated": _summary(errors[0]) | {"reduction_ci95": [of_calibration.low, of_calibration.high]},
+        "before": _summary(errors[before]),
+        "after": _summary(errors[after]),
         "noise_floor_rms_m": None if np.isnan(floor) else floor,
         "reduction_ci95": [reductions[after].low, reductions[after].high],
         "reduction_std_error": reductions[after].std_error,

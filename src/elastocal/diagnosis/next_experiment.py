@@ -38,10 +38,10 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from elastocal.diagnosis.diagnose import Diagnosis
-    from elastocal.diagnosis.findings import Evidence
     from elastocal.diagnosis.hypotheses import Unit
     from elastocal.diagnosis.linearize import Linearized
     from elastocal.diagnosis.search import Model
+    from elastocal.diagnosis.verdict import Evidence
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.noise import Noise
     from elastocal.mechanics.robot import Robot
