@@ -51,8 +51,7 @@ def catalogue():
 
 
 def test_units_of_the_catalogue_have_columns_of_their_own_that_share_out_all(catalogue):
-    tried = [(c, (value,)) for c in catalogue for shape in c.shapes for value in shape.values(3)]
-    tried += [(c, ()) for c in catalogue if not c.shapes]
+    tried = [(c, [(float(value),) for shape in c.shapes for value in shape.values(3)] or [()]) for c in catalogue]
     at_joints = [Law((joint,), cause, 1.0, (), 40) for joint, cause in ((1, OWN), (1, NEIGHBOURS), (2, OWN))]
     laws = [at_joints[0], at_joints[1], Law((), f"{FORCE} shift", 1.0, (), 24), at_joints[2]]
     units = units_of(tried, laws, SETTINGS)
@@ -75,7 +74,7 @@ def test_laws_share_a_location_alike_and_shapes_of_a_law_by_the_part_of_the_rang
     growth = {c.key: c for c in catalogue if c.effect == "thermal_growth"}
     by_temperature, by_time = growth["thermal_growth[temperature]"], growth["thermal_growth[time]"]
     lags = (1000.0, 8000.0, 7900.0, 8100.0)
-    units = units_of([(by_temperature, ()), *((by_time, (lag,)) for lag in lags)], [], SETTINGS)
+    units = units_of([(by_temperature, [()]), (by_time, [(lag,) for lag in lags])], [], SETTINGS)
     found = np.exp([unit.log_prior for unit in units])
     assert by_temperature.location == by_time.location
     assert found[0] == pytest.approx(0.5)
@@ -85,7 +84,7 @@ def test_laws_share_a_location_alike_and_shapes_of_a_law_by_the_part_of_the_rang
 
 def test_plausible_sizes_fall_with_the_order_of_a_harmonic_and_signs_are_those_of_physics(catalogue):
     chosen = [c for c in catalogue if c.effect in ("transmission_harmonic", "stiffening", "base_compliance")]
-    units = units_of([(c, tuple(shape.start for shape in c.shapes)) for c in chosen], [], SETTINGS)
+    units = units_of([(c, [tuple(shape.start for shape in c.shapes)]) for c in chosen], [], SETTINGS)
     for unit, candidate in zip(units, chosen, strict=True):
         orders = np.array([parameter.order for parameter in candidate.parameters])
         expected = [parameter.plausible for parameter in candidate.parameters] * orders**-SETTINGS.harmonic_decay

@@ -68,79 +68,60 @@ class Prior:
     A mechanism is there with a small probability; given that, the number of its locations is geometric and all sets of so many
     locations are equally likely, which allows for their multiplicity (Scott and Berger, Annals of Statistics 2010).
 
-    `log_odds`: of each mechanism. `log_counts` (L + 1,): logarithm of the probability of one given set of k locations of a
-    mechanism that has L, given that it is there.
+    `log_odds` (L + 1,): of each mechanism, which has L locations, those of one given set of k of them against its absence.
     """
 
-    log_odds: dict[str, float]
-    log_counts: dict[str, np.ndarray]
+    log_odds: dict[str, np.ndarray]
 
     def log_odds_of(self, units: Iterable[Unit]) -> float:
         """Logarithm of the prior odds of a model against "nothing"."""
         units = list(units)
-        total = sum(unit.log_prior for unit in units)
-        for mechanism, count in Counter(unit.mechanism for unit in units).items():
-            total += self.log_odds[mechanism] + self.log_counts[mechanism][count]
-        return float(total)
+        counts = Counter(unit.mechanism for unit in units)
+        shares = sum(unit.log_prior for unit in units)
+        return float(shares + sum(self.log_odds[mechanism][count] for mechanism, count in counts.items()))
 
     def added(self, unit: Unit, count: int) -> float:
         """Change of the log prior odds when a unit joins a model that has its mechanism at `count` locations."""
-        counts = self.log_counts[unit.mechanism]
-        change = counts[count + 1] - counts[count] if count else self.log_odds[unit.mechanism] + counts[1]
-        return unit.log_prior + change
+        odds = self.log_odds[unit.mechanism]
+        return unit.log_prior + float(odds[count + 1] - odds[count])
 
 
 def prior_of(units: Sequence[Unit], settings: Settings) -> Prior:
     """Prior of all models that units can form."""
-    odds: dict[str, float] = {}
-    counts: dict[str, np.ndarray] = {}
-    special = {"link_weight": settings.gravity_probability, OTHER: settings.other_probability}
+    special, found = {"link_weight": settings.gravity_probability, OTHER: settings.other_probability}, dict[str, np.ndarray]()
     for mechanism in dict.fromkeys(unit.mechanism for unit in units):
-        odds[mechanism] = float(logit(special.get(mechanism, settings.mechanism_probability)))
         locations = len({unit.place for unit in units if unit.mechanism == mechanism})
         numbers = np.arange(1, locations + 1)
         geometric = numbers * np.log(settings.further_location)
         sets = gammaln(locations + 1) - gammaln(numbers + 1) - gammaln(locations - numbers + 1)
-        counts[mechanism] = np.concatenate([[0.0], geometric - logsumexp(geometric) - sets])
-    return Prior(odds, counts)
+        there = logit(special.get(mechanism, settings.mechanism_probability))
+        found[mechanism] = np.append(0.0, there + geometric - logsumexp(geometric) - sets)
+    return Prior(found)
 
 
-def units_of(tested: Sequence[tuple[Candidate, Sequence[float]]], laws: Sequence[Law], settings: Settings) -> tuple[Unit, ...]:
-    """Units of candidates and of the competitor's laws, numbered in the order of their columns.
-
-    `tested` (Candidate, sequence of float): with shape values.
-    """
-    start = 0
-    units: list[Unit] = []
-    tried: dict[str, tuple[Candidate, list[tuple[float, ...]]]] = {}
-    for candidate, shapes in tested:
-        tried.setdefault(candidate.key, (candidate, []))[1].append(tuple(float(shape) for shape in shapes))
-    variants = Counter((candidate.effect, candidate.location) for candidate, _ in tried.values())
-    shares = {key: _shares_of_shapes(*values) for key, values in tried.items()}
-    for candidate, shapes in tested:
-        values = tuple(float(shape) for shape in shapes)
-        log_share = float(np.log(shares[candidate.key][values] / variants[candidate.effect, candidate.location]))
-        columns = np.arange(start, start + len(candidate.parameters))
+def units_of(
+    tried: Iterable[tuple[Candidate, Sequence[tuple[float, ...]]]], laws: Sequence[Law], settings: Settings
+) -> tuple[Unit, ...]:
+    """Units of candidates, with values of their shapes, and of the competitor's laws, in the order of their columns."""
+    start, units, tried = 0, list[Unit](), list(tried)
+    variants = Counter((candidate.effect, candidate.location) for candidate, _ in tried)
+    for candidate, values in tried:
         sizes = np.array([p.plausible * p.order**-settings.harmonic_decay for p in candidate.parameters])
         signs = np.array([parameter.sign for parameter in candidate.parameters])
         largest = bisect_right(settings.scales, min((p.most for p in candidate.parameters), default=np.inf)) - 1
-        units.append(
-            Unit(candidate.effect, candidate.location, candidate, values, columns, sizes, signs, log_share, largest=largest)
-        )
-        start += len(columns)
+        # Of the range of what bends a candidate, each shape has the part nearest to it.
+        shares = np.ones(1) if len(values) == 1 else candidate.shapes[0].shares([value for (value,) in values])
+        for shapes, log_share in zip(values, np.log(shares / variants[candidate.effect, candidate.location]), strict=True):
+            columns = np.arange(start, start + len(sizes))
+            law = candidate.effect, candidate.location, candidate, shapes, columns, sizes, signs
+            units.append(Unit(*law, float(log_share), largest=largest))
+            start += len(sizes)
     kinds = Counter((bool(law.location), law.name) for law in laws)
     for law in laws:
-        count = law.features
         # Kinds of laws are equally likely, and of each its locations.
         log_share = float(np.log(len(laws) / len(kinds) / kinds[bool(law.location), law.name]))
-        whole = np.arange(start, start + count), np.ones(count), np.zeros(count, int)
+        whole = np.arange(start, start + law.features), np.ones(law.features), np.zeros(law.features, int)
         units.append(Unit(OTHER, law.location, None, (), *whole, log_share, law=law, largest=len(settings.scales) - 1))
-        start += count
+        start += law.features
     require_unique([unit.key for unit in units])
     return tuple(units)
-
-
-def _shares_of_shapes(candidate: Candidate, values: Sequence[tuple[float, ...]]) -> dict[tuple[float, ...], float]:
-    """Prior share of each shape of a candidate: of the range of what bends it, the part nearest to it."""
-    shares = np.ones(1) if len(values) == 1 else candidate.shapes[0].shares([value for (value,) in values])
-    return dict(zip(values, shares.tolist(), strict=True))

@@ -96,8 +96,7 @@ class Linearized:
     @cached_property
     def units(self) -> tuple[Unit, ...]:
         """Of candidates and competitors, in the order of their columns."""
-        tested = [(candidate, shapes) for candidate, values in self.tried.values() for shapes in values]
-        return units_of(tested, self.against, self.settings)
+        return units_of(self.tried.values(), self.against, self.settings)
 
     @property
     def priors(self) -> tuple[np.ndarray, np.ndarray]:
@@ -312,7 +311,7 @@ def with_stated_centres(model: Model) -> Model:
 def _log_evidence(line: Linearized, products: Products, problem: Problem | None = None) -> float:
     """Of the measurements, up to what any prior of the declared parameters shares; with none or one mechanism of a problem."""
     if problem is None:
-        problem = Problem(statistics_of(products, line.pose_errors_rad), (), Prior({}, {}), line.settings)
+        problem = Problem(statistics_of(products, line.pose_errors_rad), (), Prior({}), line.settings)
     of_declared = np.linalg.slogdet(products.into_basis)[1] - np.log(line.priors[0]).sum()
     met = np.array(list(problem.started.met.values()))
     return float(of_declared + problem.started.empty.log_evidence + log_sum_exp(met))
