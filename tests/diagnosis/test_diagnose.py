@@ -12,7 +12,6 @@ from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.next_experiment import propose
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.displacement import joint_compliances
 from elastocal.loop.whole import cases_in
 
 OFFSET = 1e-3
@@ -91,19 +90,6 @@ def test_steps_go_from_the_frames_alone_to_the_springs_to_the_effect(diagnosis):
     assert diagnosis.declared is diagnosis.steps[1].fitted and diagnosis.final is diagnosis.steps[2].fitted
     size = diagnosis.final.estimate.coefficients[-1][0]
     assert size == pytest.approx(OFFSET, abs=4 * np.sqrt(diagnosis.final.covariance[-1, -1]))
-
-
-def test_compliances_before_and_after_are_those_of_the_fits_in_microradians(diagnosis):
-    facts = diagnosis.document["compliance_urad_per_Nm"]
-    declared, final = diagnosis.declared, diagnosis.final
-    np.testing.assert_allclose(facts["before"], 1e6 * joint_compliances(declared.model, declared.estimate))
-    error = np.array(facts["std_error"])
-    # What is averaged over the models is within its own standard error of the one that is fitted.
-    after = 1e6 * joint_compliances(final.model, final.estimate)
-    assert (np.abs(facts["after"] - after) <= error).all() and (error > 0).all()
-    # With a prior of ten times what such a joint has: of some the loads of a pull tell nothing.
-    usual = np.array([final.parameters[n][1].plausible for n in final.places_of("joint_compliance")])
-    assert facts["identifiable"] == (error < 1e6 * usual).tolist() and any(facts["identifiable"])
 
 
 def faults(*decisive):

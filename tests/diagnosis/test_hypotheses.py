@@ -80,15 +80,3 @@ def test_laws_share_a_location_alike_and_shapes_of_a_law_by_the_part_of_the_rang
     assert found[0] == pytest.approx(0.5)
     np.testing.assert_allclose(found[1:], 0.5 * by_time.shapes[0].shares(lags))
     assert found[2] < 0.1 * found[1] and found[3] > 5 * found[2]
-
-
-def test_plausible_sizes_fall_with_the_order_of_a_harmonic_and_signs_are_those_of_physics(catalogue):
-    chosen = [c for c in catalogue if c.effect in ("transmission_harmonic", "stiffening", "base_compliance")]
-    units = units_of([(c, [tuple(shape.start for shape in c.shapes)]) for c in chosen], [], SETTINGS)
-    for unit, candidate in zip(units, chosen, strict=True):
-        orders = np.array([parameter.order for parameter in candidate.parameters])
-        expected = [parameter.plausible for parameter in candidate.parameters] * orders**-SETTINGS.harmonic_decay
-        np.testing.assert_allclose(unit.sizes, expected)
-        assert unit.signs.tolist() == [parameter.sign for parameter in candidate.parameters]
-    assert max(unit.sizes.max() / unit.sizes.min() for unit in units) > 1.1
-    assert any(unit.signs.any() for unit in units)

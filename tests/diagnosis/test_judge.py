@@ -114,31 +114,6 @@ def test_a_step_that_makes_predictions_worse_is_a_warning(made):
     assert said[-1] == "the step 'with joint_offset' raised the RMS error of the validation poses"
 
 
-def test_poses_outside_the_fitted_range_are_counted_flagged_and_warned_of(made):
-    """A whole turn brings the joint out of its range and the target nowhere else."""
-    case, held_out, steps = made
-    observations, measurements = held_out.observations, held_out.campaign.measurements
-    first = observations.states.pose.min()
-
-    def turned(states):
-        away = 2.0 * np.pi * (states.pose == first)[:, None] * (np.arange(case.campaign.robot.joints) == 2)
-        return replace(states, joint_angles=states.joint_angles + away)
-
-    moved = replace(observations, states=turned(observations.states))
-    campaign = replace(held_out.campaign, measurements=turned(measurements))
-    away = replace(held_out, observations=moved, campaign=campaign)
-    found = judged(steps, case, away)
-    beyond, poses = found.document["heldout"]["outside_range"], found.document["heldout"]["poses"]
-    assert 1 <= beyond["poses"] < poses
-    assert max(beyond[where]["after"]["rms_m"] for where in ("outside", "inside")) < 1e-3
-    assert found.document["gross_errors"] == []
-    assert f"{beyond['poses']} of {poses} validation poses lie outside" in found.document["warnings"][-1]
-    training, unseen = blocks_of(diagnosis_of(case, steps), away)
-    assert not training["outside_range"].any()
-    assert unseen["outside_range"][unseen["pose"] == first].all()
-    assert len(np.unique(unseen["pose"][unseen["outside_range"]])) == beyond["poses"]
-
-
 def test_splits_stand_beside_the_held_out_errors(made):
     case, held_out, steps = made
     rows = split_table(diagnosis_of(case, steps), held_out, 1)
@@ -164,14 +139,3 @@ def test_a_remainder_is_judged_where_the_campaign_asks_for_one_and_the_data_are_
     assert facts["physics"] + facts["regression_share"] + facts["left"] == pytest.approx(1.0)
     faulty = asked.document | {"effects": [asked.document["effects"][0] | {"family": "data"}]}
     assert judge(replace(asked, document=faulty), held_out, 1).document["remainder"] is None
-
-
-def test_held_out_poses_that_repeat_fitted_configurations_are_warned_of(made):
-    """At the angles of training poses: whatever the errors are, they say nothing of other poses."""
-    case, held_out, steps = made
-    states, fitted = held_out.observations.states, case.observations.states
-    assert not any("repeat configurations" in warning for warning in judged(steps, case, held_out).document["warnings"])
-    again = fitted.joint_angles[np.searchsorted(np.unique(states.pose), states.pose)] + 1e-3
-    repeating = replace(held_out, observations=replace(held_out.observations, states=replace(states, joint_angles=again)))
-    said = [warning for warning in judged(steps, case, repeating).document["warnings"] if "repeat configurations" in warning]
-    assert len(said) == 1 and said[0].startswith(f"all {len(np.unique(states.pose))} validation poses")

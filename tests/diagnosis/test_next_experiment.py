@@ -11,7 +11,7 @@ from planted import planted, two_loads_a_pose
 from scipy.stats import norm
 
 from elastocal.campaigns.campaign import Target
-from elastocal.diagnosis import next_experiment, verdict
+from elastocal.diagnosis import next_experiment
 from elastocal.diagnosis.linearize import linearized
 from elastocal.diagnosis.next_experiment import (
     DATA_AT_FAULT,
@@ -27,7 +27,7 @@ from elastocal.diagnosis.next_experiment import (
 )
 from elastocal.diagnosis.search import Alarm, Model, posterior
 from elastocal.diagnosis.settings import Settings
-from elastocal.diagnosis.verdict import concluded, mechanisms_of_models
+from elastocal.diagnosis.verdict import concluded
 
 SETTINGS = Settings(pose_steps=(0.0, 2.0), other_features=6)
 RAISED = Alarm(0.002, 10.0, True)
@@ -91,22 +91,6 @@ def test_proposal_separates_more_than_random_poses_and_resolves_more(ambiguous, 
         and len(set(columns["effect"])) == 1
         and " or ".join(map(" + ".join, [facts["best"]])) in columns["effect"][0]
     )
-
-
-def test_models_belong_to_the_hypothesis_that_they_state_and_not_to_that_of_their_parts(ambiguous, monkeypatch):
-    """A model of a law beside a smooth error may state one alone, for all models of a hypothesis even."""
-
-    def stated(problem, posterior):
-        return [tuple(f"stated {name}" for name in names) for names in mechanisms_of_models(problem, posterior)]
-
-    monkeypatch.setattr(verdict, "mechanisms_of_models", stated)
-    monkeypatch.setattr(next_experiment, "mechanisms_of_models", stated)
-    evidence = ambiguous.evidence
-    hypotheses = verdict.hypotheses_of(evidence.linearized.problem, evidence.posterior)
-    conclusion = replace(evidence.conclusion, hypotheses=hypotheses, best=hypotheses[0])
-    found = SimpleNamespace(**vars(ambiguous) | {"evidence": SimpleNamespace(**vars(evidence) | {"conclusion": conclusion})})
-    facts = propose(found, np.random.default_rng(0), 4)[1]
-    assert {*facts["best"], *facts["nearest"]} <= {f"stated {name}" for name in ELASTIC}
 
 
 def test_of_an_exact_alias_no_pose_is_asked_for(kuka):

@@ -9,7 +9,6 @@ from support import SEVEN_JOINTS, robot_of
 from synthetic import conditions_on, made_states
 
 from elastocal.diagnosis.other import BASE_M, BASE_RAD, FORCE, JOINT_RAD, NEIGHBOURS, OWN, PLACE, TIME, UNDER_LOAD, laws_of
-from elastocal.effects.conditions import at_states
 
 FEATURES = 40
 OF_JOINTS = [f"{cause}{load}" for cause in (OWN, NEIGHBOURS, TIME) for load in ("", UNDER_LOAD)]
@@ -108,11 +107,3 @@ def test_a_law_goes_by_its_own_cause_alone(joint, law, what):
     chosen = ((joint,), law) if joint else ((), f"{law} shift")
     one, other = (waves(displacements(each, chosen, states)) for each in (states, moved))
     assert (np.abs(one - other).max() > 0.02 * min(JOINT_RAD, BASE_M)) == (what in DEPENDS[joint, law])
-
-
-@EVERY
-def test_it_is_the_same_function_of_some_of_the_states(law):
-    """Normalised by the campaign: what is made in parts is what is made at once."""
-    states = around()
-    part = waves(displacements(at_states(states, slice(10, 25)), law, states))
-    np.testing.assert_allclose(part, waves(displacements(states, law))[:, 10:25], rtol=0, atol=1e-12 * JOINT_RAD)

@@ -22,7 +22,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import lapack, solve_triangular
+from scipy.linalg import solve_triangular
 from scipy.special import log_ndtr
 
 if TYPE_CHECKING:
@@ -184,11 +184,10 @@ def added_evidence(
 
 @dataclass(frozen=True)
 class Evaluated:
-    """A model with its evidence.
+    """A model with its evidence, averaged over sizes and tau.
 
-    `log_evidence`: averaged over sizes and tau. `scales` (m,): most probable size of each unit. `log_pose` (T,): log posterior
-    weight of each tau at these sizes. `without` (m,): log evidence of the model without each of its units, the sizes of the
-    others as they are.
+    `scales` (m,): most probable size of each unit. `log_pose` (T,): log posterior weight of each tau at these. `without` (m,):
+    log evidence of the model without each of its units, the sizes of the others as they are.
     """
 
     log_evidence: float
@@ -248,31 +247,6 @@ def _ascended(statistics: Statistics, present: Joint, profiles: np.ndarray) -> J
     return None
 
 
-# Above so many columns LAPACK's inverse of positive matrices, called for each of them, costs less than all of numpy's together.
-_MANY_COLUMNS = 30
-
-
-def inverses(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Invert symmetric positive matrices.
-
-    `matrices` (T, D, D). Returns `inverses` (T, D, D); `log_determinants` (T,).
-    """
-    if matrices.shape[1] < _MANY_COLUMNS:
-        factors = np.linalg.cholesky(matrices)
-        return np.linalg.inv(matrices), 2.0 * np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
-    found, log_dets = np.empty_like(matrices), np.empty(len(matrices))
-    for number, matrix in enumerate(matrices):
-        # The transpose is laid out as LAPACK wants it.
-        factor, failed = lapack.dpotrf(matrix.T, lower=0, clean=1)
-        if failed:
-            raise np.linalg.LinAlgError("a matrix that is not positive definite")
-        log_dets[number] = 2.0 * np.log(np.diag(factor)).sum()
-        upper = lapack.dpotri(factor, lower=0, overwrite_c=1)[0]
-        np.add(upper, upper.T, out=found[number])
-        np.fill_diagonal(found[number], np.diag(upper))
-    return found, log_dets
-
-
 class Joint:
     """Density of the measurements under one model with one size for each unit.
 
@@ -288,7 +262,8 @@ class Joint:
         signs = np.concatenate([np.zeros(0, int), *(unit.signs for unit in units)])
         self.starts = np.concatenate([[0], np.cumsum([len(unit.columns) for unit in units], dtype=int)])
         deviations = np.repeat(self.scales, np.diff(self.starts))
-        self.covariance, self.log_det = inverses(_with_priors(statistics.gram, columns, deviations))
+        inner = _with_priors(statistics.gram, columns, deviations)
+        self.covariance, self.log_det = np.linalg.inv(inner), np.linalg.slogdet(inner)[1]
         along = deviations * statistics.along[:, columns]
         self.mean = (self.covariance @ along[..., None])[..., 0]
         self.squares = statistics.squares - (along * self.mean).sum(axis=1)

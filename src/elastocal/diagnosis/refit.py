@@ -18,9 +18,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import solve
 
-from elastocal.diagnosis.evidence import Joint, inverses
+from elastocal.diagnosis.evidence import Joint
 from elastocal.diagnosis.search import UNLIKELY, Model, Posterior, Problem
 from elastocal.diagnosis.statistics import Statistics, normal_equations
 from elastocal.fitting.least_squares import fit
@@ -205,12 +204,8 @@ def _likely(posterior: Posterior, best: Model) -> list[tuple[Model, float]]:
 
 def squares_explained(problem: Problem, model: Model) -> dict[str, float]:
     """Sum of squares of the whitened displacements that each mechanism of a model makes, dict of str to float."""
-    coefficients, gram = _predicted(problem, model), problem.statistics.gram[0]
-    columns: dict[str, list[np.ndarray]] = {}
-    for unit in (problem.units[number] for number in model.units):
-        columns.setdefault(unit.mechanism, []).append(unit.columns)
-    found = {mechanism: np.concatenate(mine) for mechanism, mine in columns.items()}
-    return {mechanism: float(coefficients[at] @ gram[np.ix_(at, at)] @ coefficients[at]) for mechanism, at in found.items()}
+    mechanisms = dict.fromkeys(problem.units[number].mechanism for number in model.units)
+    return {mechanism: squares_beyond(problem, model, {mechanism})[0][0] for mechanism in mechanisms}
 
 
 def squares_beyond(problem: Problem, model: Model, mechanisms: Collection[str]) -> list[tuple[float, float]]:
@@ -229,7 +224,7 @@ def squares_beyond(problem: Problem, model: Model, mechanisms: Collection[str]) 
         made = gram[:, ours] @ coefficients[ours]
         whole = float(coefficients[ours] @ made[ours])
         inner = gram[np.ix_(rest, rest)] + np.diag(deviations[~inside] ** -2.0)
-        found.append((whole, whole - float(made[rest] @ solve(inner, made[rest], assume_a="pos", check_finite=False))))
+        found.append((whole, whole - float(made[rest] @ np.linalg.solve(inner, made[rest]))))
     return found
 
 
@@ -251,7 +246,7 @@ def _moments(
     information = equations[np.ix_(chosen, chosen)].copy()
     places = np.arange(declared, len(chosen))
     information[places, places] += deviations**-2.0
-    (inverse,), _ = inverses(information[None])
+    inverse = np.linalg.inv(information)
     covariance, mean = inverse * max(mean_square_left(problem, model), 1.0), inverse @ equations[chosen, -1]
     # Declared parameters from the orthonormal basis, less what the candidates' columns have in it.
     back = products.into_basis @ np.concatenate([np.eye(declared), -products.projected[:, columns]], axis=1)

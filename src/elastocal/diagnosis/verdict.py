@@ -246,35 +246,27 @@ def contradictions(final: Fit, measured: Noise, settings: Settings) -> list[str]
 
 def remainder_sentences(left: Repeatable | None) -> list[str]:
     """A sentence where what a model leaves is a function of the joints, so that no verdict covers it."""
-    if left is None or not left.remains:
-        return []
-    size, error = 1e6 * left.rms_m, 1e6 * left.rms_std_error_m
-    return [f"{size:.0f} ± {error:.0f} µm RMS of what is left are a function of the joint angles and have no name"]
+    words = "µm RMS of what is left are a function of the joint angles and have no name"
+    return [f"{1e6 * left.rms_m:.0f} ± {1e6 * left.rms_std_error_m:.0f} {words}"] if left and left.remains else []
 
 
 def scatter_warnings(left: Noise, measured: Noise, least: float) -> list[str]:
     """A sentence where a model leaves at least so many times the noise that was measured or declared."""
     factor = left.position_m / measured.position_m
-    if factor < least:
-        return []
     reference = "their repeats about each other" if measured.source == "repeats" else "the noise that is declared for them"
-    return [f"measurements scatter about the model {factor:.{0 if factor > 10 else 1}f} times as much as {reference}"]
+    words = f"measurements scatter about the model {factor:.{0 if factor > 10 else 1}f} times as much as {reference}"
+    return [words] if factor >= least else []
 
 
 def pose_error_warnings(left: Noise, least_rad: float) -> list[str]:
     """A sentence where measurements of a pose have at least such an error in common."""
-    if left.pose_rad < least_rad:
-        return []
-    return [
-        f"measurements of a pose err together as if every joint were {1e6 * left.pose_rad:.0f} µrad off, which repeats of a"
-        " pose do not show: new poses will err as much"
-    ]
+    words = f"measurements of a pose err together as if every joint were {1e6 * left.pose_rad:.0f} µrad off, which repeats of a"
+    return [f"{words} pose do not show: new poses will err as much"] if left.pose_rad >= least_rad else []
 
 
 def location_words(mechanism: str, location: Sequence[int | str]) -> str:
     """A location of a unit in words: joint 2, links 2 and 3, joint 4 orders 1-2."""
-    joints = [str(entry) for entry in location if not isinstance(entry, str)]
-    names = [entry for entry in location if isinstance(entry, str)]
+    joints, names = ([str(each) for each in location if isinstance(each, str) == named] for named in (False, True))
     # Numbers count joints, or links, which begin at the joint of the same number.
     part = getattr(effects().get(mechanism), "part", "joint")
     where = f"{plural(part, len(joints))} {' and '.join(joints)}" if joints else ""
