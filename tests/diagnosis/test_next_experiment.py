@@ -200,17 +200,8 @@ def test_alternatives_are_the_posteriors_of_dense_generalized_least_squares_at_t
         assert (found.name, found.columns.tolist()) == (name, [*range(declared), *at])
 
 
-def alternative(columns, mean, precision, name="h0", weight=1.0, signs=None):
-    signs = np.zeros(len(columns), int) if signs is None else np.array(signs)
-    return Alternative((name,), np.log(weight), np.array(columns), np.array(mean, float), np.array(precision), signs)
-
-
-def test_coefficients_have_the_sign_that_physics_gives_wherever_one_in_sixteen_draws_does():
-    drawn = alternative([0, 1], [0, 0], np.eye(2), signs=[1, -1]).drawn(200, np.random.default_rng(0))
-    np.testing.assert_allclose(drawn.mean(axis=0), np.sqrt(2 / np.pi) * np.array([1, -1]), rtol=0.15)
-    assert (drawn[:, 0] > 0).all() and (drawn[:, 1] < 0).all()
-    # Where none does, they are as the measurements have them.
-    assert (alternative([0], [-20], np.eye(1), signs=[1]).drawn(3, np.random.default_rng(0)) < 0).all()
+def alternative(columns, mean, precision, name="h0", weight=1.0):
+    return Alternative((name,), np.log(weight), np.array(columns), np.array(mean, float), np.array(precision))
 
 
 def test_misfits_are_log_densities_of_measurements_written_out_on_average_and_with_their_noise():

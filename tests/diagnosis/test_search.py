@@ -9,8 +9,7 @@ import pytest
 from made_problems import made_problem, made_rows, made_unit
 
 from elastocal.diagnosis.evidence import evaluate, log_sum_exp
-from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.diagnosis.other import NEIGHBOURS
+from elastocal.diagnosis.hypotheses import NEIGHBOURS, OTHER
 from elastocal.diagnosis.search import alarm_of, posterior
 from elastocal.diagnosis.settings import Settings
 

@@ -4,8 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from elastocal.diagnosis.hypotheses import OTHER, Unit, prior_of
-from elastocal.diagnosis.other import OWN, Law
+from elastocal.diagnosis.hypotheses import OTHER, OWN, Law, Unit, prior_of
 from elastocal.diagnosis.search import Problem
 from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.statistics import WhiteRows, products_of, statistics_of

@@ -2,6 +2,19 @@
 
 A unit is one candidate of the catalogue with given shape values. Units of one mechanism at one location (joint, link, band of
 orders) that differ in their law are variants, of which a model holds one at most.
+
+A unit of `OTHER` is a competitor for effects that the catalogue does not have: random displacements of a joint or the base.
+A displacement is a random function of a few inputs, an approximate Gaussian process: the principal components over the states
+of a campaign (Karhunen-Loeve) of a sum of random Fourier features (Rahimi and Recht, NIPS 2007) with normal coefficients. Such
+a discrepancy (Kennedy and O'Hagan, JRSS B 2001) should leave to the model what the model explains (Plumlee, JASA 2017): what is
+constant of it, or at a joint straight in its angle, is taken off, for a zero offset, a compliance and a transmission ratio have
+names. What comes with time at a joint begins at nothing, as a zero that slips; what goes by the place of the end keeps its
+constant part. A function of everything at once would fit nothing better than chance does, so that each law has the inputs of
+one cause, as terms of an additive Gaussian process have (Duvenaud et al., NIPS 2011): a joint's own angle, torque and approach;
+the angles of the joints beside it; time and temperature; the load on the base along each of its axes; the place of the end. At
+a joint each acts in proportion to the load or without it: what yields turns nothing that is not loaded, and one law for both
+would be charged for what it does not do. Alone it means that the residual is *unexplained*; beside a mechanism, that a
+*related* one acts. It names nothing and is not used to predict.
 """
 
 from __future__ import annotations
@@ -15,14 +28,48 @@ import numpy as np
 from scipy.special import gammaln, logit, logsumexp
 
 from elastocal.effects.protocol import Candidate, at_shapes, require_unique
+from elastocal.random_streams import stream
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
-    from elastocal.diagnosis.other import Law
     from elastocal.diagnosis.settings import Settings
+    from elastocal.effects.conditions import Conditions
+
+    _Waves = Callable[[Conditions], np.ndarray]
 
 OTHER = "other"
+# Deviations that no machine would hide: joints about an arc minute, the base a tenth of a millimetre and of a milliradian.
+JOINT_RAD, BASE_M, BASE_RAD = 2e-4, 1e-4, 1e-4
+# Length scales of the features in units of the inputs, which are of size one: from smooth to as many waves as poses can show.
+_LENGTH_SCALES = (0.7, 3.0)
+OWN, NEIGHBOURS, TIME, FORCE, PLACE = "own", "neighbours", "time", "force", "place"
+SHIFT, TURN, UNDER_LOAD = "shift", "turn", " under load"
+# Of so many random features the principal components are taken, at a joint as many as the settings say.
+_DRAWN, _BASE_FEATURES = 64, 6
+# Inputs that differ by less, in SI units or of their largest value, differ by rounding.
+_ROUNDING = 1e-9
+_SEED = 2007
+
+
+@dataclass(frozen=True)
+class Law:
+    """Random displacements by one cause at one location, in the shape of a candidate: per unit of their coefficients.
+
+    `location`: joint counted from 1; empty for the base. `name`: distinguishes the laws of one location. `size`: rad or m.
+    `parts` (int, callable): a coordinate that is displaced, and its waves (S, some) by the states. `features`: how many
+    displacements these are.
+    """
+
+    location: tuple[int, ...]
+    name: str
+    size: float
+    parts: tuple[tuple[int, _Waves], ...]
+    features: int
+
+    def displacement(self, around: Conditions) -> list[dict[int, np.ndarray]]:
+        """For each feature a displacement of one coordinate in some states, list of dict of int to ndarray (S,)."""
+        return [{coordinate: self.size * wave} for coordinate, waves in self.parts for wave in waves(around).T]
 
 
 @dataclass(frozen=True)
@@ -125,3 +172,115 @@ def units_of(
         start += law.features
     require_unique([unit.key for unit in units])
     return tuple(units)
+
+
+def laws_of(campaign: Conditions, features: int) -> list[Law]:
+    """Laws of which a campaign has inputs, at each joint and at the base.
+
+    `campaign`: over whose states displacements are the principal ones, and of whose states what has a name is taken off.
+    `features`: at a joint.
+    """
+    sites = campaign.sites
+    whole = [(f" {SHIFT}", BASE_M, list(sites.base[:3])), (f" {TURN}", BASE_RAD, list(sites.base[3:]))]
+    # What bends the ray to a target shifts it one way, wherever a frame that is placed wrongly would shift it every way.
+    along = [(f" {SHIFT} {axis}", BASE_M, [at]) for axis, at in zip("xyz", sites.base[:3], strict=True)]
+    half = _BASE_FEATURES // 2
+    places: list[tuple[tuple[int, ...], str, str, float, list[int], dict[bool, int]]] = [
+        *(
+            ((j + 1,), cause, words, JOINT_RAD, [j], {loaded: features})
+            for j in range(sites.joints)
+            for cause in (OWN, NEIGHBOURS, TIME)
+            for loaded, words in ((False, ""), (True, UNDER_LOAD))
+            if not loaded or np.abs(campaign.total[:, j]).max(initial=0.0) > _ROUNDING
+        ),
+        *(((), FORCE, *motion, {False: half, True: half}) for motion in whole),
+        *(((), TIME, *motion, {False: _BASE_FEATURES}) for motion in whole),
+        *(((), PLACE, *motion, {False: _BASE_FEATURES}) for motion in (*along, whole[1])),
+    ]
+    found = []
+    for location, cause, words, size, coordinates, counts in places:
+        inputs = [_Inputs(campaign, cause, coordinate) for coordinate in coordinates]
+        if any(each.differ.any() for each in inputs):
+            name = f"{cause}{words}"
+            draws = stream(_SEED, f"other {name}", "random Fourier features", location[0] if location else 0)
+            parts = tuple(
+                (each.coordinate, _principal(campaign, each, location, draws, loaded, count, 1.0 / len(counts)))
+                for each in inputs
+                for loaded, count in counts.items()
+            )
+            found.append(Law(location, name, size, parts, sum(counts.values()) * len(inputs)))
+    return found
+
+
+class _Inputs:
+    """What one coordinate goes by, each of size about one in a campaign, without what does not differ there."""
+
+    def __init__(self, campaign: Conditions, cause: str, coordinate: int) -> None:
+        self.cause, self.coordinate = cause, coordinate
+        known = self.plain(campaign)
+        self.center = known.mean(axis=0)
+        self.spread = np.abs(known - self.center).max(axis=0, initial=0.0)
+        self.differ = self.spread > _ROUNDING * np.maximum(np.abs(known).max(axis=0, initial=0.0), 1.0)
+
+    def of(self, around: Conditions) -> np.ndarray:
+        """In some states, ndarray (S, D)."""
+        return (self.plain(around) - self.center)[:, self.differ] / self.spread[self.differ]
+
+    def plain(self, around: Conditions) -> np.ndarray:
+        """In its own units, angles as points of a circle."""
+        at = self.coordinate
+        if self.cause == TIME:
+            known = [each for each in (around.time_s, around.temperature_c, around.progress) if each is not None]
+        elif self.cause == FORCE:
+            known = [around.total[:, at]]
+        elif self.cause == PLACE:
+            known = list(around.motion.position[0])
+        else:
+            joints = slice(at, at + 1) if self.cause == OWN else slice(max(at - 1, 0), at + 2)
+            known = [wave(angle) for angle in around.joint_angles[:, joints].T for wave in (np.cos, np.sin)]
+            known.append(around.total[:, at])
+            if self.cause == OWN and around.approach is not None:
+                known.append(around.approach[:, at])
+        return np.array(known, float).reshape(len(known), len(around.joint_angles)).T
+
+
+def _principal(
+    campaign: Conditions,
+    inputs: _Inputs,
+    location: tuple[int, ...],
+    draws: np.random.Generator,
+    loaded: bool,
+    count: int,
+    variance: float,
+) -> _Waves:
+    """So many principal components (S, count) of random functions of the inputs of such a variance, in proportion to the load
+    or without it, less what has a name in the catalogue."""
+    known = inputs.of(campaign)
+    lengths = np.exp(draws.uniform(*np.log(_LENGTH_SCALES), _DRAWN))
+    frequency, phase = draws.standard_normal((known.shape[1], _DRAWN)) / lengths, draws.uniform(0, 2 * np.pi, _DRAWN)
+    size = np.sqrt(2.0 * variance / _DRAWN) if known.shape[1] else 0.0
+    random = size * np.cos(known @ frequency + phase)
+    straight = inputs.cause in (OWN, NEIGHBOURS) and not loaded
+    angle = campaign.joint_angles[:, inputs.coordinate if straight else 0]
+    # Of what is taken off: the first in time of a joint, or all.
+    first = np.argmin(known[:, -1]) if location and inputs.cause == TIME else slice(None)
+    mean = np.zeros(_DRAWN) if inputs.cause == PLACE else random[first].reshape(-1, _DRAWN).mean(axis=0)
+    center, squares = angle.mean(), ((angle - angle.mean()) ** 2).sum()
+    slope = (angle - center) @ random / squares if straight and squares > _ROUNDING else np.zeros_like(mean)
+    largest = max(np.abs(_load(campaign, location)).max(initial=0.0), _ROUNDING)
+
+    def waves(around: Conditions, random: np.ndarray) -> np.ndarray:
+        found = random - mean
+        if straight:
+            found -= np.outer(around.joint_angles[:, inputs.coordinate] - center, slope)
+        return found * (_load(around, location) / largest)[:, None] if loaded else found
+
+    seen = waves(campaign, random)
+    _, vectors = np.linalg.eigh(seen.T @ seen)
+    axes = vectors[:, ::-1][:, :count]
+    return lambda around: waves(around, size * np.cos(inputs.of(around) @ frequency + phase)) @ axes
+
+
+def _load(around: Conditions, location: tuple[int, ...]) -> np.ndarray:
+    """Torque on the joint, or force on the base, ndarray (S,)."""
+    return around.total[:, location[0] - 1] if location else np.linalg.norm(around.wrench[:, :3], axis=1)

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.special import chdtri
 
-from elastocal.diagnosis import other
 from elastocal.diagnosis.evidence import log_sum_exp
-from elastocal.diagnosis.hypotheses import Prior, Unit, prior_of, units_of
+from elastocal.diagnosis.hypotheses import Law, Prior, Unit, laws_of, prior_of, units_of
 from elastocal.diagnosis.search import Problem, likely_pose_errors, pose_errors_within_reach
 from elastocal.diagnosis.statistics import Products, Statistics, WhiteRows, products_of, statistics_of
 from elastocal.effects.gravity import DECLARED_WEIGHT
@@ -76,7 +75,7 @@ class Linearized:
     tried: dict[str, tuple[Candidate, list[Shapes]]]
     lacking: dict[str, str]
     candidates: frozenset[str]
-    against: list[other.Law]
+    against: list[Law]
     most_pose_error_rad: float
 
     def alike(self, **changes: Any) -> Linearized:
@@ -198,7 +197,7 @@ def linearized(
     there = fitted.model.offered(observations.states)
     why = {candidate.key: lacking(candidate, there, observations.states.joint_angles) for candidate in candidates}
     tried = {c.key: (c, shapes_tried(c, fitted)) for c in candidates if not why[c.key]}
-    against = other.laws_of(around, settings.other_features)
+    against = laws_of(around, settings.other_features)
     missing = {key: reason for key, reason in why.items() if reason}
     return Linearized(fitted, observations, settings, around, tried, missing, frozenset(why), against, most_pose_error_rad)
 

@@ -58,8 +58,8 @@ DATA_AT_FAULT, NOTHING_TESTABLE = "the data are at fault", "the measurements can
 _ENTRIES, _WORK, _MEMORY = 600, 4e9, 5e5
 # Models that stand for the hypotheses; the others hold a few per cent.
 _MODELS, _HYPOTHESES = 12, 8
-# Draws of each model's coefficients for the choice and for the promise; times as many where physics gives signs.
-_DRAWS, PROMISE_DRAWS, _SPARE = 4, 300, 16
+# Draws of each model's coefficients for the choice and for the promise.
+_DRAWS, PROMISE_DRAWS = 4, 300
 # Poses after which nobody goes on: some two days with a tracker.
 _MOST_POSES = 100
 
@@ -138,7 +138,7 @@ class Alternative:
     """A model as it is after the present measurements.
 
     `name`: of its hypothesis. `columns` (d,): of the unknowns that it has. `mean` (U,): of the unknowns; zero for those that it
-    does not have. `precision` (d, d): of its coefficients. `signs` (d,): that physics gives them, 0 where they may have either.
+    does not have. `precision` (d, d): of its coefficients, for which half-normal priors count as normal ones.
     """
 
     name: _Name
@@ -146,14 +146,11 @@ class Alternative:
     columns: np.ndarray
     mean: np.ndarray
     precision: np.ndarray
-    signs: np.ndarray
 
     def drawn(self, count: int, stream: np.random.Generator) -> np.ndarray:
-        """Coefficients from its posterior, those that break no sign first, ndarray (count, U)."""
-        root, spare = np.linalg.inv(np.linalg.cholesky(self.precision)), _SPARE if self.signs.any() else 1
-        some = self.mean[self.columns] + stream.standard_normal((spare * count, len(self.columns))) @ root
-        found = np.repeat(self.mean[None], count, axis=0)
-        found[:, self.columns] = some[np.argsort((some * self.signs < 0.0).any(axis=1), kind="stable")[:count]]
+        """Coefficients from its posterior, ndarray (count, U)."""
+        found, root = np.repeat(self.mean[None], count, axis=0), np.linalg.inv(np.linalg.cholesky(self.precision))
+        found[:, self.columns] += stream.standard_normal((count, len(self.columns))) @ root
         return found
 
 
@@ -162,7 +159,7 @@ def alternatives_of(
 ) -> list[Alternative]:
     """Posterior of the coefficients of each model in the unknowns of some units, in units of `factor` times the noise taken.
 
-    All are taken at the pose error of the first one; half-normal priors count as normal ones but in what is drawn.
+    All are taken at the pose error of the first one.
     """
     problem, products, count = linearized.problem, linearized.products, linearized.products.declared
     total = normal_equations(products, kept[0][1].pose_error_rad)[0] / factor**2
@@ -176,8 +173,7 @@ def alternatives_of(
         precision = total[np.ix_(chosen, chosen)] + np.diag(np.append(0.0 * known, (factor * deviations) ** -2))
         mean = np.zeros(count + len(columns))
         mean[at] = np.linalg.solve(precision, total[chosen, -1])
-        signs = np.concatenate([0 * known, *(problem.units[n].signs for n in model.units)])
-        found.append(Alternative(name, model.log_odds, at, mean, precision, signs))
+        found.append(Alternative(name, model.log_odds, at, mean, precision))
     return found
 
 
@@ -299,38 +295,36 @@ def propose(diagnosis: Diagnosis, stream: np.random.Generator, poses: int = 10) 
         promising = Hypotheses(models, PROMISE_DRAWS, stream)
         # What is distinguishable from the best holds no more probability than is left open where nothing is ambiguous.
         if np.exp(promising.log_priors[0]) >= linearized.settings.credible:
-            return _stated(campaign.robot, best, NOT_DISTINGUISHABLE, indistinguishable=unreachable)
+            return _stated(campaign.robot, best, NOT_DISTINGUISHABLE, unreachable)
         chosen = Hypotheses(models, _DRAWS, stream).best_of(information, poses)
     promised = [promising.promise(total) for total in np.cumsum(information[chosen], axis=0)]
     apart = np.array([separations[1:] for separations, _, _ in promised])
     point = " ".join(dict.fromkeys(target.point for target in diagnosis.final.model.targets))
-    figures = {"separation": apart.min(axis=1), "resolved": np.array([resolved for _, _, resolved in promised])}
-    nearest, entries = promising.names[1 + int(np.argmin(apart[-1]))], (angles[chosen], wrench[chosen])
-    return _stated(campaign.robot, best, "", nearest, unreachable, entries, point, figures)
+    table = angles[chosen], wrench[chosen], point, apart.min(axis=1), np.array([resolved for _, _, resolved in promised])
+    return _stated(campaign.robot, best, "", unreachable, promising.names[1 + int(np.argmin(apart[-1]))], table)
 
 
 def _stated(
     robot: Robot,
     best: _Name,
     reason: str,
-    nearest: _Name = (),
     indistinguishable: Sequence[_Name] = (),
-    entries: Entries | None = None,
-    point: str = "",
-    figures: dict[str, np.ndarray] | None = None,
+    nearest: _Name = (),
+    table: tuple[np.ndarray, np.ndarray, str, np.ndarray, np.ndarray] | None = None,
 ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    angles, wrench = entries or (np.zeros((0, robot.joints)), np.zeros((0, 6)))
-    count, figures = len(angles), figures or {"separation": np.zeros(0), "resolved": np.zeros(0)}
-    reported = robot.reported_angles(angles) if count else angles
+    nothing = np.zeros(0)
+    angles, wrench, point, separation, resolved = table or (np.zeros((0, robot.joints)), np.zeros((0, 6)), "", nothing, nothing)
+    count = len(angles)
     columns = {
         "effect": np.full(count, f"{' + '.join(best)} or {' + '.join(nearest)}"),
         "pose": np.arange(count),
         "point": np.full(count, point),
-        **{f"q{joint + 1}": reported[:, joint] for joint in range(robot.joints)},
+        **{f"q{joint}": angle for joint, angle in enumerate(robot.reported_angles(angles).T, 1)},
         **dict(zip(WRENCH_NAMES, wrench.T, strict=True)),
-        **figures,
+        "separation": separation,
+        "resolved": resolved,
     }
-    last = {name: float(values[-1]) if count else None for name, values in figures.items()}
+    last = {name: float(columns[name][-1]) if count else None for name in ("separation", "resolved")}
     names = {"best": list(best), "nearest": list(nearest), "indistinguishable": [list(name) for name in indistinguishable]}
     return columns, {"poses": count, "reason": reason} | names | last
 
