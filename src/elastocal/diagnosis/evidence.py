@@ -47,10 +47,7 @@ def log_sum_exp(values: np.ndarray, axis: int | tuple[int, ...] | None = None) -
 
 @dataclass(frozen=True)
 class Grid:
-    """Sizes that are averaged over, with the logarithms of their weights.
-
-    `scales`, `log_weights` (S,).
-    """
+    """Sizes that are averaged over, with the logarithms of their weights. `scales`, `log_weights` (S,)."""
 
     scales: np.ndarray
     log_weights: np.ndarray

@@ -11,7 +11,7 @@ from scipy.linalg import lapack, solve_triangular
 from elastocal.diagnosis.evidence import Grid
 from elastocal.diagnosis.gross_errors import beyond_chance, gross_errors, most_by_chance
 from elastocal.diagnosis.linearize import Linearized, linearized
-from elastocal.diagnosis.statistics import WhiteRows, mirror
+from elastocal.diagnosis.statistics import WhiteRows
 from elastocal.fitting.least_squares import evaluated, fit
 from elastocal.fitting.observations import (
     Observations,
@@ -149,7 +149,7 @@ def _precision(covariance: np.ndarray, declared: np.ndarray) -> np.ndarray:
     root = np.linalg.cholesky(covariance)
     basis, _ = _declared_basis(root, declared)
     inverse = lapack.dpotri(root, lower=1)[0]
-    mirror(inverse)
+    inverse = np.tril(inverse) + np.tril(inverse, -1).T
     beside = solve_triangular(root, basis, lower=True, trans="T")
     return inverse - beside @ beside.T
 

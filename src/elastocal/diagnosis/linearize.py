@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from elastocal.diagnosis.evidence import log_sum_exp
-from elastocal.diagnosis.hypotheses import Law, Prior, Unit, laws_of, prior_of, units_of
+from elastocal.diagnosis.hypotheses import Law, Unit, laws_of, units_of
 from elastocal.diagnosis.search import Problem, likely_pose_errors, pose_errors_within_reach
 from elastocal.diagnosis.statistics import Products, Statistics, WhiteRows, products_of, statistics_of
 from elastocal.effects.gravity import DECLARED_WEIGHT
@@ -176,7 +176,7 @@ class Linearized:
         smallest = smallest_shown(statistics, self.units, settings)
         pairs = zip(self.units, smallest.tolist(), strict=True)
         shown = tuple(replace(unit, smallest=number) for unit, number in pairs if number <= unit.largest)
-        return Problem(statistics, shown, prior_of(shown, settings), settings)
+        return Problem(statistics, shown, settings)
 
     @property
     def untestable(self) -> dict[str, str]:
@@ -310,7 +310,7 @@ def with_stated_centres(model: Model) -> Model:
 def _log_evidence(line: Linearized, products: Products, problem: Problem | None = None) -> float:
     """Of the measurements, up to what any prior of the declared parameters shares; with none or one mechanism of a problem."""
     if problem is None:
-        problem = Problem(statistics_of(products, line.pose_errors_rad), (), Prior({}), line.settings)
+        problem = Problem(statistics_of(products, line.pose_errors_rad), (), line.settings)
     of_declared = np.linalg.slogdet(products.into_basis)[1] - np.log(line.priors[0]).sum()
     met = np.array(list(problem.started.met.values()))
     return float(of_declared + problem.started.empty.log_evidence + log_sum_exp(met))

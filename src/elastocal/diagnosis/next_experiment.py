@@ -162,7 +162,7 @@ def alternatives_of(
     All are taken at the pose error of the first one.
     """
     problem, products, count = linearized.problem, linearized.products, linearized.products.declared
-    total = normal_equations(products, kept[0][1].pose_error_rad)[0] / factor**2
+    total = normal_equations(products, kept[0][1].pose_error_rad) / factor**2
     place, known = np.zeros(len(total), int), np.arange(count)
     columns = count + np.concatenate([unit.columns for unit in units])
     place[columns] = np.arange(count, count + len(columns))

@@ -132,7 +132,7 @@ def averaged(linearized: Linearized, posterior: Posterior, best: Model, owners: 
     """
     likely, problem = _likely(posterior, best), linearized.problem
     sizes = {model.pose_error_rad for model, _ in likely}
-    equations = {tau: normal_equations(linearized.products, tau)[0] for tau in sizes}
+    equations = {tau: normal_equations(linearized.products, tau) for tau in sizes}
     # Sizes of the pose error that the best model makes likely, and those of the models that count.
     some, base = problem.statistics, problem.statistics.log_likelihood + problem.log_pose
     if best.units:

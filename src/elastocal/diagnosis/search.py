@@ -20,14 +20,12 @@ from __future__ import annotations
 
 from bisect import bisect
 from collections import Counter
-from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from heapq import nlargest
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from elastocal.diagnosis.evidence import (
     Evaluated,
@@ -39,7 +37,7 @@ from elastocal.diagnosis.evidence import (
     log_sum_exp,
     pose_weights,
 )
-from elastocal.diagnosis.hypotheses import OTHER, Prior, Unit
+from elastocal.diagnosis.hypotheses import OTHER, Prior, Unit, prior_of
 from elastocal.diagnosis.statistics import Products, Statistics, null_draws
 
 if TYPE_CHECKING:
@@ -69,8 +67,12 @@ class Problem:
 
     statistics: Statistics
     units: tuple[Unit, ...]
-    prior: Prior
     settings: Settings
+
+    @cached_property
+    def prior(self) -> Prior:
+        """Of all models that the units can form."""
+        return prior_of(self.units, self.settings)
 
     @cached_property
     def grid(self) -> Grid:
@@ -98,16 +100,14 @@ class Problem:
         place = self.statistics.nearest(model.pose_error_rad)
         inner = deviations[:, None] * self.statistics.gram[place][np.ix_(columns, columns)] * deviations + np.eye(len(columns))
         along = deviations * self.statistics.along[place, columns]
-        factor = cho_factor(inner, lower=True, check_finite=False) if len(along) else None
-        return columns, deviations * cho_solve(factor, along, check_finite=False) if factor else along, place
+        return columns, deviations * np.linalg.solve(inner, along), place
 
 
 @dataclass(frozen=True)
 class Model:
-    """One set of units with its posterior weight.
+    """One set of units, rising, with its posterior log odds against the declared model alone.
 
-    `units`: rising. `log_odds`: posterior log odds against the declared model alone. `scales` (m,): most probable size of each
-    unit. `pose_error_rad`: most probable size of the error common to the measurements of a pose.
+    `scales` (m,), `pose_error_rad`: most probable sizes of each unit, and of the error common to the measurements of a pose.
     """
 
     units: tuple[int, ...]
@@ -118,10 +118,7 @@ class Model:
 
 @dataclass(frozen=True)
 class Posterior:
-    """Models in the order of their probability.
-
-    `probabilities` (M,): "Nothing" among them.
-    """
+    """Models in the order of their probability. `probabilities` (M,): "Nothing" among them."""
 
     models: tuple[Model, ...]
     probabilities: np.ndarray
@@ -133,21 +130,15 @@ class Posterior:
 
 
 def initial_screening(problem: Problem) -> tuple[Model, np.ndarray]:
-    """The declared model alone, and each unit alone against it.
-
-    Returns `log_bayes_factors` (number of units,).
-    """
+    """The declared model alone, and each unit alone against it. Returns `log_bayes_factors` (number of units,)."""
     met, prior = problem.started.met, problem.prior
     single = [met[(number,)] - prior.log_odds_of([unit]) for number, unit in enumerate(problem.units)]
     return problem.started.measured[()], np.array(single)
 
 
 def posterior(problem: Problem, known: Collection[str] = ()) -> Posterior:
-    """Search the models.
-
-    `known`: keys of the candidates of a good model, from which the search starts, too.
-    """
-    searcher, units = problem.started.copy(), problem.units
+    """Search the models. `known`: keys of the candidates of a good model, from which the search starts, too."""
+    searcher, units = _Searcher(problem), problem.units
     # Each mechanism at all its locations, and the model that is known, each with the best variant at each place.
     mechanisms = dict.fromkeys(unit.mechanism for unit in units if unit.mechanism != OTHER)
     starts = [searcher.best_variants(n for n, unit in enumerate(units) if unit.mechanism == name) for name in mechanisms]
@@ -166,9 +157,8 @@ def pose_errors_within_reach(statistics: Statistics, settings: Settings) -> np.n
 
     `statistics`: of the declared model alone. Returns (T,) of bool.
     """
-    weights = evaluate(
-        statistics, [], Grid.of_settings(settings), pose_weights(statistics.pose_error_rad, settings), ()
-    ).log_pose
+    log_pose = pose_weights(statistics.pose_error_rad, settings)
+    weights = evaluate(statistics, [], Grid.of_settings(settings), log_pose, ()).log_pose
     largest = max(np.flatnonzero(weights > weights.max() + UNLIKELY)[-1], np.argmax(weights) + _REACH)
     return np.arange(len(weights)) <= largest
 
@@ -198,8 +188,7 @@ class _Searcher:
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        self.statistics, self.log_pose = problem.statistics, problem.log_pose
-        self.grid = problem.grid
+        self.statistics, self.log_pose, self.grid = problem.statistics, problem.log_pose, problem.grid
         self.empty = self.evaluated((), ())
         self.met: dict[tuple[int, ...], float] = {(): 0.0}
         self.sizes: dict[tuple[int, ...], np.ndarray] = {(): self.empty.scales}
@@ -208,20 +197,13 @@ class _Searcher:
         self.extend(())
         self.measure(())
 
-    def copy(self) -> _Searcher:
-        """The same, which goes its own way from here."""
-        other = copy(self)
-        other.met, other.sizes, other.measured = self.met.copy(), self.sizes.copy(), self.measured.copy()
-        other.extended = self.extended.copy()
-        return other
-
     def evaluated(self, model: tuple[int, ...], start: Iterable[float]) -> Evaluated:
         """Evidence of a model in full."""
         return evaluate(self.statistics, [self.problem.units[n] for n in model], self.grid, self.log_pose, start)
 
     def extend(self, model: tuple[int, ...]) -> None:
         """Meet a model with each single unit added."""
-        if model in self.extended or len(model) >= self.problem.settings.largest_model:
+        if len(model) >= self.problem.settings.largest_model:
             return
         self.extended.add(model)
         units = self.problem.units
@@ -351,10 +333,7 @@ def alarm_of(problem: Problem, products: Products, pose_error_rad: float, stream
 def _average_bayes_factors(
     problem: Problem, statistics: Statistics, log_pose: np.ndarray, along: np.ndarray, squares: np.ndarray
 ) -> np.ndarray:
-    """Log of the average Bayes factor for N sets of measurements, ndarray (N,).
-
-    `along` (T, K, N), `squares` (T, N).
-    """
+    """Log of the average Bayes factor for N sets of measurements, ndarray (N,). `along` (T, K, N), `squares` (T, N)."""
     grid, given_nothing = problem.grid, condition(statistics, np.zeros(0, int), np.zeros(0), log_pose)
     start = given_nothing.log_occam[:, None]
     nothing = log_sum_exp(start + log_likelihood(squares, statistics.freedom), axis=0)

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.linalg import blas, solve_triangular
+from scipy.linalg import solve_triangular
 
 from elastocal.fitting.observations import groups_by_size
 
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
 # Products of one pose with all columns that are in memory at once.
 _AT_ONCE = 1_000_000
-# Rows that are mirrored at once, which stay in the processor's cache.
-_MIRRORED = 64
 # Of a square from which another one was taken, less than this share is rounding.
 _INSIDE = 1e-12
 
@@ -76,7 +74,7 @@ class Products:
     into_basis: np.ndarray
     projected: np.ndarray
     inside: np.ndarray
-    met: dict[float, tuple[np.ndarray, np.ndarray, np.ndarray, float]] = field(default_factory=dict, repr=False)
+    met: dict[float, tuple[np.ndarray, np.ndarray, np.ndarray]] = field(default_factory=dict, repr=False)
 
     @property
     def without_candidates(self) -> Products:
@@ -192,39 +190,26 @@ def statistics_of(products: Products, pose_error_rad: np.ndarray) -> Statistics:
             tau = sizes[number]
             taken = (rows * (tau / np.sqrt(1.0 + tau**2 * values))[..., None]).reshape(-1, rows.shape[2])
             above[number] -= taken[:, :count].T @ taken
-            _less_squares(rest[number], taken[:, count:])
+            beside = np.ascontiguousarray(taken[:, count:])
+            rest[number] -= beside.T @ beside
             log_dets[number] += np.log1p(tau**2 * values).sum()
     factors = np.linalg.cholesky(above[:, :, :count])
-    for tau, total, factor, beside, log_det in zip(sizes, rest, factors, above[:, :, count:], log_dets, strict=True):
+    for tau, total, factor, beside in zip(sizes, rest, factors, above[:, :, count:], strict=True):
         taken = solve_triangular(factor, beside, lower=True) if tau else beside
         if tau:
-            _less_squares(total, taken)
-            mirror(total)
-        products.met[float(tau)] = factor, taken, total, float(log_det)
+            total -= taken.T @ taken
+        products.met[float(tau)] = factor, taken, total
     logs = -0.5 * log_dets - np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
     return Statistics(sizes, rest[:, :-1, :-1], rest[:, :-1, -1], rest[:, -1, -1], logs, products.freedom)
 
 
-def normal_equations(products: Products, tau: float) -> tuple[np.ndarray, float]:
-    """Z'Sigma(tau)^-1 Z, (P + K + 1, P + K + 1), and ln |Sigma| beyond that of white noise."""
+def normal_equations(products: Products, tau: float) -> np.ndarray:
+    """Z'Sigma(tau)^-1 Z, ndarray (P + K + 1, P + K + 1)."""
     if tau not in products.met:
         statistics_of(products, np.array([tau]))
-    factor, taken, rest, log_det = products.met[tau]
+    factor, taken, rest = products.met[tau]
     across = factor @ taken
-    return np.block([[factor @ factor.T, across], [across.T, rest + taken.T @ taken]]), log_det
-
-
-def _less_squares(matrix: np.ndarray, rows: np.ndarray) -> None:
-    """Take the products of some rows' columns off the lower triangle of a symmetric matrix, in place."""
-    blas.dsyrk(-1.0, np.ascontiguousarray(rows).T, 1.0, matrix.T, overwrite_c=True)
-
-
-def mirror(matrix: np.ndarray) -> None:
-    """Copy the lower triangle of a square matrix to the upper one, in place, a few rows at a time."""
-    for start in range(0, len(matrix), _MIRRORED):
-        part = slice(start, start + _MIRRORED)
-        matrix[part, part] = np.tril(matrix[part, part]) + np.tril(matrix[part, part], -1).T
-        matrix[part, start + _MIRRORED :] = matrix[start + _MIRRORED :, part].T
+    return np.block([[factor @ factor.T, across], [across.T, rest + taken.T @ taken]])
 
 
 def null_draws(

@@ -409,17 +409,14 @@ def fault_entry(fault: Fault) -> dict[str, Any]:
 def oversized(final: Fit, names: Collection[str]) -> set[str]:
     """Which of some effects have a parameter beyond what such an effect reaches: size or name is wrong."""
     some = [effect for effect in final.model.effects if effect.effect in names]
-    return {effect.effect for effect in some if any(_too_large(*entry) for entry in _estimates(final, effect))}
+    return {effect.effect for effect in some if any(too_large for *_, too_large in _estimates(final, effect))}
 
 
-def _estimates(final: Fit, effect: Candidate) -> Iterator[tuple[float, float, Parameter]]:
-    """Value, standard error and kind of each parameter of an effect, its shapes aside."""
+def _estimates(final: Fit, effect: Candidate) -> Iterator[tuple[float, float, Parameter, bool]]:
+    """Value, standard error and kind of each parameter of an effect, its shapes aside, and whether it is too large."""
     errors = np.sqrt(np.diag(final.covariance)[final.places_of(effect.key)])
-    yield from zip(final.values_of(effect.key)[0], errors, effect.parameters, strict=False)
-
-
-def _too_large(value: float, std_error: float, parameter: Parameter) -> bool:
-    return bool(abs(value) > _IMPLAUSIBLE * parameter.plausible + _SURE * std_error)
+    for value, error, parameter in zip(final.values_of(effect.key)[0], errors, effect.parameters, strict=False):
+        yield value, error, parameter, bool(abs(value) > _IMPLAUSIBLE * parameter.plausible + _SURE * error)
 
 
 def implausible(final: Fit, entries: Iterable[Mapping[str, Any]], rated_kg: float | None = None) -> list[str]:
@@ -431,12 +428,12 @@ def implausible(final: Fit, entries: Iterable[Mapping[str, Any]], rated_kg: floa
     fitted = {effect.key: effect for effect in final.model.effects}
     found = []
     for key in [key for entry in entries for key in entry["members"]]:
-        for value, error, parameter in _estimates(final, fitted[key]):
+        for value, error, parameter, too_large in _estimates(final, fitted[key]):
             size = f"{value:.3g} ± {error:.2g} {parameter.unit}"
             if parameter.sign * value < -_SURE * error:
                 needed = "positive" if parameter.sign > 0 else "negative"
                 found.append(f"{key}: {parameter.name} is {size}, and by its physics {needed}")
-            if _too_large(value, error, parameter):
+            if too_large:
                 found.append(f"{key}: {parameter.name} is {size}, more than {_IMPLAUSIBLE:g} times what such an effect reaches")
             carried = parameter.carried and final.model.identifies_compliance
             if rated_kg is not None and carried and value - _SURE * error > rated_kg:
