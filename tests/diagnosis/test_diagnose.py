@@ -8,6 +8,7 @@ from made_folders import PLAN, made_folder, made_table
 
 from elastocal.data_checks.protocol import Fault
 from elastocal.diagnosis import diagnose as module
+from elastocal.diagnosis import refit
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.next_experiment import propose
@@ -131,7 +132,7 @@ def test_frames_alone_are_kept_where_they_predict_left_out_poses_better(kuka, co
 
 
 def test_an_effect_that_is_not_expected_to_help_is_named_and_the_model_stays_as_declared(cases, kuka, monkeypatch):
-    monkeypatch.setattr(module, "expected_to_help", lambda problem, posterior, model: False)
+    monkeypatch.setattr(refit, "expected_to_help", lambda problem, posterior, model: False)
     diagnosis, held_out = diagnose(cases[0], Settings(), 1), cases[1]
     (entry,) = diagnosis.document["effects"]
     assert diagnosis.document["verdict"] == "named" and entry["name"] == "joint_offset" and not entry["adopted"]

@@ -10,42 +10,12 @@ import numpy as np
 from elastocal.counting import counted
 from elastocal.data_checks.protocol import Fault, faults
 from elastocal.data_checks.warnings import fitted_compliance_warnings
+from elastocal.diagnosis import refit, verdict
 from elastocal.diagnosis.gross_errors import Deviations, entries_of, gross_errors, warnings_of
 from elastocal.diagnosis.kept_rows import Kept, first_kept, fitted_to
 from elastocal.diagnosis.linearize import linearized, looked_at_closely, with_probable_centres
-from elastocal.diagnosis.refit import (
-    Averaged,
-    averaged,
-    expected_to_help,
-    fit_with_sizes,
-    mean_square,
-    mean_square_left,
-    noise_beside,
-    other_predictions,
-    remaining_noise,
-    selected,
-    squares_explained,
-)
 from elastocal.diagnosis.search import alarm_of, initial_screening, posterior
-from elastocal.diagnosis.verdict import (
-    ADEQUATE,
-    NAMED,
-    NOT_TESTABLE,
-    SEVERAL,
-    UNEXPLAINED,
-    Evidence,
-    concluded,
-    contradictions,
-    effect_entries,
-    fault_entry,
-    implausible,
-    oversized,
-    pose_error_warnings,
-    probability_facts,
-    remainder_sentences,
-    scatter_warnings,
-    with_related,
-)
+from elastocal.diagnosis.verdict import Evidence
 from elastocal.effects.catalogue import effects
 from elastocal.fitting.case import Case, noise_facts
 from elastocal.fitting.displacement import joint_compliances
@@ -154,8 +124,8 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         final = found.fitted
         if part.searched is not case.observations:
             final = fit(final.model, case.observations, final.noise, final.estimate, reweighted=True)
-        named, verdict = found.conclusion.best.named, found.conclusion.verdict
-        found = replace(found, conclusion=with_related(found.conclusion, oversized(final, named)))
+        named, word = found.conclusion.best.named, found.conclusion.verdict
+        found = replace(found, conclusion=verdict.with_related(found.conclusion, verdict.oversized(final, named)))
         if not found.adopted:
             steps[-1] = replace(steps[-1], fitted=_with_noise_left(case, declared, found) if named else final)
         lost = _losses(bare, [steps[-1].fitted, *([final] if found.adopted else [])], case.observations, settings)
@@ -168,13 +138,13 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         kept, (asked, repeatable) = steps[-1].fitted, found.tested or (None, None)
         if asked is not kept:
             repeatable = repeatable_part(kept, case.observations, seed)
-        unnamed = remainder_sentences(repeatable)
-        if verdict in (ADEQUATE, NOT_TESTABLE):
-            contradicting = unnamed or (contradictions(final, noise, settings) if verdict == ADEQUATE else [])
+        unnamed = verdict.remainder_sentences(repeatable)
+        if word in (verdict.ADEQUATE, verdict.NOT_TESTABLE):
+            contradicting = unnamed or (verdict.contradictions(final, noise, settings) if word == verdict.ADEQUATE else [])
         if contradicting:
-            found = replace(found, conclusion=replace(found.conclusion, verdict=UNEXPLAINED))
+            found = replace(found, conclusion=replace(found.conclusion, verdict=verdict.UNEXPLAINED))
         warnings = [*contradicting, *warnings, *filter(None, lost)]
-        warnings += [] if unnamed else pose_error_warnings(kept.noise, found.linearized.pose_std_error_rad)
+        warnings += [] if unnamed else verdict.pose_error_warnings(kept.noise, found.linearized.pose_std_error_rad)
     left_out = entries_of(errors, whole, held_out=False)
     document = _document(case, noise, steps, final, found, known, settings, warnings)
     document |= {"contradictions": contradicting, "gross_errors": left_out, "repeatable": repeatable and asdict(repeatable)}
@@ -184,7 +154,9 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
 
 def _with_noise_left(case: Case, declared: Fit, found: Evidence) -> Fit:
     """The declared model under the noise that it leaves itself, for nothing else enters the model that is kept."""
-    noise = remaining_noise(found.linearized.problem, found.posterior.nothing, found.linearized.about.noise, declared.noise)
+    noise = refit.remaining_noise(
+        found.linearized.problem, found.posterior.nothing, found.linearized.about.noise, declared.noise
+    )
     return fit(declared.model, case.observations, noise, declared.estimate, reweighted=True)
 
 
@@ -238,7 +210,7 @@ def _explained(
         if alarm.raised:
             problem = looked_at_closely(problem, alone)
         found = posterior(problem.problem, {effect.key for effect in about.model.effects})
-        conclusion = concluded(problem.problem, found, alarm)
+        conclusion = verdict.concluded(problem.problem, found, alarm)
         # Rows of a long campaign make room for the fit, and for those of the next linearisation.
         problem = problem.without_rows
         named, taken = conclusion.best.named, about.noise
@@ -247,11 +219,11 @@ def _explained(
         words = [getattr(effects().get(name), "words", "an unknown mechanism") for name in conclusion.best.mechanisms]
         leading = " with ".join(words) or "nothing is missing"
         tell(f"search {round_number + 1} of at most {settings.linearizations}: leading so far, {leading}")
-        noise = remaining_noise(problem.problem, model, taken, declared.noise)
-        about = fit_with_sizes(declared, searched, noise, selected(problem, model), near, settled=enough)
+        noise = refit.remaining_noise(problem.problem, model, taken, declared.noise)
+        about = refit.fit_with_sizes(declared, searched, noise, refit.selected(problem, model), near, settled=enough)
         off = noise.position_m > settings.relinearize_noise * taken.position_m
         small = not named or alarm.statistic < settings.relinearize_above
-        ends = not off and (small or named == before or abs(mean_square(about) - 1.0) < settings.linear_misfit)
+        ends = not off and (small or named == before or abs(refit.mean_square(about) - 1.0) < settings.linear_misfit)
         # What is a function of the joints is no error of poses, and about a model that is new the problem is another one.
         large, left = model.pose_error_rad > settings.pose_repeatability_rad, None
         if large or (ends and named not in (before, ())):
@@ -259,14 +231,14 @@ def _explained(
             tested = about, left
         remains = left is not None and left.remains
         settled = ends and not remains
-        adopted = bool(named) and expected_to_help(problem.problem, found, model)
+        adopted = bool(named) and refit.expected_to_help(problem.problem, found, model)
         evidence = Evidence(problem, found, alarm, conclusion, adopted, settled, about, tested)
         if settled:
             break
         if remains:
             most_pose_error_rad = settings.pose_repeatability_rad
             if large:
-                noise = noise_beside(about, searched, most_pose_error_rad)
+                noise = refit.noise_beside(about, searched, most_pose_error_rad)
                 about = fit(about.model, searched, noise, about.estimate, True, enough)
         before = named
         if round_number + 1 < settings.linearizations:
@@ -278,8 +250,8 @@ def _explained(
 def _effect_steps(case: Case, declared: Fit, final: Fit, found: Evidence) -> list[Step]:
     """One step for each mechanism, that which explains most first, each with those before it; of many, the rest together."""
     model = found.posterior.models[found.conclusion.best.model]
-    chosen = [(effect, final.values_of(effect.key)[1]) for effect, _ in selected(found.linearized, model)]
-    explained = squares_explained(found.linearized.problem, model)
+    chosen = [(effect, final.values_of(effect.key)[1]) for effect, _ in refit.selected(found.linearized, model)]
+    explained = refit.squares_explained(found.linearized.problem, model)
     names = sorted(found.conclusion.best.named, key=lambda name: -explained[name])
     alone = names[:-1] if len(names) <= _MOST_STEPS else names[:1]
     rest = names[len(alone) :]
@@ -287,7 +259,7 @@ def _effect_steps(case: Case, declared: Fit, final: Fit, found: Evidence) -> lis
     for number in range(len(alone), 0, -1):
         some = tuple(entry for entry in chosen if entry[0].effect in alone[:number])
         # Only its errors are shown, which a tenth of a standard error in a parameter hardly moves.
-        fitted = fit_with_sizes(declared, case.observations, final.noise, some, steps[0].fitted, settled=ON_THE_WAY)
+        fitted = refit.fit_with_sizes(declared, case.observations, final.noise, some, steps[0].fitted, settled=ON_THE_WAY)
         steps.insert(0, Step(f"with {alone[number - 1]}", "effect", fitted))
     return steps
 
@@ -304,10 +276,10 @@ def _document(
 ) -> dict[str, Any]:
     declared, final = steps[1].fitted, steps[-1].fitted
     decisive = [fault for fault in known if fault.decisive]
-    springs, tested = Averaged({}, {}), set[str]()
+    springs, tested = refit.Averaged({}, {}), set[str]()
     stated: dict[str, Any] = {
-        "verdict": NAMED if len(decisive) == 1 else SEVERAL,
-        "effects": [fault_entry(fault) for fault in decisive],
+        "verdict": verdict.NAMED if len(decisive) == 1 else verdict.SEVERAL,
+        "effects": [verdict.fault_entry(fault) for fault in decisive],
     } | dict.fromkeys(("probabilities", "misfit", "other_models_m"))
     untestable: dict[str, str] = {}
     remarks = [*warnings, *(f"{fault.name}: {fault.detail}" for fault in known if not fault.decisive)]
@@ -318,27 +290,27 @@ def _document(
         chosen = best if conclusion.best.named else nothing
         kept = chosen if found.adopted else nothing
         owners = [(owner, parameter.name) for owner, parameter in declared.parameters]
-        averages = averaged(found.linearized, found.posterior, chosen, owners)
-        springs = averages if kept is chosen else averaged(found.linearized, found.posterior, nothing, owners)
-        entries = effect_entries(found, with_effects, averages, case.observations)
+        averages = refit.averaged(found.linearized, found.posterior, chosen, owners)
+        springs = averages if kept is chosen else refit.averaged(found.linearized, found.posterior, nothing, owners)
+        entries = verdict.effect_entries(found, with_effects, averages, case.observations)
         numbers, untestable = found.linearized.products.freedom, found.linearized.untestable
         tested = {unit.candidate.key for unit in problem.units if unit.candidate}
         stated = {
             "verdict": conclusion.verdict,
             "effects": entries,
-            "probabilities": probability_facts(found),
-            "misfit": {"before": mean_square_left(problem, nothing), "after": mean_square_left(problem, best)},
+            "probabilities": verdict.probability_facts(found),
+            "misfit": {"before": refit.mean_square_left(problem, nothing), "after": refit.mean_square_left(problem, best)},
             # Root mean square by which positions may be elsewhere by other models than the one that is kept.
-            "other_models_m": float(np.sqrt(3.0 * other_predictions(problem, found.posterior, kept) / numbers))
+            "other_models_m": float(np.sqrt(3.0 * refit.other_predictions(problem, found.posterior, kept) / numbers))
             * noise.position_m,
         }
         if entries and not found.adopted:
             remarks.append("what was found is too uncertain to make predictions better: the model stays as declared")
-        remarks += implausible(with_effects, entries, case.campaign.robot.payload_kg)
+        remarks += verdict.implausible(with_effects, entries, case.campaign.robot.payload_kg)
         if not found.settled:
             often = f"linearised {settings.linearizations} times"
             remarks.append(f"the problem was {often}, and each time another model was found: more may be missing")
-    remarks += fitted_compliance_warnings(final) + scatter_warnings(final.noise, noise, settings.relinearize_noise)
+    remarks += fitted_compliance_warnings(final) + verdict.scatter_warnings(final.noise, noise, settings.relinearize_noise)
     for name, fitted in (("declared", declared), ("final", final)):
         if not fitted.converged:
             remarks.append(f"the fit of the {name} model did not converge: its parameters are not to be relied on")
@@ -356,7 +328,7 @@ def _document(
     }
 
 
-def _compliances(declared: Fit, final: Fit, springs: Averaged, prior_share: float) -> dict[str, list[float]]:
+def _compliances(declared: Fit, final: Fit, springs: refit.Averaged, prior_share: float) -> dict[str, list[float]]:
     joints = final.model.sites.joints
     after, deviations = joint_compliances(final.model, final.estimate).copy(), np.zeros(joints)
     identified = np.zeros(joints, bool)
