@@ -9,7 +9,7 @@ from scipy.stats import chi2, ncx2
 from synthetic import NOISE, made_estimate, made_model, seen_exactly, with_noise
 
 from elastocal.campaigns.campaign import Target
-from elastocal.diagnosis.kept_rows import Kept
+from elastocal.diagnosis.gross_errors import Kept
 from elastocal.diagnosis.linearize import (
     linearized,
     looked_at_closely,

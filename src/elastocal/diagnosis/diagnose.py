@@ -11,8 +11,7 @@ from elastocal.counting import counted
 from elastocal.data_checks.protocol import Fault, faults
 from elastocal.data_checks.warnings import fitted_compliance_warnings
 from elastocal.diagnosis import refit, verdict
-from elastocal.diagnosis.gross_errors import Deviations, entries_of, gross_errors, warnings_of
-from elastocal.diagnosis.kept_rows import Kept, first_kept, fitted_to
+from elastocal.diagnosis.gross_errors import Deviations, Kept, entries_of, first_kept, fitted_to, gross_errors, warnings_of
 from elastocal.diagnosis.linearize import linearized, looked_at_closely, with_probable_centres
 from elastocal.diagnosis.search import alarm_of, initial_screening, posterior
 from elastocal.diagnosis.verdict import Evidence

@@ -3,18 +3,15 @@
 A unit is one candidate of the catalogue with given shape values. Units of one mechanism at one location (joint, link, band of
 orders) that differ in their law are variants, of which a model holds one at most.
 
-A unit of `OTHER` is a competitor for effects that the catalogue does not have: random displacements of a joint or the base.
-A displacement is a random function of a few inputs, an approximate Gaussian process: the principal components over the states
-of a campaign (Karhunen-Loeve) of a sum of random Fourier features (Rahimi and Recht, NIPS 2007) with normal coefficients. Such
-a discrepancy (Kennedy and O'Hagan, JRSS B 2001) should leave to the model what the model explains (Plumlee, JASA 2017): what is
-constant of it, or at a joint straight in its angle, is taken off, for a zero offset, a compliance and a transmission ratio have
-names. What comes with time at a joint begins at nothing, as a zero that slips; what goes by the place of the end keeps its
-constant part. A function of everything at once would fit nothing better than chance does, so that each law has the inputs of
-one cause, as terms of an additive Gaussian process have (Duvenaud et al., NIPS 2011): a joint's own angle, torque and approach;
-the angles of the joints beside it; time and temperature; the load on the base along each of its axes; the place of the end. At
-a joint each acts in proportion to the load or without it: what yields turns nothing that is not loaded, and one law for both
-would be charged for what it does not do. Alone it means that the residual is *unexplained*; beside a mechanism, that a
-*related* one acts. It names nothing and is not used to predict.
+A unit of `OTHER` is a competitor for effects that the catalogue does not have: random displacements of a joint or the base. A
+displacement is a random function of a few inputs, an approximate Gaussian process: principal components over the states of a
+campaign of random Fourier features (Rahimi and Recht, NIPS 2007). Such a discrepancy (Kennedy and O'Hagan, JRSS B 2001) should
+leave to the model what the model explains (Plumlee, JASA 2017): what is constant of it, or at a joint straight in its angle, is
+taken off; what comes with time at a joint begins at nothing; what goes by the place of the end keeps its constant part. Each
+law has the inputs of one cause, as terms of an additive Gaussian process have (Duvenaud et al., NIPS 2011): a joint's own
+angle, torque and approach; the angles beside it; time and temperature; the load on the base; the place of the end. At a joint
+each acts in proportion to the load or without it: what yields turns nothing that is not loaded. Alone it means that what is
+left is *unexplained*; beside a mechanism, that a *related* one acts. It names nothing and is not used to predict.
 """
 
 from __future__ import annotations
@@ -74,14 +71,12 @@ class Law:
 
 @dataclass(frozen=True)
 class Unit:
-    """One law at one location.
+    """One law at one location: a candidate, or a law of `OTHER`.
 
-    `mechanism`: name of the effect, or `OTHER`. `location`: where it acts; equal for variants of one mechanism at one location.
-    `candidate`: None for `OTHER`. `columns` (d,) of int: its columns in the sufficient statistics. `sizes` (d,): plausible size
-    of each parameter: a column is the sensitivity times this. `signs` (d,) of int: sign that physics gives each parameter, 0
-    where it may have either. `log_prior`: logarithm of its share among the variants at its location. `law`: of `OTHER`.
-    `smallest`: place in the grid of sizes of the smallest that the measurements could show. `largest`: of the largest that such
-    an effect may have; -1 for the last.
+    `location`: where it acts; equal for variants of one mechanism at one location. `columns` (d,) of int: in the sufficient
+    statistics, each the sensitivity times `sizes` (d,), plausible ones. `signs` (d,) of int: that physics gives each parameter,
+    0 where it may have either. `log_prior`: logarithm of its share among the variants at its location. `smallest`, `largest`:
+    places in the grid of the smallest size that the measurements could show, and of the largest that it may have; -1: the last.
     """
 
     mechanism: str

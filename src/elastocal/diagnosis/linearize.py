@@ -1,8 +1,4 @@
-"""From a fit to the problem that is searched: columns of everything that its model might lack, whitened, and their products.
-
-One object for all that looks at them: the initial screening of gross errors takes its rows, alarm and search its statistics, a
-closer look at some shapes adds their columns, averages and proposals take its products.
-"""
+"""From a fit to the problem that is searched: columns of everything that its model might lack, whitened, and their products."""
 
 from __future__ import annotations
 
@@ -29,7 +25,7 @@ from elastocal.fitting.whitening import whitening
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from elastocal.diagnosis.kept_rows import Kept
+    from elastocal.diagnosis.gross_errors import Kept
     from elastocal.diagnosis.settings import Settings
     from elastocal.effects.conditions import Conditions
     from elastocal.effects.protocol import Candidate
@@ -60,12 +56,9 @@ class Linearized:
     """A model about a fit, and everything that it might lack; what asks for more work is done when it is first asked for.
 
     Coefficients count from zero, not from the fit: what candidates and declared geometry contribute to the prediction is given
-    back to the residual, so that their priors mean what they say.
-
-    `about`: of the declared model, or with effects found already, about which the problem is then linear. `around`: of the
-    states looked at. `tried`: candidates that can be tested at all, each with values of its shape. `lacking`: why not others.
-    `candidates`: keys of all: parameters of the fit that they own are coefficients of units here. `against`: laws
-    of the competitor. `most_pose_error_rad`: largest error common to the measurements of a pose that is thought of.
+    back to the residual, so that their priors mean what they say. `around`: of the states looked at. `tried`: candidates that
+    can be tested at all, each with values of its shape; `lacking`: why not others. `candidates`: keys of all: parameters of the
+    fit that they own are coefficients of units here. `against`: laws of the competitor.
     """
 
     about: Fit

@@ -27,7 +27,7 @@ from scipy.constants import g as standard_gravity
 from elastocal.diagnosis.evidence import log_sum_exp
 from elastocal.diagnosis.refit import mean_square_left
 from elastocal.diagnosis.statistics import normal_equations
-from elastocal.diagnosis.verdict import ADEQUATE, NAMED, NOT_TESTABLE, mechanisms_of_models
+from elastocal.diagnosis.verdict import ADEQUATE, NAMED, NOT_TESTABLE, Evidence, mechanisms_of_models
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import effect_columns, linearize
 from elastocal.fitting.observations import Observations, States
@@ -41,7 +41,6 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.hypotheses import Unit
     from elastocal.diagnosis.linearize import Linearized
     from elastocal.diagnosis.search import Model
-    from elastocal.diagnosis.verdict import Evidence
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.noise import Noise
     from elastocal.mechanics.robot import Robot

@@ -1,15 +1,12 @@
 """The exact fit of a selected model, and parameters averaged over models, so that intervals are honest after selection.
 
 The fit is maximum a posteriori, a generalized ridge regression (Hoerl and Kennard, Technometrics 1970): coefficients keep the
-normal priors under which they were selected, half-normal ones as normal, so that what the measurements do not determine stays
-at zero; the noise is that which the selected model leaves. No prior is wider than all sizes of the effect together made it
-before the measurements: what asks for more is often something else beside the law, which fits where poses are and not between
-them.
+priors under which they were selected, half-normal ones as normal, none wider than all sizes of the effect together made it
+before the measurements: what asks for more is often something beside the law, which fits where poses are and not between them.
 
 What other models say differently is taken from the linearised problem (Bayesian model averaging; Hoeting et al., Statistical
 Science 1999): the mean over models moves the estimate, and their spread widens its standard error (law of total variance).
-Parameters of the declared model are averaged over all models; those of an effect over its sizes and the models that have it, so
-that they answer how large it is if it is there.
+Those of an effect are averaged over its sizes and the models that have it: how large it is if it is there.
 """
 
 from __future__ import annotations
@@ -165,14 +162,11 @@ def averaged(linearized: Linearized, posterior: Posterior, best: Model, owners: 
 
 
 def expected_to_help(problem: Problem, posterior: Posterior, model: Model) -> bool:
-    """Whether predictions are expected to be better with a model than without it, at poses like those of the measurements.
+    """Whether predictions are expected to be better with a model of the posterior than without it, at poses like the measured.
 
-    By the posterior expectation of squared error: with d the displacement that a model predicts and E d its mean over all
-    models, the expected square of the error falls from E d'd to E d'd - 2 d'E d + d'd where d is added: by 2 d'E d - d'd. Under
-    the model alone that has at most the variance 4 d'd of a least-squares estimate; the interval of the gain has to exclude
-    nothing. Measurements that were held out take no part.
-
-    `model`: of the posterior.
+    With d the displacement that it predicts and E d its mean over all models, the expected square of the error falls by
+    2 d'E d - d'd where d is added. Under the model alone that has at most the variance 4 d'd of a least-squares estimate; the
+    interval of the gain has to exclude nothing.
     """
     gram = problem.statistics.gram[0]
     mean, mine = np.zeros(len(gram)), _predicted(problem, model)
@@ -183,10 +177,9 @@ def expected_to_help(problem: Problem, posterior: Posterior, model: Model) -> bo
 
 
 def other_predictions(problem: Problem, posterior: Posterior, model: Model) -> float:
-    """How otherwise the models of a posterior predict than one of them: sum of squares of whitened numbers, over probabilities.
+    """How otherwise the models of a posterior predict than one of them: expected sum of squares of whitened numbers.
 
-    The smooth error of unknown cause is in no model that is kept: it names nothing and is not used to predict, but the robot
-    has it all the same.
+    The smooth error of unknown cause is in no model that is kept, but the robot has it all the same.
     """
     gram, mine = problem.statistics.gram[0], _predicted(problem, model)
     for number in model.units:

@@ -2,18 +2,14 @@
 
 A model is a set of units. From the declared model on, and from each mechanism at all its locations, the best few models met are
 extended by every unit and shrunk by each of theirs: a beam search over the neighbours of shotgun stochastic search (Hans, Dobra
-and West, JASA 2007), without its draws and its exchanges. What lies in Occam's window (Madigan and Raftery, JASA 1994) is
-evaluated in full.
+and West, JASA 2007). What lies in Occam's window (Madigan and Raftery, JASA 1994) is evaluated in full.
 
 Whether anything is missing at all is one Monte Carlo test (`alarm_of`). Its statistic is the log of the average Bayes factor,
-over all units and all whole mechanisms, against "nothing": a Bayes factor as the statistic of a test (Good, The
-Bayes/non-Bayes compromise, JASA 1992). Its null distribution is that of simulated measurements of the same design, at the pose
-error that fits best, with the pose error averaged over anew in each draw: exact with noise and pose error known, a parametric
-bootstrap with a fitted pose error (Davison and Hinkley, Bootstrap Methods, 1997, 4.2). No Bonferroni correction and no choice
-of a test: competitors that the measurements cannot show have a Bayes factor of one in every draw. Sizes begin a step below
-those of the posterior: what lies between may be seen, and its probability does not matter to a test. Where nothing is missing a
-Bayes factor has a mean of one, so that it exceeds b with a probability of at most 1/b (Markov's inequality): where b is far
-beyond the number of draws none of them reaches it, and none is made.
+over all units and all whole mechanisms, against "nothing" (Good, The Bayes/non-Bayes compromise, JASA 1992); its null
+distribution that of simulated measurements of the same design at the pose error that fits best, averaged over anew each time: a
+parametric bootstrap (Davison and Hinkley, Bootstrap Methods, 1997, 4.2), without a correction for many tests. Sizes begin a
+step below those of the posterior: what lies between may be seen. Where nothing is missing a Bayes factor exceeds b with a
+probability of at most 1/b (Markov's inequality): where b is far beyond the number of draws, none is made.
 """
 
 from __future__ import annotations

@@ -59,11 +59,10 @@ class WhiteRows:
 class Products:
     """What `statistics_of` makes `Statistics` of, at any size of the pose error, and `null_draws` simulated ones.
 
-    `rows`: of which they are. `beside` (M, rows, P + 1): their declared columns made orthonormal, and the residual. `declared`:
-    P. `gram` (P + K + 1, P + K + 1): Z'Z of Z = [X W y], with the rows of the declared parameters' priors. `freedom`: numbers
-    measured less what the declared model fits. `into_basis` (P, P): turns declared columns into orthonormal ones. `projected`
-    (P, K + 1): what these have in the candidates' columns and the residual. `inside` (K,) of bool: columns of which these leave
-    nothing. `met`: by the sizes of the pose error of which there are statistics, what leads back to the normal equations.
+    `beside` (M, rows, P + 1): declared columns of the rows made orthonormal, and the residual. `declared`: P. `gram` (P + K + 1
+    square): Z'Z of Z = [X W y], with the priors' rows. `freedom`: numbers measured less what the declared model fits.
+    `into_basis` (P, P): turns declared columns into orthonormal ones. `projected` (P, K + 1): what these have in the others.
+    `inside` (K,) of bool: columns of which these leave nothing. `met`: by sizes of the pose error, factors of what is left.
     """
 
     rows: WhiteRows

@@ -106,13 +106,9 @@ class Evidence:
 
 
 def concluded(problem: Problem, posterior: Posterior, alarm: Alarm) -> Conclusion:
-    """State the verdict.
-
-    Returns adequate: no alarm. named: one mechanism, stated alone. class: one mechanism, but which of some, or whether a
-    related one, remains ambiguous. several: more than one mechanism. unexplained: something acts that the catalogue does not
-    have, or that no model explains better than "nothing" does. not_testable: the measurements can test no mechanism of the
-    robot, and nothing of the set-up shows.
-    """
+    """State the verdict: adequate without an alarm; named: one mechanism alone; class: one, but which remains ambiguous, or
+    whether a related one acts; several; unexplained: what the catalogue does not have, or no model explains better than
+    "nothing" does; not_testable: the measurements can test no mechanism of the robot, and nothing of the set-up shows."""
     hypotheses = hypotheses_of(problem, posterior)
     nothing = next(h for h in hypotheses if not h.mechanisms)
     mechanisms: dict[str, float] = {}
@@ -174,10 +170,9 @@ def hypotheses_of(problem: Problem, posterior: Posterior) -> tuple[Hypothesis, .
 
 
 def mechanisms_of_models(problem: Problem, posterior: Posterior) -> list[tuple[str, ...]]:
-    """What each model says that acts, in the order of the names; empty for "nothing".
+    """What each model says that acts, in the order of the names: its mechanisms, and something unknown beside a smooth error.
 
-    Its mechanisms, and something unknown where it has a smooth error beside them. Neither a law nor the smooth error is quite
-    what the machine does. So of the two that counts as a part of the other which makes displacements that the other cannot
+    Neither is quite what the machine does: that counts as a part of the other which makes displacements that the other cannot
     make, but within the tolerance of laws. Nothing related to a mechanism acts where the smooth error is far larger.
     """
     found, of_laws, of_unknown = [], problem.settings.law_tolerance**2, problem.settings.smooth_tolerance**2
@@ -227,9 +222,8 @@ def _instead_of(name: str, best: Hypothesis, credible: Iterable[Hypothesis]) -> 
 def contradictions(final: Fit, measured: Noise, settings: Settings) -> list[str]:
     """What forbids to call a declared model adequate, although no alarm is raised against it; a sentence for each.
 
-    The alarm asks whether a mechanism explains the measurements better than noise does. Noise that is estimated along with the
-    model may swallow a misfit, and a parameter may do so at a value that no robot has. `measured`: the noise as repeats or the
-    sensor have it, before the model was fitted.
+    Noise that is estimated along with the model may swallow a misfit, and so may a parameter at a value that no robot has.
+    `measured`: the noise as repeats or the sensor have it.
     """
     # Noise that somebody declared may be a guess, and a warning says that it is far off.
     found = scatter_warnings(final.noise, measured, settings.largest_scatter) if measured.source == "repeats" else []
@@ -338,8 +332,8 @@ def effect_entries(found: Evidence, final: Fit, averages: Averaged, observations
 def parameter_entries(member: Candidate, final: Fit, averages: Averaged) -> list[dict[str, Any]]:
     """Parameters and shapes of one candidate in a fit.
 
-    How far springs of unknown compliance sag does not tell a mass. Where the compliances are those of the robot
-    file, a mass is given as its product with that of the joint that it turns most, which measurements tell.
+    Where the compliances are those of the robot file a mass is given as its product with that of the joint that it turns most,
+    which measurements tell.
     """
     effect = next(effect for effect in final.model.effects if effect.key == member.key)
     mine, values = final.places_of(member.key), np.concatenate(final.values_of(member.key))
@@ -420,10 +414,9 @@ def _estimates(final: Fit, effect: Candidate) -> Iterator[tuple[float, float, Pa
 
 
 def implausible(final: Fit, entries: Iterable[Mapping[str, Any]], rated_kg: float | None = None) -> list[str]:
-    """Warnings of found parameters that nature does not allow, however many effects were found.
+    """Warnings of parameters of `effect_entries` that nature does not allow.
 
-    `entries`: of `effect_entries`. `rated_kg`: payload for which the robot is rated; looked at where the compliances are
-    identified, without which no mass is.
+    `rated_kg`: payload for which the robot is rated; looked at where compliances are identified, without which no mass is.
     """
     fitted = {effect.key: effect for effect in final.model.effects}
     found = []
