@@ -295,10 +295,8 @@ class Kept:
 
     def declared_to_all(self) -> Fit:
         """The declared model fitted to all that is kept."""
-        if self.searched is self.case.observations:
-            return self.declared
-        found = self.declared
-        return fit(found.model, self.case.observations, self.noise, found.estimate, reweighted=True)
+        found, every = self.declared, self.case.observations
+        return found if self.searched is every else fit(found.model, every, self.noise, found.estimate, reweighted=True)
 
 
 def fitted_to(case: Case, kept: np.ndarray, settings: Settings, last: Kept | None = None) -> Kept:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.special import chdtri
 
-from elastocal.diagnosis.evidence import log_sum_exp
+from elastocal.diagnosis.evidence import condition, log_sum_exp
 from elastocal.diagnosis.hypotheses import Law, Unit, laws_of, units_of
 from elastocal.diagnosis.search import Problem, likely_pose_errors, pose_errors_within_reach
 from elastocal.diagnosis.statistics import Products, Statistics, WhiteRows, products_of, statistics_of
@@ -146,9 +146,8 @@ class Linearized:
         rows, _ = self._fitted
         shown = float(np.median(np.bincount(rows.pose, (rows.jacobian**2).sum(axis=(1, 2)) / rows.jacobian.shape[-1])))
         if shown < _LEAST_INFORMATION:
-            raise InputError(
-                "campaign", "targets", "measurements that no joint moves", "targets on what moves, off a lone axis"
-            )
+            found, allowed = "measurements that no joint moves", "targets on what moves, off a lone axis"
+            raise InputError("campaign", "targets", found, allowed)
         return 1.0 / np.sqrt(shown)
 
     @property
@@ -199,16 +198,13 @@ def smallest_shown(statistics: Statistics, units: Sequence[Unit], settings: Sett
     """The smallest size at which each unit would be found with a power of one half, were it the only candidate.
 
     A test for one direction, with a Bonferroni correction for all units, reaches that where the non-centrality is the critical
-    value. A smaller effect is there or not, and the measurements are the same: it counts as not there.
-
-    Returns (number of units,) of int: place among the sizes; their number where even the largest is too small to be seen.
+    value. A smaller effect counts as not there. Returns places among the sizes (number of units,); their number where even the
+    largest is too small to be seen.
     """
-    critical = chdtri(1, settings.alarm_level / max(len(units), 1))
-    largest, width = np.zeros(len(units)), np.array([len(unit.columns) for unit in units], int)
-    for size in np.unique(width):
-        members = np.flatnonzero(width == size)
-        columns = np.array([units[number].columns for number in members.tolist()])
-        largest[members] = np.linalg.eigvalsh(statistics.gram[0][columns[:, :, None], columns[:, None, :]])[:, -1]
+    critical, largest = chdtri(1, settings.alarm_level / max(len(units), 1)), np.zeros(len(units))
+    blocks = condition(statistics.at(slice(1)), np.zeros(0, int), np.zeros(0), np.zeros(1)).blocks_of(units, range(len(units)))
+    for members, values, _, _ in blocks:
+        largest[members] = values[0].max(axis=1)
     return np.searchsorted(np.array(settings.scales) ** 2, critical / np.maximum(largest, 1e-9 * critical))
 
 
