@@ -20,18 +20,8 @@ from elastocal.fitting.observations import single_observations, state_clusters
 from elastocal.fitting.prediction import measured_in_base, residuals
 from elastocal.random_streams import stream
 from elastocal.remainder.corrected import Corrected, Plan, corrected, remainder_facts
+from elastocal.validation import held_out as figures
 from elastocal.validation.fitted_range import outside_poses, repeat_warnings
-from elastocal.validation.held_out import (
-    METRICS,
-    Errors,
-    errors_by_range,
-    grown,
-    intervals,
-    noise_floor,
-    position_errors,
-    share_below_largest,
-    summary,
-)
 from elastocal.validation.left_out import error_row, split_rows
 from elastocal.validation.placing import placed
 from elastocal.validation.span import count_configurations, joint_ranges
@@ -145,25 +135,25 @@ def heldout_errors(
     there, errors = _errors(steps, case, held_out)
     before, after = _declared(steps), len(steps) - 1
     draws = stream(seed, case.campaign.name, "held-out poses", 0)
-    limits, reductions = intervals(errors, _REPLICATES, draws, before)
-    of_calibration = intervals([errors[0], errors[after]], _REPLICATES, draws)[1][1]
-    floor = noise_floor(steps[after].fitted, held_out.observations, *there[after])
+    limits, reductions = figures.intervals(errors, _REPLICATES, draws, before)
+    of_calibration = figures.intervals([errors[0], errors[after]], _REPLICATES, draws)[1][1]
+    floor = figures.noise_floor(steps[after].fitted, held_out.observations, *there[after])
     rows, warnings = [], []
     for step, error, limit in zip(steps, errors, limits, strict=True):
-        training, tested = summary(np.linalg.norm(step.fitted.residual[:, :3], axis=1)), summary(error.distance)
+        training, tested = figures.summary(np.linalg.norm(step.fitted.residual[:, :3], axis=1)), figures.summary(error.distance)
         row: dict[str, Any] = {"step": step.name, "kind": step.kind, "parameters": int((~step.fitted.held).sum())}
-        row |= {f"train_{name}": training[name] for name in METRICS}
-        for name in METRICS:
+        row |= {f"train_{name}": training[name] for name in figures.METRICS}
+        for name in figures.METRICS:
             low, high = limit[name]
             row |= {f"heldout_{name}": tested[name], f"heldout_{name}_low": low, f"heldout_{name}_high": high}
-        rows.append(row | {f"heldout_{name.removesuffix('_m')}_over_floor": tested[name] / floor for name in METRICS})
-    for name in grown(summary(errors[before].distance), summary(errors[after].distance)):
+        rows.append(row | {f"heldout_{name.removesuffix('_m')}_over_floor": tested[name] / floor for name in figures.METRICS})
+    for name in figures.grown(figures.summary(errors[before].distance), figures.summary(errors[after].distance)):
         low, high = (1e3 * rows[number][f"heldout_{name}"] for number in (before, after))
         warnings.append(f"the {_ERRORS[name]} {ABOUT_ERRORS} grew from {low:.3f} to {high:.3f} mm")
     for last, row in pairwise(rows[before:]):
         if row["heldout_rms_m"] > last["heldout_rms_m"]:
             warnings.append(f"the step '{row['step']}' raised the RMS error {ABOUT_ERRORS}")
-    by_range = errors_by_range({"before": errors[before], "after": errors[after]}, outside)
+    by_range = figures.errors_by_range({"before": errors[before], "after": errors[after]}, outside)
     heldout = {
         "uncalibrated": _summary(errors[0]) | {"reduction_ci95": [of_calibration.low, of_calibration.high]},
         "before": _summary(errors[before]),
@@ -174,7 +164,7 @@ def heldout_errors(
         "poses": errors[0].poses,
         "configurations": count_configurations(held_out.observations.states),
         "joint_ranges": joint_ranges(held_out.observations.states, held_out.campaign.robot),
-        "share_below_max": share_below_largest(errors[0].poses),
+        "share_below_max": figures.share_below_largest(errors[0].poses),
         "outside_range": by_range,
     }
     if count := by_range["poses"]:
@@ -183,18 +173,18 @@ def heldout_errors(
     return rows, heldout, warnings + repeat_warnings(case.observations.states, held_out.observations.states)
 
 
-def _errors(steps: Sequence[Step], case: Case, held_out: Case) -> tuple[list[tuple[Model, Estimate]], list[Errors]]:
+def _errors(steps: Sequence[Step], case: Case, held_out: Case) -> tuple[list[tuple[Model, Estimate]], list[figures.Errors]]:
     """Models of all steps, placed where held-out measurements were made, and their errors there."""
     there = [placed(step.fitted, case, held_out) for step in steps]
-    return there, [position_errors(model, estimate, held_out.observations) for model, estimate in there]
+    return there, [figures.position_errors(model, estimate, held_out.observations) for model, estimate in there]
 
 
 def _declared(steps: Sequence[Step]) -> int:
     return next(number for number, step in enumerate(steps) if step.kind == "declared")
 
 
-def _summary(errors: Errors) -> dict[str, float]:
-    return {name: float(value) for name, value in summary(errors.distance).items()}
+def _summary(errors: figures.Errors) -> dict[str, float]:
+    return {name: float(value) for name, value in figures.summary(errors.distance).items()}
 
 
 def split_table(diagnosis: Diagnosis, held_out: Case, seed: int) -> list[dict[str, Any]]:
@@ -204,7 +194,7 @@ def split_table(diagnosis: Diagnosis, held_out: Case, seed: int) -> list[dict[st
     """
     case, before, after = diagnosis.case, diagnosis.declared, diagnosis.final
     draws = stream(seed, case.campaign.name, "splits", 0)
-    unseen = [position_errors(*placed(fitted, case, held_out), held_out.observations) for fitted in (before, after)]
+    unseen = [figures.position_errors(*placed(fitted, case, held_out), held_out.observations) for fitted in (before, after)]
     rows = [error_row("held out", "all", unseen[0], unseen[1], _REPLICATES, draws)]
     return rows + split_rows(before, after, case.observations, _REPLICATES, draws)
 
