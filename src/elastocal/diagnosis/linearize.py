@@ -11,7 +11,7 @@ from scipy.special import chdtri
 
 from elastocal.diagnosis.evidence import condition, log_sum_exp
 from elastocal.diagnosis.hypotheses import Law, Unit, laws_of, units_of
-from elastocal.diagnosis.search import Problem, likely_pose_errors, pose_errors_within_reach
+from elastocal.diagnosis.search import Problem, pose_errors_within_reach
 from elastocal.diagnosis.statistics import Products, Statistics, WhiteRows, products_of, statistics_of
 from elastocal.effects.gravity import DECLARED_WEIGHT
 from elastocal.errors import InputError
@@ -163,7 +163,8 @@ class Linearized:
         if products.rows.residual.size > _MANY_ROWS:
             some = spread_poses(self.observations, _SAMPLE_ROWS // self.observations.rows)[self.observations.state]
             sample = products_of(products.rows.at(some), *self.priors)
-            grid = grid[likely_pose_errors(statistics_of(sample, grid), self.units, settings)]
+            # Zero, to which Gram matrices refer, always.
+            grid = np.union1d(0.0, Problem(statistics_of(sample, grid), self.units, settings).started.statistics.pose_error_rad)
         statistics = statistics_of(products, grid)
         smallest = smallest_shown(statistics, self.units, settings)
         pairs = zip(self.units, smallest.tolist(), strict=True)

@@ -147,36 +147,15 @@ def posterior(problem: Problem, known: Collection[str] = ()) -> Posterior:
 
 
 def pose_errors_within_reach(statistics: Statistics, settings: Settings) -> np.ndarray:
-    """Sizes of the pose error up to the largest that "nothing" makes likely: what a model adds leaves no more to it.
+    """Which sizes of the pose error "nothing" makes likely, or smaller, (T,) of bool: what a model adds leaves no more to it.
 
     And up to `_REACH` steps beyond the most likely, for measurements that are simulated with that may look like more.
 
-    `statistics`: of the declared model alone. Returns (T,) of bool.
+    `statistics`: of the declared model alone.
     """
-    log_pose = pose_weights(statistics.pose_error_rad, settings)
-    weights = evaluate(statistics, [], Grid.of_settings(settings), log_pose, ()).log_pose
+    weights = Problem(statistics, (), settings).started.empty.log_pose
     largest = max(np.flatnonzero(weights > weights.max() + UNLIKELY)[-1], np.argmax(weights) + _REACH)
     return np.arange(len(weights)) <= largest
-
-
-def likely_pose_errors(statistics: Statistics, units: Sequence[Unit], settings: Settings) -> np.ndarray:
-    """Sizes of the pose error that "nothing" or some good single unit makes likely; zero, to which Gram matrices refer, always.
-
-    `statistics`: of zero first. Returns (T,) of bool.
-    """
-    grid, log_pose = Grid.of_settings(settings), pose_weights(statistics.pose_error_rad, settings)
-    conditioned = condition(statistics, np.zeros(0, int), np.zeros(0), log_pose)
-    found = added_evidence(conditioned, units, range(len(units)), grid, statistics.freedom)
-    likely = _likely(found, log_sum_exp(found, axis=(0, 2)), evaluate(statistics, [], grid, log_pose, ()))
-    likely[0] = True
-    return likely
-
-
-def _likely(by_pose_error: np.ndarray, total: np.ndarray, empty: Evaluated) -> np.ndarray:
-    good = np.argsort(-total)[:_TELLING_UNITS]
-    weights = log_sum_exp(by_pose_error[:, good], axis=2)
-    weights = np.column_stack([weights - log_sum_exp(weights, axis=0), empty.log_pose])
-    return np.any(weights > UNLIKELY, axis=1)
 
 
 class _Searcher:
@@ -216,7 +195,9 @@ class _Searcher:
         alone = log_sum_exp(conditioned.log_occam + log_likelihood(conditioned.squares, self.statistics.freedom))
         if not model:
             # Without the sizes of the pose error that neither "nothing" nor any good single unit makes likely.
-            self.keep_pose_errors(np.flatnonzero(_likely(by_pose_error, total, self.empty)))
+            weights = log_sum_exp(by_pose_error[:, np.argsort(-total)[:_TELLING_UNITS]], axis=2)
+            weights = np.column_stack([weights - log_sum_exp(weights, axis=0), self.empty.log_pose])
+            self.keep_pose_errors(np.flatnonzero((weights > UNLIKELY).any(axis=1)))
             self.empty = self.evaluated((), self.empty.scales)
         prior, here = self.problem.prior, self.met[model]
         mechanisms = Counter(units[n].mechanism for n in model)
