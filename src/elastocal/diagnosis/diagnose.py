@@ -40,10 +40,9 @@ _MOST_STEPS = 4
 
 @dataclass(frozen=True)
 class Step:
-    """One model on the way from the nominal robot to all effects found.
+    """One model on the way from the nominal robot to all effects found, fitted to the training poses.
 
-    `kind`: of the last, "kept" where frames alone predict training poses better than what was fitted. `fitted`: to the training
-    poses.
+    `kind`: of the last, "kept" where frames alone predict training poses better than what was fitted.
     """
 
     name: str
@@ -126,7 +125,11 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         named, word = found.conclusion.best.named, found.conclusion.verdict
         found = replace(found, conclusion=verdict.with_related(found.conclusion, verdict.oversized(final, named)))
         if not found.adopted:
-            steps[-1] = replace(steps[-1], fitted=_with_noise_left(case, declared, found) if named else final)
+            # Under the noise that it leaves itself, for nothing else enters the model that is kept.
+            line = found.linearized
+            left = refit.remaining_noise(line.problem, found.posterior.nothing, line.about.noise, declared.noise)
+            alone = fit(declared.model, case.observations, left, declared.estimate, reweighted=True) if named else final
+            steps[-1] = replace(steps[-1], fitted=alone)
         lost = _losses(bare, [steps[-1].fitted, *([final] if found.adopted else [])], case.observations, settings)
         found = replace(found, adopted=found.adopted and not lost)
         if found.adopted:
@@ -149,14 +152,6 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
     document |= {"contradictions": contradicting, "gross_errors": left_out, "repeatable": repeatable and asdict(repeatable)}
     document["warnings"] += warnings_of(left_out)
     return Diagnosis(case, tuple(steps), found, document, whole.measurements.select(errors.gross))
-
-
-def _with_noise_left(case: Case, declared: Fit, found: Evidence) -> Fit:
-    """The declared model under the noise that it leaves itself, for nothing else enters the model that is kept."""
-    noise = refit.remaining_noise(
-        found.linearized.problem, found.posterior.nothing, found.linearized.about.noise, declared.noise
-    )
-    return fit(declared.model, case.observations, noise, declared.estimate, reweighted=True)
 
 
 def _losses(bare: Fit, models: Sequence[Fit], observations: Observations, settings: Settings) -> list[str]:
@@ -292,7 +287,7 @@ def _document(
         averages = refit.averaged(found.linearized, found.posterior, chosen, owners)
         springs = averages if kept is chosen else refit.averaged(found.linearized, found.posterior, nothing, owners)
         entries = verdict.effect_entries(found, with_effects, averages, case.observations)
-        numbers, untestable = found.linearized.products.freedom, found.linearized.untestable
+        untestable, other = found.linearized.untestable, refit.other_predictions(problem, found.posterior, kept)
         tested = {unit.candidate.key for unit in problem.units if unit.candidate}
         stated = {
             "verdict": conclusion.verdict,
@@ -300,15 +295,14 @@ def _document(
             "probabilities": verdict.probability_facts(found),
             "misfit": {"before": refit.mean_square_left(problem, nothing), "after": refit.mean_square_left(problem, best)},
             # Root mean square by which positions may be elsewhere by other models than the one that is kept.
-            "other_models_m": float(np.sqrt(3.0 * refit.other_predictions(problem, found.posterior, kept) / numbers))
-            * noise.position_m,
+            "other_models_m": float(np.sqrt(3.0 * other / found.linearized.products.freedom)) * noise.position_m,
         }
         if entries and not found.adopted:
             remarks.append("what was found is too uncertain to make predictions better: the model stays as declared")
         remarks += verdict.implausible(with_effects, entries, case.campaign.robot.payload_kg)
         if not found.settled:
-            often = f"linearised {settings.linearizations} times"
-            remarks.append(f"the problem was {often}, and each time another model was found: more may be missing")
+            words = f"the problem was linearised {settings.linearizations} times, and each time another model was found"
+            remarks.append(f"{words}: more may be missing")
     remarks += fitted_compliance_warnings(final) + verdict.scatter_warnings(final.noise, noise, settings.relinearize_noise)
     for name, fitted in (("declared", declared), ("final", final)):
         if not fitted.converged:
