@@ -13,8 +13,6 @@ from scipy.stats import multivariate_normal, norm
 from elastocal.diagnosis.evidence import (
     Grid,
     Joint,
-    added_evidence,
-    condition,
     evaluate,
     log_likelihood,
     pose_weights,
@@ -98,22 +96,6 @@ def test_the_size_of_the_noise_is_the_most_likely_one_of_at_least_one(squares):
 
     best = minimize_scalar(negative, bounds=(0.0, 10.0), method="bounded", options={"xatol": 1e-10})
     assert log_likelihood(squares, 50) == pytest.approx(-best.fun, abs=1e-6)
-
-
-def test_added_evidence_is_that_of_the_model_with_each_unit_added_at_each_size():
-    rows = quiet(8, SIGNALS["a"])
-    statistics = statistics_of(rows.products, TAU)
-    conditioned = condition(statistics, UNITS[0].columns, np.full(2, 0.3), LOG_POSE)
-    found = added_evidence(conditioned, UNITS, [1, 2], GRID, statistics.freedom)
-    assert found.shape == (3, 3, 6) and np.isneginf(found[:, 0]).all()
-    constant = None
-    for place, tau in enumerate(TAU):
-        for number in (1, 2):
-            for step, scale in enumerate(GRID.scales):
-                value = log_density(rows, tau, deviations_of([UNITS[0], UNITS[number]], [0.3, scale]))
-                value += LOG_POSE[place] + GRID.log_weights[step]
-                constant = found[place, number, step] - value if constant is None else constant
-                assert found[place, number, step] - value == pytest.approx(constant, abs=1e-8)
 
 
 def half_normal_evidence(rows, tau, columns, signs, scale):

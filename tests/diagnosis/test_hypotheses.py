@@ -84,19 +84,6 @@ def test_units_of_the_catalogue_have_columns_of_their_own_that_share_out_all(cat
     assert len({unit.key for unit in units}) == len(units)
 
 
-def test_laws_share_a_location_alike_and_shapes_of_a_law_by_the_part_of_the_range_that_they_stand_for(catalogue):
-    """Where shapes are denser each has less: three near each other do not make their law more probable than the others."""
-    growth = {c.key: c for c in catalogue if c.effect == "thermal_growth"}
-    by_temperature, by_time = growth["thermal_growth[temperature]"], growth["thermal_growth[time]"]
-    lags = (1000.0, 8000.0, 7900.0, 8100.0)
-    units = units_of([(by_temperature, [()]), (by_time, [(lag,) for lag in lags])], [], SETTINGS)
-    found = np.exp([unit.log_prior for unit in units])
-    assert by_temperature.location == by_time.location
-    assert found[0] == pytest.approx(0.5)
-    np.testing.assert_allclose(found[1:], 0.5 * by_time.shapes[0].shares(lags))
-    assert found[2] < 0.1 * found[1] and found[3] > 5 * found[2]
-
-
 FEATURES = 40
 OF_JOINTS = [f"{cause}{load}" for cause in (OWN, NEIGHBOURS, TIME) for load in ("", UNDER_LOAD)]
 AT_A_JOINT = [((4,), name) for name in OF_JOINTS]

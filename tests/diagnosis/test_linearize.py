@@ -13,10 +13,8 @@ from elastocal.diagnosis.gross_errors import Kept
 from elastocal.diagnosis.linearize import (
     linearized,
     looked_at_closely,
-    shapes_tried,
     smallest_shown,
     with_probable_centres,
-    with_stated_centres,
 )
 from elastocal.diagnosis.settings import Settings
 from elastocal.effects.catalogue import candidates_on
@@ -47,14 +45,6 @@ def with_effect(campaign, key, values):
     start = campaign.declared.estimate.with_effects([campaign.candidates[key]])
     start.coefficients[-1][:] = values
     return model, start
-
-
-def fitted_at(campaign, key, *shapes):
-    """The declared fit with an effect of no size, of given shapes or of those that a fit starts from."""
-    model, start = with_effect(campaign, key, 0.0)
-    if shapes:
-        start.shapes[-1][:] = shapes
-    return replace(campaign.declared, model=model, estimate=start)
 
 
 def unit_of(found, key):
@@ -93,18 +83,6 @@ def test_a_problem_about_a_model_with_an_effect_is_the_one_about_the_model_witho
     assert one.along[0][1] / np.sqrt(one.gram[0][1, 1]) > 20
 
 
-def test_candidates_without_their_covariate_are_untestable_with_the_reason(kuka):
-    states = replace(two_loads_a_pose(6, 25, 3), time_s=None, temperature_c=None, approach=None)
-    campaign = planted(kuka, {}, states=states)
-    keys = ("frame_drift", "hysteresis@2", "thermal_growth[temperature]", "joint_offset@3")
-    found = problem_of(campaign, keys=keys)
-    assert set(found.untestable) == set(keys[:3])
-    assert "approach" in found.untestable["hysteresis@2"] and "temperature" in found.untestable["thermal_growth[temperature]"]
-    assert all(why.startswith("no ") and why.endswith("in the data") for why in found.untestable.values())
-    tested = {unit.candidate.key for unit in found.problem.units if unit.candidate}
-    assert tested == {"joint_offset@3"}
-
-
 def test_the_smallest_size_is_the_first_that_would_be_found_with_a_power_of_a_half(campaign):
     """Non-centrality equal to the critical value of a chi-square of one degree of freedom, at each of the sizes."""
     problem = problem_of(campaign).problem
@@ -117,15 +95,6 @@ def test_the_smallest_size_is_the_first_that_would_be_found_with_a_power_of_a_ha
         for factor, shown in ((1.01, place), (0.99, place + 1)):
             scaled = replace(problem.statistics, gram=gram * factor * critical / largest / scale**2)
             assert smallest_shown(scaled, units, SETTINGS)[0] == shown
-
-
-def test_shapes_are_tried_over_their_range_and_as_fitted(campaign):
-    shaped = next(candidate for candidate in campaign.all_candidates if candidate.shapes and not candidate.shapes[0].tried)
-    (shape,) = shaped.shapes
-    tried = [value for (value,) in shapes_tried(shaped, campaign.declared)]
-    assert len(tried) == 3 and tried == sorted(tried) and shape.lowest < tried[0] and tried[-1] < shape.highest
-    assert shapes_tried(shaped, fitted_at(campaign, shaped.key)) == [(shape.start,)]
-    assert shapes_tried(campaign.candidates["joint_offset@3"], campaign.declared) == [()]
 
 
 def test_the_shapes_of_the_best_candidates_are_looked_at_more_closely_about_the_best_value_of_each(campaign):
@@ -177,8 +146,3 @@ def test_the_prior_is_that_which_the_measurements_make_more_probable(fanuc, off,
     deviations = [p.prior_std for effect in found.declared.model.effects[1:2] for p in effect.parameters]
     assert deviations[1] == pytest.approx(28.0 * np.linalg.norm(MASSES[0].centre_m)) or stays_wide
     assert found.case.model.effects[1] == found.declared.model.effects[1]
-
-
-def test_without_declared_masses_nothing_is_chosen(fanuc):
-    model = made_model(fanuc)
-    assert with_stated_centres(model) is model

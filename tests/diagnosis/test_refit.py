@@ -15,7 +15,6 @@ from elastocal.diagnosis.refit import (
     averaged,
     expected_to_help,
     fit_with_sizes,
-    other_predictions,
     selected,
     squares_beyond,
     squares_explained,
@@ -61,18 +60,6 @@ def test_priors_arrive_in_the_fit(found):
     precision = np.array([0.0 if p.prior_std is None else p.prior_std**-2 for _, p in final.parameters])
     expected = np.linalg.inv(left.T @ left + np.diag(precision))
     np.testing.assert_allclose(np.diag(final.covariance), np.diag(expected), rtol=1e-2)
-
-
-def test_no_effect_is_fitted_under_a_wider_prior_than_it_had_before_the_measurements(found):
-    _, _, line, models = found
-    best = models.models[0]
-    unit = line.problem.units[best.units[0]]
-    before = line.problem.grid.root_mean_square(unit)
-    sizes = [0.5 * before, before, SETTINGS.scales[-1]]
-    assert before < SETTINGS.scales[-1]
-    chosen = [selected(line, replace(best, scales=np.array([size])))[0][0] for size in sizes]
-    deviations = [candidate.parameters[0].prior_std / unit.sizes[0] for candidate in chosen]
-    np.testing.assert_allclose(deviations, [0.5 * before, before, before], rtol=1e-12)
 
 
 TAU = np.array([0.0, 0.3, 0.9])
@@ -228,13 +215,3 @@ def test_squares_beyond_the_others_are_what_is_left_where_the_others_fit_them_wi
     assert squares_beyond(problem, Model((0,), 0.0, np.array([0.3]), 0.0), {"a"})[0][1] == pytest.approx(
         squares_explained(problem, Model((0,), 0.0, np.array([0.3]), 0.0))["a"]
     )
-
-
-def test_other_models_predict_otherwise_by_their_probability_and_unknown_causes_are_in_none_that_is_kept(made):
-    rows, line = made
-    gram = projected_gram(rows)
-    found = posterior_of(((0, 2), [0.3, 0.3], 0.0, 0.75), ((1,), [0.3], 0.0, 0.25))
-    mine, other = (most_probable(rows, line.problem, model) for model in found.models)
-    kept = np.where(np.isin(np.arange(len(mine)), UNITS[0].columns), mine, 0.0)
-    expected = 0.75 * (mine - kept) @ gram @ (mine - kept) + 0.25 * (other - kept) @ gram @ (other - kept)
-    assert other_predictions(line.problem, found, found.models[0]) == pytest.approx(expected, rel=1e-6)

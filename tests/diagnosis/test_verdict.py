@@ -8,7 +8,6 @@ import pytest
 from made_problems import made_problem, made_rows, made_unit
 from planted import planted
 
-from elastocal.data_checks.protocol import Fault, Value
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.refit import Averaged, squares_beyond
 from elastocal.diagnosis.search import Alarm, Model, Posterior
@@ -24,7 +23,6 @@ from elastocal.diagnosis.verdict import (
     Hypothesis,
     concluded,
     contradictions,
-    fault_entry,
     hypotheses_of,
     implausible,
     location_probabilities,
@@ -305,21 +303,3 @@ def test_a_size_beyond_what_such_an_effect_reaches_is_named(found):
         large = with_value(fitted, "joint_offset@3", 3.5 * sign * plausible, 0.1 * plausible)
         assert oversized(large, {"joint_offset", "payload"}) == {"joint_offset"} and not oversized(large, {"payload"})
     assert implausible(with_value(fitted, "joint_offset@3", 3.1 * plausible, 0.1 * plausible), entries) == []
-
-
-def test_more_than_the_rated_payload_is_named(found):
-    fitted, entries = found
-    heavy = with_value(fitted, "payload", 24.4, 0.9)
-    found_at = [warning for warning in implausible(heavy, entries, rated_kg=3.0) if "rated payload" in warning]
-    assert len(found_at) == 1 and "24.4 ± 0.9 kg" in found_at[0] and "3 kg" in found_at[0]
-    assert not any("rated payload" in warning for warning in implausible(heavy, entries, rated_kg=30.0))
-    assert not any("rated payload" in warning for warning in implausible(heavy, entries))
-
-
-def test_a_fault_of_the_data_is_an_entry_without_probability():
-    factor = Value("factor", 1e-3, "m")
-    entry = fault_entry(Fault("wrong_unit", (), "millimetres", (factor,), (1.0, np.nan), (), True, ("another frame",)))
-    assert (entry["name"], entry["family"], entry["detail"]) == ("wrong_unit", "data", "millimetres")
-    assert entry["parameters"] == [{"name": "factor", "value": 1e-3, "unit": "m", "std_error": None}]
-    assert entry["probability"] is None and entry["heldout_gain"] is None
-    assert entry["alternatives"] == ["another frame"] and entry["evidence"] == [1.0, None]

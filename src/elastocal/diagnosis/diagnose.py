@@ -19,6 +19,8 @@ from elastocal.effects.catalogue import effects
 from elastocal.fitting.case import Case, noise_facts
 from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.least_squares import ON_THE_WAY, fit
+from elastocal.fitting.observations import Observations, sample_of
+from elastocal.fitting.parameters import parameter_values
 from elastocal.fitting.robust import SETTLED
 from elastocal.fitting.tolerances import effective_parameters
 from elastocal.random_streams import stream
@@ -32,10 +34,11 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.settings import Settings
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.noise import Noise
-    from elastocal.fitting.observations import Observations
 
 # Mechanisms that are added one at a time, each by a fit; of more, only the first.
 _MOST_STEPS = 4
+# Standard errors by which parameters move where nothing else is found: they change a log likelihood by 0.03 each.
+_HARDLY = 0.25
 
 
 @dataclass(frozen=True)
@@ -93,22 +96,39 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         case = replace(case, model=part.case.model)
     tell(f"declared model fitted to {counted(len(part.case.observations), 'measurement')}")
     found: Evidence | None = None
-    start, most_pose_error_rad = None, np.inf
-    errors = Deviations.none(len(part.kept), case.model.rows)
+    about, start, most_pose_error_rad = part.declared, None, np.inf
+    measurements, errors = case.campaign.measurements, Deviations.none(len(part.kept), case.model.rows)
     good = np.zeros(len(part.kept), bool)
     for number in range(0 if decisive else settings.gross_error_rounds):
-        found = _explained(part, settings, seed, tell, start, most_pose_error_rad)
-        errors = gross_errors(found.fitted, part.noise, case.campaign.measurements, part.kept, settings)
+        if not found:
+            found = _explained(part, settings, seed, tell, start, most_pose_error_rad)
+            about = found.fitted
+        errors = gross_errors(about, part.noise, measurements, part.kept, settings)
         # A row that a model without it explains stays, whatever the next model says of it: no set of rows comes back.
         good |= ~part.kept & ~errors.gross
         remaining = ~errors.gross | good
         if (remaining == part.kept).all() or number + 1 == settings.gross_error_rounds:
             break
-        part = fitted_to(case, remaining, settings, part)
+        # The model found looks at all rows once more, without these, before another search is made.
+        like = None if (remaining & ~part.kept).any() else part.searched
+        some = sample_of(case.select(remaining).observations, settings.searched_observations, like)
+        about = fit(about.model, some, about.noise, about.estimate, True, ON_THE_WAY)
+        errors = gross_errors(about, part.noise, measurements, remaining, settings)
+        good |= ~remaining & ~errors.gross
+        last, part = part, fitted_to(case, ~errors.gross | good, settings, part)
+        if part is last:
+            break
         tell(f"{counted((~part.kept).sum(), 'gross error')} in {counted(len(good), 'row')}: once more without")
+        if noise_facts(part.noise) == noise_facts(last.noise):
+            again = fit(found.fitted.model, part.searched, about.noise, about.estimate, True, ON_THE_WAY)
+            moved = np.subtract(*(parameter_values(each.model, each.estimate) for each in (again, found.fitted)))
+            if (np.abs(moved) <= _HARDLY * np.sqrt(np.diag(found.fitted.covariance))).all():
+                # Rows of so little weight that the search would find the same.
+                about = again
+                continue
         # What was linearised about a model found is so again: from the declared one the way is the same and twice as long.
         relinearized = len(found.linearized.about.model.effects) > len(part.declared.model.effects)
-        start = (found.fitted, found.conclusion.best.named) if relinearized else None
+        start = (about, found.conclusion.best.named) if relinearized else None
         most_pose_error_rad = found.linearized.most_pose_error_rad
         # Its statistics make room for those of the next search.
         found = None
@@ -119,9 +139,9 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
     final, lost, contradicting, repeatable = declared, list[str](), list[str](), None
     warnings = [*part.warnings]
     if found:
-        final = found.fitted
-        if part.searched is not case.observations:
-            final = fit(final.model, case.observations, final.noise, final.estimate, reweighted=True)
+        final = about
+        if about is not found.fitted or part.searched is not case.observations:
+            final = fit(about.model, case.observations, about.noise, about.estimate, reweighted=True)
         named, word = found.conclusion.best.named, found.conclusion.verdict
         found = replace(found, conclusion=verdict.with_related(found.conclusion, verdict.oversized(final, named)))
         if not found.adopted:
