@@ -7,7 +7,7 @@ import pytest
 from made_campaigns import Plan, made, with_geometric_errors, with_other_compliances
 
 from elastocal.data_checks.protocol import Fault, Value, data_at_fault, fault_modules, faults
-from elastocal.diagnosis.findings import fault_entry
+from elastocal.diagnosis.verdict import fault_entry
 
 FAULT = Fault("wrong_sign", (2,), "joint 2 fits counted the other way round", (Value("x", 0.5, "m"),), (0.3, 1e-4), (), True)
 

@@ -13,19 +13,16 @@ from scipy.stats import multivariate_normal, norm
 from elastocal.diagnosis.evidence import (
     Grid,
     Joint,
-    added_evidence,
-    condition,
     evaluate,
     log_likelihood,
     pose_weights,
-    scale_weights,
 )
 from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.statistics import statistics_of
 
 TAU = np.array([0.0, 0.3, 0.9])
 SETTINGS = Settings()
-GRID = Grid(np.array(SETTINGS.scales), scale_weights(SETTINGS))
+GRID = Grid.of_settings(SETTINGS)
 LOG_POSE = pose_weights(TAU, SETTINGS)
 # Residuals of a little less than the noise, so that its size is at its floor and everything is normal.
 QUIET = 0.5
@@ -81,19 +78,6 @@ def log_bayes_factor(rows, units):
 SIGNALS = {"nothing": (), "a": (0.4, -0.3), "b": (0, 0, 0.5), "a little of all": (0.1, 0.1, -0.1, 0.1, 0.0, 0.1)}
 
 
-def test_sizes_of_many_units_that_overlap_end_where_no_other_size_of_one_is_more_probable():
-    rows, draws = made_rows(1, poses=60, candidates=100), np.random.default_rng(1)
-    shared = draws.standard_normal((100, 5)) @ draws.standard_normal((5, 100))
-    columns = rows.candidates @ (np.eye(100) + 3.0 * shared)
-    rows = replace(rows, candidates=columns, residual=rows.residual + columns @ draws.normal(0.0, 0.1, 100))
-    statistics, units = statistics_of(rows.products, TAU), [made_unit(str(n), (1,), n) for n in range(100)]
-    found = evaluate(statistics, units, GRID, LOG_POSE, np.ones(100))
-    places = np.searchsorted(GRID.scales, found.scales)
-    profiles = Joint(statistics, units, GRID, statistics.log_likelihood + LOG_POSE, places).profiles()
-    for place, profile in zip(places, profiles, strict=True):
-        assert profile[1 + place] > profile[1:].max() - 1e-6
-
-
 @pytest.mark.parametrize("signal", SIGNALS)
 @pytest.mark.parametrize("chosen", [(0,), (1,), (2,), (0, 1), (0, 1, 2)])
 def test_evidence_is_that_of_all_combinations_of_sizes(signal, chosen):
@@ -105,17 +89,6 @@ def test_evidence_is_that_of_all_combinations_of_sizes(signal, chosen):
     assert log_bayes_factor(rows, units) == pytest.approx(expected, abs=1e-8 if len(chosen) == 1 else 0.03)
 
 
-@pytest.mark.parametrize("signal", SIGNALS)
-def test_evidence_without_each_unit_is_that_of_the_smaller_model(signal):
-    """Exact where nothing else is in the model; to 0.1 nats where the sizes of others stay as they were."""
-    rows = quiet(3, SIGNALS[signal])
-    (alone,) = evaluated(rows, UNITS[:1]).without
-    assert alone == pytest.approx(evaluated(rows, ()).log_evidence, abs=1e-8)
-    found = evaluated(rows, UNITS).without
-    smaller = [evaluated(rows, UNITS[:n] + UNITS[n + 1 :]).log_evidence for n in range(3)]
-    np.testing.assert_allclose(found, smaller, atol=0.1)
-
-
 @pytest.mark.parametrize("squares", [10.0, 49.9, 50.1, 80.0, 400.0])
 def test_the_size_of_the_noise_is_the_most_likely_one_of_at_least_one(squares):
     def negative(log_variance):
@@ -123,22 +96,6 @@ def test_the_size_of_the_noise_is_the_most_likely_one_of_at_least_one(squares):
 
     best = minimize_scalar(negative, bounds=(0.0, 10.0), method="bounded", options={"xatol": 1e-10})
     assert log_likelihood(squares, 50) == pytest.approx(-best.fun, abs=1e-6)
-
-
-def test_added_evidence_is_that_of_the_model_with_each_unit_added_at_each_size():
-    rows = quiet(8, SIGNALS["a"])
-    statistics = statistics_of(rows.products, TAU)
-    conditioned = condition(statistics, UNITS[0].columns, np.full(2, 0.3), LOG_POSE)
-    found = added_evidence(conditioned, UNITS, [1, 2], GRID, statistics.freedom)
-    assert found.shape == (3, 3, 6) and np.isneginf(found[:, 0]).all()
-    constant = None
-    for place, tau in enumerate(TAU):
-        for number in (1, 2):
-            for step, scale in enumerate(GRID.scales):
-                value = log_density(rows, tau, deviations_of([UNITS[0], UNITS[number]], [0.3, scale]))
-                value += LOG_POSE[place] + GRID.log_weights[step]
-                constant = found[place, number, step] - value if constant is None else constant
-                assert found[place, number, step] - value == pytest.approx(constant, abs=1e-8)
 
 
 def half_normal_evidence(rows, tau, columns, signs, scale):
@@ -168,24 +125,6 @@ def test_half_normal_priors_are_exact_of_one_coefficient_and_taken_one_by_one_of
     found = [evaluate(one, units, grid, np.zeros(1), [scale] * len(units)) for units in ([unit], [])]
     expected = half_normal_evidence(rows, 0.3, columns, signs, scale)
     assert found[0].log_evidence - found[1].log_evidence == pytest.approx(expected, abs=within)
-
-
-def test_weights_of_sizes_are_log_normal_about_the_center_and_sum_to_one():
-    settings = replace(SETTINGS, scales=(0.01, 0.1, 1.0), scale_center=0.1, scale_spread=(3.0, 0.7))
-    weights = np.exp(scale_weights(settings))
-    assert weights.sum() == pytest.approx(1.0)
-    ratio = np.log(10.0)
-    assert weights[0] / weights[1] == pytest.approx(np.exp(-0.5 * (ratio / 3.0) ** 2))
-    assert weights[2] / weights[1] == pytest.approx(np.exp(-0.5 * (ratio / 0.7) ** 2))
-    assert np.exp(GRID.log_weights).sum() == pytest.approx(1.0) and GRID.scales[np.argmax(GRID.log_weights)] == 0.1
-
-
-def test_the_prior_of_a_coefficient_over_all_sizes_has_the_deviation_of_its_draws():
-    """200,000 draws: a standard error of 0.5 %, for large sizes are rare."""
-    unit = replace(UNITS[0], smallest=1, largest=4)
-    draws = np.random.default_rng(1)
-    sizes = draws.choice(GRID.scales, 200_000, p=np.exp(GRID.of(unit)))
-    assert GRID.root_mean_square(unit) == pytest.approx((sizes * draws.standard_normal(len(sizes))).std(), rel=0.02)
 
 
 def test_evidence_is_averaged_over_the_sizes_that_a_unit_may_have():

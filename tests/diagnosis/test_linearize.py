@@ -4,16 +4,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import HAND, planted, two_loads_a_pose
+from planted import planted, two_loads_a_pose
 from scipy.stats import chi2, ncx2
-from synthetic import NOISE, made_states
+from synthetic import NOISE, made_estimate, made_model, seen_exactly, with_noise
 
-from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.diagnosis.linearize import lacking, linearized, shapes_looked_at_closely, shapes_tried, smallest_shown
-from elastocal.diagnosis.other import laws_of
+from elastocal.campaigns.campaign import Target
+from elastocal.diagnosis.gross_errors import Kept
+from elastocal.diagnosis.linearize import (
+    linearized,
+    looked_at_closely,
+    smallest_shown,
+    with_probable_centres,
+)
 from elastocal.diagnosis.settings import Settings
+from elastocal.effects.catalogue import candidates_on
+from elastocal.fitting.case import Case
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.prediction import residuals
+from elastocal.mechanics.robot import Mass
 
 SETTINGS = Settings()
 KEYS = ("joint_offset@2", "joint_offset@3", "joint_tilt@2", "link_elasticity@3", "payload", "link_geometry@4")
@@ -37,14 +45,6 @@ def with_effect(campaign, key, values):
     start = campaign.declared.estimate.with_effects([campaign.candidates[key]])
     start.coefficients[-1][:] = values
     return model, start
-
-
-def fitted_at(campaign, key, *shapes):
-    """The declared fit with an effect of no size, of given shapes or of those that a fit starts from."""
-    model, start = with_effect(campaign, key, 0.0)
-    if shapes:
-        start.shapes[-1][:] = shapes
-    return replace(campaign.declared, model=model, estimate=start)
 
 
 def unit_of(found, key):
@@ -83,53 +83,6 @@ def test_a_problem_about_a_model_with_an_effect_is_the_one_about_the_model_witho
     assert one.along[0][1] / np.sqrt(one.gram[0][1, 1]) > 20
 
 
-def test_the_competitor_acts_by_all_its_laws_of_which_the_campaign_has_inputs_and_that_show(campaign):
-    loud = {unit.key for unit in problem_of(campaign, keys=KEYS[:1]).problem.units if unit.mechanism == OTHER}
-    quiet = replace(campaign.declared, noise=campaign.declared.noise.scaled(0.01))
-    found = problem_of(campaign, quiet, KEYS[:1])
-    assert loud < {unit.key for unit in found.problem.units}
-    against = [unit.law for unit in found.problem.units if unit.mechanism == OTHER]
-    laws = laws_of(campaign.declared.conditions, SETTINGS.other_features)
-    assert [(law.location, law.name) for law in against] == [(law.location, law.name) for law in laws]
-    assert {each.location for each in against} == {(1,), (2,), (3,), (4,), (5,), (6,), ()}
-    columns = [len(unit.columns) for unit in found.problem.units if unit.mechanism == OTHER and unit.location]
-    assert set(columns) == {SETTINGS.other_features}
-
-
-def test_candidates_without_their_covariate_are_untestable_with_the_reason(kuka):
-    states = replace(two_loads_a_pose(6, 25, 3), time_s=None, temperature_c=None, approach=None)
-    campaign = planted(kuka, {}, states=states)
-    keys = ("frame_drift", "hysteresis@2", "thermal_growth[temperature]", "joint_offset@3")
-    found = problem_of(campaign, keys=keys)
-    assert set(found.untestable) == set(keys[:3])
-    assert "approach" in found.untestable["hysteresis@2"] and "temperature" in found.untestable["thermal_growth[temperature]"]
-    assert all(why.startswith("no ") and why.endswith("in the data") for why in found.untestable.values())
-    tested = {unit.candidate.key for unit in found.problem.units if unit.candidate}
-    assert tested == {"joint_offset@3"}
-
-
-@pytest.mark.parametrize(
-    ("key", "joint", "angles"),
-    [("transmission_harmonic@4[orders 1-2]", 4, 3), *(("nest_eccentricity", 6, n) for n in (3, 7, 8))],
-)
-def test_too_few_angles_of_a_joint_test_no_law_that_goes_by_them(kuka, key, joint, angles):
-    """Nor of the last joint a nest, a law that belongs to no joint."""
-    states = made_states(6, 30, seed=4)
-    states.joint_angles[:, joint - 1] = np.arange(30) % angles * 0.4
-    campaign = planted(kuka, {}, states=states, targets=HAND)
-    told = lacking(campaign.candidates[key], campaign.declared.model.offered(states), states.joint_angles)
-    assert told == ("" if angles == 8 else "too few different angles of a joint")
-
-
-def test_what_is_too_small_to_be_seen_at_any_size_is_untestable(kuka):
-    """Measurements ten thousand times as noisy show no offset."""
-    campaign = planted(kuka, {}, seed=5)
-    loud = replace(campaign.declared, noise=NOISE.scaled(1e4))
-    found = problem_of(campaign, loud, KEYS[:2])
-    assert set(found.untestable.values()) == {"too small to be seen at any size that such an effect has"}
-    assert not any(unit.candidate for unit in found.problem.units)
-
-
 def test_the_smallest_size_is_the_first_that_would_be_found_with_a_power_of_a_half(campaign):
     """Non-centrality equal to the critical value of a chi-square of one degree of freedom, at each of the sizes."""
     problem = problem_of(campaign).problem
@@ -144,36 +97,16 @@ def test_the_smallest_size_is_the_first_that_would_be_found_with_a_power_of_a_ha
             assert smallest_shown(scaled, units, SETTINGS)[0] == shown
 
 
-def test_shapes_are_tried_over_their_range_and_as_fitted(campaign):
-    shaped = next(candidate for candidate in campaign.all_candidates if candidate.shapes and not candidate.shapes[0].tried)
-    (shape,) = shaped.shapes
-    tried = [value for (value,) in shapes_tried(shaped, campaign.declared)]
-    assert len(tried) == 3 and tried == sorted(tried) and shape.lowest < tried[0] and tried[-1] < shape.highest
-    assert shapes_tried(shaped, fitted_at(campaign, shaped.key)) == [(shape.start,)]
-    assert shapes_tried(campaign.candidates["joint_offset@3"], campaign.declared) == [()]
-
-
-@pytest.mark.parametrize("when", [0.63, 1 / 12, 0.9])
-def test_a_step_that_was_fitted_is_tried_close_to_where_it_was_within_its_range(campaign, when):
-    """Itself among them, or the fit could only become worse; each of its values has a share of the prior."""
-    step = campaign.candidates["setup_step"]
-    tried = [value for (value,) in shapes_tried(step, fitted_at(campaign, "setup_step", when))]
-    (shape,) = step.shapes
-    assert np.isclose(tried, when).any() and len(tried) >= 4
-    assert min(tried) >= shape.lowest and max(tried) <= shape.highest
-    assert np.ptp(tried) < 0.5 / 12
-    assert (shape.shares(tried) > 0).all()
-
-
 def test_the_shapes_of_the_best_candidates_are_looked_at_more_closely_about_the_best_value_of_each(campaign):
     """Of laws with a shape that is tried at several values, at a single one, and without one."""
-    problem = problem_of(campaign, keys=("setup_step", "thermal_growth[time]", "link_elasticity@3", "joint_offset@3")).problem
+    problem = problem_of(campaign, keys=("setup_step", "thermal_growth[time]", "link_elasticity@3", "joint_offset@3"))
     sizes = {("setup_step", 5): 30.0, ("setup_step", 6): 25.0, ("thermal_growth[time]", 1): 28.0, ("joint_offset@3", 0): 29.0}
-    alone = np.zeros(len(problem.units))
+    alone = np.zeros(len(problem.problem.units))
     for (key, place), size in sizes.items():
-        numbers = [n for n, unit in enumerate(problem.units) if unit.candidate and unit.candidate.key == key]
+        numbers = [n for n, unit in enumerate(problem.problem.units) if unit.candidate and unit.candidate.key == key]
         alone[numbers[place]] = size
-    found = {key: [value for (value,) in values] for key, values in shapes_looked_at_closely(problem, alone).items()}
+    tried = looked_at_closely(problem, alone).tried
+    found = {key: [value for (value,) in values] for key, (_, values) in tried.items() if values != problem.tried[key][1]}
     assert set(found) == {"setup_step", "thermal_growth[time]"}
     closer = np.linspace(5 / 12, 7 / 12, 9)[1:-1]
     np.testing.assert_allclose(found["setup_step"], np.unique(np.round([*np.arange(1, 12) / 12, *closer], 12)))
@@ -181,14 +114,35 @@ def test_the_shapes_of_the_best_candidates_are_looked_at_more_closely_about_the_
     np.testing.assert_allclose(found["thermal_growth[time]"], np.geomspace(lags[1], lags[3], 9))
 
 
-def test_the_prior_of_a_declared_parameter_is_kept(kuka):
-    """An effect that is declared with a prior keeps it: it is projected off no further than its prior lets it be."""
-    campaign = planted(kuka, {}, seed=6)
-    stiff = campaign.candidates["joint_offset@2"]
-    stiff = replace(stiff, parameters=tuple(replace(p, prior_std=1e-9) for p in stiff.parameters))
-    model = campaign.declared.model.with_effects([stiff])
-    fitted = fit(model, campaign.observations, campaign.declared.noise, campaign.declared.estimate.with_effects([stiff]))
-    other = [campaign.candidates["joint_offset@2"]]
-    held = linearized(fitted, campaign.observations, other, SETTINGS).problem.statistics
-    free = linearized(campaign.declared, campaign.observations, other, SETTINGS).problem.statistics
-    np.testing.assert_allclose(held.gram[0][0, 0], free.gram[0][0, 0], rtol=1e-3)
+MASSES = (
+    Mass(1, 280.0, (0.1, 0.02, -0.10), 0.1),
+    Mass(2, 190.0, (0.52, 0.05, 0.0), 0.1),
+    Mass(3, 220.0, (0.35, -0.04, 0.2), 0.1),
+)
+TARGETS = (Target("elbow", "3DoF", (0.0, 0.1, 0.05)), Target("hand", "6DoF", (0.1, 0.05, 0.02)))
+
+
+def kept(robot, off=0.0, payload_kg=0.0):
+    """Two loads a pose of a robot whose moments are off by `off` standard deviations of the wide prior."""
+    model = made_model(robot, TARGETS, fitted_frames=False, compliance=robot.compliance, identified=True)
+    candidates = candidates_on(model.sites)
+    weight = model.effects[1]
+    true = made_estimate(model, size=0.0).with_effects([candidates["payload[mass]"]])
+    moved = [off * p.prior_std * (-1) ** n * p.name.startswith("moment") for n, p in enumerate(weight.parameters)]
+    true = replace(true, coefficients=(robot.compliance, np.array(moved), np.array([payload_kg])))
+    states = two_loads_a_pose(6, 30, 5)
+    seen = seen_exactly(model.with_effects([candidates["payload[mass]"]]), true, states)
+    seen = with_noise(seen, np.random.default_rng(6))
+    noise = replace(NOISE, joint_rad=np.zeros(6))
+    declared = fit(model, seen, noise)
+    return Kept(Case(None, seen, model, candidates), np.ones(len(seen), bool), noise, [], declared, seen)
+
+
+@pytest.mark.parametrize(("off", "payload_kg", "stays_wide"), [(0.0, 0.0, False), (1.0, 0.0, True), (0.0, 20.0, False)])
+def test_the_prior_is_that_which_the_measurements_make_more_probable(fanuc, off, payload_kg, stays_wide):
+    part = kept(replace(fanuc, masses=MASSES, payload_kg=165.0), off, payload_kg)
+    found = with_probable_centres(part, Settings())
+    assert (found is part) == stays_wide
+    deviations = [p.prior_std for effect in found.declared.model.effects[1:2] for p in effect.parameters]
+    assert deviations[1] == pytest.approx(28.0 * np.linalg.norm(MASSES[0].centre_m)) or stays_wide
+    assert found.case.model.effects[1] == found.declared.model.effects[1]

@@ -6,63 +6,54 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from made_problems import made_problem, made_rows, made_unit
 from planted import planted, two_loads_a_pose
+from scipy.stats import norm
 
 from elastocal.campaigns.campaign import Target
-from elastocal.diagnosis import next_experiment, verdict
-from elastocal.diagnosis.alarm import Alarm
-from elastocal.diagnosis.alternatives import Promise, alternatives_of
+from elastocal.diagnosis import next_experiment
 from elastocal.diagnosis.linearize import linearized
 from elastocal.diagnosis.next_experiment import (
     DATA_AT_FAULT,
     NOT_DISTINGUISHABLE,
     NOTHING_AMBIGUOUS,
-    Entries,
-    Proposal,
+    PROMISE_DRAWS,
+    Alternative,
+    Hypotheses,
+    Instrument,
+    alternatives_of,
     drawn,
-    facts_of,
-    instrument_of,
     propose,
-    shares_of,
-    table_of,
 )
-from elastocal.diagnosis.search import posterior
+from elastocal.diagnosis.search import Alarm, Model, posterior
 from elastocal.diagnosis.settings import Settings
-from elastocal.diagnosis.statistics import rows_alike
-from elastocal.diagnosis.verdict import concluded, mechanisms_of_models
+from elastocal.diagnosis.verdict import concluded
 
 SETTINGS = Settings(pose_steps=(0.0, 2.0), other_features=6)
 RAISED = Alarm(0.002, 10.0, True)
 ELASTIC = ("link_elasticity", "base_compliance", "joint_tilt")
-LADDER = (0.0, 1.0, -1.0)
 
 
-def diagnosed(campaign, robot, keys, declared=None):
+def diagnosed(campaign, robot, keys):
     """A diagnosis in which only some candidates compete."""
-    declared = declared or campaign.declared
-    line = linearized(declared, campaign.observations, [campaign.candidates[key] for key in keys], SETTINGS)
+    robot = replace(robot, joint_limits=np.clip(robot.joint_limits, -2.0, 2.0))
+    line = linearized(campaign.declared, campaign.observations, [campaign.candidates[key] for key in keys], SETTINGS)
     found = posterior(line.problem)
     conclusion = concluded(line.problem, found, RAISED)
     evidence = SimpleNamespace(linearized=line, posterior=found, alarm=RAISED, conclusion=conclusion)
     case = SimpleNamespace(observations=campaign.observations, campaign=SimpleNamespace(robot=robot))
-    return SimpleNamespace(case=case, evidence=evidence, final=declared)
-
-
-def limits(robot):
-    return np.clip(robot.joint_limits, -2.0, 2.0)
+    return SimpleNamespace(case=case, evidence=evidence, final=campaign.declared)
 
 
 def pieces(diagnosis):
     """Models and instrument as `propose` makes them, without the error of a pose."""
-    evidence = diagnosis.evidence
-    kept, reason = next_experiment._ambiguous(evidence, SETTINGS)
+    line = diagnosis.evidence.linearized
+    kept, reason = next_experiment._ambiguous(diagnosis.evidence)
     assert not reason, reason
-    numbers = sorted({n for models in kept.values() for model in models for n in model.units})
-    lead = kept[evidence.conclusion.best.mechanisms][0]
-    noise = replace(evidence.linearized.about.noise, pose_rad=lead.pose_error_rad)
-    states = diagnosis.case.observations.states
-    made = instrument_of(evidence.linearized, diagnosis.final, numbers, noise, states, LADDER)
-    return alternatives_of(evidence, kept, made, lead, 1.0), made
+    units = tuple(line.problem.units[n] for n in sorted({n for _, model in kept for n in model.units}))
+    noise = replace(line.about.noise, pose_rad=kept[0][1].pose_error_rad)
+    instrument = Instrument(diagnosis.final, line, units, noise, diagnosis.case.observations.states)
+    return alternatives_of(line, units, kept, 1.0), instrument
 
 
 def keys_like(campaign, *starts):
@@ -74,42 +65,32 @@ def ambiguous(kuka):
     """A nonlinear link in eight poses, which the tilt of a joint explains as well."""
     states = two_loads_a_pose(6, 8, (5, 3), 1500.0)
     campaign = planted(kuka, {"link_elasticity@2": (3.9e-8, 5.2e-8)}, seed=3, poses=8, states=states)
-    return diagnosed(campaign, kuka, keys_like(campaign, *ELASTIC)), campaign
+    return diagnosed(campaign, kuka, keys_like(campaign, *ELASTIC))
 
 
-@pytest.fixture(scope="module")
-def proposal(ambiguous, kuka):
-    return propose(ambiguous[0], limits(kuka), SETTINGS, np.random.default_rng(0), 10, LADDER)
-
-
-def test_proposal_separates_more_than_random_poses_and_resolves_more(ambiguous, proposal, kuka):
-    models, instrument = pieces(ambiguous[0])
-    promise, rng, found = Promise(models, np.random.default_rng(2)), np.random.default_rng(3), []
-    robot = replace(kuka, joint_limits=limits(kuka))
+def test_proposal_separates_more_than_random_poses_and_resolves_more(ambiguous, kuka):
+    columns, facts = propose(ambiguous, np.random.default_rng(0))
+    models, instrument = pieces(ambiguous)
+    hypotheses, rng, found = Hypotheses(models, PROMISE_DRAWS, np.random.default_rng(2)), np.random.default_rng(3), []
     for _ in range(8):
-        logs = promise.log_factors(instrument.information(drawn(instrument.states, robot, LADDER, 10, rng)).sum(axis=0))
-        found.append((promise.separations(logs)[1:].min(), promise.resolved(logs)))
+        entries = drawn(instrument.states, ambiguous.case.campaign.robot, 10, rng)
+        apart, _, resolved = hypotheses.promise(instrument.information(entries).sum(axis=0))
+        found.append((apart[1:].min(), resolved))
     separation, resolved = np.mean(found, axis=0)
-    assert proposal.separation[-1] > 1.4 * separation and proposal.resolved[-1] > resolved + 0.1, (separation, resolved)
-    assert (np.diff(proposal.separation) > -0.3).all() and proposal.separation[-1] > proposal.separation[0]
-    assert np.abs(proposal.entries.joint_angles).max() <= 2.0
-
-
-def test_models_belong_to_the_hypothesis_that_they_state_and_not_to_that_of_their_parts(ambiguous, kuka, monkeypatch):
-    """A model of a law beside a smooth error may state one alone, for all models of a hypothesis even."""
-
-    def stated(problem, posterior):
-        return [tuple(f"stated {name}" for name in names) for names in mechanisms_of_models(problem, posterior)]
-
-    diagnosis, _ = ambiguous
-    monkeypatch.setattr(verdict, "mechanisms_of_models", stated)
-    monkeypatch.setattr(next_experiment, "mechanisms_of_models", stated)
-    evidence = diagnosis.evidence
-    hypotheses = verdict.hypotheses_of(evidence.linearized.problem, evidence.posterior)
-    conclusion = replace(evidence.conclusion, hypotheses=hypotheses, best=hypotheses[0])
-    found = SimpleNamespace(**vars(diagnosis) | {"evidence": SimpleNamespace(**vars(evidence) | {"conclusion": conclusion})})
-    proposal = propose(found, limits(kuka), SETTINGS, np.random.default_rng(0), 4, LADDER)
-    assert {*proposal.best, *proposal.nearest} <= {f"stated {name}" for name in ELASTIC}
+    assert columns["separation"][-1] > 1.4 * separation and columns["resolved"][-1] > resolved + 0.1, (separation, resolved)
+    assert (np.diff(columns["separation"]) > -0.3).all() and columns["separation"][-1] > columns["separation"][0]
+    assert (facts["poses"], facts["reason"], facts["separation"]) == (10, "", columns["separation"][-1])
+    assert max(np.abs(columns[f"q{joint}"]).max() for joint in range(1, 7)) <= 2.0 and set(columns["point"]) == {"3DoF 6DoF"}
+    # In the angles of the controller, and nothing else changes.
+    reporting = replace(ambiguous.case.campaign.robot, reported_offset=np.full(6, 0.1))
+    case = SimpleNamespace(observations=ambiguous.case.observations, campaign=SimpleNamespace(robot=reporting))
+    reported, same = propose(SimpleNamespace(**vars(ambiguous) | {"case": case}), np.random.default_rng(0))
+    np.testing.assert_allclose(reported["q3"], columns["q3"] - 0.1)
+    assert (
+        same == facts
+        and len(set(columns["effect"])) == 1
+        and " or ".join(map(" + ".join, [facts["best"]])) in columns["effect"][0]
+    )
 
 
 def test_of_an_exact_alias_no_pose_is_asked_for(kuka):
@@ -117,13 +98,12 @@ def test_of_an_exact_alias_no_pose_is_asked_for(kuka):
     names = ("compensator_torque", "transmission_harmonic")
     campaign = planted(kuka, {"compensator_torque@2": (1e-4, 1e-4, 5e-5, 5e-5)}, poses=15)
     diagnosis = diagnosed(campaign, kuka, ["compensator_torque@2", "transmission_harmonic@2[orders 1-2]"])
-    found = propose(diagnosis, limits(kuka), SETTINGS, np.random.default_rng(0), 4)
-    assert found.reason == NOT_DISTINGUISHABLE and not len(found)
-    assert {found.best, *found.indistinguishable} >= {(name,) for name in names}
-    facts = json.loads(json.dumps(facts_of(found), allow_nan=False))
-    assert (facts["reason"], facts["poses"], facts["separation"], facts["resolved"]) == (found.reason, 0, None, None)
-    table = table_of(found, kuka)
-    assert table.empty and list(table.columns[:5]) == ["effect", "pose", "load", "point", "q1"]
+    columns, facts = propose(diagnosis, np.random.default_rng(0), 4)
+    assert {*facts["best"], *(name for each in facts["indistinguishable"] for name in each)} >= set(names)
+    facts = json.loads(json.dumps(facts, allow_nan=False))
+    stated = (facts["reason"], facts["poses"], facts["separation"], facts["resolved"])
+    assert stated == (NOT_DISTINGUISHABLE, 0, None, None)
+    assert list(columns)[:4] == ["effect", "pose", "point", "q1"] and not any(map(len, columns.values()))
 
 
 def test_an_alias_does_not_keep_the_others_from_being_distinguished(kuka):
@@ -134,39 +114,21 @@ def test_an_alias_does_not_keep_the_others_from_being_distinguished(kuka):
     alias = [replace(campaign.candidates[key], effect="twin") for key in keys_like(campaign, "joint_tilt")]
     candidates = campaign.candidates | {each.key: each for each in alias}
     keys = [*keys_like(campaign, *ELASTIC), *(each.key for each in alias)]
-    diagnosis = diagnosed(replace(campaign, candidates=candidates), kuka, keys)
-    found = propose(diagnosis, limits(kuka), SETTINGS, np.random.default_rng(0), 6, LADDER)
-    assert sorted([found.best, *found.indistinguishable]) == [("joint_tilt",), ("twin",)]
-    assert len(found) == 6 and found.separation[-1] > 2
+    columns, facts = propose(diagnosed(replace(campaign, candidates=candidates), kuka, keys), np.random.default_rng(0), 6)
+    assert sorted([facts["best"], *facts["indistinguishable"]]) == [["joint_tilt"], ["twin"]]
+    assert len(columns["pose"]) == 6 and facts["separation"] > 2
 
 
 def test_nothing_is_proposed_where_nothing_is_ambiguous(kuka):
     # So many poses that something unknown beside it has less than what is left open.
     campaign = planted(kuka, {"joint_offset@3": (2e-3,)}, poses=40)
     diagnosis = diagnosed(campaign, kuka, ["joint_offset@3", "payload"])
-    assert propose(diagnosis, limits(kuka), SETTINGS, np.random.default_rng(0)).reason == NOTHING_AMBIGUOUS
+    assert propose(diagnosis, np.random.default_rng(0))[1]["reason"] == NOTHING_AMBIGUOUS
     quiet = SimpleNamespace(**vars(diagnosis) | {"evidence": None})
-    assert propose(quiet, limits(kuka), SETTINGS, np.random.default_rng(0)).reason == DATA_AT_FAULT
+    assert propose(quiet, np.random.default_rng(0))[1]["reason"] == DATA_AT_FAULT
 
 
-def test_rows_of_the_table_are_poses_in_the_angles_of_the_controller_with_their_loads_and_what_they_add(kuka):
-    robot = replace(kuka, reported_matrix=np.diag([1.0, -1, 1, 1, 1, 1]), reported_offset=np.full(6, 0.1))
-    wrench = np.array([[0.0, 300.0, -400.0, 1.0, 2.0, 3.0], np.zeros(6)])
-    entries = Entries(np.arange(12.0).reshape(2, 6) / 10, wrench, None)
-    figures = {"separation": np.array([4.25, 17.5]), "resolved": np.array([0.3, 0.87])}
-    told = {"nearest": ("link_elasticity", "other"), "indistinguishable": (("payload",), ("joint_tilt", "hysteresis"))}
-    proposal = Proposal(("joint_tilt",), entries=entries, shares=(0.0, 1.0), points=("3DoF", "6DoF"), **figures, **told)
-    table = table_of(proposal, robot)
-    angles = table[[f"q{joint}" for joint in range(1, 7)]].to_numpy()
-    np.testing.assert_allclose(angles @ robot.reported_matrix.T + robot.reported_offset, entries.joint_angles)
-    np.testing.assert_array_equal(table[["fx", "fy", "fz", "mx", "my", "mz"]], wrench)
-    assert table["separation"].tolist() == [4.25, 17.5] and table["resolved"].tolist() == [0.3, 0.87]
-    assert list(table["pose"]) == [0, 1] and list(table["load"]) == [1, 0] and (table["point"] == "3DoF 6DoF").all()
-    assert table["effect"][0] == "joint_tilt or link_elasticity + other"
-    assert set(table["indistinguishable"]) == {"payload; joint_tilt + hysteresis"}
-
-
-def test_information_in_the_campaigns_own_states_is_that_of_the_campaign(kuka):
+def test_information_in_the_campaigns_own_states_is_that_of_the_campaign(kuka, monkeypatch):
     # Without a time or rows: new states come after all of those.
     states = replace(two_loads_a_pose(6, 12, 1), time_s=None, temperature_c=None, row=np.ones(24, int))
     unknown = (Target("elbow", "3DoF", None), Target("hand", "6DoF", (0.1, 0.0, 0.0)))
@@ -174,51 +136,113 @@ def test_information_in_the_campaigns_own_states_is_that_of_the_campaign(kuka):
     declared = replace(campaign.declared, weights=np.ones(len(campaign.observations)))
     keys = keys_like(campaign, "lost_motion@2", "joint_tilt@3", "hysteresis@4", "payload")
     line = linearized(declared, campaign.observations, [campaign.candidates[key] for key in keys], SETTINGS)
-    made = instrument_of(line, declared, range(len(line.problem.units)), declared.noise, states, (1.0,))
-    total = made.information(Entries(states.joint_angles, states.wrench, states.approach[:, None])).sum(axis=0)
-    rows = line.products.rows
-    every = rows_alike(line.products, rows.declared, rows.candidates.dense()[..., made.columns], made.columns)
+    made = Instrument(declared, line, line.problem.units, declared.noise, states)
+    entries = states.joint_angles[::2], states.wrench[1::2]
+    seen = made.observations(entries)
+    # Each pose is read at every target without its load and under it, where the campaign ended.
+    np.testing.assert_array_equal(seen.states.wrench, states.wrench)
+    np.testing.assert_array_equal(seen.states.joint_angles, states.joint_angles)
+    np.testing.assert_array_equal(seen.target, np.tile([0, 1], 24))
+    assert set(seen.states.approach.ravel()) == {-1.0, 1.0} and seen.states.time_s is None
+    own = replace(seen, states=replace(seen.states, approach=states.approach))
+    monkeypatch.setattr(Instrument, "observations", lambda self, entries: own)
+    information = made.information(entries)
+    products = line.products
+    columns, rows = np.concatenate([unit.columns for unit in made.units]), products.rows
+    basis = rows.declared @ products.into_basis
+    every = np.concatenate([basis, rows.candidates.dense()[..., columns] - basis @ products.projected[:, columns]], axis=-1)
     expected = np.tensordot(every, every, ((0, 1), (0, 1)))
     # Declared parameters that measurements do not show have their prior, of information one, and only rounding beside it.
     size = np.sqrt(np.diag(expected) + 1e-6)
-    np.testing.assert_allclose(total / np.outer(size, size), expected / np.outer(size, size), atol=1e-6)
+    scaled = information.sum(axis=0) / np.outer(size, size)
+    np.testing.assert_allclose(scaled, expected / np.outer(size, size), atol=1e-6)
+    # Twice the noise, a quarter of the information.
+    louder = replace(made, noise=made.noise.scaled(2.0)).information(entries)
+    np.testing.assert_allclose(4 * louder, information, rtol=1e-9, atol=1e-10 * np.abs(information).max())
 
 
-def test_entries_have_the_directions_and_senses_of_the_campaigns_loads_and_are_as_large_as_may_be(kuka):
+def test_entries_have_the_campaigns_loads_as_large_as_may_be(kuka):
     states, draws = two_loads_a_pose(6, 8, (5, 3), 1500.0), np.random.default_rng(0)
-    up, size = np.array([0.0, 0.0, 1.0, 0.0, 0.5, 0.0]), np.linspace(100.0, 800.0, len(states))
-    sense = np.where(np.arange(len(states)) % 2, 1.0, -1.0)
-    robot = replace(kuka, payload_kg=200.0)
-    one, both, none = (replace(states, wrench=load[:, None] * up) for load in (size, size * sense, 0.0 * size))
-    assert [shares_of(each) for each in (one, both, none)] == [(0.0, 1.0), (0.0, 1.0, -1.0), (1.0,)]
-    for each, senses in ((one, {1.0}), (both, {-1.0, 1.0}), (none, {0.0})):
-        found = drawn(each, robot, (1.0,), 40, draws)
-        assert set(np.sign(found.wrench[:, 2])) == senses and not found.wrench[:, [0, 1, 3, 5]].any()
-        # The weight of the rated payload, at the lever of the campaign's loads.
-        expected = 200.0 * 9.80665 * np.abs(np.sign(found.wrench[:, 2]))
-        np.testing.assert_allclose(np.linalg.norm(found.wrench[:, :3], axis=1), expected)
-        np.testing.assert_allclose(found.wrench[:, 4], 0.5 * found.wrench[:, 2])
-    free = drawn(states, kuka, (1.0,), 200, draws)
-    assert np.linalg.svd(free.wrench[:, :3], compute_uv=False)[-1] > 0.5 * np.sqrt(200 / 3) * 1500.0
-    assert drawn(replace(states, approach=None), kuka, (1.0,), 3, draws).approach is None
-    assert set(drawn(states, kuka, LADDER, 9, draws).approach.ravel()) == {-1.0, 1.0}
+    size = np.linspace(100.0, 800.0, len(states))
+    loaded = replace(states, wrench=size[:, None] * np.array([0.0, 0.0, 1.0, 0.0, 0.5, 0.0]))
+    # The weight of the rated payload, at the lever of the campaign's loads.
+    _, wrench = drawn(loaded, replace(kuka, payload_kg=200.0), 40, draws)
+    np.testing.assert_allclose(wrench, np.tile(200.0 * 9.80665 * np.array([0, 0, 1, 0, 0.5, 0]), (40, 1)))
+    assert not drawn(replace(states, wrench=0.0 * states.wrench), kuka, 3, draws)[1].any()
 
 
-def test_each_entry_is_read_at_every_share_and_target_where_the_campaign_ended(ambiguous):
-    _, instrument = pieces(ambiguous[0])
-    entries = drawn(instrument.states, ambiguous[0].case.campaign.robot, LADDER, 3, np.random.default_rng(5))
-    seen = instrument.observations(entries)
-    np.testing.assert_allclose(seen.states.wrench[:3], np.array(LADDER)[:, None] * entries.wrench[0])
-    np.testing.assert_array_equal(seen.states.joint_angles, np.repeat(entries.joint_angles, 3, axis=0))
-    np.testing.assert_array_equal(seen.states.approach, entries.approach.reshape(9, 6))
-    own, targets = instrument.states, len(instrument.fitted.model.targets)
-    assert set(seen.states.time_s) == {own.time_s.max()} and set(seen.states.temperature_c) == {own.temperature_c.mean()}
-    np.testing.assert_array_equal(seen.target, np.tile(np.arange(targets), 9))
-    # Many at once are each by itself; twice the noise, a quarter of the information.
-    found = instrument.information(entries)
-    each = [instrument.information(entries.at([number]))[0] for number in range(3)]
-    np.testing.assert_allclose(found, each, rtol=1e-10, atol=1e-12 * np.abs(found).max())
-    apart = replace(instrument, noise=replace(instrument.noise, pose_rad=0.0))
-    louder = replace(apart, noise=apart.noise.scaled(2.0))
-    expected = pytest.approx(apart.information(entries), rel=1e-9, abs=1e-10 * np.abs(found).max())
-    assert 4 * louder.information(entries) == expected
+UNITS = (made_unit("offset", (1,), 0), made_unit("tilt", (1,), [2, 3]), made_unit("sag", (2,), [4, 5]))
+# Of the columns of the problem's statistics those that are looked at, in their order: the units' own, without column 1.
+COLUMNS = np.array([0, 2, 3, 4, 5])
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.7])
+def test_alternatives_are_the_posteriors_of_dense_generalized_least_squares_at_the_pose_error_of_the_leading_model(factor):
+    """Declared parameters over their priors; a larger noise widens every deviation, and so leaves the means."""
+    rows = made_rows(1, prior=0.5)
+    problem, products = made_problem(rows, UNITS, tau=np.array([0.0, 0.4]))
+    models = [Model((0,), 2.0, np.array([0.5]), 0.4), Model((0, 2), 0.5, np.array([0.5, 2.0]), 0.4)]
+    kept = [*((("offset",), model) for model in models), (("tilt",), Model((1,), 1.0, np.array([1.5]), 0.0))]
+    line = SimpleNamespace(problem=problem, products=products)
+    covariance, declared = rows.marginal_covariance(0.4), rows.declared.shape[1]
+    for found, (name, model) in zip(alternatives_of(line, UNITS, kept, factor), kept, strict=True):
+        columns = np.concatenate([UNITS[n].columns for n in model.units])
+        deviation = np.repeat(model.scales, [len(UNITS[n].columns) for n in model.units])
+        W = rows.candidates[:, columns]
+        precision = W.T @ np.linalg.solve(covariance, W) + np.diag(deviation**-2.0)
+        mean = np.linalg.solve(precision, W.T @ np.linalg.solve(covariance, rows.residual - rows.expected))
+        at = declared + np.searchsorted(COLUMNS, columns)
+        expected = np.zeros(declared + len(COLUMNS))
+        expected[at] = mean
+        np.testing.assert_allclose(found.mean[declared:], expected[declared:], rtol=1e-8, atol=1e-12)
+        spread = np.linalg.inv(found.precision)[declared:, declared:]
+        np.testing.assert_allclose(spread, factor**2 * np.linalg.inv(precision), rtol=1e-8)
+        assert (found.name, found.columns.tolist()) == (name, [*range(declared), *at])
+
+
+def alternative(columns, mean, precision, name="h0", weight=1.0):
+    return Alternative((name,), np.log(weight), np.array(columns), np.array(mean, float), np.array(precision))
+
+
+def test_misfits_are_log_densities_of_measurements_written_out_on_average_and_with_their_noise():
+    """-2 ln p_j = ln |C| + off' C^-1 off with C = I + A_j P_j^-1 A_j', off = A u + e; on average tr C^-1 instead of e."""
+    rng, models = np.random.default_rng(0), []
+    for number, name in enumerate(["h0", "h1", "h1", "h0"]):
+        mine, mean = np.sort(rng.choice(5, 2 + number % 3, replace=False)), np.zeros(5)
+        half, mean[mine] = rng.standard_normal((len(mine), len(mine) + 2)), rng.standard_normal(len(mine))
+        models.append(alternative(mine, mean, half @ half.T, name))
+    hypotheses = Hypotheses(models, 1, rng)
+    # One experiment of a single row, that tells one direction only; one of many.
+    for A in (rng.standard_normal((rows, 5)) for rows in (1, 12)):
+        noise = rng.standard_normal((4, len(A)))
+        mean = hypotheses.misfits(np.array([A.T @ A]))[0]
+        each = hypotheses.misfits(np.array([A.T @ A]), noise @ A)[0]
+        for t, (truth, e) in enumerate(zip(hypotheses.truths, noise, strict=True)):
+            for j, model in enumerate(models):
+                mine = A[:, model.columns]
+                C = np.eye(len(A)) + mine @ np.linalg.solve(model.precision, mine.T)
+                off, log_det = A @ (truth - model.mean), np.linalg.slogdet(C)[1]
+                expected = log_det + np.trace(np.linalg.inv(C)) - len(A) + off @ np.linalg.solve(C, off)
+                assert mean[t, j] == pytest.approx(expected, rel=1e-9, abs=1e-9)
+                expected = log_det + (off + e) @ np.linalg.solve(C, off + e) - e @ e
+                assert each[t, j] == pytest.approx(expected, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("separation", [2.0, 2 * np.log(19.0), 16.2])
+def test_of_two_fixed_hypotheses_entropy_and_promise_are_those_of_normal_log_factors(separation):
+    """Entropy sum of w_i ln (1 + w_j / w_i exp(-separation / 8)); a log factor of mean lambda / 2 and variance lambda."""
+    weights, information = (0.7, 0.3), 0.5 * separation * np.eye(2)
+    known = [alternative([0, 1], m, 1e12 * np.eye(2), n, w) for m, n, w in zip(np.eye(2), ("h0", "h1"), weights, strict=True)]
+    hypotheses, close = Hypotheses(known, 1000, np.random.default_rng(0)), np.exp(-separation / 8)
+    expected = 0.7 * np.log1p(0.3 / 0.7 * close) + 0.3 * np.log1p(0.7 / 0.3 * close)
+    np.testing.assert_allclose(hypotheses.entropy_left(information[None]), expected, rtol=1e-4)
+    apart, often, resolved = hypotheses.promise(information)
+    # At 5 standard errors: false once in a million.
+    error = np.sqrt((0.7**2 + 0.3**2) / 1000)
+    assert abs(apart[1] / 2 - separation / 2) < 5 * np.sqrt(separation) * error
+    reached = norm.cdf((separation / 2 - np.log(19)) / np.sqrt(separation))
+    assert abs(often[1] - reached) < 5 * 0.5 * error
+    # The prior counts in what is resolved.
+    beside = [np.log(19) - sign * np.log(0.7 / 0.3) for sign in (1, -1)]
+    share = np.dot(weights, [norm.cdf((separation / 2 - least) / np.sqrt(separation)) for least in beside])
+    assert abs(resolved - share) < 5 * 0.5 * error

@@ -1,4 +1,4 @@
-"""The search: on problems small enough for all models to be enumerated, the posterior is that of the enumeration."""
+"""The search, on problems small enough for all models to be enumerated, and the alarm: its statistic and its power."""
 
 from dataclasses import replace
 from itertools import combinations
@@ -9,9 +9,8 @@ import pytest
 from made_problems import made_problem, made_rows, made_unit
 
 from elastocal.diagnosis.evidence import evaluate, log_sum_exp
-from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.diagnosis.other import NEIGHBOURS
-from elastocal.diagnosis.search import initial_screening, posterior
+from elastocal.diagnosis.hypotheses import NEIGHBOURS, OTHER
+from elastocal.diagnosis.search import alarm_of, posterior
 from elastocal.diagnosis.settings import Settings
 
 TAU = [0.0, 0.3, 0.9]
@@ -87,31 +86,6 @@ def test_laws_of_the_competitor_at_one_location_join_in_one_model():
     assert posterior(made_problem(rows, laws, tau=TAU)[0]).models[0].units == (0, 1)
 
 
-def test_no_model_is_larger_than_the_settings_allow():
-    found = posterior(problem_of("one mechanism everywhere", settings=replace(Settings(), largest_model=2)))
-    assert max(len(model.units) for model in found.models) == 2
-
-
-@pytest.mark.parametrize("smallest", [0, 3])
-def test_single_bayes_factors_are_those_of_the_models_with_one_unit(smallest):
-    problem = problem_of("a faint one")
-    problem = replace(problem, units=tuple(replace(unit, smallest=smallest) for unit in problem.units))
-    _, factors = initial_screening(problem)
-    empty = evaluate(problem.statistics, [], problem.grid, problem.log_pose, []).log_evidence
-    for number, unit in enumerate(problem.units):
-        one = evaluate(problem.statistics, [unit], problem.grid, problem.log_pose, [0.1])
-        assert factors[number] == pytest.approx(one.log_evidence - empty, abs=1e-6)
-
-
-@pytest.mark.parametrize("tau", TAU)
-def test_the_pose_error_of_a_model_is_the_one_of_the_measurements(tau):
-    rows = made_rows(6, poses=100, candidates=10)
-    noisy = rows.drawn(np.random.default_rng(8), tau)
-    problem, _ = made_problem(noisy, UNITS, tau=TAU)
-    found, (nothing, _) = posterior(problem), initial_screening(problem)
-    assert nothing.pose_error_rad == found.models[0].pose_error_rad == tau
-
-
 def test_a_search_that_knows_a_good_model_finds_it_whatever_leads_there():
     """Of mechanisms at one location each: no single one of them shows, nor any two."""
     units = [made_unit(name, (1,), column, candidate=SimpleNamespace(key=name)) for column, name in enumerate("abc")]
@@ -122,13 +96,68 @@ def test_a_search_that_knows_a_good_model_finds_it_whatever_leads_there():
     assert found.models[0].units == (0, 1, 2) and found.models[0].log_odds > best + 5
 
 
-def test_no_unit_of_a_model_is_smaller_than_measurements_can_show():
-    """Where the most probable size of a faint signal is below that."""
-    problem = problem_of("a faint one")
-    free = next(model for model in posterior(problem).models if model.units == (0,))
-    least = len(problem.settings.scales) - 1
-    assert free.scales[0] < problem.grid.scales[least]
-    held = replace(problem, units=tuple(replace(unit, smallest=least) for unit in problem.units))
-    found = posterior(held)
-    assert (0,) in [model.units for model in found.models]
-    assert all((model.scales >= problem.grid.scales[least]).all() for model in found.models)
+ALARM_UNITS = (
+    made_unit("offset", (1,), 0),
+    made_unit("offset", (2,), 1),
+    made_unit("tilt", (1,), [2, 3], signs=1),
+    made_unit(OTHER, (1,), [4, 5, 6]),
+)
+
+
+def signalled(size):
+    rows = made_rows(5, candidates=8)
+    return made_problem(replace(rows, residual=rows.residual + size * rows.candidates[:, 2:4] @ [1.0, 1.0]), ALARM_UNITS)
+
+
+def test_statistic_rises_and_p_value_falls_with_the_size_of_what_is_missing():
+    sizes = [0.0, 0.3, 0.6, 1.2, 2.4]
+    found = [alarm_of(*signalled(size), 0.0, np.random.default_rng(6)) for size in sizes]
+    assert (np.diff([one.statistic for one in found[1:]]) > 0).all() and found[-1].statistic > found[0].statistic
+    assert (np.diff([one.p_value for one in found[1:]]) <= 0).all()
+    assert found[-1].raised and found[-1].p_value == 1 / 500
+    assert not found[0].raised
+
+
+@pytest.mark.parametrize("smallest", [0, 2])
+def test_statistic_is_the_log_of_the_prior_weighted_bayes_factors(smallest):
+    """Of all models of one unit, each averaged over its sizes and pose errors; signs of physics do not count.
+
+    Sizes begin a step below the smallest.
+    """
+    problem, products = signalled(0.3)
+    problem = replace(problem, units=(*problem.units[:2], replace(problem.units[2], smallest=smallest), *problem.units[3:]))
+    found = alarm_of(problem, products, 0.0, np.random.default_rng(7))
+    # The sizes of the pose error that draws at zero can make likely: zero and the two next.
+    some = problem.statistics.at(np.arange(3))
+    log_pose = problem.log_pose[:3]
+    unsigned = [
+        replace(unit, signs=np.zeros(len(unit.columns), int), smallest=max(unit.smallest - 1, 0)) for unit in problem.units
+    ]
+    nothing = evaluate(some, [], problem.grid, log_pose, []).log_evidence
+    total = [
+        evaluate(some, [unit], problem.grid, log_pose, [0.1]).log_evidence - nothing + problem.prior.log_odds_of([unit])
+        for unit in unsigned
+    ]
+    assert found.statistic == pytest.approx(log_sum_exp(np.array(total)), abs=1e-6)
+
+
+def test_a_mechanism_counts_at_all_its_locations_at_once_too():
+    """With one law at each; of two laws each, and only of those that are at every location once."""
+    candidates = {detail: SimpleNamespace(detail=detail) for detail in ("", "two slopes")}
+    units = (
+        made_unit("stiffening", (1,), 0, candidate=candidates[""], smallest=1),
+        made_unit("stiffening", (2,), [1, 2], candidate=candidates[""]),
+        made_unit("stiffening", (1,), 3, candidate=candidates["two slopes"]),
+        made_unit("payload", (), 4, candidate=candidates[""]),
+    )
+    problem, products = made_problem(made_rows(5, candidates=8), units)
+    found = alarm_of(problem, products, 0.0, np.random.default_rng(7))
+    some, log_pose, grid = problem.statistics.at(np.arange(3)), problem.log_pose[:3], problem.grid
+    whole = replace(units[0], columns=np.arange(3), signs=np.zeros(3, int), sizes=np.ones(3), smallest=0)
+    tested = [(replace(unit, smallest=max(unit.smallest - 1, 0)), [unit]) for unit in units] + [(whole, list(units[:2]))]
+    nothing = evaluate(some, [], grid, log_pose, []).log_evidence
+    total = [
+        evaluate(some, [unit], grid, log_pose, [0.1]).log_evidence - nothing + problem.prior.log_odds_of(members)
+        for unit, members in tested
+    ]
+    assert found.statistic == pytest.approx(log_sum_exp(np.array(total)), abs=1e-6)

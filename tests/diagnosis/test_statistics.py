@@ -7,7 +7,7 @@ import pytest
 from made_problems import made_rows
 
 from elastocal.diagnosis import statistics
-from elastocal.diagnosis.statistics import normal_equations, null_draws, statistics_of
+from elastocal.diagnosis.statistics import null_draws, statistics_of
 
 TAU = np.array([0.0, 0.1, 0.7, 5.0])
 CASES = {
@@ -81,18 +81,6 @@ def test_badly_scaled_and_nearly_collinear_columns_cost_no_precision():
     np.testing.assert_allclose(found.gram[0], exact[:3, :3], rtol=1e-7, atol=1e-7 * np.abs(exact[:3, :3]).max())
     np.testing.assert_allclose(found.along[0], exact[:3, 3], rtol=1e-7, atol=1e-7 * np.abs(exact[:3, 3]).max())
     np.testing.assert_allclose(found.squares[0], exact[3, 3], rtol=1e-9)
-
-
-def test_normal_equations_lead_to_the_statistics():
-    """Their Schur complement of the declared parameters."""
-    products = made_rows(7).products
-    total, log_det = normal_equations(products, TAU[2])
-    count, expected = products.declared, statistics_of(products, TAU[2:3])
-    rest = total[count:, count:] - total[count:, :count] @ np.linalg.solve(total[:count, :count], total[:count, count:])
-    np.testing.assert_allclose(rest[:-1, :-1], expected.gram[0], rtol=1e-9, atol=1e-9)
-    np.testing.assert_allclose(rest[:-1, -1], expected.along[0], rtol=1e-9, atol=1e-9)
-    logs = -0.5 * log_det - 0.5 * np.linalg.slogdet(total[:count, :count])[1]
-    assert logs == pytest.approx(expected.log_likelihood[0])
 
 
 # Moments are compared at 5 standard errors: each test fails by chance once in some ten thousand seeds, and sees with a power of

@@ -4,8 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from elastocal.diagnosis.hypotheses import OTHER, Unit, prior_of
-from elastocal.diagnosis.other import OWN, Law
+from elastocal.diagnosis.hypotheses import OTHER, OWN, Law, Unit
 from elastocal.diagnosis.search import Problem
 from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.statistics import WhiteRows, products_of, statistics_of
@@ -96,4 +95,4 @@ def made_problem(rows, units, settings=None, tau=None):
         information = np.median(np.bincount(rows.pose, (rows.jacobian**2).sum(axis=1))) / rows.jacobian.shape[1]
         tau = np.array(settings.pose_steps) / np.sqrt(information)
     tau = np.asarray(tau, float)
-    return Problem(statistics_of(products, tau), tuple(units), prior_of(units, settings), settings), products
+    return Problem(statistics_of(products, tau), tuple(units), settings), products

@@ -1,28 +1,18 @@
-"""Bayes factors of models [1] from sufficient statistics.
+"""Bayes factors of models (Kass and Raftery, JASA 1995) from sufficient statistics.
 
 Coefficients of a unit are normal about zero with standard deviation s times their plausible size, one size s for the unit: a
-local prior [2] beside the probability that the unit is not there, spike and slab [3]. With D the diagonal of all s^2,
+local prior beside the probability that the unit is not there, spike and slab (Mitchell and Beauchamp, JASA 1988). With D the
+diagonal of all s^2,
 
     ln p(y | model, s, tau) = -1/2 ln |I + D^1/2 G D^1/2| + l(y'My - b'(G + D^-1)^-1 b),
 
 where l(rss) = -nu/2 ln sigma^2 - rss / (2 sigma^2) at sigma^2 = max(rss / nu, 1): the noise is at least what repeats or the
-campaign say, or else a smooth competitor could interpolate. Above one it is profiled [4], and the priors widen with it as
-conjugate ones do. Sizes and tau are averaged over, never maximised, as g is in mixtures of g priors [5].
+campaign say, or else a smooth competitor could interpolate. Above one it is profiled, and the priors widen with it as conjugate
+ones do. Sizes and tau are averaged over, never maximised, as g is in mixtures of g priors (Liang et al., JASA 2008).
 
 Where physics gives a coefficient its sign, the prior is half-normal: the Bayes factor of the normal one times twice the
-posterior probability of that sign, as against an encompassing model [6]; of several such coefficients as if they were
-independent.
-
-[1] Kass, R. E. and Raftery, A. E., Bayes factors, Journal of the American Statistical Association 90, 1995.
-[2] Johnson, V. E. and Rossell, D., On the use of non-local prior densities in Bayesian hypothesis tests, Journal of the Royal
-    Statistical Society B 72, 2010.
-[3] Mitchell, T. J. and Beauchamp, J. J., Bayesian variable selection in linear regression, Journal of the American Statistical
-    Association 83, 1988.
-[4] Murphy, S. A. and van der Vaart, A. W., On profile likelihood, Journal of the American Statistical Association 95, 2000.
-[5] Liang, F. et al., Mixtures of g priors for Bayesian variable selection, Journal of the American Statistical Association 103,
-    2008.
-[6] Klugkist, I., Laudy, O. and Hoijtink, H., Inequality constrained analysis of variance: a Bayesian approach, Psychological
-    Methods 10, 2005.
+posterior probability of that sign, as against an encompassing model (Klugkist et al., Psychological Methods 2005); of several
+such coefficients as if they were independent.
 """
 
 from __future__ import annotations
@@ -32,7 +22,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import lapack, solve_triangular
+from scipy.linalg import solve_triangular
 from scipy.special import log_ndtr
 
 if TYPE_CHECKING:
@@ -57,13 +47,17 @@ def log_sum_exp(values: np.ndarray, axis: int | tuple[int, ...] | None = None) -
 
 @dataclass(frozen=True)
 class Grid:
-    """Sizes that are averaged over, with the logarithms of their weights.
-
-    `scales`, `log_weights` (S,).
-    """
+    """Sizes that are averaged over, with the logarithms of their weights. `scales`, `log_weights` (S,)."""
 
     scales: np.ndarray
     log_weights: np.ndarray
+
+    @classmethod
+    def of_settings(cls, settings: Settings) -> Grid:
+        """Sizes whose logarithms have normal pieces below and above the most likely size."""
+        off = np.log(np.asarray(settings.scales) / settings.scale_center)
+        log_weights = -0.5 * (off / np.where(off < 0, *settings.scale_spread)) ** 2
+        return cls(np.array(settings.scales), log_weights - log_sum_exp(log_weights))
 
     def of(self, unit: Unit) -> np.ndarray:
         """Logarithms of the weights for one unit: sizes from its smallest to its largest share them, ndarray (S,)."""
@@ -87,29 +81,15 @@ class Grid:
             return weights - log_sum_exp(weights, axis=2)[..., None]
 
 
-def scale_weights(settings: Settings) -> np.ndarray:
-    """Logarithms of the prior weights of the sizes, (S,): log-normal pieces below and above the most likely size."""
-    off = np.log(np.asarray(settings.scales) / settings.scale_center)
-    spread = np.where(off < 0, *settings.scale_spread)
-    log_weights = -0.5 * (off / spread) ** 2
-    return log_weights - log_sum_exp(log_weights)
-
-
 def pose_weights(pose_error_rad: np.ndarray, settings: Settings) -> np.ndarray:
-    """Logarithms of the prior weights of sizes of the pose error, one of which is zero.
-
-    `pose_error_rad` (T,). Returns (T,).
-    """
+    """Logarithms of the prior weights of sizes of the pose error, one of which is zero, (T,)."""
     there = pose_error_rad > 0
     share = settings.pose_error_probability / max(there.sum(), 1)
     return np.log(np.where(there, share, 1.0 - settings.pose_error_probability))
 
 
 def log_likelihood(squares: np.ndarray, freedom: int) -> np.ndarray:
-    """l(rss): the profiled likelihood of the noise, which is at least one.
-
-    `squares`: of any shape. Returns of the same shape.
-    """
+    """l(rss): the profiled likelihood of the noise, which is at least one."""
     variance = np.maximum(squares / freedom, 1.0)
     return -0.5 * freedom * np.log(variance) - 0.5 * squares / variance
 
@@ -201,11 +181,10 @@ def added_evidence(
 
 @dataclass(frozen=True)
 class Evaluated:
-    """A model with its evidence.
+    """A model with its evidence, averaged over sizes and tau.
 
-    `log_evidence`: averaged over sizes and tau. `scales` (m,): most probable size of each unit. `log_pose` (T,): log posterior
-    weight of each tau at these sizes. `without` (m,): log evidence of the model without each of its units, the sizes of the
-    others as they are.
+    `scales` (m,): most probable size of each unit. `log_pose` (T,): log posterior weight of each tau at these. `without` (m,):
+    log evidence of the model without each of its units, the sizes of the others as they are.
     """
 
     log_evidence: float
@@ -221,13 +200,12 @@ def evaluate(
 
     The sum over all combinations of sizes is taken as the product of the sums over each size about the mode; exact for one
     unit, and where sizes are independent given the measurements. The mode is found by coordinate ascent (iterated conditional
-    modes [1]), all units at once where that raises the density and else those that gain most. One inverse gives what every
-    unit sees given all others: with C the posterior covariance of the scaled coefficients, C_uu^-1 = I + s^2 G_uu|rest.
+    modes; Besag, JRSS B 1986), all units at once where that raises the density and else those that gain most. One inverse gives
+    what every unit sees given all others: with C the posterior covariance of the scaled coefficients, C_uu^-1 = I + s^2
+    G_uu|rest.
 
     `log_pose` (T,): logarithm of the prior weight of each size of the pose error. `start`: sizes from which the search for the
     mode starts; each in its grid.
-
-    [1] Besag, J., On the statistical analysis of dirty pictures, Journal of the Royal Statistical Society B 48, 1986.
     """
     off = [np.where(np.isfinite(grid.of(u)), np.abs(grid.scales - size), np.inf) for size, u in zip(start, units, strict=True)]
     places = np.array([np.argmin(distances) for distances in off], int)
@@ -266,31 +244,6 @@ def _ascended(statistics: Statistics, present: Joint, profiles: np.ndarray) -> J
     return None
 
 
-# Above so many columns LAPACK's inverse of positive matrices, called for each of them, costs less than all of numpy's together.
-_MANY_COLUMNS = 30
-
-
-def inverses(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Invert symmetric positive matrices.
-
-    `matrices` (T, D, D). Returns `inverses` (T, D, D); `log_determinants` (T,).
-    """
-    if matrices.shape[1] < _MANY_COLUMNS:
-        factors = np.linalg.cholesky(matrices)
-        return np.linalg.inv(matrices), 2.0 * np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
-    found, log_dets = np.empty_like(matrices), np.empty(len(matrices))
-    for number, matrix in enumerate(matrices):
-        # The transpose is laid out as LAPACK wants it.
-        factor, failed = lapack.dpotrf(matrix.T, lower=0, clean=1)
-        if failed:
-            raise np.linalg.LinAlgError("a matrix that is not positive definite")
-        log_dets[number] = 2.0 * np.log(np.diag(factor)).sum()
-        upper = lapack.dpotri(factor, lower=0, overwrite_c=1)[0]
-        np.add(upper, upper.T, out=found[number])
-        np.fill_diagonal(found[number], np.diag(upper))
-    return found, log_dets
-
-
 class Joint:
     """Density of the measurements under one model with one size for each unit.
 
@@ -306,7 +259,8 @@ class Joint:
         signs = np.concatenate([np.zeros(0, int), *(unit.signs for unit in units)])
         self.starts = np.concatenate([[0], np.cumsum([len(unit.columns) for unit in units], dtype=int)])
         deviations = np.repeat(self.scales, np.diff(self.starts))
-        self.covariance, self.log_det = inverses(_with_priors(statistics.gram, columns, deviations))
+        inner = _with_priors(statistics.gram, columns, deviations)
+        self.covariance, self.log_det = np.linalg.inv(inner), np.linalg.slogdet(inner)[1]
         along = deviations * statistics.along[:, columns]
         self.mean = (self.covariance @ along[..., None])[..., 0]
         self.squares = statistics.squares - (along * self.mean).sum(axis=1)

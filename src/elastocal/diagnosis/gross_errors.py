@@ -1,16 +1,11 @@
 """Rows that no model of the robot explains: a lost beam, a held point, a mistyped angle. They are found, named and left out.
 
-A row is judged by its deletion residual: its distance from what the other rows predict, in standard deviations (the externally
-studentized residual [1]). Rows are a gross error beyond the distance that the largest of so many good rows exceeds with a
-small probability (a test of mean-shift outliers with Bonferroni's bound [2]). The unit is one standard deviation or, where
-that is more, what the rows that do not stand out scatter: a model that does not fit makes no row stand out.
-
-Before it is known what the model lacks, the rows are predicted by everything that it might lack at once: the Gaussian process
-whose covariance is that of all candidates at their prior sizes. The worst row is taken out, the others are predicted again, and
-so on. Rows that the final model explains after all are taken back.
-
-[1] Cook, R. D. and Weisberg, S., Residuals and Influence in Regression, section 2.2, Chapman and Hall, 1982.
-[2] Barnett, V. and Lewis, T., Outliers in Statistical Data, section 8.2, Wiley, 1994.
+A row is judged by its distance from what the other rows predict, in standard deviations (externally studentized residual; Cook
+and Weisberg, Residuals and Influence in Regression, 1982), and is a gross error beyond what the largest of so many good rows
+exceeds with a small probability (mean-shift outliers with Bonferroni's bound; Barnett and Lewis, Outliers in Statistical Data,
+1994). The unit is one standard deviation or, where that is more, what the rows that do not stand out scatter: a model that does
+not fit makes no row stand out. Before it is known what the model lacks, rows are predicted by everything that it might lack at
+once (`improbable`); rows that the final model explains after all are taken back.
 """
 
 from __future__ import annotations
@@ -19,24 +14,38 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.linalg import lapack, solve_triangular
 from scipy.special import chdtri, fdtri, gammaincinv
 
 from elastocal.counting import counted
+from elastocal.diagnosis.evidence import Grid
+from elastocal.diagnosis.linearize import Linearized, linearized
+from elastocal.diagnosis.statistics import WhiteRows
 from elastocal.fitting.displacement import conditions, observations_at_once
-from elastocal.fitting.linearization import linearize
-from elastocal.fitting.noise import measurement_covariances
-from elastocal.fitting.observations import part_at, parts_of, select_states, single_observations, spread_poses
+from elastocal.fitting.least_squares import evaluated, fit
+from elastocal.fitting.linearization import Linearization, linearize
+from elastocal.fitting.noise import Noise, measurement_covariances
+from elastocal.fitting.observations import (
+    Observations,
+    measured_in,
+    part_at,
+    parts_of,
+    sample_of,
+    select_states,
+    single_observations,
+    spread_poses,
+    without_outlying_repeats,
+)
 from elastocal.fitting.parameters import parameters
 from elastocal.fitting.prediction import residuals
+from elastocal.fitting.tolerances import estimated_noise, fit_declared
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
     from elastocal.diagnosis.settings import Settings
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
-    from elastocal.fitting.linearization import Linearization
     from elastocal.fitting.model import Estimate, Model
-    from elastocal.fitting.noise import Noise
 
 # Shares of the distances from which the scale is estimated: the second sees tails that are heavier than normal ones.
 _SCALE_QUANTILES = (0.5, 0.75)
@@ -57,13 +66,12 @@ class Deviations:
     """Rows beside a model.
 
     `residual` (N, rows): m and rad, base axes. `distance` (N,): from what the other rows predict, in robust standard
-    deviations. `gross` (N,) of bool. `yardstick`: by which they were judged, where they are those of a fit.
+    deviations. `gross` (N,) of bool.
     """
 
     residual: np.ndarray
     distance: np.ndarray
     gross: np.ndarray
-    yardstick: Yardstick | None = None
 
     @classmethod
     def none(cls, count: int, rows: int) -> Deviations:
@@ -84,29 +92,26 @@ class _Beside:
     """Rows of measurements beside a model, of which a sample and all that lie far off are looked at closely.
 
     `residual` (N, rows). `far` (N,): whole distance in standard deviations of the sensor, no less than that in those of a row.
-    `sample`, `closely` (N,) of bool: poses spread over those kept; these, and what is as far off as a quarter of all. `parts`:
-    which of the latter; their linearisation; variance (m, rows, rows) of each, and that of a radian in each joint.
+    `near`, `closely` (N,) of bool: poses spread over all; these, and what is as far off as a quarter of them. `parts`: which of
+    the latter; their linearisation; variance (m, rows, rows) of each, and that of a radian in each joint. `noise`: of one row.
     """
 
     residual: np.ndarray
     far: np.ndarray
-    sample: np.ndarray
+    near: np.ndarray
     closely: np.ndarray
     parts: list[tuple[slice, Linearization, np.ndarray, np.ndarray]]
+    noise: Noise
 
     @classmethod
-    def of(cls, model: Model, estimate: Estimate, measurements: Measurements, noise: Noise, kept: np.ndarray) -> _Beside:
-        single, sample = single_observations(measurements), kept.copy()
-        sample[kept] = spread_poses(select_states(single, kept), _MOST)
+    def of(cls, model: Model, estimate: Estimate, measurements: Measurements, noise: Noise) -> _Beside:
+        single = single_observations(measurements)
         near, residual = spread_poses(single, _MOST), np.empty((len(single), model.rows))
-        if near.all():
-            closely, far = near, np.zeros(len(single))
-        else:
-            for states, seen in parts_of(single, observations_at_once(model.rows, 0)):
-                part = part_at(single, states, seen)
-                residual[seen] = residuals(model, estimate, part, conditions(model, estimate, part.states))
-            far = np.linalg.norm(residual / np.repeat([noise.position_m, noise.orientation_rad], 3)[: model.rows], axis=1)
-            closely = near | sample | (far > np.quantile(far[near], _SCALE_QUANTILES[-1]))
+        for edges in parts_of(single, observations_at_once(model.rows, 0)):
+            part = part_at(single, *edges)
+            residual[edges[1]] = residuals(model, estimate, part, conditions(model, estimate, part.states))
+        far = np.linalg.norm(residual / np.repeat([noise.position_m, noise.orientation_rad], 3)[: model.rows], axis=1)
+        closely = near | (far > np.quantile(far[near], _SCALE_QUANTILES[-1]))
         some, parts = select_states(single, closely), []
         for edges in parts_of(some, observations_at_once(model.rows, len(parameters(model, estimate)))):
             part = part_at(some, *edges)
@@ -114,31 +119,29 @@ class _Beside:
             jacobian = line.coordinate_jacobian[..., : model.sites.joints]
             own = measurement_covariances(noise, jacobian[:, None], model.rows, None if spread is None else spread[:, None])
             parts.append((edges[1], line, own, jacobian @ jacobian.transpose(0, 2, 1)))
-        residual[closely] = np.concatenate([line.residual for _, line, _, _ in parts])
-        return cls(residual, far, sample, closely, parts)
+        return cls(residual, far, near, closely, parts, noise)
 
-    def yardstick(self, fitted: Fit, noise: Noise, kept: np.ndarray) -> Yardstick:
+    def yardstick(self, fitted: Fit, kept: np.ndarray) -> Yardstick:
         """As `yardstick_of`, by the rows that were fitted, (N,) of bool."""
-        free, mine = ~fitted.held, self.sample[self.closely]
-        negligible = self.sample.sum() < kept.sum() or not free.any()
+        free, mine, rows = ~fitted.held, (self.near & kept)[self.closely], fitted.model.rows
+        negligible = not (self.near | ~kept).all() or not free.any()
         sizes = np.array([p.plausible for _, p in fitted.parameters])[free]
-        best = (np.inf, Yardstick(noise, None))
+        best = (np.inf, Yardstick(self.noise, None))
         for share in _POSE_SHARES if fitted.noise.pose_rad else (0.0,):
-            pose_rad, covariance = share * fitted.noise.pose_rad, None
-            white = [np.linalg.inv(np.linalg.cholesky(own + pose_rad**2 * common)) for _, _, own, common in self.parts]
+            covariance, white = None, self._white(share * fitted.noise.pose_rad)
             if not negligible:
                 information = np.diag((sizes / fitted.prior_std[free]) ** 2)
                 for (seen, line, _, _), each in zip(self.parts, white, strict=True):
-                    rows = (each @ (line.sensitivities[..., free] * sizes))[mine[seen]].reshape(-1, len(sizes))
-                    information += rows.T @ rows
+                    seen_by = (each @ (line.sensitivities[..., free] * sizes))[mine[seen]].reshape(-1, len(sizes))
+                    information += seen_by.T @ seen_by
                 covariance = np.zeros((len(free), len(free)))
                 covariance[np.ix_(free, free)] = np.linalg.pinv(information, hermitian=True) * np.outer(sizes, sizes)
             distance = self._distances(white, covariance, np.ones(len(mine), bool))[mine]
             volume = -np.concatenate([np.log(np.diagonal(each, axis1=1, axis2=2)).sum(axis=1) for each in white])[mine].mean()
-            rows = fitted.model.rows
             # Rows do not scatter less than the noise that is known of them: a share that says so is too large.
             spread = volume + rows * np.log(max(np.median(distance) / np.sqrt(2 * gammaincinv(rows / 2, 0.5)), 1.0))
-            best = min(best, (spread, Yardstick(replace(noise, pose_rad=pose_rad), covariance)), key=lambda each: each[0])
+            found = Yardstick(replace(self.noise, pose_rad=share * fitted.noise.pose_rad), covariance)
+            best = min(best, (spread, found), key=lambda each: each[0])
         return best[1]
 
     def distances(self, yardstick: Yardstick, fitted: np.ndarray) -> np.ndarray:
@@ -146,10 +149,12 @@ class _Beside:
 
         ``fitted`` says which rows the parameters were fitted to, (N,): residuals of these are smaller, those of others larger.
         """
-        found, pose_rad = self.far.copy(), yardstick.noise.pose_rad
-        white = [np.linalg.inv(np.linalg.cholesky(own + pose_rad**2 * common)) for _, _, own, common in self.parts]
+        found, white = self.far.copy(), self._white(yardstick.noise.pose_rad)
         found[self.closely] = self._distances(white, yardstick.covariance, fitted[self.closely])
         return found
+
+    def _white(self, pose_rad: float) -> list[np.ndarray]:
+        return [np.linalg.inv(np.linalg.cholesky(own + pose_rad**2 * common)) for _, _, own, common in self.parts]
 
     def _distances(self, white: list[np.ndarray], covariance: np.ndarray | None, fitted: np.ndarray) -> np.ndarray:
         found = np.empty(len(fitted))
@@ -171,13 +176,10 @@ def yardstick_of(fitted: Fit, noise: Noise, measurements: Measurements) -> Yards
     """What the rows that a model was fitted to say of themselves, beside the noise that was declared or repeats show.
 
     Of the error common to a pose that the fit states the share counts that makes the generalized variance of most rows smallest
-    (an S-estimate [1]): the rest may be that of the very errors that are looked for, or of a law that is not linear.
-
-    [1] Davies, P. L., Asymptotic behaviour of S-estimates of multivariate location parameters and dispersion matrices, Annals
-        of Statistics 15, 1987.
+    (an S-estimate; Davies, Annals of Statistics 1987): the rest may be that of the very errors that are looked for, or of a law
+    that is not linear.
     """
-    every = np.ones(len(measurements), bool)
-    return _Beside.of(fitted.model, fitted.estimate, measurements, noise, every).yardstick(fitted, noise, every)
+    return _Beside.of(fitted.model, fitted.estimate, measurements, noise).yardstick(fitted, np.ones(len(measurements), bool))
 
 
 def beyond_chance(distance: np.ndarray, rows: int, kept: np.ndarray, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
@@ -211,10 +213,9 @@ def most_by_chance(count: int, rows: int, settings: Settings, freedom: float = n
 
 def gross_errors(fitted: Fit, noise: Noise, measurements: Measurements, kept: np.ndarray, settings: Settings) -> Deviations:
     """Judge the rows of a campaign by a fit to those that are ``kept``, (N,), and the noise declared or shown by repeats."""
-    rows = _Beside.of(fitted.model, fitted.estimate, measurements, noise, kept)
-    yardstick = rows.yardstick(fitted, noise, kept)
-    distance = rows.distances(yardstick, kept)
-    return Deviations(rows.residual, *beyond_chance(distance, fitted.model.rows, kept, settings), yardstick)
+    rows = _Beside.of(fitted.model, fitted.estimate, measurements, noise)
+    distance = rows.distances(rows.yardstick(fitted, kept), kept)
+    return Deviations(rows.residual, *beyond_chance(distance, fitted.model.rows, kept, settings))
 
 
 def held_out_gross_errors(
@@ -230,7 +231,7 @@ def held_out_gross_errors(
     if model is not fitted.model or estimate is not fitted.estimate:
         yardstick = replace(yardstick, covariance=None)
     every = np.ones(len(measurements), bool)
-    rows = _Beside.of(model, estimate, measurements, yardstick.noise, every)
+    rows = _Beside.of(model, estimate, measurements, yardstick.noise)
     distance, gross = beyond_chance(rows.distances(yardstick, ~every), model.rows, every, settings)
     least = settings.extrapolated_error
     if outside.sum() >= _FEWEST_TO_COMPARE:
@@ -262,21 +263,188 @@ def entries_of(found: Deviations, campaign: Campaign, held_out: bool) -> list[di
 def warnings_of(entries: list[dict[str, Any]]) -> list[str]:
     """A sentence for each of the first gross errors, and how many more there are."""
     more = len(entries) - _MOST_NAMED
-    return [entry["detail"] for entry in entries[:_MOST_NAMED]] + (
-        [f"{counted(more, 'further row')} left out"] if more > 0 else []
-    )
+    rest = [f"{counted(more, 'further row')} left out"] if more > 0 else []
+    return [entry["detail"] for entry in entries[:_MOST_NAMED]] + rest
 
 
 def _sentence(found: Deviations, campaign: Campaign, place: int) -> str:
-    measurements, away = campaign.measurements, 1e3 * float(np.linalg.norm(found.residual[place, :3]))
+    measurements, off = campaign.measurements, found.residual[place]
+    away = 1e3 * float(np.linalg.norm(off[:3]))
     size = f"{away:.3g} mm" if away < 1e3 else f"{1e-3 * away:.3g} m"
-    if found.residual.shape[1] > 3:
-        size += f" and {1e3 * np.linalg.norm(found.residual[place, 3:]):.3g} mrad"
+    size += f" and {1e3 * np.linalg.norm(off[3:]):.3g} mrad" if len(off) > 3 else ""
     alike = (measurements.position == measurements.position[place]).all(axis=1)
     alike[place] = False
-    reason = ""
-    if not measurements.position[place].any():
-        reason = ", reads 0, 0, 0"
-    elif alike.any():
-        reason = f", the same point as {campaign.place_of(int(measurements.row[np.argmax(alike)]))}"
+    reason = f", the same point as {campaign.place_of(int(measurements.row[np.argmax(alike)]))}" if alike.any() else ""
+    reason = reason if measurements.position[place].any() else ", reads 0, 0, 0"
     return f"{campaign.place_of(int(measurements.row[place]))}: {size} off{reason}, left out"
+
+
+@dataclass(frozen=True)
+class Kept:
+    """The part of a case that is fitted, ``kept`` of all its measurements (N,), with its noise and declared model.
+
+    `searched`: observations that a search looks at, no more than so many; `declared` is the fit to these.
+    """
+
+    case: Case
+    kept: np.ndarray
+    noise: Noise
+    warnings: list[str]
+    declared: Fit
+    searched: Observations
+
+    def declared_to_all(self) -> Fit:
+        """The declared model fitted to all that is kept."""
+        found, every = self.declared, self.case.observations
+        return found if self.searched is every else fit(found.model, every, self.noise, found.estimate, reweighted=True)
+
+
+def fitted_to(case: Case, kept: np.ndarray, settings: Settings, last: Kept | None = None) -> Kept:
+    """The part of a case that is kept, or the last one where that is the same."""
+    if last is not None and (kept == last.kept).all():
+        return last
+    part = case.select(kept)
+    noise, warnings = estimated_noise(part)
+    # Where rows only leave, the rest of the last sample.
+    like = last.searched if last is not None and not (kept & ~last.kept).any() else None
+    searched = sample_of(part.observations, settings.searched_observations, like)
+    return Kept(part, kept, noise, warnings, fit_declared(part.model, searched, noise), searched)
+
+
+def first_kept(case: Case, settings: Settings) -> Kept:
+    """The part of a case that its declared model, or all candidates together, might explain.
+
+    Rows under far larger loads than most are judged by the others alone: they would pull any fit to themselves (bad leverage
+    points; Rousseeuw and Leroy, Robust Regression and Outlier Detection, 1987).
+    """
+    measurements, candidates = case.campaign.measurements, list(case.candidates.values())
+    pulling = extreme_loads(measurements, settings)
+    whole = part = fitted_to(case, ~pulling, settings)
+    for _ in range(settings.gross_error_rounds):
+        errors = gross_errors(part.declared, part.noise, measurements, part.kept, settings)
+        last, part = part, fitted_to(case, ~errors.gross, settings, part)
+        if part is last:
+            break
+    observations, most = case.observations, settings.gross_start_numbers // case.model.rows
+    few = spread_poses(observations, most)
+    if part is whole and not few.all():
+        # Nothing stands apart, and there are too many to look more closely.
+        return whole
+    apart = np.unique(observations.state[measured_in(observations, measurements, ~part.kept)])
+    few[apart[np.linspace(0, len(apart) - 1, min(len(apart), most)).astype(int)]] = True
+    few[observations.state[measured_in(observations, measurements, pulling)]] = False
+    some = select_states(observations, few)
+    about = evaluated(part.declared.model, some, part.noise, part.declared.estimate)
+    taken = improbable(linearized(about, some, candidates, settings))
+    # A repeat far from its others is in no average, and stays what the declared model says of it.
+    looked_at = measured_in(measurements, some, np.ones(len(some), bool))
+    looked_at &= np.isin(measurements.row, without_outlying_repeats(measurements).row)
+    return fitted_to(case, ~np.where(looked_at, measured_in(measurements, some, taken), ~part.kept), settings, whole)
+
+
+def extreme_loads(measurements: Measurements, settings: Settings) -> np.ndarray:
+    """Which rows are under a force far beyond that of most loaded ones, if these are few, ndarray of bool (N,)."""
+    force = np.linalg.norm(measurements.wrench[:, :3], axis=1)
+    usual = np.quantile(force[force > 0], 0.75) if force.any() else np.inf
+    far = force > settings.extreme_load * usual
+    return far & (far.mean() <= settings.gross_error_share)
+
+
+def improbable(line: Linearized) -> np.ndarray:
+    """Which observations all candidates together do not explain, ndarray of bool (M,).
+
+    The whitened residual has the covariance I + X D X' + W S W', with X the declared sensitivities, D their priors, W those
+    of all candidates and S their mean square sizes. Observations are taken out, the worst first, until what is left agrees;
+    then those come back that it predicts.
+    """
+    rows, settings = line.rows, line.settings
+    observed, own = rows.residual.shape
+    kept = np.ones(observed, bool)
+    grid = Grid.of_settings(settings)
+    sizes = np.sqrt(np.exp(grid.log_weights) @ grid.scales**2)
+    declared = (rows.declared * line.priors[0]).reshape(rows.residual.size, -1)
+    columns = (sizes * rows.candidates.dense()).reshape(rows.residual.size, -1)
+    covariance, residual = np.eye(len(columns)) + columns @ columns.T, rows.residual.ravel()
+    precision, limit = _precision(covariance, declared), most_by_chance(observed, own, settings)
+    while kept.mean() > 1.0 - settings.gross_error_share:
+        distance = _deletion_distances(precision, residual, kept, own)
+        worst = int(np.argmax(distance))
+        if distance[worst] <= limit:
+            break
+        kept[worst] = False
+        precision = _without(precision, np.arange(worst * own, (worst + 1) * own))
+    if not kept.all():
+        covariance = covariance + _pose_error(rows, line.pose_errors_rad, covariance, declared, np.repeat(kept, own))
+    whole = _precision(covariance, declared)
+    while not kept.all():
+        out = np.flatnonzero(np.repeat(~kept, own))
+        distance = _deletion_distances(_without(whole, out), residual, kept, own)
+        variance = np.linalg.inv(whole[np.ix_(out, out)])
+        rest = (variance @ (whole @ residual)[out]).reshape(-1, own, 1)
+        distance[~kept] = np.sqrt((rest * np.linalg.solve(_blocks(variance, own), rest)).sum(axis=(1, 2)))
+        back = ~kept & ~beyond_chance(distance, own, kept, settings)[1]
+        if not back.any():
+            break
+        kept |= back
+    return ~kept
+
+
+def _precision(covariance: np.ndarray, declared: np.ndarray) -> np.ndarray:
+    """Inverse of a covariance to which that of declared columns of unit size is added (Woodbury's identity)."""
+    root = np.linalg.cholesky(covariance)
+    basis, _ = _declared_basis(root, declared)
+    inverse = lapack.dpotri(root, lower=1)[0]
+    inverse = np.tril(inverse) + np.tril(inverse, -1).T
+    beside = solve_triangular(root, basis, lower=True, trans="T")
+    return inverse - beside @ beside.T
+
+
+def _log_likelihood(covariance: np.ndarray, declared: np.ndarray, residual: np.ndarray) -> float:
+    """Logarithm of the density of a residual of zero mean under that sum, but for a constant."""
+    root = np.linalg.cholesky(covariance)
+    basis, log_size = _declared_basis(root, declared)
+    white = solve_triangular(root, residual, lower=True)
+    squares = white @ white - ((basis.T @ white) ** 2).sum()
+    return float(-0.5 * squares - np.log(np.diag(root)).sum() - log_size)
+
+
+def _declared_basis(root: np.ndarray, declared: np.ndarray) -> tuple[np.ndarray, float]:
+    """Whitened declared columns beside their priors, made orthonormal, (n, P) without the latter; half the log determinant."""
+    white = solve_triangular(root, declared, lower=True)
+    basis, triangle = np.linalg.qr(np.concatenate([white, np.eye(declared.shape[1])]))
+    return basis[: len(declared)], float(np.log(np.abs(np.diag(triangle))).sum())
+
+
+def _without(precision: np.ndarray, out: np.ndarray) -> np.ndarray:
+    """The inverse covariance of the rows without some, in whose place it is zero."""
+    left = precision - precision[:, out] @ np.linalg.solve(precision[np.ix_(out, out)], precision[out])
+    left[out], left[:, out] = 0.0, 0.0
+    return left
+
+
+def _pose_error(
+    rows: WhiteRows, pose_errors_rad: np.ndarray, covariance: np.ndarray, declared: np.ndarray, known: np.ndarray
+) -> np.ndarray:
+    """Covariance of the error common to a pose, at the size that makes the rows known most probable."""
+    residual, own = rows.residual.ravel()[known], rows.residual.shape[1]
+    jacobian, pose = rows.jacobian.reshape(len(known), -1), np.repeat(rows.pose, own)
+    common = (jacobian @ jacobian.T) * (pose[:, None] == pose)
+    best = (-np.inf, 0.0)
+    for tau in pose_errors_rad:
+        likely = _log_likelihood((covariance + tau**2 * common)[np.ix_(known, known)], declared[known], residual)
+        best = max(best, (likely, float(tau)))
+    return best[1] ** 2 * common
+
+
+def _deletion_distances(precision: np.ndarray, residual: np.ndarray, kept: np.ndarray, own: int) -> np.ndarray:
+    """Length of the deletion residual of each observation that is kept, 0 of others, (M,)."""
+    blocks = np.where(kept[:, None, None], _blocks(precision, own), np.eye(own))
+    along = (precision @ residual).reshape(-1, own, 1)
+    squares = (along * np.linalg.solve(blocks, along)).sum(axis=(1, 2))
+    return np.where(kept, np.sqrt(np.maximum(squares, 0.0)), 0.0)
+
+
+def _blocks(matrix: np.ndarray, own: int) -> np.ndarray:
+    """Blocks on the diagonal, ndarray (M, own, own)."""
+    every = np.arange(len(matrix) // own)
+    return matrix.reshape(len(every), own, len(every), own)[every, :, every]

@@ -8,28 +8,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.campaigns.campaign import NO_REMAINDER, residual_columns
+from elastocal.campaigns.campaign import NO_REMAINDER, Measurements, residual_columns
 from elastocal.counting import counted
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.gross_errors import Deviations, entries_of, held_out_gross_errors, warnings_of, yardstick_of
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.case import noise_from
+from elastocal.fitting.case import Case, noise_from
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.observations import single_observations, state_clusters
 from elastocal.fitting.prediction import measured_in_base, residuals
 from elastocal.random_streams import stream
-from elastocal.remainder.corrected import Plan, corrected, remainder_facts
+from elastocal.remainder.corrected import Corrected, Plan, corrected, remainder_facts
+from elastocal.validation import held_out as figures
 from elastocal.validation.fitted_range import outside_poses, repeat_warnings
-from elastocal.validation.held_out import (
-    METRICS,
-    errors_by_range,
-    grown,
-    intervals,
-    noise_floor,
-    position_errors,
-    share_below_largest,
-    summary,
-)
 from elastocal.validation.left_out import error_row, split_rows
 from elastocal.validation.placing import placed
 from elastocal.validation.span import count_configurations, joint_ranges
@@ -37,12 +28,8 @@ from elastocal.validation.span import count_configurations, joint_ranges
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from elastocal.campaigns.campaign import Measurements
     from elastocal.diagnosis.diagnose import Diagnosis, Step
-    from elastocal.fitting.case import Case
     from elastocal.fitting.model import Estimate, Model
-    from elastocal.remainder.corrected import Corrected
-    from elastocal.validation.held_out import Errors
 
 _REPLICATES = 1000
 # What warnings of errors that grew are known by.
@@ -77,15 +64,14 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     errors, part, outside = without_gross_errors(diagnosis, held_out)
     left_out = entries_of(errors, held_out.campaign, held_out=True)
     rows, heldout, warnings = heldout_errors(steps, case, part, outside, seed)
-    of_all = [row["heldout_rms_m"] for row in rows]
-    heldout["with_gross_errors"] = None
+    of_all, heldout["with_gross_errors"] = [row["heldout_rms_m"] for row in rows], None
     if left_out:
         whole = [_summary(error) for error in _errors(steps, case, held_out)[1]]
         of_all = [error["rms_m"] for error in whole]
         heldout["with_gross_errors"] = {"before": whole[_declared(steps)], "after": whole[-1]}
-        without, with_them, count = 1e3 * heldout["after"]["rms_m"], 1e3 * of_all[-1], counted(len(left_out), "gross error")
         warnings.append(
-            f"held-out errors are without {count}: with all rows the RMS is {with_them:.3g} mm instead of {without:.3g} mm"
+            f"held-out errors are without {counted(len(left_out), 'gross error')}: with all rows the RMS is"
+            f" {1e3 * of_all[-1]:.3g} mm instead of {1e3 * heldout['after']['rms_m']:.3g} mm"
         )
     rows = [row | {"heldout_rms_all_rows_m": rms} for row, rms in zip(rows, of_all, strict=True)]
     # By what share each step lowers the held-out RMS.
@@ -121,12 +107,11 @@ def without_gross_errors(diagnosis: Diagnosis, held_out: Case) -> tuple[Deviatio
     its poses lie outside the range of the fitted ones, (P,)."""
     final, measurements = diagnosis.final, held_out.campaign.measurements
     poses = outside_poses(final, diagnosis.case, held_out)
+    part, errors = held_out, Deviations.none(len(measurements), held_out.model.rows)
     if data_at_fault(diagnosis.document):
-        return Deviations.none(len(measurements), held_out.model.rows), held_out, poses
-    part, settings = held_out, Settings()
-    errors = Deviations.none(len(measurements), held_out.model.rows)
-    noise = noise_from(diagnosis.document).of_measurements
-    yardstick = diagnosis.yardstick or yardstick_of(final, noise, diagnosis.case.campaign.measurements)
+        return errors, part, poses
+    settings, noise = Settings(), noise_from(diagnosis.document).of_measurements
+    yardstick = yardstick_of(final, noise, diagnosis.case.campaign.measurements)
     outside = poses[state_clusters(measurements)]
     for _ in range(settings.gross_error_rounds):
         # Frames of another campaign are fitted to what is kept of it.
@@ -149,38 +134,36 @@ def heldout_errors(
     there, errors = _errors(steps, case, held_out)
     before, after = _declared(steps), len(steps) - 1
     draws = stream(seed, case.campaign.name, "held-out poses", 0)
-    limits, reductions = intervals(errors, _REPLICATES, draws, before)
-    of_calibration = intervals([errors[0], errors[after]], _REPLICATES, draws)[1][1]
-    floor = noise_floor(steps[after].fitted, held_out.observations, *there[after])
+    limits, reductions = figures.intervals(errors, _REPLICATES, draws, before)
+    of_calibration = figures.intervals([errors[0], errors[after]], _REPLICATES, draws)[1][1]
+    floor = figures.noise_floor(steps[after].fitted, held_out.observations, *there[after])
     rows, warnings = [], []
     for step, error, limit in zip(steps, errors, limits, strict=True):
-        training, tested = summary(np.linalg.norm(step.fitted.residual[:, :3], axis=1)), summary(error.distance)
+        training, tested = figures.summary(np.linalg.norm(step.fitted.residual[:, :3], axis=1)), figures.summary(error.distance)
         row: dict[str, Any] = {"step": step.name, "kind": step.kind, "parameters": int((~step.fitted.held).sum())}
-        row |= {f"train_{name}": training[name] for name in METRICS}
-        for name in METRICS:
-            row |= {f"heldout_{name}": tested[name]}
-            row |= {f"heldout_{name}_low": limit[name][0], f"heldout_{name}_high": limit[name][1]}
-        row |= {f"heldout_{name.removesuffix('_m')}_over_floor": tested[name] / floor for name in METRICS}
-        rows.append(row)
-    for name in grown(summary(errors[before].distance), summary(errors[after].distance)):
+        row |= {f"train_{name}": training[name] for name in figures.METRICS}
+        for name in figures.METRICS:
+            low, high = limit[name]
+            row |= {f"heldout_{name}": tested[name], f"heldout_{name}_low": low, f"heldout_{name}_high": high}
+        rows.append(row | {f"heldout_{name.removesuffix('_m')}_over_floor": tested[name] / floor for name in figures.METRICS})
+    for name in figures.grown(figures.summary(errors[before].distance), figures.summary(errors[after].distance)):
         low, high = (1e3 * rows[number][f"heldout_{name}"] for number in (before, after))
         warnings.append(f"the {_ERRORS[name]} {ABOUT_ERRORS} grew from {low:.3f} to {high:.3f} mm")
     for last, row in pairwise(rows[before:]):
         if row["heldout_rms_m"] > last["heldout_rms_m"]:
             warnings.append(f"the step '{row['step']}' raised the RMS error {ABOUT_ERRORS}")
-    ends = [_summary(errors[number]) for number in (0, before, after)]
-    by_range = errors_by_range({"before": errors[before], "after": errors[after]}, outside)
+    by_range = figures.errors_by_range({"before": errors[before], "after": errors[after]}, outside)
     heldout = {
-        "uncalibrated": ends[0] | {"reduction_ci95": [of_calibration.low, of_calibration.high]},
-        "before": ends[1],
-        "after": ends[2],
+        "uncalibrated": _summary(errors[0]) | {"reduction_ci95": [of_calibration.low, of_calibration.high]},
+        "before": _summary(errors[before]),
+        "after": _summary(errors[after]),
         "noise_floor_rms_m": None if np.isnan(floor) else floor,
         "reduction_ci95": [reductions[after].low, reductions[after].high],
         "reduction_std_error": reductions[after].std_error,
         "poses": errors[0].poses,
         "configurations": count_configurations(held_out.observations.states),
         "joint_ranges": joint_ranges(held_out.observations.states, held_out.campaign.robot),
-        "share_below_max": share_below_largest(errors[0].poses),
+        "share_below_max": figures.share_below_largest(errors[0].poses),
         "outside_range": by_range,
     }
     if count := by_range["poses"]:
@@ -189,18 +172,18 @@ def heldout_errors(
     return rows, heldout, warnings + repeat_warnings(case.observations.states, held_out.observations.states)
 
 
-def _errors(steps: Sequence[Step], case: Case, held_out: Case) -> tuple[list[tuple[Model, Estimate]], list[Errors]]:
+def _errors(steps: Sequence[Step], case: Case, held_out: Case) -> tuple[list[tuple[Model, Estimate]], list[figures.Errors]]:
     """Models of all steps, placed where held-out measurements were made, and their errors there."""
     there = [placed(step.fitted, case, held_out) for step in steps]
-    return there, [position_errors(model, estimate, held_out.observations) for model, estimate in there]
+    return there, [figures.position_errors(model, estimate, held_out.observations) for model, estimate in there]
 
 
 def _declared(steps: Sequence[Step]) -> int:
     return next(number for number, step in enumerate(steps) if step.kind == "declared")
 
 
-def _summary(errors: Errors) -> dict[str, float]:
-    return {name: float(value) for name, value in summary(errors.distance).items()}
+def _summary(errors: figures.Errors) -> dict[str, float]:
+    return {name: float(value) for name, value in figures.summary(errors.distance).items()}
 
 
 def split_table(diagnosis: Diagnosis, held_out: Case, seed: int) -> list[dict[str, Any]]:
@@ -210,7 +193,7 @@ def split_table(diagnosis: Diagnosis, held_out: Case, seed: int) -> list[dict[st
     """
     case, before, after = diagnosis.case, diagnosis.declared, diagnosis.final
     draws = stream(seed, case.campaign.name, "splits", 0)
-    unseen = [position_errors(*placed(fitted, case, held_out), held_out.observations) for fitted in (before, after)]
+    unseen = [figures.position_errors(*placed(fitted, case, held_out), held_out.observations) for fitted in (before, after)]
     rows = [error_row("held out", "all", unseen[0], unseen[1], _REPLICATES, draws)]
     return rows + split_rows(before, after, case.observations, _REPLICATES, draws)
 

@@ -1,41 +1,36 @@
-"""From a fit to the problem that is searched: columns of everything that its model might lack, whitened, and their products.
-
-One object for all that looks at them: the initial screening of gross errors takes its rows, alarm and search its statistics, a
-closer look at some shapes adds their columns, averages and proposals take its products.
-"""
+"""From a fit to the problem that is searched: columns of everything that its model might lack, whitened, and their products."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.special import chdtri
 
-from elastocal.diagnosis import other
-from elastocal.diagnosis.hypotheses import prior_of, units_of
-from elastocal.diagnosis.search import Problem, likely_pose_errors, pose_errors_within_reach
-from elastocal.diagnosis.statistics import Products, WhiteRows, products_of, statistics_of
+from elastocal.diagnosis.evidence import condition, log_sum_exp
+from elastocal.diagnosis.hypotheses import Law, Unit, laws_of, units_of
+from elastocal.diagnosis.search import Problem, pose_errors_within_reach
+from elastocal.diagnosis.statistics import Products, Statistics, WhiteRows, products_of, statistics_of
+from elastocal.effects.gravity import DECLARED_WEIGHT
 from elastocal.errors import InputError
 from elastocal.fitting.factored import Displacements, Factored
+from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.observations import spread_poses
+from elastocal.fitting.observations import Observations, spread_poses
 from elastocal.fitting.parameters import nonlinear_parameters, parameter_values
 from elastocal.fitting.whitening import whitening
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from typing import Any
 
-    from elastocal.diagnosis.hypotheses import Unit
+    from elastocal.diagnosis.gross_errors import Kept
     from elastocal.diagnosis.settings import Settings
-    from elastocal.diagnosis.statistics import Statistics
     from elastocal.effects.conditions import Conditions
-    from elastocal.effects.protocol import Candidate, Displacing
+    from elastocal.effects.protocol import Candidate
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.model import Model
-    from elastocal.fitting.observations import Observations
 
     Shapes = tuple[float, ...]
 
@@ -61,12 +56,9 @@ class Linearized:
     """A model about a fit, and everything that it might lack; what asks for more work is done when it is first asked for.
 
     Coefficients count from zero, not from the fit: what candidates and declared geometry contribute to the prediction is given
-    back to the residual, so that their priors mean what they say.
-
-    `about`: of the declared model, or with effects found already, about which the problem is then linear. `around`: of the
-    states looked at. `tried`: candidates that can be tested at all, each with values of its shape. `lacking`: why not others.
-    `candidates`: keys of all: parameters of the fit that they own are coefficients of units here. `against`: laws
-    of the competitor. `most_pose_error_rad`: largest error common to the measurements of a pose that is thought of.
+    back to the residual, so that their priors mean what they say. `around`: of the states looked at. `tried`: candidates that
+    can be tested at all, each with values of its shape; `lacking`: why not others. `candidates`: keys of all: parameters of the
+    fit that they own are coefficients of units here. `against`: laws of the competitor.
     """
 
     about: Fit
@@ -76,21 +68,10 @@ class Linearized:
     tried: dict[str, tuple[Candidate, list[Shapes]]]
     lacking: dict[str, str]
     candidates: frozenset[str]
-    against: list[other.Law]
+    against: list[Law]
     most_pose_error_rad: float
 
-    def with_shapes(self, closer: dict[str, list[Shapes]]) -> Linearized:
-        """The same with other values of the shapes of some candidates, by their keys, such as of a closer look."""
-        if not closer:
-            return self
-        tried = {key: (candidate, closer.get(key, shapes)) for key, (candidate, shapes) in self.tried.items()}
-        return self._with_the_same_fit(tried=tried)
-
-    def under(self, model: Model) -> Linearized:
-        """The same under other priors of the declared parameters, those of a model that is alike in all else."""
-        return self._with_the_same_fit(about=replace(self.about, model=model))
-
-    def _with_the_same_fit(self, **changes: Any) -> Linearized:
+    def alike(self, **changes: Any) -> Linearized:
         """The same but for what does not change the whitened rows of the fit, which are not made again."""
         found = replace(self, **changes)
         vars(found).update({"_fitted": self._fitted})
@@ -107,8 +88,7 @@ class Linearized:
     @cached_property
     def units(self) -> tuple[Unit, ...]:
         """Of candidates and competitors, in the order of their columns."""
-        tested = [(candidate, shapes) for candidate, values in self.tried.values() for shapes in values]
-        return units_of(tested, self.against, self.settings)
+        return units_of(self.tried.values(), self.against, self.settings)
 
     @property
     def priors(self) -> tuple[np.ndarray, np.ndarray]:
@@ -145,18 +125,12 @@ class Linearized:
         return rows, line.conditions
 
     @property
-    def declared_rows(self) -> WhiteRows:
-        """Whitened rows without candidates."""
-        return self._fitted[0]
-
-    @property
     def rows(self) -> WhiteRows:
         """Whitened rows, candidates in the order of the units."""
         rows, conditions = self._fitted
-        effects: list[tuple[Displacing, Shapes]] = []
-        effects += [(candidate, each) for candidate, shapes in self.tried.values() for each in shapes]
-        effects += [(law, ()) for law in self.against]
-        laws = [law for effect, shapes in effects for law in effect.displacement(conditions, *shapes)]
+        tried = [(candidate, each) for candidate, shapes in self.tried.values() for each in shapes]
+        laws = [law for candidate, shapes in tried for law in candidate.displacement(conditions, *shapes)]
+        laws += [law for against in self.against for law in against.displacement(conditions)]
         sizes = np.concatenate([unit.sizes for unit in self.units])
         displacements = Displacements.of(laws, sizes, len(self.observations.states))
         return replace(rows, candidates=replace(rows.candidates, displacements=displacements))
@@ -172,9 +146,8 @@ class Linearized:
         rows, _ = self._fitted
         shown = float(np.median(np.bincount(rows.pose, (rows.jacobian**2).sum(axis=(1, 2)) / rows.jacobian.shape[-1])))
         if shown < _LEAST_INFORMATION:
-            raise InputError(
-                "campaign", "targets", "measurements that no joint moves", "targets on what moves, off a lone axis"
-            )
+            found, allowed = "measurements that no joint moves", "targets on what moves, off a lone axis"
+            raise InputError("campaign", "targets", found, allowed)
         return 1.0 / np.sqrt(shown)
 
     @property
@@ -190,12 +163,13 @@ class Linearized:
         if products.rows.residual.size > _MANY_ROWS:
             some = spread_poses(self.observations, _SAMPLE_ROWS // self.observations.rows)[self.observations.state]
             sample = products_of(products.rows.at(some), *self.priors)
-            grid = grid[likely_pose_errors(statistics_of(sample, grid), self.units, settings)]
+            # Zero, to which Gram matrices refer, always.
+            grid = np.union1d(0.0, Problem(statistics_of(sample, grid), self.units, settings).started.statistics.pose_error_rad)
         statistics = statistics_of(products, grid)
         smallest = smallest_shown(statistics, self.units, settings)
         pairs = zip(self.units, smallest.tolist(), strict=True)
         shown = tuple(replace(unit, smallest=number) for unit, number in pairs if number <= unit.largest)
-        return Problem(statistics, shown, prior_of(shown, settings), settings)
+        return Problem(statistics, shown, settings)
 
     @property
     def untestable(self) -> dict[str, str]:
@@ -216,7 +190,7 @@ def linearized(
     there = fitted.model.offered(observations.states)
     why = {candidate.key: lacking(candidate, there, observations.states.joint_angles) for candidate in candidates}
     tried = {c.key: (c, shapes_tried(c, fitted)) for c in candidates if not why[c.key]}
-    against = other.laws_of(around, settings.other_features)
+    against = laws_of(around, settings.other_features)
     missing = {key: reason for key, reason in why.items() if reason}
     return Linearized(fitted, observations, settings, around, tried, missing, frozenset(why), against, most_pose_error_rad)
 
@@ -225,16 +199,13 @@ def smallest_shown(statistics: Statistics, units: Sequence[Unit], settings: Sett
     """The smallest size at which each unit would be found with a power of one half, were it the only candidate.
 
     A test for one direction, with a Bonferroni correction for all units, reaches that where the non-centrality is the critical
-    value. A smaller effect is there or not, and the measurements are the same: it counts as not there.
-
-    Returns (number of units,) of int: place among the sizes; their number where even the largest is too small to be seen.
+    value. A smaller effect counts as not there. Returns places among the sizes (number of units,); their number where even the
+    largest is too small to be seen.
     """
-    critical = chdtri(1, settings.alarm_level / max(len(units), 1))
-    largest, width = np.zeros(len(units)), np.array([len(unit.columns) for unit in units], int)
-    for size in np.unique(width):
-        members = np.flatnonzero(width == size)
-        columns = np.array([units[number].columns for number in members.tolist()])
-        largest[members] = np.linalg.eigvalsh(statistics.gram[0][columns[:, :, None], columns[:, None, :]])[:, -1]
+    critical, largest = chdtri(1, settings.alarm_level / max(len(units), 1)), np.zeros(len(units))
+    blocks = condition(statistics.at(slice(1)), np.zeros(0, int), np.zeros(0), np.zeros(1)).blocks_of(units, range(len(units)))
+    for members, values, _, _ in blocks:
+        largest[members] = values[0].max(axis=1)
     return np.searchsorted(np.array(settings.scales) ** 2, critical / np.maximum(largest, 1e-9 * critical))
 
 
@@ -258,27 +229,25 @@ def shapes_tried(candidate: Candidate, fitted: Fit) -> list[Shapes]:
     return [(float(value),) for value in values]
 
 
-def shapes_looked_at_closely(problem: Problem, alone: np.ndarray) -> dict[str, list[Shapes]]:
-    """Values of the shapes of the best candidates, by their keys, closer to each other about the best value of each.
+def looked_at_closely(line: Linearized, alone: np.ndarray) -> Linearized:
+    """The same with more shapes of the best candidates, closer to each other about the best value of each.
 
-    `alone` (number of units,): log Bayes factor of each unit alone. Returns empty where no shape matters.
+    `alone` (number of units,): log Bayes factor of each unit alone. Returns itself where no shape matters.
     """
-    units = problem.units
-    odds = alone + [problem.prior.log_odds_of([unit]) for unit in units]
-    found: dict[str, list[Shapes]] = {}
-    for number in np.argsort(-odds):
-        unit = units[number]
-        near = odds[number] > odds.max() - _NEAR_THE_BEST and alone[number] > _WORTH_A_LOOK
-        if near and unit.shapes and unit.candidate and unit.candidate.key not in found:
-            (shape,), (best,) = unit.candidate.shapes, unit.shapes
-            tried = sorted(other.shapes[0] for other in units if other.candidate and other.candidate.key == unit.candidate.key)
-            place = tried.index(best)
-            below, above = [shape.lowest, *tried][place], [*tried, shape.highest][place + 1]
+    units, tried = line.problem.units, dict(line.tried)
+    odds = alone + [line.problem.prior.log_odds_of([unit]) for unit in units]
+    near = (odds > odds.max() - _NEAR_THE_BEST) & (alone > _WORTH_A_LOOK) if len(units) else []
+    for unit in (units[number] for number in np.argsort(-odds) if near[number]):
+        if unit.shapes and unit.candidate and tried[unit.candidate.key] is line.tried[unit.candidate.key]:
+            (shape,), (best,), key = unit.candidate.shapes, unit.shapes, unit.candidate.key
+            known = sorted(each.shapes[0] for each in units if each.candidate and each.candidate.key == key)
+            place = known.index(best)
+            below, above = [shape.lowest, *known][place], [*known, shape.highest][place + 1]
             # The best may lie at an end of the range.
             sides = [edges for edges in ((below, best), (best, above)) if edges[0] < edges[1]]
             closer = [value for edges in sides for value in shape.between(*edges, _SHAPES_CLOSER)]
-            found[unit.candidate.key] = [(float(value),) for value in sorted({*tried, *closer})]
-    return found
+            tried[key] = unit.candidate, [(float(value),) for value in sorted({*known, *closer})]
+    return line if tried == line.tried else line.alike(tried=tried)
 
 
 def lacking(candidate: Candidate, there: frozenset[str], joint_angles: np.ndarray) -> str:
@@ -293,3 +262,45 @@ def lacking(candidate: Candidate, there: frozenset[str], joint_angles: np.ndarra
         if angles < candidate.distinct_angles:
             return f"joint {joint} stood still" if angles == 1 else "too few different angles of a joint"
     return ""
+
+
+def with_probable_centres(part: Kept, settings: Settings) -> Kept:
+    """The kept part of a case, fitted with the prior of its centres of mass that is more probable; itself without masses.
+
+    Most robot files state centres of mass as well as masses; of some nobody ever asked. Priors as wide as the links' girth for
+    all robots would hide a payload, narrow ones would take a centre off its link for one. So both are hypotheses, equally
+    probable beforehand, and the measurements choose by the evidence of each, whatever single mechanism may be beside it.
+
+    `part`: with the wide prior.
+    """
+    stated = with_stated_centres(part.declared.model)
+    if stated is part.declared.model:
+        return part
+    line = linearized(part.declared, part.searched, list(part.case.candidates.values()), settings)
+    lines = [line, line.alike(about=replace(line.about, model=stated))]
+    wide, narrow = (_log_evidence(each, products_of(each._fitted[0], *each.priors)) for each in lines)
+    # A prior that is better without any mechanism is not worse with one, for a mechanism explains what it leaves.
+    if wide > narrow:
+        wide, narrow = (_log_evidence(each, each.products, each.problem) for each in lines)
+        if wide > narrow:
+            return part
+    fitted = fit(stated, part.searched, part.noise, part.declared.estimate, reweighted=True)
+    return replace(part, case=replace(part.case, model=with_stated_centres(part.case.model)), declared=fitted)
+
+
+def with_stated_centres(model: Model) -> Model:
+    """A declared model whose first moments are known as well as the robot file says; itself without declared masses."""
+    weight = next((effect for effect in model.effects if effect.effect == DECLARED_WEIGHT), None)
+    if weight is None:
+        return model
+    stated = replace(weight, parameters=tuple(replace(p, prior_std=p.plausible) for p in weight.parameters))
+    return replace(model, effects=tuple(stated if effect is weight else effect for effect in model.effects))
+
+
+def _log_evidence(line: Linearized, products: Products, problem: Problem | None = None) -> float:
+    """Of the measurements, up to what any prior of the declared parameters shares; with none or one mechanism of a problem."""
+    if problem is None:
+        problem = Problem(statistics_of(products, line.pose_errors_rad), (), line.settings)
+    of_declared = np.linalg.slogdet(products.into_basis)[1] - np.log(line.priors[0]).sum()
+    met = np.array(list(problem.started.met.values()))
+    return float(of_declared + problem.started.empty.log_evidence + log_sum_exp(met))

@@ -43,17 +43,14 @@ def misplaced(fitted: Fit, campaign: Campaign) -> list[dict[str, Any]]:
     Returns of each ``place``: "tool", "base" or "link 3"; ``alternatives``, which say it as well; ``shift_m`` (3,) in the axes
     of the base or of the far end of the link; ``sizes``, its length over the usual one; ``sentence``.
     """
-    free, listed = np.flatnonzero(~fitted.held), fitted.parameters
-    effects = {effect.key: effect.effect for effect in fitted.model.effects}
-    geometry = np.array([effects.get(listed[at][0]) in (_BASE, _LINK, _OFFSET) for at in free], bool)
-    usual = np.array([listed[at][1].plausible for at in free])
+    free, effects = np.flatnonzero(~fitted.held), {effect.key: effect.effect for effect in fitted.model.effects}
+    owners, listed = zip(*(fitted.parameters[at] for at in free), strict=True) if len(free) else ((), ())
+    kinds = [effects.get(owner) for owner in owners]
+    geometry = np.array([kind in (_BASE, _LINK, _OFFSET) for kind in kinds], bool)
+    usual = np.array([parameter.plausible for parameter in listed])
     values = parameter_values(fitted.model, fitted.estimate)[free]
-    shifts = [
-        n
-        for n in np.flatnonzero(geometry).tolist()
-        if effects[listed[free[n]][0]] != _OFFSET and listed[free[n]][1].unit == "m"
-    ]
-    turns = geometry & np.array([listed[at][1].unit == "rad" for at in free], bool)
+    shifts = [n for n, kind in enumerate(kinds) if kind in (_BASE, _LINK) and listed[n].unit == "m"]
+    turns = geometry & np.array([parameter.unit == "rad" for parameter in listed], bool)
     if not shifts or (np.abs(values) < usual)[shifts].all() or (np.abs(values[turns]) > _LARGEST_TURN).any():
         return []
     wrong_m = max(_WRONG_M, float(np.abs(values[shifts]).max()))
@@ -76,18 +73,17 @@ def misplaced(fitted: Fit, campaign: Campaign) -> list[dict[str, Any]]:
             found.append((0.5 * (weighted @ best - np.linalg.slogdet(whole)[1]) - np.log(prior[geometry]).sum(), best))
         return max(found, key=lambda each: each[0])
 
-    def place_of(number: int) -> str:
-        owner = listed[free[number]][0]
-        tool = owner == f"{_LINK}@{campaign.robot.joints}" and any(each.offset_m is not None for each in _at_end(campaign))
-        return TOOL if tool else BASE if effects[owner] == _BASE else f"link {owner.rpartition('@')[2]}"
-
+    reflector = any(target.offset_m is not None for target in _at_end(campaign))
+    tool = f"{_LINK}@{campaign.robot.joints}" if reflector else ""
+    places = {
+        n: TOOL if owners[n] == tool else BASE if kinds[n] == _BASE else f"link {owners[n].split('@')[1]}" for n in shifts
+    }
     taken: list[int] = []
     others: dict[str, set[str]] = {}
     last, at = explained(taken)
     # Along one axis of a place, or along all of them.
-    ways = [(n,) for n in shifts] + [
-        tuple(n for n in shifts if place_of(n) == place) for place in {place_of(n) for n in shifts}
-    ]
+    ways = [(n,) for n in shifts]
+    ways += [tuple(n for n in shifts if places[n] == place) for place in set(places.values())]
     while len(taken) < _MOST_AXES and (left := [way for way in ways if not set(way) & set(taken)]):
         tried = {way: explained([*taken, *way]) for way in left}
         most = max(gain for gain, _ in tried.values())
@@ -95,15 +91,14 @@ def misplaced(fitted: Fit, campaign: Campaign) -> list[dict[str, Any]]:
             break
         # Of places that say it as well: targets and tools are misplaced before bases, and these before links.
         alike = [way for way in tried if tried[way][0] > most - _AS_WELL]
-        best = min(alike, key=lambda way: (_rank(place_of(way[0])), len(way), -tried[way][0]))
+        best = min(alike, key=lambda way: ({TOOL: 0, BASE: 1}.get(places[way[0]], 2), len(way), -tried[way][0]))
         last, at = tried[best]
         taken += best
-        others.setdefault(place_of(best[0]), set()).update(place_of(way[0]) for way in alike)
+        others.setdefault(places[best[0]], set()).update(places[way[0]] for way in alike)
     found = []
     for place, alternatives in others.items():
-        mine = [n for n in taken if place_of(n) == place]
-        shift = np.zeros(3)
-        shift[["xyz".index(listed[free[n]][1].name[-1]) for n in mine]] = at[mine]
+        mine, shift = [n for n in taken if places[n] == place], np.zeros(3)
+        shift[["xyz".index(listed[n].name[-1]) for n in mine]] = at[mine]
         sizes = float(np.linalg.norm(shift) / usual[mine].max())
         if sizes > _MOST_SIZES:
             facts = {"place": place, "alternatives": sorted(alternatives - {place}), "shift_m": shift.tolist(), "sizes": sizes}
@@ -116,22 +111,15 @@ def point_sentence(campaign: Campaign) -> str:
     end, targets = campaign.robot.chain.end_effector.name, _at_end(campaign)
     if not targets:
         names = ", ".join(f"{target.name} on {target.point}" for target in campaign.targets)
-        return (
-            f"All errors are those of {end}, on which no target was measured ({names}): what lies between is the robot file's."
-        )
-    each = [
-        target.name + (", whose offset was fitted" if target.offset_m is None else f" at {_millimetres(target.offset_m)} of it")
-        for target in targets
-    ]
+        between = "what lies between is the robot file's."
+        return f"All errors are those of {end}, on which no target was measured ({names}): {between}"
+    fitted = ", whose offset was fitted"
+    each = [t.name + (fitted if t.offset_m is None else f" at {_millimetres(t.offset_m)} of it") for t in targets]
     return f"All errors are those of {end}, measured by the target {'; '.join(each)}."
 
 
 def _at_end(campaign: Campaign) -> list[Target]:
     return [target for target in campaign.targets if target.point == campaign.robot.chain.end_effector.name]
-
-
-def _rank(place: str) -> int:
-    return {TOOL: 0, BASE: 1}.get(place, 2)
 
 
 def _millimetres(at: Sequence[float] | np.ndarray) -> str:
@@ -142,15 +130,16 @@ def _sentence(facts: dict[str, Any], campaign: Campaign) -> str:
     shift, place, end = np.array(facts["shift_m"]), facts["place"], campaign.robot.chain.end_effector.name
     largest, whole = np.abs(shift).max(), np.linalg.norm(shift)
     along = f"along {'xyz'[np.argmax(np.abs(shift))]}" if largest > _ALONG * whole else f"by {_millimetres(shift)}"
-    length = f"{1e3 * whole:.1f} mm"
+    length, others = f"{1e3 * whole:.1f} mm", " or ".join(facts["alternatives"])
+    text = (
+        f"{place} ends {length} from where the robot file has it, {along} of its far end: a wrong length, or another variant of"
+    )
+    text += " the robot" + (", or a wrong height of base or pedestal" if place == "link 1" else "")
     if place == TOOL:
-        text = f"reflector or tool sits {length} from where it is declared, {along} of {end}: the flange is not certified, the "
-        text += "reflector is"
+        text = f"reflector or tool sits {length} from where it is declared, {along} of {end}: the flange is not certified, the"
+        text += " reflector is"
     elif place == BASE:
         text = f"the base stands {length} from where it is declared, {along} of the base"
-    else:
-        text = f"{place} ends {length} from where the robot file has it, {along} of its far end: a wrong length, or another "
-        text += "variant of the robot" + (", or a wrong height of base or pedestal" if place == "link 1" else "")
-    if facts["alternatives"]:
-        text += f" (or it is {' or '.join(facts['alternatives'])}: these measurements do not distinguish them)"
+    if others:
+        text += f" (or it is {others}: these measurements do not distinguish them)"
     return f"{text}. It is {facts['sizes']:.0f} times what such a length is usually off"

@@ -1,27 +1,27 @@
 """Posterior over models: extend the best, drop what is not needed, weigh all that were met.
 
 A model is a set of units. From the declared model on, and from each mechanism at all its locations, the best few models met are
-extended by every unit and shrunk by each of theirs: a beam search over the neighbours of shotgun stochastic search [1],
-without its draws and its exchanges. What lies in Occam's window [2] is evaluated in full.
+extended by every unit and shrunk by each of theirs: a beam search over the neighbours of shotgun stochastic search (Hans, Dobra
+and West, JASA 2007). What lies in Occam's window (Madigan and Raftery, JASA 1994) is evaluated in full.
 
-[1] Hans, C., Dobra, A. and West, M., Shotgun stochastic search for "large p" regression, Journal of the American Statistical
-    Association 102, 2007.
-[2] Madigan, D. and Raftery, A. E., Model selection and accounting for model uncertainty in graphical models using Occam's
-    window, Journal of the American Statistical Association 89, 1994.
+Whether anything is missing at all is one Monte Carlo test (`alarm_of`). Its statistic is the log of the average Bayes factor,
+over all units and all whole mechanisms, against "nothing" (Good, The Bayes/non-Bayes compromise, JASA 1992); its null
+distribution that of simulated measurements of the same design at the pose error that fits best, averaged over anew each time: a
+parametric bootstrap (Davison and Hinkley, Bootstrap Methods, 1997, 4.2), without a correction for many tests. Sizes begin a
+step below those of the posterior: what lies between may be seen. Where nothing is missing a Bayes factor exceeds b with a
+probability of at most 1/b (Markov's inequality): where b is far beyond the number of draws, none is made.
 """
 
 from __future__ import annotations
 
 from bisect import bisect
 from collections import Counter
-from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from heapq import nlargest
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from elastocal.diagnosis.evidence import (
     Evaluated,
@@ -32,16 +32,14 @@ from elastocal.diagnosis.evidence import (
     log_likelihood,
     log_sum_exp,
     pose_weights,
-    scale_weights,
 )
-from elastocal.diagnosis.hypotheses import OTHER, Prior
+from elastocal.diagnosis.hypotheses import OTHER, Prior, Unit, prior_of
+from elastocal.diagnosis.statistics import Products, Statistics, null_draws
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Sequence
 
-    from elastocal.diagnosis.hypotheses import Unit
     from elastocal.diagnosis.settings import Settings
-    from elastocal.diagnosis.statistics import Statistics
 
 # Models below the best by more than this, in log odds, hold nothing.
 _NEGLIGIBLE = 9.0
@@ -53,7 +51,10 @@ UNLIKELY, _TELLING_UNITS = -9.0, 10
 # from it by a few units, which over a hundred orders of magnitude do not hang on.
 _OUT_OF_QUESTION = -300.0
 # Steps of the grid of the pose error to either side that measurements simulated with one size can make likely.
-REACH = 2
+_REACH = 2
+# Bayes factor over the number of draws, the measurements' own included, beyond which none is made. The mean of one is that over
+# the prior of the pose error; at the fitted one it is larger by at most the inverse of that one's prior probability.
+_BEYOND_DRAWS = 1e4
 
 
 @dataclass(frozen=True)
@@ -62,13 +63,17 @@ class Problem:
 
     statistics: Statistics
     units: tuple[Unit, ...]
-    prior: Prior
     settings: Settings
+
+    @cached_property
+    def prior(self) -> Prior:
+        """Of all models that the units can form."""
+        return prior_of(self.units, self.settings)
 
     @cached_property
     def grid(self) -> Grid:
         """Sizes of a unit."""
-        return Grid(np.array(self.settings.scales), scale_weights(self.settings))
+        return Grid.of_settings(self.settings)
 
     @property
     def log_pose(self) -> np.ndarray:
@@ -91,18 +96,14 @@ class Problem:
         place = self.statistics.nearest(model.pose_error_rad)
         inner = deviations[:, None] * self.statistics.gram[place][np.ix_(columns, columns)] * deviations + np.eye(len(columns))
         along = deviations * self.statistics.along[place, columns]
-        solved = (
-            cho_solve(cho_factor(inner, lower=True, check_finite=False), along, check_finite=False) if len(along) else along
-        )
-        return columns, deviations * solved, place
+        return columns, deviations * np.linalg.solve(inner, along), place
 
 
 @dataclass(frozen=True)
 class Model:
-    """One set of units with its posterior weight.
+    """One set of units, rising, with its posterior log odds against the declared model alone.
 
-    `units`: rising. `log_odds`: posterior log odds against the declared model alone. `scales` (m,): most probable size of each
-    unit. `pose_error_rad`: most probable size of the error common to the measurements of a pose.
+    `scales` (m,), `pose_error_rad`: most probable sizes of each unit, and of the error common to the measurements of a pose.
     """
 
     units: tuple[int, ...]
@@ -113,10 +114,7 @@ class Model:
 
 @dataclass(frozen=True)
 class Posterior:
-    """Models in the order of their probability.
-
-    `probabilities` (M,): "Nothing" among them.
-    """
+    """Models in the order of their probability. `probabilities` (M,): "Nothing" among them."""
 
     models: tuple[Model, ...]
     probabilities: np.ndarray
@@ -128,59 +126,36 @@ class Posterior:
 
 
 def initial_screening(problem: Problem) -> tuple[Model, np.ndarray]:
-    """The declared model alone, and each unit alone against it.
-
-    Returns `log_bayes_factors` (number of units,).
-    """
+    """The declared model alone, and each unit alone against it. Returns `log_bayes_factors` (number of units,)."""
     met, prior = problem.started.met, problem.prior
     single = [met[(number,)] - prior.log_odds_of([unit]) for number, unit in enumerate(problem.units)]
     return problem.started.measured[()], np.array(single)
 
 
 def posterior(problem: Problem, known: Collection[str] = ()) -> Posterior:
-    """Search the models.
-
-    `known`: keys of the candidates of a good model, from which the search starts, too.
-    """
-    searcher = problem.started.copy()
-    searcher.start_from_whole_mechanisms()
-    searcher.start_from(known)
+    """Search the models. `known`: keys of the candidates of a good model, from which the search starts, too."""
+    searcher, units = _Searcher(problem), problem.units
+    # Each mechanism at all its locations, and the model that is known, each with the best variant at each place.
+    mechanisms = dict.fromkeys(unit.mechanism for unit in units if unit.mechanism != OTHER)
+    starts = [searcher.best_variants(n for n, unit in enumerate(units) if unit.mechanism == name) for name in mechanisms]
+    starts = [start for start in starts if 1 < len(start) <= problem.settings.largest_model]
+    starts.append(searcher.best_variants(n for n, unit in enumerate(units) if unit.candidate and unit.candidate.key in known))
+    for start in filter(None, starts):
+        searcher.measure(start)
     searcher.grow()
     return searcher.weigh()
 
 
 def pose_errors_within_reach(statistics: Statistics, settings: Settings) -> np.ndarray:
-    """Sizes of the pose error up to the largest that "nothing" makes likely: what a model adds leaves no more to it.
+    """Which sizes of the pose error "nothing" makes likely, or smaller, (T,) of bool: what a model adds leaves no more to it.
 
-    And up to `REACH` steps beyond the most likely, for measurements that are simulated with that may look like more.
+    And up to `_REACH` steps beyond the most likely, for measurements that are simulated with that may look like more.
 
-    `statistics`: of the declared model alone. Returns (T,) of bool.
+    `statistics`: of the declared model alone.
     """
-    problem = Problem(statistics, (), Prior({}, {}), settings)
-    weights = evaluate(statistics, [], problem.grid, problem.log_pose, ()).log_pose
-    largest = max(np.flatnonzero(weights > weights.max() + UNLIKELY)[-1], np.argmax(weights) + REACH)
+    weights = Problem(statistics, (), settings).started.empty.log_pose
+    largest = max(np.flatnonzero(weights > weights.max() + UNLIKELY)[-1], np.argmax(weights) + _REACH)
     return np.arange(len(weights)) <= largest
-
-
-def likely_pose_errors(statistics: Statistics, units: Sequence[Unit], settings: Settings) -> np.ndarray:
-    """Sizes of the pose error that "nothing" or some good single unit makes likely; zero, to which Gram matrices refer, always.
-
-    `statistics`: of zero first. Returns (T,) of bool.
-    """
-    problem = Problem(statistics, tuple(units), Prior({}, {}), settings)
-    conditioned = condition(statistics, np.zeros(0, int), np.zeros(0), problem.log_pose)
-    found = added_evidence(conditioned, units, range(len(units)), problem.grid, statistics.freedom)
-    empty = evaluate(statistics, [], problem.grid, problem.log_pose, ())
-    likely = _likely(found, log_sum_exp(log_sum_exp(found, axis=0), axis=1), empty)
-    likely[0] = True
-    return likely
-
-
-def _likely(by_pose_error: np.ndarray, total: np.ndarray, empty: Evaluated) -> np.ndarray:
-    good = np.argsort(-total)[:_TELLING_UNITS]
-    weights = log_sum_exp(by_pose_error[:, good], axis=2)
-    weights = np.column_stack([weights - log_sum_exp(weights, axis=0), empty.log_pose])
-    return np.any(weights > UNLIKELY, axis=1)
 
 
 class _Searcher:
@@ -188,8 +163,7 @@ class _Searcher:
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        self.statistics, self.log_pose = problem.statistics, problem.log_pose
-        self.grid = problem.grid
+        self.statistics, self.log_pose, self.grid = problem.statistics, problem.log_pose, problem.grid
         self.empty = self.evaluated((), ())
         self.met: dict[tuple[int, ...], float] = {(): 0.0}
         self.sizes: dict[tuple[int, ...], np.ndarray] = {(): self.empty.scales}
@@ -198,20 +172,13 @@ class _Searcher:
         self.extend(())
         self.measure(())
 
-    def copy(self) -> _Searcher:
-        """The same, which goes its own way from here."""
-        other = copy(self)
-        other.met, other.sizes, other.measured = self.met.copy(), self.sizes.copy(), self.measured.copy()
-        other.extended = self.extended.copy()
-        return other
-
     def evaluated(self, model: tuple[int, ...], start: Iterable[float]) -> Evaluated:
         """Evidence of a model in full."""
         return evaluate(self.statistics, [self.problem.units[n] for n in model], self.grid, self.log_pose, start)
 
     def extend(self, model: tuple[int, ...]) -> None:
         """Meet a model with each single unit added."""
-        if model in self.extended or len(model) >= self.problem.settings.largest_model:
+        if len(model) >= self.problem.settings.largest_model:
             return
         self.extended.add(model)
         units = self.problem.units
@@ -228,7 +195,9 @@ class _Searcher:
         alone = log_sum_exp(conditioned.log_occam + log_likelihood(conditioned.squares, self.statistics.freedom))
         if not model:
             # Without the sizes of the pose error that neither "nothing" nor any good single unit makes likely.
-            self.keep_pose_errors(np.flatnonzero(_likely(by_pose_error, total, self.empty)))
+            weights = log_sum_exp(by_pose_error[:, np.argsort(-total)[:_TELLING_UNITS]], axis=2)
+            weights = np.column_stack([weights - log_sum_exp(weights, axis=0), self.empty.log_pose])
+            self.keep_pose_errors(np.flatnonzero((weights > UNLIKELY).any(axis=1)))
             self.empty = self.evaluated((), self.empty.scales)
         prior, here = self.problem.prior, self.met[model]
         mechanisms = Counter(units[n].mechanism for n in model)
@@ -264,21 +233,6 @@ class _Searcher:
                 self.met[smaller] = left + whole - prior.added(units[number], counts[units[number].mechanism] - 1)
                 self.sizes[smaller] = np.delete(found.scales, place)
         return self.measured[model]
-
-    def start_from_whole_mechanisms(self) -> None:
-        """Meet each mechanism at all its locations, with the best variant at each."""
-        units = self.problem.units
-        for mechanism in dict.fromkeys(unit.mechanism for unit in units if unit.mechanism != OTHER):
-            whole = self.best_variants(number for number, unit in enumerate(units) if unit.mechanism == mechanism)
-            if 1 < len(whole) <= self.problem.settings.largest_model:
-                self.measure(whole)
-
-    def start_from(self, known: Collection[str]) -> None:
-        """Meet the model of some candidates, each with the best of its shapes."""
-        units = enumerate(self.problem.units)
-        model = self.best_variants(number for number, unit in units if unit.candidate and unit.candidate.key in known)
-        if model:
-            self.measure(model)
 
     def best_variants(self, numbers: Iterable[int]) -> tuple[int, ...]:
         """Of some units the best at each place, rising."""
@@ -322,3 +276,72 @@ class _Searcher:
         models.sort(key=lambda model: -model.log_odds)
         odds = np.array([model.log_odds for model in models])
         return Posterior(tuple(models), np.exp(odds - log_sum_exp(odds)))
+
+
+@dataclass(frozen=True)
+class Alarm:
+    """Outcome of the test; `statistic`: log of the average Bayes factor against "nothing"."""
+
+    p_value: float
+    statistic: float
+    raised: bool
+
+
+def alarm_of(problem: Problem, products: Products, pose_error_rad: float, stream: np.random.Generator) -> Alarm:
+    """Test whether the declared model lacks anything.
+
+    `pose_error_rad`: pose error of the declared model at which measurements are simulated.
+    """
+    settings, statistics = problem.settings, problem.statistics
+    # Sizes that draws of the fitted one can make likely: its own, and some to either side.
+    place = statistics.nearest(pose_error_rad)
+    chosen = slice(max(place - _REACH, 0), place + _REACH + 1)
+    statistics, log_pose = statistics.at(chosen), problem.log_pose[chosen]
+    own = statistics.along[..., None], statistics.squares[:, None]
+    statistic = float(_average_bayes_factors(problem, statistics, log_pose, *own)[0])
+    reached = 0
+    if statistic <= np.log(_BEYOND_DRAWS * (1 + settings.alarm_draws)):
+        drawn = null_draws(products, pose_error_rad, statistics.pose_error_rad, settings.alarm_draws, stream)
+        reached = int((_average_bayes_factors(problem, statistics, log_pose, *drawn) >= statistic).sum())
+    p_value = (1 + reached) / (1 + settings.alarm_draws)
+    return Alarm(p_value, statistic, p_value <= settings.alarm_level)
+
+
+def _average_bayes_factors(
+    problem: Problem, statistics: Statistics, log_pose: np.ndarray, along: np.ndarray, squares: np.ndarray
+) -> np.ndarray:
+    """Log of the average Bayes factor for N sets of measurements, ndarray (N,). `along` (T, K, N), `squares` (T, N)."""
+    grid, given_nothing = problem.grid, condition(statistics, np.zeros(0, int), np.zeros(0), log_pose)
+    start = given_nothing.log_occam[:, None]
+    nothing = log_sum_exp(start + log_likelihood(squares, statistics.freedom), axis=0)
+    tested, log_priors = _alternatives(problem)
+    total = np.full(len(nothing), -np.inf)
+    for members, values, vectors, columns in given_nothing.blocks_of(tested, range(len(tested))):
+        for place, number in enumerate(members):
+            turned = (vectors[:, place].transpose(0, 2, 1) @ along[:, columns[place]]) ** 2
+            unit = tested[number]
+            first = max(unit.smallest - 1, 0)
+            variances = grid.scales[first:, None] ** 2
+            weights = grid.between(first, unit.largest)[first:]
+            widened = 1.0 + variances * values[:, None, place]
+            left = squares[:, None] - (variances / widened) @ turned
+            known = weights + start - 0.5 * np.log(widened).sum(axis=2)
+            terms = log_likelihood(left, statistics.freedom) + known[..., None]
+            total = np.logaddexp(total, log_priors[number] + log_sum_exp(terms, axis=(0, 1)))
+    return total - nothing
+
+
+def _alternatives(problem: Problem) -> tuple[list[Unit], list[float]]:
+    """Every unit, and every mechanism with one law at all its locations in one size; with their log prior odds."""
+    prior = problem.prior
+    alternatives, log_priors = list(problem.units), [prior.log_odds_of([unit]) for unit in problem.units]
+    laws: dict[tuple[str, str, tuple[float, ...]], list[Unit]] = {}
+    for unit in problem.units:
+        if unit.candidate:
+            laws.setdefault((unit.mechanism, unit.candidate.detail, unit.shapes), []).append(unit)
+    for units in laws.values():
+        if len({unit.location for unit in units}) == len(units) > 1:
+            columns, smallest = np.concatenate([unit.columns for unit in units]), min(unit.smallest for unit in units)
+            alternatives.append(replace(units[0], columns=columns, smallest=smallest))
+            log_priors.append(prior.log_odds_of(units) - (len(units) - 1) * units[0].log_prior)
+    return alternatives, log_priors

@@ -2,17 +2,13 @@
 
 Measurements y = X beta + W gamma + e, with X the declared model's sensitivities and W those of all candidates, both whitened by
 the noise of the measurements. The measurements of a pose may have an error in common as well: that of the joints when the pose
-was taken, of variance tau^2 I, seen through the Jacobian. By the matrix inversion lemma (Woodbury's identity [1])
+was taken, of variance tau^2 I, seen through the Jacobian. By the matrix inversion lemma (Hager, SIAM Review 1989)
 
     Z' Sigma(tau)^-1 Z = Z'Z - sum over poses B_p' (I / tau^2 + C_p)^-1 B_p,   B_p = J_p' Z_p,   C_p = J_p' J_p,   Z = [X W y],
 
 so that one pass over the poses serves every tau. Columns are first made orthogonal to X by a QR decomposition of the scaled
 rows: the condition number of X is not squared. Marginalising beta gives W'MW, W'My, y'My with M = Sigma^-1 - Sigma^-1 X
-(X'Sigma^-1 X)^-1 X'Sigma^-1 and the determinants of restricted maximum likelihood (REML [2]).
-
-[1] Hager, W. W., Updating the inverse of a matrix, SIAM Review 31, 1989.
-[2] Harville, D. A., Maximum likelihood approaches to variance component estimation and to related problems, Journal of the
-    American Statistical Association 72, 1977.
+(X'Sigma^-1 X)^-1 X'Sigma^-1 and the determinants of restricted maximum likelihood (REML; Harville, JASA 1977).
 """
 
 from __future__ import annotations
@@ -21,7 +17,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.linalg import blas, solve_triangular
+from scipy.linalg import solve_triangular
 
 from elastocal.fitting.observations import groups_by_size
 
@@ -32,8 +28,6 @@ if TYPE_CHECKING:
 
 # Products of one pose with all columns that are in memory at once.
 _AT_ONCE = 1_000_000
-# Rows that are mirrored at once, which stay in the processor's cache.
-_MIRRORED = 64
 # Of a square from which another one was taken, less than this share is rounding.
 _INSIDE = 1e-12
 
@@ -65,11 +59,10 @@ class WhiteRows:
 class Products:
     """What `statistics_of` makes `Statistics` of, at any size of the pose error, and `null_draws` simulated ones.
 
-    `rows`: of which they are. `beside` (M, rows, P + 1): their declared columns made orthonormal, and the residual. `declared`:
-    P. `gram` (P + K + 1, P + K + 1): Z'Z of Z = [X W y], with the rows of the declared parameters' priors. `freedom`: numbers
-    measured less what the declared model fits. `into_basis` (P, P): turns declared columns into orthonormal ones. `projected`
-    (P, K + 1): what these have in the candidates' columns and the residual. `inside` (K,) of bool: columns of which these leave
-    nothing. `met`: by the sizes of the pose error of which there are statistics, what leads back to the normal equations.
+    `beside` (M, rows, P + 1): declared columns of the rows made orthonormal, and the residual. `declared`: P. `gram` (P + K + 1
+    square): Z'Z of Z = [X W y], with the priors' rows. `freedom`: numbers measured less what the declared model fits.
+    `into_basis` (P, P): turns declared columns into orthonormal ones. `projected` (P, K + 1): what these have in the others.
+    `inside` (K,) of bool: columns of which these leave nothing. `met`: by sizes of the pose error, factors of what is left.
     """
 
     rows: WhiteRows
@@ -80,20 +73,15 @@ class Products:
     into_basis: np.ndarray
     projected: np.ndarray
     inside: np.ndarray
-    met: dict[float, tuple[np.ndarray, np.ndarray, np.ndarray, float]] = field(default_factory=dict, repr=False)
+    met: dict[float, tuple[np.ndarray, np.ndarray, np.ndarray]] = field(default_factory=dict, repr=False)
 
     @property
     def without_candidates(self) -> Products:
         """Of the declared model alone."""
-        kept = np.append(np.arange(self.declared), self.gram.shape[0] - 1)
+        kept = np.append(np.arange(self.declared), -1)
         rows = replace(self.rows, candidates=self.rows.candidates.of_columns(np.zeros(len(self.inside), bool)))
-        few: dict[str, Any] = {
-            "met": {},
-            "gram": self.gram[np.ix_(kept, kept)],
-            "projected": self.projected[:, -1:],
-            "inside": self.inside[:0],
-        }
-        return replace(self, rows=rows, **few)
+        some: dict[str, Any] = {"gram": self.gram[np.ix_(kept, kept)], "projected": self.projected[:, -1:]}
+        return replace(self, rows=rows, inside=self.inside[:0], met={}, **some)
 
     @property
     def without_rows(self) -> Products:
@@ -135,9 +123,8 @@ def products_of(rows: WhiteRows, prior_std: np.ndarray, present: np.ndarray) -> 
 
     The declared columns are made orthonormal by QR of the scaled rows, so that no condition number is squared; what candidates
     have in them is taken off their products by Pythagoras' theorem, which costs 1e-16 of the square of a candidate: nothing
-    beside noise of one. What the declared model fits are its effective degrees of freedom, the trace of its hat matrix [1].
-
-    [1] Hastie, T. J. and Tibshirani, R. J., Generalized Additive Models, Chapman and Hall, 1990.
+    beside noise of one. What the declared model fits are its effective degrees of freedom, the trace of its hat matrix (Hastie
+    and Tibshirani, Generalized Additive Models, 1990).
     """
     observed, components, count = rows.declared.shape
     declared = rows.declared.reshape(observed * components, count)
@@ -161,16 +148,6 @@ def products_of(rows: WhiteRows, prior_std: np.ndarray, present: np.ndarray) -> 
     freedom = max(round(len(declared) - (seen**2).sum()), 1)
     into_basis = np.linalg.inv(triangle) / norms[:, None]
     return Products(rows, beside, count, gram, freedom, into_basis, projected, inside)
-
-
-def rows_alike(products: Products, declared: np.ndarray, candidates: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Whitened rows at other states in the parameters of some products.
-
-    `declared` (..., P). `candidates` (..., U): sensitivities to some of the candidates, in units of their plausible sizes.
-    `columns` (U,) of int: which of them. Returns (..., P + U).
-    """
-    basis = declared @ products.into_basis
-    return np.concatenate([basis, candidates - basis @ products.projected[:, columns]], axis=-1)
 
 
 @dataclass(frozen=True)
@@ -212,51 +189,35 @@ def statistics_of(products: Products, pose_error_rad: np.ndarray) -> Statistics:
             tau = sizes[number]
             taken = (rows * (tau / np.sqrt(1.0 + tau**2 * values))[..., None]).reshape(-1, rows.shape[2])
             above[number] -= taken[:, :count].T @ taken
-            _less_squares(rest[number], taken[:, count:])
+            beside = np.ascontiguousarray(taken[:, count:])
+            rest[number] -= beside.T @ beside
             log_dets[number] += np.log1p(tau**2 * values).sum()
     factors = np.linalg.cholesky(above[:, :, :count])
-    for tau, total, factor, beside, log_det in zip(sizes, rest, factors, above[:, :, count:], log_dets, strict=True):
+    for tau, total, factor, beside in zip(sizes, rest, factors, above[:, :, count:], strict=True):
         taken = solve_triangular(factor, beside, lower=True) if tau else beside
         if tau:
-            _less_squares(total, taken)
-            mirror(total)
-        products.met[float(tau)] = factor, taken, total, float(log_det)
+            total -= taken.T @ taken
+        products.met[float(tau)] = factor, taken, total
     logs = -0.5 * log_dets - np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
     return Statistics(sizes, rest[:, :-1, :-1], rest[:, :-1, -1], rest[:, -1, -1], logs, products.freedom)
 
 
-def normal_equations(products: Products, tau: float) -> tuple[np.ndarray, float]:
-    """Z'Sigma(tau)^-1 Z, (P + K + 1, P + K + 1), and ln |Sigma| beyond that of white noise."""
+def normal_equations(products: Products, tau: float) -> np.ndarray:
+    """Z'Sigma(tau)^-1 Z, ndarray (P + K + 1, P + K + 1)."""
     if tau not in products.met:
         statistics_of(products, np.array([tau]))
-    factor, taken, rest, log_det = products.met[tau]
+    factor, taken, rest = products.met[tau]
     across = factor @ taken
-    return np.block([[factor @ factor.T, across], [across.T, rest + taken.T @ taken]]), log_det
-
-
-def _less_squares(matrix: np.ndarray, rows: np.ndarray) -> None:
-    """Take the products of some rows' columns off the lower triangle of a symmetric matrix, in place."""
-    blas.dsyrk(-1.0, np.ascontiguousarray(rows).T, 1.0, matrix.T, overwrite_c=True)
-
-
-def mirror(matrix: np.ndarray) -> None:
-    """Copy the lower triangle of a square matrix to the upper one, in place, a few rows at a time."""
-    for start in range(0, len(matrix), _MIRRORED):
-        part = slice(start, start + _MIRRORED)
-        matrix[part, part] = np.tril(matrix[part, part]) + np.tril(matrix[part, part], -1).T
-        matrix[part, start + _MIRRORED :] = matrix[start + _MIRRORED :, part].T
+    return np.block([[factor @ factor.T, across], [across.T, rest + taken.T @ taken]])
 
 
 def null_draws(
     products: Products, tau: float, pose_error_rad: np.ndarray, count: int, stream: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Statistics of simulated measurements of the declared model, in which nothing is missing: a parametric bootstrap [1].
+    """Statistics of simulated measurements of the declared model, in which nothing is missing: a parametric bootstrap.
 
     `tau`: pose error with which to simulate, rad. `pose_error_rad` (T,): at which the statistics are wanted. Returns `along`
     (T, K, N); `squares` (T, N): as in `Statistics`, for N draws of unit variance.
-
-    [1] Davison, A. C. and Hinkley, D. V., Bootstrap Methods and their Application, section 4.2, Cambridge University Press,
-        1997.
     """
     rows, declared = products.rows, products.declared
     joints, sizes = rows.jacobian.shape[2], np.asarray(pose_error_rad)

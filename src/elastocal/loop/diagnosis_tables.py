@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.diagnosis.diagnose import Diagnosis, Step, diagnose
-from elastocal.diagnosis.next_experiment import facts_of, propose, table_of
+from elastocal.diagnosis.next_experiment import propose
 from elastocal.diagnosis.search import initial_screening
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.case import case_from, noise_facts, noise_from
@@ -37,15 +37,16 @@ if TYPE_CHECKING:
 def diagnose_campaign(job: Any) -> None:
     """The step of a rule: what the training poses say, and the next experiment."""
     # Who reads the tables of a diagnosis starts without pandas.
+    import pandas as pd
+
     from elastocal.io.data_frames import write_csv
 
     case = load_case(job.input.descriptions, job.input.training)
     name, seed = job.wildcards.campaign, job.params.seed
     found = diagnose(case, Settings(), seed, lambda line: print(f"{name}: {line}", file=sys.stderr, flush=True))
-    robot, draws = case.campaign.robot, stream(seed, case.campaign.name, "next experiment", 0)
-    proposal = propose(found, robot.joint_limits, Settings(), draws, job.params.states)
-    write_csv(job.output.experiment, table_of(proposal, robot))
-    found = replace(found, document=found.document | {"next_experiment": facts_of(proposal)})
+    columns, facts = propose(found, stream(seed, case.campaign.name, "next experiment", 0), job.params.states)
+    write_csv(job.output.experiment, pd.DataFrame(columns))
+    found = replace(found, document=found.document | {"next_experiment": facts})
     write_json(job.output.diagnosis, diagnosis_facts(found))
     origin = provenance(job.params, **job.wildcards)
     write_table(job.output.steps, STEPS, step_blocks(found), origin)

@@ -16,12 +16,11 @@ from elastocal.application.accuracy import calibrate_on_case, campaign_accuracy
 from elastocal.campaigns.campaign import columns_of
 from elastocal.data_checks.protocol import faults
 from elastocal.data_checks.warnings import controller_warnings
-from elastocal.diagnosis.gross_errors import entries_of, gross_errors, warnings_of
-from elastocal.diagnosis.kept_rows import first_kept
+from elastocal.diagnosis.gross_errors import Kept, entries_of, first_kept, gross_errors, warnings_of
 from elastocal.diagnosis.linearize import linearized
 from elastocal.diagnosis.misplaced import misplaced
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.case import case_from
+from elastocal.fitting.case import Case, case_from
 from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.tolerances import effective_parameters
@@ -32,8 +31,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from elastocal.campaigns.campaign import Campaign
-    from elastocal.diagnosis.kept_rows import Kept
-    from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
 
 # Held-out poses of which a 95 % interval of an RMS is wider than a factor of two.

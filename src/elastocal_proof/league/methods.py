@@ -9,8 +9,8 @@ import numpy as np
 
 from elastocal.campaigns.campaign import columns_of, measurements_from
 from elastocal.campaigns.holdout import blocks_of_poses, configurations, measured_poses
-from elastocal.diagnosis.averaging import squares_explained
 from elastocal.diagnosis.diagnose import diagnose
+from elastocal.diagnosis.refit import squares_explained
 from elastocal.diagnosis.settings import Settings
 from elastocal.errors import InputError
 from elastocal.fitting.case import Case, case_from
