@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support import ODD_CHAINS, OTHER_CHAINS, PARALLELOGRAM, TRACK, chain_of, homogeneous, random_angles
+from support import ODD_CHAINS, OTHER_CHAINS, TRACK, chain_of, homogeneous, random_angles
 
 from elastocal.mechanics.kinematics import poses, poses_and_jacobians
 from elastocal.mechanics.robot import Mass
@@ -98,14 +98,10 @@ def test_carried_links_are_those_whose_weight_can_turn_the_joint(name, chain_cal
     assert sites.shoulder == next(joint for joint, links in enumerate(expected) if links)
 
 
-def test_sites_of_a_robot_on_a_track_and_of_one_with_a_parallelogram():
+def test_sites_of_a_robot_on_a_track():
     sites = sites_of(chain_of(TRACK))
     assert sites.prismatic == (True, False, False, False) and sites.joint_signs == (-1.0, 1.0, 1.0, 1.0)
     np.testing.assert_allclose(sites.link_vectors_m[:3], [(0, 0, 0.3), (0, 0, 0.5), (0.3, 0, 0)], atol=1e-16)
-    sites = sites_of(chain_of(PARALLELOGRAM))
-    assert (sites.joints, len(sites.tilt), len(sites.link_end)) == (4, 4, 5)
-    # A link ends where a passive joint turns.
-    np.testing.assert_allclose(sites.link_vectors_m[2:4], [(0, 0, 0.8), (0.9, 0, 0)], atol=1e-16)
 
 
 def test_the_longest_torque_of_a_weight_is_that_of_a_level_arm_with_the_mass_in_the_middle_of_its_link(kuka):

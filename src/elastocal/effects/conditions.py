@@ -116,29 +116,21 @@ class Conditions:
         on_each = self._falling[0] * (behind @ masses)[:, None]
         for i in range(3):
             on_each += self._falling[1][i] * (behind @ first[:, i])
-        return self.motion.by_coordinate(on_each).T
+        return on_each.T
 
-    def gravity_of_corrections(self, coordinates: Sequence[int]) -> Iterator[np.ndarray]:
-        """By how much `gravity` on some coordinates, in rising order, grows with each of the `mass_corrections`, per unit.
+    def gravity_of_corrections(self, coordinates: Sequence[int] | np.ndarray) -> Iterator[np.ndarray]:
+        """By how much `gravity` on some coordinates grows with each of the `mass_corrections`, per unit.
 
         Yields (number of the coordinates, S).
         """
-        moved = self.motion
-        chosen = np.flatnonzero(np.isin(moved.coordinate, coordinates))
-        place, row = moved.place[chosen], np.searchsorted(coordinates, moved.coordinate[chosen])
-        falling, turning = self._falling[0][chosen], [each[chosen] for each in self._falling[1]]
         for number in range(len(self.mass_corrections)):
-            after, first_moment, mass = self._correction(number)
-            on_each = sum(turning[i] * first_moment[i] for i in range(3))
-            if mass:
-                on_each += mass * falling
-            on_each[place >= after] = 0.0
-            if len(chosen) == len(coordinates):
-                yield on_each
+            body, kind = divmod(number, MASS_PARAMETERS)
+            rotation, after = self._body_rotation[body], self.sites.followed[self.sites.joints + 2 + body].after
+            if kind:
+                yield self._weighing(coordinates, after, rotation[:, kind - 1], 0.0)
             else:
-                on_coordinates = np.zeros((len(coordinates), on_each.shape[1]))
-                np.add.at(on_coordinates, row, on_each)
-                yield on_coordinates
+                centre = np.tensordot(self.sites.masses[body].centre_m, rotation, (0, 1))
+                yield self._weighing(coordinates, after, self._body_position[body] + centre)
 
     @cached_property
     def total(self) -> np.ndarray:
@@ -150,45 +142,30 @@ class Conditions:
     @cached_property
     def mass_torques(self) -> np.ndarray:
         """Torque on each joint per unit of each of the `mass_corrections`, ndarray (4 m, S, n)."""
-        moved, bodies, centres = self.motion, self._body_rotation, np.array([mass.centre_m for mass in self.sites.masses])
-        chosen = slice(np.searchsorted(moved.coordinate, self.sites.joints))
-        falling, turning = self._falling
-        first = np.empty((len(bodies), MASS_PARAMETERS, *bodies.shape[1:2], bodies.shape[-1]))
-        first[:, 1:] = bodies.swapaxes(1, 2)
-        first[:, 0] = self._body_position + (bodies * centres[:, None, :, None]).sum(axis=2)
-        on_each = turning[0][chosen] * first[:, :, 0, None]
-        for i in (1, 2):
-            on_each += turning[i][chosen] * first[:, :, i, None]
-        on_each[:, 0] += falling[chosen]
-        on_each *= self._behind[chosen].T[:, None, :, None]
-        found = moved.by_coordinate(on_each)
-        return found.reshape(-1, *found.shape[2:]).swapaxes(1, 2)
+        return np.array(list(self.gravity_of_corrections(range(self.sites.joints)))).swapaxes(1, 2)
 
     @cached_property
     def weight(self) -> np.ndarray:
         """Torque on each joint of one kilogram at the far end of each link, ndarray (n + 1, S, n)."""
         ends = enumerate(self.sites.followed[1 : self.sites.joints + 2], 1)
-        return np.array([self._weighing(end.after, self.motion.position[number]) for number, end in ends])
+        return np.array([self._on_joints(end.after, self.motion.position[number], 1.0) for number, end in ends])
 
     def weight_moment(self, link: int, axis: int) -> np.ndarray:
         """Torque on each joint of a first moment of one kg m along an axis of the frame at the far end of a link, (S, n)."""
-        return self._weighing(self.sites.followed[1 + link].after, self.motion.rotation[1 + link][:, axis], 0.0)
+        return self._on_joints(self.sites.followed[1 + link].after, self.motion.rotation[1 + link][:, axis], 0.0)
 
-    def _correction(self, number: int) -> tuple[int, np.ndarray, float]:
-        """Of what one of the `mass_corrections` adds: how many transforms come before it, its first moment (3, S), its mass."""
-        body, kind = divmod(number, MASS_PARAMETERS)
-        rotation, after = self._body_rotation[body], self.sites.followed[self.sites.joints + 2 + body].after
-        if kind:
-            return after, rotation[:, kind - 1], 0.0
-        return after, self._body_position[body] + np.tensordot(self.sites.masses[body].centre_m, rotation, (0, 1)), 1.0
+    def _on_joints(self, after: int, first_moment: np.ndarray, mass: float) -> np.ndarray:
+        return self._weighing(range(self.sites.joints), after, first_moment, mass).T
 
-    def _weighing(self, after: int, first_moment: np.ndarray, mass: float = 1.0) -> np.ndarray:
-        """Torque on each joint of a mass and its first moment (3, S) behind so many transforms, ndarray (S, n)."""
-        moved = self.motion
-        chosen = slice(np.searchsorted(moved.coordinate, self.sites.joints))
+    def _weighing(
+        self, coordinates: Sequence[int] | np.ndarray, after: int, first_moment: np.ndarray, mass: float = 1.0
+    ) -> np.ndarray:
+        """Force on some coordinates of a mass and its first moment (3, S) behind so many transforms, ndarray (., S)."""
+        chosen = slice(coordinates.start, coordinates.stop) if isinstance(coordinates, range) else coordinates
         falling, turning = self._falling
-        on_each = mass * falling[chosen] + sum(turning[i][chosen] * first_moment[i] for i in range(3))
-        return moved.by_coordinate(on_each * (moved.place[chosen] < after)[:, None]).T
+        on_each = sum(turning[i][chosen] * first_moment[i] for i in range(3)) + mass * falling[chosen]
+        on_each[self.motion.place[chosen] >= after] = 0.0
+        return on_each
 
     @cached_property
     def end_rotation(self) -> np.ndarray:

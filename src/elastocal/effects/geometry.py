@@ -112,8 +112,7 @@ def tracker_scale(own: Effect, sites: Sites) -> Candidates:
 
     p' = (1 + s) p about the tracker, with p a position (m) and s the scale error (m/m) [1]. Scaled about the base positions
     differ from that by a shift of the frame, which is fitted where it is unknown; and a robot whose positions are all scaled
-    about its base is one whose column, links and travels along a track are longer by that share. What lies behind a passive
-    joint is no link and is left out.
+    about its base is one whose column, links and travels along a track are longer by that share.
 
     [1] B. Muralikrishnan, S. Phillips and D. Sawyer, Laser trackers for large-scale dimensional metrology: a review, Precision
         Engineering 44, 2016.

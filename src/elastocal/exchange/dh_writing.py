@@ -31,7 +31,7 @@ def dh_table(robot: Robot, nominal: Robot | None = None) -> pd.DataFrame:
     """Rows as `elastocal import dh` reads them: ``Ty(b) Ry(beta)`` becomes a fixed row of its own.
 
     `nominal`: by which each pair of axes is described, see `dh_deltas`; the robot itself without. Returns of the angles that
-    the controller reports, where for both it counts each joint by itself. Raises `InputError`: prismatic or passive joints.
+    the controller reports, where for both it counts each joint by itself. Raises `InputError`: prismatic joints.
     """
     rows: list[dict[str, Any]] = []
     turned, like = 0.0, nominal or robot
@@ -93,8 +93,8 @@ def _describe(robot: Robot, kinds: Sequence[_Kind] | None, own: bool) -> tuple[n
 def _axes(robot: Robot, own: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Points on and directions of the joint axes and of the end effector's z axis, and its frame, where nothing is turned."""
     chain = robot.chain
-    if any(chain.prismatic) or any(chain.is_passive(place) for place in range(len(chain.transforms))):
-        raise InputError(robot.name, "chain", "prismatic or passive joints", "a chain of revolute joints, for a DH table")
+    if any(chain.prismatic):
+        raise InputError(robot.name, "chain", "prismatic joints", "a chain of revolute joints, for a DH table")
     sense = np.diag(robot.reported_matrix) if own else np.ones(robot.joints)
     zero = robot.reported_offset if own else np.zeros(robot.joints)
     here, points, directions = np.eye(4), [], []

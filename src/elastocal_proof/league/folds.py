@@ -16,7 +16,7 @@ from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_table, write_table
 from elastocal.loop.loading import load_whole_campaign
 from elastocal.loop.schemas import measurements
-from elastocal.mechanics.robot_file import joint_count
+from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.random_streams import stream
 from elastocal_proof.league.schemas import FOLDS
 
@@ -51,7 +51,7 @@ class DataSet:
 def load_data_set(descriptions_path: str | Path, measurements_path: str | Path, folds_path: str | Path) -> DataSet:
     """Read a data set from files as `deal_league_folds` wrote them."""
     descriptions = read_json(descriptions_path)
-    joints = joint_count(descriptions["robot"], descriptions["source"])
+    joints = robot_from_document(descriptions["robot"], descriptions["source"]).joints
     return DataSet(descriptions, read_table(measurements_path, measurements(joints)), read_table(folds_path, FOLDS))
 
 
