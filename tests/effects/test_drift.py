@@ -1,8 +1,9 @@
-"""A set-up that was moved, beyond its closed form: it is found."""
+"""A set-up that was moved is found; by how much a robot is warmer."""
 
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from synthetic import NOISE, candidate_on, made_estimate, made_model, made_states, seen_exactly, with_noise
 
 from elastocal.fitting.least_squares import fit
@@ -32,3 +33,12 @@ def test_moved_setup_is_found_without_a_clock(fanuc):
             assert abs(found.estimate.coefficients[0][0] - 3e-4) < 4 * deviation < 1e-4
     best = candidate.shapes[0].values(3)[int(np.argmin(misfit))]
     assert abs(best - WHEN) < SPACING / 2 and np.median(misfit) > min(misfit) + 100
+
+
+@pytest.mark.parametrize("effect", ["thermal_growth", "temperature_gradient"])
+def test_each_cause_needs_its_covariate_and_only_the_time_has_a_lag(effect, fanuc):
+    where = {"thermal_growth": "[{}]", "temperature_gradient": "@2[{}]"}[effect]
+    by_temperature, by_time = (candidate_on(fanuc.chain, effect + where.format(cause)) for cause in ("temperature", "time"))
+    assert (by_temperature.needs, by_time.needs, by_temperature.shapes) == ({"temperature"}, {"time"}, ())
+    (lag,) = by_time.shapes
+    assert lag.unit == "s" and lag.lowest == 15 * 60 and lag.highest == 10 * 3600 and lag.start == 3600
