@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_campaigns import POINTS, Plan, made, with_measured
-from scipy.spatial.transform import Rotation
 from support import PinocchioPoint
 
 from elastocal.data_checks.placement import placed, robust_sigma, robustly_placed, spread
@@ -51,29 +50,6 @@ def test_one_measurement_in_four_far_off_moves_the_robust_fit_by_nothing_and_the
     np.testing.assert_allclose(robust.distance[far], 0.3, rtol=1e-6)
     np.testing.assert_allclose(robust.distance[~far], 0.0, atol=1e-6)
     assert placed(campaign).distance[~far].min() > 0.01
-
-
-def test_every_target_is_placed_by_measurements_of_its_own_however_widely_they_scatter(fanuc):
-    campaign = made(fanuc, 1, replace(EXACT, tracker=True, poses=16))
-    seen, rng = campaign.measurements, np.random.default_rng(3)
-    wide = seen.target == 2
-    position = seen.position + np.where(wide[:, None], 0.02, 1e-5) * rng.standard_normal(seen.position.shape)
-    found = robustly_placed(with_measured(campaign, position=position))
-    # Half of normal vectors are shorter than 1.54 standard deviations.
-    assert np.median(found.distance[wide]) < 2 * 0.02
-
-
-def test_each_session_of_a_tracker_has_a_frame_of_its_own(fanuc):
-    campaign = made(fanuc, 1, replace(EXACT, tracker=True, poses=20))
-    seen = campaign.measurements
-    later, turn = seen.pose >= 10, Rotation.from_rotvec([0.3, -0.4, 0.5])
-    position = np.where(later[:, None], turn.apply(seen.position) + np.array([1.0, 2.0, 3.0]), seen.position)
-    vectors = np.where(later[:, None], (turn * Rotation.from_rotvec(seen.rotation_vector)).as_rotvec(), seen.rotation_vector)
-    both = with_measured(campaign, session=later.astype(np.int32), position=position, rotation_vector=vectors)
-    for place in (placed, robustly_placed):
-        found = place(both)
-        assert found.estimate.sessions == (0, 1)
-        np.testing.assert_allclose(found.distance, 0.0, atol=1e-8)
 
 
 @pytest.mark.parametrize(("wanted", "poses"), [(4, [0, 4, 7, 11]), (2, [0, 11]), (50, list(range(12)))])

@@ -6,23 +6,15 @@ import numpy as np
 import pytest
 from support import chain_of
 from synthetic import (
-    NOISE,
     candidate_on,
     conditions_on,
     displacements,
     equipped,
-    made_estimate,
-    made_model,
     made_states,
-    seen_exactly,
-    with_noise,
 )
 
-from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
-from elastocal.effects.protocol import LOADED_JOINTS
 from elastocal.effects.transmission import transmission_harmonic
-from elastocal.fitting.least_squares import fit
 from elastocal.mechanics.sites import sites_of
 
 
@@ -39,16 +31,6 @@ def test_order_may_lie_anywhere_between_two_integers_and_away_from_both(fanuc):
     made = displacements(bands[1], around, 2.7)
     angle = states.joint_angles[:, 2]
     np.testing.assert_allclose(made[:, :, 2], [wave(k * angle) for k in (2.7, 5.4) for wave in (np.cos, np.sin)], rtol=1e-13)
-
-
-def test_order_between_integers_is_fitted_where_it_is(fanuc):
-    candidate = candidate_on(fanuc, "transmission_order@3[order 2-3]")
-    model = made_model(fanuc, (Target("A", "6DoF", (0.1, 0, 0)),), fitted_frames=False, effects=(candidate,))
-    true = replace(made_estimate(model), coefficients=(np.array([2e-4, -3e-4, 1e-4, 5e-5]),), shapes=(np.array([2.68]),))
-    seen = with_noise(seen_exactly(model, true, made_states(6, 60, seed=5, span=2.5)), np.random.default_rng(6))
-    found = fit(model, seen, NOISE, made_estimate(model, size=0.0))
-    assert found.converged
-    assert abs(found.estimate.shapes[0][0] - 2.68) < 4 * np.sqrt(found.covariance[-1, -1]) < 0.3
 
 
 def test_harmonics_are_cosines_and_sines_of_all_orders_up_to_36(fanuc):
@@ -93,21 +75,3 @@ def test_torques_of_laws_are_shares_of_the_full_torque_of_the_joint(key, lowest,
     full = FULL_NM if payload_kg is None else 2.0 * payload_kg * np.linalg.norm(sites.gravity_m_s2)
     assert (shape.lowest, shape.start, shape.highest) == pytest.approx((lowest * full, start * full, highest * full))
     assert (shape.name, shape.unit, shape.tried) == ("torque", "N m", 0)
-
-
-@pytest.mark.parametrize(
-    ("key", "name", "unit", "plausible", "sign", "needs"),
-    [
-        # Play opens with the torque and a gear gets stiffer with it; friction may hold back either way.
-        ("lost_motion@1", "half_play", "rad", 1e-4, 1, LOADED_JOINTS),
-        ("stiffening@1", "beyond", "rad/(N m)", 1e-3 / FULL_NM, -1, LOADED_JOINTS),
-        ("stiffening@1[two slopes]", "beyond", "rad/(N m)", 1e-3 / FULL_NM, -1, LOADED_JOINTS),
-        ("hysteresis@1", "half_width", "rad", 1e-4, 0, {"approach"}),
-    ],
-)
-def test_each_law_of_a_gear_has_one_parameter_of_known_size_and_sign(key, name, unit, plausible, sign, needs):
-    candidate = candidate_on(chain_of(TURNTABLE), key)
-    (parameter,) = candidate.parameters
-    assert (parameter.name, parameter.unit, parameter.sign) == (name, unit, sign)
-    assert parameter.plausible == pytest.approx(plausible) and parameter.prior_std is None
-    assert candidate.needs == needs and candidate.joints == (1,) and candidate.family == "gearbox"

@@ -3,9 +3,7 @@
 import math
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from support import chain_of, refused
+from support import refused
 
 from elastocal.mechanics.chain import Transform, parse_chain
 
@@ -25,31 +23,6 @@ def test_each_token_becomes_one_transform():
     )
     assert chain.coordinates == 2
     assert [(p.name, p.after) for p in chain.points] == [("EE", 8)]
-
-
-@st.composite
-def written_chains(draw):
-    """(text, transforms) of a chain of random tokens."""
-    words, transforms, joints = [], [], 0
-    for kind in [*draw(st.lists(st.sampled_from("TRq"), min_size=1, max_size=12)), "q"]:
-        axis, sign = draw(st.integers(0, 2)), draw(st.sampled_from(["", "-"]))
-        factor = -1.0 if sign else 1.0
-        if kind == "q":
-            joints += 1
-            words.append(f"R{'xyz'[axis]}({sign}q{joints})")
-            transforms.append(Transform("R", axis, 0.0, joints - 1, factor))
-        else:
-            number = f"{draw(st.integers(0, 359))}.{draw(st.integers(0, 999)):03d}"
-            words.append(f"{kind}{'xyz'[axis]}({sign}{number}{'deg' if kind == 'R' else ''})")
-            amount = math.radians(float(number)) if kind == "R" else float(number)
-            transforms.append(Transform(kind, axis, factor * amount))
-    return " ".join([*words, "[EE]"]), tuple(transforms)
-
-
-@given(written_chains())
-def test_any_written_chain_is_read_as_written(written):
-    text, transforms = written
-    assert chain_of(text).transforms == transforms
 
 
 @pytest.mark.parametrize(

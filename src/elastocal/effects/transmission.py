@@ -26,6 +26,7 @@ from elastocal.effects.sizes import JOINT, Size, full_torque_Nm
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from typing import Any
 
     from elastocal.effects.conditions import Conditions
     from elastocal.effects.protocol import Candidates, Displacements, Effect
@@ -174,7 +175,12 @@ def bearing_runout(own: Effect, sites: Sites, joint: int, motion: str) -> Candid
         return [dict(zip(end, turned @ shift, strict=True)) for shift in moved]
 
     parameters = [Parameter(name, unit, size, size) for name in names]
-    options = {"detail": motion, "distinct_angles": _SAMPLES_PER_PERIOD * 2, "location_name": motion, "fixed": True}
+    options: dict[str, Any] = {
+        "detail": motion,
+        "distinct_angles": _SAMPLES_PER_PERIOD * 2,
+        "location_name": motion,
+        "fixed": True,
+    }
     yield own.candidate((joint + 1,), parameters, law, **options)
 
 
