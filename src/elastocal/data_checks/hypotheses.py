@@ -20,7 +20,7 @@ from elastocal.data_checks.placement import spread
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from elastocal.campaigns.campaign import Campaign
+    from elastocal.campaigns.campaign import Campaign, Measurements
 
 # Poses enough to compare some two hundred hypotheses.
 POSES = 40
@@ -96,8 +96,7 @@ def shifts(campaign: Campaign) -> list[Hypothesis]:
         there = partial(np.take, indices=np.maximum(source, 0), axis=0)
         moved = columns(position=there, rotation_vector=there)(campaign).measurements.select(source >= 0)
         detail = f"the measured columns fit one {kind} further {'down' if steps > 0 else 'up'}"
-        some = spread(replace(campaign, measurements=moved), POSES)
-        found.append(Hypothesis("shuffled_rows", detail, lambda _, some=some: some))
+        found.append(Hypothesis("shuffled_rows", detail, partial(_with_spread, moved)))
     return found
 
 
@@ -179,6 +178,10 @@ def columns(**functions: Callable[[np.ndarray], np.ndarray]) -> Callable[[Campai
         return replace(campaign, measurements=replace(campaign.measurements, **changed))
 
     return read
+
+
+def _with_spread(measurements: Measurements, campaign: Campaign) -> Campaign:
+    return spread(replace(campaign, measurements=measurements), POSES)
 
 
 def _with_angles(matrix: np.ndarray, campaign: Campaign) -> Campaign:

@@ -98,8 +98,8 @@ def deflections(campaign: Campaign) -> Deflections | None:
         left, sizes, _ = np.linalg.svd(free.reshape(residual.size, -1), full_matrices=False)
         basis, flat = left[:, sizes > 1e-9 * sizes[0]], [part.reshape(residual.size, -1) for part in parts]
         centred = [values - basis @ (basis.T @ values) for values in flat]
-    seen, *by = (values.reshape(residual.size, -1) for values in centred)
-    return Deflections(seen[:, 0], *by, int(pose.max()) + 1)
+    seen, by_force, by_moment = (values.reshape(residual.size, -1) for values in centred)
+    return Deflections(seen[:, 0], by_force, by_moment, int(pose.max()) + 1)
 
 
 def _of_frames_and_targets(campaign: Campaign, beside: Placement) -> list[np.ndarray]:

@@ -34,7 +34,7 @@ def frame_drift(own: Effect, sites: Sites) -> Candidates:
     """A tracker or a robot's foot that drifts: stand, floor or bolts settle, and all measurements move as one rigid body.
 
     u = t (d, r) at the foot in base axes, with t the time since the first measurement (h), d in m/h and r in rad/h; a point p
-    (m) moves by t (d + r x p). Derived here: to first order in time a slow rigid motion is its velocity times t.
+    (m) moves by t (d + r x p).
     """
     six = moved_and_turned(own.size("shift an hour", sites), own.size("turn an hour", sites), "/h")
 
@@ -57,9 +57,8 @@ def setup_step(own: Effect, sites: Sites) -> Candidates:
     """A tracker, a nest or a foot that was moved between two rows: a rigid motion of all measurements from there on.
 
     u = (d, r) at the foot in base axes from the share w of the campaign on, zero before; d in m, r in rad, and a point p (m)
-    moves by d + r x p. Where it happens is a shape: w = 0 is the first row of the campaign, 1 its last. A step needs no clock:
-    the rows stand in the order in which they were read, and where the rows are not known the poses count by their numbers.
-    Derived here: a small rigid motion times a unit step.
+    moves by d + r x p. Where it happens is a shape: w = 0 is the first row of the campaign, 1 its last. A step needs no clock;
+    where the rows are not known the poses count by their numbers.
     """
     six = moved_and_turned(own.size("shift", sites), own.size("turn", sites))
 

@@ -77,9 +77,8 @@ def link_elasticity(own: Effect, sites: Sites, links: tuple[int, ...], detail: s
     are shift (m) and turns (rad) of the far end under force F (N) and moment M (N m) there, with x along the link of length l
     (m): Euler-Bernoulli and St Venant (Timoshenko and Gere 1972). A uniform link has a, b, c = 1/3, 1/2, 1; one whose diameter
     falls linearly by a share t to its far end, thin-walled, the integrals over s from 0 to 1 of (1 - s)^2, 1 - s and 1 over (1
-    - t s)^3. Linear in 1/EI and 1/GJ, 1/(N m^2), of the uniform link that a force shifts and a moment along twists as far: so
-    what is estimated of the size hardly depends on the taper. Stretching and shear are left out, for they are small in links
-    much longer than wide.
+    - t s)^3. Linear in 1/EI and 1/GJ, 1/(N m^2), of the uniform link that a force shifts and a moment along twists as far.
+    Stretching and shear are left out, small in links much longer than wide.
     """
     # A fit asks for the same taper under one load after the other.
     compliances = lru_cache(maxsize=4)(lambda taper: [_end_compliance(sites, link, taper) for link in links])
@@ -173,9 +172,8 @@ def cross_compliance(own: Effect, sites: Sites, one: int, other: int) -> Candida
     """Elastic coupling of two joints: each turns under the torque of the other, as where one flexible casting holds both gears.
 
     theta_i = c_ij tau_j and theta_j = c_ij tau_i, with theta in rad, tau the torques of load and declared masses (N m) and c_ij
-    in rad/(N m), the same both ways by the reciprocal theorem of elastic bodies (Timoshenko and Goodier 1970). Beside the
-    compliances of two parallel joints, seen at the end-effector alone, it is not distinguishable from bending of the link
-    between them in its plane.
+    in rad/(N m), the same both ways by the reciprocal theorem of elastic bodies (Timoshenko and Goodier 1970). Of two parallel
+    joints, seen at the end-effector alone, it is not distinguishable from bending of the link between them.
     """
     both, coupling = (one + 1, other + 1), own.parameters("coupling", ["compliance"], "rad/(N m)", sites, one, other)
     yield own.candidate(
@@ -215,8 +213,7 @@ def compensator_stiffness(own: Effect, sites: Sites, joint: int) -> Candidates:
 
     is what the spring (Klimchik et al. 2013) adds (N m/rad), with T and its symbols as in `compensator_torque`, and -c^2 k is
     what that adds to the compliance c of the joint. For a short crank it is theta = tau (u_1 cos q + v_1 sin q + u_2 cos 2q +
-    v_2 sin 2q), with theta in rad, tau the torque of load and declared masses (N m), u and v in rad/(N m). With order 1 alone
-    it is the same as a shoulder whose own stiffness depends on its angle.
+    v_2 sin 2q), with theta in rad, tau the torque of load and declared masses (N m), u and v in rad/(N m).
     """
 
     variation = wave_parameters(own, "variation", "rad/(N m)", sites, joint)
@@ -232,9 +229,8 @@ def flange_flexibility(own: Effect, sites: Sites) -> Candidates:
     """A flange, its bearing or a tool changer that yields elastically: what holds the tool is a spring behind the last joint.
 
     u = C w, with u the shift (m) and turn (rad) of the flange along its axes, w the external force (N) and moment (N m) there
-    and C diagonal, m/N and rad/(N m): a spring in six directions, as in complete stiffness models of serial robots (Klimchik et
-    al. 2014). The turn about the axis of the last joint is that of its compliance, and is held by the fit where that is
-    identified.
+    and C diagonal, m/N and rad/(N m) (Klimchik et al. 2014). The turn about the axis of the last joint is held by the fit where
+    its compliance is identified.
     """
     shifts = own.parameters("shift", [f"shift_{axis}" for axis in "xyz"], "m/N", sites)
     turns = own.parameters("turn", [f"turn_{axis}" for axis in "xyz"], "rad/(N m)", sites, sites.joints - 1)

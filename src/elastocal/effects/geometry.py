@@ -28,9 +28,8 @@ _NEST_ORDER, _SAMPLES_PER_PERIOD = 2, 4
 def joint_offset(own: Effect, sites: Sites, joint: int) -> Candidates:
     """Zero offset of a joint: its encoder was mastered a little off the mark.
 
-    theta_i = delta_i at every pose, with and without load, in rad (m for a prismatic joint) (Khalil and Dombre 2002). An offset
-    of the first joint is a turn of the base, one of the last a turn of the tool: they are identifiable only where frame and
-    target are known.
+    theta_i = delta_i at every pose, with and without load, in rad (m for a prismatic joint) (Khalil and Dombre 2002). Of the
+    first joint it is a turn of the base, of the last one of the tool: identifiable only where frame and target are known.
     """
     quantity, unit = ("shift", "m") if sites.prismatic[joint] else ("turn", "rad")
     offset = own.parameters(quantity, ["offset"], unit, sites)
@@ -65,8 +64,7 @@ def base_placement(own: Effect, sites: Sites) -> Candidates:
     """A robot whose foot does not stand where the campaign declares it: a constant shift and turn.
 
     u = (d, r) at the foot in base axes, d in m and r in rad; a point p (m) moves by d + r x p. Where the placement of the base
-    is unknown it is fitted, and there is nothing to misplace. A turn about a vertical first axis is the zero offset of joint 1,
-    and alike in every measurement. Derived here: a small rigid motion.
+    is unknown it is fitted, and there is nothing to misplace. A turn about a vertical first axis is the zero offset of joint 1.
     """
     six = moved_and_turned(own.size("shift", sites), own.size("turn", sites))
     yield own.candidate((), six, lambda around: [{c: around.always} for c in sites.base], {"declared base"})
@@ -80,8 +78,7 @@ def nest_eccentricity(own: Effect, sites: Sites) -> Candidates:
     d = sum_e e (a_e cos 2q + b_e sin 2q) over the two axes e across the last joint, in the frame that turns with it; d, a_e and
     b_e in m, q the angle of that joint in rad. Derived here: of the Fourier series of d, order 0 is a target elsewhere and
     order 1, if it circles against the joint, a link of other dimensions; order 2 is the lowest of which neither makes a part,
-    as of an oval ball or nest in which the reflector turns to face the tracker. How well reflectors are centred is one of the
-    errors of trackers (Muralikrishnan et al. 2016).
+    as of an oval ball or nest in which the reflector turns to face the tracker (Muralikrishnan et al. 2016).
     """
     last = sites.joints - 1
     if sites.prismatic[last]:

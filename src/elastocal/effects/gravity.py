@@ -73,8 +73,7 @@ def link_weight(own: Effect, sites: Sites) -> Candidates:
     (kg) and tau_ik its torque on joint i (N m/kg). Given the compliances it is linear in masses and first moments (Atkeson et
     al. 1986), which turn all joints at once; of one joint alone, in the products with its compliance. A link's own mass m at
     its middle counts as m/2 at either end. Where the robot file declares masses, theirs are parameters already
-    (`declared_weight`). Variants have the first moments of these links across their lines (kg m) too: centres of mass are
-    seldom on them.
+    (`declared_weight`). Variants have first moments across the lines of links (kg m) too.
     """
     if sites.masses:
         return
@@ -123,9 +122,9 @@ def declared_masses(own: Effect, sites: Sites) -> Candidates:
     """Declared masses that are farther off than the robot file says: all by one factor, or each by its own.
 
     theta_i = c_i sum_k s_k m_k tau_ik(q), with theta_i in rad, c_i the compliance (rad/(N m)), m_k the declared mass of link k
-    (kg), tau_ik its torque on joint i (N m/kg) and s_k the share by which it is heavier, one for all links or each its own.
-    A mass takes its declared centre with it. What the robot file says of its own tolerance is part of the declared model
-    (`declared_weight`). Without a load the compliances are free, and no factor of all masses is distinguishable from them.
+    (kg), tau_ik its torque on joint i (N m/kg) and s_k the share by which it is heavier, one for all links or each its own. A
+    mass takes its declared centre with it. Without a load the compliances are free, and no factor of all masses is
+    distinguishable from them.
     """
     bodies = [(number, mass) for number, mass in enumerate(sites.masses) if mass.link and mass.mass_kg]
     if not bodies:

@@ -26,7 +26,6 @@ from elastocal.effects.sizes import JOINT, Size, full_torque_Nm
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
-    from typing import Any
 
     from elastocal.effects.conditions import Conditions
     from elastocal.effects.protocol import Candidates, Displacements, Effect
@@ -85,13 +84,12 @@ def transmission_order(own: Effect, sites: Sites, joint: int, above: int) -> Can
     theta_i = sum_m a_m cos(m k q_i) + b_m sin(m k q_i), m = 1, 2, with theta_i, a_m, b_m and the joint angle q_i in rad and k
     between two integers: planets, cranks and cages turn by ratios of numbers of teeth (Müller 1982), and what is out of round
     errs twice in their turn as well, wherever twice k lies. Integers k are those of `transmission_harmonic`. Over the part of a
-    turn that a joint uses, orders nearer than half a wave over that part are nearly one function, so that the middle between
-    two integers is where a search has to try; and less than a whole wave in a turn would be nearly any smooth function.
+    turn that a joint uses neighbouring orders are nearly one function: the middle between two integers is where a search has to
+    try.
     """
     shape = Shape("order", "1", above + 0.5, above + _MARGIN, above + 1 - _MARGIN, tried=1)
     four = own.parameters("amplitude", ("cos_kq", "sin_kq", "cos_2kq", "sin_2kq"), "rad", sites)
     parameters = [replace(wave, order=(above + 1) * (1 + number // 2)) for number, wave in enumerate(four)]
-
     band, angles = f"order {above}-{above + 1}", _SAMPLES_PER_PERIOD * (above + 1)
     options = {"shapes": (shape,), "detail": band, "distinct_angles": angles, "location_name": band}
     yield own.of_joint(joint, parameters, lambda at, order: waves(order * at.joint_angles[:, joint], 1, 2), **options)
@@ -115,9 +113,9 @@ def transmission_ratio(own: Effect, sites: Sites, joint: int, sources: list[int]
     """Wrong ratio of a gear, or coupling from a joint before it: the controller divides the motor's angle by a wrong number.
 
     theta_i = e_i q_i + e_ih q_h, h = i - 1, with theta and q in rad and e in rad/rad (m and m/m for prismatic joints): linear
-    in the angle and not periodic. Derived here: a motor turns by N_i q_i + N_ih q_h, so that errors of both numbers turn the
-    joint by -(dN_i q_i + dN_ih q_h) / N_i. In a wrist whose last two motors sit in the forearm and drive through hollow shafts
-    both joints follow the first wrist joint: as an alternative theta_i = e_ih q_h alone, with h that joint.
+    in the angle and not periodic. Derived here: a motor turns by N_i q_i + N_ih q_h, with errors of both numbers. In a wrist
+    whose last two motors sit in the forearm and drive through hollow shafts both joints follow the first wrist joint: as an
+    alternative theta_i = e_ih q_h alone, with h that joint.
     """
     # A spindle has a pitch of its own, but is not coupled to what turns.
     alike = [source for source in sources if sites.prismatic[source] == sites.prismatic[joint]]
@@ -175,13 +173,8 @@ def bearing_runout(own: Effect, sites: Sites, joint: int, motion: str) -> Candid
         return [dict(zip(end, turned @ shift, strict=True)) for shift in moved]
 
     parameters = [Parameter(name, unit, size, size) for name in names]
-    options: dict[str, Any] = {
-        "detail": motion,
-        "distinct_angles": _SAMPLES_PER_PERIOD * 2,
-        "location_name": motion,
-        "fixed": True,
-    }
-    yield own.candidate((joint + 1,), parameters, law, **options)
+    at, angles = (joint + 1,), _SAMPLES_PER_PERIOD * 2
+    yield own.candidate(at, parameters, law, detail=motion, distinct_angles=angles, location_name=motion, fixed=True)
 
 
 def _seen_behind(sites: Sites, joint: int, axis: int, angle: np.ndarray) -> np.ndarray:
@@ -240,9 +233,9 @@ def lost_motion(own: Effect, sites: Sites, joint: int) -> Candidates:
     """Play that the gear crosses where the torque changes its sign: teeth leave one flank and touch the other.
 
     theta_i = D_i tanh(tau_i / tau_0), with theta_i in rad, tau_i the torque of load and declared masses (N m), D_i half the
-    play (rad) and tau_0 the torque at which it is taken up (N m). Linear in D_i, not in tau_0: makers of gears measure lost
-    motion at 3 % of the rated torque (Nabtesco, Precision Reduction Gear RV, glossary). Derived here: tanh is a smooth step
-    from one flank, -D_i, to the other, +D_i.
+    play (rad) and tau_0 the torque at which it is taken up (N m). Makers of gears measure it at 3 % of the rated torque
+    (Nabtesco, Precision Reduction Gear RV, glossary). Derived here: tanh is a smooth step from one flank, -D_i, to the other,
+    +D_i.
     """
     play, shapes = own.parameters("play", ["half_play"], "rad", sites), (_torque(sites, joint, _PLAY),)
     yield own.of_joint(joint, play, lambda around, at: [np.tanh(around.total[:, joint] / at)], LOADED_JOINTS, shapes=shapes)
