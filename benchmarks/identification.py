@@ -8,12 +8,10 @@ import numpy as np
 from common import Row, interleaved, load_robot, load_strategy
 
 from elastocal.mechanics.robot import Robot
-from elastocal.study.equation_11 import Measurements, estimate_compliance, measurements_of
+from elastocal.study.equation_11 import Measurements, estimate_compliance, regressors_of, stacked
 from elastocal.study.simulation import (
     Loading,
     blocks_of_sets,
-    deflection_columns,
-    experiment_columns,
     measurement_noise,
     random_experiments,
     true_deflections,
@@ -76,8 +74,8 @@ def _measurements(robot: Robot, strategy: Strategy, sets: Sequence[int], configu
     point = robot.chain.end_effector
     noise = NOISE * measurement_noise(1, "kuka", point.name, sets, configurations)
     measured = true_deflections(robot, experiments, point, "end_effector") + noise
-    columns = {point.name: deflection_columns(point.name, sets, measured)}
-    return measurements_of(experiment_columns(sets, experiments), columns, robot.chain, strategy, ROWS, "end_effector")
+    matrices = regressors_of(experiments, robot.chain, strategy.points, ROWS, "end_effector")
+    return {point.name: stacked(matrices[point.name], measured)}
 
 
 def _systems(measurements: Measurements) -> tuple[np.ndarray, np.ndarray]:

@@ -1,24 +1,22 @@
-"""The list of hypotheses: each a change of the file, those of the fewest changes first."""
-
-from dataclasses import replace
+"""The list of hypotheses: each a each of the file, those of the fewest eachs first."""
 
 import numpy as np
 import pytest
-from made_campaigns import Plan, made
+from made_campaigns import Plan, made, with_measured
 
-from elastocal.data_checks.alternatives import find
-from elastocal.data_checks.hypotheses import hypotheses, shifts
+from elastocal.data_checks.alternatives import other_readings
+from elastocal.data_checks.hypotheses import discrete, fitted, shifts
 
 
-def test_what_is_simple_comes_first_and_no_change_is_there_twice(fanuc):
+def test_what_is_simple_comes_first_and_no_each_is_there_twice(fanuc):
     campaign = made(fanuc, 1, Plan(poses=10))
-    single, fitted = hypotheses(campaign, shifts(campaign.measurements))
+    single = [*discrete(campaign), *shifts(campaign)]
     assert single[0].joints == (1,)
-    details = [change.detail for change in single]
+    details = [each.detail for each in single]
     assert len(set(details)) == len(details)
-    assert [change.placement for change in fitted] == ["frame", "targets", "targets"]
-    for change in single:
-        read = change.correct(campaign)
+    assert [each.detail for each in fitted(campaign)] == ["frame", "targets", "targets"]
+    for each in single:
+        read = each.read(campaign)
         assert read is not campaign and len(read.measurements) <= len(campaign.measurements)
 
 
@@ -32,7 +30,7 @@ def test_measured_columns_of_each_target_or_pose_moved_by_one_are_named(fanuc, k
         members = np.flatnonzero(groups == group)
         source[members] = np.roll(members, steps)
     turned = measurements.rotation_vector[source]
-    (fault,) = find(campaign, replace(measurements, position=measurements.position[source], rotation_vector=turned))
+    (fault,) = other_readings(with_measured(campaign, position=measurements.position[source], rotation_vector=turned))
     # Of two loads of a pose each second row is of the next pose: both words say so.
     assert (fault.name, fault.decisive) == ("shuffled_rows", True)
     assert fault.detail.endswith("up" if steps > 0 else "down")

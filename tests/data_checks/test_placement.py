@@ -4,12 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_campaigns import POINTS, Plan, made
-from scipy.spatial.transform import Rotation
+from made_campaigns import POINTS, Plan, made, with_measured
 from support import PinocchioPoint
 
 from elastocal.data_checks.placement import placed, robust_sigma, robustly_placed, spread
-from elastocal.fitting.observations import single_observations
 
 EXACT = Plan(poses=12, loads=1, noise=0.0, force=0.0)
 
@@ -20,13 +18,9 @@ def exact(request, fanuc):
     return made(fanuc, 1, replace(EXACT, tracker=request.param == "tracker"))
 
 
-def with_position(campaign, position):
-    return replace(campaign.measurements, position=position)
-
-
 @pytest.mark.parametrize("place", [placed, robustly_placed])
 def test_measurements_of_the_nominal_robot_lie_where_it_puts_them(exact, place):
-    found = place(exact, exact.measurements)
+    found = place(exact)
     np.testing.assert_allclose(found.distance, 0.0, atol=1e-8)
     np.testing.assert_allclose(found.turn, 0.0, atol=1e-7)
 
@@ -35,15 +29,15 @@ def test_known_targets_are_predicted_by_pinocchio(fanuc):
     campaign = made(fanuc, 1, EXACT)
     moved = tuple(replace(target, offset_m=(0.1, -0.2, 0.05 * k)) for k, target in enumerate(campaign.targets))
     campaign, seen = replace(campaign, targets=moved), campaign.measurements
-    found = placed(campaign, seen)
+    found = placed(campaign)
     for row in range(0, len(seen), 7):
         target = moved[seen.target[row]]
         point = PinocchioPoint(fanuc.chain, replace(fanuc.chain.point(target.point), offset_m=target.offset_m))
         position, rotation, _ = point.pose_and_jacobian(seen.joint_angles[row])
-        np.testing.assert_allclose(found.predicted[row], position, rtol=0, atol=1e-12)
-        np.testing.assert_allclose(found.predicted_rotation[row], rotation, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(found.predicted[0][row], position, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(found.predicted[1][row], rotation, rtol=0, atol=1e-12)
         # In the base frame measured positions stay as they are.
-        np.testing.assert_array_equal(found.measured[row], seen.position[row])
+        np.testing.assert_array_equal(found.measured[0][row], seen.position[row])
 
 
 def test_one_measurement_in_four_far_off_moves_the_robust_fit_by_nothing_and_the_other_one_by_much(fanuc):
@@ -51,34 +45,11 @@ def test_one_measurement_in_four_far_off_moves_the_robust_fit_by_nothing_and_the
     rng, position = np.random.default_rng(2), campaign.measurements.position.copy()
     far = rng.random(len(position)) < 0.25
     position[far] += [0.3, 0.0, 0.0]
-    measurements = with_position(campaign, position)
-    robust = robustly_placed(campaign, measurements)
+    campaign = with_measured(campaign, position=position)
+    robust = robustly_placed(campaign)
     np.testing.assert_allclose(robust.distance[far], 0.3, rtol=1e-6)
     np.testing.assert_allclose(robust.distance[~far], 0.0, atol=1e-6)
-    assert placed(campaign, measurements).distance[~far].min() > 0.01
-
-
-def test_every_target_is_placed_by_measurements_of_its_own_however_widely_they_scatter(fanuc):
-    campaign = made(fanuc, 1, replace(EXACT, tracker=True, poses=16))
-    seen, rng = campaign.measurements, np.random.default_rng(3)
-    wide = seen.target == 2
-    position = seen.position + np.where(wide[:, None], 0.02, 1e-5) * rng.standard_normal(seen.position.shape)
-    found = robustly_placed(campaign, with_position(campaign, position))
-    # Half of normal vectors are shorter than 1.54 standard deviations.
-    assert np.median(found.distance[wide]) < 2 * 0.02
-
-
-def test_each_session_of_a_tracker_has_a_frame_of_its_own(fanuc):
-    campaign = made(fanuc, 1, replace(EXACT, tracker=True, poses=20))
-    seen = campaign.measurements
-    later, turn = seen.pose >= 10, Rotation.from_rotvec([0.3, -0.4, 0.5])
-    position = np.where(later[:, None], turn.apply(seen.position) + np.array([1.0, 2.0, 3.0]), seen.position)
-    vectors = np.where(later[:, None], (turn * Rotation.from_rotvec(seen.rotation_vector)).as_rotvec(), seen.rotation_vector)
-    both = replace(seen, session=later.astype(np.int32), position=position, rotation_vector=vectors)
-    for place in (placed, robustly_placed):
-        found = place(campaign, both)
-        assert found.estimate.sessions == (0, 1)
-        np.testing.assert_allclose(found.distance, 0.0, atol=1e-8)
+    assert placed(campaign).distance[~far].min() > 0.01
 
 
 @pytest.mark.parametrize(("wanted", "poses"), [(4, [0, 4, 7, 11]), (2, [0, 11]), (50, list(range(12)))])
@@ -86,28 +57,13 @@ def test_poses_are_spread_over_the_campaign_at_their_lowest_load_and_first_repea
     campaign = made(fanuc, 1, Plan(poses=12, loads=2, repeats=2))
     some = campaign.measurements.select(campaign.measurements.load > 0)
     order = np.random.default_rng(5).permutation(len(some))
-    found = spread(some.select(order), wanted)
+    found = spread(replace(campaign, measurements=some.select(order)), wanted).measurements
     for target in range(len(POINTS)):
         assert sorted(found.pose[found.target == target].tolist()) == poses
     assert (found.load == 1).all() and (found.repeat == 0).all()
     # In the order in which they were given.
     place = [np.flatnonzero(some.row[order] == row)[0] for row in found.row]
     assert (np.diff(place) > 0).all()
-
-
-def test_every_measurement_is_an_observation_in_a_state_of_its_own(exact):
-    rng = np.random.default_rng(6)
-    seen = exact.measurements.select(rng.permutation(len(exact.measurements)))
-    seen = replace(seen, time_s=rng.uniform(0, 9, len(seen)))
-    found = single_observations(seen)
-    assert len(found) == len(found.states) == len(seen)
-    np.testing.assert_array_equal(found.state, np.arange(len(seen)))
-    for name in ("session", "pose", "load", "joint_angles", "wrench", "time_s"):
-        np.testing.assert_array_equal(getattr(found.states, name), getattr(seen, name))
-    assert (found.states.repeats == 1).all() and found.states.approach is None
-    np.testing.assert_array_equal(found.position, seen.position)
-    np.testing.assert_allclose(found.rotation, Rotation.from_rotvec(seen.rotation_vector).as_matrix())
-    assert single_observations(replace(seen, rotation_vector=None)).rotation is None
 
 
 @pytest.mark.parametrize("components", [1, 2, 3])

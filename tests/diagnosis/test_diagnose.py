@@ -102,7 +102,7 @@ def faults(*decisive):
     [((True,), "named", ["fault_0"]), ((True, False, True), "several", ["fault_0", "fault_2"])],
 )
 def test_measurements_at_fault_end_the_diagnosis_at_the_declared_model(decisive, verdict, names, case, monkeypatch):
-    monkeypatch.setattr(module, "faults", lambda campaign, measurements: faults(*decisive))
+    monkeypatch.setattr(module, "faults", lambda campaign: faults(*decisive))
     monkeypatch.setattr(module, "_explained", None)
     diagnosis = diagnose(case, Settings(), 1)
     document = diagnosis.document

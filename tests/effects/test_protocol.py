@@ -38,12 +38,6 @@ def test_a_few_values_of_a_shape_grow_by_one_factor_from_the_lowest_and_on_to_th
     np.testing.assert_allclose(TRIED[1].values(few), expected, rtol=1e-12)
 
 
-@pytest.mark.parametrize("shape", TRIED, ids=lambda shape: shape.name)
-def test_a_shape_alone_stands_for_all_of_its_range_and_one_at_an_end_for_the_half_next_to_it(shape):
-    assert shape.shares([shape.start]).tolist() == [1.0]
-    np.testing.assert_allclose(shape.shares([shape.highest, shape.lowest] if shape.tried else [36000.0, 900.0]), [0.5, 0.5])
-
-
 @pytest.mark.parametrize(
     ("joints", "detail", "location_name", "key", "location"),
     [

@@ -53,16 +53,6 @@ def test_rigid_joints_are_sized_as_those_of_an_arm_of_this_load_and_reach(fanuc)
         assert 0.1 < ours / fanuc.compliance[joint] < 3.0
 
 
-def test_loads_and_lengths_are_sized_by_the_rated_load_and_the_reach(fanuc):
-    sites = sites_of(replace(fanuc, payload_kg=100.0))
-    assert effects()["force_bias"].size("force", sites) == pytest.approx(0.01 * 100.0 * 9.80665)
-    assert effects()["payload"].size("mass", sites) == pytest.approx(15.0)
-    long = replace(sites, link_vectors_m=2.0 * sites.link_vectors_m)
-    assert effects()["link_geometry"].size("length", long) == pytest.approx(
-        2.0 * effects()["link_geometry"].size("length", sites)
-    )
-
-
 def test_parameters_have_the_sign_of_the_size(fanuc):
     own = effects()
     (tilt,) = own["joint_tilt"].parameters("tilt", ["t"], "rad/(N m)", sites_of(fanuc), 0, over=4.0)

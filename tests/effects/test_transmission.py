@@ -3,23 +3,18 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
+from support import chain_of
 from synthetic import (
-    NOISE,
     candidate_on,
     conditions_on,
     displacements,
     equipped,
-    made_estimate,
-    made_model,
     made_states,
-    seen_exactly,
-    with_noise,
 )
 
-from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
 from elastocal.effects.transmission import transmission_harmonic
-from elastocal.fitting.least_squares import fit
 from elastocal.mechanics.sites import sites_of
 
 
@@ -38,16 +33,6 @@ def test_order_may_lie_anywhere_between_two_integers_and_away_from_both(fanuc):
     np.testing.assert_allclose(made[:, :, 2], [wave(k * angle) for k in (2.7, 5.4) for wave in (np.cos, np.sin)], rtol=1e-13)
 
 
-def test_order_between_integers_is_fitted_where_it_is(fanuc):
-    candidate = candidate_on(fanuc, "transmission_order@3[order 2-3]")
-    model = made_model(fanuc, (Target("A", "6DoF", (0.1, 0, 0)),), fitted_frames=False, effects=(candidate,))
-    true = replace(made_estimate(model), coefficients=(np.array([2e-4, -3e-4, 1e-4, 5e-5]),), shapes=(np.array([2.68]),))
-    seen = with_noise(seen_exactly(model, true, made_states(6, 60, seed=5, span=2.5)), np.random.default_rng(6))
-    found = fit(model, seen, NOISE, made_estimate(model, size=0.0))
-    assert found.converged
-    assert abs(found.estimate.shapes[0][0] - 2.68) < 4 * np.sqrt(found.covariance[-1, -1]) < 0.3
-
-
 def test_harmonics_are_cosines_and_sines_of_all_orders_up_to_36(fanuc):
     orders = {joint: [] for joint in range(1, 7)}
     for candidate in transmission_harmonic.candidates(sites_of(fanuc)):
@@ -57,3 +42,36 @@ def test_harmonics_are_cosines_and_sines_of_all_orders_up_to_36(fanuc):
         assert candidate.distinct_angles == 4 * int(orders[joint][-1].removeprefix("sin_").removesuffix("q"))
     expected = [f"{wave}_{order}q" for order in range(1, 37) for wave in ("cos", "sin")]
     assert all(found == expected for found in orders.values())
+
+
+def test_play_is_mostly_taken_up_before_the_slopes_of_a_stiffening_gear_meet(fanuc):
+    """Where both laws reach they are one, for two slopes are play and a spring: it shall be a small part of either range."""
+    for joint in range(1, 7):
+        (taken_up,), (meeting,) = (
+            candidate_on(fanuc.chain, f"{name}").shapes for name in (f"lost_motion@{joint}", f"stiffening@{joint}[two slopes]")
+        )
+        assert taken_up.lowest < taken_up.start < meeting.lowest < taken_up.highest < meeting.start < meeting.highest
+        both = np.log(taken_up.highest / meeting.lowest)
+        assert all(both < 0.3 * np.log(shape.highest / shape.lowest) for shape in (taken_up, meeting))
+
+
+# An arm of two metres that turns about the vertical; eight kilograms a cubic metre of reach suit it.
+TURNTABLE, FULL_NM = "Rz(q1) Tx(2) [hand]", 8.0 * 2.0**3 * 9.80665 * 2.0
+
+
+@pytest.mark.parametrize(
+    ("key", "lowest", "start", "highest"),
+    [
+        ("lost_motion@1", 0.003, 0.03, 0.1),
+        ("stiffening@1", 0.05, 0.3, 0.8),
+        ("stiffening@1[two slopes]", 0.05, 0.3, 0.8),
+    ],
+)
+@pytest.mark.parametrize("payload_kg", [None, 100.0])
+def test_torques_of_laws_are_shares_of_the_full_torque_of_the_joint(key, lowest, start, highest, payload_kg):
+    """Lost motion is read at 3 % of it. Of a kilonewton, or of the rated payload, two metres away."""
+    sites = replace(equipped(chain_of(TURNTABLE)), payload_kg=payload_kg)
+    (shape,) = candidates_on(sites)[key].shapes
+    full = FULL_NM if payload_kg is None else 2.0 * payload_kg * np.linalg.norm(sites.gravity_m_s2)
+    assert (shape.lowest, shape.start, shape.highest) == pytest.approx((lowest * full, start * full, highest * full))
+    assert (shape.name, shape.unit, shape.tried) == ("torque", "N m", 0)

@@ -31,6 +31,11 @@ class Plan:
     force: float = 1000.0
 
 
+def with_measured(campaign, **columns):
+    """A campaign with other columns of its measurements."""
+    return replace(campaign, measurements=replace(campaign.measurements, **columns))
+
+
 def made(robot, seed, plan=Plan(), true_robot=None, true_offset=0.0, sag=0.0, moving=None):
     """A campaign of a robot, measured as planned.
 

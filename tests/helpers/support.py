@@ -20,10 +20,9 @@ SEVEN_JOINTS = (
 )
 TURNED = "Rx(90deg) Ty(0.3) Rz(-q1) Rx(-90deg) Tx(0.2) Rz(30deg) Ry(-q2) [A] Tx(-0.5) Rx(45.5deg) Rz(q3) Ty(0.4) Rx(-q4) [B]"
 OTHER_CHAINS = {"ur10": UR10, "three joints": THREE_JOINTS, "seven joints": SEVEN_JOINTS, "fixed rotations": TURNED}
-# A robot on a track; one whose forearm a parallelogram keeps from turning with the upper arm.
+# A robot on a track.
 TRACK = "Tz(0.3) Tx(-q1) Tz(0.5) Rz(q2) Tx(0.3) Ry(q3) Tx(0.7) [elbow] Ry(q4) Tx(0.6) [hand]"
-PARALLELOGRAM = "Tz(0.5) Rz(q1) Tx(0.3) Ry(q2) Tz(0.8) [elbow] Ry(-q2) Ry(q3) Tx(0.9) Ry(-q3) Tz(-0.1) Rz(q4) Tx(0.1) [hand]"
-ODD_CHAINS = {"track": TRACK, "parallelogram": PARALLELOGRAM}
+ODD_CHAINS = {"track": TRACK}
 
 
 def chain_of(text, **lengths_m):

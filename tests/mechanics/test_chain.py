@@ -3,9 +3,7 @@
 import math
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from support import chain_of, refused
+from support import refused
 
 from elastocal.mechanics.chain import Transform, parse_chain
 
@@ -27,31 +25,6 @@ def test_each_token_becomes_one_transform():
     assert [(p.name, p.after) for p in chain.points] == [("EE", 8)]
 
 
-@st.composite
-def written_chains(draw):
-    """(text, transforms) of a chain of random tokens."""
-    words, transforms, joints = [], [], 0
-    for kind in [*draw(st.lists(st.sampled_from("TRq"), min_size=1, max_size=12)), "q"]:
-        axis, sign = draw(st.integers(0, 2)), draw(st.sampled_from(["", "-"]))
-        factor = -1.0 if sign else 1.0
-        if kind == "q":
-            joints += 1
-            words.append(f"R{'xyz'[axis]}({sign}q{joints})")
-            transforms.append(Transform("R", axis, 0.0, joints - 1, factor))
-        else:
-            number = f"{draw(st.integers(0, 359))}.{draw(st.integers(0, 999)):03d}"
-            words.append(f"{kind}{'xyz'[axis]}({sign}{number}{'deg' if kind == 'R' else ''})")
-            amount = math.radians(float(number)) if kind == "R" else float(number)
-            transforms.append(Transform(kind, axis, factor * amount))
-    return " ".join([*words, "[EE]"]), tuple(transforms)
-
-
-@given(written_chains())
-def test_any_written_chain_is_read_as_written(written):
-    text, transforms = written
-    assert chain_of(text).transforms == transforms
-
-
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -63,13 +36,12 @@ def test_any_written_chain_is_read_as_written(written):
         ("Tz(l1) Rz(q1) Tx() [A]", ["'Tx()'"]),
         ("Tz(l1) Rz(q1) Tx(l2) []", ["'[]'"]),
         ("Tz(l1) Rz(q2) Tx(l2) [A]", ["'Rz(q2)'", "q1 or degrees"]),
-        ("Tz(l1) Rz(q1) Tx(l2) Ry(q3) [A]", ["'Ry(q3)'", "q2, a joint before it or degrees"]),
-        ("Tz(l1) Rz(q1) Tx(q1) Tx(l2) [A]", ["'Tx(q1)'", "R.() or in T.() alone"]),
-        ("Tz(l1) Tx(q1) Rz(q1) Tx(l2) [A]", ["'Rz(q1)'", "R.() or in T.() alone"]),
+        ("Tz(l1) Rz(q1) Tx(l2) Ry(q3) [A]", ["'Ry(q3)'", "q2 or degrees"]),
+        ("Tz(l1) Rz(q1) Tx(l2) Ry(-q1) [A]", ["'Ry(-q1)'", "q2 or degrees"]),
         ("Tz(l1) Rz(q1) Tx(l2) Ry(90) [A]", ["'Ry(90)'", "90deg"]),
         ("Tz(l1) Rz(q1) Tx(l2) Ry(l2) [A]", ["'Ry(l2)'"]),
         ("Tz(l1) Rz(q1) Tx(l9) [A]", ["'Tx(l9)'", "l1, l2 or metres"]),
-        ("Tz(l1) Rz(q1) Tx(q3) [A]", ["'Tx(q3)'", "q2, a joint before it or l1, l2 or metres"]),
+        ("Tz(l1) Rz(q1) Tx(q3) [A]", ["'Tx(q3)'", "q2 or l1, l2 or metres"]),
         ("Tz(l1) Rz(q1) Tx(5deg) [A]", ["'Tx(5deg)'", "l1, l2 or metres"]),
         ("Tz(l1) Rz(q1) Tx(1,5) [A]", ["'Tx(1,5)'"]),
         ("Tz(l1) Rz(q1) [A] Tx(l2) [A]", ["[A] twice", "once"]),

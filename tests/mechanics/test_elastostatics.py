@@ -8,11 +8,9 @@ from scipy.integrate import quad
 from support import random_loads
 
 from elastocal.mechanics.elastostatics import (
-    exact_deflections,
     generalized_forces,
     joint_torques,
     regressor,
-    spring_compliance,
     tube_compliance,
     wrench_of_offset_force,
 )
@@ -74,21 +72,6 @@ def test_columns_of_the_regressor_are_those_of_equation_10(kuka):
         np.testing.assert_allclose(matrix[index], np.column_stack(columns), rtol=1e-12, atol=1e-9)
 
 
-def test_exact_deflection_departs_from_the_linear_one_in_second_order(robot):
-    loads = random_loads(robot, 2, 5)
-    for point in robot.chain.points:
-        jacobian = poses_and_jacobians(robot.chain, loads.joint_angles, point)[2]
-        torques = joint_torques(robot.chain, loads.joint_angles, loads.wrench, robot.chain.end_effector)
-        beyond = []
-        for share in (1.0, 0.5):
-            springs = share * robot.compliance * torques
-            linear = (jacobian * springs[..., None, :]).sum(axis=-1)
-            beyond.append(exact_deflections(robot.chain, loads.joint_angles, springs, point) - linear)
-        # Springs turn by some 1e-3 rad: second order is some nanometres to micrometres, third a thousandth of that.
-        assert np.abs(beyond[0]).max() > 1e-8
-        assert np.linalg.norm(beyond[0] - 4 * beyond[1]) < 0.01 * np.linalg.norm(beyond[0])
-
-
 TUBE = Tube(0.25, 0.02, 70e9, 26e9)
 
 
@@ -120,16 +103,6 @@ def integrated_beam(tube, along):
 def test_tube_compliance_is_that_of_an_integrated_beam(tube, length):
     expected = integrated_beam(tube, [length, 0.0, 0.0])
     np.testing.assert_allclose(tube_compliance(tube, length), expected, rtol=1e-10, atol=1e-12 * np.abs(expected).max())
-
-
-def test_every_link_adds_its_block(kuka_extended):
-    compliance = spring_compliance(kuka_extended)
-    assert compliance.shape == (36, 36)
-    expected = np.zeros((36, 36))
-    expected[:6, :6] = np.diag(kuka_extended.compliance)
-    for number, link in enumerate(kuka_extended.links):
-        expected[6 + 6 * number : 12 + 6 * number, 6 + 6 * number : 12 + 6 * number] = integrated_beam(link.tube, link.vector_m)
-    np.testing.assert_allclose(compliance, expected, rtol=0, atol=1e-12 * compliance.max())
 
 
 def test_extended_deflection_is_that_of_joints_and_beams_added_up(kuka_extended):

@@ -20,7 +20,6 @@ from elastocal.mechanics import kinematics
 from elastocal.mechanics.kinematics import (
     jacobians,
     motion,
-    pose_differences,
     poses,
     poses_and_jacobians,
     rotation_vectors,
@@ -43,17 +42,8 @@ def assert_agrees_with_pinocchio(chain, point, angles):
 @pytest.mark.parametrize("name", ["kuka", "fanuc", "track", *OTHER_CHAINS])
 def test_pose_and_jacobian_agree_with_pinocchio(name, chain_called):
     chain = chain_called(name)
-    for point in chain.points:
-        assert_agrees_with_pinocchio(chain, point, random_angles(np.random.default_rng(2), chain, 20))
-
-
-@pytest.mark.parametrize("kind", ["R", "T"])
-def test_turning_and_sliding_coordinates_agree_with_pinocchio_and_keep_the_angles(kind):
-    chain = chain_of(OTHER_CHAINS["fixed rotations"])
-    moving = [t if t.coordinate is None else replace(t, kind=kind) for t in chain.transforms]
-    chain = replace(chain, transforms=tuple(moving))
     # Component first in memory, so that the package may work on the angles themselves and not on a copy.
-    angles = np.asfortranarray(random_angles(np.random.default_rng(14), chain, 5))
+    angles = np.asfortranarray(random_angles(np.random.default_rng(2), chain, 20))
     before = angles.copy()
     for point in chain.points:
         assert_agrees_with_pinocchio(chain, point, angles)
@@ -139,18 +129,6 @@ def test_batches_across_a_block_are_those_of_its_parts(fanuc, monkeypatch, size)
     for found, expected in zip(poses(fanuc.chain, angles, fanuc.chain.end_effector), whole[:2], strict=True):
         np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING)
     np.testing.assert_allclose(jacobians(fanuc.chain, angles, fanuc.chain.end_effector), whole[2], rtol=0, atol=ROUNDING)
-
-
-@pytest.mark.parametrize("name", ODD_CHAINS)
-def test_joints_that_shift_or_move_several_transforms_have_the_slopes_of_central_differences(name, chain_called):
-    chain = chain_called(name)
-    q = np.random.default_rng(35).uniform(-1.5, 1.5, (5, chain.coordinates))
-    for point in chain.points:
-        jacobian = poses_and_jacobians(chain, q, point)[2]
-        for coordinate in range(chain.coordinates):
-            step = 1e-6 * np.eye(chain.coordinates)[coordinate]
-            slope = pose_differences(*poses(chain, q + step, point), *poses(chain, q - step, point)) / 2e-6
-            np.testing.assert_allclose(jacobian[..., coordinate], slope, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", ["kuka", *OTHER_CHAINS, *ODD_CHAINS])

@@ -1,13 +1,10 @@
 """Sites: the chain that holds every deviation against the robot's own chain, finite differences, pinocchio and the eye."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from support import ODD_CHAINS, OTHER_CHAINS, PARALLELOGRAM, TRACK, chain_of, homogeneous, random_angles
+from support import ODD_CHAINS, OTHER_CHAINS, TRACK, chain_of, homogeneous, random_angles
 
 from elastocal.mechanics.kinematics import poses, poses_and_jacobians
-from elastocal.mechanics.robot import Mass
 from elastocal.mechanics.sites import sites_of
 
 NAMES = ["kuka", "fanuc", *OTHER_CHAINS]
@@ -98,23 +95,7 @@ def test_carried_links_are_those_whose_weight_can_turn_the_joint(name, chain_cal
     assert sites.shoulder == next(joint for joint, links in enumerate(expected) if links)
 
 
-def test_sites_of_a_robot_on_a_track_and_of_one_with_a_parallelogram():
+def test_sites_of_a_robot_on_a_track():
     sites = sites_of(chain_of(TRACK))
     assert sites.prismatic == (True, False, False, False) and sites.joint_signs == (-1.0, 1.0, 1.0, 1.0)
     np.testing.assert_allclose(sites.link_vectors_m[:3], [(0, 0, 0.3), (0, 0, 0.5), (0.3, 0, 0)], atol=1e-16)
-    sites = sites_of(chain_of(PARALLELOGRAM))
-    assert (sites.joints, len(sites.tilt), len(sites.link_end)) == (4, 4, 5)
-    # A link ends where a passive joint turns.
-    np.testing.assert_allclose(sites.link_vectors_m[2:4], [(0, 0, 0.8), (0.9, 0, 0)], atol=1e-16)
-
-
-def test_the_longest_torque_of_a_weight_is_that_of_a_level_arm_with_the_mass_in_the_middle_of_its_link(kuka):
-    """Of an arm of 1.15 m and, stretched out behind it, a forearm of 1.2 m; the longest lever of sixteen poses is near that."""
-    arm, forearm = Mass(2, 100.0, (0.5, 0.0, 0.0), 0.1), Mass(3, 40.0, (0.5, 0.0, 0.0), 0.1)
-    sites = replace(sites_of(kuka.chain), masses=(arm, forearm))
-    of_arm = replace(sites, masses=(arm,)).longest_weight_torque_Nm(1)
-    assert 0.95 < of_arm / (100.0 * 9.80665 * 0.5 * 1.15) <= 1.0 + 1e-9
-    reach = 1.15 + np.hypot(1.2, 0.041)
-    assert 0.8 < (sites.longest_weight_torque_Nm(1) - of_arm) / (40.0 * 9.80665 * 0.5 * (1.15 + reach)) <= 1.0 + 1e-9
-    # The arm does not hang on joint 3.
-    assert sites.longest_weight_torque_Nm(2) == replace(sites, masses=(forearm,)).longest_weight_torque_Nm(2) > 0

@@ -132,18 +132,12 @@ def _add_link_errors(chain: Chain, at_ends: dict[int, np.ndarray]) -> Chain:
     for place in range(len(chain.transforms) + 1):
         transform = chain.transforms[place] if place < len(chain.transforms) else None
         ends = transform is None or transform.coordinate is not None
-        if ends and seen in at_ends and not (transform is not None and chain.is_passive(place) and _has_ended(chain, place)):
+        if ends and seen in at_ends:
             error = at_ends.pop(seen)
             transforms += [Transform("TR"[axis // 3], axis % 3, float(value)) for axis, value in enumerate(error)]
         moved[place] = len(transforms)
         if transform is not None:
             transforms.append(transform)
-            seen += transform.coordinate is not None and not chain.is_passive(place)
+            seen += transform.coordinate is not None
     points = tuple(MeasuringPoint(p.name, moved[p.after], p.offset_m) for p in chain.points)
     return Chain(tuple(transforms), points, chain.coordinates)
-
-
-def _has_ended(chain: Chain, place: int) -> bool:
-    """Whether the link before a place has ended before it, at an earlier passive joint."""
-    before = [p for p in range(place) if chain.transforms[p].coordinate is not None]
-    return bool(before) and chain.is_passive(before[-1])

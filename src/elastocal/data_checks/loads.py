@@ -11,22 +11,20 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 from scipy.constants import g, pound_force
 
-from elastocal.data_checks.placement import at_targets, free_columns, rms, robust_sigma, robustly_placed, spread
+from elastocal.data_checks.placement import Placement, jacobians_at_targets, placed, rms, robust_sigma, robustly_placed, spread
 from elastocal.data_checks.protocol import Fault, Value
 from elastocal.fitting.identifiability import solve_normal
-from elastocal.fitting.observations import single_observations, state_clusters
-from elastocal.fitting.prediction import measured_in_base
+from elastocal.fitting.observations import state_clusters
 from elastocal.mechanics.elastostatics import generalized_forces, regressor
-from elastocal.mechanics.kinematics import poses_and_jacobians
+from elastocal.mechanics.kinematics import jacobians
 
 if TYPE_CHECKING:
-    from elastocal.campaigns.campaign import Campaign, Measurements
+    from elastocal.campaigns.campaign import Campaign
 
-NAMES, FAMILY, AFTER = ("wrong_sign", "wrong_unit"), "data", ("constant_columns", "alternatives")
-
-_MANY_POSES = 150
+_MANY_POSES, _FEWEST_POSES = 150, 4
 # Compliances of a robot and those of its data sheet differ by no more, all together and each beside the others.
 _RATIO = 1.7
 # A joint says something if its compliance is known so well, and so many joints must.
@@ -35,63 +33,23 @@ _WELL_KNOWN, _FEWEST_JOINTS = 0.15, 3
 _UNEXPLAINED = 0.5
 # Units that explain the deflections as well as each other, but for so much, are distinguished by the compliances alone.
 _AS_WELL = 1.1
-_FEWEST_POSES = 4
 _ROUNDING_M = 1e-9
 _APART, _REJECTIONS = 6.0, 4
 # Below this share of their square, loads of one pose do not differ.
 _DIFFERING = 1e-6
-
-
-@dataclass(frozen=True)
-class Unit:
-    """Units in which loads may have been written.
-
-    `force`, `moment`: N and N m for each unit written. `detail`: empty for N and N m themselves.
-    """
-
-    force: float
-    moment: float
-    detail: str
-
-
+# Newtons and newton metres for each unit in which loads may have been written, and what is said of it.
 UNITS = (
-    Unit(1.0, 1.0, ""),
-    Unit(g, g, "the loads look like kilogram-force: measurements fit 9.81 times the written loads"),
-    Unit(1 / g, 1 / g, "measurements fit the written loads over 9.81, as if they had been converted twice"),
-    Unit(1e3, 1e3, "the loads look like kilonewtons: measurements fit 1000 times the written loads"),
-    Unit(1e-3, 1e-3, "the loads look like millinewtons: measurements fit a thousandth of the written loads"),
-    Unit(pound_force, pound_force, "the loads look like pounds-force: measurements fit 4.45 times the written loads"),
-    Unit(1 / pound_force, 1 / pound_force, "measurements fit the written loads over 4.45, as if they had been converted twice"),
-    Unit(1.0, 1e-3, "the moments look like newton millimetres: measurements fit a thousandth of the written moments"),
-    Unit(1e3, 1.0, "the forces look like kilonewtons: measurements fit 1000 times the written forces"),
-    Unit(g, 1.0, "the forces look like kilogram-force: measurements fit 9.81 times the written forces"),
+    (1.0, 1.0, ""),
+    (g, g, "the loads look like kilogram-force: measurements fit 9.81 times the written loads"),
+    (1 / g, 1 / g, "measurements fit the written loads over 9.81, as if they had been converted twice"),
+    (1e3, 1e3, "the loads look like kilonewtons: measurements fit 1000 times the written loads"),
+    (1e-3, 1e-3, "the loads look like millinewtons: measurements fit a thousandth of the written loads"),
+    (pound_force, pound_force, "the loads look like pounds-force: measurements fit 4.45 times the written loads"),
+    (1 / pound_force, 1 / pound_force, "measurements fit the written loads over 4.45, as if they had been converted twice"),
+    (1.0, 1e-3, "the moments look like newton millimetres: measurements fit a thousandth of the written moments"),
+    (1e3, 1.0, "the forces look like kilonewtons: measurements fit 1000 times the written forces"),
+    (g, 1.0, "the forces look like kilogram-force: measurements fit 9.81 times the written forces"),
 )
-
-
-def find(campaign: Campaign, measurements: Measurements) -> list[Fault]:
-    """Sign and unit in which the loads explain the measurements, where they are not as they must be.
-
-    Only where compliances are known: no size of a deflection is to be expected else.
-    """
-    deflected = deflections(campaign, measurements) if campaign.robot.compliance_known else None
-    found = unit_of_loads(deflected) if deflected else None
-    if found is None:
-        return []
-    evidence, faults = (found.rms_as_written, found.rms_corrected), []
-    slope = Value("deflection over the one expected", found.slope, "–")
-    if found.sign < 0:
-        detail = "the loads fit turned round, as if they were written as what the robot does to its surroundings"
-        faults.append(Fault("wrong_sign", (), detail, (slope,), evidence, (), True))
-    if found.unit.detail:
-        parameters = (
-            Value("newtons for each unit of force written", found.unit.force, "N"),
-            Value("newton metres for each unit of moment written", found.unit.moment, "N m"),
-            slope,
-        )
-        other = found.less_likely
-        detail = found.unit.detail if other is None else f"{found.unit.detail}; less likely, {other.detail}"
-        faults.append(Fault("wrong_unit", (), detail, parameters, evidence, (), True))
-    return faults
 
 
 @dataclass(frozen=True)
@@ -107,73 +65,66 @@ class Deflections:
     poses: int
 
 
-@dataclass(frozen=True)
-class UnitFound:
-    """Sign and unit in which the loads explain the deflections.
-
-    `sign`: +1, or -1 where the loads are turned round. `unit`: which brings the compliances nearest to the nominal ones.
-    `less_likely`: another that explains the deflections as well, by compliances that are further from the nominal ones.
-    `slope`: deflection seen over the one expected as written, the mean over the joints. `rms_as_written`, `rms_corrected`:
-    residual at nominal compliances times the best factor that robots have in common, m.
-    """
-
-    sign: float
-    unit: Unit
-    less_likely: Unit | None
-    slope: float
-    rms_as_written: float
-    rms_corrected: float
-
-
-def deflections(campaign: Campaign, measurements: Measurements) -> Deflections | None:
+def deflections(campaign: Campaign) -> Deflections | None:
     """Differences between the loads of each pose; where there is one load a pose, all of the deflection.
 
     Frames, targets and geometry are taken off as means of each target in each pose (within transformation) or, where the loads
     of a pose do not differ, by projection (Frisch-Waugh-Lovell theorem [1]).
 
-    Returns None without loads, or with too few poses.
+    Returns None without loads or known compliances, for no size of a deflection is to be expected then, or with too few poses.
 
     [1] Lovell, M. C., Seasonal adjustment of economic time series and multiple regression analysis, Journal of the American
         Statistical Association 58, 1963.
     """
-    if not measurements.wrench.any():
+    pose = state_clusters(campaign.measurements)
+    loaded = campaign.robot.compliance_known and campaign.measurements.wrench.any()
+    if not loaded or pose.max() + 1 < _FEWEST_POSES:
         return None
-    pose = state_clusters(measurements)
-    chosen = np.unique(np.linspace(0, pose.max(), _MANY_POSES).round().astype(int))
-    measurements = measurements.select(np.isin(pose, chosen))
+    measurements = campaign.measurements.select(np.isin(pose, np.linspace(0, pose.max(), _MANY_POSES).round().astype(int)))
+    campaign, chain = replace(campaign, measurements=measurements), campaign.robot.chain
     # Frames and targets from the lowest loads: those of a wrong unit must not enter.
-    estimate = robustly_placed(campaign, spread(measurements)).estimate
-    position, rotation, jacobian = at_targets(campaign.robot.chain, measurements.joint_angles, campaign, measurements, estimate)
-    residual, end = measured_in_base(estimate, single_observations(measurements))[0] - position, _end(campaign, measurements)
+    whole = placed(campaign, robustly_placed(spread(campaign)).estimate)
+    residual, jacobian = whole.measured[0] - whole.predicted[0], jacobians_at_targets(campaign, whole.estimate)
+    end = jacobians(chain, measurements.joint_angles, replace(chain.end_effector, offset_m=(0.0, 0.0, 0.0)))
     torques = [generalized_forces(end, measurements.wrench * (np.arange(6) // 3 == part)) for part in (0, 1)]
-    parts = [regressor(jacobian, each) * campaign.robot.compliance for each in torques]
+    parts = [residual[..., None], *(regressor(jacobian, each) * campaign.robot.compliance for each in torques)]
     pose = state_clusters(measurements)
-    count = int(pose.max()) + 1
-    if count < _FEWEST_POSES:
-        return None
-    group = pose * len(campaign.targets) + measurements.target
-    centred = [_centred(values, group) for values in (residual[..., None], *parts)]
-    whole = sum((part**2).sum() for part in parts)
-    if sum((part**2).sum() for part in centred[1:]) <= _DIFFERING * whole:
+    rows = [part.reshape(len(measurements), -1) for part in parts]
+    group = [pose, measurements.target]
+    centred = [part - pd.DataFrame(part).groupby(group).transform("mean").to_numpy() for part in rows]
+    if sum((part**2).sum() for part in centred[1:]) <= _DIFFERING * sum((part**2).sum() for part in rows[1:]):
         # Less what frames, targets and joint offsets can explain of them.
-        columns = [jacobian, *free_columns(campaign, measurements, rotation, position)]
-        left, sizes, _ = np.linalg.svd(np.concatenate(columns, axis=-1).reshape(residual.size, -1), full_matrices=False)
-        basis = left[:, sizes > 1e-9 * sizes[0]]
-        whole_columns = [part.reshape(residual.size, -1) for part in (residual, *parts)]
-        centred = [values - basis @ (basis.T @ values) for values in whole_columns]
-    flat = [values.reshape(3 * len(measurements), -1) for values in centred]
-    return Deflections(flat[0][:, 0], flat[1], flat[2], count)
+        free = np.concatenate([jacobian, *_of_frames_and_targets(campaign, whole)], axis=-1)
+        left, sizes, _ = np.linalg.svd(free.reshape(residual.size, -1), full_matrices=False)
+        basis, flat = left[:, sizes > 1e-9 * sizes[0]], [part.reshape(residual.size, -1) for part in parts]
+        centred = [values - basis @ (basis.T @ values) for values in flat]
+    seen, by_force, by_moment = (values.reshape(residual.size, -1) for values in centred)
+    return Deflections(seen[:, 0], by_force, by_moment, int(pose.max()) + 1)
 
 
-def unit_of_loads(deflected: Deflections) -> UnitFound | None:
-    """The sign and unit that explain the deflections far better than the loads as written.
+def _of_frames_and_targets(campaign: Campaign, beside: Placement) -> list[np.ndarray]:
+    """Sensitivities of positions to frames and targets that nobody knows, ndarrays (N, 3, .), base axes."""
+    measurements, columns = campaign.measurements, []
+    if campaign.frame == "tracker":
+        turns = np.stack([np.cross(axis, beside.predicted[0]) for axis in np.eye(3)], axis=-1)
+        rigid = np.concatenate([np.broadcast_to(np.eye(3), turns.shape), turns], axis=-1)
+        columns += [rigid * (measurements.session == session)[:, None, None] for session in np.unique(measurements.session)]
+    unknown = [index for index, target in enumerate(campaign.targets) if target.offset_m is None]
+    return columns + [beside.nominal[1] * (measurements.target == index)[:, None, None] for index in unknown]
 
-    Returns None where the loads as written do, or where nothing does.
+
+def wrong_loads(deflected: Deflections | None) -> list[Fault]:
+    """The sign and the unit that explain deflections far better than the loads as written; none where nothing does.
+
+    Of units that explain them as well, the one that brings the compliances nearest to the nominal ones, and the next one as
+    less likely.
     """
+    if deflected is None:
+        return []
     as_written = (deflected.by_force + deflected.by_moment).sum(axis=1)
     found = []
-    for unit in UNITS:
-        corrected = unit.force * deflected.by_force + unit.moment * deflected.by_moment
+    for force, moment, detail in UNITS:
+        corrected = force * deflected.by_force + moment * deflected.by_moment
         fitted = _ratios(deflected, corrected)
         if fitted is None:
             continue
@@ -188,14 +139,24 @@ def unit_of_loads(deflected: Deflections) -> UnitFound | None:
         before, share_before = _left(seen, written)
         after, share_after = _left(seen, sign * corrected[kept].sum(axis=1))
         if share_before >= _UNEXPLAINED and share_after <= _UNEXPLAINED * share_before:
-            slope = float(written @ seen / (written @ written))
-            found.append((abs(off.mean()), UnitFound(sign, unit, None, slope, before, after)))
-    if not found:
-        return None
-    least = min(each.rms_corrected for _, each in found)
-    as_well = sorted((pair for pair in found if pair[1].rms_corrected <= _AS_WELL * least), key=lambda pair: pair[0])
-    best = as_well[0][1]
-    return replace(best, less_likely=as_well[1][1].unit) if len(as_well) > 1 else best
+            slope = Value("deflection over the one expected", float(written @ seen / (written @ written)), "–")
+            found.append((abs(off.mean()), (before, after), sign, (force, moment, detail), slope))
+    as_well = [each for each in found if each[1][1] <= _AS_WELL * min(other[1][1] for other in found)]
+    if not as_well:
+        return []
+    (_, evidence, sign, (force, moment, detail), slope), *others = sorted(as_well, key=lambda each: each[0])
+    faults = []
+    if sign < 0:
+        turned = "the loads fit turned round, as if they were written as what the robot does to its surroundings"
+        faults.append(Fault("wrong_sign", (), turned, (slope,), evidence, (), True))
+    if detail:
+        units = (
+            Value("newtons for each unit of force written", force, "N"),
+            Value("newton metres for each unit of moment written", moment, "N m"),
+        )
+        words = "; ".join([detail, *(f"less likely, {other[3][2]}" for other in others[:1])])
+        faults.append(Fault("wrong_unit", (), words, (*units, slope), evidence, (), True))
+    return faults
 
 
 def _left(seen: np.ndarray, expected: np.ndarray) -> tuple[float, float]:
@@ -213,8 +174,7 @@ def _ratios(deflected: Deflections, expected: np.ndarray) -> tuple[np.ndarray, n
     joints = expected.shape[1]
     kept = np.ones(len(deflected.seen), bool)
     for _ in range(_REJECTIONS):
-        left, right = expected[kept], deflected.seen[kept]
-        solution = np.linalg.lstsq(left, right, rcond=1e-10)[0]
+        solution = np.linalg.lstsq(expected[kept], deflected.seen[kept], rcond=1e-10)[0]
         residual = deflected.seen - expected @ solution
         kept = np.abs(residual) <= _APART * max(robust_sigma(np.abs(residual), 1), _ROUNDING_M)
         if kept.sum() < 4 * joints:
@@ -225,19 +185,4 @@ def _ratios(deflected: Deflections, expected: np.ndarray) -> tuple[np.ndarray, n
     # Measurements of one pose have their errors in common: poses count, not measurements.
     deviation = np.sqrt(np.diag(covariance) * max(kept.sum() / (3 * deflected.poses), 1.0))
     well = ~held & (deviation < _WELL_KNOWN * np.abs(step))
-    if well.sum() < min(_FEWEST_JOINTS, joints):
-        return None
-    return step[well], kept
-
-
-def _end(campaign: Campaign, measurements: Measurements) -> np.ndarray:
-    """Jacobian of the origin of the last measuring point, where wrenches are stated, ndarray (N, 6, n)."""
-    chain = campaign.robot.chain
-    return poses_and_jacobians(chain, measurements.joint_angles, replace(chain.end_effector, offset_m=(0.0, 0.0, 0.0)))[2]
-
-
-def _centred(values: np.ndarray, group: np.ndarray) -> np.ndarray:
-    """Values less the mean of their group."""
-    total = np.zeros((group.max() + 1, *values.shape[1:]))
-    np.add.at(total, group, values)
-    return values - (total / np.maximum(np.bincount(group), 1).reshape(-1, *[1] * (values.ndim - 1)))[group]
+    return (step[well], kept) if well.sum() >= min(_FEWEST_JOINTS, joints) else None

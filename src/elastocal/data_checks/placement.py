@@ -1,11 +1,9 @@
-"""Where the nominal robot puts each measurement, without loads, once frames and targets are fitted to most of the measurements.
-
-No NAMES: what the faults of positions have in common.
-"""
+"""Where the nominal robot puts each measurement, without loads, in frames and targets fitted to most of the measurements."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,7 +20,6 @@ if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.observations import Observations
-    from elastocal.mechanics.chain import Chain
 
 # Poses enough to tell what concerns all measurements.
 MANY_POSES = 80
@@ -30,10 +27,9 @@ MANY_POSES = 80
 IMPLAUSIBLE_M, IMPLAUSIBLE_RAD = 0.02, 0.1
 # A correction must lower the residual by this factor.
 FAR_BETTER = 5.0
-# Share of the measurements that frames and targets are first fitted to, and steps of fitting to those that fit best.
-_CORE, _CORE_STEPS = 0.6, 5
-# Measurements beyond so many robust standard deviations take no part in the last fit.
-_APART = 5.0
+# Share of the measurements that frames and targets are first fitted to, and steps of fitting to those that fit best. Those
+# beyond so many robust standard deviations take no part in the last fit.
+_CORE, _CORE_STEPS, _APART = 0.6, 5, 5.0
 # Largest distances that an RMS leaves out: single measurements say nothing of all.
 _TRIMMED = 0.1
 
@@ -42,35 +38,48 @@ _TRIMMED = 0.1
 class Placement:
     """Measurements beside the nominal robot, in base axes.
 
-    `estimate`: frames and targets. `predicted`, `measured` (N, 3): m. `predicted_rotation`, `measured_rotation` (N, 3, 3).
+    `model`: frames and targets alone. `nominal` (N, 3), (N, 3, 3): poses of the measuring points. `estimate`: frames, targets.
     """
 
+    model: Model
+    observations: Observations
+    nominal: tuple[np.ndarray, np.ndarray]
     estimate: Estimate
-    predicted: np.ndarray
-    measured: np.ndarray
-    predicted_rotation: np.ndarray | None
-    measured_rotation: np.ndarray | None
 
-    @property
+    @cached_property
+    def predicted(self) -> tuple[np.ndarray, np.ndarray | None]:
+        """Positions that the robot gives the targets, ndarray (N, 3), m, and orientations (N, 3, 3), as `measured`."""
+        (position, rotation), target = self.nominal, self.observations.target
+        turned = None if self.observations.rotation is None else rotation @ self.estimate.target_rotation[target]
+        return position + (rotation @ self.estimate.target_offset[target][..., None])[..., 0], turned
+
+    @cached_property
+    def measured(self) -> tuple[np.ndarray, np.ndarray | None]:
+        """Positions and orientations; these None where positions alone are measured."""
+        return measured_in_base(self.estimate, self.observations)
+
+    @cached_property
     def distance(self) -> np.ndarray:
         """From the predicted to the measured position, ndarray (N,), m."""
-        return np.linalg.norm(self.measured - self.predicted, axis=1)
+        return np.linalg.norm(self.measured[0] - self.predicted[0], axis=1)
 
-    @property
+    @cached_property
     def turn(self) -> np.ndarray | None:
         """Angle between predicted and measured orientation, ndarray (N,), rad; None where positions are measured."""
-        if self.measured_rotation is None or self.predicted_rotation is None:
+        seen, predicted = self.measured[1], self.predicted[1]
+        if seen is None or predicted is None:
             return None
-        relative = self.measured_rotation @ self.predicted_rotation.transpose(0, 2, 1)
-        return np.linalg.norm(rotation_vectors(relative), axis=1)
+        return np.linalg.norm(rotation_vectors(seen @ predicted.transpose(0, 2, 1)), axis=1)
 
 
-def placed(campaign: Campaign, measurements: Measurements) -> Placement:
-    """Fit frames and targets to all measurements alike."""
-    return _Nominal.of(campaign, measurements).placed()
+def placed(campaign: Campaign, estimate: Estimate | None = None) -> Placement:
+    """Measurements in given frames and targets, or in those fitted to all measurements alike."""
+    model, observations = replace(declared_model(campaign), effects=()), single_observations(campaign.measurements)
+    nominal = nominal_poses(model, observations)
+    return Placement(model, observations, nominal, estimate or registered_to(model, observations, *nominal))
 
 
-def robustly_placed(campaign: Campaign, measurements: Measurements) -> Placement:
+def robustly_placed(campaign: Campaign) -> Placement:
     """Fit frames and targets to the measurements that agree with each other.
 
     Least trimmed squares by concentration steps [1] from the fit to all, trimmed for each target in each session; then one
@@ -79,77 +88,43 @@ def robustly_placed(campaign: Campaign, measurements: Measurements) -> Placement
     [1] Rousseeuw, P. J. and Van Driessen, K., Computing LTS regression for large data sets, Data Mining and Knowledge Discovery
         12, 2006.
     """
-    nominal = _Nominal.of(campaign, measurements)
-    found = nominal.placed()
-    if campaign.frame == "base" and not nominal.model.fitted_parts:
+    found = placed(campaign)
+    if campaign.frame == "base" and not found.model.fitted_parts:
         return found
     for step in range(_CORE_STEPS + 1):
-        distance, kept = found.distance, np.zeros(len(measurements), bool)
-        for members in of_each_target(measurements):
+        distance, kept = found.distance, np.zeros(len(campaign.measurements), bool)
+        for members in of_each_target(campaign.measurements):
             limit = np.quantile(distance[members], _CORE)
             if step == _CORE_STEPS:
                 limit = max(limit, _APART * robust_sigma(distance[members], 3))
             kept[members] = distance[members] <= limit
-        found = nominal.placed(kept)
+        some, nominal = select_states(found.observations, kept), (part[kept] for part in found.nominal)
+        found = replace(found, estimate=registered_to(found.model, some, *nominal))
     return found
 
 
-def placed_by(campaign: Campaign, measurements: Measurements, estimate: Estimate) -> Placement:
-    """Measurements beside the nominal robot in given frames and targets, without loads: they move it by millimetres only."""
-    return _Nominal.of(campaign, measurements).placed_by(estimate)
-
-
-def spread(measurements: Measurements, poses: int = MANY_POSES) -> Measurements:
-    """Measurements of some poses all over the campaign, at the lowest load of each.
+def spread(campaign: Campaign, poses: int = MANY_POSES) -> Campaign:
+    """A campaign with its measurements of some poses all over it, at the lowest load of each.
 
     `poses`: at most so many of each target in each session.
     """
-    chosen = []
-    for members in of_each_target(measurements):
-        order = members[np.lexsort((measurements.repeat[members], measurements.load[members], measurements.pose[members]))]
-        first = order[np.unique(measurements.pose[order], return_index=True)[1]]
+    seen, chosen = campaign.measurements, []
+    for members in of_each_target(seen):
+        order = members[np.lexsort((seen.repeat[members], seen.load[members], seen.pose[members]))]
+        first = order[np.unique(seen.pose[order], return_index=True)[1]]
         chosen.append(first[np.unique(np.linspace(0, len(first) - 1, poses).round().astype(int))])
-    return measurements.select(np.sort(np.concatenate(chosen)))
+    return replace(campaign, measurements=seen.select(np.sort(np.concatenate(chosen))))
 
 
-def at_targets(
-    chain: Chain, coordinates: np.ndarray, campaign: Campaign, measurements: Measurements, estimate: Estimate
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where a chain has the target of each measurement: `position` (N, 3), `rotation` (N, 3, 3), `jacobian` (N, 3, C)."""
-    count = len(coordinates)
-    found = np.empty((count, 3)), np.empty((count, 3, 3)), np.empty((count, 6, chain.coordinates))
+def jacobians_at_targets(campaign: Campaign, estimate: Estimate) -> np.ndarray:
+    """How the target of each measurement moves with the joints, ndarray (N, 3, n)."""
+    chain, measurements = campaign.robot.chain, campaign.measurements
+    found = np.empty((len(measurements), 3, campaign.robot.joints))
     for index, target in enumerate(campaign.targets):
         mine = measurements.target == index
         point = replace(chain.point(target.point), offset_m=tuple(estimate.target_offset[index]))
-        for part, values in zip(found, poses_and_jacobians(chain, coordinates[mine], point), strict=True):
-            part[mine] = values
-    return found[0], found[1], found[2][:, :3]
-
-
-def free_columns(
-    campaign: Campaign, measurements: Measurements, rotation: np.ndarray, position: np.ndarray
-) -> list[np.ndarray]:
-    """Sensitivities of positions to frames and targets that nobody knows, ndarrays (N, 3, .), base axes.
-
-    `rotation`, `position` (N, 3, 3), (N, 3): of the points on which the targets sit, and of the targets.
-    """
-    columns = []
-    if campaign.frame == "tracker":
-        turns = np.stack([np.cross(axis, position) for axis in np.eye(3)], axis=-1)
-        rigid = np.concatenate([np.broadcast_to(np.eye(3), turns.shape), turns], axis=-1)
-        columns += [rigid * (measurements.session == session)[:, None, None] for session in np.unique(measurements.session)]
-    for index, target in enumerate(campaign.targets):
-        if target.offset_m is None:
-            columns.append(rotation * (measurements.target == index)[:, None, None])
-    return columns
-
-
-def with_measured(measurements: Measurements, source: np.ndarray) -> Measurements:
-    """Measurements with the measured columns of other rows."""
-    turned = measurements.rotation_vector
-    return replace(
-        measurements, position=measurements.position[source], rotation_vector=None if turned is None else turned[source]
-    )
+        found[mine] = poses_and_jacobians(chain, measurements.joint_angles[mine], point)[2][:, :3]
+    return found
 
 
 def rms(values: np.ndarray) -> float:
@@ -177,34 +152,3 @@ def of_each_target(measurements: Measurements) -> list[np.ndarray]:
     """Indices of the measurements of each target in each session."""
     number = groups_of(np.column_stack([measurements.session, measurements.target]))[1]
     return [np.flatnonzero(number == group) for group in range(number.max() + 1)]
-
-
-@dataclass(frozen=True)
-class _Nominal:
-    """Measurements beside the poses of their measuring points on the nominal robot, which every placement shares.
-
-    `model`: frames and targets alone. `observations`: N of them. `position`, `rotation` (N, 3), (N, 3, 3): as by
-    `registration.nominal_poses`.
-    """
-
-    model: Model
-    observations: Observations
-    position: np.ndarray
-    rotation: np.ndarray
-
-    @classmethod
-    def of(cls, campaign: Campaign, measurements: Measurements) -> _Nominal:
-        model, observations = replace(declared_model(campaign), effects=()), single_observations(measurements)
-        return cls(model, observations, *nominal_poses(model, observations))
-
-    def placed(self, kept: np.ndarray | None = None) -> Placement:
-        """All of them, in frames and targets that are fitted to all, or to those kept, ndarray of bool (N,)."""
-        some, at = (self.observations, slice(None)) if kept is None else (select_states(self.observations, kept), kept)
-        return self.placed_by(registered_to(self.model, some, self.position[at], self.rotation[at]))
-
-    def placed_by(self, estimate: Estimate) -> Placement:
-        target = self.observations.target
-        predicted = self.position + (self.rotation @ estimate.target_offset[target][..., None])[..., 0]
-        measured, seen = measured_in_base(estimate, self.observations)
-        expected = None if seen is None else self.rotation @ estimate.target_rotation[target]
-        return Placement(estimate, predicted, measured, expected, seen)

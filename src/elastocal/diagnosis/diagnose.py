@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.counting import counted
-from elastocal.data_checks.protocol import Fault, faults
+from elastocal.data_checks.faults import faults
+from elastocal.data_checks.protocol import Fault
 from elastocal.data_checks.warnings import fitted_compliance_warnings
 from elastocal.diagnosis import refit, verdict
 from elastocal.diagnosis.gross_errors import Deviations, Kept, entries_of, first_kept, fitted_to, gross_errors, warnings_of
@@ -86,7 +87,7 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
     whole = case.campaign
     tell = progress or (lambda line: None)
     part = first_kept(case, settings)
-    known = faults(part.case.campaign, part.case.campaign.measurements)
+    known = faults(part.case.campaign)
     decisive = [fault for fault in known if fault.decisive]
     if decisive:
         # Where all measurements mean something else, no single row is wrong.

@@ -1,8 +1,7 @@
 """What effects may depend on in each state of the robot: its loads, its motion, the approach, time and temperature.
 
-The load on each coordinate is the generalized force J^T w of a wrench w (N, N m) by the principle of virtual work [1].
-
-[1] B. Siciliano, L. Sciavicco, L. Villani and G. Oriolo, Robotics: Modelling, Planning and Control, Springer, 2009.
+The load on each coordinate is the generalized force J^T w of a wrench w (N, N m) by the principle of virtual work (Siciliano et
+al. 2009).
 """
 
 from __future__ import annotations
@@ -18,28 +17,11 @@ from elastocal.mechanics.kinematics import Motion, cross, motion
 from elastocal.mechanics.sites import Sites
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-    from typing import Protocol
+    from collections.abc import Iterator
 
-    class States(Protocol):
-        """Poses, loads and senses of approach as they were measured, see `Conditions`; arrays of S."""
+    from elastocal.fitting.observations import States
 
-        @property
-        def pose(self) -> np.ndarray: ...
-        @property
-        def joint_angles(self) -> np.ndarray: ...
-        @property
-        def wrench(self) -> np.ndarray: ...
-        @property
-        def approach(self) -> np.ndarray | None: ...
-        @property
-        def time_s(self) -> np.ndarray | None: ...
-        @property
-        def temperature_c(self) -> np.ndarray | None: ...
-        @property
-        def row(self) -> np.ndarray | None: ...
-        def __len__(self) -> int: ...
-
+    Coordinates = range | list[int] | np.ndarray
 
 # For each mass that the robot file declares: of the mass itself, and of its first moments along the axes of its frame.
 MASS_PARAMETERS = 4
@@ -50,7 +32,7 @@ class Conditions:
     """Everything that an effect may depend on, for S states of the robot.
 
     Loads are taken where the robot has yielded to them: at the displaced coordinates behind `motion`, not at the commanded ones
-    (the term K_C of the conservative congruence transformation [1]).
+    (the term K_C of the conservative congruence transformation (Chen and Kao 2000)).
 
     `compliance` (n,): joint compliances, rad/(N m). `joint_angles` (S, n): as commanded, rad. `wrench` (S, 6): N, N m, at the
     last measuring point, base axes. `motion`: of `Sites.followed`. `mass_corrections` (4 m,): by how much each of the declared
@@ -59,9 +41,6 @@ class Conditions:
     `progress` (S,): how far the campaign had come, from 0 at its first row to 1 at its last: see `progress_of`. `of_angles`:
     laws that go with the joint angles alone, by the keys of their candidates; shared wherever the same states are under other
     loads: see `Candidate.fixed`.
-
-    [1] S.-F. Chen and I. Kao, Conservative congruence transformation for joint and Cartesian stiffness matrices of robotic
-        hands and fingers, International Journal of Robotics Research 19, 2000.
     """
 
     sites: Sites
@@ -83,10 +62,7 @@ class Conditions:
 
     @cached_property
     def load(self) -> np.ndarray:
-        """Generalized force of the external wrench on every coordinate of the sites (equation 7), ndarray (S, C).
-
-        N on translations, N m on rotations.
-        """
+        """Generalized force (N, N m) of the external wrench on every coordinate of the sites (equation 7), ndarray (S, C)."""
         force, moment = self.wrench.T[:3], np.empty((3, len(self.wrench)))
         cross(self.motion.position[0], force, moment)
         moment += self.wrench.T[3:]
@@ -98,9 +74,9 @@ class Conditions:
         sites, corrections = self.sites, self.mass_corrections.reshape(-1, MASS_PARAMETERS)
         masses = np.array([mass.mass_kg for mass in sites.masses]) + corrections[:, 0]
         centres = np.array([mass.centre_m for mass in sites.masses])
-        along, rotation = masses[:, None] * centres + corrections[:, 1:], self._body_rotation
+        along, rotation = masses[:, None] * centres + corrections[:, 1:], self.motion.rotation[self._bodies]
         first = sum(along[:, j, None, None] * rotation[:, :, j] for j in range(3))
-        return self._gravity_of(masses, first + masses[:, None, None] * self._body_position, self._behind)
+        return self._gravity_of(masses, first + masses[:, None, None] * self.motion.position[self._bodies], self._behind)
 
     @cached_property
     def usual_gravity(self) -> np.ndarray:
@@ -116,29 +92,21 @@ class Conditions:
         on_each = self._falling[0] * (behind @ masses)[:, None]
         for i in range(3):
             on_each += self._falling[1][i] * (behind @ first[:, i])
-        return self.motion.by_coordinate(on_each).T
+        return on_each.T
 
-    def gravity_of_corrections(self, coordinates: Sequence[int]) -> Iterator[np.ndarray]:
-        """By how much `gravity` on some coordinates, in rising order, grows with each of the `mass_corrections`, per unit.
+    def gravity_of_corrections(self, coordinates: Coordinates) -> Iterator[np.ndarray]:
+        """By how much `gravity` on some coordinates grows with each of the `mass_corrections`, per unit.
 
         Yields (number of the coordinates, S).
         """
-        moved = self.motion
-        chosen = np.flatnonzero(np.isin(moved.coordinate, coordinates))
-        place, row = moved.place[chosen], np.searchsorted(coordinates, moved.coordinate[chosen])
-        falling, turning = self._falling[0][chosen], [each[chosen] for each in self._falling[1]]
         for number in range(len(self.mass_corrections)):
-            after, first_moment, mass = self._correction(number)
-            on_each = sum(turning[i] * first_moment[i] for i in range(3))
-            if mass:
-                on_each += mass * falling
-            on_each[place >= after] = 0.0
-            if len(chosen) == len(coordinates):
-                yield on_each
+            body, kind = divmod(number, MASS_PARAMETERS)
+            rotation, after = self.motion.rotation[self._bodies][body], self.sites.followed[self.sites.joints + 2 + body].after
+            if kind:
+                yield self._weighing(coordinates, after, rotation[:, kind - 1], 0.0)
             else:
-                on_coordinates = np.zeros((len(coordinates), on_each.shape[1]))
-                np.add.at(on_coordinates, row, on_each)
-                yield on_coordinates
+                centre = np.tensordot(self.sites.masses[body].centre_m, rotation, (0, 1))
+                yield self._weighing(coordinates, after, self.motion.position[self._bodies][body] + centre)
 
     @cached_property
     def total(self) -> np.ndarray:
@@ -150,45 +118,26 @@ class Conditions:
     @cached_property
     def mass_torques(self) -> np.ndarray:
         """Torque on each joint per unit of each of the `mass_corrections`, ndarray (4 m, S, n)."""
-        moved, bodies, centres = self.motion, self._body_rotation, np.array([mass.centre_m for mass in self.sites.masses])
-        chosen = slice(np.searchsorted(moved.coordinate, self.sites.joints))
-        falling, turning = self._falling
-        first = np.empty((len(bodies), MASS_PARAMETERS, *bodies.shape[1:2], bodies.shape[-1]))
-        first[:, 1:] = bodies.swapaxes(1, 2)
-        first[:, 0] = self._body_position + (bodies * centres[:, None, :, None]).sum(axis=2)
-        on_each = turning[0][chosen] * first[:, :, 0, None]
-        for i in (1, 2):
-            on_each += turning[i][chosen] * first[:, :, i, None]
-        on_each[:, 0] += falling[chosen]
-        on_each *= self._behind[chosen].T[:, None, :, None]
-        found = moved.by_coordinate(on_each)
-        return found.reshape(-1, *found.shape[2:]).swapaxes(1, 2)
+        return np.array(list(self.gravity_of_corrections(range(self.sites.joints)))).swapaxes(1, 2)
 
     @cached_property
     def weight(self) -> np.ndarray:
         """Torque on each joint of one kilogram at the far end of each link, ndarray (n + 1, S, n)."""
-        ends = enumerate(self.sites.followed[1 : self.sites.joints + 2], 1)
-        return np.array([self._weighing(end.after, self.motion.position[number]) for number, end in ends])
+        joints, ends = range(self.sites.joints), enumerate(self.sites.followed[1 : self.sites.joints + 2], 1)
+        return np.array([self._weighing(joints, end.after, self.motion.position[number]).T for number, end in ends])
 
     def weight_moment(self, link: int, axis: int) -> np.ndarray:
         """Torque on each joint of a first moment of one kg m along an axis of the frame at the far end of a link, (S, n)."""
-        return self._weighing(self.sites.followed[1 + link].after, self.motion.rotation[1 + link][:, axis], 0.0)
+        after, moment = self.sites.followed[1 + link].after, self.motion.rotation[1 + link][:, axis]
+        return self._weighing(range(self.sites.joints), after, moment, 0.0).T
 
-    def _correction(self, number: int) -> tuple[int, np.ndarray, float]:
-        """Of what one of the `mass_corrections` adds: how many transforms come before it, its first moment (3, S), its mass."""
-        body, kind = divmod(number, MASS_PARAMETERS)
-        rotation, after = self._body_rotation[body], self.sites.followed[self.sites.joints + 2 + body].after
-        if kind:
-            return after, rotation[:, kind - 1], 0.0
-        return after, self._body_position[body] + np.tensordot(self.sites.masses[body].centre_m, rotation, (0, 1)), 1.0
-
-    def _weighing(self, after: int, first_moment: np.ndarray, mass: float = 1.0) -> np.ndarray:
-        """Torque on each joint of a mass and its first moment (3, S) behind so many transforms, ndarray (S, n)."""
-        moved = self.motion
-        chosen = slice(np.searchsorted(moved.coordinate, self.sites.joints))
+    def _weighing(self, coordinates: Coordinates, after: int, first_moment: np.ndarray, mass: float = 1.0) -> np.ndarray:
+        """Force on some coordinates of a mass and its first moment (3, S) behind so many transforms, ndarray (., S)."""
+        chosen = slice(coordinates.start, coordinates.stop) if isinstance(coordinates, range) else coordinates
         falling, turning = self._falling
-        on_each = mass * falling[chosen] + sum(turning[i][chosen] * first_moment[i] for i in range(3))
-        return moved.by_coordinate(on_each * (moved.place[chosen] < after)[:, None]).T
+        on_each = sum(turning[i][chosen] * first_moment[i] for i in range(3)) + mass * falling[chosen]
+        on_each[self.motion.place[chosen] >= after] = 0.0
+        return on_each
 
     @cached_property
     def end_rotation(self) -> np.ndarray:
@@ -206,18 +155,14 @@ class Conditions:
         return generalized_forces(self.end_jacobian, wrench) * self.compliance
 
     @property
-    def _body_position(self) -> np.ndarray:
-        return self.motion.position[self.sites.joints + 2 : len(self.sites.followed)]
-
-    @property
-    def _body_rotation(self) -> np.ndarray:
-        return self.motion.rotation[self.sites.joints + 2 : len(self.sites.followed)]
+    def _bodies(self) -> slice:
+        """Of what has a mass among the points that `motion` follows."""
+        return slice(self.sites.joints + 2, len(self.sites.followed))
 
     @cached_property
     def _behind(self) -> np.ndarray:
         """Whether each mass is behind each moving transform, ndarray (K, m)."""
-        bodies = self.sites.followed[self.sites.joints + 2 :]
-        return (self.motion.place[:, None] < [body.after for body in bodies]).astype(float)
+        return (self.motion.place[:, None] < [body.after for body in self.sites.followed[self._bodies]]).astype(float)
 
     @cached_property
     def _falling(self) -> tuple[np.ndarray, list[np.ndarray]]:
@@ -232,10 +177,10 @@ class Conditions:
 
 
 def progress_of(states: States, row_span: tuple[int, int] | None = None) -> np.ndarray:
-    """How far a campaign had come in each state.
+    """How far a campaign had come in each state, ndarray (S,): 0 at its first row, 1 at its last.
 
-    `row_span` (int, int): first and last row of the campaign; those of the states without. States that have no row come after
-    it. Returns (S,): 0 at the first row, 1 at the last. Where no rows are known, poses count in the order of their numbers.
+    `row_span` (int, int): these rows; those of the states without. States that have no row come after them. Where no rows are
+    known, poses count in the order of their numbers.
     """
     if not len(states) or (states.row is None and row_span is not None):
         return np.ones(len(states))
@@ -282,15 +227,9 @@ def at_coordinates(conditions: Conditions, coordinates: np.ndarray) -> Condition
 
 
 def at_states(conditions: Conditions, chosen: slice | np.ndarray) -> Conditions:
-    """Some of the states.
-
-    `chosen` (S,) of bool.
-    """
+    """Some of the states; `chosen` (S,) of bool."""
     moved = conditions.motion
-    some = replace(
-        moved, position=moved.position[..., chosen], rotation=moved.rotation[..., chosen], twist=moved.twist[..., chosen]
-    )
-
+    some = replace(moved, **{name: getattr(moved, name)[..., chosen] for name in ("position", "rotation", "twist")})
     columns = ("joint_angles", "wrench", "approach", "time_s", "temperature_c", "progress")
     kept = {name: values[chosen] for name in columns if (values := getattr(conditions, name)) is not None}
     return replace(conditions, motion=some, of_angles={}, **kept)
@@ -322,11 +261,12 @@ def offered(sites: Sites, states: States) -> frozenset[str]:
     Returns "load": an external load or a weight; "load on the joints": that, or declared masses; "external load", without which
     the compliances are not identifiable; "approach", where it is known somewhere; "time" and "temperature", where they change.
     """
-    loaded = bool(sites.masses) or bool(states.wrench.any())
+    external = bool(states.wrench.any())
+    loaded = bool(sites.masses) or external
     there = {
         "load": sites.usual_weight or loaded,
         "load on the joints": loaded,
-        "external load": bool(states.wrench.any()),
+        "external load": external,
         "approach": states.approach is not None and bool(states.approach.any()),
         "time": states.time_s is not None and np.ptp(states.time_s) > 0,
         "temperature": states.temperature_c is not None and np.ptp(states.temperature_c) > 0,

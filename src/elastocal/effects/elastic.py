@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects.gravity import compensated_joint, wave_parameters, waves
+from elastocal.effects.gravity import compensated_joint, wave_parameters
 from elastocal.effects.protocol import (
     LOADED_JOINTS,
-    WAVES,
     Candidate,
     Parameter,
     Shape,
@@ -20,6 +19,7 @@ from elastocal.effects.protocol import (
     load_behind,
     small_form,
     turning_joints,
+    waves,
 )
 from elastocal.effects.sizes import JOINT, PER_LENGTH, SHIFT, STIFFEST, Size
 
@@ -75,12 +75,10 @@ def link_elasticity(own: Effect, sites: Sites, links: tuple[int, ...], detail: s
     y = F_y l^3 a/EI + M_z l^2 b/EI, r_z = F_y l^2 b/EI + M_z l c/EI, likewise in the other plane, r_x = M_x l c/GJ,
 
     are shift (m) and turns (rad) of the far end under force F (N) and moment M (N m) there, with x along the link of length l
-    (m): Euler-Bernoulli and St Venant [1]. A uniform link has a, b, c = 1/3, 1/2, 1; one whose diameter falls linearly by a
-    share t to its far end, thin-walled, the integrals over s from 0 to 1 of (1 - s)^2, 1 - s and 1 over (1 - t s)^3. Linear in
-    1/EI and 1/GJ, 1/(N m^2), of the uniform link that a force shifts and a moment along twists as far: so what is estimated of
-    the size hardly depends on the taper. Stretching and shear are left out, for they are small in links much longer than wide.
-
-    [1] S. P. Timoshenko and J. M. Gere, Mechanics of Materials, Van Nostrand Reinhold, 1972.
+    (m): Euler-Bernoulli and St Venant (Timoshenko and Gere 1972). A uniform link has a, b, c = 1/3, 1/2, 1; one whose diameter
+    falls linearly by a share t to its far end, thin-walled, the integrals over s from 0 to 1 of (1 - s)^2, 1 - s and 1 over (1
+    - t s)^3. Linear in 1/EI and 1/GJ, 1/(N m^2), of the uniform link that a force shifts and a moment along twists as far.
+    Stretching and shear are left out, small in links much longer than wide.
     """
     # A fit asks for the same taper under one load after the other.
     compliances = lru_cache(maxsize=4)(lambda taper: [_end_compliance(sites, link, taper) for link in links])
@@ -127,12 +125,8 @@ def joint_tilt(own: Effect, sites: Sites, joint: int) -> Candidates:
     """A bearing that tilts across its axis under the moment that it carries.
 
     theta_e = c_e (e . M_i) at joint i, with theta_e the tilt (rad) about each of the two axes e across the joint's own, which
-    turn with it, M_i the moment of load and declared masses there (N m) and c_e in rad/(N m) [1]. The carriage of a prismatic
-    joint rolls about its own axis as well.
-
-    [1] C. Reinl, M. Friedmann, J. Bauer, M. Pischan, E. Abele and O. von Stryk, Model-based off-line compensation of path
-        deviation for industrial robots in milling applications, IEEE/ASME Conference on Advanced Intelligent Mechatronics,
-        2011.
+    turn with it, M_i the moment of load and declared masses there (N m) and c_e in rad/(N m) (Reinl et al. 2011). The carriage
+    of a prismatic joint rolls about its own axis as well.
     """
     # A carriage rolls about its own axis too, which is no joint's.
     across = [axis for axis in range(3) if sites.prismatic[joint] or axis != sites.joint_axes[joint]]
@@ -153,10 +147,8 @@ def base_compliance(own: Effect, sites: Sites) -> Candidates:
 
     u = C (F, M + p x F), C = diag(c_h, c_h, c_v, c_t, c_t, 0), is the displacement of the foot (m, rad) in base axes under a
     force F (N) and a moment M (N m) at p (m), declared masses included; c_h and c_v in m/N, c_t in rad/(N m), like a rigid
-    footing on springs [1]. The compliance about the vertical is that of a joint 1 that turns about it, and is not counted
-    again.
-
-    [1] F. E. Richart, J. R. Hall and R. D. Woods, Vibrations of Soils and Foundations, Prentice-Hall, 1970.
+    footing on springs (Richart, Hall and Woods 1970). The compliance about the vertical is that of a joint 1 that turns about
+    it, and is not counted again.
     """
     tx, ty, tz, rx, ry, _ = sites.base
     shifts = own.parameters("shift", ["horizontal", "vertical"], "m/N", sites)
@@ -180,10 +172,8 @@ def cross_compliance(own: Effect, sites: Sites, one: int, other: int) -> Candida
     """Elastic coupling of two joints: each turns under the torque of the other, as where one flexible casting holds both gears.
 
     theta_i = c_ij tau_j and theta_j = c_ij tau_i, with theta in rad, tau the torques of load and declared masses (N m) and c_ij
-    in rad/(N m), the same both ways by the reciprocal theorem of elastic bodies [1]. Beside the compliances of two parallel
-    joints, seen at the end-effector alone, it is not distinguishable from bending of the link between them in its plane.
-
-    [1] S. P. Timoshenko and J. N. Goodier, Theory of Elasticity, 3rd edition, McGraw-Hill, 1970.
+    in rad/(N m), the same both ways by the reciprocal theorem of elastic bodies (Timoshenko and Goodier 1970). Of two parallel
+    joints, seen at the end-effector alone, it is not distinguishable from bending of the link between them.
     """
     both, coupling = (one + 1, other + 1), own.parameters("coupling", ["compliance"], "rad/(N m)", sites, one, other)
     yield own.candidate(
@@ -202,12 +192,13 @@ def joint_dependent_stiffness(own: Effect, sites: Sites, joint: int) -> Candidat
     beside the mean, which is the compliance of the model.
     """
 
-    def law(around: Conditions) -> Displacements:
-        angle, torque = around.joint_angles[:, joint], around.total[:, joint]
-        return [{joint: torque * wave(angle)} for wave in WAVES.values()]
-
     variation = own.parameters("variation", ["cos_q", "sin_q"], "rad/(N m)", sites, joint)
-    yield own.candidate((joint + 1,), variation, law, LOADED_JOINTS)
+    yield own.of_joint(joint, variation, lambda around: _softer(around, joint, 1), LOADED_JOINTS)
+
+
+def _softer(around: Conditions, joint: int, *orders: int) -> list[np.ndarray]:
+    """Torque on a joint times waves of its angle."""
+    return [around.total[:, joint] * wave for wave in waves(around.joint_angles[:, joint], *orders)]
 
 
 @_effect(
@@ -220,21 +211,13 @@ def compensator_stiffness(own: Effect, sites: Sites, joint: int) -> Candidates:
 
     k = -dT/dq = K a L [(s0/s) (cos p + a L sin^2 p / s^2) - cos p], p = alpha + q,
 
-    is what the spring [1] adds (N m/rad), with T and its symbols as in `compensator_torque`, and -c^2 k is what that adds to
-    the compliance c of the joint. For a short crank it is theta = tau (u_1 cos q + v_1 sin q + u_2 cos 2q + v_2 sin 2q), with
-    theta in rad, tau the torque of load and declared masses (N m), u and v in rad/(N m). With order 1 alone it is the same as a
-    shoulder whose own stiffness depends on its angle.
-
-    [1] A. Klimchik, Y. Wu, C. Dumas, S. Caro, B. Furet and A. Pashkevich, Identification of geometrical and elastostatic
-        parameters of heavy industrial robots, IEEE International Conference on Robotics and Automation, 2013.
+    is what the spring (Klimchik et al. 2013) adds (N m/rad), with T and its symbols as in `compensator_torque`, and -c^2 k is
+    what that adds to the compliance c of the joint. For a short crank it is theta = tau (u_1 cos q + v_1 sin q + u_2 cos 2q +
+    v_2 sin 2q), with theta in rad, tau the torque of load and declared masses (N m), u and v in rad/(N m).
     """
 
-    def law(around: Conditions) -> Displacements:
-        torque = around.total[:, joint]
-        return [{joint: torque * wave} for wave in waves(around.joint_angles[:, joint])]
-
     variation = wave_parameters(own, "variation", "rad/(N m)", sites, joint)
-    yield own.candidate((joint + 1,), variation, law, LOADED_JOINTS)
+    yield own.of_joint(joint, variation, lambda around: _softer(around, joint, 1, 2), LOADED_JOINTS)
 
 
 @_effect(
@@ -246,11 +229,8 @@ def flange_flexibility(own: Effect, sites: Sites) -> Candidates:
     """A flange, its bearing or a tool changer that yields elastically: what holds the tool is a spring behind the last joint.
 
     u = C w, with u the shift (m) and turn (rad) of the flange along its axes, w the external force (N) and moment (N m) there
-    and C diagonal, m/N and rad/(N m): a spring in six directions, as in complete stiffness models of serial robots [1]. The
-    turn about the axis of the last joint is that of its compliance, and is held by the fit where that is identified.
-
-    [1] A. Klimchik, S. Caro, B. Furet and A. Pashkevich, Complete stiffness model for a serial robot, International Conference
-        on Informatics in Control, Automation and Robotics, 2014.
+    and C diagonal, m/N and rad/(N m) (Klimchik et al. 2014). The turn about the axis of the last joint is held by the fit where
+    its compliance is identified.
     """
     shifts = own.parameters("shift", [f"shift_{axis}" for axis in "xyz"], "m/N", sites)
     turns = own.parameters("turn", [f"turn_{axis}" for axis in "xyz"], "rad/(N m)", sites, sites.joints - 1)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects.protocol import WAVES, Parameter, effect, every_joint, moved_and_turned
+from elastocal.effects.protocol import WAVES, Parameter, effect, every_joint, moved_and_turned, waves
 from elastocal.effects.sizes import REACH, Size
 
 if TYPE_CHECKING:
@@ -28,17 +28,14 @@ _NEST_ORDER, _SAMPLES_PER_PERIOD = 2, 4
 def joint_offset(own: Effect, sites: Sites, joint: int) -> Candidates:
     """Zero offset of a joint: its encoder was mastered a little off the mark.
 
-    theta_i = delta_i at every pose, with and without load, in rad (m for a prismatic joint) [1]. An offset of the first joint
-    is a turn of the base, one of the last a turn of the tool: they are identifiable only where frame and target are known.
-
-    [1] W. Khalil and E. Dombre, Modeling, Identification and Control of Robots, Hermes Penton, 2002.
+    theta_i = delta_i at every pose, with and without load, in rad (m for a prismatic joint) (Khalil and Dombre 2002). Of the
+    first joint it is a turn of the base, of the last one of the tool: identifiable only where frame and target are known.
     """
     quantity, unit = ("shift", "m") if sites.prismatic[joint] else ("turn", "rad")
     offset = own.parameters(quantity, ["offset"], unit, sites)
-    yield own.candidate((joint + 1,), offset, lambda around: [{joint: around.always}], fixed=True)
+    yield own.of_joint(joint, offset, lambda around: [around.always], fixed=True)
 
 
-# The column before joint 1 belongs to the base.
 @_effect(
     "geometric error",
     Size("length", 4e-4, "tolerances of castings: a millimetre of 2.5 m", REACH),
@@ -50,17 +47,14 @@ def link_geometry(own: Effect, sites: Sites, joint: int) -> Candidates:
     """Wrong dimensions of a link: machining and assembly leave its far end shifted and turned from where the drawing has it.
 
     u = (d, r), the same at every pose, in the frame of the chain at the far end, d in m and r in rad: to first order all that
-    Denavit-Hartenberg or Hayati parameters [1] can be wrong by, without their singularities. Components that other links, the
-    base or the tool make as well are not identifiable and are held by the fit.
-
-    [1] W. Khalil and E. Dombre, Modeling, Identification and Control of Robots, Hermes Penton, 2002.
+    Denavit-Hartenberg or Hayati parameters (Khalil and Dombre 2002) can be wrong by, without their singularities. Components
+    that other links, the base or the tool make as well are not identifiable and are held by the fit.
     """
     six, end = moved_and_turned(own.size("length", sites), own.size("turn", sites)), sites.link_end[joint + 1]
     yield own.candidate((joint + 1,), six, lambda around: [{c: around.always} for c in end], fixed=True)
 
 
-# Where the robot should be is said in the declared base's frame, in which it stands elsewhere: that moves it.
-# Several times what registering leaves (0.05 to 0.3 mm, 20 to 100 urad), where a step went wrong.
+# It moves the robot, whose tasks are said in the declared base's frame.
 @_effect(
     "base that stands elsewhere than declared",
     Size("shift", 5e-4, "a tracker registers to 0.05 to 0.3 mm, unless a step goes wrong"),
@@ -70,8 +64,7 @@ def base_placement(own: Effect, sites: Sites) -> Candidates:
     """A robot whose foot does not stand where the campaign declares it: a constant shift and turn.
 
     u = (d, r) at the foot in base axes, d in m and r in rad; a point p (m) moves by d + r x p. Where the placement of the base
-    is unknown it is fitted, and there is nothing to misplace. A turn about a vertical first axis is the zero offset of joint 1,
-    and alike in every measurement. Derived here: a small rigid motion.
+    is unknown it is fitted, and there is nothing to misplace. A turn about a vertical first axis is the zero offset of joint 1.
     """
     six = moved_and_turned(own.size("shift", sites), own.size("turn", sites))
     yield own.candidate((), six, lambda around: [{c: around.always} for c in sites.base], {"declared base"})
@@ -85,11 +78,7 @@ def nest_eccentricity(own: Effect, sites: Sites) -> Candidates:
     d = sum_e e (a_e cos 2q + b_e sin 2q) over the two axes e across the last joint, in the frame that turns with it; d, a_e and
     b_e in m, q the angle of that joint in rad. Derived here: of the Fourier series of d, order 0 is a target elsewhere and
     order 1, if it circles against the joint, a link of other dimensions; order 2 is the lowest of which neither makes a part,
-    as of an oval ball or nest in which the reflector turns to face the tracker. How well reflectors are centred is one of the
-    errors of trackers [1].
-
-    [1] B. Muralikrishnan, S. Phillips and D. Sawyer, Laser trackers for large-scale dimensional metrology: a review, Precision
-        Engineering 44, 2016.
+    as of an oval ball or nest in which the reflector turns to face the tracker (Muralikrishnan et al. 2016).
     """
     last = sites.joints - 1
     if sites.prismatic[last]:
@@ -98,8 +87,8 @@ def nest_eccentricity(own: Effect, sites: Sites) -> Candidates:
     parameters = [Parameter(f"{wave}_{'xyz'[axis]}_{_NEST_ORDER}q", "m", size, size) for axis in across for wave in WAVES]
 
     def law(around: Conditions) -> Displacements:
-        angle, turned = _NEST_ORDER * around.joint_angles[:, last], sites.link_rotations[last + 1].T
-        shifts = [np.outer(turned[:, axis], wave(angle)) for axis in across for wave in WAVES.values()]
+        turned, both = sites.link_rotations[last + 1].T, waves(around.joint_angles[:, last], _NEST_ORDER)
+        shifts = [np.outer(turned[:, axis], wave) for axis in across for wave in both]
         return [dict(zip(sites.link_end[last + 1][:3], shift, strict=True)) for shift in shifts]
 
     yield own.candidate((), parameters, law, distinct_angles=_SAMPLES_PER_PERIOD * _NEST_ORDER, turning=(last + 1,))
@@ -110,13 +99,9 @@ def nest_eccentricity(own: Effect, sites: Sites) -> Candidates:
 def tracker_scale(own: Effect, sites: Sites) -> Candidates:
     """A tracker that measures all lengths too long or too short, by its wavelength in warm air or by a bad absolute distance.
 
-    p' = (1 + s) p about the tracker, with p a position (m) and s the scale error (m/m) [1]. Scaled about the base positions
-    differ from that by a shift of the frame, which is fitted where it is unknown; and a robot whose positions are all scaled
-    about its base is one whose column, links and travels along a track are longer by that share. What lies behind a passive
-    joint is no link and is left out.
-
-    [1] B. Muralikrishnan, S. Phillips and D. Sawyer, Laser trackers for large-scale dimensional metrology: a review, Precision
-        Engineering 44, 2016.
+    p' = (1 + s) p about the tracker, with p a position (m) and s the scale error (m/m) (Muralikrishnan et al. 2016). Scaled
+    about the base positions differ from that by a shift of the frame, which is fitted where it is unknown; and a robot whose
+    positions are all scaled about its base is one whose column, links and travels along a track are longer by that share.
     """
 
     def law(around: Conditions) -> Displacements:

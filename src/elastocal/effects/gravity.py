@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.effects.conditions import MASS_PARAMETERS
-from elastocal.effects.protocol import LOADED_JOINTS, WAVES, Candidate, Parameter, effect, small_form, turning_joints
+from elastocal.effects.protocol import LOADED_JOINTS, Candidate, Parameter, effect, small_form, turning_joints, waves
 from elastocal.effects.sizes import RATED, SAG, TORQUE, Size
 
 if TYPE_CHECKING:
@@ -70,13 +70,10 @@ def link_weight(own: Effect, sites: Sites) -> Candidates:
     """Sag of the arm, or of one joint, under the weight of the links that it carries.
 
     theta_i = c_i sum_k m_k tau_ik(q), with theta_i in rad, c_i the compliance (rad/(N m)), m_k a mass at the far end of link k
-    (kg) and tau_ik its torque on joint i (N m/kg). Given the compliances it is linear in masses and first moments [1], which
-    turn all joints at once; of one joint alone, in the products with its compliance. A link's own mass m at its middle counts
-    as m/2 at either end. Where the robot file declares masses, theirs are parameters already (`declared_weight`). Variants have
-    the first moments of these links across their lines (kg m) too: centres of mass are seldom on them.
-
-    [1] C. G. Atkeson, C. H. An and J. M. Hollerbach, Estimation of inertial parameters of manipulator loads and links,
-        International Journal of Robotics Research 5, 1986.
+    (kg) and tau_ik its torque on joint i (N m/kg). Given the compliances it is linear in masses and first moments (Atkeson et
+    al. 1986), which turn all joints at once; of one joint alone, in the products with its compliance. A link's own mass m at
+    its middle counts as m/2 at either end. Where the robot file declares masses, theirs are parameters already
+    (`declared_weight`). Variants have first moments across the lines of links (kg m) too.
     """
     if sites.masses:
         return
@@ -125,9 +122,9 @@ def declared_masses(own: Effect, sites: Sites) -> Candidates:
     """Declared masses that are farther off than the robot file says: all by one factor, or each by its own.
 
     theta_i = c_i sum_k s_k m_k tau_ik(q), with theta_i in rad, c_i the compliance (rad/(N m)), m_k the declared mass of link k
-    (kg), tau_ik its torque on joint i (N m/kg) and s_k the share by which it is heavier, one for all links or each its own.
-    A mass takes its declared centre with it. What the robot file says of its own tolerance is part of the declared model
-    (`declared_weight`). Without a load the compliances are free, and no factor of all masses is distinguishable from them.
+    (kg), tau_ik its torque on joint i (N m/kg) and s_k the share by which it is heavier, one for all links or each its own. A
+    mass takes its declared centre with it. Without a load the compliances are free, and no factor of all masses is
+    distinguishable from them.
     """
     bodies = [(number, mass) for number, mass in enumerate(sites.masses) if mass.link and mass.mass_kg]
     if not bodies:
@@ -151,10 +148,7 @@ def payload(own: Effect, sites: Sites) -> Candidates:
 
     theta = diag(c) J^T (m g, m r x g), with theta the turns of the joints (rad), c their compliances (rad/(N m)), J the
     Jacobian of the end-effector, g gravity (m/s^2), m the mass (kg) and r its centre from there (m). Given the compliances it
-    is linear in m and in the first moments m r along the axes of the end-effector (kg m) [1].
-
-    [1] C. G. Atkeson, C. H. An and J. M. Hollerbach, Estimation of inertial parameters of manipulator loads and links,
-        International Journal of Robotics Research 5, 1986.
+    is linear in m and in the first moments m r along the axes of the end-effector (kg m) (Atkeson et al. 1986).
     """
     mass = own.size("mass", sites)
     moments = [Parameter(f"moment_{axis}", "kg m", _LEVER_M * mass) for axis in "xyz"]
@@ -181,13 +175,8 @@ def compensated_joint(sites: Sites) -> list[tuple[int]]:
     return [(on - 1,)] if on and not sites.prismatic[on - 1] else []
 
 
-def waves(angle: np.ndarray) -> list[np.ndarray]:
-    """Cosine and sine of an angle (S,) and of twice the angle, in the order of `wave_parameters`; list of ndarray (S,)."""
-    return [wave(order * angle) for order in (1, 2) for wave in WAVES.values()]
-
-
 def wave_parameters(own: Effect, quantity: str, unit: str, sites: Sites, joint: int) -> list[Parameter]:
-    """Parameters of `waves`, of which those of twice the angle are half as large."""
+    """Parameters of `waves` of orders 1 and 2, of which the latter are half as large."""
     each = [own.parameters(quantity, [f"cos_{k}q", f"sin_{k}q"], unit, sites, joint, over=k) for k in (1, 2)]
     return [parameter for order in each for parameter in order]
 
@@ -203,12 +192,10 @@ def compensator_torque(own: Effect, sites: Sites, joint: int) -> Candidates:
     T = -dU/dq = K a L (1 - s0/s) sin(alpha + q), U = K (s - s0)^2 / 2, s^2 = a^2 + L^2 + 2 a L cos(alpha + q),
 
     in N m, for a spring of stiffness K (N/m) and free length s0 (m) between a crank a on the joint and an anchor at the
-    distance L (m) [1]. For a short crank, a << L, it is a sine of q and of 2q with unknown phases, under the law of a gas
-    cylinder too; the compliance of the joint turns it into theta = sum_k u_k cos(k q) + v_k sin(k q), k = 1, 2, in rad.
-
-    [1] A. Klimchik, Y. Wu, C. Dumas, S. Caro, B. Furet and A. Pashkevich, Identification of geometrical and elastostatic
-        parameters of heavy industrial robots, IEEE International Conference on Robotics and Automation, 2013.
+    distance L (m) (Klimchik et al. 2013). For a short crank, a << L, it is a sine of q and of 2q with unknown phases, under the
+    law of a gas cylinder too; the compliance of the joint turns it into theta = sum_k u_k cos(k q) + v_k sin(k q), k = 1, 2, in
+    rad.
     """
     parameters = wave_parameters(own, "turn", "rad", sites, joint)
-    whole = own.candidate((joint + 1,), parameters, lambda around: [{joint: w} for w in waves(around.joint_angles[:, joint])])
+    whole = own.of_joint(joint, parameters, lambda around: waves(around.joint_angles[:, joint], 1, 2))
     yield from (whole, small_form(whole, "first order", slice(2)))

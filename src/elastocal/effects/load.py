@@ -91,7 +91,7 @@ def force_bias(own: Effect, sites: Sites, frame: str) -> Candidates:
     theta = diag(c) J^T (b, 0) wherever a load is recorded, or (b, r x b) in a pull with the lever r (m); theta are the turns of
     the joints (rad), c their compliances (rad/(N m)), J the Jacobian of the loaded point, and b the force that acts beyond the
     recorded one (N), which is minus what the sensor shows at zero. It is fixed in base axes, or in the flange where the sensor
-    turns with the tool. Derived here: a wrench w loads the joints by J^T w, so that its error dw turns them by diag(c) J^T dw.
+    turns with the tool.
     """
     parameters = own.parameters("force", [f"along_{axis}" for axis in "xyz"], "N", sites)
     yield _wrong(own, parameters, frame, lambda axis, wrench: (axis * wrench.any(axis=1, keepdims=True), np.zeros_like(axis)))
@@ -107,8 +107,7 @@ def application_point(own: Effect, sites: Sites, frame: str) -> Candidates:
 
     theta = diag(c) J^T (0, dr x F), with theta the turns of the joints (rad), c their compliances (rad/(N m)), J the Jacobian
     of the loaded point, F the force (N) and dr the shift of its point of application (m), fixed in base axes, or in the flange
-    where the load hangs on the tool. Derived here: a force that is moved by dr has the further moment dr x F, and a wrench w
-    loads the joints by J^T w.
+    where the load hangs on the tool. Derived here: a force that is moved by dr has the further moment dr x F.
     """
     parameters = own.parameters("shift", [f"shift_{axis}" for axis in "xyz"], "m", sites)
     yield _wrong(own, parameters, frame, lambda axis, wrench: (np.zeros_like(axis), np.cross(axis, wrench[:, :3])))
@@ -119,9 +118,9 @@ def force_scale(own: Effect, sites: Sites) -> Candidates:
     """A force sensor that shows too much or too little: its sensitivity differs from the one of its calibration.
 
     theta = diag(c) J^T (s w), with theta the turns of the joints (rad), c their compliances (rad/(N m)), J the Jacobian of the
-    loaded point, w the recorded wrench (N, N m) and s the share by which the one that acts is larger. Derived here: the error s
-    w of the wrench loads the joints by J^T (s w). Where all compliances are identified and no declared masses load the joints
-    it is exactly an alias of them, so that only a reference weight can find it.
+    loaded point, w the recorded wrench (N, N m) and s the share by which the one that acts is larger. Where all compliances are
+    identified and no declared masses load the joints it is exactly an alias of them, so that only a reference weight can find
+    it.
     """
     scale = own.parameters("scale", ["scale"], "1", sites)
     yield own.candidate((), scale, lambda around: [dict(enumerate(around.joint_deflections(around.wrench).T))], LOADED_JOINTS)

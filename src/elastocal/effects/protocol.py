@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     Places = Callable[[Sites], Iterable[tuple[Any, ...]]]
     Candidates = Iterator["Candidate"]
     Listing = Callable[..., Candidates]
+    Turns = Callable[..., Iterable[np.ndarray]]
 
 
 # Needs of laws that go with the load on the joints.
@@ -40,8 +41,7 @@ WAVES = {"cos": np.cos, "sin": np.sin}
 def load_behind(sites: Sites, joints: int) -> frozenset[str]:
     """Needs of the law of what yields to the load, behind so many joints.
 
-    A weight that is only usual, not declared, loads columns and rails: behind a joint that turns, what yields to it and how
-    much weighs on the joint are one thing, for which `link_weight` has the masses free.
+    A weight that is only usual, not declared, loads columns and rails: behind a joint that turns `link_weight` has it.
     """
     return frozenset({"load"}) if all(sites.prismatic[:joints]) else LOADED_JOINTS
 
@@ -50,8 +50,7 @@ class Displacing(Protocol):
     """Whatever displaces coordinates of the sites: a candidate, or a law that is none."""
 
     @property
-    def displacement(self) -> Law:
-        """By the conditions and a value of each of the shapes."""
+    def displacement(self) -> Law: ...
 
 
 @dataclass(frozen=True)
@@ -60,13 +59,10 @@ class Parameter:
 
     `plausible`: magnitude that such an effect can reach on a real robot; one that the data cannot distinguish from zero even at
     this size is not estimated. `prior_std`: standard deviation of a normal prior about zero, for series whose terms the data
-    distinguish only in part, as in ridge regression [1]. None, as nearly everywhere, for no prior. Reported with the estimate.
-    `sign`: that such an effect has by its physics; 0 where it may have either. `order`: of a harmonic, whose plausible size
-    falls with it; 1 elsewhere. `sized`: whether the prior's standard deviation was estimated from the measurements, not known
-    beforehand. `most`: times its plausible size that a search allows for. `carried`: whether it is a mass that counts as
-    payload of the robot.
-
-    [1] A. E. Hoerl and R. W. Kennard, Ridge regression: biased estimation for nonorthogonal problems, Technometrics 12, 1970.
+    distinguish only in part, as in ridge regression (Hoerl and Kennard 1970), reported with the estimate; None, as nearly
+    everywhere, for no prior. `sign`: that such an effect has by its physics; 0 where it may have either. `order`: of a
+    harmonic, whose plausible size falls with it; 1 elsewhere. `sized`: whether the prior was estimated from the measurements.
+    `most`: times its plausible size that a search allows for. `carried`: whether it is a mass that counts as payload.
     """
 
     name: str
@@ -85,8 +81,7 @@ class Shape:
     """An unknown in which the effect is not linear.
 
     `start`: where the search starts. `lowest`, `highest`: range in which the law keeps its meaning. `tried`: how many evenly
-    spaced values a search must try lest it step over the law, one for the start alone; 0 where a few values of growing size
-    will do.
+    spaced values a search must try lest it step over the law, one for the start alone; 0 where a few growing values will do.
     """
 
     name: str
@@ -111,12 +106,10 @@ class Shape:
     def shares(self, values: Sequence[float] | np.ndarray) -> np.ndarray:
         """How much of the range each of some values stands for: the part nearest to it (Voronoi cell), ndarray of sum one."""
         scale = (lambda value: value) if self.tried else np.log
-        places = scale(np.asarray(values, float))
+        places, low, high = scale(np.asarray(values, float)), scale(self.lowest), scale(self.highest)
         order = np.argsort(places)
         inner = 0.5 * (places[order][1:] + places[order][:-1])
-        edges = np.concatenate(
-            [[scale(self.lowest)], np.clip(inner, scale(self.lowest), scale(self.highest)), [scale(self.highest)]]
-        )
+        edges = np.concatenate([[low], np.clip(inner, low, high), [high]])
         found = np.empty(len(places))
         found[order] = np.diff(edges) / (edges[-1] - edges[0])
         return found
@@ -126,17 +119,16 @@ class Shape:
 class Candidate:
     """One way in which one effect can act on this robot.
 
-    `joints`: joints concerned, counted from 1; empty where the effect belongs to no joint. `detail`: which variant, where
-    an effect has more than one for these joints. `parameters`: in which the displacement is linear. `displacement`:
-    ``displacement(conditions, *shapes)`` gives for each parameter a dict from a coordinate of the sites to its displacement
-    per unit of the parameter, ndarray (S,). It may go with the total loads of the coordinates that it displaces, of no
-    others. `needs`: what must be there, see `Model.offered`: "load", "load on the joints", "external load", "approach",
-    "time", "temperature", "declared base". `distinct_angles`: how many different angles of its joints the law needs to be
-    distinguishable from a smooth one. `of_setup`: whether it belongs to where tracker and robot stood in one campaign, and
-    is not carried over to another. `location_name`: names the location beside the joints where these do not: a column, a
-    band of orders. Candidates of one effect at one location are variants of its law, of which only one can hold. `turning`:
-    joints with whose angles the law goes, counted from 1, where it belongs to no joint. `fixed`: whether the displacement per
-    unit goes with the joint angles alone, not with loads, springs or where the robot yielded to, so that no step changes it.
+    `joints`: concerned, from 1; empty where the effect belongs to no joint. `detail`: which variant, where an effect has more
+    than one for these joints. `parameters`: in which the displacement is linear. `displacement`: ``displacement(conditions,
+    *shapes)`` gives for each parameter a dict from a coordinate of the sites to its displacement per unit, ndarray (S,). It may
+    go with the total loads of the coordinates that it displaces, of no others. `needs`: what must be there, see
+    `conditions.offered`. `distinct_angles`: how many different angles of its joints the law needs to be distinguishable from a
+    smooth one. `location_name`: names the location beside the joints where these do not: a column, a band of orders. Candidates
+    of one effect at one location are variants of its law, of which only one can hold. `of_setup`: whether it belongs to where
+    tracker and robot stood in one campaign, and is not carried over to another. `turning`: joints with whose angles the law
+    goes, from 1, where it belongs to no joint. `fixed`: whether the displacement per unit goes with the joint angles alone, not
+    with loads, springs or where the robot yielded to, so that no step changes it.
     """
 
     effect: str
@@ -207,8 +199,12 @@ class Effect:
         self, joints: tuple[int, ...], parameters: Iterable[Parameter], law: Law, needs: Collection[str] = (), **more: Any
     ) -> Candidate:
         """A `Candidate` of this effect; `more` as there."""
-        at, detail = (self.name, self.family, joints), more.pop("detail", "")
-        return Candidate(*at, detail, tuple(parameters), law, frozenset(needs), **more)
+        detail = more.pop("detail", "")
+        return Candidate(self.name, self.family, joints, detail, tuple(parameters), law, frozenset(needs), **more)
+
+    def of_joint(self, joint: int, parameters: Iterable[Parameter], turns: Turns, *needs: Any, **more: Any) -> Candidate:
+        """A candidate that moves one joint alone, from 0, by ``turns(conditions, *shapes)``, one for each parameter."""
+        return self.candidate((joint + 1,), parameters, lambda *at: [{joint: turn} for turn in turns(*at)], *needs, **more)
 
     def size(self, quantity: str, sites: Sites, *joints: int) -> float:
         """Size of a quantity of this effect on an arm, see `Size.on`."""
@@ -227,10 +223,9 @@ def effect(family: str, words: str, *sizes: Size, at: Places = lambda sites: [()
 
     Keys and tables call it by the name of the function; its docstring has the physics, the formula with units and the source.
     `family`: kind of its physics, such as elastic or gearbox. `words`: its physical name in words that precede "of joint 2", or
-    stand alone where it has no joint. `sizes`: of its quantities. `at`: ``at(sites)`` lists the places. Further by name:
-    `moves_robot`, whether it moves the robot, as without a word, so that its tasks feel it, or only what was measured of it:
-    instruments, targets, the set-up; `part`, "link" if its joints stand for the links behind them; `detail_words` and
-    `parameter_words`, if the detail of a candidate or the name of a parameter alone says too little.
+    stand alone. `sizes`: of its quantities. `at`: ``at(sites)`` lists the places. `more`: `moves_robot`, False where it moves
+    only what was measured of the robot, so that its tasks do not feel it; `part`, "link" if its joints stand for the links
+    behind them; `detail_words` and `parameter_words`, if the detail of a candidate or the name of a parameter says too little.
     """
 
     def made(listed: Listing) -> Effect:
@@ -238,6 +233,11 @@ def effect(family: str, words: str, *sizes: Size, at: Places = lambda sites: [()
         return Effect(listed.__name__, family, words, cleandoc(listed.__doc__ or ""), by_quantity, listed, at, **more)
 
     return made
+
+
+def waves(angle: np.ndarray, *orders: float) -> list[np.ndarray]:
+    """Cosine and sine of so many times an angle (S,), order by order; list of ndarray (S,)."""
+    return [wave(order * angle) for order in orders for wave in WAVES.values()]
 
 
 def every_joint(sites: Sites) -> list[tuple[int]]:

@@ -1,4 +1,7 @@
-"""Transmission: effects that are there without a load, by the angle of the joint."""
+"""Transmission: effects that are there without a load, by the angle of the joint.
+
+Gearboxes: effects by the load or the approach, but not in proportion.
+"""
 
 from __future__ import annotations
 
@@ -8,15 +11,27 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects.protocol import WAVES, Parameter, Shape, effect, turning_joints
-from elastocal.effects.sizes import Size
+from elastocal.effects.protocol import (
+    LOADED_JOINTS,
+    WAVES,
+    Parameter,
+    Shape,
+    effect,
+    every_joint,
+    needed,
+    turning_joints,
+    waves,
+)
+from elastocal.effects.sizes import JOINT, Size, full_torque_Nm
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
     from elastocal.effects.conditions import Conditions
     from elastocal.effects.protocol import Candidates, Displacements, Effect
     from elastocal.mechanics.sites import Sites
 
-_effect = partial(effect, "transmission")
+_effect, _gearbox = partial(effect, "transmission"), partial(effect, "gearbox")
 _SAMPLES_PER_PERIOD = 4
 _BANDS = ((1, 2), (3, 6), (7, 12), (13, 18), (19, 24), (25, 30), (31, 36))
 # Nearer to an integer than the margin an order is not distinguishable from it.
@@ -35,10 +50,8 @@ def transmission_harmonic(own: Effect, sites: Sites, joint: int, low: int, high:
     """Transmission error of a gear, periodic in the angle of its joint: eccentric and uneven parts let it run ahead and behind.
 
     theta_i = sum_k a_k cos(k q_i) + b_k sin(k q_i), with theta_i, a_k, b_k and the joint angle q_i in rad. Orders 1 and 2 are
-    an eccentric gear [1] or encoder. Orders 3 to 36 are left by parts that pass so many times in a turn of the joint, and come
-    in bands that are judged one by one; those of the motor's turns are `motor_eccentricity`.
-
-    [1] J. D. Smith, Gear Noise and Vibration, 2nd edition, Marcel Dekker, 2003.
+    an eccentric gear (Smith 2003) or encoder. Orders 3 to 36 are left by parts that pass so many times in a turn of the joint,
+    and come in bands that are judged one by one; those of the motor's turns are `motor_eccentricity`.
     """
     # Over the part of a turn that a joint uses, neighbouring orders are nearly the same function: without a prior they would
     # cancel each other at a hundred times that.
@@ -48,18 +61,15 @@ def transmission_harmonic(own: Effect, sites: Sites, joint: int, low: int, high:
         for wave in own.parameters("amplitude", (f"cos_{order}q", f"sin_{order}q"), "rad", sites)
     ]
 
-    def law(around: Conditions) -> Displacements:
+    def turns(around: Conditions) -> Iterator[np.ndarray]:
         # Powers of one complex exponential take a fifth of the time of as many cosines and sines.
         turned, once = np.exp(1j * np.multiply.outer([low, 1], around.joint_angles[:, joint]))
-        waves = []
         for _ in range(low, high + 1):
-            waves += [{joint: turned.real.copy()}, {joint: turned.imag.copy()}]
+            yield from (turned.real.copy(), turned.imag.copy())
             turned = turned * once
-        return waves
 
     band, angles = f"orders {low}-{high}", _SAMPLES_PER_PERIOD * high
-    at = (joint + 1,)
-    yield own.candidate(at, parameters, law, detail=band, distinct_angles=angles, location_name=band, fixed=True)
+    yield own.of_joint(joint, parameters, turns, detail=band, distinct_angles=angles, location_name=band, fixed=True)
 
 
 @_effect(
@@ -72,25 +82,17 @@ def transmission_order(own: Effect, sites: Sites, joint: int, above: int) -> Can
     """Transmission error of an order that is no integer: parts of a gear that do not come round with the joint.
 
     theta_i = sum_m a_m cos(m k q_i) + b_m sin(m k q_i), m = 1, 2, with theta_i, a_m, b_m and the joint angle q_i in rad and k
-    between two integers: planets, cranks and cages turn by ratios of numbers of teeth [1], and what is out of round errs twice
-    in their turn as well, wherever twice k lies. Integers k are those of `transmission_harmonic`.
-    Over the part of a turn that a joint uses, orders nearer than half a wave over that part are nearly one function, so that
-    the middle between two integers is where a search has to try; and less than a whole wave in a turn would be nearly any
-    smooth function.
-
-    [1] H. W. Müller, Epicyclic Drive Trains, Wayne State University Press, 1982.
+    between two integers: planets, cranks and cages turn by ratios of numbers of teeth (Müller 1982), and what is out of round
+    errs twice in their turn as well, wherever twice k lies. Integers k are those of `transmission_harmonic`. Over the part of a
+    turn that a joint uses neighbouring orders are nearly one function: the middle between two integers is where a search has to
+    try.
     """
     shape = Shape("order", "1", above + 0.5, above + _MARGIN, above + 1 - _MARGIN, tried=1)
-    waves = own.parameters("amplitude", ("cos_kq", "sin_kq", "cos_2kq", "sin_2kq"), "rad", sites)
-    parameters = [replace(wave, order=(above + 1) * (1 + number // 2)) for number, wave in enumerate(waves)]
-
-    def law(around: Conditions, order: float) -> Displacements:
-        angle = order * around.joint_angles[:, joint]
-        return [{joint: wave(times * angle)} for times in (1, 2) for wave in WAVES.values()]
-
+    four = own.parameters("amplitude", ("cos_kq", "sin_kq", "cos_2kq", "sin_2kq"), "rad", sites)
+    parameters = [replace(wave, order=(above + 1) * (1 + number // 2)) for number, wave in enumerate(four)]
     band, angles = f"order {above}-{above + 1}", _SAMPLES_PER_PERIOD * (above + 1)
-    at = (joint + 1,)
-    yield own.candidate(at, parameters, law, shapes=(shape,), detail=band, distinct_angles=angles, location_name=band)
+    options = {"shapes": (shape,), "detail": band, "distinct_angles": angles, "location_name": band}
+    yield own.of_joint(joint, parameters, lambda at, order: waves(order * at.joint_angles[:, joint], 1, 2), **options)
 
 
 def _driven(sites: Sites) -> list[tuple[int, list[int], str]]:
@@ -111,17 +113,15 @@ def transmission_ratio(own: Effect, sites: Sites, joint: int, sources: list[int]
     """Wrong ratio of a gear, or coupling from a joint before it: the controller divides the motor's angle by a wrong number.
 
     theta_i = e_i q_i + e_ih q_h, h = i - 1, with theta and q in rad and e in rad/rad (m and m/m for prismatic joints): linear
-    in the angle and not periodic. Derived here: a motor turns by N_i q_i + N_ih q_h, so that errors of both numbers turn the
-    joint by -(dN_i q_i + dN_ih q_h) / N_i. In a wrist whose last two motors sit in the forearm and drive through hollow shafts
-    both joints follow the first wrist joint: as an alternative theta_i = e_ih q_h alone, with h that joint.
+    in the angle and not periodic. Derived here: a motor turns by N_i q_i + N_ih q_h, with errors of both numbers. In a wrist
+    whose last two motors sit in the forearm and drive through hollow shafts both joints follow the first wrist joint: as an
+    alternative theta_i = e_ih q_h alone, with h that joint.
     """
     # A spindle has a pitch of its own, but is not coupled to what turns.
     alike = [source for source in sources if sites.prismatic[source] == sites.prismatic[joint]]
     unit = "m/m" if sites.prismatic[joint] else "rad/rad"
     per = own.parameters("per turn", [f"per_q{source + 1}" for source in alike], unit, sites)
-    yield own.candidate(
-        (joint + 1,), per, lambda around: [{joint: around.joint_angles[:, q]} for q in alike], detail=detail, fixed=True
-    )
+    yield own.of_joint(joint, per, lambda around: [around.joint_angles[:, q] for q in alike], detail=detail, fixed=True)
 
 
 @_effect(
@@ -132,22 +132,14 @@ def motor_eccentricity(own: Effect, sites: Sites, joint: int) -> Candidates:
 
     theta_i = sum_k a_k cos(k N q_i) + b_k sin(k N q_i), k = 1, 2, with theta_i, a_k, b_k and the joint angle q_i in rad and N
     the gear ratio, which must be known well enough for the phase of its waves. Strain wave gears, too, err in the rhythm of
-    their input [1]. Where the robot file has no gear ratio of a joint nothing is offered there.
-
-    [1] T. D. Tuttle, Understanding and Modeling the Behavior of a Harmonic Drive Gear Transmission, technical report, MIT
-        Artificial Intelligence Laboratory, 1992.
+    their input (Tuttle 1992). Where the robot file has no gear ratio of a joint nothing is offered there.
     """
     ratio = sites.gear_ratio[joint] if sites.gear_ratio else None
     if ratio is None:
         return
-    size = own.size("amplitude", sites)
+    size, options = own.size("amplitude", sites), {"distinct_angles": _ANGLES_OF_MOTOR, "fixed": True}
     parameters = [Parameter(f"{wave}_{order}_motor", "rad", size) for order in (1, 2) for wave in WAVES]
-
-    def law(around: Conditions) -> Displacements:
-        angle = ratio * around.joint_angles[:, joint]
-        return [{joint: wave(order * angle)} for order in (1, 2) for wave in WAVES.values()]
-
-    yield own.candidate((joint + 1,), parameters, law, distinct_angles=_ANGLES_OF_MOTOR, fixed=True)
+    yield own.of_joint(joint, parameters, lambda around: waves(ratio * around.joint_angles[:, joint], 1, 2), **options)
 
 
 @_effect(
@@ -160,10 +152,8 @@ def bearing_runout(own: Effect, sites: Sites, joint: int, motion: str) -> Candid
     """A bearing that runs out: races or seats that are out of round or askew move the axis of a joint once and twice per turn.
 
     e = sum_k a_k cos(k q) + b_k sin(k q), k = 1, 2, with q the joint angle (rad), is each of the error motions of an axis of
-    rotation [1]: radial along two fixed axes across it (m), axial along it (m), and tilt about the two (rad). Fixed axes are
-    those of the link before the joint.
-
-    [1] ISO 230-7, Test code for machine tools, part 7: Geometric accuracy of axes of rotation, 2015.
+    rotation (ISO 230-7): radial along two fixed axes across it (m), axial along it (m), and tilt about the two (rad). Fixed
+    axes are those of the link before the joint.
     """
     wobbles, along = motion == "wobble", sites.joint_axes[joint]
     axes = (along,) if motion == "axial" else ((along + 1) % 3, (along + 2) % 3)
@@ -175,15 +165,15 @@ def bearing_runout(own: Effect, sites: Sites, joint: int, motion: str) -> Candid
     def law(around: Conditions) -> Displacements:
         angle = around.joint_angles[:, joint]
         fixed = [_seen_behind(sites, joint, axis, angle) for axis in axes]
-        moved = [direction * wave(order * angle) for direction in fixed for order in (1, 2) for wave in WAVES.values()]
+        moved = [direction * wave for direction in fixed for wave in waves(angle, 1, 2)]
         if wobbles:
             return [dict(zip(sites.tilt[joint], turn, strict=True)) for turn in moved]
         # A link shifts as its far end does.
         end, turned = sites.link_end[joint + 1][:3], sites.link_rotations[joint + 1].T
         return [dict(zip(end, turned @ shift, strict=True)) for shift in moved]
 
-    at, parameters = (joint + 1,), [Parameter(name, unit, size, size) for name in names]
-    angles = _SAMPLES_PER_PERIOD * 2
+    parameters = [Parameter(name, unit, size, size) for name in names]
+    at, angles = (joint + 1,), _SAMPLES_PER_PERIOD * 2
     yield own.candidate(at, parameters, law, detail=motion, distinct_angles=angles, location_name=motion, fixed=True)
 
 
@@ -197,3 +187,71 @@ def _seen_behind(sites: Sites, joint: int, axis: int, angle: np.ndarray) -> np.n
     ahead = 1.0 if (own + 1) % 3 == axis else -1.0
     seen[axis], seen[3 - own - axis] = np.cos(turned), -ahead * np.sin(turned)
     return seen
+
+
+# Start, least and most of the torque of a law, of the full torque. Slopes that meet at less are those of play; where both laws
+# reach, either may be meant.
+_PLAY, _MEETING = np.array([0.03, 0.003, 0.1]), np.array([0.3, 0.05, 0.8])
+_AS_AT_REST: dict[str, Callable[[np.ndarray, float], np.ndarray]] = {
+    "": lambda load, torque: torque * np.tanh(load / torque),
+    "two slopes": lambda load, torque: np.clip(load, -torque, torque),
+}
+
+
+def _torque(sites: Sites, joint: int, shares: np.ndarray) -> Shape:
+    start, lowest, highest = (shares * full_torque_Nm(sites, joint)).tolist()
+    return Shape("torque", "N m", start, lowest, highest)
+
+
+# Small gears carry less torque and may bend more by it.
+@_gearbox(
+    "gear stiffening",
+    Size("lost beyond", 0.5, "of gears' compliance half goes once all teeth bear", JOINT, sign=-1),
+    at=lambda sites: [(joint, law) for law in _AS_AT_REST for (joint,) in turning_joints(sites)],
+)
+def stiffening(own: Effect, sites: Sites, joint: int, detail: str) -> Candidates:
+    """A gear that gets stiffer with torque: more of its teeth, pins or rollers share a larger load.
+
+    theta_i = d_i (tau_i - s(tau_i)), with s(tau) = clip(tau, -tau_1, tau_1) or tau_1 tanh(tau / tau_1),
+
+    theta_i in rad, tau_i the torque of load and declared masses (N m), d_i < 0 in rad/(N m), and s the part that bends the gear
+    as at rest: either two slopes that meet at the torque tau_1 (N m); or a slope that falls smoothly, as several kinks do
+    together, and which below tau_1 is the cubic law tau^3 / (3 tau_1^2). Neither is linear in tau_1. A stiffness that depends
+    on the torque was measured on strain wave gears (Tuttle 1992).
+    """
+    beyond, meeting = own.parameters("lost beyond", ["beyond"], "rad/(N m)", sites, joint), _torque(sites, joint, _MEETING)
+
+    def turns(around: Conditions, torque: float) -> list[np.ndarray]:
+        load = around.total[:, joint]
+        return [load - _AS_AT_REST[detail](load, torque)]
+
+    yield own.of_joint(joint, beyond, turns, LOADED_JOINTS, shapes=(meeting,), detail=detail)
+
+
+@_gearbox("lost motion (backlash)", Size("play", 1e-4, "a third of an arc minute", sign=1), at=turning_joints)
+def lost_motion(own: Effect, sites: Sites, joint: int) -> Candidates:
+    """Play that the gear crosses where the torque changes its sign: teeth leave one flank and touch the other.
+
+    theta_i = D_i tanh(tau_i / tau_0), with theta_i in rad, tau_i the torque of load and declared masses (N m), D_i half the
+    play (rad) and tau_0 the torque at which it is taken up (N m). Makers of gears measure it at 3 % of the rated torque
+    (Nabtesco, Precision Reduction Gear RV, glossary). Derived here: tanh is a smooth step from one flank, -D_i, to the other,
+    +D_i.
+    """
+    play, shapes = own.parameters("play", ["half_play"], "rad", sites), (_torque(sites, joint, _PLAY),)
+    yield own.of_joint(joint, play, lambda around, at: [np.tanh(around.total[:, joint] / at)], LOADED_JOINTS, shapes=shapes)
+
+
+@_gearbox(
+    "hysteresis", Size("turn", 1e-4, "a third of an arc minute"), Size("shift", 2e-5, "the nut of a spindle"), at=every_joint
+)
+def hysteresis(own: Effect, sites: Sites, joint: int) -> Candidates:
+    """Friction and backlash that hold a joint back on the side from which it came: the gear stays wound up after a stop.
+
+    theta_i = h_i s_i, with s_i = -1 or +1 the sense in which the joint was approached, 0 where it is not known, and h_i half
+    the width of the loop (rad; m for a prismatic joint), negative where the joint stays short: friction F sgn(dq/dt)
+    (Armstrong-Hélouvry 1991) that is left at rest winds up a gear of compliance c by c F. Where the approach is not recorded
+    this is part of the repeatability.
+    """
+    quantity, unit = ("shift", "m") if sites.prismatic[joint] else ("turn", "rad")
+    width = own.parameters(quantity, ["half_width"], unit, sites)
+    yield own.of_joint(joint, width, lambda around: [needed(around.approach)[:, joint]], {"approach"})

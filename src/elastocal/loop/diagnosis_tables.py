@@ -21,7 +21,7 @@ from elastocal.io.json_files import read_json, write_json
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_table, write_table
 from elastocal.loop.schemas import CANDIDATES, CORRELATIONS, STEPS, measurements
-from elastocal.mechanics.robot_file import joint_count
+from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.random_streams import stream
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def load_case(descriptions_path: str | Path, measurements_path: str | Path, part
     """A campaign from the files of step 1; `part` is the campaign that holds the test, where it is another one."""
     descriptions = read_json(descriptions_path)
     described = (part and descriptions[part]) or descriptions
-    joints = joint_count(described["robot"], described["source"])
+    joints = robot_from_document(described["robot"], described["source"]).joints
     return case_from(described, read_table(measurements_path, measurements(joints)))
 
 

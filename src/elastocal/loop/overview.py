@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.application.accuracy import calibrate_on_case, campaign_accuracy
 from elastocal.campaigns.campaign import columns_of
-from elastocal.data_checks.protocol import faults
+from elastocal.data_checks.faults import faults
 from elastocal.data_checks.warnings import controller_warnings
 from elastocal.diagnosis.gross_errors import Kept, entries_of, first_kept, gross_errors, warnings_of
 from elastocal.diagnosis.linearize import linearized
@@ -62,7 +62,7 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
     left_out = entries_of(replace(errors, gross=~part.kept), whole.campaign, held_out=False)
     case, noise, warnings, declared = part.case, part.noise, part.warnings, part.declared_to_all()
     campaign, states = case.campaign, case.observations.states
-    found = faults(campaign, campaign.measurements)
+    found = faults(campaign)
     decisive = any(fault.decisive for fault in found)
     springs, negative = _compliances(declared)
     facts: dict[str, Any] = _identified(declared) | {

@@ -7,8 +7,7 @@ The chain notation is the paper's matrix product written in a line (equations 1-
 ``T`` and ``R`` are a translation along and a rotation about x, y or z of the moving frame; the argument is the name of a
 length, a joint ``q1 .. qn``, or a number (metres in ``T``, ``deg`` in ``R``), each with an optional minus sign;
 ``[NAME]`` marks a measuring point. ``T.(q3)`` is a prismatic joint: its coordinate is in metres, and so are its limits and its
-offset; its compliance is in µm/N. A joint that stands in several places, such as ``Ry(q2) Tz(l) Ry(-q2)``, moves all of them:
-what a parallelogram or another coupling does. It is where it stands first; behind a later place a passive joint turns.
+offset; its compliance is in µm/N. Each joint stands in one place, in order.
 
 Such a product is an elementary transform sequence [1].
 
@@ -98,20 +97,14 @@ class Chain:
         raise KeyError(f"measuring point {name!r}; the chain has {', '.join(p.name for p in self.points)}")
 
     def moved_by(self, point: MeasuringPoint) -> tuple[int, ...]:
-        """Indices of the coordinates before `point`, each once: those that can move it."""
-        transforms = self.transforms[: point.after]
-        return tuple(dict.fromkeys(t.coordinate for t in transforms if t.coordinate is not None))
+        """Indices of the coordinates before `point`: those that can move it."""
+        return tuple(t.coordinate for t in self.transforms[: point.after] if t.coordinate is not None)
 
     @property
     def prismatic(self) -> tuple[bool, ...]:
         """Whether each coordinate is a shift and not a turn, tuple of bool."""
         kinds = {t.coordinate: t.kind == "T" for t in self.transforms if t.coordinate is not None}
         return tuple(kinds.get(coordinate, False) for coordinate in range(self.coordinates))
-
-    def is_passive(self, place: int) -> bool:
-        """Whether the transform at a place is moved by a coordinate that moves one before it as well."""
-        coordinate = self.transforms[place].coordinate
-        return coordinate is not None and any(t.coordinate == coordinate for t in self.transforms[:place])
 
 
 def with_inserted(chain: Chain, inserted: Mapping[int, Sequence[tuple[str, int]]]) -> Chain:
@@ -136,13 +129,13 @@ def parse_chain(text: str, lengths_m: Mapping[str, float], source: str) -> Chain
     """Read the chain notation.
 
     `text`: the chain, as in the module's docstring. `lengths_m`: named lengths. `source`: named in errors. Raises `InputError`:
-    a token outside the notation, an unknown or unused length, joints that are not q1..qn in order, a joint that turns in one
-    place and shifts in another, no measuring point, a measuring point named twice.
+    a token outside the notation, an unknown or unused length, joints that are not q1..qn in order, no measuring point, a
+    measuring point named twice.
     """
     transforms: list[Transform] = []
     points: list[MeasuringPoint] = []
     used: set[str] = set()
-    kinds: dict[str, str] = {}
+    joints = 0
     for word in text.split():
         token = _TOKEN.fullmatch(word)
         if not token:
@@ -163,21 +156,19 @@ def parse_chain(text: str, lengths_m: Mapping[str, float], source: str) -> Chain
         elif _NUMBER.fullmatch(number) and (kind == "T" or argument.endswith("deg")):
             value = float(number)
             transforms.append(Transform(kind, axis, sign * (value if kind == "T" else math.radians(value))))
-        elif argument == f"q{len(kinds) + 1}" or argument in kinds:
-            if kinds.setdefault(argument, kind) != kind:
-                raise InputError(source, "chain", repr(word), f"{argument} in R.() or in T.() alone")
-            transforms.append(Transform(kind, axis, 0.0, int(argument[1:]) - 1, sign))
+        elif argument == f"q{joints + 1}":
+            transforms.append(Transform(kind, axis, 0.0, joints, sign))
+            joints += 1
         else:
             others = "degrees such as 90deg" if kind == "R" else f"{', '.join(lengths_m)} or metres"
-            allowed = f"q{len(kinds) + 1}{', a joint before it' if kinds else ''} or {others}"
-            raise InputError(source, "chain", repr(word), f"in {kind}{token['axis']}(): {allowed}")
-    if not kinds:
+            raise InputError(source, "chain", repr(word), f"in {kind}{token['axis']}(): q{joints + 1} or {others}")
+    if not joints:
         raise InputError(source, "chain", "no joint", "at least one R.(q1) or T.(q1)")
     if not points or points[-1].after != len(transforms):
         raise InputError(source, "chain", f"{text.split()[-1]!r} at its end", "a measuring point such as [6DoF] at the end")
     if unused := sorted(set(lengths_m) - used):
         raise InputError(source, "lengths_m", ", ".join(unused), "lengths that the chain uses")
-    return Chain(tuple(transforms), tuple(points), len(kinds))
+    return Chain(tuple(transforms), tuple(points), joints)
 
 
 def notation(chain: Chain) -> str:
@@ -185,17 +176,11 @@ def notation(chain: Chain) -> str:
     words = []
     for place in range(len(chain.transforms) + 1):
         words += [f"[{point.name}]" for point in chain.points if point.after == place]
-        if place < len(chain.transforms):
-            words.append(_word(chain.transforms[place]))
+        for moved in chain.transforms[place : place + 1]:
+            sign, argument = moved.sign, f"q{(moved.coordinate or 0) + 1}"
+            if moved.coordinate is None:
+                sign, amount, turns = math.copysign(1.0, moved.constant), abs(moved.constant), moved.kind == "R"
+                number = np.format_float_positional(math.degrees(amount) if turns else amount, trim="-")
+                argument = f"{number}deg" if turns else number
+            words.append(f"{moved.kind}{AXES[moved.axis]}({'-' if sign < 0 else ''}{argument})")
     return " ".join(words)
-
-
-def _word(transform: Transform) -> str:
-    turns = transform.kind == "R"
-    if transform.coordinate is not None:
-        sign, argument = transform.sign, f"q{transform.coordinate + 1}"
-    else:
-        sign, amount = math.copysign(1.0, transform.constant), abs(transform.constant)
-        number = np.format_float_positional(math.degrees(amount) if turns else amount, trim="-")
-        argument = f"{number}deg" if turns else number
-    return f"{transform.kind}{AXES[transform.axis]}({'-' if sign < 0 else ''}{argument})"

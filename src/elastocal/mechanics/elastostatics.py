@@ -1,10 +1,8 @@
 """Equations 5-10: what a wrench does to a chain of springs; the extended model, whose links are springs too.
 
 Wrenches are (force, moment) in N and N m at the end-effector, base axes. Deflections are (displacement, rotation vector) in m
-and rad, base axes. Compliances of rotary springs are in rad/(N m).
-
-The virtual joint method: elastic joints, and six-dimensional springs at the ends of links, are joints that yield to the
-generalized forces of the wrench [1], [2]. Forces are taken at the unloaded pose.
+and rad, base axes. By the virtual joint method elastic joints, and six-dimensional springs at the ends of links, are joints
+that yield to the generalized forces of the wrench [1], [2], in rad/(N m). Forces are taken at the unloaded pose.
 
 [1] Salisbury, J. K., Active stiffness control of a manipulator in Cartesian coordinates, IEEE Conference on Decision and
     Control, 1980.
@@ -45,13 +43,9 @@ def wrench_of_offset_force(
 
 
 def generalized_forces(jacobian: np.ndarray, wrench: np.ndarray) -> np.ndarray:
-    """Torques (forces) on the coordinates of a chain, J^T w (the right-hand factor of equation 7).
-
-    The principle of virtual work, by which statics is dual to kinematics [1].
+    """Torques (forces) on the coordinates of a chain, J^T w by virtual work (the right-hand factor of equation 7).
 
     `jacobian` (..., 6, n): of the point where the wrench is stated. `wrench` (..., 6). Returns (..., n).
-
-    [1] Siciliano, B., Sciavicco, L., Villani, L. and Oriolo, G., Robotics: Modelling, Planning and Control, Springer, 2009.
     """
     return np.asarray(sum(jacobian[..., row, :] * wrench[..., row, None] for row in range(6)))
 
@@ -59,26 +53,21 @@ def generalized_forces(jacobian: np.ndarray, wrench: np.ndarray) -> np.ndarray:
 def loaded_point(chain: Chain, point: MeasuringPoint, wrench_at: str) -> MeasuringPoint:
     """Where the wrench acts that deflects a measuring point (interpretation R6).
 
-    `wrench_at`: one of "end_effector", "measuring_point". Returns the end-effector itself, whatever target sits on it; or the
-    measuring point.
+    `wrench_at`: "end_effector", itself, whatever target sits on it; or "measuring_point".
     """
     return replace(chain.end_effector, offset_m=(0.0, 0.0, 0.0)) if wrench_at == "end_effector" else point
 
 
 def joint_torques(chain: Chain, joint_angles: np.ndarray, wrench: np.ndarray, at: MeasuringPoint) -> np.ndarray:
-    """Torques that a wrench puts on the joints.
-
-    `joint_angles` (..., n): rad. `wrench` (..., 6). `at`: where the wrench is stated, see `loaded_point`. Returns (..., n): N
-    m.
-    """
+    """Torques on the joints, ndarray (..., n), N m, by a wrench (..., 6) stated at a point, see `loaded_point`."""
     return generalized_forces(jacobians(chain, joint_angles, at), wrench)
 
 
 def regressor(jacobian: np.ndarray, torques: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
-    """Matrix A of equation 10, with columns J_j J_j^T w, so that the deflection is A c (equation 9).
+    """Matrix A of equation 10, with columns J_j J_j^T w, so that the deflection is A c (equation 9), ndarray (..., 6, n).
 
-    `jacobian` (..., 6, n): of the measuring point. `torques` (..., n): N m; J^T w of the loaded point. `out` (..., 6, n):
-    overwritten with the result; may be the Jacobian itself. Returns (..., 6, n): m or rad per rad/(N m).
+    `jacobian` (..., 6, n): of the measuring point. `torques` (..., n): J^T w of the loaded point. `out`: overwritten with the
+    result; may be the Jacobian itself.
     """
     return np.multiply(jacobian, torques[..., None, :], out=out)
 
@@ -108,35 +97,15 @@ def tube_compliance(tube: Tube, length_m: float) -> np.ndarray:
     area = np.pi * (outer**2 - inner**2) / 4
     bending = tube.youngs_modulus_Pa * np.pi * (outer**4 - inner**4) / 64
     torsion = tube.shear_modulus_Pa * np.pi * (outer**4 - inner**4) / 32
-    compliance = np.diag(
-        [
-            length / (tube.youngs_modulus_Pa * area),
-            length**3 / (3 * bending),
-            length**3 / (3 * bending),
-            length / torsion,
-            length / bending,
-            length / bending,
-        ]
-    )
+    sideways, along = [length**3 / (3 * bending)] * 2, length / (tube.youngs_modulus_Pa * area)
+    compliance = np.diag([along, *sideways, length / torsion, length / bending, length / bending])
     compliance[1, 5] = compliance[5, 1] = length**2 / (2 * bending)
     compliance[2, 4] = compliance[4, 2] = -(length**2) / (2 * bending)
     return compliance
 
 
-def link_compliance(link: Link) -> np.ndarray:
-    """Compliance of a link at its far end, in the frame of the chain there.
-
-    Returns (6, 6).
-    """
-    turn = beam_axes(link)
-    return turn @ tube_compliance(link.tube, float(np.linalg.norm(link.vector_m))) @ turn.T
-
-
 def beam_axes(link: Link) -> np.ndarray:
-    """Axes of a link as a beam, x along it, twice: of displacements and of rotations.
-
-    Returns (6, 6): columns in the frame of the chain.
-    """
+    """Axes of a link as a beam, x along it, twice: of displacements and of rotations; (6, 6), columns in the chain's frame."""
     along = np.array(link.vector_m) / np.linalg.norm(link.vector_m)
     # A round tube has no preferred lateral axes: any right-handed triad with x along the link will do.
     helper = np.eye(3)[np.argmin(np.abs(along))]
@@ -145,29 +114,19 @@ def beam_axes(link: Link) -> np.ndarray:
 
 
 def extended_chain(robot: Robot) -> Chain:
-    """The robot's chain with Tx Ty Tz Rx Ry Rz springs (equation 5) at the far end of each link.
-
-    Links of the virtual joint method: each yields in a six-dimensional virtual joint [1].
-
-    Returns coordinates 0..n-1 are the joints as before, then six for each link in turn.
-
-    [1] Pashkevich, A., Chablat, D. and Wenger, P., Stiffness analysis of overconstrained parallel manipulators, Mechanism and
-        Machine Theory 44, 2009.
-    """
+    """The robot's chain with Tx Ty Tz Rx Ry Rz springs (equation 5) at the far end of each link, behind those of the joints."""
     return with_inserted(robot.chain, dict.fromkeys((link.after for link in robot.links), SIX))
 
 
 def spring_compliance(robot: Robot) -> np.ndarray:
-    """Aggregated compliance of all springs of the extended chain, the inverse of K_theta in equation 7.
-
-    Returns (m, m): block diagonal: joints, then links. Without links, the diagonal of the joint compliances.
-    """
+    """Compliance of all springs of the extended chain, joints, then links: the inverse of K_theta in equation 7, (m, m)."""
     n = robot.joints
     compliance = np.zeros((n + 6 * len(robot.links),) * 2)
     compliance[:n, :n] = np.diag(robot.compliance)
     for number, link in enumerate(robot.links):
         block = slice(n + 6 * number, n + 6 * number + 6)
-        compliance[block, block] = link_compliance(link)
+        turn = beam_axes(link)
+        compliance[block, block] = turn @ tube_compliance(link.tube, float(np.linalg.norm(link.vector_m))) @ turn.T
     return compliance
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -96,10 +95,7 @@ def poses(chain: Chain, coordinates: np.ndarray, point: MeasuringPoint) -> tuple
 
 
 def poses_of_points(chain: Chain, coordinates: np.ndarray, points: Sequence[MeasuringPoint]) -> tuple[np.ndarray, np.ndarray]:
-    """Poses of several measuring points in one walk along the chain.
-
-    `chain`, `coordinates`: as in `poses`. Returns `position` (T, ..., 3); `rotation` (T, ..., 3, 3).
-    """
+    """Poses of several measuring points in one walk along the chain: `position` (T, ..., 3), `rotation` (T, ..., 3, 3)."""
     components, batch = _component_first(coordinates)
     size = components.shape[1]
     position, rotation = np.empty((len(points), 3, size)), np.empty((len(points), 3, 3, size))
@@ -111,20 +107,14 @@ def poses_of_points(chain: Chain, coordinates: np.ndarray, points: Sequence[Meas
 
 
 def corners(chain: Chain, coordinates: np.ndarray) -> np.ndarray:
-    """Where an arm has corners: at its base and behind each translation.
-
-    `chain`, `coordinates`: as in `poses`. Returns (K, ..., 3): m, base axes.
-    """
+    """Where an arm has corners: at its base and behind each translation, ndarray (K, ..., 3), m, base axes."""
     places = [0, *(number + 1 for number, transform in enumerate(chain.transforms) if transform.kind == "T")]
     return poses_of_points(chain, coordinates, [MeasuringPoint(str(place), place) for place in places])[0]
 
 
 def joint_axes(chain: Chain, coordinates: np.ndarray) -> np.ndarray:
-    """Where each joint turns or slides, and about or along which axis.
-
-    `chain`, `coordinates`: as in `poses`. Returns (J, 2, ..., 3): a place on the axis in m and its direction, base axes.
-    """
-    moved = [number for number, t in enumerate(chain.transforms) if t.coordinate is not None and not chain.is_passive(number)]
+    """A place on the axis of each joint, m, and its direction, base axes, ndarray (J, 2, ..., 3)."""
+    moved = [number for number, t in enumerate(chain.transforms) if t.coordinate is not None]
     position, rotation = poses_of_points(chain, coordinates, [MeasuringPoint(str(number), number) for number in moved])
     axes = np.stack([turned[..., chain.transforms[number].axis] for number, turned in zip(moved, rotation, strict=True)])
     return np.stack([position, axes], axis=1)
@@ -143,8 +133,7 @@ def poses_and_jacobians(
     geometric Jacobian [1], which are those of the spatial one [2] at the point.
 
     [1] Siciliano, B., Sciavicco, L., Villani, L. and Oriolo, G., Robotics: Modelling, Planning and Control, Springer, 2009.
-    [2] Murray, R. M., Li, Z. and Sastry, S. S., A Mathematical Introduction to Robotic Manipulation, section 3.4, CRC Press,
-        1994.
+    [2] Murray, R. M., Li, Z. and Sastry, S. S., A Mathematical Introduction to Robotic Manipulation, CRC Press, 1994.
     """
     components, batch = _component_first(coordinates)
     size = components.shape[1]
@@ -158,43 +147,29 @@ def poses_and_jacobians(
 
 
 def jacobians(chain: Chain, coordinates: np.ndarray, point: MeasuringPoint) -> np.ndarray:
-    """Geometric Jacobian of a measuring point, where its pose is not needed.
-
-    `chain`, `coordinates`, `point`: as in `poses_and_jacobians`. Returns (..., 6, n): the last of what `poses_and_jacobians`
-    returns.
-    """
-    components, batch = _component_first(coordinates)
-    jacobian = np.empty((6, chain.coordinates, components.shape[1]))
-    for part in _blocks(components.shape[1]):
-        frames = _walk(chain, components[:, part], point.after)
-        _store_twists(chain, frames, point, _place_point(frames, point)[1], jacobian[:, :, part])
-    return _batch_first(jacobian, batch)
+    """Geometric Jacobian of a measuring point, (..., 6, n): the last of what `poses_and_jacobians` returns."""
+    return poses_and_jacobians(chain, coordinates, point)[2]
 
 
 @dataclass(frozen=True)
 class Motion:
     """Poses of some points of a chain, and how each transform that moves would move everything behind it; component first.
 
-    `position` (T, 3, S): m, base frame. `rotation` (T, 3, 3, S). `twist` (6, K, S): for each moving transform, in the order of
-    their coordinates, the velocity of what lies behind it, per unit of the coordinate: of the body's point at the base's
-    origin, then the angular one (the spatial twist [1]). `place`, `coordinate` (K,) of int: how many transforms come before
-    each, and the coordinate that moves it.
-
-    [1] Murray, R. M., Li, Z. and Sastry, S. S., A Mathematical Introduction to Robotic Manipulation, section 3.4, CRC Press,
-        1994.
+    `position` (T, 3, S): m, base frame. `rotation` (T, 3, 3, S). `twist` (6, C, S): for each coordinate the velocity of what
+    lies behind it, per unit: of the body's point at the base's origin, then the angular one (the spatial twist, Murray, Li and
+    Sastry 1994, section 3.4). `place` (C,) of int: how many transforms come before the one that it moves.
     """
 
     position: np.ndarray
     rotation: np.ndarray
     twist: np.ndarray
     place: np.ndarray
-    coordinate: np.ndarray
 
     def jacobian(self, after: int, position: np.ndarray, rows: int = 6, chosen: slice | np.ndarray = slice(None)) -> np.ndarray:
-        """Geometric Jacobian of points behind so many transforms of the chain.
+        """Geometric Jacobian of points behind so many transforms of the chain, (rows, C, S').
 
         `position` (3, S'): where the points are, m. `rows`: linear velocities alone, or also angular ones. `chosen` (S',) of
-        int: configuration of each. Returns (rows, C, S').
+        int: configuration of each.
         """
         twist = self.twist[..., chosen]
         angular, moved = twist[3:], np.empty_like(twist[:rows])
@@ -204,32 +179,17 @@ class Motion:
         return self._behind_none(moved, after)
 
     def generalized_forces(self, after: int, force: np.ndarray, moment: np.ndarray) -> np.ndarray:
-        """Force or torque on each coordinate by a wrench on what lies behind so many transforms of the chain.
+        """Force or torque on each coordinate (C, S) by a wrench on what lies behind so many transforms of the chain.
 
-        `force`, `moment` (3, S): the moment about the base's origin. Returns (C, S).
+        `force`, `moment` (3, S): the moment about the base's origin.
         """
         on_each = np.einsum("ik...,i...->k...", self.twist, np.concatenate([force, moment]))
         return self._behind_none(on_each, after)
 
-    def by_coordinate(self, values: np.ndarray) -> np.ndarray:
-        """Values (..., K', S) of the transforms of the first coordinates, or of all, summed for each: (..., C', S)."""
-        if self._one_each:
-            return values
-        coordinate = self.coordinate[: values.shape[-2]]
-        out = np.zeros((*values.shape[:-2], coordinate[-1] + 1, values.shape[-1]))
-        np.add.at(out, (..., coordinate, slice(None)), values)  # type: ignore[arg-type]  # The stubs know no slices here.
-        return out
-
     def _behind_none(self, values: np.ndarray, after: int) -> np.ndarray:
-        """By coordinate, without transforms behind a place of the chain."""
-        behind = self.place >= after
-        if behind.any():
-            values[..., behind, :] = 0.0
-        return self.by_coordinate(values)
-
-    @cached_property
-    def _one_each(self) -> bool:
-        return len(np.unique(self.coordinate)) == len(self.coordinate)
+        """Values (..., C, S) without coordinates behind a place of the chain."""
+        values[..., self.place >= after, :] = 0.0
+        return values
 
 
 def motion(chain: Chain, coordinates: np.ndarray, points: Sequence[MeasuringPoint]) -> Motion:
@@ -246,10 +206,9 @@ def motion(chain: Chain, coordinates: np.ndarray, points: Sequence[MeasuringPoin
         frames = _walk(chain, components[:, part], len(chain.transforms))
         for number, point in enumerate(points):
             _store_pose(_place_point(frames, point), position[number, :, part], rotation[number, :, :, part])
-        for column, (_, place) in enumerate(moving):
-            _store_twist(chain.transforms[place], frames[place], _BASE, twist[:, column, part])
-    coordinate, place = np.array(moving, int).T
-    return Motion(position, rotation, twist, place, coordinate)
+        for coordinate, place in moving:
+            _store_twist(chain.transforms[place], frames[place], _BASE, twist[:, coordinate, part])
+    return Motion(position, rotation, twist, np.array([place for _, place in moving], int))
 
 
 def pose_differences(position: np.ndarray, rotation: np.ndarray, position_0: np.ndarray, rotation_0: np.ndarray) -> np.ndarray:
@@ -269,21 +228,11 @@ def pose_differences(position: np.ndarray, rotation: np.ndarray, position_0: np.
 
 
 def rotation_vectors(rotation: np.ndarray) -> np.ndarray:
-    """Rotation vectors of rotation matrices, for angles below pi.
+    """Rotation vectors (..., 3), rad, of rotation matrices (..., 3, 3), for angles below pi.
 
-    The logarithm on SO(3) [1], by the arctangent of sine and cosine, so that small angles keep their digits.
-
-    `rotation` (..., 3, 3). Returns (..., 3): rad.
-
-    [1] Murray, R. M., Li, Z. and Sastry, S. S., A Mathematical Introduction to Robotic Manipulation, CRC Press, 1994.
+    The logarithm on SO(3), by the arctangent of sine and cosine, so that small angles keep their digits.
     """
-    skew = 0.5 * np.stack(
-        [
-            rotation[..., 2, 1] - rotation[..., 1, 2],
-            rotation[..., 0, 2] - rotation[..., 2, 0],
-            rotation[..., 1, 0] - rotation[..., 0, 1],
-        ]
-    )
+    skew = 0.5 * np.stack([rotation[..., i - 1, i - 2] - rotation[..., i - 2, i - 1] for i in range(3)])
     sine = np.sqrt((skew**2).sum(axis=0))
     cosine = 0.5 * (rotation[..., 0, 0] + rotation[..., 1, 1] + rotation[..., 2, 2] - 1.0)
     angle = np.arctan2(sine, cosine)
@@ -319,19 +268,14 @@ def _store_pose(frame: Frame, position: np.ndarray, rotation: np.ndarray) -> Non
 def _store_twists(
     chain: Chain, frames: Sequence[Frame], point: MeasuringPoint, target: np.ndarray, jacobian: np.ndarray
 ) -> None:
-    """Columns of the Jacobian of a point, which is at `target`; those of a coordinate that moves several transforms add up."""
-    filled: set[int] = set()
-    transforms = chain.transforms[: point.after]
+    """Columns of the Jacobian of a point, which is at `target`."""
+    behind, transforms = set(range(jacobian.shape[1])), chain.transforms[: point.after]
     for number, (transform, frame) in enumerate(zip(transforms, frames, strict=False)):
         if transform.coordinate is not None:
-            column = jacobian[:, transform.coordinate]
-            again = transform.coordinate in filled
-            twist = np.empty_like(column) if again else column
-            _store_twist(transform, frame, None if _passes(transforms[number:], point) else target, twist)
-            if again:
-                column += twist
-            filled.add(transform.coordinate)
-    for coordinate in set(range(jacobian.shape[1])) - filled:
+            passed = _passes(transforms[number:], point)
+            _store_twist(transform, frame, None if passed else target, jacobian[:, transform.coordinate])
+            behind.discard(transform.coordinate)
+    for coordinate in behind:
         jacobian[:, coordinate] = 0.0
 
 

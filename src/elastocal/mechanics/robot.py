@@ -31,10 +31,7 @@ _SHORTEST_LEVER_M = 0.2
 
 @dataclass(frozen=True)
 class Tube:
-    """A thick-walled tube of one material.
-
-    `outer_diameter_m`, `wall_m`: outer diameter and wall thickness. `youngs_modulus_Pa`, `shear_modulus_Pa`: material.
-    """
+    """A thick-walled tube of one material."""
 
     outer_diameter_m: float
     wall_m: float
@@ -71,10 +68,7 @@ class Mass:
 
 @dataclass(frozen=True)
 class Compensator:
-    """A gravity compensator beside a joint.
-
-    `joint`: from 1. `kind`: one of "spring", "gas".
-    """
+    """A gravity compensator, "spring" or "gas", beside a joint, counted from 1."""
 
     joint: int
     kind: str
@@ -120,25 +114,16 @@ class Robot:
         return bool(np.allclose(np.abs(self.reported_matrix), np.eye(self.joints), atol=0.0))
 
     def model_angles(self, reported: np.ndarray) -> np.ndarray:
-        """The chain's joint angles from those that the controller reports.
-
-        `reported` (..., n): rad. Returns (..., n).
-        """
+        """The chain's joint angles (..., n) from those that the controller reports, rad."""
         return reported @ self.reported_matrix.T + self.reported_offset
 
     def reported_angles(self, angles: np.ndarray) -> np.ndarray:
-        """Joint angles as the controller reports them from the chain's.
-
-        `angles` (N, n): rad. Returns (N, n).
-        """
+        """Joint angles (N, n) as the controller reports them from the chain's, rad."""
         return np.linalg.solve(self.reported_matrix, (angles - self.reported_offset).T).T
 
 
 def with_rigid_joints(robot: Robot) -> Robot:
-    """A robot whose joints do not yield, whatever it weighs: what is left of one without known compliances.
-
-    Returns without masses, which turn nothing.
-    """
+    """A robot whose joints do not yield, without masses, which turn nothing: what is left without known compliances."""
     return replace(robot, compliance=np.zeros(robot.joints), masses=(), compliance_known=False)
 
 
@@ -154,12 +139,10 @@ def usual_payload_kg(chain: Chain) -> float:
 
 
 def usual_compliance(chain: Chain, payload_kg: float | None = None) -> np.ndarray:
-    """Joint compliances that suit the size of an arm: two milliradians under the rated load at the longest lever.
+    """Joint compliances (n,) that suit the size of an arm: two milliradians under the rated load at the longest lever.
 
     The published ones of KUKA and FANUC robots of 165 kg are 0.5 to 5 times these: a scale for what is to be identified, no
-    value to compute with.
-
-    `payload_kg`: rated load; by `usual_payload_kg` without. Returns (n,): rad/(N m); of prismatic joints m/N.
+    value to compute with. `payload_kg`: rated load; by `usual_payload_kg` without.
     """
     load_N = STANDARD_GRAVITY * (usual_payload_kg(chain) if payload_kg is None else payload_kg)
     levers = np.maximum(_reach_behind(chain), _SHORTEST_LEVER_M)

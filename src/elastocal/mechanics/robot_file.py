@@ -117,14 +117,6 @@ def document_of(robot: Robot) -> dict[str, Any]:
     return {key: value for key, value in document.items() if value is not None}
 
 
-def joint_count(document: Mapping[str, Any], source: str = "robot") -> int:
-    """Number of joints of the contents of a robot file.
-
-    `source`: named in errors.
-    """
-    return parse_chain(document["chain"], document.get("lengths_m", {}), source).coordinates
-
-
 def joint_limits(limits_deg: Sequence[Sequence[float]] | None, chain: Chain, source: str) -> np.ndarray:
     """Joint limits in rad, of prismatic joints in m.
 
@@ -175,7 +167,6 @@ def _links(chain: Chain, described: Mapping[str, Any] | None, source: str) -> tu
     odd = {
         "fixed rotations": any(t.kind == "R" and t.coordinate is None for t in chain.transforms),
         "prismatic joints": any(chain.prismatic),
-        "passive joints": any(chain.is_passive(place) for place in range(len(chain.transforms))),
     }
     if what := next((what for what, there in odd.items() if there), ""):
         raise InputError(source, "links", f"a chain with {what}", "links on chains that turn at their joints only")

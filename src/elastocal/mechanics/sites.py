@@ -1,12 +1,8 @@
 """Where a robot can deviate from its chain: small displacements at the base, at each joint and at the far end of each link.
 
-Every physical effect moves the robot through some of these coordinates. The chain that holds them all gives exact poses, and
-its Jacobian the sensitivity of a measured point to each of them.
-
-They are virtual joints of the virtual joint method [1], whether a spring yields in them or an error of geometry is one.
-
-[1] Pashkevich, A., Chablat, D. and Wenger, P., Stiffness analysis of overconstrained parallel manipulators, Mechanism and
-    Machine Theory 44, 2009.
+Every physical effect moves the robot through some of these coordinates, the virtual joints of the virtual joint method (see
+`elastostatics`), whether a spring yields in them or an error of geometry is one. The chain that holds them all gives exact
+poses, and its Jacobian the sensitivity of a measured point to each of them.
 """
 
 from __future__ import annotations
@@ -39,9 +35,8 @@ class Sites:
     Ty Tz Rx Ry Rz of the foot, base axes. `tilt`: for each joint Rx Ry Rz just behind it, in the frame that turns with it.
     `link_end`: for each link 0..n Tx Ty Tz Rx Ry Rz at its far end, in the frame of the chain there. Link 0 is the column
     before joint 1, link n the flange behind the last joint. `joint_axes`: 0, 1, 2 for a joint about x, y, z of its frame.
-    `link_vectors_m` (n + 1, 3): from the near to the far end of each link, in the frame of its far end. A link ends at a
-    passive joint; what lies behind that and before the next joint belongs to no link. `link_rotations` (n + 1, 3, 3): from
-    the frame at the far end of each link to that at its near end: fixed rotations between two joints. `joint_signs`: sense
+    `link_vectors_m` (n + 1, 3): from the near to the far end of each link, in the frame of its far end. `link_rotations`
+    (n + 1, 3, 3): from the frame there to that at its near end: fixed rotations between two joints. `joint_signs`: sense
     in which each joint turns about its axis, +1 or -1. `prismatic`: which joints shift along their axis instead; theirs are
     metres and newtons. `masses`: what the links weigh, where the robot file says so. `gravity_m_s2`: base axes.
     `payload_kg`: as in `Robot`. `compliance` (n,): of the joints as in `Robot`, usual ones of rigid joints: the scale of
@@ -108,18 +103,12 @@ class Sites:
         return next(loaded, None)
 
     def carried_links(self, joint: int) -> list[int]:
-        """Links with a length behind a joint whose weight can turn it, as numbers from 1.
-
-        `joint`: from 0.
-        """
+        """Links with a length behind a joint, from 0, whose weight can turn it, as numbers from 1."""
         links = [k for k in range(joint + 1, self.joints + 1) if np.linalg.norm(self.link_vectors_m[k]) > _SHORTEST_M]
         return [k for k in links if self._longest_levers[k, joint] > _SHORTEST_M]
 
     def longest_weight_torque_Nm(self, joint: int) -> float:  # noqa: N802 - units in names keep their case
-        """Torque on a joint by the weight of all declared masses behind it, each at its longest lever.
-
-        `joint`: from 0. Returns a mass counts as in the middle of its link.
-        """
+        """Torque on a joint, from 0, by all declared masses behind it, each at the longest lever of the middle of its link."""
         levers, gravity = self._longest_levers[:, joint], np.linalg.norm(self.gravity_m_s2)
         behind = [mass for mass in self.masses if mass.link > joint]
         return float(sum(mass.mass_kg * gravity * 0.5 * (levers[mass.link - 1] + levers[mass.link]) for mass in behind))
@@ -129,10 +118,7 @@ class Sites:
         return sorted(np.argsort(np.abs(self.link_vectors_m[link]), kind="stable")[:2].tolist())
 
     def moment_turns(self, link: int, axis: int, joint: int) -> bool:
-        """Whether a first moment along an axis of the frame at the far end of a link can turn a joint by its weight.
-
-        `link`: 0 is the column. `joint`: from 0.
-        """
+        """Whether a first moment along an axis of the frame at the far end of a link can turn a joint, from 0."""
         return bool(self._largest_turns[link, axis, joint] > _SHORTEST_M)
 
     @cached_property
@@ -144,22 +130,19 @@ class Sites:
     @cached_property
     def _longest_levers(self) -> np.ndarray:
         """Of the weight of each link on each joint over some poses, ndarray (n + 1, n), m."""
-        levers = []
-        for link, position in enumerate(self._at_random.position):
-            jacobian = self._at_random.jacobian(self.far_end(link).after, position, rows=3)[:, : self.joints]
-            levers.append(np.abs(np.tensordot(self.down, jacobian, 1)).max(axis=1))
-        return np.array(levers)
+        return np.array([self._largest(link, self.down, position) for link, position in enumerate(self._at_random.position)])
 
     @cached_property
     def _largest_turns(self) -> np.ndarray:
         """Torque on each joint by a unit moment along each axis of each link over some poses, ndarray (n + 1, 3, n)."""
-        found = []
-        for link, rotation in enumerate(self._at_random.rotation):
-            nothing, after = np.zeros_like(rotation[:, 0]), self.far_end(link).after
-            turning = [np.cross(rotation[:, axis], self.down[:, None], axis=0) for axis in range(3)]
-            forces = [self._at_random.generalized_forces(after, nothing, moment)[: self.joints] for moment in turning]
-            found.append([np.abs(force).max(axis=1) for force in forces])
-        return np.array(found)
+        each = enumerate(self._at_random.rotation)
+        return np.array([[self._largest(link, 0.0 * self.down, axis) for axis in axes.swapaxes(0, 1)] for link, axes in each])
+
+    def _largest(self, link: int, force: np.ndarray, arm: np.ndarray) -> np.ndarray:
+        """Torque on each joint, (n,), by a force (3,) at the base's origin and a unit weight at the end of an arm (3, S)."""
+        moment = np.cross(arm, self.down[:, None], axis=0)
+        forces = np.broadcast_to(force[:, None], moment.shape)
+        return np.abs(self._at_random.generalized_forces(self.far_end(link).after, forces, moment)[: self.joints]).max(axis=1)
 
 
 def sites_of(holder: Robot | Chain) -> Sites:
@@ -182,18 +165,12 @@ def sites_of(holder: Robot | Chain) -> Sites:
 def _sites_of(chain: Chain, **known: Any) -> Sites:
     inserted: dict[int, list[tuple[str, int]]] = defaultdict(list)
     # A point at the end of a link is moved by the link's end; one inside a link is not.
-    inserted[0] += SIX
-    joints: list[Transform] = []
-    links: list[tuple[np.ndarray, np.ndarray]] = []
-    start = 0
-    for index, transform in enumerate((*chain.transforms, None)):
-        if (transform is None or transform.coordinate is not None) and len(links) == len(joints):
-            inserted[index] += SIX
-            links.append(_link(chain.transforms[start:index]))
-        if transform is not None and transform.coordinate is not None and not chain.is_passive(index):
-            inserted[index + 1] += SIX[3:]
-            joints.append(transform)
-            start = index + 1
+    places = [index for index, transform in enumerate(chain.transforms) if transform.coordinate is not None]
+    joints, links = [chain.transforms[place] for place in places], []
+    for start, end in zip([0, *(place + 1 for place in places)], [*places, len(chain.transforms)], strict=True):
+        inserted[start] += SIX[3:] if start else SIX
+        inserted[end] += SIX
+        links.append(_link(chain.transforms[start:end]))
     n = len(joints)
     # Along the chain: six of the foot, six of the end of a link, three of the joint behind it, and so on.
     ends = [range(n + 6 + 9 * link, n + 12 + 9 * link) for link in range(n + 1)]

@@ -21,7 +21,7 @@ from elastocal.io.storage import read_table, write_table
 from elastocal.loop.diagnosis_tables import diagnosis_facts, parameter_columns, step_fit
 from elastocal.loop.loading import load_whole_campaign
 from elastocal.loop.schemas import measurements
-from elastocal.mechanics.robot_file import joint_count
+from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.random_streams import stream
 from elastocal.remainder.corrected import Plan, corrected, regressions
 from elastocal.validation.fitted_range import outside_poses
@@ -76,7 +76,7 @@ class Method:
 def load_data_set(descriptions_path: str | Path, measurements_path: str | Path, folds_path: str | Path) -> DataSet:
     """Read a data set from files as `deal_league_folds` wrote them."""
     descriptions = read_json(descriptions_path)
-    joints = joint_count(descriptions["robot"], descriptions["source"])
+    joints = robot_from_document(descriptions["robot"], descriptions["source"]).joints
     return DataSet(descriptions, read_table(measurements_path, measurements(joints)), read_table(folds_path, FOLDS))
 
 

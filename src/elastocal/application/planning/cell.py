@@ -86,8 +86,7 @@ def link_points(robot: Robot, angles: np.ndarray, joint: int = 0) -> np.ndarray:
 
 def _joint_places(robot: Robot) -> list[int]:
     """Places of the joints among the transforms of the chain."""
-    chain = robot.chain
-    return [p for p, transform in enumerate(chain.transforms) if transform.coordinate is not None and not chain.is_passive(p)]
+    return [place for place, transform in enumerate(robot.chain.transforms) if transform.coordinate is not None]
 
 
 def _points(robot: Robot, angles: np.ndarray, places: list[int]) -> np.ndarray:

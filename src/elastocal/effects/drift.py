@@ -1,4 +1,4 @@
-"""Warmth: by how much the robot is warmer, by the temperature or by the time, and what that does to it."""
+"""Drift: tracker, nests and foot that move during a campaign, and a robot that gets warmer, by temperature or time."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.effects.geometry import longer
-from elastocal.effects.protocol import Parameter, Shape, effect, needed
+from elastocal.effects.protocol import Parameter, Shape, effect, moved_and_turned, needed
 from elastocal.effects.sizes import Size
 
 if TYPE_CHECKING:
@@ -17,6 +17,58 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 _effect = partial(effect, "drift")
+_HOUR_S = 3600.0
+# The nearest of these has all but a 24th of the measurements on the right side of the step. Nearer to an end than the outermost
+# a step would be a shift of nearly all measurements.
+_WHEN = Shape("when", "1", 0.5, 1 / 12, 11 / 12, tried=11)
+
+
+# Tracker and foot drift alike in the measurements, and a task counts from where the foot stands.
+@_effect(
+    "drift of the tracker or of the robot's foot",
+    Size("shift an hour", 2e-4, "a tripod on a warming floor"),
+    Size("turn an hour", 1e-4, "the same over its height"),
+    moves_robot=False,
+)
+def frame_drift(own: Effect, sites: Sites) -> Candidates:
+    """A tracker or a robot's foot that drifts: stand, floor or bolts settle, and all measurements move as one rigid body.
+
+    u = t (d, r) at the foot in base axes, with t the time since the first measurement (h), d in m/h and r in rad/h; a point p
+    (m) moves by t (d + r x p).
+    """
+    six = moved_and_turned(own.size("shift an hour", sites), own.size("turn an hour", sites), "/h")
+
+    def law(around: Conditions) -> Displacements:
+        hours = needed(around.time_s) / _HOUR_S
+        return [{coordinate: hours} for coordinate in sites.base]
+
+    yield own.candidate((), six, law, {"time"}, of_setup=True)
+
+
+# As a drift.
+@_effect(
+    "shift of the set-up between rows",
+    Size("shift", 5e-4, "a stand that is knocked"),
+    Size("turn", 2e-4, "the same over its height"),
+    moves_robot=False,
+    parameter_words={"when": "share of the measurements before it"},
+)
+def setup_step(own: Effect, sites: Sites) -> Candidates:
+    """A tracker, a nest or a foot that was moved between two rows: a rigid motion of all measurements from there on.
+
+    u = (d, r) at the foot in base axes from the share w of the campaign on, zero before; d in m, r in rad, and a point p (m)
+    moves by d + r x p. Where it happens is a shape: w = 0 is the first row of the campaign, 1 its last. A step needs no clock;
+    where the rows are not known the poses count by their numbers.
+    """
+    six = moved_and_turned(own.size("shift", sites), own.size("turn", sites))
+
+    def law(around: Conditions, when: float) -> Displacements:
+        after = (needed(around.progress) >= when).astype(float)
+        return [{coordinate: after} for coordinate in sites.base]
+
+    yield own.candidate((), six, law, shapes=(_WHEN,), of_setup=True)
+
+
 _REFERENCE_C, _SHORTEST_M = 20.0, 0.05
 # By which of them the shapes of a law go. Castings of a robot follow their motors and the air in a quarter of an hour to some
 # hours.
@@ -40,11 +92,8 @@ def thermal_growth(own: Effect, sites: Sites, cause: str, quantity: str, unit: s
     """Column and links that grow as they warm up: motors, gears and the air warm the castings, which expand.
 
     dl = alpha dT l for each length l (m). With a measured temperature alpha is the expansion (1/K) and dT the temperature above
-    20 °C, at which dimensions are stated [1]; with the time t (s) alone dl = g (1 - exp(-t / t_0)) l, with g the final growth
-    (m/m) and t_0 (s) the lag of a body that has one temperature throughout [2].
-
-    [1] ISO 1, Geometrical product specifications: standard reference temperature, 2016.
-    [2] F. P. Incropera and D. P. DeWitt, Fundamentals of Heat and Mass Transfer, Wiley, 2002.
+    20 °C, at which dimensions are stated (ISO 1); with the time t (s) alone dl = g (1 - exp(-t / t_0)) l, with g the final
+    growth (m/m) and t_0 (s) the lag of a body that has one temperature throughout (Incropera and DeWitt 2002).
     """
     growth = own.parameters(quantity, [quantity.replace(" ", "_")], unit, sites)
     yield own.candidate(
@@ -74,13 +123,11 @@ def _warmed(sites: Sites) -> list[tuple[int | None, str]]:
 def temperature_gradient(own: Effect, sites: Sites, link: int | None, cause: str) -> Candidates:
     """An arm that is warmer on one side or at one end than at the other: motors, sun or a draught warm it unevenly.
 
-    A gradient g (K/m) across a link bends it to the curvature alpha g (1/m) [1], with alpha the expansion (1/K), so that a link
-    of length l (m) ends by l^2 / 2 times that to the side (m) and turned by l times that (rad). Along the arm motors and gears
-    at its foot are warmer than the wrist: a link whose middle is x (m) from the foot grows by the share b (x - x_0), x_0 the
-    mean over the arm, which keeps its length. Both in proportion to the temperature above 20 °C where it is measured,
-    parameters in 1/(K m), or to a first-order lag since the campaign began, in 1/m.
-
-    [1] B. A. Boley and J. H. Weiner, Theory of Thermal Stresses, Wiley, 1960.
+    A gradient g (K/m) across a link bends it to the curvature alpha g (1/m) (Boley and Weiner 1960), with alpha the expansion
+    (1/K), so that a link of length l (m) ends by l^2 / 2 times that to the side (m) and turned by l times that (rad). Along the
+    arm motors and gears at its foot are warmer than the wrist: a link whose middle is x (m) from the foot grows by the share b
+    (x - x_0), x_0 the mean over the arm, which keeps its length. Both in proportion to the temperature above 20 °C where it is
+    measured, parameters in 1/(K m), or to a first-order lag since the campaign began, in 1/m.
     """
     quantity, unit = {"temperature": ("curvature a kelvin", "1/(K m)"), "time": ("curvature", "1/m")}[cause]
     if link is None:

@@ -1,0 +1,161 @@
+"""Every fault of the data, looked for before any physics: constant columns, other readings, loads, shuffled rows, nonsense.
+
+Where it is ambiguous none is found: a false alarm stops a trace that was right, a miss only leaves it to what comes after.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from elastocal.data_checks.alternatives import other_readings
+from elastocal.data_checks.loads import deflections, wrong_loads
+from elastocal.data_checks.placement import (
+    FAR_BETTER,
+    IMPLAUSIBLE_M,
+    IMPLAUSIBLE_RAD,
+    of_each_target,
+    placed,
+    rms,
+    robust_sigma,
+    robustly_placed,
+    spread,
+    trimmed_rms,
+)
+from elastocal.data_checks.protocol import Fault, Value
+from elastocal.fitting.observations import state_clusters
+
+if TYPE_CHECKING:
+    from elastocal.campaigns.campaign import Campaign, Measurements
+
+# Below the last digit that any sensor writes (0.1 µm) and any controller reports (1e-6 rad or so).
+_SAME_M, _SAME_RAD, _FEWEST_POSES = 1e-6, 1e-6, 3
+# A row is out of place beyond so many robust standard deviations of the others, if so many are in place, which tell how well
+# rows in place fit; and back in place within so many.
+_OUT_OF_PLACE, _FEWEST_IN_PLACE, _IN_PLACE = 20.0, 10, 5.0
+# A place is no chance if it is so much nearer than other poses are to each other; so for this share of the rows.
+_NO_CHANCE, _MOST, _FEWEST_ROWS = 0.25, 0.8, 2
+# Places closer than this are one place; and no robot nor tracker reaches so far.
+_SAME_PLACE_M, _SESSIONS_APART_M = 1e-3, 1e5
+# Orientations distinguish places as points at this distance from the target would, m.
+_ARM_M = 0.5
+# Five times what no geometric error and no deflection makes.
+_FARTHEST_M, _FARTHEST_RAD = 5 * IMPLAUSIBLE_M, 5 * IMPLAUSIBLE_RAD
+
+
+def faults(campaign: Campaign) -> tuple[Fault, ...]:
+    """Every fault that the measurements of a campaign show; none is looked for where another one makes that meaningless."""
+    found: list[Fault] = []
+    for find in (constant_columns, other_readings):
+        found += find(campaign)
+        if any(fault.decisive for fault in found):
+            return tuple(found)
+    return (*found, *wrong_loads(deflections(campaign)), *(shuffled_rows(campaign) or implausible_measurements(campaign)))
+
+
+def constant_columns(campaign: Campaign) -> list[Fault]:
+    """Positions that stay where they are while the robot moves, or joint angles that do not while the measurements do.
+
+    Returns one for each kind, of the first target that shows it.
+    """
+    some, predicted = spread(campaign).measurements, placed(spread(campaign)).predicted[0]
+    found: dict[str, Fault] = {}
+    for members in of_each_target(some):
+        if (poses := len(np.unique(some.pose[members]))) < _FEWEST_POSES:
+            continue
+        measured, who, kinds = some.position[members], campaign.targets[some.target[members[0]]].name, {}
+        # Standard deviations along the main axes, the smallest first: a plane seen in its own axes has one constant column.
+        needed, moved = _extents(predicted[members]), _extents(measured)[-1]
+        still = np.ptp(measured, axis=0) < _SAME_M
+        if still.any() and needed[still.sum() - 1] > IMPLAUSIBLE_M:
+            axes, verb = ", ".join(np.array(list("xyz"))[still]), "are" if still.sum() > 1 else "is"
+            where = "zero" if not measured[:, still].any() else "the same"
+            detail = f"{axes} of {who} {verb} {where} in all {poses} poses, though by its joint angles the robot moved"
+            kinds[axes] = detail, needed[-1]
+        if np.ptp(some.joint_angles[members], axis=0).max() < _SAME_RAD and moved > IMPLAUSIBLE_M:
+            same = f"the joint angles are the same in all {poses} poses"
+            kinds["angles"] = f"{same}, though the measurements of {who} lie {moved:.2g} m apart", moved
+        count = (Value("poses", float(poses), "–"),)
+        for kind, (detail, size) in kinds.items():
+            found.setdefault(kind, Fault("constant_columns", (), detail, count, (float(size), 0.0), (), True))
+    return list(found.values())
+
+
+def _extents(points: np.ndarray) -> np.ndarray:
+    """Standard deviations of points along their principal axes, rising, ndarray (3,), m."""
+    off = points - points.mean(axis=0)
+    return np.sqrt(np.maximum(np.linalg.eigvalsh(off.T @ off / len(points)), 0.0))
+
+
+def shuffled_rows(campaign: Campaign) -> list[Fault]:
+    """Rows that fit in the places of each other, as well as rows fit that are in place; one fault, or none.
+
+    A row is out of place where it is absurdly far from the nominal robot as it stands, and where another place is not only
+    better but clearly nearer than chance would have it: among many points some point is always near. Where frames are fitted,
+    most rows must be in place; elsewhere all may be out of it.
+    """
+    # One fit to some poses serves all: it only has to be good to a few centimetres.
+    beside, measurements = placed(campaign, robustly_placed(spread(campaign)).estimate), campaign.measurements
+    distance, level = beside.distance, IMPLAUSIBLE_M
+    out = distance > IMPLAUSIBLE_M
+    if (~out).sum() >= _FEWEST_IN_PLACE:
+        sigma = robust_sigma(distance[~out], 3)
+        out &= distance > _OUT_OF_PLACE * sigma
+        # Loads move some targets much more than others.
+        level = max(_IN_PLACE * sigma, 2.0 * np.quantile(distance[~out], 0.95), _SAME_PLACE_M)
+    rows = np.flatnonzero(out)
+    if len(rows) < _FEWEST_ROWS:
+        return []
+    places = [_places(measurements, *pose)[rows] for pose in (beside.measured, beside.predicted)]
+    predicted, (left, number) = places[1], map(np.asarray, cKDTree(places[0]).query(places[1]))
+    source = rows[number]
+    back = (left < level) & (left < _NO_CHANCE * _spacing(predicted)) & (source != rows)
+    # Each measurement has one place: one that stands for many is no permutation.
+    pose = state_clusters(measurements)
+    taken = len(np.unique(pose[source[back]])), len(np.unique(pose[rows[back]]))
+    if back.sum() < max(_FEWEST_ROWS, _MOST * len(rows)) or taken[0] < _MOST * taken[1]:
+        return []
+    before, after = rms(distance[rows]), rms(left[back])
+    if after > before / FAR_BETTER:
+        return []
+    detail = f"{back.sum()} of {len(measurements)} rows fit with the measured columns of another one of them"
+    concerned = tuple(sorted(measurements.row[rows[back]].tolist()))
+    share = Value("share of the measurements", float(back.mean() * len(rows) / len(measurements)), "–")
+    return [Fault("shuffled_rows", (), detail, (share,), (before, after), concerned, True)]
+
+
+def _places(measurements: Measurements, position: np.ndarray, rotation: np.ndarray | None) -> np.ndarray:
+    """Positions and, where they are measured, orientations as points whose distances are in m, sessions far apart."""
+    # A small angle changes the nine entries, taken together, by the square root of two times itself.
+    turned = [] if rotation is None else [_ARM_M / np.sqrt(2) * rotation.reshape(-1, 9)]
+    return np.column_stack([position, _SESSIONS_APART_M * measurements.session, *turned])
+
+
+def _spacing(points: np.ndarray) -> np.ndarray:
+    """How far from each of some points (N, .) the next place of its session is, 0 where there is none, ndarray (N,), m."""
+    # One of each place.
+    places = points[np.unique(np.round(points / _SAME_PLACE_M), axis=0, return_index=True)[1]]
+    near = np.reshape(cKDTree(places).query(points, k=min(4, len(places)))[0], (len(points), -1))
+    other = np.where(near > 2 * _SAME_PLACE_M, near, np.inf).min(axis=1)
+    return np.where(other < _SESSIONS_APART_M / 2, other, 0.0)
+
+
+def implausible_measurements(campaign: Campaign) -> list[Fault]:
+    """Measurements absurdly far from the nominal robot, for a reason that no other fault names; one fault, or none."""
+    some = spread(campaign)
+    # Nearly all campaigns are done with the first, which takes a sixth of the time.
+    for place in (placed, robustly_placed):
+        placement = place(some)
+        away = trimmed_rms(placement.distance)
+        turned = 0.0 if placement.turn is None else trimmed_rms(placement.turn)
+        if away < _FARTHEST_M and turned < _FARTHEST_RAD:
+            return []
+    what = f"positions lie {away:.2g} m" if away >= _FARTHEST_M else f"orientations lie {turned:.2g} rad"
+    detail = (
+        f"{what} (RMS) from where the robot file puts them, and no other sense, unit, axis, frame or order of rows that was"
+        " tried mends it: chain, zeros of the joints, measuring points and columns need a look"
+    )
+    parameters = (Value("RMS distance of positions", away, "m"), Value("RMS turn of orientations", turned, "rad"))
+    return [Fault("implausible_measurements", (), detail, parameters, (rms(placement.distance),) * 2, (), True)]

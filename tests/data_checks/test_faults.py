@@ -1,0 +1,112 @@
+"""Faults are named where they are, and none where the model is right or only lacks something."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_campaigns import POINTS, Plan, made, with_geometric_errors, with_measured, with_other_compliances
+
+from elastocal.data_checks.faults import constant_columns, faults, implausible_measurements, shuffled_rows
+
+PLANS = {
+    "base": Plan(poses=10, loads=2),
+    "tracker": Plan(poses=15, tracker=True),
+    "positions": Plan(poses=20, tracker=True, oriented=False, loads=1, repeats=2),
+    "few poses": Plan(poses=8, loads=2),
+    "small loads": Plan(poses=10, loads=2, force=20.0),
+    "no noise": Plan(poses=10, loads=2, noise=0.0),
+}
+
+
+# Each plan with a seed of its own.
+@pytest.mark.parametrize(("seed", "plan"), list(enumerate(PLANS)))
+def test_no_fault_is_found_where_the_model_is_right(fanuc, plan, seed):
+    assert faults(made(fanuc, seed, PLANS[plan])) == ()
+
+
+@pytest.mark.parametrize(("seed", "plan"), list(enumerate(PLANS)))
+def test_nothing_decisive_is_found_where_the_model_lacks_something(kuka, plan, seed):
+    """Springs, zeros, a sag and lengths off, which is most at once."""
+    offsets = np.random.default_rng(seed).normal(0.0, 3e-3, kuka.joints)
+    true_robot = with_geometric_errors(with_other_compliances(kuka, seed, 0.5), seed, 0.01)
+    assert not [fault for fault in faults(made(kuka, seed, PLANS[plan], true_robot, offsets, sag=3e-3)) if fault.decisive]
+
+
+def test_a_wrong_sign_is_not_called_shuffled_rows(fanuc):
+    campaign = made(fanuc, 1, Plan(poses=20))
+    turned = with_measured(campaign, joint_angles=campaign.measurements.joint_angles * [1, 1, -1, 1, 1, 1])
+    assert [fault.name for fault in faults(turned)] == ["wrong_sign"]
+
+
+@pytest.fixture(scope="module", params=["base", "tracker"])
+def twelve_poses(request, fanuc):
+    return made(fanuc, 1, Plan(poses=12, tracker=request.param == "tracker"))
+
+
+@pytest.mark.parametrize(("kept", "words"), [((0, 0, 0), "x, y, z of"), ((1, 1, 0), "z of"), ((0, 1, 0), "x, z of")])
+@pytest.mark.parametrize(("value", "same"), [(0.0, "zero"), (1.5, "the same")])
+def test_positions_that_stand_still_are_named(twelve_poses, kept, words, value, same):
+    still = np.where(kept, twelve_poses.measurements.position, value)
+    (fault,) = constant_columns(with_measured(twelve_poses, position=still))
+    assert (fault.name, fault.decisive) == ("constant_columns", True)
+    assert fault.detail.startswith(words) and f" {same} in all 12 poses" in fault.detail
+
+
+def test_angles_that_stand_still_while_the_measurements_move_are_named_unless_it_is_one_pose_read_again(twelve_poses):
+    seen = twelve_poses.measurements
+    still = with_measured(twelve_poses, joint_angles=np.full_like(seen.joint_angles, 0.4))
+    (fault,) = constant_columns(still)
+    assert fault.detail.startswith("the joint angles are the same in all 12 poses")
+    again = seen.position[: len(POINTS)][seen.target] + 1e-5 * seen.pose[:, None]
+    assert constant_columns(with_measured(still, position=again)) == []
+
+
+def test_a_robot_that_moves_in_a_plane_may_have_a_constant_coordinate(fanuc):
+    campaign = made(fanuc, 1, Plan(poses=12, noise=0.0, loads=0), moving={1: 0, 2: 0, 3: 0, 4: 0, 5: 0})
+    assert np.ptp(campaign.measurements.position[campaign.measurements.target == 3, 2]) < 1e-9
+    assert constant_columns(campaign) == []
+
+
+@pytest.fixture(scope="module", params=["base", "tracker"])
+def campaign(request, fanuc):
+    return made(fanuc, 1, Plan(tracker=request.param == "tracker"), with_other_compliances(fanuc, 1, 0.3))
+
+
+def with_rows(campaign, source):
+    seen = campaign.measurements
+    return with_measured(campaign, position=seen.position[source], rotation_vector=seen.rotation_vector[source])
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.4])
+def test_measurements_in_the_rows_of_each_other_are_named_with_these_rows(campaign, share):
+    """Two rows that change places, or a share of all."""
+    rng, source = np.random.default_rng(0), np.arange(len(campaign.measurements))
+    some = rng.choice(len(source), max(round(share * len(source)), 2), replace=False)
+    source[some] = rng.permutation(some) if share else some[::-1]
+    moved = some[source[some] != some]
+    (fault,) = shuffled_rows(with_rows(campaign, source))
+    assert (fault.name, fault.joints, fault.decisive) == ("shuffled_rows", (), True)
+    assert set(fault.rows) <= set((moved + 1).tolist()) and len(fault.rows) >= 0.9 * len(moved)
+    assert fault.evidence[1] < fault.evidence[0] / 5
+
+
+@pytest.mark.parametrize(("steps", "words"), [(1, "row further up"), (-1, "row further down")])
+def test_measured_columns_moved_by_one_row_are_named(campaign, steps, words):
+    (fault,) = faults(with_rows(campaign, np.roll(np.arange(len(campaign.measurements)), steps)))
+    assert fault.name == "shuffled_rows" and words in fault.detail
+
+
+def test_measurements_that_belong_nowhere_are_not_shuffled(campaign):
+    rng, position = np.random.default_rng(3), campaign.measurements.position.copy()
+    position[rng.choice(len(position), 20, replace=False)] += rng.normal(0.0, 0.3, (20, 3))
+    assert shuffled_rows(with_measured(campaign, position=position)) == []
+
+
+@pytest.mark.parametrize("tracker", [True, False])
+def test_measurements_of_another_robot_are_named_and_those_of_one_off_by_centimetres_are_not(fanuc, kuka, tracker):
+    campaign = made(fanuc, 1, Plan(poses=20, tracker=tracker))
+    (fault,) = implausible_measurements(replace(campaign, robot=kuka))
+    assert (fault.name, fault.decisive) == ("implausible_measurements", True)
+    assert fault.parameters[0].value > 0.1 and "\n" not in fault.detail
+    off = made(fanuc, 1, Plan(poses=20, tracker=tracker), with_geometric_errors(fanuc, 1, 0.01), 5e-3, sag=5e-3)
+    assert implausible_measurements(off) == []
