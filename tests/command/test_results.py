@@ -14,7 +14,7 @@ from made_urdf import joint, link
 from made_urdf import robot as made
 from scipy.spatial.transform import Rotation
 
-from elastocal.application.accuracy import accuracy_from, accuracy_sentence, error_rows
+from elastocal.application.accuracy import Accuracy, accuracy_sentence, error_rows
 from elastocal.application.calibrated import nominal_forward
 from elastocal.campaigns.reading import campaign_files, read_robot
 from elastocal.exchange.dh import robot_from_dh
@@ -64,7 +64,7 @@ def test_a_certificate_has_the_accuracy_and_the_table_that_correct_states_to_the
     lines = result.output.splitlines()
     assert document["conformity"]["decision"] in lines[0] and "0.500 mm" in lines[0]
     assert document["point"] in lines[1] and "Nobody has measured" in lines[2] and lines[3].endswith(".pdf")
-    assert accuracy_sentence(accuracy_from(document["accuracy"])) in corrected[1]
+    assert accuracy_sentence(Accuracy(**document["accuracy"])) in corrected[1]
     rows = error_rows(json.loads(VERDICT.read_text()))
     assert document["errors"] == rows and len(rows) == 2
     assert document["budget"][0]["name"] == "uncorrected" and rows[1][1] == f"{1e3 * document['budget'][0]['rms_m']:.3f} mm"

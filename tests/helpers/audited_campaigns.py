@@ -40,9 +40,8 @@ def diagnosed_campaign(top, robot, effects=(), **design):
     write_json(results / "campaign.json", descriptions)
     case, unseen = (case_from(descriptions, columns_of(part)) for part in parts)
     found = diagnose(case, Settings(), 1)
-    write_json(results / "diagnosis.json", tables.diagnosis_facts(found))
+    write_json(results / "diagnosis.json", tables.diagnosis_facts(found) | {"covariance": found.final.covariance.tolist()})
     write_table(results / "steps.parquet", schemas.STEPS, tables.step_blocks(found), {})
-    write_table(results / "correlations.parquet", schemas.CORRELATIONS, [tables.correlation_columns(found.final)], {})
     # As the next job does: from the files.
     again = tables.diagnosis_from(case, tables.diagnosis_facts(found), read_table(results / "steps.parquet", schemas.STEPS))
     blocks = residual_blocks(again, judged(again, unseen, 1))

@@ -51,8 +51,8 @@ def test_the_robot_is_that_of_the_final_fit(checkout):
 
 
 def test_the_regression_comes_back_and_physics_alone_has_its_own_accuracy(regressed_checkout):
-    words = regressed_checkout / "smooth", ROBOTS, regressed_checkout
-    whole, physics = (load_diagnosed(*words, physics_only) for physics_only in (False, True))
+    whole = load_diagnosed(regressed_checkout / "smooth", ROBOTS, regressed_checkout)
+    physics = whole.by_physics()
     stated, heldout = whole.verdict, whole.verdict["heldout"]
     assert heldout["delivered"]["rms_m"] < 0.6 * heldout["after"]["rms_m"]
     assert physics.calibrated.remainder is None and physics.verdict["heldout"]["delivered"] == heldout["after"]

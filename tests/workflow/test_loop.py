@@ -186,9 +186,9 @@ def test_a_new_effect_is_a_module_and_a_new_campaign_a_file_that_is_read_again_w
     cell.path("src/elastocal/effects/sag.py").write_text(SAG, encoding="utf-8")
     cell.path("config/campaigns/tiny.yaml").write_text(yaml.safe_dump(TINY | {"robot": "kuka_extended"}), encoding="utf-8")
     cell.configure({"loop": {"campaigns": ["tiny"]}})
-    candidates, training = "reports/loop/made/candidates.parquet", "results/loop/tiny/training.parquet"
+    candidates, training = "reports/loop/made/candidates.csv", "results/loop/tiny/training.parquet"
     cell.run(candidates, training, *OWN[1:])
-    assert "sag@2" in pq.ParquetFile(cell.path(candidates)).read().column("candidate").to_pylist()
+    assert "\nsag@2," in cell.path(candidates).read_text(encoding="utf-8")
     measurements = pq.ParquetFile(cell.path(training)).read()
     assert set(measurements.column("pose").to_pylist()) < set(range(8))
     planned = cell.planned("reports/loop/tiny/verdict.json", "reports/loop/campaigns.csv")

@@ -93,6 +93,6 @@ def subtract_placement(scope: Scope, position: np.ndarray, rotation: np.ndarray,
     return np.asarray(fields - columns @ find_absorbed(columns, fields, free))
 
 
-def root_mean_square(displacement: np.ndarray) -> float:
-    """Root mean square of the lengths of displacements (N, 3)."""
-    return float(np.sqrt((displacement**2).sum(axis=1).mean()))
+def root_mean_square(lengths: np.ndarray) -> float:
+    """Root mean square of lengths (N,), or of those of displacements (N, 3)."""
+    return float(np.sqrt((lengths**2).sum() / len(lengths)))

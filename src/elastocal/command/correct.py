@@ -79,7 +79,8 @@ def correct(
     check_places(*files)
     if not output.parent.is_dir():
         raise InputError(output, "", "no such folder", "a file in a folder that is there")
-    campaign = diagnosed_campaign(folder, physics_only)
+    campaign = diagnosed_campaign(folder)
+    campaign = campaign.by_physics() if physics_only else campaign
     calibrated = campaign.calibrated
     prismatic = calibrated.robot.chain.prismatic
     named = axes_of(controller, prismatic, axes) if controller else ()

@@ -60,12 +60,12 @@ def _installed() -> Path | None:
     return next((file.parent for file in found if file.is_file()), None)
 
 
-def diagnosed_campaign(folder: Path, physics_only: bool = False) -> Diagnosed:
+def diagnosed_campaign(folder: Path) -> Diagnosed:
     """A campaign with what its diagnosis found, as `load_diagnosed`; results by other libraries or pins come with a warning."""
     from elastocal.io.origin import environment
     from elastocal.loop.calibrated_files import load_diagnosed
 
-    found = load_diagnosed(folder, robots(), workplace(), physics_only)
+    found = load_diagnosed(folder, robots(), workplace())
     was, now = found.origin["environment"], environment(pipeline())
     if other := [name for name in sorted(was | now) if was.get(name) != now.get(name)]:
         from rich.console import Console

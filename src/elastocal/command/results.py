@@ -56,7 +56,8 @@ def certificate(
     console = Console(stderr=True)
     campaign = read_descriptions(folder, robots())[0]
     limit = length_m("--tolerance", tolerance)
-    found = diagnosed_campaign(folder, physics_only)
+    found = diagnosed_campaign(folder)
+    found = found.by_physics() if physics_only else found
     place = workplace() / "reports" / "loop" / found.name
     check_places(place / PAGES, place / DOCUMENT, top=workplace() / "reports")
     if data_at_fault(found.verdict):
@@ -78,14 +79,14 @@ def certificate(
 
 def _lines(document: Mapping[str, Any]) -> list[str]:
     """The answer in three lines: the decision by its criterion; over which poses and of which point; why, or what it lacks."""
-    from elastocal.application.accuracy import accuracy_from, millimetres
+    from elastocal.application.accuracy import Accuracy, millimetres
     from elastocal.application.frames import FRAMES
 
-    found, accuracy = document["conformity"], accuracy_from(document["accuracy"])
+    found, accuracy = document["conformity"], Accuracy(**document["accuracy"])
     answer = f"{found['decision']}: no error is predicted of a robot of which nothing was fitted"
     if accuracy.fitted or accuracy.form_m:
         answer = (
-            f"{found['decision']}, as {accuracy.kind}: the RMS position error of the corrected robot is"
+            f"{found['decision']}, as predicted: the RMS position error of the corrected robot is"
             f" {millimetres(accuracy.rms_m)}, {1 - found['accepted_risk']:.0%} sure to be below"
             f" {millimetres(found['limit_m'])}, the tolerance {millimetres(found['tolerance_m'])}"
         )
@@ -128,14 +129,13 @@ def export(
         raise InputError(urdf, "", "the file that would be replaced", "a URDF outside of --output")
     whole = diagnosed_campaign(folder)
     # No file has the regression: what stands in them is of a robot without.
-    found = whole if whole.calibrated.remainder is None else diagnosed_campaign(folder, physics_only=True)
-    calibrated, states = found.calibrated, found.case.observations.states
+    calibrated, states = whole.by_physics().calibrated, whole.case.observations.states
     nominal, robot = calibrated.robot, fold_effects(calibrated).robot
     drop_in = None if urdf is None else write_calibrated_origins(urdf, nominal, robot)
-    stated = f"Calibrated by elastocal from the campaign {found.name}."
+    stated = f"Calibrated by elastocal from the campaign {whole.name}."
     text = yaml.safe_dump(document_of(robot), sort_keys=False, default_flow_style=None, width=128)
     accuracy = campaign_accuracy(calibrated)
-    document = sidecar(calibrated, found.name, date.today().isoformat(), accuracy)
+    document = sidecar(calibrated, whole.name, date.today().isoformat(), accuracy)
     lines = [accuracy_sentence(accuracy), *(str(output / name) for name in (ROBOT, *([URDF] if urdf else []), SIDECAR))]
     with write_together(output, _EXPORTED) as partial:
         write_text(partial / ROBOT, f"# {stated}\n{text}")
@@ -149,10 +149,10 @@ def export(
     if document["effects"]:
         names = ", ".join(entry["key"] for entry in document["effects"])
         lines.insert(0, f"! only {SIDECAR} holds {names}: {_sizes(find_left_out_m(calibrated, at, under))}")
-    if found is not whole:
+    if whole.calibrated.remainder is not None:
         words, lost = whole.verdict["remainder"]["words"], np.linalg.norm(regressed(whole.calibrated, at, under), axis=1)
         lines.insert(0, f"! no file holds the {words} on the remainder, which elastocal correct adds: {_sizes(lost)}")
-    print_answer(True, f"{found.name}: calibrated robot in {output}", lines, "", console)
+    print_answer(True, f"{whole.name}: calibrated robot in {output}", lines, "", console)
 
 
 def _sizes(off: np.ndarray) -> str:

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.application.accuracy import REGION, campaign_poses, error_rows, predict_errors
-from elastocal.application.certificate import error_budget
+from elastocal.application.accuracy import REGION, campaign_poses, error_rows, predict_errors, uncorrected_m
+from elastocal.application.calibrated import effect_costs
+from elastocal.application.frames import root_mean_square
 from elastocal.campaigns.reading import campaign_files
 from elastocal.diagnosis.misplaced import point_sentence
 from elastocal.io.records import checksum
@@ -21,6 +22,7 @@ from elastocal.validation.span import joint_ranges, shortfalls
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
     from elastocal.loop.calibrated_files import Diagnosed
     from elastocal.mechanics.robot import Robot
 
@@ -71,7 +73,7 @@ def certificate(folder: str | Path, robots_folder: str | Path, found: Diagnosed,
         "validation_rms_m": {"uncorrected": heldout["uncalibrated"]["rms_m"], "corrected": heldout["delivered"]["rms_m"]},
         "regression": (verdict["remainder"] or {}).get("words", ""),
         "noise_floor_rms_m": heldout["noise_floor_rms_m"],
-        "accuracy": accuracy.document(),
+        "accuracy": asdict(accuracy),
         "point": point_sentence(found.case.campaign),
         "misplaced": verdict["misplaced"],
         "worst_pose": _worst_pose(robot, poses[0], prediction.error_m),
@@ -80,6 +82,29 @@ def certificate(folder: str | Path, robots_folder: str | Path, found: Diagnosed,
         "budget": [{"name": name, "rms_m": rms} for name, rms in error_budget(calibrated, *poses).items()],
         "budget_states": accuracy.poses,
         "tracker_rms_m": float(np.sqrt(3.0) * calibrated.noise.position_m),
+    }
+
+
+def error_budget(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> dict[str, float]:
+    """Error budget of a robot over commands (N, n), m, RMS.
+
+    What is missed without any correction; each effect by its name in the catalogue, or ``joint_compliance``, if it alone were
+    left out, largest first; what a correction leaves, by `accuracy.predict_errors`. Only the last add up: effects may work
+    against each other, and loads meet springs.
+    """
+    costs = effect_costs(calibrated, reported_angles, operating)
+    rest = predict_errors(calibrated, reported_angles, operating, draws=0)
+    ends = {
+        "left by the regression": root_mean_square(rest.regression_m),
+        "form of the model": root_mean_square(rest.form_m),
+        "not commanded": rest.scope.left_out_m,
+    }
+    return {
+        "uncorrected": uncorrected_m(calibrated, reported_angles, operating),
+        **{name: costs[name] for name in sorted(costs, key=costs.__getitem__, reverse=True) if costs[name] > 0.0},
+        "uncertainty of the parameters": root_mean_square(rest.parameters_m),
+        "repeatability": root_mean_square(rest.repeated_m),
+        **{name: end for name, end in ends.items() if end},
     }
 
 

@@ -20,7 +20,7 @@ from elastocal.fitting.parameters import parameters
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_table, write_table
-from elastocal.loop.schemas import CANDIDATES, CORRELATIONS, STEPS, measurements
+from elastocal.loop.schemas import STEPS, measurements
 from elastocal.mechanics.robot_file import joint_count
 from elastocal.random_streams import stream
 
@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 def diagnose_campaign(job: Any) -> None:
     """The step of a rule: what the training poses say, and the next experiment."""
     # Who reads the tables of a diagnosis starts without pandas.
+    import pandas as pd
+
     from elastocal.io.data_frames import write_csv
 
     case = load_case(job.input.descriptions, job.input.training)
@@ -46,11 +48,9 @@ def diagnose_campaign(job: Any) -> None:
     proposal = propose(found, robot.joint_limits, Settings(), draws, job.params.states)
     write_csv(job.output.experiment, table_of(proposal, robot))
     found = replace(found, document=found.document | {"next_experiment": facts_of(proposal)})
-    write_json(job.output.diagnosis, diagnosis_facts(found))
-    origin = provenance(job.params, **job.wildcards)
-    write_table(job.output.steps, STEPS, step_blocks(found), origin)
-    write_table(job.output.correlations, CORRELATIONS, [correlation_columns(found.final)], origin)
-    write_table(job.output.candidates, CANDIDATES, [candidate_columns(found)], origin)
+    write_csv(job.output.candidates, pd.DataFrame(candidate_rows(found)))
+    write_json(job.output.diagnosis, diagnosis_facts(found) | {"covariance": found.final.covariance.tolist()})
+    write_table(job.output.steps, STEPS, step_blocks(found), provenance(job.params, **job.wildcards))
 
 
 def load_case(descriptions_path: str | Path, measurements_path: str | Path, part: str | None = None) -> Case:
@@ -79,12 +79,12 @@ def diagnosis_facts(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def final_parameters(facts: Mapping[str, Any], columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Parameters of the final model.
+    """Parameters of the final model, (N,): `columns` of the steps table, of the last step of diagnosis.json, `facts`."""
+    return _of_step(columns, len(facts["steps"]) - 1)
 
-    `facts`: of diagnosis.json. `columns` (N,): of the steps table. Returns (N,): columns of the steps table, of the last step.
-    """
-    last = len(facts["steps"]) - 1
-    return {name: values[columns["step"] == last] for name, values in columns.items()}
+
+def _of_step(columns: Mapping[str, np.ndarray], number: int) -> dict[str, np.ndarray]:
+    return {name: values[columns["step"] == number] for name, values in columns.items()}
 
 
 def diagnosis_from(case: Case, facts: Mapping[str, Any], columns: Mapping[str, np.ndarray]) -> Diagnosis:
@@ -107,29 +107,26 @@ def rows_left_out(case: Case, facts: Mapping[str, Any]) -> np.ndarray:
 
 
 def step_fit(case: Case, facts: Mapping[str, Any], columns: Mapping[str, np.ndarray], number: int) -> Fit:
-    """The fit of one step; it starts where it once ended.
-
-    `case`, `facts`, `columns`: as in `diagnosis_from`. `number`: of the step, from 0.
-    """
+    """The fit of one step, from 0; it starts where it once ended. `case`, `facts`, `columns`: as in `diagnosis_from`."""
     model, estimate = step_model(case, facts, columns, number)
     return fit(model, case.observations, noise_from({"noise": facts["steps"][number]["noise"]}), estimate)
 
 
 def step_model(case: Case, facts: Mapping[str, Any], columns: Mapping[str, np.ndarray], number: int) -> tuple[Model, Estimate]:
-    """Model and estimate of one step, without fitting it again.
-
-    `case`, `facts`, `columns`: as in `diagnosis_from`. `number`: of the step, from 0. Returns `model`: with the priors under
-    which it was fitted.
-    """
-    mine = {name: values[columns["step"] == number] for name, values in columns.items()}
+    """Model of one step, with the priors under which it was fitted, and its estimate; without fitting it again."""
+    mine = _of_step(columns, number)
     known = {effect.key: effect for effect in case.model.effects} | case.candidates
     effects = tuple(_with_priors(known[key], mine) for key in facts["steps"][number]["effects"])
     model = replace(case.model, effects=effects)
     return model, estimate_from(mine, model, np.unique(case.observations.states.session))
 
 
-def candidate_columns(diagnosis: Diagnosis) -> dict[str, list[Any]]:
-    """Columns of the candidates table: those tested by falling Bayes factor, then the others with the reason."""
+def candidate_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """Rows of candidates.csv: those tested by falling Bayes factor, then the others with the reason.
+
+    ``log_bayes_factor``: of a candidate alone against the declared model, averaged over its size; ``probability`` that it is in
+    the model; ``chosen``: whether the most probable model has it; ``note``: why it was not tested.
+    """
     evidence, candidates = diagnosis.evidence, diagnosis.case.candidates
     rows: list[tuple[Any, ...]] = []
     untestable = dict.fromkeys(candidates, "the measurements are at fault")
@@ -144,15 +141,25 @@ def candidate_columns(diagnosis: Diagnosis) -> dict[str, list[Any]]:
         for number in np.argsort(-factors):
             unit = problem.units[number]
             if unit.candidate:
-                shape = unit.shapes[0] if unit.shapes else np.nan
+                shape = unit.shapes[0] if unit.shapes else None
                 rows.append((unit.candidate, shape, factors[number], inclusion[number], number in chosen, ""))
     tested = {row[0].key for row in rows}
-    rows += [(candidates[key], np.nan, np.nan, np.nan, False, untestable[key]) for key in candidates if key not in tested]
-    listed = [
-        (each.key, each.effect, each.family, "+".join(map(str, each.joints)), shape, len(each.parameters), *figures)
-        for each, shape, *figures in rows
+    rows += [(each, None, None, None, False, untestable[key]) for key, each in candidates.items() if key not in tested]
+    return [
+        {
+            "candidate": each.key,
+            "effect": each.effect,
+            "family": each.family,
+            "joints": "+".join(map(str, each.joints)),
+            "shape": shape,
+            "parameters": len(each.parameters),
+            "log_bayes_factor": factor,
+            "probability": inclusion,
+            "chosen": picked,
+            "note": note,
+        }
+        for each, shape, factor, inclusion, picked, note in rows
     ]
-    return {column.name: [row[place] for row in listed] for place, column in enumerate(CANDIDATES.columns)}
 
 
 def _with_priors(effect: Candidate, columns: Mapping[str, np.ndarray]) -> Candidate:
@@ -182,39 +189,8 @@ def parameter_columns(fitted: Fit) -> dict[str, np.ndarray | list[str]]:
     }
 
 
-def correlation_columns(fitted: Fit) -> dict[str, np.ndarray | list[str]]:
-    """Columns of the correlations table of a fit: every pair of parameters that are not held."""
-    named = [f"{owner} {parameter.name}" for owner, parameter in parameters(fitted.model, fitted.estimate)]
-    free = np.flatnonzero(~fitted.held)
-    deviation = np.sqrt(np.diag(fitted.covariance))[free]
-    correlation = fitted.covariance[np.ix_(free, free)] / np.outer(deviation, deviation)
-    rows, columns = np.tril_indices(len(free), -1)
-    return {
-        "one": [named[free[row]] for row in rows],
-        "other": [named[free[column]] for column in columns],
-        "correlation": correlation[rows, columns],
-    }
-
-
-def covariance_from(parameters: Mapping[str, np.ndarray], correlations: Mapping[str, np.ndarray]) -> np.ndarray:
-    """The covariance of a fit from its tables, the inverse of `parameter_columns` and `correlation_columns`.
-
-    `parameters`, `correlations`: columns of one fit. Returns (P, P): zero where held.
-    """
-    names = [f"{owner} {parameter}" for owner, parameter in zip(parameters["owner"], parameters["parameter"], strict=True)]
-    place = {name: number for number, name in enumerate(names)}
-    deviation = np.where(parameters["held"], 0.0, parameters["std_error"])
-    correlation = np.eye(len(names))
-    for one, other, value in zip(correlations["one"], correlations["other"], correlations["correlation"], strict=True):
-        correlation[place[one], place[other]] = correlation[place[other], place[one]] = value
-    return correlation * np.outer(deviation, deviation)
-
-
 def estimate_from(columns: Mapping[str, np.ndarray], model: Model, sessions: Collection[int]) -> Estimate:
-    """The estimate of a model from the columns of its parameters.
-
-    `columns` (N,).
-    """
+    """The estimate of a model from the columns of its parameters (N,)."""
     values = {(o, p): v for o, p, v in zip(columns["owner"], columns["parameter"], columns["value"], strict=True)}
 
     def placed(owner: str, *stated: Sequence[float] | None) -> tuple[list[float], np.ndarray]:

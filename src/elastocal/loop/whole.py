@@ -3,22 +3,19 @@ same two calls, with tables between them."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from elastocal.application.accuracy import (
-    before_m,
     calibrate_on_case,
     campaign_accuracy,
     campaign_poses,
     judge_by_held_out,
     regression_on,
     set_form,
+    uncorrected_m,
 )
-from elastocal.application.calibrated import forward, nominal_forward
-from elastocal.application.certificate import effect_costs
+from elastocal.application.calibrated import effect_costs
 from elastocal.campaigns.columns import columns_of
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.diagnose import diagnose
@@ -32,7 +29,6 @@ from elastocal.io.storage import read_table, write_table
 from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop.loading import load_campaign
 from elastocal.loop.schemas import STEPS, residuals
-from elastocal.mechanics.kinematics import pose_differences
 from elastocal.validation.held_out import position_residuals
 from elastocal.validation.placing import placed
 
@@ -130,8 +126,4 @@ def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
 
 def _accuracy(found: CalibratedRobot) -> dict[str, Any]:
     """Predicted accuracy of a corrected robot, and in the same frame the RMS error of the uncorrected one at the same poses."""
-    angles, operating = campaign_poses(found)
-    position, rotation = forward(found, angles, operating)
-    off = pose_differences(*nominal_forward(found.robot, angles), position, rotation)
-    uncorrected = float(np.sqrt((before_m(found, position, rotation, off) ** 2).mean()))
-    return {"accuracy": campaign_accuracy(found).document(), "uncorrected_m": uncorrected}
+    return {"accuracy": asdict(campaign_accuracy(found)), "uncorrected_m": uncorrected_m(found, *campaign_poses(found))}
