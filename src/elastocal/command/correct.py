@@ -58,9 +58,17 @@ def correct(
     import numpy as np
     from rich.console import Console
 
-    from elastocal.application.accuracy import accuracy_sentence, before_m, campaign_accuracy, error_rows, predict_errors
+    from elastocal.application.accuracy import (
+        accuracy_sentence,
+        before_m,
+        campaign_accuracy,
+        error_rows,
+        millimetres,
+        predict_errors,
+    )
     from elastocal.application.calibrated import OperatingConditions, assumptions, beyond_fitted, regressed
     from elastocal.application.compensation import find_joint_targets
+    from elastocal.application.frames import root_mean_square
     from elastocal.diagnosis.misplaced import point_sentence
     from elastocal.exchange.controllers import axes_of, check_name, controller_of, targets_of
     from elastocal.exchange.target_path import NO_BOUND, OK, read_target_path_of
@@ -69,7 +77,6 @@ def correct(
 
     console = Console(stderr=True)
     controller = controller_of(language, "") if language else None
-    check_places(output)
     if output.suffix != ".csv":
         raise InputError("--output", "", repr(output.name), "a name that ends in .csv; --format writes a program beside it")
     if axes and controller is None:
@@ -98,7 +105,6 @@ def correct(
         raise InputError(path, "", "no pose that the robot reaches", "one at least, for a program")
     swings = _swings(wanted, found, good, calibrated.robot)
     if swings and not allow_large_steps:
-        print_lines([f"! {line}" for line in swings[:_NAMED]], console)
         more = f" and {counted(len(swings) - 1, 'more large step')}" if len(swings) > 1 else ""
         raise InputError(path, "", swings[0] + more, "targets between, another posture, or --allow-large-steps")
     wrench = np.zeros((len(wanted), 6)) if wanted.wrench is None else wanted.wrench
@@ -116,28 +122,28 @@ def correct(
             targets = targets_of(found.joint_angles[good], prismatic, named)
             write_text(folder_of_all / files[1].name, controller.program(name, targets, _notes(campaign, wrench[good])))
     share = f"{grouped(good.sum())} of {counted(len(good), 'target')}"
-    stated, sentences = [], []
+    stated, lines = [], []
     if bounded.any():
         known = errors if bounded.all() else predict_errors(calibrated, found.joint_angles[bounded], operating.part(bounded))
         accuracy = known.accuracy("the targets" if bounded[good].all() else "the targets with a bound")
-        stated.append((accuracy, float(np.sqrt((before[bounded] ** 2).mean()))))
-        sentences.append(accuracy_sentence(accuracy))
+        stated.append((accuracy, root_mean_square(before[bounded])))
+        lines.append(accuracy_sentence(accuracy))
     table = error_rows(campaign.verdict, *stated)
-    lines = [*(f"{where}: {off} uncorrected, {after} corrected" for where, off, after in table), *sentences]
+    lines = [*(f"{where}: {off} uncorrected, {after} corrected" for where, off, after in table), *lines]
     if good.any():
         lines += [accuracy_sentence(campaign_accuracy(calibrated)), point_sentence(campaign.case.campaign)]
     if calibrated.remainder is not None:
         added = np.linalg.norm(regressed(calibrated, found.joint_angles[good], operating.part(good)), axis=1)
-        size = f"{1e3 * np.sqrt((added[added > 0.0] ** 2).mean()):.3f} mm RMS" if added.any() else "nothing"
+        size = f"{millimetres(root_mean_square(added[added > 0.0]))} RMS" if added.any() else "nothing"
         acts = f"{grouped((added > 0.0).sum())} of {counted(len(added), 'target')}"
         words = campaign.verdict["remainder"]["words"]
         lines.append(f"a {words} on what the model leaves corrects {acts} by {size}; --physics-only leaves it out")
     if controller:
         called = ", ".join(f"q{number} as {axis}" for number, axis in enumerate(named, 1))
         lines.append(f"{files[1].name} goes to {share}: {controller.words}, {called}")
-    alarms = [*(each["sentence"] for each in campaign.verdict["misplaced"]), *swings[:_NAMED]]
-    if len(swings) > _NAMED:
-        alarms.append(f"and {counted(len(swings) - _NAMED, 'more large step')}")
+    alarms = [*(each["sentence"] for each in campaign.verdict["misplaced"])]
+    if swings:
+        alarms.append(first_names(swings, _NAMED))
     if unbounded := int((good & ~bounded).sum()):
         what = f"{_LOADS_BOUNDED:g} times the measured loads or outside the fitted range of joints"
         alarms.append(f"no bound is stated for {grouped(unbounded)} of {counted(int(good.sum()), 'target')}: beyond {what}")
