@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from elastocal.counting import counted, first_names, grouped, plural
+from elastocal.counting import counted, first_names, grouped
 
 # A count in a message, of what may be one and is not a limit, with its noun written by hand.
 _BY_HAND = re.compile(
@@ -15,10 +15,6 @@ _BY_HAND = re.compile(
 def test_one_thing_is_no_plural_and_thousands_are_grouped():
     assert counted(1, "row") == "1 row" and counted(0, "row") == "0 rows" and counted(2, "entry", "entries") == "2 entries"
     assert counted(12000, "pose") == "12\u2009000 poses" and grouped(-1234567) == "-1\u2009234\u2009567"
-
-
-def test_a_noun_agrees_without_its_number():
-    assert plural("joint", 1) == "joint" and plural("joint", 2) == "joints" and plural("entry", 2, "entries") == "entries"
 
 
 def test_of_many_names_the_first_are_written_and_the_others_counted():

@@ -86,15 +86,6 @@ def test_bounds_hold_95_percent_of_robots_drawn_from_the_covariance(fanuc, unkno
     assert np.mean(np.array(worst) < stated.worst_bound_m) == pytest.approx(0.95, abs=0.05)
 
 
-def test_what_the_form_of_the_model_leaves_open_is_in_every_figure(turned):
-    angles = np.random.default_rng(2).uniform(-1, 1, (5, 6))
-    known = set_scope(turned, True)
-    found = predict_errors(replace(known, scope=replace(known.scope, form_m=1e-3)), angles, NEUTRAL)
-    assert found.accuracy("").rms_m == pytest.approx(1e-3, rel=0.01)
-    assert found.accuracy("").rms_bound_m > 1e-3 and found.accuracy("").worst_m > 1e-3 and (found.bound_m > 1e-3).all()
-    assert "form of the model" in accuracy_sentence(found.accuracy("some poses"))
-
-
 def test_a_misplaced_base_is_no_error_of_the_uncorrected_robot_where_nobody_knows_the_base(turned):
     coefficients = (*turned.estimate.coefficients[:-1], np.array([1e-3]))
     value = replace(turned, estimate=replace(turned.estimate, coefficients=coefficients))
@@ -108,16 +99,10 @@ def test_a_misplaced_base_is_no_error_of_the_uncorrected_robot_where_nobody_know
     assert np.sqrt((unknown**2).mean()) < np.sqrt((known**2).mean())
 
 
-def test_quantiles_are_those_of_one_and_of_three_directions_and_hold_between():
+def test_quantiles_are_those_of_one_and_of_three_directions():
     alike, single = np.eye(3), np.diag([1.0, 0.0, 0.0])
     found = quantile_of_length(np.stack([alike, single, np.zeros((3, 3))]))
     np.testing.assert_allclose(found, [chi.ppf(0.95, 3), norm.ppf(0.975), 0.0], rtol=1e-12)
-    rng = np.random.default_rng(1)
-    for scales in ([1.0, 0.5, 0.1], [1.0, 1.0, 0.2], [1.0, 0.1, 0.1]):
-        lengths = np.linalg.norm(rng.standard_normal((200_000, 3)) * scales, axis=1)
-        bound = quantile_of_length(np.diag(np.square(scales))[None])[0]
-        # The gamma distribution has two of the moments.
-        assert np.mean(lengths < bound) == pytest.approx(0.95, abs=0.01)
 
 
 def scope_with(robot, candidate, values, shapes, unknown_base=False, std=0.0):
@@ -150,16 +135,6 @@ def test_every_effect_that_no_command_contains_counts_as_error(fanuc):
         # One that is fitted to nothing is as uncertain as it is.
         unsure = scope_with(fanuc, candidate, np.zeros(len(values)), shapes, std=1.0)
         assert unsure.left_out_m > 0.1 * scope.left_out_m, key
-
-
-def test_a_step_counts_as_all_of_it_in_the_base_frame_and_as_what_no_placement_takes_up_in_the_robots_own(fanuc):
-    step = all_that_leave_the_robot_alone(fanuc)["setup_step"]
-    values = [1e-3, 0.0, 0.0, 0.0, 0.0, 0.0]
-    whole, half = ([scope_with(fanuc, step, values, [when], unknown) for unknown in (False, True)] for when in (0.0, 0.5))
-    assert (whole[0].frame, whole[1].frame) == (BASE, ROBOT)
-    assert [each.left_out_m for each in whole] == pytest.approx([1e-3, 0.0], abs=1e-9)
-    assert half[0].left_out_m == pytest.approx(1e-3, rel=1e-6)
-    assert 2e-4 < half[1].left_out_m <= 5.1e-4
 
 
 def test_what_goes_with_a_condition_counts_as_error_where_a_command_does_not_state_it(fanuc):
@@ -234,5 +209,9 @@ def test_of_a_robot_of_which_nothing_was_fitted_no_error_of_zero_is_predicted(fa
     found = predict_errors(calibrated, np.zeros((3, 6)), NEUTRAL).accuracy("some poses")
     assert found.rms_m == 0.0 and not found.fitted
     assert "nothing of the robot was fitted" in accuracy_sentence(found) and "0.000" not in accuracy_sentence(found)
+    # What the form of the model leaves open is in every figure.
     contradicted = replace(calibrated, scope=replace(calibrated.scope, form_m=1e-3, contradicted=True))
-    assert "1.000 mm" in accuracy_sentence(predict_errors(contradicted, np.zeros((3, 6)), NEUTRAL).accuracy("some poses"))
+    open_form = predict_errors(contradicted, np.zeros((3, 6)), NEUTRAL)
+    stated = open_form.accuracy("some poses")
+    assert stated.rms_m == pytest.approx(1e-3, rel=0.01) and min(stated.rms_bound_m, stated.worst_m) > 1e-3
+    assert (open_form.bound_m > 1e-3).all() and "1.000 mm" in accuracy_sentence(stated)

@@ -24,13 +24,6 @@ from elastocal.loop.diagnosis_tables import diagnosis_from
 from elastocal.loop.schemas import STEPS
 
 
-@pytest.fixture
-def changed(checkout, tmp_path):
-    """A copy, to be changed."""
-    shutil.copytree(checkout, tmp_path / "top", symlinks=True)
-    return tmp_path / "top"
-
-
 def test_the_robot_is_that_of_the_final_fit(checkout):
     found = load_diagnosed(checkout / "made", ROBOTS, checkout)
     tables = checkout / "results/loop/made"
@@ -109,7 +102,8 @@ def test_a_campaign_that_has_changed_since_is_refused_be_it_in_a_held_out_row(ch
         load_diagnosed(tmp_path / "changed", ROBOTS, checkout)
 
 
-def test_results_of_another_engine_are_refused(changed):
+def test_results_of_another_engine_are_refused(checkout, tmp_path):
+    changed = shutil.copytree(checkout, tmp_path / "top", symlinks=True)
     (changed / ENGINE).write_text("VERSION = 2\n", encoding="utf-8")
     with refused(changed / ENGINE, "", "not what read_campaign made was made with", f"elastocal diagnose {changed}/made"):
         load_diagnosed(changed / "made", ROBOTS, changed)

@@ -76,13 +76,9 @@ def folder_of(path, robot, kind):
     return made_folder(path / "made", robot, table=table, **settings)
 
 
-def verdict_of(path, robot, kind):
-    return diagnosed(folder_of(path, robot, kind), ROBOTS, 1)
-
-
 @pytest.mark.parametrize("kind", slow_but(["several"], KINDS))
 def test_verdict_is(kind, kuka, tmp_path):
-    verdict = verdict_of(tmp_path, kuka, kind)
+    verdict = diagnosed(folder_of(tmp_path, kuka, kind), ROBOTS, 1)
     json.dumps(verdict, allow_nan=False)
     probabilities, heldout = verdict["probabilities"], verdict["heldout"]
     assert verdict["verdict"] == kind, probabilities
