@@ -23,7 +23,7 @@ from elastocal.application.accuracy import (
     scope_of,
 )
 from elastocal.application.calibrated import NEUTRAL, forward, moves_robot
-from elastocal.application.frames import BASE, ROBOT, scope_about, subtract_placement
+from elastocal.application.frames import BASE, ROBOT, Scope, subtract_placement
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.noise import Noise
@@ -76,7 +76,7 @@ def test_bounds_hold_95_percent_of_robots_drawn_from_the_covariance(fanuc, unkno
         off = (forward(other, angles)[0] - position)[..., None]
         if unknown_base:
             off = subtract_placement(
-                scope_about(position), position, np.zeros((60, 3, 3)), np.concatenate([off, 0 * off], axis=1)
+                Scope(ROBOT, position.mean(axis=0)), position, np.zeros((60, 3, 3)), np.concatenate([off, 0 * off], axis=1)
             )
         distance = np.linalg.norm(off[:, :3, 0], axis=1)
         rms.append(np.sqrt((distance**2).mean()))

@@ -32,38 +32,20 @@ TARGETS = (
 )
 
 
-@pytest.fixture(scope="module")
-def loaded(kuka, config_folder, tmp_path_factory):
-    """Descriptions and training measurements of a campaign that declares an effect."""
-    folder = made_folder(tmp_path_factory.mktemp("loop") / "made", kuka, declared=["joint_offset"])
-    return load_campaign(folder, config_folder / "robots")[:2]
-
-
-@pytest.fixture
-def files(loaded, tmp_path):
-    descriptions, training = loaded
-    paths = tmp_path / "descriptions.json", tmp_path / "training.parquet"
-    write_json(paths[0], descriptions)
-    write_table(paths[1], measurements(6), [columns_of(training)], {})
-    return paths
-
-
-def test_a_case_has_the_measurements_and_the_description_of_the_folder_and_looks_for_nothing_declared(files, loaded):
-    case, training = tables.load_case(*files), loaded[1]
-    for name in ("pose", "load", "joint_angles", "wrench", "position"):
-        np.testing.assert_array_equal(getattr(case.campaign.measurements, name), getattr(training, name))
-    assert case.campaign.name == "made" and case.campaign.noise == {"position_m": 6e-5}
-    assert [target.name for target in case.model.targets] == ["3DoF", "6DoF"]
-    assert {effect.effect for effect in case.model.effects} >= {"joint_offset"}
-    assert "joint_offset" not in {candidate.effect for candidate in case.candidates.values()}
-
-
-def test_a_test_has_the_description_of_another_campaign_where_it_is_one(files, loaded):
-    descriptions = loaded[0]
-    assert tables.load_case(*files, "held_out").campaign.name == "made"
+def test_a_case_is_the_folder_and_a_test_may_be_of_another_campaign(kuka, config_folder, tmp_path):
+    folder = made_folder(tmp_path / "made", kuka, declared=["joint_offset"])
+    descriptions, training, _ = load_campaign(folder, config_folder / "robots")
+    files = tmp_path / "descriptions.json", tmp_path / "training.parquet"
     other = {key: descriptions[key] for key in ("source", "campaign", "robot")}
     write_json(files[0], descriptions | {"held_out": changed(other, ("campaign", "campaign"), "other")})
-    assert [tables.load_case(*files, part).campaign.name for part in (None, "held_out")] == ["made", "other"]
+    write_table(files[1], measurements(6), [columns_of(training)], {})
+    case = tables.load_case(*files)
+    for name in ("pose", "load", "joint_angles", "wrench", "position"):
+        np.testing.assert_array_equal(getattr(case.campaign.measurements, name), getattr(training, name))
+    assert case.campaign.name == "made" and tables.load_case(*files, "held_out").campaign.name == "other"
+    assert case.campaign.noise == {"position_m": 6e-5} and [target.name for target in case.model.targets] == ["3DoF", "6DoF"]
+    assert "joint_offset" in {effect.effect for effect in case.model.effects}
+    assert "joint_offset" not in {candidate.effect for candidate in case.candidates.values()}
 
 
 def there_and_back(path, schema, columns):

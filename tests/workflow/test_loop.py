@@ -13,7 +13,7 @@ from study_folder import Study
 from typer.testing import CliRunner
 
 from elastocal.command.main import app
-from elastocal.command.pipeline import diagnosed_campaign
+from elastocal.command.terminal import diagnosed_campaign
 from elastocal.errors import InputError
 
 CELL = "cells/made"

@@ -286,8 +286,7 @@ def scope_of(calibrated: CalibratedRobot, model: Model, estimate: Estimate, cova
     free = free_parts(base, offset, turn and model.rows == 6)
     reported, operating = robot.reported_angles(states.joint_angles), conditions_in(calibrated, states)
     position, rotation = forward(calibrated, reported, operating)
-    none = np.zeros((12, len(calibrated.covariance)))
-    scope = Scope(ROBOT if base else BASE, position.mean(axis=0), none, np.zeros(12), offset)
+    scope = Scope(ROBOT if base else BASE, position.mean(axis=0), offset_removed=offset)
     columns = placement(scope, position, rotation)
     before = pose_differences(*nominal_forward(robot, reported), position, rotation)[..., None]
 

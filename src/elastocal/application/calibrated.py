@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.frames import root_mean_square, scope_in_base, subtract_placement
+from elastocal.application.frames import BASE, Scope, root_mean_square, subtract_placement
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import effects
 from elastocal.fitting.displacement import conditions, displaced_coordinates
@@ -25,7 +25,6 @@ from elastocal.remainder.corrected import beyond_regressed, inputs_of
 from elastocal.validation.fitted_range import beyond_campaign, beyond_loads
 
 if TYPE_CHECKING:
-    from elastocal.application.frames import Scope
     from elastocal.effects.protocol import Candidate
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.model import Estimate, Model
@@ -124,7 +123,8 @@ def calibrate_by_model(robot: Robot, model: Model, estimate: Estimate, covarianc
         coefficients=tuple(estimate.coefficients[number] for number in kept),
         shapes=tuple(estimate.shapes[number] for number in kept),
     )
-    return CalibratedRobot(robot, bare, values, covariance[np.ix_(rows, rows)], noise, scope_in_base(len(rows)))
+    scope = Scope(BASE, np.zeros(3), np.zeros((12, len(rows))))
+    return CalibratedRobot(robot, bare, values, covariance[np.ix_(rows, rows)], noise, scope)
 
 
 def move_to_end_effector(model: Model, estimate: Estimate) -> tuple[Model, Estimate]:

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from typer import Argument, Option
 
-from elastocal.command.pipeline import pipeline, robots, workplace
-from elastocal.command.terminal import MOST_ROWS, print_answer, print_lines
+from elastocal.command.terminal import MOST_ROWS, pipeline, print_answer, print_lines, robots, workplace
 from elastocal.counting import counted
 from elastocal.errors import InputError, escaped, steering
 

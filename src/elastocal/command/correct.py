@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
-from elastocal.command.pipeline import PhysicsOnly, diagnosed_campaign
-from elastocal.command.terminal import print_answer, print_lines
+from elastocal.command.terminal import PhysicsOnly, diagnosed_campaign, print_answer, print_lines
 from elastocal.counting import counted, first_names, grouped
 from elastocal.errors import InputError
 

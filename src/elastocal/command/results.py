@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer import Argument, Option
 
-from elastocal.command.pipeline import PhysicsOnly, diagnosed_campaign, robots, workplace
-from elastocal.command.terminal import length_m, print_answer
+from elastocal.command.terminal import PhysicsOnly, diagnosed_campaign, length_m, print_answer, robots, workplace
 from elastocal.counting import counted
 from elastocal.errors import InputError
 
@@ -39,22 +38,17 @@ def certificate(
     report. The exit code is 0 if the robot passes, and 1 if it fails or is undecided. A robot that nobody measured after
     correction is predicted to pass or fail.
     """
-    from datetime import date
-
     from rich.console import Console
 
-    from elastocal.campaigns.reading import read_descriptions
     from elastocal.data_checks.protocol import data_at_fault
     from elastocal.figures.certificate import budget_bars
     from elastocal.figures.style import save_all
     from elastocal.io.atomic_writes import check_places, write_together
     from elastocal.io.json_files import write_json
-    from elastocal.loop.certificate import Wanted
-    from elastocal.loop.certificate import certificate as certified
+    from elastocal.loop.calibrated_files import certificate as certified
     from elastocal.report.certificate import certificate_facts, write_certificate
 
     console = Console(stderr=True)
-    campaign = read_descriptions(folder, robots())[0]
     limit = length_m("--tolerance", tolerance)
     found = diagnosed_campaign(folder)
     found = found.by_physics() if physics_only else found
@@ -62,10 +56,8 @@ def certificate(
     check_places(place / PAGES, place / DOCUMENT, top=workplace() / "reports")
     if data_at_fault(found.verdict):
         raise InputError(folder, "", "data at fault", "a campaign whose data are in order; its report says what is wrong")
-    stated = {"measured_on": campaign.get("measured_on", "")} | campaign.get("certificate", {})
-    wanted = Wanted(limit, risk, campaign.get("serial_number", ""), date.today().isoformat(), stated)
     with console.status("working"):
-        document = certified(folder, robots(), found, wanted)
+        document = certified(folder, robots(), found, limit, risk)
         facts = certificate_facts(document)
         with tempfile.TemporaryDirectory() as scratch, write_together(place, (PAGES, DOCUMENT)) as partial:
             names = [row[0] for row in facts["budget"]]

@@ -1,16 +1,32 @@
-"""The calibrated robot of a campaign that was diagnosed, from the files of its diagnosis, without a fit of its model."""
+"""A campaign that was diagnosed, from the files of its diagnosis: its calibrated robot, without a fit of its model, and the
+contents of its certificate, how good the robot is, against what, and how sure that is."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import platform
+from dataclasses import asdict, dataclass, replace
+from datetime import date
 from functools import cached_property
+from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.application.accuracy import calibrate_on_case, regression_on, set_form
+from elastocal.application.accuracy import (
+    REGION,
+    calibrate_on_case,
+    campaign_poses,
+    error_rows,
+    predict_errors,
+    regression_on,
+    set_form,
+    uncorrected_m,
+)
+from elastocal.application.calibrated import effect_costs
+from elastocal.application.frames import root_mean_square
 from elastocal.campaigns.reading import campaign_files, read_descriptions
+from elastocal.diagnosis.misplaced import point_sentence
 from elastocal.errors import InputError
 from elastocal.fitting.case import noise_from
 from elastocal.io.json_files import read_json
@@ -21,16 +37,20 @@ from elastocal.loop.diagnosis_tables import load_case, rows_left_out, step_model
 from elastocal.loop.schemas import STEPS
 from elastocal.remainder.corrected import fitted_again
 from elastocal.remainder.tuning import Spread
+from elastocal.validation.conformity import PASS, UNDECIDED, predicted_conformity
+from elastocal.validation.span import joint_ranges, shortfalls
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
-    from typing import Any
 
-    from elastocal.application.calibrated import CalibratedRobot
+    from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
     from elastocal.fitting.case import Case
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.noise import Noise
     from elastocal.io.records import JobRecord
+    from elastocal.mechanics.robot import Robot
+
+_LIBRARIES = ("elastocal", "numpy", "scipy")
 
 
 @dataclass(frozen=True)
@@ -114,3 +134,84 @@ def _data_of(jobs: Sequence[JobRecord], first: str) -> set[tuple[str, str]]:
 
 def _listed(values: Iterable[str]) -> str:
     return ", ".join(sorted(set(values)))
+
+
+def certificate(
+    folder: str | Path, robots_folder: str | Path, found: Diagnosed, tolerance_m: float, accepted_risk: float
+) -> dict[str, Any]:
+    """Contents of a certificate: all of the corrected robot is predicted, at the poses and loads of the campaign.
+
+    `folder`, `robots_folder`: as in `reading.read_campaign`. `found`: the campaign. Returns JSON-serialisable.
+    """
+    document = read_descriptions(folder, robots_folder)[0]
+    calibrated, verdict = found.calibrated, found.verdict
+    robot, states, poses = calibrated.robot, found.case.observations.states, campaign_poses(calibrated)
+    prediction = predict_errors(calibrated, *poses)
+    accuracy = prediction.accuracy(REGION)
+    decision = predicted_conformity(prediction.rms_m, accuracy.poses, tolerance_m, accepted_risk)
+    heldout = verdict["heldout"]
+    judged = heldout["configurations"]
+    missing = shortfalls(judged, states, robot)
+    if not accuracy.fitted:
+        missing = ["nothing fitted: no error of 0 is predicted of a robot of which nothing was fitted", *missing]
+    if missing and decision.decision == PASS:
+        decision = replace(decision, decision=UNDECIDED)
+    return {
+        "campaign": found.name,
+        "robot": robot.name,
+        "serial": document.get("serial_number", ""),
+        "date": date.today().isoformat(),
+        "stated": {"measured_on": document.get("measured_on", "")} | document.get("certificate", {}),
+        "versions": {name: metadata.version(name) for name in _LIBRARIES} | {"python": platform.python_version()},
+        "origin": found.origin,
+        "files": {Path(file).name: checksum(file) for file in campaign_files(folder, robots_folder)},
+        "verdict": verdict["verdict"],
+        "repeatable": verdict["repeatable"],
+        "effects": [effect["name"] for effect in verdict["effects"]],
+        "errors": error_rows(verdict),
+        "validation_rms_m": {"uncorrected": heldout["uncalibrated"]["rms_m"], "corrected": heldout["delivered"]["rms_m"]},
+        "regression": (verdict["remainder"] or {}).get("words", ""),
+        "noise_floor_rms_m": heldout["noise_floor_rms_m"],
+        "accuracy": asdict(accuracy),
+        "point": point_sentence(found.case.campaign),
+        "misplaced": verdict["misplaced"],
+        "worst_pose": _worst_pose(robot, poses[0], prediction.error_m),
+        "conformity": asdict(decision) | {"configurations": judged, "shortfalls": missing},
+        "joint_ranges": joint_ranges(states, robot),
+        "budget": [{"name": name, "rms_m": rms} for name, rms in error_budget(calibrated, *poses).items()],
+        "budget_states": accuracy.poses,
+        "tracker_rms_m": float(np.sqrt(3.0) * calibrated.noise.position_m),
+    }
+
+
+def error_budget(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> dict[str, float]:
+    """Error budget of a robot over commands (N, n), m, RMS.
+
+    What is missed without any correction; each effect by its name in the catalogue, or ``joint_compliance``, if it alone were
+    left out, largest first; what a correction leaves, by `accuracy.predict_errors`. Only the last add up: effects may work
+    against each other, and loads meet springs.
+    """
+    costs = effect_costs(calibrated, reported_angles, operating)
+    rest = predict_errors(calibrated, reported_angles, operating, draws=0)
+    ends = {
+        "left by the regression": root_mean_square(rest.regression_m),
+        "form of the model": root_mean_square(rest.form_m),
+        "not commanded": rest.scope.left_out_m,
+    }
+    return {
+        "uncorrected": uncorrected_m(calibrated, reported_angles, operating),
+        **{name: costs[name] for name in sorted(costs, key=costs.__getitem__, reverse=True) if costs[name] > 0.0},
+        "uncertainty of the parameters": root_mean_square(rest.parameters_m),
+        "repeatability": root_mean_square(rest.repeated_m),
+        **{name: end for name, end in ends.items() if end},
+    }
+
+
+def _worst_pose(robot: Robot, reported_angles: np.ndarray, error_m: np.ndarray) -> dict[str, Any]:
+    """Where the corrected robot is predicted to be worst: command in rad and m, RMS error there."""
+    place = int(np.argmax(error_m))
+    joints = [
+        {"value": float(value), "unit": "m" if slides else "rad"}
+        for value, slides in zip(reported_angles[place], robot.chain.prismatic, strict=True)
+    ]
+    return {"joints": joints, "error_m": float(error_m[place])}

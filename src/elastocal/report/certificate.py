@@ -42,7 +42,7 @@ def write_certificate(path: str | Path, facts: Mapping[str, Any], figures: Itera
 def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
     """Facts for the pages of a certificate.
 
-    `document`: of `loop.certificate.certificate`. Returns JSON-serialisable; strings ready to print, lists for tables.
+    `document`: of `calibrated_files.certificate`. Returns JSON-serialisable; strings ready to print, lists for tables.
     """
     spoken = {"accuracy_sentence": accuracy_sentence(Accuracy(**document["accuracy"])), "title": title_of(document)}
     stated = sentences("certificate.txt", say.FILTERS, document=document, **spoken)

@@ -87,7 +87,7 @@ def test_information_is_the_inverse_of_the_covariance_of_a_fit_with_priors(measu
         replace(e, parameters=tuple(replace(p, prior_std=p.plausible) for p in e.parameters)) for e in model.effects[1:]
     )
     model = replace(model, effects=(model.effects[0], *effects))
-    seen = observe(survey, some.joint_angles, some.force, survey.shares)
+    seen = observe(survey, some.joint_angles, some.force)
     position, rotation = predict(model, estimate, seen, conditions(model, estimate, seen.states))
     exact = replace(seen, position=position, rotation=None if seen.rotation is None else rotation)
     noise = Noise("declared", survey.position_m, survey.orientation_rad, np.zeros(6))

@@ -15,14 +15,14 @@ Standard deviations of a sensor are half of what its maker permits as the larges
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
-from elastocal.application.calibrated import nominal_forward
-from elastocal.application.frames import BASE, ROBOT, scope_about, subtract_placement
+from elastocal.application.calibrated import OperatingConditions, calibrate_by_model, nominal_forward, pose_sensitivities
+from elastocal.application.frames import BASE, ROBOT, Scope, subtract_placement
 from elastocal.application.planning.cell import find_allowed
 from elastocal.application.planning.designs import (
     Criterion,
@@ -45,6 +45,7 @@ from elastocal.errors import InputError
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import Estimate, Model
+from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import Observations, States
 from elastocal.fitting.parameters import parameters
 from elastocal.mechanics.components import WRENCH_NAMES
@@ -164,7 +165,7 @@ def information(survey: Survey, reported_angles: np.ndarray, force: np.ndarray) 
     at_once = max(_AT_ONCE // len(survey.shares), 1)
     for start in range(0, len(reported_angles), at_once):
         part = slice(start, start + at_once)
-        seen = observe(survey, reported_angles[part], force[part], survey.shares)
+        seen = observe(survey, reported_angles[part], force[part])
         line = linearize(model, estimate, seen, conditions(model, estimate, seen.states))
         found[part] = (line.sensitivities * scale).reshape(-1, numbers, len(named))
     return found
@@ -179,30 +180,28 @@ def accuracy_rows(survey: Survey, reported_angles: np.ndarray, force: np.ndarray
     `reported_angles` (N, n): where it shall be known, rad. `force` (N, 3): under which it works there, N, base axes. Returns
     (N, 3, P): m, per plausible size of each parameter.
     """
-    end = survey.robot.chain.end_effector
-    there = [target for target in survey.targets if target.point == end.name]
-    model, estimate = model_of(replace(survey, targets=(Target("end effector", end.name, end.offset_m),)))
-    bare = replace(model, fitted_frames=False)
-    seen = observe(replace(survey, targets=bare.targets), reported_angles, force, (1.0,))
-    moved = linearize(bare, estimate, seen, conditions(bare, estimate, seen.states)).sensitivities[:, :3]
-    plausible = [parameter.plausible for _, parameter in parameters(bare, estimate)]
-    moved = np.concatenate([moved, np.zeros_like(moved)], axis=1) * plausible
+    model, estimate = model_of(survey)
+    count = len(parameters(model, estimate))
+    noise = Noise("declared", survey.position_m, survey.orientation_rad, np.zeros(survey.robot.joints))
+    robot = calibrate_by_model(survey.robot, model, estimate, np.zeros((count, count)), noise)
+    moved = pose_sensitivities(robot, reported_angles, OperatingConditions(np.hstack([force, np.zeros_like(force)])))
     position, rotation = nominal_forward(survey.robot, reported_angles)
+    there = [target for target in survey.targets if target.point == survey.robot.chain.end_effector.name]
     offset = bool(there) and all(target.offset_m is None for target in there)
-    scope = replace(scope_about(position), frame=ROBOT if survey.unknown_base else BASE, offset_removed=offset)
-    rows = subtract_placement(scope, position, rotation, moved)[:, :3]
+    scope = Scope(ROBOT if survey.unknown_base else BASE, position.mean(axis=0), offset_removed=offset)
+    plausible = np.array([parameter.plausible for _, parameter in parameters(robot.model, robot.estimate)])
+    found = np.zeros((len(moved), 3, count))
     # Behind the parameters of base and reflectors.
-    found = np.zeros((len(rows), 3, len(parameters(*model_of(survey)))))
-    found[..., -len(plausible) :] = rows
+    found[..., -len(plausible) :] = subtract_placement(scope, position, rotation, moved * plausible)[:, :3]
     return found
 
 
-def observe(survey: Survey, reported_angles: np.ndarray, force: np.ndarray, shares: tuple[float, ...]) -> Observations:
+def observe(survey: Survey, reported_angles: np.ndarray, force: np.ndarray) -> Observations:
     """Every target under every share of the load of each configuration, in this order."""
-    loads, targets = len(shares), len(survey.targets)
+    loads, targets = len(survey.shares), len(survey.targets)
     angles = np.repeat(survey.robot.model_angles(reported_angles), loads, axis=0)
     wrench = np.zeros((len(angles), 6))
-    wrench[:, :3] = (force[:, None] * np.array(shares)[:, None]).reshape(-1, 3)
+    wrench[:, :3] = (force[:, None] * np.array(survey.shares)[:, None]).reshape(-1, 3)
     count = len(angles)
     nothing = np.zeros(count, int)
     states = States(nothing, np.arange(count) // loads, np.arange(count) % loads, angles, wrench, nothing + 1)
