@@ -133,7 +133,7 @@ def _installed() -> Path | None:
     return next((file.parent for file in found if file.is_file()), None)
 
 
-def diagnosed_campaign(folder: Path) -> Diagnosed:
+def diagnosed_campaign(folder: Path, physics_only: bool = False) -> Diagnosed:
     """A campaign with what its diagnosis found, as `load_diagnosed`; results by other libraries or pins come with a warning."""
     from rich.console import Console
 
@@ -145,4 +145,4 @@ def diagnosed_campaign(folder: Path) -> Diagnosed:
     if other := [name for name in sorted(was | now) if was.get(name) != now.get(name)]:
         there, here = (", ".join(f"{name} {each.get(name, 'none')[:12]}" for name in other) for each in (was, now))
         print_lines([f"warning: {folder} was diagnosed with {there}; here are {here}"], Console(stderr=True))
-    return found
+    return found.by_physics() if physics_only else found
