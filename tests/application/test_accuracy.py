@@ -105,27 +105,19 @@ def test_quantiles_are_those_of_one_and_of_three_directions():
     np.testing.assert_allclose(found, [chi.ppf(0.95, 3), norm.ppf(0.975), 0.0], rtol=1e-12)
 
 
-def scope_with(robot, candidate, values, shapes, unknown_base=False, std=0.0):
+def scope_with(robot, candidate, values, shapes, std=0.0):
     """Scope of a fit that has one more effect than the robot is commanded by."""
     calibrated = made_calibrated(robot, "joint_offset@2")
-    model = replace(
-        plain_model(robot, "joint_offset@2"), effects=(*calibrated.model.effects, candidate), fitted_frames=unknown_base
-    )
-    estimate = calibrated.estimate
-    estimate = replace(
-        estimate, coefficients=(*estimate.coefficients, np.array(values)), shapes=(*estimate.shapes, np.array(shapes, float))
-    )
+    model, estimate = plain_model(robot, "joint_offset@2"), calibrated.estimate
+    model = replace(model, effects=(*calibrated.model.effects, candidate))
+    one_more = (*estimate.coefficients, np.array(values)), (*estimate.shapes, np.array(shapes, float))
+    estimate = replace(estimate, coefficients=one_more[0], shapes=one_more[1])
     added = np.diag([*(std * p.plausible for p in candidate.parameters), *(0.0 for _ in candidate.shapes)]) ** 2
-    frame = np.zeros((6, 6)) if unknown_base else np.zeros((0, 0))
-    return scope_of(calibrated, model, estimate, block_diag(frame, calibrated.covariance, added), LOADED)
-
-
-def all_that_leave_the_robot_alone(robot):
-    return {key: candidate for key, candidate in candidates_on(sites_of(robot)).items() if not moves_robot(candidate)}
+    return scope_of(calibrated, model, estimate, block_diag(calibrated.covariance, added), LOADED)
 
 
 def test_every_effect_that_no_command_contains_counts_as_error(fanuc):
-    found = all_that_leave_the_robot_alone(fanuc)
+    found = {key: candidate for key, candidate in candidates_on(sites_of(fanuc)).items() if not moves_robot(candidate)}
     assert {candidate.effect for candidate in found.values()} >= {"setup_step", "frame_drift", "tracker_scale", "force_bias"}
     # The last one of each effect.
     for key, candidate in {candidate.effect: (key, candidate) for key, candidate in found.items()}.values():

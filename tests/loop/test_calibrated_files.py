@@ -23,17 +23,14 @@ from elastocal.application.calibrated import OperatingConditions, calibrate_by_f
 from elastocal.io.json_files import read_json
 from elastocal.io.origin import environment
 from elastocal.io.records import checksum
-from elastocal.io.storage import read_table
 from elastocal.loop.calibrated_files import certificate, error_budget, load_diagnosed
 from elastocal.loop.diagnosis_tables import diagnosis_from
-from elastocal.loop.schemas import STEPS
 
 
 def test_the_robot_is_that_of_the_final_fit(checkout):
     found = load_diagnosed(checkout / "made", ROBOTS, checkout)
     tables = checkout / "results/loop/made"
-    steps = read_table(tables / "steps.parquet", STEPS)
-    again = diagnosis_from(found.case, read_json(tables / "diagnosis.json"), steps)
+    again = diagnosis_from(found.case, read_json(tables / "diagnosis.json"))
     expected = calibrate_by_fit(again.final, found.case.campaign.robot)
     assert [e.key for e in found.calibrated.model.effects] == ["joint_compliance", "joint_offset@3"]
     for mine, theirs in zip(found.calibrated.estimate.coefficients, expected.estimate.coefficients, strict=True):

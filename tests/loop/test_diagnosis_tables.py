@@ -1,5 +1,9 @@
 """Campaigns and estimates come back from their files as they were."""
 
+import json
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from made_folders import made_folder
@@ -8,6 +12,7 @@ from synthetic import NOISE, made_estimate, made_model
 
 from elastocal.campaigns.campaign import Target
 from elastocal.campaigns.columns import columns_of
+from elastocal.diagnosis.diagnose import Step
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.fit_result import Fit
 from elastocal.fitting.parameters import parameters
@@ -48,33 +53,40 @@ def test_a_case_is_the_folder_and_a_test_may_be_of_another_campaign(kuka, config
     assert "joint_offset" not in {candidate.effect for candidate in case.candidates.values()}
 
 
-def there_and_back(path, schema, columns):
-    write_table(path, schema, [columns], {})
-    return read_table(path, schema)
-
-
 @pytest.mark.parametrize("kind", MODELS)
-def test_estimates_come_back_from_their_tables(kind, tmp_path):
+def test_models_and_estimates_come_back_from_json_and_parameters_from_their_table(kind, tmp_path):
     settings, keys = MODELS[kind]
     chain = chain_of("Tz(0.4) Rz(q1) Tx(0.1) Ry(q2) Tx(0.7) [elbow] Ry(q3) Tx(0.6) [hand]")
-    model = made_model(chain, TARGETS if settings["fitted_frames"] else TARGETS[:1], **settings)
-    model = model.with_effects([candidates_on(model.sites)[key] for key in keys])
+    declared = made_model(chain, TARGETS if settings["fitted_frames"] else TARGETS[:1], **settings)
+    candidates = candidates_on(declared.sites)
+    # A prior whose size was estimated.
+    sized = [
+        replace(each, parameters=tuple(replace(p, prior_std=1.5e-3, sized=True) for p in each.parameters))
+        for each in (candidates[key] for key in keys)
+    ]
+    model = declared.with_effects(sized)
     estimate = made_estimate(model, sessions=(0, 7) if settings["fitted_frames"] else (3,), seed=1)
     listed = parameters(model, estimate)
-    root = np.random.default_rng(2).standard_normal((len(listed), len(listed)))
     held = np.arange(len(listed)) % 3 == 1
-    covariance = root @ root.T * np.outer(~held, ~held)
+    covariance = np.diag(1.0 - held)
     fitted = Fit(model, estimate, NOISE, held, covariance, np.ones(1), None, np.zeros((1, 3)), None, None)
-    kept = {"step": np.zeros(len(listed), int), **tables.parameter_columns(fitted)}
-    columns = there_and_back(tmp_path / "p.parquet", STEPS, kept)
-    back = tables.estimate_from(columns, model, estimate.sessions)
-    assert back.sessions == estimate.sessions
+    found = SimpleNamespace(document={}, steps=[Step("all", "effect", fitted)])
+    (step,) = json.loads(json.dumps(tables.diagnosis_facts(found)))["steps"]
+    again, back = tables.step_model(SimpleNamespace(model=declared, candidates=candidates), step)
+    assert again.effects == model.effects and back.sessions == estimate.sessions
     for name in ("frame_rotation", "frame_position", "target_offset", "target_rotation"):
-        np.testing.assert_allclose(getattr(back, name), getattr(estimate, name), atol=1e-14, err_msg=name)
+        np.testing.assert_array_equal(getattr(back, name), getattr(estimate, name), err_msg=name)
     for name in ("coefficients", "shapes"):
         for one, other in zip(getattr(back, name), getattr(estimate, name), strict=True):
             np.testing.assert_array_equal(one, other)
+    write_table(tmp_path / "p.parquet", STEPS, tables.step_blocks(found), {})
+    columns = tables.final_parameters({"steps": [step]}, read_table(tmp_path / "p.parquet", STEPS))
     assert columns["held"].tolist() == held.tolist()
     assert columns["unit"].tolist() == [parameter.unit for _, parameter in listed]
     priors = [parameter.prior_std for _, parameter in listed]
     np.testing.assert_array_equal(columns["prior_std"], [np.nan if prior is None else prior for prior in priors])
+    shown = {(o, p): v for o, p, v in zip(columns["owner"], columns["parameter"], columns["value"], strict=True)}
+    for session, shift in zip(estimate.sessions if settings["fitted_frames"] else (), estimate.frame_position, strict=False):
+        assert [shown[f"frame {session}", name] for name in ("dx", "dy", "dz")] == shift.tolist()
+    for effect, values in zip(model.effects, estimate.coefficients, strict=True):
+        assert [shown[effect.key, p.name] for p in effect.parameters] == values.tolist()

@@ -94,7 +94,6 @@ rule judge_campaign:
         training=rules.read_campaign.output.training,
         held_out=rules.read_campaign.output.held_out,
         diagnosis=rules.diagnose_campaign.output.diagnosis,
-        steps=rules.diagnose_campaign.output.steps,
     output:
         verdict="reports/loop/{campaign}/verdict.json",
         before_after=shown(

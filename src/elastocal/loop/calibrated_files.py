@@ -32,9 +32,7 @@ from elastocal.fitting.case import noise_from
 from elastocal.io.json_files import read_json
 from elastocal.io.origin import configuration_sha256
 from elastocal.io.records import check_sources, checksum, jobs_behind
-from elastocal.io.storage import read_table
 from elastocal.loop.diagnosis_tables import load_case, rows_left_out, step_model
-from elastocal.loop.schemas import STEPS
 from elastocal.remainder.corrected import fitted_again
 from elastocal.remainder.tuning import Spread
 from elastocal.validation.conformity import PASS, UNDECIDED, predicted_conformity
@@ -110,17 +108,17 @@ def load_diagnosed(folder: str | Path, robots_folder: str | Path, top: str | Pat
     now = {(Path(file).name, checksum(file)) for file in campaign_files(folder, robots_folder)}
     if not data <= now <= {(Path(file).name, digest) for job in jobs for file, digest in job.inputs.items()}:
         raise InputError(folder, "", "changes since its diagnosis", f"a campaign as it was diagnosed: {fresh}")
-    facts, steps = read_json(tables / "diagnosis.json"), read_table(tables / "steps.parquet", STEPS)
+    facts = read_json(tables / "diagnosis.json")
     case = load_case(tables / "campaign.json", tables / "training.parquet")
     case = case.select(~rows_left_out(case, facts))
-    model, estimate = step_model(case, facts, steps, len(facts["steps"]) - 1)
+    model, estimate = step_model(case, facts["steps"][-1])
     origin = {
         "commit": _listed(job.origin.commit for job in jobs),
         "code_sha256": configuration_sha256({file: digest for job in jobs for file, digest in job.sources.items()}),
         "data_sha256": configuration_sha256(sorted(data)),
         "environment": {name: _listed(job.environment.get(name, "none") for job in jobs) for name in jobs[-1].environment},
     }
-    noise, form_m = noise_from({"noise": facts["steps"][-1]["noise"]}), facts["document"].get("other_models_m") or 0.0
+    noise, form_m = noise_from(facts["steps"][-1]), facts["document"].get("other_models_m") or 0.0
     return Diagnosed(name, case, model, estimate, np.array(facts["covariance"]), noise, form_m, read_json(verdict), origin)
 
 

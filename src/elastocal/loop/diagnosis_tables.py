@@ -25,13 +25,16 @@ from elastocal.mechanics.robot_file import joint_count
 from elastocal.random_streams import stream
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping
     from pathlib import Path
 
-    from elastocal.effects.protocol import Candidate
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.model import Model
+
+
+# Parts of an estimate in diagnosis.json: arrays, and an array for each effect.
+_PLACEMENTS, _OF_EFFECTS = ("frame_rotation", "frame_position", "target_offset", "target_rotation"), ("coefficients", "shapes")
 
 
 def diagnose_campaign(job: Any) -> None:
@@ -69,35 +72,39 @@ def step_blocks(diagnosis: Diagnosis) -> Iterator[dict[str, np.ndarray | list[st
 
 
 def diagnosis_facts(diagnosis: Diagnosis) -> dict[str, Any]:
-    """What diagnosis.json holds."""
-    fits = [(step, step.fitted.model.effects) for step in diagnosis.steps]
-    steps = [
-        {"name": s.name, "kind": s.kind, "noise": noise_facts(s.fitted.noise), "effects": [effect.key for effect in effects]}
-        for s, effects in fits
-    ]
+    """What diagnosis.json holds: of each step its model, with the priors under which it was fitted, and its estimate."""
+    steps = []
+    for step in diagnosis.steps:
+        effects, estimate = step.fitted.model.effects, step.fitted.estimate
+        steps.append(
+            {
+                "name": step.name,
+                "kind": step.kind,
+                "noise": noise_facts(step.fitted.noise),
+                "effects": [effect.key for effect in effects],
+                "priors": [[parameter.prior_std for parameter in effect.parameters] for effect in effects],
+                "estimate": {"sessions": [int(session) for session in estimate.sessions]}
+                | {name: getattr(estimate, name).tolist() for name in _PLACEMENTS}
+                | {name: [values.tolist() for values in getattr(estimate, name)] for name in _OF_EFFECTS},
+            }
+        )
     return {"document": diagnosis.document, "steps": steps}
 
 
 def final_parameters(facts: Mapping[str, Any], columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Parameters of the final model, (N,): `columns` of the steps table, of the last step of diagnosis.json, `facts`."""
-    return _of_step(columns, len(facts["steps"]) - 1)
+    return {name: values[columns["step"] == len(facts["steps"]) - 1] for name, values in columns.items()}
 
 
-def _of_step(columns: Mapping[str, np.ndarray], number: int) -> dict[str, np.ndarray]:
-    return {name: values[columns["step"] == number] for name, values in columns.items()}
+def diagnosis_from(case: Case, facts: Mapping[str, Any]) -> Diagnosis:
+    """A diagnosis from diagnosis.json, `facts`; without the evidence, which only training poses have.
 
-
-def diagnosis_from(case: Case, facts: Mapping[str, Any], columns: Mapping[str, np.ndarray]) -> Diagnosis:
-    """A diagnosis from diagnosis.json and its steps table; without the evidence, which only training poses have.
-
-    `case`: of the training poses. `facts`: of `diagnosis_facts`. `columns` (N,): of the steps table.
+    `case`: of the training poses.
     """
     measurements, left_out = case.campaign.measurements, rows_left_out(case, facts)
     case = case.select(~left_out)
-    steps = [
-        Step(step["name"], step["kind"], step_fit(case, facts, columns, number)) for number, step in enumerate(facts["steps"])
-    ]
-    return Diagnosis(case, tuple(steps), None, facts["document"], measurements.select(left_out))
+    steps = tuple(Step(step["name"], step["kind"], step_fit(case, step)) for step in facts["steps"])
+    return Diagnosis(case, steps, None, facts["document"], measurements.select(left_out))
 
 
 def rows_left_out(case: Case, facts: Mapping[str, Any]) -> np.ndarray:
@@ -106,19 +113,26 @@ def rows_left_out(case: Case, facts: Mapping[str, Any]) -> np.ndarray:
     return np.isin(case.campaign.measurements.row, left_out)
 
 
-def step_fit(case: Case, facts: Mapping[str, Any], columns: Mapping[str, np.ndarray], number: int) -> Fit:
-    """The fit of one step, from 0; it starts where it once ended. `case`, `facts`, `columns`: as in `diagnosis_from`."""
-    model, estimate = step_model(case, facts, columns, number)
-    return fit(model, case.observations, noise_from({"noise": facts["steps"][number]["noise"]}), estimate)
+def step_fit(case: Case, step: Mapping[str, Any]) -> Fit:
+    """The fit of one step of diagnosis.json; it starts where it once ended."""
+    model, estimate = step_model(case, step)
+    return fit(model, case.observations, noise_from(step), estimate)
 
 
-def step_model(case: Case, facts: Mapping[str, Any], columns: Mapping[str, np.ndarray], number: int) -> tuple[Model, Estimate]:
-    """Model of one step, with the priors under which it was fitted, and its estimate; without fitting it again."""
-    mine = _of_step(columns, number)
-    known = {effect.key: effect for effect in case.model.effects} | case.candidates
-    effects = tuple(_with_priors(known[key], mine) for key in facts["steps"][number]["effects"])
-    model = replace(case.model, effects=effects)
-    return model, estimate_from(mine, model, np.unique(case.observations.states.session))
+def step_model(case: Case, step: Mapping[str, Any]) -> tuple[Model, Estimate]:
+    """Model of one step of diagnosis.json and its estimate, without fitting it again."""
+    known, stated = {effect.key: effect for effect in case.model.effects} | case.candidates, step["estimate"]
+    effects = []
+    for key, priors in zip(step["effects"], step["priors"], strict=True):
+        # A prior that the catalogue does not have is one whose size was estimated.
+        parameters = tuple(
+            replace(p, prior_std=prior, sized=prior != p.prior_std)
+            for p, prior in zip(known[key].parameters, priors, strict=True)
+        )
+        effects.append(replace(known[key], parameters=parameters))
+    parts: dict[str, Any] = {name: np.array(stated[name], float) for name in _PLACEMENTS}
+    parts |= {name: tuple(np.array(values, float) for values in stated[name]) for name in _OF_EFFECTS}
+    return replace(case.model, effects=tuple(effects)), Estimate(tuple(stated["sessions"]), **parts)
 
 
 def candidate_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
@@ -162,19 +176,6 @@ def candidate_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     ]
 
 
-def _with_priors(effect: Candidate, columns: Mapping[str, np.ndarray]) -> Candidate:
-    """An effect with the priors under which it was fitted."""
-    mine = columns["owner"] == effect.key
-    prior = dict(zip(columns["parameter"][mine], columns["prior_std"][mine], strict=True))
-    priors = [None if np.isnan(prior[p.name]) else float(prior[p.name]) for p in effect.parameters]
-    # A prior that the catalogue does not have is one whose size was estimated.
-    parameters = tuple(
-        replace(p, prior_std=deviation, sized=deviation != p.prior_std)
-        for p, deviation in zip(effect.parameters, priors, strict=True)
-    )
-    return replace(effect, parameters=parameters)
-
-
 def parameter_columns(fitted: Fit) -> dict[str, np.ndarray | list[str]]:
     """Columns of the parameters table of a fit."""
     named = parameters(fitted.model, fitted.estimate)
@@ -187,30 +188,6 @@ def parameter_columns(fitted: Fit) -> dict[str, np.ndarray | list[str]]:
         "held": fitted.held,
         "prior_std": np.array([np.nan if p.prior_std is None else p.prior_std for _, p in named]),
     }
-
-
-def estimate_from(columns: Mapping[str, np.ndarray], model: Model, sessions: Collection[int]) -> Estimate:
-    """The estimate of a model from the columns of its parameters (N,)."""
-    values = {(o, p): v for o, p, v in zip(columns["owner"], columns["parameter"], columns["value"], strict=True)}
-
-    def placed(owner: str, *stated: Sequence[float] | None) -> tuple[list[float], np.ndarray]:
-        shift, turn = (
-            [values.get((owner, name), missing) for name, missing in zip(names, each or (0.0, 0.0, 0.0), strict=True)]
-            for names, each in zip((("dx", "dy", "dz"), ("rx", "ry", "rz")), stated, strict=True)
-        )
-        return shift, Rotation.from_rotvec(turn).as_matrix()
-
-    frames = [placed(f"frame {session}", None, None) for session in sessions]
-    targets = [placed(f"target {target.name}", target.offset_m, target.rotation) for target in model.targets]
-    return Estimate(
-        tuple(int(session) for session in sessions),
-        np.array([turn for _, turn in frames]),
-        np.array([shift for shift, _ in frames]),
-        np.array([shift for shift, _ in targets]),
-        np.array([turn for _, turn in targets]),
-        tuple(np.array([values[effect.key, p.name] for p in effect.parameters]) for effect in model.effects),
-        tuple(np.array([values[effect.key, s.name] for s in effect.shapes]) for effect in model.effects),
-    )
 
 
 def _absolute_values(model: Model, estimate: Estimate) -> np.ndarray:

@@ -76,7 +76,8 @@ def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
     untestable = linearized(part.declared, part.searched, candidates, settings).untestable
     found, negative = faults(campaign, campaign.measurements), _negative_springs(declared)
     diagnosable, testable = not any(fault.decisive for fault in found), len(candidates) - len(untestable)
-    attention, accuracy = [fault.detail for fault in found], []
+    attention = [fault.detail for fault in found]
+    accuracy: list[tuple[str, str]] = []
     if diagnosable and not negative:
         fitted = calibrate_on_case(case, declared.model, declared.estimate, declared.covariance, part.noise)
         sentence = accuracy_sentence(campaign_accuracy(fitted))

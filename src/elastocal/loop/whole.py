@@ -25,10 +25,10 @@ from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.case import Case, case_from
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.provenance import provenance
-from elastocal.io.storage import read_table, write_table
+from elastocal.io.storage import write_table
 from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop.loading import load_campaign
-from elastocal.loop.schemas import STEPS, residuals
+from elastocal.loop.schemas import residuals
 from elastocal.validation.held_out import position_residuals
 from elastocal.validation.placing import placed
 
@@ -50,7 +50,7 @@ def judge_campaign(job: Any) -> None:
 
     case = tables.load_case(job.input.descriptions, job.input.training)
     held_out = tables.load_case(job.input.descriptions, job.input.held_out, "held_out")
-    found = tables.diagnosis_from(case, read_json(job.input.diagnosis), read_table(job.input.steps, STEPS))
+    found = tables.diagnosis_from(case, read_json(job.input.diagnosis))
     verdict = judged(found, held_out, job.params.seed)
     write_json(job.output.verdict, verdict.document, allow_nan=False)
     write_csv(job.output.before_after, pd.DataFrame(verdict.rows))
