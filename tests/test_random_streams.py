@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from elastocal.random_streams import draw, stream
 
@@ -12,14 +10,6 @@ PINNED = [[15342428524767668725, 11329942245932861333], [16420136037410210294, 1
 
 def numbers(*name, count=8):
     return stream(*name).random(count)
-
-
-def uniform(generator):
-    return generator.random((4, 3))
-
-
-def test_a_stream_is_the_same_each_time_it_is_opened():
-    np.testing.assert_array_equal(numbers(1, "kuka", "noise/6DoF", 3), numbers(1, "kuka", "noise/6DoF", 3))
 
 
 @pytest.mark.parametrize(
@@ -38,26 +28,10 @@ def test_another_seed_robot_purpose_or_data_set_gives_other_numbers(other):
     assert not np.isin(numbers(1, "kuka", "noise/6DoF", 3), numbers(*other)).any()
 
 
-def test_neighbouring_data_sets_do_not_overlap_however_far_they_are_drawn():
-    one, other = numbers(1, "kuka", "x", 0, count=100_000), numbers(1, "kuka", "x", 1, count=100_000)
-    assert not np.isin(one, other).any()
-    # The correlation of independent numbers has a standard deviation of 1 / sqrt(count): one of 0.02 is seen with 0.9.
-    assert abs(np.corrcoef(one, other)[0, 1]) < 5 / np.sqrt(100_000)
-
-
 def test_numbers_are_pinned():
     # Published results rest on these streams; whoever changes them changes every table.
     assert stream(1, "kuka", "identification/joint angles", 0).bit_generator.random_raw(2).tolist() == PINNED[0]
     assert stream(7, "fanuc", "noise/3DoF", 999).bit_generator.random_raw(2).tolist() == PINNED[1]
-
-
-@given(st.permutations(range(6)), st.integers(1, 6))
-def test_draws_do_not_depend_on_order_number_or_blocks(order, cut):
-    expected = {n: array for n, array in enumerate(draw(5, "kuka", "x", range(6), uniform))}
-    for block in (order[:cut], order[cut:]):
-        if block:
-            for number, array in zip(block, draw(5, "kuka", "x", block, uniform), strict=True):
-                np.testing.assert_array_equal(array, expected[number])
 
 
 def test_draws_are_those_of_streams_of_their_own_whatever_the_one_before_left_over():

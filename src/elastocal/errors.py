@@ -76,16 +76,7 @@ def text_fault(text: str) -> tuple[str, str] | None:
 _PARTIAL = re.compile(r"\.[0-9a-f]{16}\.partial\b.*")
 # What the loader of libraries says of it.
 _NO_MEMORY = ("failed to map segment", "annot allocate memory")
-_SPACE = "a place with space where this user may write"
-_REMEDIES = {
-    **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EACCES, errno.EPERM, errno.EROFS), _SPACE),
-    errno.EEXIST: "a name that nothing else has",
-    errno.ENOENT: "a file or folder that is there",
-    errno.ENOTDIR: "a folder where the path has something else",
-    errno.EISDIR: "a file",
-    errno.ENAMETOOLONG: "a shorter name",
-    errno.ELOOP: "a path without links in a circle",
-}
+_USABLE = "a file or folder that is there, on a disk with space, where this user may read and write"
 
 
 def fault_of_machine(error: OSError | MemoryError | ImportError, place: str = "disk") -> InputError:
@@ -94,9 +85,8 @@ def fault_of_machine(error: OSError | MemoryError | ImportError, place: str = "d
         return InputError("memory", "", "none left", "a smaller file, more memory, or fewer jobs at a time (-j1)")
     if isinstance(error, ImportError):
         return InputError("Python", "", str(error), "an environment with every package of this version")
-    found, allowed = reason_of(error), _REMEDIES.get(error.errno or 0, "a disk that can be read and written")
     # What was asked for, not the name beside it under which it is written.
-    return InputError(_PARTIAL.sub("", str(error.filename or place)), "", found, allowed)
+    return InputError(_PARTIAL.sub("", str(error.filename or place)), "", reason_of(error), _USABLE)
 
 
 def reason_of(error: OSError) -> str:

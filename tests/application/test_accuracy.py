@@ -22,8 +22,8 @@ from elastocal.application.accuracy import (
     quantile_of_length,
     scope_of,
 )
-from elastocal.application.calibrated import NEUTRAL, forward
-from elastocal.application.frames import BASE, ROBOT, scope_about, subtract_placement
+from elastocal.application.calibrated import NEUTRAL, forward, moves_robot
+from elastocal.application.frames import BASE, ROBOT, Scope, subtract_placement
 from elastocal.effects.catalogue import candidates_on, moves_robot
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.noise import Noise
@@ -76,7 +76,7 @@ def test_bounds_hold_95_percent_of_robots_drawn_from_the_covariance(fanuc, unkno
         off = (forward(other, angles)[0] - position)[..., None]
         if unknown_base:
             off = subtract_placement(
-                scope_about(position), position, np.zeros((60, 3, 3)), np.concatenate([off, 0 * off], axis=1)
+                Scope(ROBOT, position.mean(axis=0)), position, np.zeros((60, 3, 3)), np.concatenate([off, 0 * off], axis=1)
             )
         distance = np.linalg.norm(off[:, :3, 0], axis=1)
         rms.append(np.sqrt((distance**2).mean()))
@@ -84,15 +84,6 @@ def test_bounds_hold_95_percent_of_robots_drawn_from_the_covariance(fanuc, unkno
     assert np.sqrt(np.mean(np.square(rms))) == pytest.approx(stated.rms_m, rel=0.08)
     assert np.mean(np.array(rms) < stated.rms_bound_m) == pytest.approx(0.95, abs=0.05)
     assert np.mean(np.array(worst) < stated.worst_bound_m) == pytest.approx(0.95, abs=0.05)
-
-
-def test_what_the_form_of_the_model_leaves_open_is_in_every_figure(turned):
-    angles = np.random.default_rng(2).uniform(-1, 1, (5, 6))
-    known = set_scope(turned, True)
-    found = predict_errors(replace(known, scope=replace(known.scope, form_m=1e-3)), angles, NEUTRAL)
-    assert found.accuracy("").rms_m == pytest.approx(1e-3, rel=0.01)
-    assert found.accuracy("").rms_bound_m > 1e-3 and found.accuracy("").worst_m > 1e-3 and (found.bound_m > 1e-3).all()
-    assert "form of the model" in accuracy_sentence(found.accuracy("some poses"))
 
 
 def test_a_misplaced_base_is_no_error_of_the_uncorrected_robot_where_nobody_knows_the_base(turned):
@@ -108,39 +99,25 @@ def test_a_misplaced_base_is_no_error_of_the_uncorrected_robot_where_nobody_know
     assert np.sqrt((unknown**2).mean()) < np.sqrt((known**2).mean())
 
 
-def test_quantiles_are_those_of_one_and_of_three_directions_and_hold_between():
+def test_quantiles_are_those_of_one_and_of_three_directions():
     alike, single = np.eye(3), np.diag([1.0, 0.0, 0.0])
     found = quantile_of_length(np.stack([alike, single, np.zeros((3, 3))]))
     np.testing.assert_allclose(found, [chi.ppf(0.95, 3), norm.ppf(0.975), 0.0], rtol=1e-12)
-    rng = np.random.default_rng(1)
-    for scales in ([1.0, 0.5, 0.1], [1.0, 1.0, 0.2], [1.0, 0.1, 0.1]):
-        lengths = np.linalg.norm(rng.standard_normal((200_000, 3)) * scales, axis=1)
-        bound = quantile_of_length(np.diag(np.square(scales))[None])[0]
-        # The gamma distribution has two of the moments.
-        assert np.mean(lengths < bound) == pytest.approx(0.95, abs=0.01)
 
 
-def scope_with(robot, candidate, values, shapes, unknown_base=False, std=0.0):
+def scope_with(robot, candidate, values, shapes, std=0.0):
     """Scope of a fit that has one more effect than the robot is commanded by."""
     calibrated = made_calibrated(robot, "joint_offset@2")
-    model = replace(
-        plain_model(robot, "joint_offset@2"), effects=(*calibrated.model.effects, candidate), fitted_frames=unknown_base
-    )
-    estimate = calibrated.estimate
-    estimate = replace(
-        estimate, coefficients=(*estimate.coefficients, np.array(values)), shapes=(*estimate.shapes, np.array(shapes, float))
-    )
+    model, estimate = plain_model(robot, "joint_offset@2"), calibrated.estimate
+    model = replace(model, effects=(*calibrated.model.effects, candidate))
+    one_more = (*estimate.coefficients, np.array(values)), (*estimate.shapes, np.array(shapes, float))
+    estimate = replace(estimate, coefficients=one_more[0], shapes=one_more[1])
     added = np.diag([*(std * p.plausible for p in candidate.parameters), *(0.0 for _ in candidate.shapes)]) ** 2
-    frame = np.zeros((6, 6)) if unknown_base else np.zeros((0, 0))
-    return scope_of(calibrated, model, estimate, block_diag(frame, calibrated.covariance, added), LOADED)
-
-
-def all_that_leave_the_robot_alone(robot):
-    return {key: candidate for key, candidate in candidates_on(sites_of(robot)).items() if not moves_robot(candidate)}
+    return scope_of(calibrated, model, estimate, block_diag(calibrated.covariance, added), LOADED)
 
 
 def test_every_effect_that_no_command_contains_counts_as_error(fanuc):
-    found = all_that_leave_the_robot_alone(fanuc)
+    found = {key: candidate for key, candidate in candidates_on(sites_of(fanuc)).items() if not moves_robot(candidate)}
     assert {candidate.effect for candidate in found.values()} >= {"setup_step", "frame_drift", "tracker_scale", "force_bias"}
     # The last one of each effect.
     for key, candidate in {candidate.effect: (key, candidate) for key, candidate in found.items()}.values():
@@ -150,16 +127,6 @@ def test_every_effect_that_no_command_contains_counts_as_error(fanuc):
         # One that is fitted to nothing is as uncertain as it is.
         unsure = scope_with(fanuc, candidate, np.zeros(len(values)), shapes, std=1.0)
         assert unsure.left_out_m > 0.1 * scope.left_out_m, key
-
-
-def test_a_step_counts_as_all_of_it_in_the_base_frame_and_as_what_no_placement_takes_up_in_the_robots_own(fanuc):
-    step = all_that_leave_the_robot_alone(fanuc)["setup_step"]
-    values = [1e-3, 0.0, 0.0, 0.0, 0.0, 0.0]
-    whole, half = ([scope_with(fanuc, step, values, [when], unknown) for unknown in (False, True)] for when in (0.0, 0.5))
-    assert (whole[0].frame, whole[1].frame) == (BASE, ROBOT)
-    assert [each.left_out_m for each in whole] == pytest.approx([1e-3, 0.0], abs=1e-9)
-    assert half[0].left_out_m == pytest.approx(1e-3, rel=1e-6)
-    assert 2e-4 < half[1].left_out_m <= 5.1e-4
 
 
 def test_what_goes_with_a_condition_counts_as_error_where_a_command_does_not_state_it(fanuc):
@@ -234,5 +201,9 @@ def test_of_a_robot_of_which_nothing_was_fitted_no_error_of_zero_is_predicted(fa
     found = predict_errors(calibrated, np.zeros((3, 6)), NEUTRAL).accuracy("some poses")
     assert found.rms_m == 0.0 and not found.fitted
     assert "nothing of the robot was fitted" in accuracy_sentence(found) and "0.000" not in accuracy_sentence(found)
+    # What the form of the model leaves open is in every figure.
     contradicted = replace(calibrated, scope=replace(calibrated.scope, form_m=1e-3, contradicted=True))
-    assert "1.000 mm" in accuracy_sentence(predict_errors(contradicted, np.zeros((3, 6)), NEUTRAL).accuracy("some poses"))
+    open_form = predict_errors(contradicted, np.zeros((3, 6)), NEUTRAL)
+    stated = open_form.accuracy("some poses")
+    assert stated.rms_m == pytest.approx(1e-3, rel=0.01) and min(stated.rms_bound_m, stated.worst_m) > 1e-3
+    assert (open_form.bound_m > 1e-3).all() and "1.000 mm" in accuracy_sentence(stated)

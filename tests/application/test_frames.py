@@ -16,7 +16,7 @@ FIELDS = {"base": BASE_MOVED, "offset": ROTATION @ [1e-3, 0.0, 2e-3], "stretched
 @pytest.mark.parametrize("offset", [False, True])
 @pytest.mark.parametrize("name", FIELDS)
 def test_each_freedom_takes_up_its_own_motion(frame, offset, name):
-    scope = Scope(frame, POSITION.mean(axis=0), np.zeros((12, 0)), np.zeros(12), offset)
+    scope = Scope(frame, POSITION.mean(axis=0), offset_removed=offset)
     field = np.concatenate([FIELDS[name], np.zeros((50, 3))], axis=1)[..., None]
     left = root_mean_square(subtract_placement(scope, POSITION, ROTATION, field)[:, :3, 0])
     taken_up = {"base": frame == ROBOT, "offset": offset, "stretched": False}[name]

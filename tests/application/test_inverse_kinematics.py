@@ -13,7 +13,6 @@ from elastocal.application.inverse_kinematics import (
     allowed_steps,
     along_path,
     find_beyond_limits,
-    refine,
 )
 from elastocal.mechanics.kinematics import poses
 
@@ -23,32 +22,6 @@ BENT = np.array([0.0, 0.2, 0.1, 0.3, 0.7, 0.0])
 
 def find_poses(robot, angles):
     return poses(robot.chain, angles, robot.chain.end_effector)
-
-
-def draw_angles(robot, count, seed=1, share=0.8):
-    low, high = robot.joint_limits.T
-    return low + (high - low) * (0.5 + share * (np.random.default_rng(seed).random((count, robot.joints)) - 0.5))
-
-
-@pytest.mark.parametrize("name", ["gp180", "ur10", "fanuc_cpa", "iiwa14"])
-def test_refined_angles_reach_the_poses_from_nearby(name):
-    robot = analysed(name)
-    angles = draw_angles(robot, 200)
-    found, left = refine(robot, *find_poses(robot, angles), angles + 0.05)
-    assert (left < SOLVED_M).mean() > 0.98
-    good = left < SOLVED_M
-    np.testing.assert_allclose(find_poses(robot, found)[0][good], find_poses(robot, angles)[0][good], atol=1e-7)
-    np.testing.assert_allclose(find_poses(robot, found)[1][good], find_poses(robot, angles)[1][good], atol=1e-7)
-
-
-def test_a_smooth_path_stays_smooth_and_within_limits():
-    robot = analysed("gp180")
-    share = np.linspace(0.0, 1.0, 80)[:, None]
-    angles = robot.joint_limits.mean(axis=1) + BENT + 0.3 * np.sin(3.0 * share * np.arange(1, 7))
-    found, left = along_path(robot, *find_poses(robot, angles))
-    assert left.max() < SOLVED_M
-    assert not find_beyond_limits(robot, found).any()
-    assert np.abs(np.diff(found, axis=0)).max() < 3.0 * np.abs(np.diff(angles, axis=0)).max()
 
 
 @pytest.mark.parametrize("name", ["kuka", "gp180", "abb"])

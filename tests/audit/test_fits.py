@@ -57,9 +57,9 @@ def test_a_campaign_of_springs_holds(diagnosed):
     [
         (STEPS, ("std_error", 0), lambda value: 0.5 * value, "standard errors of step 1 (declared)"),
         (
-            "results/loop/cell/correlations.parquet",
-            ("correlation", 0),
-            lambda value: value + 0.01,
+            "results/loop/cell/diagnosis.json",
+            ["covariance", 0, 0],
+            lambda value: 1.1 * value,
             "correlations of the estimates",
         ),
         (RESIDUALS, ("before_dy", 7), lambda value: value + 1e-6, "residuals before"),

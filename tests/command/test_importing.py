@@ -9,31 +9,19 @@ from elastocal.campaigns.reading import read_robot
 ARM = (link("base"), link("arm", 2.0), link("hand"), joint("j1", "base", "arm", xyz=(0, 0, 0.5)), joint("j2", "arm", "hand"))
 
 
-@pytest.fixture
-def output(tmp_path):
-    return tmp_path / "robot.yaml"
-
-
-def of_table(output, text, *more):
-    (output.parent / "arm.csv").write_text(text)
-    return "import", "dh", output.parent / "arm.csv", "-o", output, *more
-
-
-def of_urdf(output, *more, parts=ARM):
-    return "import", "urdf", written(output.parent, *parts), "--base", "base", "--tip", "hand", "-o", output, *more
-
-
-def test_a_table_becomes_a_robot_file_in_the_units_and_the_notation_asked_for(elastocal, output):
+def test_a_table_becomes_a_robot_file_in_the_units_and_the_notation_asked_for(elastocal, tmp_path):
+    (tmp_path / "arm.csv").write_text("d,a,alpha\n100,400,1.5707963267948966\n")
     units = "--angles", "rad", "--lengths", "mm", "--modified", "--name", "arm 1"
-    result = elastocal(*of_table(output, "d,a,alpha\n100,400,1.5707963267948966\n", *units))
+    result = elastocal("import", "dh", tmp_path / "arm.csv", "-o", tmp_path / "robot.yaml", *units)
     assert result.exit_code == 0 and "arm 1: 1 joint," in result.output and "written:" in result.output
-    text = output.read_text()
+    text = (tmp_path / "robot.yaml").read_text()
     assert "Tx(0.4) Rx(90deg) Rz(q1) Tz(0.1) [flange]" in text and "modified" in text.splitlines()[0]
-    assert read_robot(output).name == "arm 1"
+    assert read_robot(tmp_path / "robot.yaml").name == "arm 1"
 
 
-def test_a_urdf_becomes_a_robot_file_and_is_told(elastocal, output):
-    result = elastocal(*of_urdf(output, "--point", "arm"))
+def test_a_urdf_becomes_a_robot_file_and_is_told(elastocal, tmp_path):
+    words, output = ("--base", "base", "--tip", "hand", "--point", "arm"), tmp_path / "robot.yaml"
+    result = elastocal("import", "urdf", written(tmp_path, *ARM), "-o", output, *words)
     assert result.exit_code == 0
     assert "2 joints" in result.output and "no compliances" in result.output and f"written: {output}" in result.output
     robot = read_robot(output)

@@ -52,18 +52,14 @@ def test_a_plan_is_a_folder_to_fill_in_with_its_pages(planned, elastocal, refusa
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--box", "1,2,3"], "--box"),
         (["--box", "1,0,0,1,0,1"], "--box"),
         (["--tracker", "1,2"], "--tracker"),
         (["--noise", "0.03"], "--noise"),
         (["--target", "elbow"], "--target"),
-        (["--target", "A:elbow"], "'elbow'"),
         (["--target", "A:6DoF", "--target", "A:4DoF"], "'A' twice"),
         (["--target", "6DoF=0.1,0,0", "--target", "6DoF=0,0.1,0", "--target", "6DoF"], "A:6DoF and B:6DoF"),
-        (["--target", ":6DoF"], "a name of 0"),
         (["--target", f"{'A' * 81}:6DoF"], "a name of 81"),
         (["--target", "=A:6DoF"], "--target"),
-        (["--target", "A:6DoF="], "3 numbers"),
         (["--orientation-noise", "0.01deg"], "--measured pose"),
         (["--measured", "pose", "--orientation-noise", "0.01"], "with its unit"),
         (["--box=-9,9,-9,9,-9,9"], "boxes"),

@@ -1,8 +1,12 @@
-"""Certificates, as they are typed, and the calibrated robot as files that are read again."""
+"""What a diagnosed campaign leads to, as it is typed: corrected targets, certificates, and the calibrated robot as files.
+
+Nothing is written where a pose cannot be reached.
+"""
 
 import json
 import re
 import shutil
+from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -10,15 +14,168 @@ import pandas as pd
 import pytest
 from analysed_robots import ROBOTS, analysed
 from certified import record_jobs
+from made_remainders import smooth
 from made_urdf import joint, link
 from made_urdf import robot as made
 from scipy.spatial.transform import Rotation
 
-from elastocal.application.accuracy import accuracy_from, accuracy_sentence, error_rows
-from elastocal.application.calibrated import nominal_forward
+from elastocal.application.accuracy import Accuracy, accuracy_sentence, error_rows
+from elastocal.application.calibrated import forward, nominal_forward
+from elastocal.application.frames import root_mean_square, subtract_placement
 from elastocal.campaigns.reading import campaign_files, read_robot
 from elastocal.exchange.urdf import robot_from_urdf
+from elastocal.loop.calibrated_files import load_diagnosed
 from elastocal.mechanics.kinematics import poses
+
+BENT = np.array([0.0, 0.2, 0.1, 0.3, 0.7, 0.0])
+
+
+def path_of(angles, folder, **more):
+    """Wanted poses: where joint angles put the rigid robot."""
+    position, rotation = nominal_forward(analysed("kuka"), angles)
+    pose = np.column_stack([position, Rotation.from_matrix(rotation).as_rotvec()])
+    table = pd.DataFrame(pose, columns=["x", "y", "z", "rx", "ry", "rz"]).assign(**more)
+    table.to_csv(folder / "path.csv", index=False)
+    return folder / "path.csv"
+
+
+def columns_of(angles):
+    return {f"q{number}": column for number, column in enumerate(angles.T, 1)}
+
+
+@pytest.fixture
+def angles():
+    return analysed("kuka").joint_limits.mean(axis=1) + BENT + 0.2 * np.linspace(0, 1, 8)[:, None]
+
+
+@pytest.fixture
+def path(tmp_path, angles):
+    return path_of(angles, tmp_path)
+
+
+@pytest.fixture
+def output(tmp_path):
+    return tmp_path / "targets.csv"
+
+
+@pytest.fixture
+def words(in_checkout, path, output):
+    return "correct", in_checkout / "made", path, "--output", output
+
+
+def missed(robot, scope, wanted, commands):
+    """RMS error in m of a robot that errs by `smooth`, after the best placement of its base."""
+    position, rotation = nominal_forward(robot, commands)
+    off = (wanted - position - smooth(robot.model_angles(commands)))[..., None]
+    off = subtract_placement(scope, position, rotation, np.concatenate([off, 0 * off], axis=1))
+    return root_mean_square(off[:, :3, 0])
+
+
+def test_the_regression_corrects_what_physics_does_not_have(elastocal, regressed_checkout, monkeypatch, tmp_path):
+    """At poses between those of the campaign: how close the robot then comes to them, by what it really errs by."""
+    monkeypatch.chdir(regressed_checkout)
+    found = load_diagnosed("smooth", ROBOTS, regressed_checkout)
+    robot, states = found.calibrated.robot, found.case.observations.states
+    commands = robot.reported_angles(0.5 * (states.joint_angles[1:] + states.joint_angles[:-1]))
+    position, _ = nominal_forward(robot, commands)
+    path = path_of(commands, tmp_path, **columns_of(commands))
+    words, errors = ("--partial", "--allow-large-steps"), {}
+    for flags, corrected in (((), found), (("--physics-only",), found.by_physics())):
+        result = elastocal("correct", "smooth", path, "--output", tmp_path / "t.csv", *words, *flags)
+        assert ("Gaussian process" in result.stderr) == (not flags)
+        targets = pd.read_csv(tmp_path / "t.csv")
+        good = (targets["status"] == "ok").to_numpy()
+        assert good.mean() > 0.9
+        there = targets.loc[good, [f"q{j}" for j in range(1, 7)]].to_numpy()
+        errors[flags] = missed(robot, found.calibrated.scope, position[good], there)
+        np.testing.assert_allclose(forward(corrected.calibrated, there)[0], position[good], atol=1e-8)
+        assert errors[flags] < targets["predicted_bound_m"].mean()
+    assert errors[()] < 0.5 * errors["--physics-only",]
+
+
+def test_the_targets_bring_the_diagnosed_robot_to_the_wanted_poses_and_a_program_has_them(
+    elastocal, words, output, checkout, angles
+):
+    result = elastocal(*words, "--format", "krl")
+    assert result.exit_code == 0, result.stderr
+    told = " ".join(result.stderr.split())
+    assert "8 of 8 targets corrected" in told and "targets.src goes to 8 of 8 targets: KUKA KRL, q1 as A1" in told
+    targets = pd.read_csv(output)
+    commands = targets[[f"q{j}" for j in range(1, 7)]].to_numpy()
+    robot = load_diagnosed(checkout / "made", ROBOTS, checkout).calibrated
+    wanted, _ = nominal_forward(robot.robot, angles)
+    np.testing.assert_allclose(forward(robot, commands)[0], wanted, atol=1e-7)
+    missed = np.linalg.norm(wanted - forward(robot, targets[[f"q{j}_uncorrected" for j in range(1, 7)]].to_numpy())[0], axis=1)
+    np.testing.assert_allclose(targets["predicted_error_before_m"], missed, atol=1e-7)
+    assert (targets["status"] == "ok").all() and (targets["predicted_std_m"] > 0).all()
+    program = output.with_suffix(".src").read_text()
+    for stated in ("robot: KUKA KR 270 R2700 ultra", "campaign: made", f"date: {date.today()}", "tool: "):
+        assert stated in program
+    moves = [line[15:-1].split(", ") for line in program.splitlines() if "PTP" in line]
+    np.testing.assert_allclose(np.radians([[float(word.split()[1]) for word in move] for move in moves]), commands, atol=1e-8)
+
+
+def test_a_pose_out_of_reach_is_named_and_nothing_is_written_and_in_no_program(elastocal, refusal, words, path, output):
+    beyond = [0.0, 0.0, 6.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    pd.read_csv(path).assign(x=lambda wanted: wanted["x"] + beyond).to_csv(path, index=False)
+    assert "line 4 is unreachable" in refusal(*words) and not output.exists()
+    result = elastocal(*words, "--partial", "--format", "tp")
+    assert result.exit_code == 0
+    assert pd.read_csv(output)["status"].tolist().count("ok") == 7
+    assert "7 of 8 targets corrected" in result.stderr and "targets.ls goes to 7 of 8" in " ".join(result.stderr.split())
+    assert output.with_suffix(".ls").read_text().count("GP1:") == 7
+    pd.read_csv(path).assign(x=8.0).to_csv(path, index=False)
+    assert "no pose" in refusal(*words, "--partial", "--format", "urscript")
+    assert not output.with_suffix(".script").exists()
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (("--format", "karel"), "krl | rapid | tp | urscript"),
+        (("--axes", "A1,A2"), "with --format"),
+        (("--output", "x.mod"), "ends in .csv"),
+        (("--format", "krl", "--output", "my targets.csv"), "as the name of a program"),
+    ],
+)
+def test_what_is_no_program_is_refused_before_any_work(refusal, words, tmp_path, more, message):
+    assert message in refusal(*words, *more)
+    assert [file.name for file in tmp_path.iterdir()] == ["path.csv"] and not Path("x.mod").exists()
+
+
+def test_a_swing_is_named_by_its_line_and_no_program_is_written_unless_it_is_allowed(
+    elastocal, refusal, words, path, output, angles
+):
+    turned = angles.copy()
+    turned[:4, 0], turned[4:, 0] = np.radians(178.0), np.radians(-178.0)
+    path_of(turned, path.parent, **columns_of(turned))
+    line = refusal(*words, "--format", "krl")
+    assert "line 6: joint 1 turns by 356.0 degrees" in line and "--allow-large-steps" in line
+    assert not output.exists() and not output.with_suffix(".src").exists()
+    result = elastocal(*words, "--format", "krl", "--allow-large-steps")
+    assert result.exit_code == 0 and output.with_suffix(".src").exists()
+    assert "! line 6: joint 1 turns by 356.0 degrees" in " ".join(result.stderr.split())
+    pd.read_csv(path).drop(columns=[f"q{joint}" for joint in range(1, 7)]).to_csv(path, index=False)
+    assert elastocal(*words).exit_code == 0
+    assert np.abs(np.diff(pd.read_csv(output)["q1"])).max() < 0.1
+
+
+def test_targets_keep_their_loads_and_beyond_twice_the_measured_ones_have_no_bound(
+    elastocal, words, checkout, path, output, angles
+):
+    measured = load_diagnosed(checkout / "made", ROBOTS, checkout).case.observations.states.wrench
+    largest = np.linalg.norm(measured[:, :3], axis=1).max()
+    loads = -largest * np.array([0.0, 1.0, 1.9, 1.99, 2.1, 3.0, 10.0, 100.0])
+    path_of(angles, path.parent, fx=0.0, fy=0.0, fz=loads)
+    result = elastocal(*words)
+    assert result.exit_code == 0 and "no bound is stated for 4 of 8 targets" in " ".join(result.stderr.split())
+    targets = pd.read_csv(output)
+    assert targets["predicted_bound_m"].isna().tolist() == [False] * 4 + [True] * 4
+    assert (targets["status"][:4] == "ok").all()
+    assert (targets["status"][4:] == "no bound: loads beyond 2 times the measured ones").all()
+    np.testing.assert_allclose(targets["fz"], loads)
+    assert (targets[["fx", "mx", "my", "mz"]] == 0).all(axis=None)
+
 
 CERTIFICATE, VERDICT = Path("reports/loop/made/certificate.json"), Path("reports/loop/made/verdict.json")
 
@@ -29,22 +186,20 @@ def issue(elastocal, *words):
     return result, json.loads(CERTIFICATE.read_text())
 
 
-def path_of(count, folder):
-    robot = analysed("kuka")
-    bent = np.random.default_rng(1).uniform(-0.3, 0.3, (count, 6)) + np.array([0.0, 0.2, 0.1, 0.3, 0.7, 0.0])
-    position, rotation = nominal_forward(robot, robot.reported_angles(bent + robot.joint_limits.mean(axis=1)))
-    pose = np.column_stack([position, Rotation.from_matrix(rotation).as_rotvec()])
-    pd.DataFrame(pose, columns=["x", "y", "z", "rx", "ry", "rz"]).to_csv(folder / "path.csv", index=False)
-    return folder / "path.csv"
-
-
 @pytest.fixture(scope="module")
 def corrected(checkout, elastocal, tmp_path_factory):
     """Targets that `correct` wrote, their folder, and what it said."""
     folder = tmp_path_factory.mktemp("corrected")
+    bent = analysed("kuka").joint_limits.mean(axis=1) + BENT + np.linspace(0, 0.3, 20)[:, None]
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(checkout)
-        found = elastocal("correct", "made", path_of(20, folder), "--output", folder / "targets.csv")
+        found = elastocal(
+            "correct",
+            "made",
+            path_of(bent, folder),
+            "--output",
+            folder / "targets.csv",
+        )
     assert found.exit_code == 0, found.output
     return folder, found.stderr
 
@@ -63,7 +218,7 @@ def test_a_certificate_has_the_accuracy_and_the_table_that_correct_states_to_the
     lines = result.output.splitlines()
     assert document["conformity"]["decision"] in lines[0] and "0.500 mm" in lines[0]
     assert document["point"] in lines[1] and "Nobody has measured" in lines[2] and lines[3].endswith(".pdf")
-    assert accuracy_sentence(accuracy_from(document["accuracy"])) in corrected[1]
+    assert accuracy_sentence(Accuracy(**document["accuracy"])) in corrected[1]
     rows = error_rows(json.loads(VERDICT.read_text()))
     assert document["errors"] == rows and len(rows) == 2
     assert document["budget"][0]["name"] == "uncorrected" and rows[1][1] == f"{1e3 * document['budget'][0]['rms_m']:.3f} mm"
@@ -82,12 +237,10 @@ def test_the_robot_is_judged_as_it_is_corrected(elastocal, regressed_checkout, m
     verdict = json.loads((reports / "verdict.json").read_text())
     ends = verdict["accuracy"]["rms_bound_m"], verdict["physics"]["accuracy"]["rms_m"]
     assert ends[0] < ends[1]
-    documents = {}
-    for flags in ((), ("--physics-only",)):
+    for flags, decision in ((("--physics-only",), "undecided"), ((), "pass")):
         elastocal("certificate", "smooth", "--tolerance", f"{1e3 * sum(ends) / 2:.4f}mm", *flags)
-        documents[flags] = json.loads((reports / "certificate.json").read_text())
-    delivered, physics = documents.values()
-    assert (delivered["conformity"]["decision"], physics["conformity"]["decision"]) == ("pass", "undecided")
+        delivered = json.loads((reports / "certificate.json").read_text())
+        assert delivered["conformity"]["decision"] == decision
     left = ("uncertainty of the parameters", "repeatability", "form of the model", "not commanded", "left by the regression")
     squares = sum(line["rms_m"] ** 2 for line in delivered["budget"] if line["name"] in left)
     assert squares == pytest.approx(delivered["accuracy"]["rms_m"] ** 2, rel=1e-9)
@@ -98,7 +251,9 @@ def test_the_robot_is_judged_as_it_is_corrected(elastocal, regressed_checkout, m
     assert stated["rms_m"] == pytest.approx(verdict["physics"]["accuracy"]["rms_m"], rel=1e-3)
 
 
-def test_what_is_misplaced_is_said_and_data_at_fault_get_no_certificate(elastocal, refusal, checkout, tmp_path, monkeypatch):
+def test_what_is_misplaced_is_said_and_data_at_fault_get_no_certificate(
+    elastocal, refusal, checkout, path, tmp_path, monkeypatch
+):
     shutil.copytree(checkout, tmp_path / "top", symlinks=True)
     monkeypatch.chdir(tmp_path / "top")
     verdict, sentence = json.loads(VERDICT.read_text()), "reflector or tool sits 5.0 mm from where it is declared"
@@ -106,7 +261,7 @@ def test_what_is_misplaced_is_said_and_data_at_fault_get_no_certificate(elastoca
     record_jobs("made", campaign_files("made", ROBOTS))
     for words in (
         ("certificate", "made", "--tolerance", "0.5mm"),
-        ("correct", "made", path_of(1, tmp_path), "--output", "t.csv"),
+        ("correct", "made", path, "--output", "t.csv"),
     ):
         assert f"! {sentence}" in elastocal(*words).stderr, words
     assert json.loads(CERTIFICATE.read_text())["misplaced"] == [{"sentence": sentence}]

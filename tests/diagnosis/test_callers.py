@@ -4,13 +4,12 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from loop_scripts import ANALYSIS, Files, run_loop
 from made_folders import PLAN, made_folder, made_table
 
-from elastocal.io.storage import read_table, write_table
-from elastocal.loop import diagnosis_tables as tables
-from elastocal.loop.schemas import CANDIDATES
+from elastocal.loop.diagnosis_tables import candidate_rows
 from elastocal.loop.whole import diagnosed
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -64,13 +63,8 @@ def test_rules_come_to_the_same_verdict_with_their_tables_between_the_steps(kind
     same(by_rules, expected)
 
 
-def there_and_back(path, schema, columns):
-    write_table(path, schema, [columns], {})
-    return read_table(path, schema)
-
-
-def test_every_candidate_is_in_the_table_tested_or_with_a_reason(diagnosis, tmp_path):
-    table = there_and_back(tmp_path / "c.parquet", CANDIDATES, tables.candidate_columns(diagnosis))
+def test_every_candidate_is_in_the_table_tested_or_with_a_reason(diagnosis):
+    table = {name: column.to_numpy() for name, column in pd.DataFrame(candidate_rows(diagnosis)).items()}
     assert set(table["candidate"]) == set(diagnosis.case.candidates)
     tested = np.isfinite(table["log_bayes_factor"])
     assert (tested == (table["note"] == "")).all() and tested.any() and not tested.all()

@@ -39,7 +39,7 @@ def test_each_panel_has_its_errors_and_their_rms(table):
 
 def test_views_show_boxes_tracker_and_both_kinds_of_poses():
     survey = made_survey()
-    plan = choose_plan(survey, made_candidates(survey, 300), 14, 4, "D", 1)
+    plan = choose_plan(survey, made_candidates(survey, 300), 14, 4, 1)
     cell = Cell((np.array([[1.0, 2.0], [0.0, 1.0], [0.0, 1.0]]),), np.array([3.0, 1.0, 1.0]), 0.1)
     figure = plan_picture(survey.robot, cell, plan)
     assert [axis.get_title() for axis in figure.axes] == ["from above", "from the side", "what each pose is worth"]
@@ -53,7 +53,7 @@ def test_views_show_boxes_tracker_and_both_kinds_of_poses():
 
 def test_every_pose_has_a_picture_with_its_number_and_pages_are_full():
     survey = made_survey()
-    plan = choose_plan(survey, made_candidates(survey, 300), 55, 4, "D", 1)
+    plan = choose_plan(survey, made_candidates(survey, 300), 55, 4, 1)
     pages = pose_pictures(survey.robot, plan)
     titles = [axis.get_title(loc="left") for page in pages for axis in page.axes if axis.get_title(loc="left")]
     assert titles == [*(str(pose) for pose in range(1, 56)), *(f"{pose} held out" for pose in range(56, 60))]

@@ -9,7 +9,7 @@ from elastocal.diagnosis.judge import residual_blocks
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.case import case_from
 from elastocal.io.json_files import write_json
-from elastocal.io.storage import read_table, write_table
+from elastocal.io.storage import write_table
 from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop import schemas
 from elastocal.loop.loading import load_campaign
@@ -40,11 +40,10 @@ def diagnosed_campaign(top, robot, effects=(), **design):
     write_json(results / "campaign.json", descriptions)
     case, unseen = (case_from(descriptions, columns_of(part)) for part in parts)
     found = diagnose(case, Settings(), 1)
-    write_json(results / "diagnosis.json", tables.diagnosis_facts(found))
+    write_json(results / "diagnosis.json", tables.diagnosis_facts(found) | {"covariance": found.final.covariance.tolist()})
     write_table(results / "steps.parquet", schemas.STEPS, tables.step_blocks(found), {})
-    write_table(results / "correlations.parquet", schemas.CORRELATIONS, [tables.correlation_columns(found.final)], {})
     # As the next job does: from the files.
-    again = tables.diagnosis_from(case, tables.diagnosis_facts(found), read_table(results / "steps.parquet", schemas.STEPS))
+    again = tables.diagnosis_from(case, tables.diagnosis_facts(found))
     blocks = residual_blocks(again, judged(again, unseen, 1))
     write_table(reports / "residuals.parquet", schemas.residuals(arm.joints), blocks, {})
     return top

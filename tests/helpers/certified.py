@@ -15,7 +15,7 @@ from elastocal.io.records import JobRecord, input_digests, write_records
 # A module by which all was made.
 ENGINE = "src/engine.py"
 TABLES = ("campaign.json", "training.parquet", "held_out.parquet")
-FOUND = ("diagnosis.json", "steps.parquet", "correlations.parquet")
+FOUND = ("diagnosis.json", "steps.parquet")
 REPORTS = ("verdict.json", "before_after.csv", "residuals.parquet")
 REPORT = "report.html"
 

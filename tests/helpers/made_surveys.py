@@ -4,18 +4,17 @@ import numpy as np
 from analysed_robots import analysed
 
 from elastocal.application.planning.cell import Cell
-from elastocal.application.planning.plan import Loads, Survey, find_allowed_candidates
+from elastocal.application.planning.plan import Survey, find_allowed_candidates
 from elastocal.campaigns.campaign import Target
 
 OPEN = Cell((), None, 0.1)
-PULL = Loads(100.0, True)
 
 
-def made_survey(name="ur10", loads=PULL, measured="position", unknown_base=True):
+def made_survey(name="ur10", measured="position", unknown_base=True):
     """One reflector at an unknown place of the end effector."""
     robot = analysed(name)
     target = Target("T", robot.chain.end_effector.name, None)
-    return Survey(robot, (target,), unknown_base, measured, loads.shares, 6e-5, 6e-5)
+    return Survey(robot, (target,), unknown_base, measured, 6e-5, 6e-5, 100.0, pulled=True)
 
 
 def made_rows(count=40, numbers=6, parameters=5, seed=1):
@@ -24,6 +23,6 @@ def made_rows(count=40, numbers=6, parameters=5, seed=1):
     return (draws.standard_normal((count, numbers, parameters)) * draws.uniform(0.1, 3.0, (count, 1, 1))).astype(np.float32)
 
 
-def made_candidates(survey, count=200, cell=OPEN, loads=PULL):
+def made_candidates(survey, count=200, cell=OPEN):
     """Configurations that a cell allows."""
-    return find_allowed_candidates(survey, cell, loads, count, 1)
+    return find_allowed_candidates(survey, cell, count, 1)

@@ -3,10 +3,9 @@
 from pathlib import Path
 
 import pytest
-from support import refused
 
 from elastocal.io import atomic_writes
-from elastocal.io.atomic_writes import atomic_write, check_places, remove_partials, write_text, write_together
+from elastocal.io.atomic_writes import atomic_write, remove_partials, write_text, write_together
 
 
 @pytest.mark.parametrize("before", [None, "much longer than what follows"])
@@ -47,16 +46,6 @@ def test_names_on_the_way_are_random_and_opened_exclusively(tmp_path, monkeypatc
     with pytest.raises(FileExistsError), write_together(tmp_path, ["one.txt"]):
         raise AssertionError("never written")
     assert (tmp_path / "victim").read_text() == "mine"
-
-
-def test_a_folder_below_the_one_that_the_user_named_is_no_link(tmp_path):
-    (tmp_path / "elsewhere").mkdir()
-    (tmp_path / "top").mkdir()
-    (tmp_path / "top" / "figures").symlink_to(tmp_path / "elsewhere")
-    check_places(tmp_path / "top/figures/a.pdf")
-    check_places(tmp_path / "top/figures/a.pdf", top=tmp_path / "top/figures")
-    with refused(tmp_path / "top/figures", "", "found a link; allowed: a folder"):
-        check_places(tmp_path / "top/figures/a.pdf", top=tmp_path / "top")
 
 
 def test_old_files_are_gone_before_the_first_new_one_is_there(tmp_path, monkeypatch):

@@ -69,30 +69,19 @@ def test_every_quantity_has_a_least_and_a_largest(name):
     [
         (("lengths_m", "l"), math.nan, "lengths_m.l", ["finite"]),
         (("compliance_urad_per_Nn",), [1], "compliance_urad_per_Nn", ["unknown key", "'compliance_urad_per_Nm'?", "chain"]),
-        (("chain",), None, "chain", ["nothing", "chain notation"]),
         (("links", "tubes", 0, "wall_m"), None, "links.tubes[0].wall_m", ["nothing", "metres"]),
-        (("chain",), ["Rz(q1)"], "chain", ["['Rz(q1)']", "string"]),
         (("joint_limits_deg",), [[1]], "joint_limits_deg[0]", ["[1]", "allowed: 2 entries"]),
-        (("joint_limits_deg",), [], "joint_limits_deg", ["[]", "1 or more entries"]),
         (("compliance_urad_per_Nm",), [0], "compliance_urad_per_Nm[0]", ["found 0", "1e-06 to 100000"]),
         (("compliance_urad_per_Nm",), [True], "compliance_urad_per_Nm[0]", ["True", "number"]),
-        (("stages", 1, "hold"), [1], "stages[1].hold", ["unknown key", "'held'?"]),
         (("stages", 0, "joints"), [], "stages[0].joints", ["[]", "1 or more entries"]),
         (("stages", 0, "joints"), [1, 1], "stages[0].joints", ["[1, 1]", "each entry once"]),
         (("stages", 0, "joints"), [1.5], "stages[0].joints[0]", ["1.5", "integer"]),
-        (("stages", 0, "joints"), "1-6", "stages[0].joints", ["'1-6'", "1 or more entries"]),
     ],
 )
 def test_a_faulty_robot_or_strategy_is_refused_in_one_line(path, value, key, words):
     document, schema = (STRATEGY, "strategy") if path[0] == "stages" else (ROBOT, "robot")
     with refused("x.yaml", f"{key}:", *words):
         check_document(changed(document, path, value), schema, "x.yaml")
-
-
-@pytest.mark.parametrize("start", ["<robot name='x'>", '\n<?xml version="1.0"?>\n<robot>'])
-def test_a_urdf_for_a_document_is_told_how_it_is_imported(tmp_path, start):
-    with refused(tmp_path / "a.yaml", "", "XML", "elastocal import urdf"):
-        read(tmp_path, start)
 
 
 # Each alias stands for so many values.
@@ -103,17 +92,17 @@ BOMB = "a: &a [" + "x, " * 500 + "x]\nb: [" + "*a, " * 400 + "*a]\n"
     ("text", "where", "words"),
     [
         (BOMB, "line 2", ["more values", str(MOST_VALUES), "aliases"]),
-        ("a: &a [*a]\n", "line 1", ["alias *a", "complete"]),
+        ("a: &a [*a]\n", "line 1", ["alias *a", "no other anchor"]),
         ("a: &a [x]\nb: &b [*a]\n", "line 2", ["alias *a", "no other anchor"]),
         ("[" * 100_000, "line 1", ["in each other", f"{DEEPEST} deep"]),
         ("#" * (LARGEST_BYTES + 1), "", [f"more than {LARGEST_BYTES} bytes", f"at most {LARGEST_BYTES}"]),
         ("x: 1\na: !!python/object/apply:os.system [true]\n", "line 2", ["tag", "without tags"]),
         ("a: 1\nb: x\0\n", "line 2", ["control character", "x00"]),
         ("a: 1\n---\nb: 2\n", "line 2", ["found another document"]),
+        ('\n<?xml version="1.0"?>\n<robot>', "", ["XML", "elastocal import urdf"]),
         ("x: 1\na: @x\n", "line 2", ["found character that cannot start"]),
         ("campaign: a\nrobot: b\ncampaign: c\n", "line 3", ["'campaign' again", "first in line 1"]),
         ("a: 1\nseed: 1_0\n", "line 2", ["found 1_0", "decimal"]),
-        ("seed: 010\n", "line 1", ["found 010", "in quotes"]),
         (f"seed: {'9' * 5000}\n", "line 1", ["999", "18 digits"]),
     ],
 )

@@ -92,13 +92,8 @@ def test_a_file_that_was_made_again_since_another_read_it_is_found(jobs):
 def test_any_altered_character_of_a_record_is_found():
     path = record_of(FITTED)
     written = path.read_text(encoding="utf-8")
-    for place in range(0, len(written) - 1, 7):
-        if written[place].isspace():
-            continue
-        path.write_text(written[:place] + chr(ord(written[place]) ^ 1) + written[place + 1 :], encoding="utf-8")
-        with pytest.raises(InputError, match=r"^results/records/results/fit\.json\.json: found no record of a job "):
-            read_record(FITTED)
-    for text in ("", "{", "{}", "[]", json.dumps({"sha256": "", "files": 1})):
+    altered = [written[:n] + chr(ord(c) ^ 1) + written[n + 1 :] for n, c in enumerate(written[:-1]) if not c.isspace()]
+    for text in (*altered[::7], "", "{", "{}", "[]", json.dumps({"sha256": "", "files": 1})):
         path.write_text(text, encoding="utf-8")
         with pytest.raises(InputError, match=r"^results/records/results/fit\.json\.json: found no record of a job "):
             read_record(FITTED)

@@ -103,25 +103,19 @@ def test_a_file_that_is_cut_off_or_has_another_column_or_is_somebody_elses_is_re
 
 TEXTS = TableSchema(
     "texts",
-    (
-        Column("owner", "text", "", "one of its own for each row"),
-        Column("value", "float64", "m", "any", missing=True),
-        Column("held", "bool", "", "whether it is held"),
-        Column("kind", "string", "", "one for each row group"),
-    ),
+    (Column("owner", "text", "", "one of its own for each row"), Column("kind", "string", "", "one for each row group")),
 )
 ODD_TEXTS = ["", "µrad/(N·m)", "a, b\nc", "", "x" * 300]
 
 
 def text_block(texts, kind="k"):
-    return {"owner": texts, "value": np.arange(len(texts)) / 3, "held": np.arange(len(texts)) % 2 == 1, "kind": kind}
+    return {"owner": texts, "kind": kind}
 
 
 def test_text_columns_come_back_row_by_row(new):
     write_table(new, TEXTS, [text_block(ODD_TEXTS), text_block(np.array(["a", "b", "a"], dtype=object), "l")], ORIGIN)
     back = read_table(new, TEXTS)
-    assert back["owner"].tolist() == [*ODD_TEXTS, "a", "b", "a"] and back["owner"].dtype == object
-    assert back["kind"].tolist() == ["k"] * 5 + ["l"] * 3
+    assert back["owner"].tolist() == [*ODD_TEXTS, "a", "b", "a"] and back["kind"].tolist() == ["k"] * 5 + ["l"] * 3
     assert read_table(new, TEXTS, ["owner"], kind="l")["owner"].tolist() == ["a", "b", "a"]
     assert pq.ParquetFile(new).read().column("owner").to_pylist() == [*ODD_TEXTS, "a", "b", "a"]
 
@@ -133,14 +127,8 @@ def test_tables_without_rows_come_back(blocks, new):
     write_table(new, TEXTS, written, ORIGIN)
     back = read_table(new, TEXTS)
     rows = 1 if "some" in blocks else 0
-    assert {name: (len(values), values.dtype) for name, values in back.items()} == {
-        "owner": (rows, np.dtype(object)),
-        "value": (rows, np.dtype("float64")),
-        "held": (rows, np.dtype(bool)),
-        "kind": (rows, np.dtype(object)),
-    }
-    assert list(read_table(new, TEXTS, ["value"])) == ["value"]
-    assert read_provenance(new) == ORIGIN
+    assert {name: (len(values), values.dtype) for name, values in back.items()} == dict.fromkeys(back, (rows, np.dtype(object)))
+    assert list(read_table(new, TEXTS, ["owner"])) == ["owner"] and read_provenance(new) == ORIGIN
     assert len(list(read_blocks(new, TEXTS))) == rows
     with refused(new, "metadata elastocal.table", "texts", "things"):
         read_table(new, SCHEMA)

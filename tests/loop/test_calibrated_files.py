@@ -1,8 +1,12 @@
-"""The calibrated robot comes from the tables of a diagnosis as it was fitted, and only while all behind it is as it was."""
+"""The calibrated robot comes from the tables of a diagnosis as it was fitted, and only while all behind it is as it was.
+
+A certificate decides by what is predicted, and its error budget has what each effect costs and what a correction leaves.
+"""
 
 import hashlib
 import json
 import shutil
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -10,32 +14,23 @@ import pandas as pd
 import pytest
 from analysed_robots import ROBOTS
 from certified import ENGINE
+from made_calibrated import USUAL, made_calibrated
 from made_remainders import NOISE_M
 from support import refused
 
 from elastocal.application.accuracy import campaign_accuracy
-from elastocal.application.calibrated import calibrate_by_fit
+from elastocal.application.calibrated import OperatingConditions, calibrate_by_fit, forward, nominal_forward
 from elastocal.io.json_files import read_json
 from elastocal.io.origin import environment
 from elastocal.io.records import checksum
-from elastocal.io.storage import read_table
-from elastocal.loop.calibrated_files import load_diagnosed
+from elastocal.loop.calibrated_files import certificate, error_budget, load_diagnosed
 from elastocal.loop.diagnosis_tables import diagnosis_from
-from elastocal.loop.schemas import STEPS
-
-
-@pytest.fixture
-def changed(checkout, tmp_path):
-    """A copy, to be changed."""
-    shutil.copytree(checkout, tmp_path / "top", symlinks=True)
-    return tmp_path / "top"
 
 
 def test_the_robot_is_that_of_the_final_fit(checkout):
     found = load_diagnosed(checkout / "made", ROBOTS, checkout)
     tables = checkout / "results/loop/made"
-    steps = read_table(tables / "steps.parquet", STEPS)
-    again = diagnosis_from(found.case, read_json(tables / "diagnosis.json"), steps)
+    again = diagnosis_from(found.case, read_json(tables / "diagnosis.json"))
     expected = calibrate_by_fit(again.final, found.case.campaign.robot)
     assert [e.key for e in found.calibrated.model.effects] == ["joint_compliance", "joint_offset@3"]
     for mine, theirs in zip(found.calibrated.estimate.coefficients, expected.estimate.coefficients, strict=True):
@@ -51,8 +46,8 @@ def test_the_robot_is_that_of_the_final_fit(checkout):
 
 
 def test_the_regression_comes_back_and_physics_alone_has_its_own_accuracy(regressed_checkout):
-    words = regressed_checkout / "smooth", ROBOTS, regressed_checkout
-    whole, physics = (load_diagnosed(*words, physics_only) for physics_only in (False, True))
+    whole = load_diagnosed(regressed_checkout / "smooth", ROBOTS, regressed_checkout)
+    physics = whole.by_physics()
     stated, heldout = whole.verdict, whole.verdict["heldout"]
     assert heldout["delivered"]["rms_m"] < 0.6 * heldout["after"]["rms_m"]
     assert physics.calibrated.remainder is None and physics.verdict["heldout"]["delivered"] == heldout["after"]
@@ -109,7 +104,56 @@ def test_a_campaign_that_has_changed_since_is_refused_be_it_in_a_held_out_row(ch
         load_diagnosed(tmp_path / "changed", ROBOTS, checkout)
 
 
-def test_results_of_another_engine_are_refused(changed):
+def test_results_of_another_engine_are_refused(checkout, tmp_path):
+    changed = shutil.copytree(checkout, tmp_path / "top", symlinks=True)
     (changed / ENGINE).write_text("VERSION = 2\n", encoding="utf-8")
     with refused(changed / ENGINE, "", "not what read_campaign made was made with", f"elastocal diagnose {changed}/made"):
         load_diagnosed(changed / "made", ROBOTS, changed)
+
+
+@pytest.mark.parametrize(("share", "judged", "decision"), [(0.2, 8, "fail"), (2.0, 8, "pass"), (2.0, 3, "undecided")])
+def test_a_certificate_passes_below_and_fails_above_what_is_predicted_if_enough_configurations_judge(
+    checkout, share, judged, decision
+):
+    found = load_diagnosed(checkout / "made", ROBOTS, checkout)
+    found = replace(found, verdict=found.verdict | {"heldout": found.verdict["heldout"] | {"configurations": judged}})
+    tolerance_m = share * found.verdict["accuracy"]["rms_m"]
+    conformity = certificate(checkout / "made", ROBOTS, found, tolerance_m, 0.05)["conformity"]
+    assert conformity["decision"] == decision
+    assert [line.startswith("too few: 3 configurations") for line in conformity["shortfalls"]] == [True] * (judged == 3)
+
+
+def rms(one, other):
+    return np.sqrt(((one - other) ** 2).sum(axis=1).mean())
+
+
+@pytest.fixture
+def states(fanuc):
+    rng = np.random.default_rng(0)
+    low, high = fanuc.joint_limits.T
+    wrench = np.hstack([300.0 * rng.standard_normal((60, 3)), np.zeros((60, 3))])
+    return fanuc.reported_angles(rng.uniform(0.6 * low, 0.6 * high, (60, 6))), OperatingConditions(wrench)
+
+
+def test_each_line_of_the_budget_is_what_the_robot_misses_without_that_effect(fanuc, states):
+    calibrated = made_calibrated(fanuc, *USUAL)
+    found, (whole, _) = error_budget(calibrated, *states), forward(calibrated, *states)
+    assert found["uncorrected"] == pytest.approx(rms(whole, nominal_forward(fanuc, states[0])[0]))
+    for name in ("joint_offset", "link_geometry", "joint_compliance", "link_weight"):
+        values = tuple(
+            0.0 * value if effect.effect == name else value
+            for effect, value in zip(calibrated.model.effects, calibrated.estimate.coefficients, strict=True)
+        )
+        without = replace(calibrated, estimate=replace(calibrated.estimate, coefficients=values))
+        assert found[name] == pytest.approx(rms(whole, forward(without, *states)[0]))
+    names = list(found)
+    assert names[0] == "uncorrected" and names[-2:] == ["uncertainty of the parameters", "repeatability"]
+    middle = [found[name] for name in names[1:-2]]
+    assert middle == sorted(middle, reverse=True)
+
+
+def test_springs_of_the_robot_file_cost_what_they_give_under_load(fanuc, states):
+    calibrated = made_calibrated(fanuc, "joint_offset@2", identified=False)
+    rigid = replace(calibrated, model=replace(calibrated.model, nominal_compliance=np.zeros(6)))
+    expected = rms(*(forward(each, *states)[0] for each in (calibrated, rigid)))
+    assert error_budget(calibrated, *states)["joint_compliance"] == pytest.approx(expected) and expected > 1e-5

@@ -12,51 +12,39 @@ from elastocal.loop.overview import overview
 from elastocal.mechanics.kinematics import poses
 
 
-def overview_of(folder):
-    return overview(folder, ROBOTS)
-
-
 @pytest.fixture(scope="module")
-def facts(kuka, tmp_path_factory):
-    return overview_of(made_folder(tmp_path_factory.mktemp("o") / "made", kuka))
+def found(kuka, tmp_path_factory):
+    return overview(made_folder(tmp_path_factory.mktemp("o") / "made", kuka), ROBOTS)
 
 
-def test_springs_have_their_errors_and_candidates_their_reasons(facts):
-    assert facts["diagnosable"] and facts["faults"] == []
-    assert all(0 < spring["relative_std_error"] < 1 for spring in facts["compliance"][:5])
-    # Of the last joint, on whose axis the target sits, nothing is determined.
-    assert facts["compliance"][5] == {"value_urad_per_Nm": None, "relative_std_error": None}
-    assert facts["testable"] > 20
-    assert sum(facts["untestable"].values()) > 0 and all(facts["untestable"])
-    assert any("one load beside none" in sentence for sentence in facts["suspicious"])
-    assert any("held-out poses say little" in sentence for sentence in facts["suspicious"])
+def said(found, words):
+    return [sentence for sentence in found.attention if words in sentence]
 
 
-def test_of_a_compliance_that_comes_out_negative_no_number_is_stated(kuka, tmp_path):
+def test_what_was_read_and_can_be_tested_stands_in_the_table_and_what_is_little_below(found):
+    rows = dict(found.rows)
+    assert found.diagnosable and found.testable > 20 and rows["testable"].startswith(f"{found.testable} candidate")
+    assert "6 joints, position in the base frame" in rows["read"]
+    assert any(" not testable: " in words for _, words in found.rows)
+    assert 1.0 < float(rows["noise"].split(" ")[0]) < 1000.0
+    assert rows["accuracy"].startswith("if the declared model is complete: Predicted position error")
+    assert said(found, "one load beside none") and said(found, "held-out poses say little")
+    assert not said(found, "poses are few")
+
+
+def test_where_a_compliance_comes_out_negative_no_accuracy_is_stated(kuka, tmp_path):
     """What the declared model lacks hides behind it, and behind all others."""
-    signs = [1.0, 1.0, -1.0, 1.0, 1.0, 1.0]
-    table = made_table(replace(kuka, compliance=kuka.compliance * signs), "made")
-    facts = overview_of(made_folder(tmp_path / "made", kuka, table=table))
-    assert facts["compliance"] == [] and facts["accuracy"] is None
-    assert any("the compliance of joint 3 comes out negative" in sentence for sentence in facts["suspicious"])
+    table = made_table(replace(kuka, compliance=kuka.compliance * [1.0, 1.0, -1.0, 1.0, 1.0, 1.0]), "made")
+    found = overview(made_folder(tmp_path / "made", kuka, table=table), ROBOTS)
+    assert "accuracy" not in dict(found.rows) and said(found, "the compliance of joint 3 comes out negative")
 
 
-def test_a_decisive_fault_is_said_and_the_campaign_is_not_diagnosable(kuka, tmp_path):
-    table = made_table(kuka, "made")
-    table["q3"] = -table["q3"]
-    facts = overview_of(made_folder(tmp_path / "made", kuka, table=table))
-    assert not facts["diagnosable"]
-    assert any(fault["decisive"] and "joint 3" in fault["sentence"] for fault in facts["faults"])
-
-
-def test_parameters_that_are_many_for_the_poses_are_said_and_how_many_poses_it_takes(tmp_path, facts):
-    found = overview_of(service_arm_folder(tmp_path / "made", 1))
-    (said,) = [sentence for sentence in found["suspicious"] if "poses are few" in sentence]
-    least = int(said.split("Measure about ")[1].split(" ")[0])
-    assert said.startswith(f"24 poses are few for {found['parameters']} parameters, of which they determine about")
-    assert found["numbers"] == 72 and least > 48
-    assert 9 < found["effective_parameters"] < found["parameters"]
-    assert not any("poses are few" in sentence for sentence in facts["suspicious"])
+def test_parameters_that_are_many_for_the_poses_are_said_and_how_many_poses_it_takes(tmp_path):
+    (few,) = said(overview(service_arm_folder(tmp_path / "made", 1), ROBOTS), "poses are few")
+    words = few.replace(",", "").replace(":", "").split(" ")
+    parameters, effective, numbers = (int(words[place]) for place in (5, words.index("about") + 1, words.index("by") + 1))
+    assert few.startswith("24 poses") and numbers == 72 and 9 <= effective < parameters
+    assert int(few.split("Measure about ")[1].split(" ")[0]) > 48
 
 
 def test_positions_that_a_controller_worked_out_are_said_to_be_no_measurements(kuka, tmp_path):
@@ -67,5 +55,4 @@ def test_positions_that_a_controller_worked_out_are_said_to_be_no_measurements(k
         if mine.any():
             for axis, values in zip("xyz", poses(chain, at[mine], point)[0].T, strict=True):
                 table[axis][mine] = values.round(6)
-    (first, *_) = overview_of(made_folder(tmp_path / "made", kuka, table=table))["suspicious"]
-    assert "no measurements" in first
+    assert "no measurements" in overview(made_folder(tmp_path / "made", kuka, table=table), ROBOTS).attention[0]

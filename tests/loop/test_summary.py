@@ -23,23 +23,18 @@ def errors(before, after=None, pose=None, repeat=None, session=0):
     return pd.DataFrame(table)
 
 
-def rows_of(**residuals):
-    return campaign_rows({name: verdict("named") for name in residuals}, residuals, {}, 1)
-
-
-def test_errors_are_distances_in_millimetres_before_and_after():
-    row = rows_of(one=errors([1.0, -2.0, 3.0], [0.1, 0.1, -0.4])).iloc[0]
-    assert (row.campaign, row.session, row.poses) == ("one", 0, 3)
-    assert (row.before_mean_mm, row.before_rms_mm, row.before_max_mm) == pytest.approx((2.0, np.sqrt(14 / 3), 3.0))
-    assert row.before_p95_mm == pytest.approx(2.9)
-    assert (row.after_mean_mm, row.after_rms_mm, row.after_max_mm) == pytest.approx((0.2, np.sqrt(0.06), 0.4))
-
-
-def test_repeats_of_a_state_are_averaged_before_their_error_is_taken():
+def test_errors_are_distances_in_millimetres_and_repeats_of_a_state_are_averaged_before():
+    residuals = {
+        "one": errors([1.0, -2.0, 3.0], [0.1, 0.1, -0.4]),
+        "two": errors([1.5, -0.5, 0.25], pose=[4, 4, 7], repeat=[0, 1, 0]),
+    }
+    one, two = campaign_rows({name: verdict("named") for name in residuals}, residuals, {}, 1).itertuples()
+    assert (one.campaign, one.session, one.poses) == ("one", 0, 3)
+    assert (one.before_mean_mm, one.before_rms_mm, one.before_max_mm) == pytest.approx((2.0, np.sqrt(14 / 3), 3.0))
+    assert one.before_p95_mm == pytest.approx(2.9)
+    assert (one.after_mean_mm, one.after_rms_mm, one.after_max_mm) == pytest.approx((0.2, np.sqrt(0.06), 0.4))
     # Noise that cancels between repeats is gone; the mean of 1.5 and -0.5 is left.
-    table = errors([1.5, -0.5, 0.25], pose=[4, 4, 7], repeat=[0, 1, 0])
-    row = rows_of(one=table).iloc[0]
-    assert row.poses == 2 and row.before_mean_mm == pytest.approx(0.375) and row.before_max_mm == pytest.approx(0.5)
+    assert two.poses == 2 and two.before_mean_mm == pytest.approx(0.375) and two.before_max_mm == pytest.approx(0.5)
 
 
 def test_folds_of_one_campaign_are_one_row_with_all_their_poses_and_counted_verdicts():

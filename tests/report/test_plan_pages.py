@@ -13,7 +13,7 @@ from elastocal.report.plan_pages import plan_facts, write_plan_sheet
 
 def made():
     survey = made_survey()
-    plan = choose_plan(survey, made_candidates(survey, 300), 14, 4, "D", 1)
+    plan = choose_plan(survey, made_candidates(survey, 300), 14, 4, 1)
     return survey, plan, sheet(survey, plan)
 
 

@@ -13,7 +13,7 @@ from study_folder import Study
 from typer.testing import CliRunner
 
 from elastocal.command.main import app
-from elastocal.command.pipeline import diagnosed_campaign
+from elastocal.command.terminal import diagnosed_campaign
 from elastocal.errors import InputError
 
 CELL = "cells/made"
@@ -161,9 +161,9 @@ def test_a_new_effect_is_a_module_and_a_new_campaign_a_file_that_is_read_again_w
     known = yaml.safe_load(cell.path("config/campaigns/kuka_extended_end_effector.yaml").read_text(encoding="utf-8"))
     cell.path("config/campaigns/tiny.yaml").write_text(yaml.safe_dump(known | {"poses": 8}), encoding="utf-8")
     cell.configure({"loop": {"campaigns": ["tiny"]}})
-    candidates, training = "reports/loop/made/candidates.parquet", "results/loop/tiny/training.parquet"
+    candidates, training = "reports/loop/made/candidates.csv", "results/loop/tiny/training.parquet"
     cell.run(candidates, training, *OWN[1:])
-    assert "sag@2" in pq.ParquetFile(cell.path(candidates)).read().column("candidate").to_pylist()
+    assert "\nsag@2," in cell.path(candidates).read_text(encoding="utf-8")
     measurements = pq.ParquetFile(cell.path(training)).read()
     assert set(measurements.column("pose").to_pylist()) < set(range(8))
     planned = cell.planned("reports/loop/tiny/verdict.json", "reports/loop/campaigns.csv")

@@ -16,7 +16,7 @@ LOOP_REPORTS = [
     "verdict.json",
     "before_after.csv",
     "splits.csv",
-    "candidates.parquet",
+    "candidates.csv",
     "residuals.parquet",
     "next_experiment.csv",
     *(f"figures/{figure}.pdf" for figure in LOOP_FIGURES),
@@ -78,8 +78,7 @@ rule diagnose_campaign:
     output:
         diagnosis="results/loop/{campaign}/diagnosis.json",
         steps="results/loop/{campaign}/steps.parquet",
-        correlations="results/loop/{campaign}/correlations.parquet",
-        candidates="reports/loop/{campaign}/candidates.parquet",
+        candidates="reports/loop/{campaign}/candidates.csv",
         experiment="reports/loop/{campaign}/next_experiment.csv",
     params:
         step="elastocal.loop.diagnosis_tables.diagnose_campaign",
@@ -95,7 +94,6 @@ rule judge_campaign:
         training=rules.read_campaign.output.training,
         held_out=rules.read_campaign.output.held_out,
         diagnosis=rules.diagnose_campaign.output.diagnosis,
-        steps=rules.diagnose_campaign.output.steps,
     output:
         verdict="reports/loop/{campaign}/verdict.json",
         before_after=shown(

@@ -7,8 +7,7 @@ import pandas as pd
 from elastocal.figures.loop import arrows, before_after, probabilities
 from elastocal.figures.style import save
 from elastocal.io.json_files import read_json
-from elastocal.io.storage import read_table
-from elastocal.loop.schemas import CANDIDATES, angles_of, read_residuals, worst_measurement
+from elastocal.loop.schemas import angles_of, read_residuals, worst_measurement
 from elastocal.mechanics.kinematics import corners
 from elastocal.mechanics.robot_file import robot_from_document
 
@@ -17,12 +16,13 @@ def draw_campaign(job: Job) -> None:
     robot = robot_from_document(read_json(job.input.descriptions)["robot"])
     table = read_residuals(job.input.residuals, robot.joints)
     arm = corners(robot.chain, angles_of(table, robot.joints)[worst_measurement(table)])
+    candidates = pd.read_csv(job.input.candidates).fillna({"note": ""})
     stated = read_json(job.input.diagnosis)["document"]["probabilities"]
     errors = pd.read_csv(job.input.before_after).to_dict("records")
     drawn = {
         "before_after": before_after(errors, read_json(job.input.verdict)["heldout"]["noise_floor_rms_m"]),
         "arrows": arrows(table, arm),
-        "candidates": probabilities(stated, read_table(job.input.candidates, CANDIDATES)),
+        "candidates": probabilities(stated, {name: column.to_numpy() for name, column in candidates.items()}),
     }
     for name, pdf, png in zip(job.params.figures, job.output.pdf, job.output.png, strict=True):
         save(drawn[name], pdf, png, origin_of(job))

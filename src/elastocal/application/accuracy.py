@@ -10,7 +10,7 @@ is open of the form is in them unless held-out poses show more. Nothing of the t
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,15 +21,14 @@ from elastocal.application.calibrated import (
     Remainder,
     calibrate_by_model,
     forward,
-    inputs_at,
     move_to_end_effector,
     nominal_forward,
     observations_of,
     pose_sensitivities,
-    regression_acts,
+    regression_at,
     square_root,
 )
-from elastocal.application.frames import BASE, FRAMES, ROBOT, Scope, find_absorbed, free_parts, placement
+from elastocal.application.frames import BASE, FRAMES, ROBOT, Scope, find_absorbed, free_parts, placement, root_mean_square
 from elastocal.effects.catalogue import moves_robot
 from elastocal.fitting.displacement import conditions, displaced_coordinates
 from elastocal.fitting.linearization import linearize
@@ -48,7 +47,6 @@ if TYPE_CHECKING:
     from elastocal.remainder.protocol import Predictor
     from elastocal.remainder.tuning import Spread
 
-PREDICTED = "predicted"
 REGION = "the poses and loads that were fitted"
 # Of every bound, one-sided, as GUM and JCGM 106 have it; and how sure held-out poses must be that a prediction is too small
 # before they raise it: of honest campaigns one in twenty is.
@@ -65,28 +63,25 @@ _MOST_STATES = 1000
 
 @dataclass(frozen=True)
 class Accuracy:
-    """Whose error, how large, how sure; lengths in m.
+    """How large a predicted error is, of what, how surely; lengths in m, without the tracker's noise; `asdict` is its JSON.
 
-    `frame`: "robot" or "base". `kind`: "predicted". `rms_m`, `worst_m`: root mean square over the poses, and at
-    the worst of them; with one-sided confidence below `rms_bound_m`, `worst_bound_m`, None where nothing says so. `noise`: what
-    became of the tracker's noise. `region`: which poses these are. `offset_removed`, `left_out`, `contradicted`: as in
-    `frames.Scope`. `left_out_m`, `form_m`, `repeated_m`: of `rms_m`, by what is left out, by what the form of the model leaves
-    open, by the repeatability of the joints and the error that each pose has of its own; `regression_m`: by what a regression
-    on the remainder leaves beyond parameters and repeatability. `fitted`: whether anything of the robot was; without, no error
-    of 0 is one.
+    `frame`: "robot" or "base". `rms_m`, `worst_m`: root mean square over the poses, and at the worst of them; with one-sided
+    confidence below `rms_bound_m`, `worst_bound_m`, None where nothing says so. `region`: which poses these are.
+    `offset_removed`, `left_out`, `contradicted`: as in `frames.Scope`. Of `rms_m` are `left_out_m` by what is left out,
+    `form_m` by what the form of the model leaves open, `repeated_m` by the repeatability of the joints and the error that each
+    pose has of its own, `regression_m` by what a regression on the remainder leaves beyond parameters and repeatability.
+    `fitted`: whether anything of the robot was; without, no error of 0 is one.
     """
 
     frame: str
-    kind: str
     rms_m: float
     worst_m: float
     rms_bound_m: float | None
     worst_bound_m: float | None
-    noise: str
     poses: int
     region: str
     offset_removed: bool = False
-    left_out: tuple[str, ...] = ()
+    left_out: list[str] = field(default_factory=list)
     left_out_m: float = 0.0
     form_m: float = 0.0
     contradicted: bool = False
@@ -94,15 +89,6 @@ class Accuracy:
     regression_m: float = 0.0
     confidence: float = CONFIDENCE
     fitted: bool = True
-
-    def document(self) -> dict[str, Any]:
-        """As JSON."""
-        return asdict(self) | {"left_out": list(self.left_out)}
-
-
-def accuracy_from(document: Mapping[str, Any]) -> Accuracy:
-    """The inverse of `Accuracy.document`."""
-    return Accuracy(**{**document, "left_out": tuple(document["left_out"])})
 
 
 @dataclass(frozen=True)
@@ -128,21 +114,23 @@ class Prediction:
 
     def accuracy(self, region: str) -> Accuracy:
         """The statement over these poses, named in words."""
-        names = ("frame", "offset_removed", "left_out", "left_out_m", "contradicted")
+        scope = self.scope
         return Accuracy(
-            kind=PREDICTED,
-            rms_m=_rms(self.error_m),
-            worst_m=_rms(self.worst_m),
+            frame=scope.frame,
+            rms_m=root_mean_square(self.error_m),
+            worst_m=root_mean_square(self.worst_m),
             rms_bound_m=float(np.quantile(self.rms_m, CONFIDENCE)),
             worst_bound_m=float(np.quantile(self.worst_m, CONFIDENCE)),
-            noise="the tracker's noise is not in it",
             poses=len(self.error_m),
             region=region,
-            repeated_m=_rms(self.repeated_m),
-            regression_m=_rms(self.regression_m),
-            form_m=_rms(self.form_m),
+            offset_removed=scope.offset_removed,
+            left_out=list(scope.left_out),
+            left_out_m=scope.left_out_m,
+            form_m=root_mean_square(self.form_m),
+            contradicted=scope.contradicted,
+            repeated_m=root_mean_square(self.repeated_m),
+            regression_m=root_mean_square(self.regression_m),
             fitted=bool(self.parameters_m.any()),
-            **{name: getattr(self.scope, name) for name in names},
         )
 
 
@@ -204,10 +192,10 @@ def _by_regression(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Where a regression acts, (N,), and the squared error that it leaves there without the tracker's noise, (2, N), m²: on the
     average, and for intervals."""
-    acts = regression_acts(calibrated, reported_angles, operating)
+    acts, predicted = regression_at(calibrated, reported_angles, operating)
     found, more = np.zeros((2, len(acts))), calibrated.remainder
-    if more is not None:
-        std = more.predictor(inputs_at(calibrated, reported_angles[acts], operating.part(acts))).std
+    if more is not None and predicted is not None:
+        std = predicted.std
         assert std is not None, "every regression that was chosen has intervals"
         for number, times in enumerate((more.typical, 1.0)):
             found[number, acts] = np.maximum((times**2 * std**2 - more.sensor_m**2).sum(axis=1), 0.0)
@@ -247,6 +235,13 @@ def before_m(calibrated: CalibratedRobot, position: np.ndarray, rotation: np.nda
     """
     scope = calibrated.scope
     return np.linalg.norm((off - placement(scope, position, rotation) @ scope.absorbed_before)[:, :3], axis=1)
+
+
+def uncorrected_m(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> float:
+    """RMS error of the uncorrected robot at commands (N, n), m, in the frame of the corrected one."""
+    pose = forward(calibrated, reported_angles, operating)
+    off = pose_differences(*nominal_forward(calibrated.robot, reported_angles), *pose)
+    return root_mean_square(before_m(calibrated, *pose, off))
 
 
 def calibrate_on_case(
@@ -291,8 +286,7 @@ def scope_of(calibrated: CalibratedRobot, model: Model, estimate: Estimate, cova
     free = free_parts(base, offset, turn and model.rows == 6)
     reported, operating = robot.reported_angles(states.joint_angles), conditions_in(calibrated, states)
     position, rotation = forward(calibrated, reported, operating)
-    none = np.zeros((12, len(calibrated.covariance)))
-    scope = Scope(ROBOT if base else BASE, position.mean(axis=0), none, np.zeros(12), offset)
+    scope = Scope(ROBOT if base else BASE, position.mean(axis=0), offset_removed=offset)
     columns = placement(scope, position, rotation)
     before = pose_differences(*nominal_forward(robot, reported), position, rotation)[..., None]
 
@@ -408,8 +402,8 @@ def accuracy_sentence(accuracy: Accuracy) -> str:
         return f"No position error is predicted {frame}: nothing of the robot was fitted."
     rms, worst = value(accuracy.rms_m, accuracy.rms_bound_m), value(accuracy.worst_m, accuracy.worst_bound_m)
     text = (
-        f"{accuracy.kind.capitalize()} position error of the corrected robot {frame}: {rms} RMS over {accuracy.region} "
-        f"({accuracy.poses}), {worst} at the worst of them; {accuracy.noise}."
+        f"Predicted position error of the corrected robot {frame}: {rms} RMS over {accuracy.region} "
+        f"({accuracy.poses}), {worst} at the worst of them; the tracker's noise is not in it."
     )
     if accuracy.left_out:
         names = ", ".join(accuracy.left_out)
@@ -431,11 +425,11 @@ def error_rows(verdict: Mapping[str, Any], *others: tuple[Accuracy, float]) -> l
     if not verdict.get("accuracy"):
         return []
     heldout, measured = verdict["heldout"], "measured at validation poses, noise included, after the best placement of the base"
-    stated = [(accuracy_from(verdict["accuracy"]), verdict["uncorrected_m"]), *others]
+    stated = [(Accuracy(**verdict["accuracy"]), verdict["uncorrected_m"]), *others]
     return [
         [measured, millimetres(heldout["uncalibrated"]["rms_m"]), millimetres(heldout["delivered"]["rms_m"])],
         *(
-            [f"{each.kind} over {each.region}, {FRAMES[each.frame]}", millimetres(before), millimetres(each.rms_m)]
+            [f"predicted over {each.region}, {FRAMES[each.frame]}", millimetres(before), millimetres(each.rms_m)]
             for each, before in stated
         ),
     ]
@@ -444,7 +438,3 @@ def error_rows(verdict: Mapping[str, Any], *others: tuple[Accuracy, float]) -> l
 def millimetres(length_m: float) -> str:
     """A length as it is printed, to the micrometre, so that one error has one form everywhere."""
     return f"{1e3 * length_m:.3f} mm"
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt((values**2).mean()))

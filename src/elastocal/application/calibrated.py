@@ -1,6 +1,6 @@
 """The robot as corrected: the final model of a diagnosis without what belongs to one campaign's set-up and its instruments.
 
-All that uses it (`accuracy`, `compensation`, `certificate`, `exported`) asks the same of it: where it comes to rest
+All that uses it (`accuracy`, `compensation`, `exported`) asks the same of it: where it comes to rest
 (`come_to_rest` and `regressed`, `forward`), how surely (`pose_sensitivities` with its covariance, noise and scope), and where
 it was fitted (`beyond_fitted`). Poses are those of the end effector's measuring point in the robot's base frame: that of the
 chain, which the fit placed under the tracker. How far tool and work frame are known is another matter, and in no figure here.
@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.frames import scope_in_base
+from elastocal.application.frames import BASE, Scope, root_mean_square, subtract_placement
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import moves_robot
 from elastocal.fitting.displacement import conditions, displaced_coordinates
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.observations import Observations, States
 from elastocal.fitting.parameters import parameters
-from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.kinematics import pose_differences, poses
 from elastocal.remainder.corrected import beyond_regressed, inputs_of
 from elastocal.validation.fitted_range import beyond_campaign, beyond_loads
 
@@ -30,10 +30,12 @@ if TYPE_CHECKING:
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.noise import Noise
     from elastocal.mechanics.robot import Robot
-    from elastocal.remainder.protocol import Inputs, Predictor
+    from elastocal.remainder.protocol import Prediction, Predictor
 
 # States at a time: what a walk along all sites makes of them stays in the processor's cache.
 _AT_ONCE = 1024
+# Names of what costs something and is no effect of the catalogue.
+SPRINGS, REGRESSION = "joint_compliance", "regression"
 # °C, at which dimensions are stated (ISO 1).
 _REFERENCE_C = 20.0
 
@@ -121,7 +123,8 @@ def calibrate_by_model(robot: Robot, model: Model, estimate: Estimate, covarianc
         coefficients=tuple(estimate.coefficients[number] for number in kept),
         shapes=tuple(estimate.shapes[number] for number in kept),
     )
-    return CalibratedRobot(robot, bare, values, covariance[np.ix_(rows, rows)], noise, scope_in_base(len(rows)))
+    scope = Scope(BASE, np.zeros(3), np.zeros((12, len(rows))))
+    return CalibratedRobot(robot, bare, values, covariance[np.ix_(rows, rows)], noise, scope)
 
 
 def move_to_end_effector(model: Model, estimate: Estimate) -> tuple[Model, Estimate]:
@@ -143,6 +146,25 @@ def without(calibrated: CalibratedRobot, numbers: set[int]) -> CalibratedRobot:
     """A robot without some effects of its model, by their numbers there: their linear parameters are zero."""
     values = tuple(0.0 * v if number in numbers else v for number, v in enumerate(calibrated.estimate.coefficients))
     return replace(calibrated, estimate=replace(calibrated.estimate, coefficients=values))
+
+
+def effect_costs(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> dict[str, float]:
+    """RMS error in m over commands (N, n) if one effect alone were left out of the correction, by effect; compliances come
+    after effects, and a regression on the remainder last. In the frame of the robot's scope: what a new placement of its base
+    takes up is no error there.
+    """
+    pose, costs = forward(calibrated, reported_angles, operating), {}
+    names = [effect.effect for effect in calibrated.model.effects]
+    for name in dict.fromkeys([*names, SPRINGS, *([REGRESSION] if calibrated.remainder else [])]):
+        other = without(calibrated, {number for number, each in enumerate(names) if each == name})
+        if name == REGRESSION:
+            other = replace(calibrated, remainder=None)
+        elif name not in names:
+            # Compliances as declared are no effect of the model.
+            other = replace(other, model=replace(other.model, nominal_compliance=0.0 * other.model.nominal_compliance))
+        apart = pose_differences(*pose, *forward(other, reported_angles, operating))[..., None]
+        costs[name] = root_mean_square(subtract_placement(calibrated.scope, *pose, apart)[:, :3, 0])
+    return costs
 
 
 def assumptions(calibrated: CalibratedRobot, conditions: OperatingConditions) -> list[str]:
@@ -177,28 +199,25 @@ def forward(
 def regressed(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> np.ndarray:
     """Displacement of the end effector by the regression on the remainder, ndarray (N, 3), m, base axes; 0 where none acts."""
     found = np.zeros((len(reported_angles), 3))
-    if calibrated.remainder is not None:
-        acts = regression_acts(calibrated, reported_angles, operating)
-        asked = inputs_at(calibrated, reported_angles[acts], operating.part(acts))
-        found[acts] = calibrated.remainder.predictor(asked).mean
+    acts, predicted = regression_at(calibrated, reported_angles, operating)
+    if predicted is not None:
+        found[acts] = predicted.mean
     return found
 
 
-def regression_acts(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> np.ndarray:
-    """At which commands (N, n) a regression on the remainder is added, ndarray of bool (N,)."""
-    if calibrated.remainder is None:
-        return np.zeros(len(reported_angles), bool)
+def regression_at(
+    calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions
+) -> tuple[np.ndarray, Prediction | None]:
+    """At which commands (N, n) a regression on the remainder is added, ndarray of bool (N,), and what it predicts there."""
+    more = calibrated.remainder
+    if more is None:
+        return np.zeros(len(reported_angles), bool), None
     states = states_of(calibrated, reported_angles, operating)
-    return ~beyond_regressed(calibrated.states, states.joint_angles, states.wrench)
-
-
-def inputs_at(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> Inputs:
-    """What a regression on the remainder is asked of some commands (N, n)."""
-    assert calibrated.remainder is not None
-    seen = observations_of(states_of(calibrated, reported_angles, operating))
-    found = inputs_of(calibrated.model, calibrated.estimate, seen)
-    place = np.broadcast_to(calibrated.remainder.place, (len(found), 3))
-    return replace(found, others=np.hstack([found.others[:, :-3], place]))
+    acts = ~beyond_regressed(calibrated.states, states.joint_angles, states.wrench)
+    seen = observations_of(states_of(calibrated, reported_angles[acts], operating.part(acts)))
+    asked = inputs_of(calibrated.model, calibrated.estimate, seen)
+    place = np.broadcast_to(more.place, (len(asked), 3))
+    return acts, more.predictor(replace(asked, others=np.hstack([asked.others[:, :-3], place])))
 
 
 def come_to_rest(

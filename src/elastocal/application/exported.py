@@ -7,7 +7,7 @@ say, such as a gear's harmonics, stands in a sidecar; a regression on the remain
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -62,7 +62,7 @@ def sidecar(calibrated: CalibratedRobot, name: str, date: str, accuracy: Accurac
         "date": date,
         "elastocal_version": __version__,
         "conventions": _CONVENTIONS,
-        "accuracy": accuracy.document() | {"words": accuracy_sentence(accuracy)},
+        "accuracy": asdict(accuracy) | {"words": accuracy_sentence(accuracy)},
         "joint_compliance": springs,
         "effects": entries,
     }

@@ -10,7 +10,7 @@ nothing. They are taken up over the campaign's poses, so that a single new pose 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -33,8 +33,8 @@ class Scope:
 
     frame: str
     origin: np.ndarray
-    absorbed: np.ndarray
-    absorbed_before: np.ndarray
+    absorbed: np.ndarray = field(default_factory=lambda: np.zeros((12, 0)))
+    absorbed_before: np.ndarray = field(default_factory=lambda: np.zeros(12))
     offset_removed: bool = False
     left_out: tuple[str, ...] = ()
     left_out_m: float = 0.0
@@ -43,16 +43,6 @@ class Scope:
     form_m: float = 0.0
     contradicted: bool = False
     repeated_freedom: float = 0.0
-
-
-def scope_in_base(parameters: int) -> Scope:
-    """That of a robot of which nothing is known but so many parameters: in base axes, with nothing left out."""
-    return Scope(BASE, np.zeros(3), np.zeros((12, parameters)), np.zeros(12))
-
-
-def scope_about(position: np.ndarray) -> Scope:
-    """That of positions (N, 3) without a fit: placements turn about their middle."""
-    return Scope(ROBOT, position.mean(axis=0), np.zeros((12, 0)), np.zeros(12))
 
 
 def placement(scope: Scope, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
@@ -93,6 +83,6 @@ def subtract_placement(scope: Scope, position: np.ndarray, rotation: np.ndarray,
     return np.asarray(fields - columns @ find_absorbed(columns, fields, free))
 
 
-def root_mean_square(displacement: np.ndarray) -> float:
-    """Root mean square of the lengths of displacements (N, 3)."""
-    return float(np.sqrt((displacement**2).sum(axis=1).mean()))
+def root_mean_square(lengths: np.ndarray) -> float:
+    """Root mean square of lengths (N,), or of those of displacements (N, 3)."""
+    return float(np.sqrt((lengths**2).sum() / len(lengths)))

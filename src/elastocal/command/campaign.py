@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from typer import Argument, Option
 
-from elastocal.command.pipeline import pipeline, robots, workplace
-from elastocal.command.terminal import MOST_ROWS, print_answer, print_lines
-from elastocal.counting import counted, first_names
+from elastocal.command.terminal import MOST_ROWS, pipeline, print_answer, print_lines, robots, workplace
+from elastocal.counting import counted
 from elastocal.errors import InputError, escaped, steering
 
 if TYPE_CHECKING:
@@ -21,9 +19,6 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
-# Parameters that are not identifiable and are named; more would be too many to read.
-_NAMED = 8
-_SOURCES = {"repeats": "repeats", "declared": "the campaign's declaration", "residual": "the residual of the declared model"}
 # Snakemake prints the second before its logger begins.
 _NOTHING, _NO_NEWS = "Nothing to be done", "Using workflow specific profile"
 
@@ -82,65 +77,21 @@ def check(folder: Annotated[Path, Argument(help="Folder of the campaign.")]) -> 
 
     from elastocal.loop.overview import overview
 
-    facts, console = overview(folder, robots()), Console()
-    attention = [*(fault["sentence"] for fault in facts["faults"]), *facts["suspicious"]]
-    answer = f"{facts['campaign']} cannot be diagnosed: the data are at fault"
-    if facts["diagnosable"]:
-        more = f"; {counted(len(attention), 'remark')} below" if attention else ""
-        answer = f"{facts['campaign']} can be diagnosed: {counted(facts['testable'], 'candidate effect')} can be tested{more}"
-    print_answer(facts["diagnosable"], answer, [], "", console)
+    found, console = overview(folder, robots()), Console()
+    answer = f"{found.campaign} cannot be diagnosed: the data are at fault"
+    if found.diagnosable:
+        more = f"; {counted(len(found.attention), 'remark')} below" if found.attention else ""
+        answer = f"{found.campaign} can be diagnosed: {counted(found.testable, 'candidate effect')} can be tested{more}"
+    print_answer(found.diagnosable, answer, [], "", console)
     table = Table(show_header=False, box=None, pad_edge=False)
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")
-    for name, words in _lines(facts):
+    for name, words in found.rows:
         table.add_row(f"  {name}", escaped(words))
     console.print(table)
-    following = f"elastocal diagnose {folder}" if facts["diagnosable"] else "mend the data, then check again"
-    print_lines([*(f"! {sentence}" for sentence in attention), f"next: {following}"], console)
-    raise typer.Exit(0 if facts["diagnosable"] else 1)
-
-
-def _lines(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """The table, as pairs of a heading and words."""
-    from elastocal.application.accuracy import accuracy_from, accuracy_sentence
-
-    noise = facts["noise"]
-    left = f"; not identifiable: {first_names(facts['held'], _NAMED)}" if facts["held"] else ""
-    sessions = f", {facts['sessions']} sessions" if facts["sessions"] > 1 else ""
-    robot = f"{facts['campaign']}: {facts['robot']}, {counted(facts['joints'], 'joint')}"
-    poses = f"{counted(facts['training']['poses'], 'pose')} to fit and {counted(facts['held_out']['poses'], 'validation pose')}"
-    # Numbers of loads are labels; 0 is none.
-    loaded = len(facts["loads"]) - (0 in facts["loads"])
-    parts = [*(["unloaded"] if 0 in facts["loads"] else []), *([counted(loaded, "load")] if loaded else [])]
-    loads = " and ".join(parts) + (f" of up to {facts['largest_force_N']:,.0f} N" if loaded else "")
-    repeats = "each state measured once" if facts["repeats"] == 1 else f"a state measured up to {facts['repeats']} times"
-    found = [
-        ("read", f"{robot}, {facts['measured']} in the {facts['frame']} frame"),
-        ("", f"{poses}; {counted(facts['measurements'], 'measurement')} of {', '.join(facts['targets'])}{sessions}"),
-        ("", f"{loads}; {repeats}"),
-        ("noise", f"{1e6 * noise['position_m']:.0f} µm a coordinate, from {_SOURCES[noise['source']]}"),
-        ("declared model", f"residual of {1e3 * facts['residual_rms_m']:.3f} mm RMS on the fitted poses"),
-        ("identified", f"{counted(facts['parameters'], 'parameter')}, effectively {facts['effective_parameters']:.0f}{left}"),
-    ]
-    for mount in facts["mounts"]:
-        rotation = ", ".join(f"{value:.4f}" for value in mount["rotation_rad"])
-        found.append(("mount", f"{mount['target']}: rotation [{rotation}] rad in the frame of its point, fitted"))
-    springs = {f"joint {joint}": spring for joint, spring in enumerate(facts["compliance"], 1)}
-    known = [
-        f"{joint} {spring['value_urad_per_Nm']:.3g} ± {100 * spring['relative_std_error']:.1f} %"
-        for joint, spring in springs.items()
-        if spring["value_urad_per_Nm"] is not None
-    ]
-    if known:
-        found.append(("compliance", f"if the declared model is complete, in µrad/(N m): {', '.join(known)}"))
-    if unknown := [joint for joint, spring in springs.items() if spring["value_urad_per_Nm"] is None]:
-        found.append(("" if known else "compliance", f"not determined by these poses: {', '.join(unknown)}"))
-    if facts["accuracy"]:
-        sentence = accuracy_sentence(accuracy_from(facts["accuracy"]))
-        found.append(("accuracy", f"if the declared model is complete: {sentence}"))
-    found.append(("testable", counted(facts["testable"], "candidate effect")))
-    found += [("", f"{count} not testable: {reason}") for reason, count in facts["untestable"].items()]
-    return found
+    following = f"elastocal diagnose {folder}" if found.diagnosable else "mend the data, then check again"
+    print_lines([*(f"! {sentence}" for sentence in found.attention), f"next: {following}"], console)
+    raise typer.Exit(0 if found.diagnosable else 1)
 
 
 def diagnose(

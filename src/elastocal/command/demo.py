@@ -7,8 +7,7 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
-from elastocal.command.pipeline import robots, workplace
-from elastocal.command.terminal import LARGEST_SEED, print_answer, print_lines
+from elastocal.command.terminal import LARGEST_SEED, print_answer, print_lines, robots, workplace
 from elastocal.counting import counted
 
 _ROBOT, _TARGETS, _PATH = "kuka", "targets.csv", "path.csv"

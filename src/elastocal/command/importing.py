@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 from typer import Argument, Option
 
-from elastocal.command.pipeline import robots
-from elastocal.command.terminal import MOST_ROWS, example
+from elastocal.command.terminal import MOST_ROWS, example, robots
 from elastocal.counting import counted
 from elastocal.errors import InputError, printable
 

@@ -10,11 +10,10 @@ from typer.core import TyperGroup
 
 import elastocal
 from elastocal.command.campaign import check, diagnose, init
-from elastocal.command.correct import correct
 from elastocal.command.demo import demo
 from elastocal.command.importing import importing
 from elastocal.command.plan import plan
-from elastocal.command.results import certificate, export
+from elastocal.command.results import certificate, correct, export
 from elastocal.command.terminal import example
 from elastocal.errors import InputError, fault_of_machine
 

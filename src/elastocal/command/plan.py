@@ -27,7 +27,7 @@ from elastocal.errors import InputError, text_fault
 
 if TYPE_CHECKING:
     from elastocal.application.planning.cell import Cell
-    from elastocal.application.planning.plan import Loads, Plan, Sensor, Survey
+    from elastocal.application.planning.plan import Plan, Survey
     from elastocal.campaigns.campaign import Target
     from elastocal.mechanics.chain import Chain
     from elastocal.mechanics.robot import Robot
@@ -47,10 +47,6 @@ class _Options:
     poses: Annotated[int, Option(min=1, max=MOST_POSES, help="Poses to fit.")] = 20
     held_out: Annotated[int, Option(min=3, max=MOST_POSES, help="Random poses that judge the result and fit nothing.")] = 9
     number: Annotated[int, Option("--candidates", min=10, max=MOST_ROWS, help="Random configurations to choose from.")] = 10_000
-    criterion: Annotated[
-        Literal["D", "A", "I"],
-        Option(help="D, A: minimize the determinant or the trace of the covariance; I: the error over the workspace."),
-    ] = "D"
     force: Annotated[float, Option(min=0.0, max=1e6, help="Force of the load in N; 0 for none.")] = 0.0
     pull: Annotated[bool, Option("--pull", help="The load pulls in any direction. Default: it hangs.")] = False
     measured: Annotated[
@@ -87,21 +83,20 @@ def plan(**words: Any) -> None:
     """
     from rich.console import Console
 
-    from elastocal.application.planning.plan import Loads, choose_plan, find_allowed_candidates
+    from elastocal.application.planning.plan import choose_plan, find_allowed_candidates
     from elastocal.campaigns.measurements import CSV
     from elastocal.campaigns.reading import read_robot
     from elastocal.io.texts import kind_of
 
     options, console = _Options(**words), Console(stderr=True)
-    folder, loads = options.folder, Loads(options.force, options.pull)
-    survey, sensor = _survey(options, read_robot(options.robot), loads)
+    folder, survey = options.folder, _survey(options, read_robot(options.robot))
     cell = _cell(options, survey.robot)
     if os.path.lexists(folder):
         raise InputError(folder, "", f"{kind_of(os.lstat(folder).st_mode)} that is there", "a new one")
     with console.status("planning"):
-        some = find_allowed_candidates(survey, cell, loads, options.number, options.seed)
-        found = choose_plan(survey, some, options.poses, options.held_out, options.criterion, options.seed)
-    worth = _worth(survey, sensor, options, found)
+        some = find_allowed_candidates(survey, cell, options.number, options.seed)
+        found = choose_plan(survey, some, options.poses, options.held_out, options.seed)
+    worth = _worth(survey, options, found)
     rows = _write(survey, cell, options, found, worth)
     answer = (
         f"{counted(options.poses, 'pose')} to fit and {options.held_out} held out, of {len(some.joint_angles):,} that the cell "
@@ -115,20 +110,20 @@ def plan(**words: Any) -> None:
 plan.__signature__ = inspect.signature(_Options, eval_str=True)  # type: ignore[attr-defined]
 
 
-def _survey(options: _Options, arm: Robot, loads: Loads) -> tuple[Survey, Sensor]:
+def _survey(options: _Options, arm: Robot) -> Survey:
     """What is measured and how well, as stated or usual; options that do not go together are refused."""
     from elastocal.application.planning.plan import SENSORS, Survey
 
-    sensor, pose = SENSORS[options.measured], options.measured == "pose"
-    if options.orientation_noise is not None and not pose:
-        raise InputError("--orientation-noise", "", "positions, which have no orientation", "--measured pose beside it")
-    position_m = sensor.position_m if options.noise is None else length_m("--noise", options.noise)
-    stated = options.orientation_noise
-    # Of positions no orientation is read: its noise is not used.
-    usual = sensor.orientation_rad or position_m
-    orientation_rad = usual if stated is None else angle_rad("--orientation-noise", stated)
+    _, position_m, orientation_rad = SENSORS[options.measured]
+    if options.noise is not None:
+        position_m = length_m("--noise", options.noise)
+    if options.orientation_noise is not None:
+        if options.measured != "pose":
+            raise InputError("--orientation-noise", "", "positions, which have no orientation", "--measured pose beside it")
+        orientation_rad = angle_rad("--orientation-noise", options.orientation_noise)
     targets = _read_targets(options.target or [arm.chain.end_effector.name], arm.chain)
-    return Survey(arm, targets, not options.base_known, options.measured, loads.shares, position_m, orientation_rad), sensor
+    known, loads = options.base_known, (options.force, options.pull)
+    return Survey(arm, targets, not known, options.measured, position_m, orientation_rad, *loads)
 
 
 def _cell(options: _Options, arm: Robot) -> Cell:
@@ -166,12 +161,13 @@ def _read_targets(described: list[str], chain: Chain) -> tuple[Target, ...]:
     return tuple(found.values())
 
 
-def _worth(survey: Survey, sensor: Sensor, options: _Options, found: Plan) -> list[str]:
+def _worth(survey: Survey, options: _Options, found: Plan) -> list[str]:
     """What a plan is worth, in sentences."""
     import numpy as np
 
     from elastocal.application.accuracy import millimetres
     from elastocal.application.frames import BASE, FRAMES, ROBOT
+    from elastocal.application.planning.plan import SENSORS
 
     pose = survey.measured == "pose"
     random = 1e3 * np.quantile(found.random_m[:, -1], [0.05, 0.5, 0.95])
@@ -183,8 +179,8 @@ def _worth(survey: Survey, sensor: Sensor, options: _Options, found: Plan) -> li
         "It is a standard error by the uncertainty of the parameters alone, without the tracker's noise.",
         f"Assumed noise: {1e6 * survey.position_m:.3g} µm"
         + (f", {1e6 * survey.orientation_rad:.3g} µrad" if pose else "")
-        + ("." if stated else f"; {sensor.words}."),
-        f"{options.criterion}-efficiency: at least {100 * found.efficiency:.0f} % of the best design with as many poses.",
+        + ("." if stated else f"; {SENSORS[survey.measured][0]}."),
+        f"D-efficiency: at least {100 * found.efficiency:.0f} % of the best design with as many poses.",
     ]
 
 

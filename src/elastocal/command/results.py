@@ -1,30 +1,228 @@
-"""What a diagnosed campaign leads to beside corrected targets: `elastocal certificate` and `elastocal export`."""
+"""What a diagnosed campaign leads to: `elastocal correct`, `certificate` and `export`."""
 
 from __future__ import annotations
 
+import math
 import tempfile
+from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer import Argument, Option
 
-from elastocal.command.pipeline import PhysicsOnly, diagnosed_campaign, robots, workplace
-from elastocal.command.terminal import length_m, print_answer
-from elastocal.counting import counted
+from elastocal.command.terminal import PhysicsOnly, diagnosed_campaign, length_m, print_answer, print_lines, robots, workplace
+from elastocal.counting import counted, first_names, grouped
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     import numpy as np
+    import pandas as pd
 
+    from elastocal.application.accuracy import Prediction
+    from elastocal.application.compensation import Correction
+    from elastocal.exchange.target_path import TargetPath
     from elastocal.exchange.urdf_writing import CorrectedUrdf
+    from elastocal.loop.calibrated_files import Diagnosed
     from elastocal.mechanics.robot import Robot
 
 DOCUMENT, PAGES = "certificate.json", "certificate.pdf"
 ROBOT, URDF, SIDECAR = _EXPORTED = "robot.yaml", "robot.urdf", "effects.json"
 _ROUNDING_MM = 1e-5
+# Lines that a message names.
+_NAMED = 5
+# Loads beyond so many times the measured ones have no bound: stiffness that is fitted as a constant need not be one there.
+_LOADS_BOUNDED = 2.0
+
+
+def correct(
+    folder: Annotated[Path, Argument(help="Folder of a diagnosed campaign.")],
+    path: Annotated[Path, Argument(help="CSV of wanted poses: x, y, z in m, rx, ry, rz in rad; fx..fz or fx..mz, q1..qn.")],
+    output: Annotated[Path, Option(help="CSV of joint targets.")],
+    language: Annotated[
+        str, Option("--format", help="Write a program beside the CSV too: krl (KUKA), rapid (ABB), tp (FANUC), urscript.")
+    ] = "",
+    axes: Annotated[
+        str, Option(help="What the controller calls q1..qn, such as A1,A2,E1,A3,A4,A5,A6; needed where it is ambiguous.")
+    ] = "",
+    allow_large_steps: Annotated[
+        bool,
+        Option("--allow-large-steps", help="Accept joints that turn by more than 5 times what the path turns, and 10 degrees."),
+    ] = False,
+    physics_only: PhysicsOnly = False,
+    partial: Annotated[bool, Option("--partial", help="Write the file even if some targets cannot be reached.")] = False,
+) -> None:
+    """Compute the joint targets that reach the wanted poses.
+
+    Loads, weight and every effect found are compensated, and where joints and loads were fitted what a regression predicts of
+    the rest, if the diagnosis chose one. Each target states by how much the robot will miss it. Posture and
+    turns of the joints are those that move the robot least; where q1..qn state them they are kept. A joint that swings from
+    target to target, or a stated posture that does not reach its target, is refused with its line.
+    Predicted errors are stated as `elastocal certificate` states them: in the frame of the declared base, or, where the base is
+    unknown, in the robot's own frame after its best placement over the campaign's poses.
+    """
+    import numpy as np
+    from rich.console import Console
+
+    from elastocal.application.accuracy import (
+        accuracy_sentence,
+        before_m,
+        campaign_accuracy,
+        error_rows,
+        millimetres,
+        predict_errors,
+    )
+    from elastocal.application.calibrated import OperatingConditions, assumptions, beyond_fitted, regressed
+    from elastocal.application.compensation import find_joint_targets
+    from elastocal.application.frames import root_mean_square
+    from elastocal.diagnosis.misplaced import point_sentence
+    from elastocal.exchange.controllers import axes_of, check_name, controller_of, targets_of
+    from elastocal.exchange.target_path import NO_BOUND, OK, read_target_path_of
+    from elastocal.io.atomic_writes import check_places, write_text, write_together
+    from elastocal.io.data_frames import write_csv
+
+    console = Console(stderr=True)
+    controller = controller_of(language, "") if language else None
+    if output.suffix != ".csv":
+        raise InputError("--output", "", repr(output.name), "a name that ends in .csv; --format writes a program beside it")
+    if axes and controller is None:
+        raise InputError("--axes", "", repr(axes), "with --format")
+    files = [output, *([output.with_suffix(controller.suffix)] if controller else [])]
+    name = check_name(controller, files[-1]) if controller else ""
+    check_places(*files)
+    if not output.parent.is_dir():
+        raise InputError(output, "", "no such folder", "a file in a folder that is there")
+    campaign = diagnosed_campaign(folder, physics_only)
+    calibrated = campaign.calibrated
+    prismatic = calibrated.robot.chain.prismatic
+    named = axes_of(controller, prismatic, axes) if controller else ()
+    wanted = read_target_path_of(path, calibrated.robot)
+    operating = OperatingConditions(wanted.wrench, wanted.approach, wanted.time_s, wanted.temperature_c)
+    print_lines((f"assumed: {line}" for line in assumptions(calibrated, operating)), console)
+    with console.status("correcting"):
+        found = find_joint_targets(calibrated, wanted.position, wanted.rotation, operating, wanted.start)
+    good = found.status == OK
+    if not good.all() and not partial:
+        rows = first_names([f"line {wanted.lines[row]} is {found.status[row]}" for row in (~good).nonzero()[0]], _NAMED)
+        reached = "poses that the robot reaches within its limits, in the posture that q1..qn state if any, or --partial"
+        raise InputError(path, "", rows, reached)
+    if controller and not good.any():
+        raise InputError(path, "", "no pose that the robot reaches", "one at least, for a program")
+    swings = _swings(wanted, found, good, calibrated.robot)
+    if swings and not allow_large_steps:
+        more = f" and {counted(len(swings) - 1, 'more large step')}" if len(swings) > 1 else ""
+        raise InputError(path, "", swings[0] + more, "targets between, another posture, or --allow-large-steps")
+    wrench = np.zeros((len(wanted), 6)) if wanted.wrench is None else wanted.wrench
+    outside, loaded = beyond_fitted(calibrated, found.joint_angles, wrench)
+    beyond, heavy = outside | loaded, beyond_fitted(calibrated, found.joint_angles, wrench, _LOADS_BOUNDED)[1]
+    bounded = good & ~outside & ~heavy
+    status = found.status.astype(object)
+    status[good & outside] = f"{NO_BOUND}joints outside the fitted range"
+    status[good & heavy] = f"{NO_BOUND}loads beyond {_LOADS_BOUNDED:g} times the measured ones"
+    errors = predict_errors(calibrated, found.joint_angles, operating)
+    before = before_m(calibrated, wanted.position, wanted.rotation, found.error_before)
+    with write_together(output.parent, [file.name for file in files]) as folder_of_all:
+        write_csv(folder_of_all / output.name, _joint_targets(wanted, wrench, found, before, errors, beyond, status))
+        if controller:
+            targets = targets_of(found.joint_angles[good], prismatic, named)
+            write_text(folder_of_all / files[1].name, controller.program(name, targets, _notes(campaign, wrench[good])))
+    share = f"{grouped(good.sum())} of {counted(len(good), 'target')}"
+    stated, lines = [], []
+    if bounded.any():
+        known = errors if bounded.all() else predict_errors(calibrated, found.joint_angles[bounded], operating.part(bounded))
+        accuracy = known.accuracy("the targets" if bounded[good].all() else "the targets with a bound")
+        stated.append((accuracy, root_mean_square(before[bounded])))
+        lines.append(accuracy_sentence(accuracy))
+    table = error_rows(campaign.verdict, *stated)
+    lines = [*(f"{where}: {off} uncorrected, {after} corrected" for where, off, after in table), *lines]
+    if good.any():
+        lines += [accuracy_sentence(campaign_accuracy(calibrated)), point_sentence(campaign.case.campaign)]
+    if calibrated.remainder is not None:
+        added = np.linalg.norm(regressed(calibrated, found.joint_angles[good], operating.part(good)), axis=1)
+        size = f"{millimetres(root_mean_square(added[added > 0.0]))} RMS" if added.any() else "nothing"
+        acts = f"{grouped((added > 0.0).sum())} of {counted(len(added), 'target')}"
+        words = campaign.verdict["remainder"]["words"]
+        lines.append(f"a {words} on what the model leaves corrects {acts} by {size}; --physics-only leaves it out")
+    if controller:
+        called = ", ".join(f"q{number} as {axis}" for number, axis in enumerate(named, 1))
+        lines.append(f"{files[1].name} goes to {share}: {controller.words}, {called}")
+    alarms = [*(each["sentence"] for each in campaign.verdict["misplaced"])]
+    if swings:
+        alarms.append(first_names(swings, _NAMED))
+    if unbounded := int((good & ~bounded).sum()):
+        what = f"{_LOADS_BOUNDED:g} times the measured loads or outside the fitted range of joints"
+        alarms.append(f"no bound is stated for {grouped(unbounded)} of {counted(int(good.sum()), 'target')}: beyond {what}")
+    if beyond.any():
+        some = f"{grouped(beyond.sum())} of {counted(len(beyond), 'target')}"
+        alarms.append(f"{some} lie beyond the poses or loads of the campaign: their predicted errors are extrapolated")
+    lines += [*(f"! {alarm}" for alarm in alarms), *map(str, files)]
+    print_answer(good.all(), f"{share} corrected", lines, f"elastocal certificate {folder} --tolerance 0.2mm", console)
+
+
+def _swings(wanted: TargetPath, found: Correction, good: np.ndarray, robot: Robot) -> list[str]:
+    """A line for each joint that moves farther from one reached target to the next than `allowed_steps`."""
+    from elastocal.application.compensation import large_steps
+
+    lines = [wanted.lines[row] for row in good.nonzero()[0]]
+    return [
+        f"line {lines[row]}: joint {joint + 1} shifts by {1e3 * step:.0f} mm, {1e3 * most:.0f} allowed"
+        if robot.chain.prismatic[joint]
+        else f"line {lines[row]}: joint {joint + 1} turns by {math.degrees(step):.1f} degrees, {math.degrees(most):.1f} allowed"
+        for row, joint, step, most in large_steps(robot, wanted.position[good], wanted.rotation[good], found.joint_angles[good])
+    ]
+
+
+def _notes(campaign: Diagnosed, wrench: np.ndarray) -> list[str]:
+    """For what a program holds: robot, campaign, day, loads (N, 6) and tool, one line each."""
+    end = campaign.calibrated.robot.chain.end_effector
+    force, moment = (math.sqrt((part**2).sum(axis=1).max()) for part in (wrench[:, :3], wrench[:, 3:]))
+    load = f"force up to {force:.4g} N, moment up to {moment:.4g} N m"
+    return [
+        f"robot: {campaign.calibrated.robot.name}",
+        f"campaign: {campaign.name}",
+        f"date: {date.today().isoformat()}",
+        f"load: {load if force or moment else 'none beside what the robot file states'}",
+        f"tool: {end.name}, target offset {', '.join(f'{1e3 * value:.4g}' for value in end.offset_m)} mm",
+    ]
+
+
+def _joint_targets(
+    wanted: TargetPath,
+    wrench: np.ndarray,
+    found: Correction,
+    before: np.ndarray,
+    errors: Prediction,
+    beyond: np.ndarray,
+    status: np.ndarray,
+) -> pd.DataFrame:
+    """The file of joint targets: wanted poses, loads, commands q1..qn (rad, as the controller reports them), errors, status.
+
+    `before` (N,) is what uncorrected targets would be missed by, m; `beyond` whether each lies beyond what was measured.
+    """
+    import numpy as np
+    import pandas as pd
+    from scipy.spatial.transform import Rotation
+
+    from elastocal.exchange.target_path import NO_BOUND
+    from elastocal.mechanics.components import WRENCH_NAMES
+
+    pose = np.column_stack([wanted.position, Rotation.from_matrix(wanted.rotation).as_rotvec()])
+    columns = dict(zip(("x", "y", "z", "rx", "ry", "rz"), pose.T, strict=True)) | dict(zip(WRENCH_NAMES, wrench.T, strict=True))
+    angles = {f"q{joint}": column for joint, column in enumerate(found.joint_angles.T, 1)}
+    nominal = {f"q{joint}_uncorrected": column for joint, column in enumerate(found.uncorrected.T, 1)}
+    stated = {
+        "predicted_error_before_m": before,
+        "predicted_error_after_m": errors.error_m,
+        "predicted_bound_m": np.where([each.startswith(NO_BOUND) for each in status], np.nan, errors.bound_m),
+        "predicted_std_m": np.sqrt(errors.parameters_m**2 + errors.repeated_m**2 + errors.regression_m**2),
+        "predicted_rotation_before_rad": np.linalg.norm(found.error_before[:, 3:], axis=1),
+        "predicted_rotation_std_rad": errors.std_rad,
+        "repeatability_m": errors.repeated_m,
+        "outside_range": beyond,
+    }
+    return pd.DataFrame(angles | stated | {"status": status} | columns | nominal)
 
 
 def certificate(
@@ -39,32 +237,25 @@ def certificate(
     report. The exit code is 0 if the robot passes, and 1 if it fails or is undecided. A robot that nobody measured after
     correction is predicted to pass or fail.
     """
-    from datetime import date
-
     from rich.console import Console
 
-    from elastocal.campaigns.reading import read_descriptions
     from elastocal.data_checks.protocol import data_at_fault
     from elastocal.figures.loop import budget_bars
     from elastocal.figures.style import save_all
     from elastocal.io.atomic_writes import check_places, write_together
     from elastocal.io.json_files import write_json
-    from elastocal.loop.certificate import Wanted
-    from elastocal.loop.certificate import certificate as certified
+    from elastocal.loop.calibrated_files import certificate as certified
     from elastocal.report.certificate import certificate_facts, write_certificate
 
     console = Console(stderr=True)
-    campaign = read_descriptions(folder, robots())[0]
     limit = length_m("--tolerance", tolerance)
     found = diagnosed_campaign(folder, physics_only)
     place = workplace() / "reports" / "loop" / found.name
     check_places(place / PAGES, place / DOCUMENT, top=workplace() / "reports")
     if data_at_fault(found.verdict):
         raise InputError(folder, "", "data at fault", "a campaign whose data are in order; its report says what is wrong")
-    stated = {"measured_on": campaign.get("measured_on", "")} | campaign.get("certificate", {})
-    wanted = Wanted(limit, risk, campaign.get("serial_number", ""), date.today().isoformat(), stated)
     with console.status("working"):
-        document = certified(folder, robots(), found, wanted)
+        document = certified(folder, robots(), found, limit, risk)
         facts = certificate_facts(document)
         with tempfile.TemporaryDirectory() as scratch, write_together(place, (PAGES, DOCUMENT)) as partial:
             names = [row[0] for row in facts["budget"]]
@@ -78,14 +269,14 @@ def certificate(
 
 def _lines(document: Mapping[str, Any]) -> list[str]:
     """The answer in three lines: the decision by its criterion; over which poses and of which point; why, or what it lacks."""
-    from elastocal.application.accuracy import accuracy_from, millimetres
+    from elastocal.application.accuracy import Accuracy, millimetres
     from elastocal.application.frames import FRAMES
 
-    found, accuracy = document["conformity"], accuracy_from(document["accuracy"])
+    found, accuracy = document["conformity"], Accuracy(**document["accuracy"])
     answer = f"{found['decision']}: no error is predicted of a robot of which nothing was fitted"
     if accuracy.fitted or accuracy.form_m:
         answer = (
-            f"{found['decision']}, as {accuracy.kind}: the RMS position error of the corrected robot is"
+            f"{found['decision']}, as predicted: the RMS position error of the corrected robot is"
             f" {millimetres(accuracy.rms_m)}, {1 - found['accepted_risk']:.0%} sure to be below"
             f" {millimetres(found['limit_m'])}, the tolerance {millimetres(found['tolerance_m'])}"
         )
@@ -108,8 +299,6 @@ def export(
     A URDF holds the geometry; effects.json holds springs and effects as well. None holds the regression on the
     remainder: what is lost with it is said, and the accuracy stated is without.
     """
-    from datetime import date
-
     import numpy as np
     import yaml
     from rich.console import Console
@@ -128,14 +317,13 @@ def export(
         raise InputError(urdf, "", "the file that would be replaced", "a URDF outside of --output")
     whole = diagnosed_campaign(folder)
     # No file has the regression: what stands in them is of a robot without.
-    found = whole if whole.calibrated.remainder is None else diagnosed_campaign(folder, physics_only=True)
-    calibrated, states = found.calibrated, found.case.observations.states
+    calibrated, states = whole.by_physics().calibrated, whole.case.observations.states
     nominal, robot = calibrated.robot, fold_effects(calibrated).robot
     drop_in = None if urdf is None else write_calibrated_origins(urdf, nominal, robot)
-    stated = f"Calibrated by elastocal from the campaign {found.name}."
+    stated = f"Calibrated by elastocal from the campaign {whole.name}."
     text = yaml.safe_dump(document_of(robot), sort_keys=False, default_flow_style=None, width=128)
     accuracy = campaign_accuracy(calibrated)
-    document = sidecar(calibrated, found.name, date.today().isoformat(), accuracy)
+    document = sidecar(calibrated, whole.name, date.today().isoformat(), accuracy)
     lines = [accuracy_sentence(accuracy), *(str(output / name) for name in (ROBOT, *([URDF] if urdf else []), SIDECAR))]
     with write_together(output, _EXPORTED) as partial:
         write_text(partial / ROBOT, f"# {stated}\n{text}")
@@ -148,10 +336,10 @@ def export(
     if document["effects"]:
         names = ", ".join(entry["key"] for entry in document["effects"])
         lines.insert(0, f"! only {SIDECAR} holds {names}: {_sizes(find_left_out_m(calibrated, at, under))}")
-    if found is not whole:
+    if whole.calibrated.remainder is not None:
         words, lost = whole.verdict["remainder"]["words"], np.linalg.norm(regressed(whole.calibrated, at, under), axis=1)
         lines.insert(0, f"! no file holds the {words} on the remainder, which elastocal correct adds: {_sizes(lost)}")
-    print_answer(True, f"{found.name}: calibrated robot in {output}", lines, "", console)
+    print_answer(True, f"{whole.name}: calibrated robot in {output}", lines, "", console)
 
 
 def _sizes(off: np.ndarray) -> str:

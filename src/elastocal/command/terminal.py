@@ -1,10 +1,15 @@
-"""What subcommands take from the terminal, quantities with their unit and lists of numbers, and how they print an answer."""
+"""What subcommands share: quantities with units and lists of numbers, how an answer is printed, where the pipeline is that they
+run, with its robots, where its results are, and a diagnosed campaign among them."""
 
 from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING
+from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from typer import Option
 
 from elastocal.errors import InputError, escaped
 
@@ -13,6 +18,8 @@ if TYPE_CHECKING:
 
     import numpy as np
     from rich.console import Console
+
+    from elastocal.loop.calibrated_files import Diagnosed
 
 _METRES = {"mm": 1e-3, "um": 1e-6, "µm": 1e-6, "m": 1.0}
 _RADIANS = {"deg": math.radians(1.0), "°": math.radians(1.0), "rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "µrad": 1e-6}
@@ -23,6 +30,14 @@ _BOUNDS_M, _BOUNDS_RAD = (1e-8, 0.1), (1e-8, 0.2)
 _FARTHEST_PLACE_M, FARTHEST_TARGET_M = 1e3, 10.0
 # Draws are numbered in 32 bits; more poses, rows or lines than these are slips of the keyboard.
 LARGEST_SEED, MOST_POSES, MOST_ROWS = 2**32 - 1, 10_000, 10_000_000
+
+
+_SNAKEFILE = "Snakefile"
+# Where a wheel has the Snakefile, rules and configuration; see `data-files` in pyproject.toml.
+_INSTALLED = f"share/elastocal/{_SNAKEFILE}"
+PhysicsOnly = Annotated[
+    bool, Option("--physics-only", help="Leave out the regression on what the model leaves: correct by named effects alone.")
+]
 
 
 def length_m(option: str, text: str) -> float:
@@ -79,3 +94,55 @@ def print_lines(lines: Iterable[str], console: Console) -> None:
     """Print lines as they are, with what would steer a terminal as escapes: they hold names and paths of other people."""
     for line in lines:
         console.print(escaped(line), markup=False, highlight=False, soft_wrap=True)
+
+
+def pipeline() -> Path:
+    """The folder with the Snakefile: of the checkout, where there is one, else what this package installed; none is refused."""
+    found = _checkout() or _installed()
+    if found is None:
+        allowed = "a folder inside of a checkout of elastocal, or its wheel installed in an environment"
+        raise InputError(Path.cwd(), "", "no Snakefile here or above", allowed)
+    return found
+
+
+def robots() -> Path:
+    """The folder of the robot files that campaigns name."""
+    return pipeline() / "config" / "robots"
+
+
+def workplace() -> Path:
+    """The folder in which results/ and reports/ are: the checkout, where there is one, else the working directory."""
+    return _checkout() or Path.cwd()
+
+
+def _checkout() -> Path | None:
+    """The working directory or one above it, else the one that this package is run from."""
+    for folder in (Path.cwd(), *Path.cwd().parents, *Path(__file__).resolve().parents):
+        if (folder / _SNAKEFILE).is_file() and (folder / "config" / "robots").is_dir():
+            return folder
+    return None
+
+
+def _installed() -> Path | None:
+    """What the wheel of this package brought, wherever the installer has put it."""
+    try:
+        files = metadata.distribution("elastocal").files or []
+    except metadata.PackageNotFoundError:
+        return None
+    found = [Path(str(file.locate())).resolve() for file in files if file.as_posix().endswith(_INSTALLED)]
+    return next((file.parent for file in found if file.is_file()), None)
+
+
+def diagnosed_campaign(folder: Path, physics_only: bool = False) -> Diagnosed:
+    """A campaign with what its diagnosis found, as `load_diagnosed`; results by other libraries or pins come with a warning."""
+    from rich.console import Console
+
+    from elastocal.io.origin import environment
+    from elastocal.loop.calibrated_files import load_diagnosed
+
+    found = load_diagnosed(folder, robots(), workplace())
+    was, now = found.origin["environment"], environment(pipeline())
+    if other := [name for name in sorted(was | now) if was.get(name) != now.get(name)]:
+        there, here = (", ".join(f"{name} {each.get(name, 'none')[:12]}" for name in other) for each in (was, now))
+        print_lines([f"warning: {folder} was diagnosed with {there}; here are {here}"], Console(stderr=True))
+    return found.by_physics() if physics_only else found

@@ -41,7 +41,7 @@ _ALL_ELSE = "Everything else"
 _LABEL, _LONGEST = 44, 80
 # Height of a row of one line, and of each further line.
 _ROW_MM, _LINE_MM = 4.6, 3.0
-# Why nothing is tested where the data are at fault, as tables.candidate_columns notes it.
+# Why nothing is tested where the data are at fault, as tables.candidate_rows notes it.
 _AT_FAULT = "the measurements are at fault"
 # What is left however well the robot is corrected.
 _REST = ("uncertainty of the parameters", "repeatability", "form of the model", "not commanded", "left by the regression")

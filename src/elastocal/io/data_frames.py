@@ -1,8 +1,7 @@
 """Tables on disk as pandas data frames, and data frames as the tables that people read."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
@@ -17,32 +16,20 @@ def read_frame(path: str | Path, schema: TableSchema, columns: Sequence[str] | N
 
 
 def read_long(paths: Iterable[str | Path], schema: Callable[[int], TableSchema]) -> pd.DataFrame:
-    """Tables of many strategies in one frame, headed by robot, noise_um and strategy (its name, not that of its file).
+    """Tables of many robots in one frame, headed by the robot, and by noise_um and strategy (its name) where they are of one.
 
     `schema` is that of a number of joints; columns of joints that a robot lacks are empty.
     """
-    frames = [pd.DataFrame({"robot": [], "noise_um": [], "strategy": []})]
+    frames = []
     for path in paths:
         origin = read_provenance(path)
-        settings = origin["configuration"]
-        heads = {"robot": origin["robot"], "noise_um": float(origin["noise"]), "strategy": settings["strategy"]["name"]}
-        frames.append(_headed(heads, path, schema, settings["robot"]))
-    return pd.concat(frames[1:] or frames, ignore_index=True)
-
-
-def read_studies(paths: Iterable[str | Path], schema: Callable[[int], TableSchema]) -> pd.DataFrame:
-    """Tables of further studies, one at least, in one frame, headed by the robot that their provenance says."""
-    origins = [(path, read_provenance(path)) for path in paths]
-    frames = [
-        _headed({"robot": origin["robot"]}, path, schema, origin["configuration"]["study"]["robot"]) for path, origin in origins
-    ]
-    return pd.concat(frames, ignore_index=True)
-
-
-def _headed(
-    heads: Mapping[str, Any], path: str | Path, schema: Callable[[int], TableSchema], robot: Mapping[str, Any]
-) -> pd.DataFrame:
-    return pd.DataFrame({**heads, **read_table(path, schema(len(robot["compliance_urad_per_Nm"])))})
+        settings, heads = origin["configuration"], {"robot": origin["robot"]}
+        if "strategy" in settings:
+            heads |= {"noise_um": float(origin["noise"]), "strategy": settings["strategy"]["name"]}
+        robot = settings["robot"] if "robot" in settings else settings["study"]["robot"]
+        columns = read_table(path, schema(len(robot["compliance_urad_per_Nm"])))
+        frames.append(pd.DataFrame({**heads, **columns}))
+    return pd.concat(frames or [pd.DataFrame({"robot": [], "noise_um": [], "strategy": []})], ignore_index=True)
 
 
 def write_csv(path: str | Path, frame: pd.DataFrame, digits: int = 9) -> None:

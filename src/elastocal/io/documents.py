@@ -125,32 +125,26 @@ def parsed(text: str, source: str | Path) -> Any:
 def _check_events(text: str) -> None:
     """Refuse what lets a small file grow beyond bounds or makes other objects than values, before anything is made of it.
 
-    An alias stands for as many values as its anchor has; none may stand within an anchor, and so for other aliases.
+    An alias counts as all values before it, more than its anchor has; none may stand within an anchor, and so for others.
     """
-    total, sizes = 0, dict[str | None, int]()
-    # Of each open list or mapping its anchor, and how many values stand before it.
-    opened: list[tuple[str | None, int]] = []
+    plain, total, opened = 0, 0, list[str | None]()
     for event in yaml.parse(text, Loader=_Loader):
         if isinstance(event, yaml.ScalarEvent | yaml.CollectionStartEvent):
             if event.tag is not None:
                 raise _UnclearError(event.start_mark, f"the tag {event.tag}", "values without tags")
-            opened.append((event.anchor, total))
-            total += 1
+            plain, total = plain + 1, total + 1
         if isinstance(event, yaml.AliasEvent):
-            if event.anchor not in sizes or any(anchor for anchor, _ in opened):
-                raise _UnclearError(
-                    event.start_mark, f"the alias *{event.anchor}", "one of what is complete, in no other anchor"
-                )
-            total += sizes[event.anchor]
-        if isinstance(event, yaml.ScalarEvent | yaml.CollectionEndEvent):
-            anchor, before = opened.pop()
-            sizes[anchor] = total - before
+            if any(opened):
+                raise _UnclearError(event.start_mark, f"the alias *{event.anchor}", "one in no other anchor")
+            total += plain
+        if isinstance(event, yaml.CollectionStartEvent):
+            opened.append(event.anchor)
+        elif isinstance(event, yaml.CollectionEndEvent):
+            opened.pop()
         if len(opened) >= DEEPEST:
             raise _UnclearError(event.start_mark, "lists or keys in each other", f"at most {DEEPEST} deep")
         if total > MOST_VALUES:
-            raise _UnclearError(
-                event.start_mark, "more values than a document has", f"at most {MOST_VALUES}, aliases written out"
-            )
+            raise _UnclearError(event.start_mark, "more values than a document has", f"at most {MOST_VALUES} with aliases")
 
 
 def one_line(value: Any) -> str:

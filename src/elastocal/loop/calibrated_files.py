@@ -1,105 +1,130 @@
-"""The calibrated robot of a campaign that was diagnosed, from the tables of its diagnosis, without a fit of its model."""
+"""A campaign that was diagnosed, from the files of its diagnosis: its calibrated robot, without a fit of its model, and the
+contents of its certificate, how good the robot is, against what, and how sure that is."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import platform
+from dataclasses import asdict, dataclass, replace
+from datetime import date
+from functools import cached_property
+from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from elastocal.application.accuracy import calibrate_on_case, regression_on, set_form
+import numpy as np
+
+from elastocal.application.accuracy import (
+    REGION,
+    calibrate_on_case,
+    campaign_poses,
+    error_rows,
+    predict_errors,
+    regression_on,
+    set_form,
+    uncorrected_m,
+)
+from elastocal.application.calibrated import effect_costs
+from elastocal.application.frames import root_mean_square
 from elastocal.campaigns.reading import campaign_files, read_descriptions
+from elastocal.diagnosis.misplaced import point_sentence
 from elastocal.errors import InputError
 from elastocal.fitting.case import noise_from
 from elastocal.io.json_files import read_json
 from elastocal.io.origin import configuration_sha256
 from elastocal.io.records import check_sources, checksum, jobs_behind
-from elastocal.io.storage import read_table
-from elastocal.loop.diagnosis_tables import covariance_from, final_parameters, load_case, rows_left_out, step_model
-from elastocal.loop.schemas import CORRELATIONS, STEPS
+from elastocal.loop.diagnosis_tables import load_case, rows_left_out, step_model
 from elastocal.remainder.corrected import fitted_again
 from elastocal.remainder.tuning import Spread
+from elastocal.validation.conformity import PASS, UNDECIDED, predicted_conformity
+from elastocal.validation.span import joint_ranges, shortfalls
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
-    from typing import Any
 
-    from elastocal.application.calibrated import CalibratedRobot
+    from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
     from elastocal.fitting.case import Case
+    from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.noise import Noise
     from elastocal.io.records import JobRecord
+    from elastocal.mechanics.robot import Robot
 
-# Of results/loop/<campaign>/ and of reports/loop/<campaign>/, whose last file has all others behind it.
-DESCRIPTIONS, TRAINING, DIAGNOSIS = "campaign.json", "training.parquet", "diagnosis.json"
-STEPS_TABLE, CORRELATIONS_TABLE = "steps.parquet", "correlations.parquet"
-VERDICT, REPORT = "verdict.json", "report.html"
+_LIBRARIES = ("elastocal", "numpy", "scipy")
 
 
 @dataclass(frozen=True)
 class Diagnosed:
     """A campaign and what its diagnosis found.
 
-    `name`: of the campaign. `case`: of the training poses, without their gross errors. `calibrated`: by the final model, its
-    errors as large as verdict.json says after a look at held-out poses. `verdict`: verdict.json; of physics alone, where that
-    was asked for, as if there were no regression. `origin`: ``commit`` of the jobs that made it, ``code_sha256`` and
-    ``data_sha256`` of all that they read of the program and of the campaign, ``environment``.
+    `name`: of the campaign. `case`: of the training poses, without their gross errors. `model`, `estimate`, `covariance`,
+    `noise`: the final ones. `form_m`: what other models leave open. `verdict`: verdict.json. `origin`: ``commit`` of the jobs
+    that made it, ``code_sha256`` and ``data_sha256`` of all that they read of the program and of the campaign, ``environment``.
     """
 
     name: str
     case: Case
-    calibrated: CalibratedRobot
+    model: Model
+    estimate: Estimate
+    covariance: np.ndarray
+    noise: Noise
+    form_m: float
     verdict: dict[str, Any]
     origin: dict[str, Any]
 
+    @cached_property
+    def calibrated(self) -> CalibratedRobot:
+        """By the final model, its errors as large as the verdict says after a look at held-out poses."""
+        more, again, accuracy = None, self.verdict["remainder"], self.verdict["accuracy"]
+        if again and again["regression"]:
+            predictor = fitted_again(again, self.model, self.estimate, self.case.observations)
+            noise_m = self.verdict["noise"]["position_m"]
+            more = regression_on(self.case, self.estimate, predictor, Spread(**again["spread"]), noise_m)
+        found = calibrate_on_case(self.case, self.model, self.estimate, self.covariance, self.noise, more)
+        contradicted = bool(accuracy and accuracy["contradicted"])
+        return set_form(found, accuracy["form_m"] if contradicted else self.form_m, contradicted)
 
-def load_diagnosed(folder: str | Path, robots_folder: str | Path, top: str | Path, physics_only: bool = False) -> Diagnosed:
+    def by_physics(self) -> Diagnosed:
+        """The same without the regression on the remainder, as if there were none."""
+        heldout = self.verdict["heldout"] | {"delivered": self.verdict["heldout"]["after"]}
+        alone = {"remainder": None, "heldout": heldout} | (self.verdict["physics"] or {})
+        return replace(self, verdict=self.verdict | alone)
+
+
+def load_diagnosed(folder: str | Path, robots_folder: str | Path, top: str | Path) -> Diagnosed:
     """A campaign that was diagnosed, of which nothing has changed since, in the folder that holds results/ and reports/.
 
     An InputError refuses what is not as `jobs_behind` asks of all jobs behind its report or `check_sources` of those behind its
-    verdict, and other files of the campaign than were read. `physics_only`: without the regression on the remainder.
+    verdict, and other files of the campaign than were read.
     """
     name = read_descriptions(folder, robots_folder)[0]["campaign"]
     results, reports = f"results/loop/{name}", f"reports/loop/{name}"
-    fresh = f"elastocal diagnose {folder}"
-    if not Path(top, reports, VERDICT).exists() and not Path(top, results, DIAGNOSIS).exists():
-        raise InputError(folder, "", f"no diagnosis of it in {Path(top, results)}", fresh)
-    jobs_behind([f"{reports}/{REPORT}"], top)
-    jobs = jobs_behind([f"{reports}/{VERDICT}"], top)
+    tables, verdict, fresh = Path(top, results), Path(top, reports, "verdict.json"), f"elastocal diagnose {folder}"
+    if not verdict.exists() and not (tables / "diagnosis.json").exists():
+        raise InputError(folder, "", f"no diagnosis of it in {tables}", fresh)
+    # The report has all other files behind it.
+    jobs_behind([f"{reports}/report.html"], top)
+    jobs = jobs_behind([f"{reports}/verdict.json"], top)
     check_sources(jobs, top, f"results of this version: {fresh}")
-    data = _data_of(jobs, results)
+    data = _data_of(jobs, f"{results}/campaign.json")
     now = {(Path(file).name, checksum(file)) for file in campaign_files(folder, robots_folder)}
     if not data <= now <= {(Path(file).name, digest) for job in jobs for file, digest in job.inputs.items()}:
         raise InputError(folder, "", "changes since its diagnosis", f"a campaign as it was diagnosed: {fresh}")
-    tables, stated = Path(top, results), Path(top, reports)
-    facts, steps = read_json(tables / DIAGNOSIS), read_table(tables / STEPS_TABLE, STEPS)
-    verdict = read_json(stated / VERDICT)
-    if physics_only:
-        verdict |= {"remainder": None, "heldout": verdict["heldout"] | {"delivered": verdict["heldout"]["after"]}}
-        verdict |= verdict["physics"] or {}
-    case = load_case(tables / DESCRIPTIONS, tables / TRAINING)
+    facts = read_json(tables / "diagnosis.json")
+    case = load_case(tables / "campaign.json", tables / "training.parquet")
     case = case.select(~rows_left_out(case, facts))
-    last = len(facts["steps"]) - 1
-    model, estimate = step_model(case, facts, steps, last)
-    covariance = covariance_from(final_parameters(facts, steps), read_table(tables / CORRELATIONS_TABLE, CORRELATIONS))
-    noise = noise_from({"noise": facts["steps"][last]["noise"]})
-    more, again = None, verdict["remainder"]
-    if again and again["regression"]:
-        predictor, spread = fitted_again(again, model, estimate, case.observations), Spread(**again["spread"])
-        more = regression_on(case, estimate, predictor, spread, verdict["noise"]["position_m"])
-    calibrated = calibrate_on_case(case, model, estimate, covariance, noise, more)
-    accuracy = verdict["accuracy"]
-    contradicted = bool(accuracy and accuracy["contradicted"])
-    form = accuracy["form_m"] if contradicted else facts["document"].get("other_models_m") or 0.0
+    model, estimate = step_model(case, facts["steps"][-1])
     origin = {
         "commit": _listed(job.origin.commit for job in jobs),
         "code_sha256": configuration_sha256({file: digest for job in jobs for file, digest in job.sources.items()}),
         "data_sha256": configuration_sha256(sorted(data)),
         "environment": {name: _listed(job.environment.get(name, "none") for job in jobs) for name in jobs[-1].environment},
     }
-    return Diagnosed(name, case, set_form(calibrated, form, contradicted), verdict, origin)
+    noise, form_m = noise_from(facts["steps"][-1]), facts["document"].get("other_models_m") or 0.0
+    return Diagnosed(name, case, model, estimate, np.array(facts["covariance"]), noise, form_m, read_json(verdict), origin)
 
 
-def _data_of(jobs: Sequence[JobRecord], results: str) -> set[tuple[str, str]]:
+def _data_of(jobs: Sequence[JobRecord], first: str) -> set[tuple[str, str]]:
     """Names and SHA-256 of the campaign's files as step 1 read them: the user's, which may have moved, or its folder's."""
-    job = next(job for job in jobs if f"{results}/{DESCRIPTIONS}" in job.outputs)
+    job = next(job for job in jobs if first in job.outputs)
     folder = Path(next(iter(job.inputs))).parent
     files = job.own or [file for file in job.inputs if Path(file).parent == folder]
     return {(Path(file).name, job.inputs[file]) for file in files}
@@ -107,3 +132,84 @@ def _data_of(jobs: Sequence[JobRecord], results: str) -> set[tuple[str, str]]:
 
 def _listed(values: Iterable[str]) -> str:
     return ", ".join(sorted(set(values)))
+
+
+def certificate(
+    folder: str | Path, robots_folder: str | Path, found: Diagnosed, tolerance_m: float, accepted_risk: float
+) -> dict[str, Any]:
+    """Contents of a certificate: all of the corrected robot is predicted, at the poses and loads of the campaign.
+
+    `folder`, `robots_folder`: as in `reading.read_campaign`. `found`: the campaign. Returns JSON-serialisable.
+    """
+    document = read_descriptions(folder, robots_folder)[0]
+    calibrated, verdict = found.calibrated, found.verdict
+    robot, states, poses = calibrated.robot, found.case.observations.states, campaign_poses(calibrated)
+    prediction = predict_errors(calibrated, *poses)
+    accuracy = prediction.accuracy(REGION)
+    decision = predicted_conformity(prediction.rms_m, accuracy.poses, tolerance_m, accepted_risk)
+    heldout = verdict["heldout"]
+    judged = heldout["configurations"]
+    missing = shortfalls(judged, states, robot)
+    if not accuracy.fitted:
+        missing = ["nothing fitted: no error of 0 is predicted of a robot of which nothing was fitted", *missing]
+    if missing and decision.decision == PASS:
+        decision = replace(decision, decision=UNDECIDED)
+    return {
+        "campaign": found.name,
+        "robot": robot.name,
+        "serial": document.get("serial_number", ""),
+        "date": date.today().isoformat(),
+        "stated": {"measured_on": document.get("measured_on", "")} | document.get("certificate", {}),
+        "versions": {name: metadata.version(name) for name in _LIBRARIES} | {"python": platform.python_version()},
+        "origin": found.origin,
+        "files": {Path(file).name: checksum(file) for file in campaign_files(folder, robots_folder)},
+        "verdict": verdict["verdict"],
+        "repeatable": verdict["repeatable"],
+        "effects": [effect["name"] for effect in verdict["effects"]],
+        "errors": error_rows(verdict),
+        "validation_rms_m": {"uncorrected": heldout["uncalibrated"]["rms_m"], "corrected": heldout["delivered"]["rms_m"]},
+        "regression": (verdict["remainder"] or {}).get("words", ""),
+        "noise_floor_rms_m": heldout["noise_floor_rms_m"],
+        "accuracy": asdict(accuracy),
+        "point": point_sentence(found.case.campaign),
+        "misplaced": verdict["misplaced"],
+        "worst_pose": _worst_pose(robot, poses[0], prediction.error_m),
+        "conformity": asdict(decision) | {"configurations": judged, "shortfalls": missing},
+        "joint_ranges": joint_ranges(states, robot),
+        "budget": [{"name": name, "rms_m": rms} for name, rms in error_budget(calibrated, *poses).items()],
+        "budget_states": accuracy.poses,
+        "tracker_rms_m": float(np.sqrt(3.0) * calibrated.noise.position_m),
+    }
+
+
+def error_budget(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> dict[str, float]:
+    """Error budget of a robot over commands (N, n), m, RMS.
+
+    What is missed without any correction; each effect by its name in the catalogue, or ``joint_compliance``, if it alone were
+    left out, largest first; what a correction leaves, by `accuracy.predict_errors`. Only the last add up: effects may work
+    against each other, and loads meet springs.
+    """
+    costs = effect_costs(calibrated, reported_angles, operating)
+    rest = predict_errors(calibrated, reported_angles, operating, draws=0)
+    ends = {
+        "left by the regression": root_mean_square(rest.regression_m),
+        "form of the model": root_mean_square(rest.form_m),
+        "not commanded": rest.scope.left_out_m,
+    }
+    return {
+        "uncorrected": uncorrected_m(calibrated, reported_angles, operating),
+        **{name: costs[name] for name in sorted(costs, key=costs.__getitem__, reverse=True) if costs[name] > 0.0},
+        "uncertainty of the parameters": root_mean_square(rest.parameters_m),
+        "repeatability": root_mean_square(rest.repeated_m),
+        **{name: end for name, end in ends.items() if end},
+    }
+
+
+def _worst_pose(robot: Robot, reported_angles: np.ndarray, error_m: np.ndarray) -> dict[str, Any]:
+    """Where the corrected robot is predicted to be worst: command in rad and m, RMS error there."""
+    place = int(np.argmax(error_m))
+    joints = [
+        {"value": float(value), "unit": "m" if slides else "rad"}
+        for value, slides in zip(reported_angles[place], robot.chain.prismatic, strict=True)
+    ]
+    return {"joints": joints, "error_m": float(error_m[place])}

@@ -20,18 +20,21 @@ from elastocal.fitting.parameters import parameters
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_table, write_table
-from elastocal.loop.schemas import CANDIDATES, CORRELATIONS, STEPS, measurements
+from elastocal.loop.schemas import STEPS, measurements
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.random_streams import stream
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping
     from pathlib import Path
 
-    from elastocal.effects.protocol import Candidate
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.model import Model
+
+
+# Parts of an estimate in diagnosis.json: arrays, and an array for each effect.
+_PLACEMENTS, _OF_EFFECTS = ("frame_rotation", "frame_position", "target_offset", "target_rotation"), ("coefficients", "shapes")
 
 
 def diagnose_campaign(job: Any) -> None:
@@ -47,11 +50,9 @@ def diagnose_campaign(job: Any) -> None:
     columns, facts = propose(found, stream(seed, case.campaign.name, "next experiment", 0), job.params.states)
     write_csv(job.output.experiment, pd.DataFrame(columns))
     found = replace(found, document=found.document | {"next_experiment": facts})
-    write_json(job.output.diagnosis, diagnosis_facts(found))
-    origin = provenance(job.params, **job.wildcards)
-    write_table(job.output.steps, STEPS, step_blocks(found), origin)
-    write_table(job.output.correlations, CORRELATIONS, [correlation_columns(found.final)], origin)
-    write_table(job.output.candidates, CANDIDATES, [candidate_columns(found)], origin)
+    write_csv(job.output.candidates, pd.DataFrame(candidate_rows(found)))
+    write_json(job.output.diagnosis, diagnosis_facts(found) | {"covariance": found.final.covariance.tolist()})
+    write_table(job.output.steps, STEPS, step_blocks(found), provenance(job.params, **job.wildcards))
 
 
 def load_case(descriptions_path: str | Path, measurements_path: str | Path, part: str | None = None) -> Case:
@@ -70,35 +71,39 @@ def step_blocks(diagnosis: Diagnosis) -> Iterator[dict[str, np.ndarray | list[st
 
 
 def diagnosis_facts(diagnosis: Diagnosis) -> dict[str, Any]:
-    """What diagnosis.json holds."""
-    fits = [(step, step.fitted.model.effects) for step in diagnosis.steps]
-    steps = [
-        {"name": s.name, "kind": s.kind, "noise": noise_facts(s.fitted.noise), "effects": [effect.key for effect in effects]}
-        for s, effects in fits
-    ]
+    """What diagnosis.json holds: of each step its model, with the priors under which it was fitted, and its estimate."""
+    steps = []
+    for step in diagnosis.steps:
+        effects, estimate = step.fitted.model.effects, step.fitted.estimate
+        steps.append(
+            {
+                "name": step.name,
+                "kind": step.kind,
+                "noise": noise_facts(step.fitted.noise),
+                "effects": [effect.key for effect in effects],
+                "priors": [[parameter.prior_std for parameter in effect.parameters] for effect in effects],
+                "estimate": {"sessions": [int(session) for session in estimate.sessions]}
+                | {name: getattr(estimate, name).tolist() for name in _PLACEMENTS}
+                | {name: [values.tolist() for values in getattr(estimate, name)] for name in _OF_EFFECTS},
+            }
+        )
     return {"document": diagnosis.document, "steps": steps}
 
 
 def final_parameters(facts: Mapping[str, Any], columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Parameters of the final model.
-
-    `facts`: of diagnosis.json. `columns` (N,): of the steps table. Returns (N,): columns of the steps table, of the last step.
-    """
-    last = len(facts["steps"]) - 1
-    return {name: values[columns["step"] == last] for name, values in columns.items()}
+    """Parameters of the final model, (N,): `columns` of the steps table, of the last step of diagnosis.json, `facts`."""
+    return {name: values[columns["step"] == len(facts["steps"]) - 1] for name, values in columns.items()}
 
 
-def diagnosis_from(case: Case, facts: Mapping[str, Any], columns: Mapping[str, np.ndarray]) -> Diagnosis:
-    """A diagnosis from diagnosis.json and its steps table; without the evidence, which only training poses have.
+def diagnosis_from(case: Case, facts: Mapping[str, Any]) -> Diagnosis:
+    """A diagnosis from diagnosis.json, `facts`; without the evidence, which only training poses have.
 
-    `case`: of the training poses. `facts`: of `diagnosis_facts`. `columns` (N,): of the steps table.
+    `case`: of the training poses.
     """
     measurements, left_out = case.campaign.measurements, rows_left_out(case, facts)
     case = case.select(~left_out)
-    steps = [
-        Step(step["name"], step["kind"], step_fit(case, facts, columns, number)) for number, step in enumerate(facts["steps"])
-    ]
-    return Diagnosis(case, tuple(steps), None, facts["document"], measurements.select(left_out))
+    steps = tuple(Step(step["name"], step["kind"], step_fit(case, step)) for step in facts["steps"])
+    return Diagnosis(case, steps, None, facts["document"], measurements.select(left_out))
 
 
 def rows_left_out(case: Case, facts: Mapping[str, Any]) -> np.ndarray:
@@ -107,30 +112,34 @@ def rows_left_out(case: Case, facts: Mapping[str, Any]) -> np.ndarray:
     return np.isin(case.campaign.measurements.row, left_out)
 
 
-def step_fit(case: Case, facts: Mapping[str, Any], columns: Mapping[str, np.ndarray], number: int) -> Fit:
-    """The fit of one step; it starts where it once ended.
+def step_fit(case: Case, step: Mapping[str, Any]) -> Fit:
+    """The fit of one step of diagnosis.json; it starts where it once ended."""
+    model, estimate = step_model(case, step)
+    return fit(model, case.observations, noise_from(step), estimate)
 
-    `case`, `facts`, `columns`: as in `diagnosis_from`. `number`: of the step, from 0.
+
+def step_model(case: Case, step: Mapping[str, Any]) -> tuple[Model, Estimate]:
+    """Model of one step of diagnosis.json and its estimate, without fitting it again."""
+    known, stated = {effect.key: effect for effect in case.model.effects} | case.candidates, step["estimate"]
+    effects = []
+    for key, priors in zip(step["effects"], step["priors"], strict=True):
+        # A prior that the catalogue does not have is one whose size was estimated.
+        parameters = tuple(
+            replace(p, prior_std=prior, sized=prior != p.prior_std)
+            for p, prior in zip(known[key].parameters, priors, strict=True)
+        )
+        effects.append(replace(known[key], parameters=parameters))
+    parts: dict[str, Any] = {name: np.array(stated[name], float) for name in _PLACEMENTS}
+    parts |= {name: tuple(np.array(values, float) for values in stated[name]) for name in _OF_EFFECTS}
+    return replace(case.model, effects=tuple(effects)), Estimate(tuple(stated["sessions"]), **parts)
+
+
+def candidate_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """Rows of candidates.csv: those tested by falling Bayes factor, then the others with the reason.
+
+    ``log_bayes_factor``: of a candidate alone against the declared model, averaged over its size; ``probability`` that it is in
+    the model; ``chosen``: whether the most probable model has it; ``note``: why it was not tested.
     """
-    model, estimate = step_model(case, facts, columns, number)
-    return fit(model, case.observations, noise_from({"noise": facts["steps"][number]["noise"]}), estimate)
-
-
-def step_model(case: Case, facts: Mapping[str, Any], columns: Mapping[str, np.ndarray], number: int) -> tuple[Model, Estimate]:
-    """Model and estimate of one step, without fitting it again.
-
-    `case`, `facts`, `columns`: as in `diagnosis_from`. `number`: of the step, from 0. Returns `model`: with the priors under
-    which it was fitted.
-    """
-    mine = {name: values[columns["step"] == number] for name, values in columns.items()}
-    known = {effect.key: effect for effect in case.model.effects} | case.candidates
-    effects = tuple(_with_priors(known[key], mine) for key in facts["steps"][number]["effects"])
-    model = replace(case.model, effects=effects)
-    return model, estimate_from(mine, model, np.unique(case.observations.states.session))
-
-
-def candidate_columns(diagnosis: Diagnosis) -> dict[str, list[Any]]:
-    """Columns of the candidates table: those tested by falling Bayes factor, then the others with the reason."""
     evidence, candidates = diagnosis.evidence, diagnosis.case.candidates
     rows: list[tuple[Any, ...]] = []
     untestable = dict.fromkeys(candidates, "the measurements are at fault")
@@ -145,28 +154,25 @@ def candidate_columns(diagnosis: Diagnosis) -> dict[str, list[Any]]:
         for number in np.argsort(-factors):
             unit = problem.units[number]
             if unit.candidate:
-                shape = unit.shapes[0] if unit.shapes else np.nan
+                shape = unit.shapes[0] if unit.shapes else None
                 rows.append((unit.candidate, shape, factors[number], inclusion[number], number in chosen, ""))
     tested = {row[0].key for row in rows}
-    rows += [(candidates[key], np.nan, np.nan, np.nan, False, untestable[key]) for key in candidates if key not in tested]
-    listed = [
-        (each.key, each.effect, each.family, "+".join(map(str, each.joints)), shape, len(each.parameters), *figures)
-        for each, shape, *figures in rows
+    rows += [(each, None, None, None, False, untestable[key]) for key, each in candidates.items() if key not in tested]
+    return [
+        {
+            "candidate": each.key,
+            "effect": each.effect,
+            "family": each.family,
+            "joints": "+".join(map(str, each.joints)),
+            "shape": shape,
+            "parameters": len(each.parameters),
+            "log_bayes_factor": factor,
+            "probability": inclusion,
+            "chosen": picked,
+            "note": note,
+        }
+        for each, shape, factor, inclusion, picked, note in rows
     ]
-    return {column.name: [row[place] for row in listed] for place, column in enumerate(CANDIDATES.columns)}
-
-
-def _with_priors(effect: Candidate, columns: Mapping[str, np.ndarray]) -> Candidate:
-    """An effect with the priors under which it was fitted."""
-    mine = columns["owner"] == effect.key
-    prior = dict(zip(columns["parameter"][mine], columns["prior_std"][mine], strict=True))
-    priors = [None if np.isnan(prior[p.name]) else float(prior[p.name]) for p in effect.parameters]
-    # A prior that the catalogue does not have is one whose size was estimated.
-    parameters = tuple(
-        replace(p, prior_std=deviation, sized=deviation != p.prior_std)
-        for p, deviation in zip(effect.parameters, priors, strict=True)
-    )
-    return replace(effect, parameters=parameters)
 
 
 def parameter_columns(fitted: Fit) -> dict[str, np.ndarray | list[str]]:
@@ -181,61 +187,6 @@ def parameter_columns(fitted: Fit) -> dict[str, np.ndarray | list[str]]:
         "held": fitted.held,
         "prior_std": np.array([np.nan if p.prior_std is None else p.prior_std for _, p in named]),
     }
-
-
-def correlation_columns(fitted: Fit) -> dict[str, np.ndarray | list[str]]:
-    """Columns of the correlations table of a fit: every pair of parameters that are not held."""
-    named = [f"{owner} {parameter.name}" for owner, parameter in parameters(fitted.model, fitted.estimate)]
-    free = np.flatnonzero(~fitted.held)
-    deviation = np.sqrt(np.diag(fitted.covariance))[free]
-    correlation = fitted.covariance[np.ix_(free, free)] / np.outer(deviation, deviation)
-    rows, columns = np.tril_indices(len(free), -1)
-    return {
-        "one": [named[free[row]] for row in rows],
-        "other": [named[free[column]] for column in columns],
-        "correlation": correlation[rows, columns],
-    }
-
-
-def covariance_from(parameters: Mapping[str, np.ndarray], correlations: Mapping[str, np.ndarray]) -> np.ndarray:
-    """The covariance of a fit from its tables, the inverse of `parameter_columns` and `correlation_columns`.
-
-    `parameters`, `correlations`: columns of one fit. Returns (P, P): zero where held.
-    """
-    names = [f"{owner} {parameter}" for owner, parameter in zip(parameters["owner"], parameters["parameter"], strict=True)]
-    place = {name: number for number, name in enumerate(names)}
-    deviation = np.where(parameters["held"], 0.0, parameters["std_error"])
-    correlation = np.eye(len(names))
-    for one, other, value in zip(correlations["one"], correlations["other"], correlations["correlation"], strict=True):
-        correlation[place[one], place[other]] = correlation[place[other], place[one]] = value
-    return correlation * np.outer(deviation, deviation)
-
-
-def estimate_from(columns: Mapping[str, np.ndarray], model: Model, sessions: Collection[int]) -> Estimate:
-    """The estimate of a model from the columns of its parameters.
-
-    `columns` (N,).
-    """
-    values = {(o, p): v for o, p, v in zip(columns["owner"], columns["parameter"], columns["value"], strict=True)}
-
-    def placed(owner: str, *stated: Sequence[float] | None) -> tuple[list[float], np.ndarray]:
-        shift, turn = (
-            [values.get((owner, name), missing) for name, missing in zip(names, each or (0.0, 0.0, 0.0), strict=True)]
-            for names, each in zip((("dx", "dy", "dz"), ("rx", "ry", "rz")), stated, strict=True)
-        )
-        return shift, Rotation.from_rotvec(turn).as_matrix()
-
-    frames = [placed(f"frame {session}", None, None) for session in sessions]
-    targets = [placed(f"target {target.name}", target.offset_m, target.rotation) for target in model.targets]
-    return Estimate(
-        tuple(int(session) for session in sessions),
-        np.array([turn for _, turn in frames]),
-        np.array([shift for shift, _ in frames]),
-        np.array([shift for shift, _ in targets]),
-        np.array([turn for _, turn in targets]),
-        tuple(np.array([values[effect.key, p.name] for p in effect.parameters]) for effect in model.effects),
-        tuple(np.array([values[effect.key, s.name] for s in effect.shapes]) for effect in model.effects),
-    )
 
 
 def _absolute_values(model: Model, estimate: Estimate) -> np.ndarray:

@@ -31,10 +31,10 @@ def read_campaign(job: Any) -> None:
 
 
 def load_campaign(folder: str | Path, robots_folder: str | Path) -> tuple[dict[str, Any], Measurements, Measurements]:
-    """Read a campaign and part its measurements.
+    """Read a campaign, `folder` and `robots_folder` as in `reading.read_campaign`, and part its measurements.
 
-    `folder`, `robots_folder`: as in `reading.read_campaign`. Returns `descriptions`: ``campaign`` and ``robot``, the documents;
-    ``held_out`` with the same of the campaign that holds the test, or None. Raises `InputError`.
+    Returns `descriptions`: ``campaign`` and ``robot``, the documents; ``held_out`` with the same of the campaign that holds the
+    test, or None; measurements to fit and to test. Raises `InputError`.
     """
     campaign = reading.read_campaign(folder, robots_folder, effects())
     descriptions = _descriptions(folder, robots_folder, campaign)
@@ -47,11 +47,7 @@ def load_campaign(folder: str | Path, robots_folder: str | Path) -> tuple[dict[s
 
 
 def load_whole_campaign(folder: str | Path, robots_folder: str | Path) -> tuple[dict[str, Any], Measurements]:
-    """Read a campaign without parting its measurements.
-
-    `folder`, `robots_folder`: as in `reading.read_campaign`. Returns `descriptions`: as by `load_campaign`, but for the
-    campaign that holds the test. Raises `InputError`.
-    """
+    """Read a campaign as `load_campaign`, without parting its measurements and without the campaign that holds the test."""
     campaign = reading.read_campaign(folder, robots_folder, effects())
     return _descriptions(folder, robots_folder, campaign), campaign.measurements
 

@@ -39,10 +39,7 @@ def measurements(joints: int) -> TableSchema:
             *_angles_and_wrench(joints),
             *(Column(axis, "float64", "m", f"measured position along {axis}") for axis in "xyz"),
             *(Column(f"r{axis}", "float64", "rad", f"measured rotation vector about {axis}", missing=True) for axis in "xyz"),
-            *(
-                Column(f"approach{j}", "float64", "", f"sense of approach of joint {j}", missing=True)
-                for j in range(1, joints + 1)
-            ),
+            *(Column(f"approach{j + 1}", "float64", "", f"approach of joint {j + 1}", missing=True) for j in range(joints)),
             Column("time_s", "float64", "s", "time since any instant", missing=True),
             Column("temperature_c", "float64", "°C", "temperature", missing=True),
             Column("u95_m", "float64", "m", "expanded uncertainty of this position, 95 % of one coordinate", missing=True),
@@ -50,48 +47,17 @@ def measurements(joints: int) -> TableSchema:
     )
 
 
-PARAMETER_COLUMNS = (
-    Column("owner", "text", "", "frame of a session, target, effect, or the fit itself"),
-    Column("parameter", "text", "", "name of the parameter"),
-    Column("unit", "text", "", "unit of value, standard error and prior"),
-    Column("value", "float64", "", "estimate; placement of the base for frames, of the target in its point for targets"),
-    Column("std_error", "float64", "", "standard error; 0 where held", missing=True),
-    Column("held", "bool", "", "whether the parameter is not identifiable from these data and keeps its value"),
-    Column("prior_std", "float64", "", "standard deviation of the normal prior about zero, if there is one", missing=True),
-)
-
 STEPS = TableSchema(
     "steps",
     (
         Column("step", "int32", "", "number of the model on the way from the nominal robot to all effects found", minimum=0),
-        *PARAMETER_COLUMNS,
-    ),
-)
-
-CORRELATIONS = TableSchema(
-    "correlations",
-    (
-        Column("one", "text", "", "owner and name of a parameter"),
-        Column("other", "text", "", "owner and name of another"),
-        Column("correlation", "float64", "", "of their estimates"),
-    ),
-)
-
-CANDIDATES = TableSchema(
-    "candidates",
-    (
-        Column("candidate", "text", "", "effect @ joints [variant]"),
-        Column("effect", "text", "", "name in the catalogue"),
-        Column("family", "text", "", "family in the catalogue"),
-        Column("joints", "text", "", "joints concerned, from 1, joined by +"),
-        Column("shape", "float64", "", "value of the shape parameter, where there is one", missing=True),
-        Column("parameters", "int32", "", "number of its parameters", minimum=0),
-        Column(
-            "log_bayes_factor", "float64", "", "of it alone against the declared model, averaged over its size", missing=True
-        ),
-        Column("probability", "float64", "", "posterior probability that it is in the model", missing=True),
-        Column("chosen", "bool", "", "whether the most probable model has it"),
-        Column("note", "text", "", "why it was not tested"),
+        Column("owner", "text", "", "frame of a session, target, effect, or the fit itself"),
+        Column("parameter", "text", "", "name of the parameter"),
+        Column("unit", "text", "", "unit of value, standard error and prior"),
+        Column("value", "float64", "", "estimate; placement of the base for frames, of the target in its point for targets"),
+        Column("std_error", "float64", "", "standard error; 0 where held", missing=True),
+        Column("held", "bool", "", "whether the parameter is not identifiable from these data and keeps its value"),
+        Column("prior_std", "float64", "", "standard deviation of the normal prior about zero, if there is one", missing=True),
     ),
 )
 

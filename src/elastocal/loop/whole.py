@@ -3,22 +3,19 @@ same two calls, with tables between them."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from elastocal.application.accuracy import (
-    before_m,
     calibrate_on_case,
     campaign_accuracy,
     campaign_poses,
     judge_by_held_out,
     regression_on,
     set_form,
+    uncorrected_m,
 )
-from elastocal.application.calibrated import forward, nominal_forward
-from elastocal.application.certificate import effect_costs
+from elastocal.application.calibrated import effect_costs
 from elastocal.campaigns.campaign import columns_of
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.diagnose import diagnose
@@ -28,11 +25,10 @@ from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.case import Case, case_from
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.provenance import provenance
-from elastocal.io.storage import read_table, write_table
+from elastocal.io.storage import write_table
 from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop.loading import load_campaign
-from elastocal.loop.schemas import STEPS, residuals
-from elastocal.mechanics.kinematics import pose_differences
+from elastocal.loop.schemas import residuals
 from elastocal.validation.held_out import position_residuals
 from elastocal.validation.placing import placed
 
@@ -54,7 +50,7 @@ def judge_campaign(job: Any) -> None:
 
     case = tables.load_case(job.input.descriptions, job.input.training)
     held_out = tables.load_case(job.input.descriptions, job.input.held_out, "held_out")
-    found = tables.diagnosis_from(case, read_json(job.input.diagnosis), read_table(job.input.steps, STEPS))
+    found = tables.diagnosis_from(case, read_json(job.input.diagnosis))
     verdict = judged(found, held_out, job.params.seed)
     write_json(job.output.verdict, verdict.document, allow_nan=False)
     write_csv(job.output.before_after, pd.DataFrame(verdict.rows))
@@ -130,8 +126,4 @@ def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
 
 def _accuracy(found: CalibratedRobot) -> dict[str, Any]:
     """Predicted accuracy of a corrected robot, and in the same frame the RMS error of the uncorrected one at the same poses."""
-    angles, operating = campaign_poses(found)
-    position, rotation = forward(found, angles, operating)
-    off = pose_differences(*nominal_forward(found.robot, angles), position, rotation)
-    uncorrected = float(np.sqrt((before_m(found, position, rotation, off) ** 2).mean()))
-    return {"accuracy": campaign_accuracy(found).document(), "uncorrected_m": uncorrected}
+    return {"accuracy": asdict(campaign_accuracy(found)), "uncorrected_m": uncorrected_m(found, *campaign_poses(found))}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elastocal.application.accuracy import accuracy_from, accuracy_sentence
+from elastocal.application.accuracy import Accuracy, accuracy_sentence
 from elastocal.counting import counted
 from elastocal.report import words as say
 from elastocal.report.loop_facts import title_of
@@ -42,9 +42,9 @@ def write_certificate(path: str | Path, facts: Mapping[str, Any], figures: Itera
 def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
     """Facts for the pages of a certificate.
 
-    `document`: of `loop.certificate.certificate`. Returns JSON-serialisable; strings ready to print, lists for tables.
+    `document`: of `calibrated_files.certificate`. Returns JSON-serialisable; strings ready to print, lists for tables.
     """
-    spoken = {"accuracy_sentence": accuracy_sentence(accuracy_from(document["accuracy"])), "title": title_of(document)}
+    spoken = {"accuracy_sentence": accuracy_sentence(Accuracy(**document["accuracy"])), "title": title_of(document)}
     stated = sentences("certificate.txt", say.FILTERS, document=document, **spoken)
     budget = []
     for line in document["budget"]:

@@ -310,8 +310,8 @@ def repeat_studies(job: Job) -> None:
 
 def tabulate_studies(job: Job) -> None:
     """Table 4 over studies."""
-    from elastocal.io.data_frames import read_studies
+    from elastocal.io.data_frames import read_long
 
     asked = job.params
-    found = over_studies_table(read_studies(job.input.studies, repeated), asked.length, asked.limits)
+    found = over_studies_table(read_long(job.input.studies, repeated), asked.length, asked.limits)
     write_csvs(job, table=add_slugs(found, asked.slugs))

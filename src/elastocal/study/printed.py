@@ -25,7 +25,7 @@ import numpy as np
 import pandas as pd
 from scipy.special import stdtr
 
-from elastocal.io.data_frames import read_long, read_studies
+from elastocal.io.data_frames import read_long
 from elastocal.study.evaluation import metrics, repeated
 from elastocal.study.jobs import MICRO, MILLI, Job, frames, read_reference, write_csvs
 from elastocal.study.metrics import length_to_reach
@@ -255,6 +255,6 @@ def compare_with_paper(job: Job) -> None:
 def compare_with_studies(job: Job) -> None:
     """Every printed figure among further studies, and all at once."""
     beside, initial = pd.read_csv(job.input.beside, dtype={"table": str}), frames(job, job.input.initial, INITIAL)
-    studies = read_studies(job.input.studies, repeated)
+    studies = read_long(job.input.studies, repeated)
     joint = joint_table(studies, read_reference(job.input.reference), job.params.length)
     write_csvs(job, table=comparison_table(beside, studies, initial, job.params.length), joint=joint)

@@ -199,11 +199,12 @@ def fits(run: Audited, file: str, campaign: str) -> Iterator[Finding]:
         free = step.parameters[~step.parameters["held"]]
         yield compare(f"standard errors {words}", _BY, free["std_error"] / fit.bse, np.ones(len(free)), _OF_ERRORS)
         if number == len(known.steps) - 1:
-            names = free["owner"] + " " + free["parameter"]
-            expected = pd.DataFrame(np.asarray(fit.cov_params()) / np.outer(fit.bse, fit.bse), names, names)
-            stored = run.table(f"results/loop/{campaign}/correlations.parquet")
-            pairs = [expected.loc[pair] for pair in zip(stored["one"], stored["other"], strict=True)]
-            yield compare("correlations of the estimates", _BY, stored["correlation"], pairs, absolute=_OF_ERRORS)
+            expected = np.asarray(fit.cov_params()) / np.outer(fit.bse, fit.bse)
+            held = step.parameters["held"].to_numpy()
+            covariance = np.array(run.document(f"results/loop/{campaign}/diagnosis.json")["covariance"])[~held][:, ~held]
+            deviation = np.sqrt(np.diag(covariance))
+            stored = (covariance / np.outer(deviation, deviation)).ravel()
+            yield compare("correlations of the estimates", _BY, stored, expected.ravel(), absolute=_OF_ERRORS)
 
 
 def model_of(arm: Arm) -> mujoco.MjModel:

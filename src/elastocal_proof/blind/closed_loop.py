@@ -19,7 +19,7 @@ from statsmodels.stats.proportion import proportion_confint
 from elastocal.application.accuracy import predict_errors
 from elastocal.application.calibrated import OperatingConditions, calibrate_by_fit, nominal_forward
 from elastocal.application.compensation import find_joint_targets
-from elastocal.application.frames import find_absorbed, placement, scope_about
+from elastocal.application.frames import ROBOT, Scope, find_absorbed, placement
 from elastocal.campaigns.reading import read_robot
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import as_delivered, without_gross_errors
@@ -259,7 +259,7 @@ def stated_accuracy(robot_file: Path, effect: str, seed: int, frame: str) -> lis
     off = reached(plant, targets.joint_angles, wanted.wrench, seed + 1)[0] - wanted.position
     if frame != "base":
         over = good & (wanted.part != MILLING)
-        columns = placement(scope_about(wanted.position[over]), wanted.position, wanted.rotation)
+        columns = placement(Scope(ROBOT, wanted.position[over].mean(axis=0)), wanted.position, wanted.rotation)
         field = np.concatenate([off, np.zeros_like(off)], axis=1)[..., None]
         off = (field - columns @ find_absorbed(columns[over], field[over], np.repeat([True, True, False, False], 3)))[:, :3, 0]
     tolerance = float(np.exp(stream(seed, "tolerance").uniform(*np.log(_TOLERANCES_M))))

@@ -149,10 +149,9 @@ def fold_tables(diagnosis: Diagnosis, fold: int) -> tuple[dict[str, Any], dict[s
     return facts | {"steps": facts["steps"][-1:]}, {"fold": np.full(count, fold), "step": np.full(count, _KEPT), **columns}
 
 
-def fit_of_fold(case: Case, facts: Mapping[str, Any], fits: Mapping[str, np.ndarray], fold: int) -> Fit:
+def fit_of_fold(case: Case, facts: Mapping[str, Any], fold: int) -> Fit:
     """The physical model as the diagnosis of a fold left it; `facts`: of all folds by their numbers."""
-    mine = fits["fold"] == fold
-    return step_fit(case, facts[str(fold)], {name: values[mine] for name, values in fits.items()}, _KEPT)
+    return step_fit(case, facts[str(fold)]["steps"][-1])
 
 
 def mechanism_columns(diagnosis: Diagnosis, fold: int) -> dict[str, np.ndarray | list[str]]:
@@ -204,7 +203,7 @@ def enter_league(job: Any) -> None:
     blocks, settings = [], {}
     for fold, training, tests in rounds(split, data, others):
         if method.physics == DIAGNOSIS:
-            fitted = fit_of_fold(training, read_json(job.input.facts), read_table(job.input.fits, FITS), fold)
+            fitted = fit_of_fold(training, read_json(job.input.facts), fold)
         else:
             fitted = fitted_physics(method.physics, training)
         for number, held_out in enumerate(tests, 1 if others else 0):

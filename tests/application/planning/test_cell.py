@@ -34,16 +34,14 @@ def test_a_target_behind_the_arm_is_hidden_and_one_before_it_is_seen(survey, ang
     target, _ = poses(survey.robot.chain, survey.robot.model_angles(angles), survey.robot.chain.end_effector)
     elbow = link_points(survey.robot, survey.robot.model_angles(angles))[8 * 2]
     out = (target - elbow) / np.linalg.norm(target - elbow, axis=1, keepdims=True)
-    for number in range(0, 300, 60):
-        if np.linalg.norm(target[number] - elbow[number]) < 0.4:
-            continue
+    for number in np.flatnonzero(np.linalg.norm(target - elbow, axis=1) > 0.4)[::60]:
         behind = Cell((), elbow[number] - 3.0 * out[number], 0.08)
         assert not find_allowed(behind, survey.robot, survey.targets, angles[number : number + 1])["sight"][0]
     lone = Cell((), np.array([0.0, 0.0, 500.0]), 1e-6)
     assert find_allowed(lone, survey.robot, survey.targets, angles)["sight"].all()
 
 
-@pytest.mark.parametrize("name", ["kuka", "abb", "ur10", "iiwa14"])
+@pytest.mark.parametrize("name", ["abb", "iiwa14"])
 def test_neither_forearm_nor_target_is_below_the_floor_or_in_the_column(name):
     robot, draws = analysed(name), np.random.default_rng(1)
     low, high = robot.joint_limits.T

@@ -20,17 +20,6 @@ ROWS = made_rows()
 PLACES = made_rows(7, 3, 5, 2).astype(float)
 
 
-def start():
-    return np.eye(5) + np.einsum("nki,nkj->ij", ROWS[:2].astype(float), ROWS[:2].astype(float))
-
-
-@pytest.mark.parametrize("kind", CRITERIA)
-def test_slopes_are_derivatives_of_the_value(kind):
-    rule, matrix, step = criterion(kind, PLACES), start(), 1e-6
-    expected = [(rule.value(matrix + step * row.T.astype(float) @ row) - rule.value(matrix)) / step for row in ROWS]
-    np.testing.assert_allclose(rule.slopes(ROWS, matrix), expected, rtol=1e-3)
-
-
 @pytest.mark.parametrize("kind", CRITERIA)
 def test_an_unknown_base_under_opposite_pulls_leaves_the_prior_its_1(kind):
     """Rows of thirty thousand of which the middle ones follow from the others: I + Z Z' is singular in single precision."""

@@ -151,15 +151,13 @@ def best_value(rows: np.ndarray, count: int, criterion: Criterion, chosen: list[
     return bound
 
 
-def efficiency(criterion: Criterion, matrix: np.ndarray, bound: float) -> float:
-    """Share of the best design's worth that a design with a matrix (P, P) is sure to have, by a bound of `best_value`.
+def d_efficiency(matrix: np.ndarray, bound: float) -> float:
+    """Share of the best design's worth that one with a matrix (P, P) is sure to have, by a bound of `best_value`.
 
-    D: by determinants, per parameter that the measurements tell more of than the prior; A, I: of variances.
+    By determinants, per parameter that the measurements tell more of than the prior.
     """
-    if criterion.weight is None:
-        learned = float(np.trace(np.eye(len(matrix)) - np.linalg.inv(matrix)))
-        return float(np.exp((criterion.value(matrix) - bound) / learned))
-    return bound / criterion.value(matrix)
+    learned = float(np.trace(np.eye(len(matrix)) - np.linalg.inv(matrix)))
+    return float(np.exp((Criterion(None).value(matrix) - bound) / learned))
 
 
 def _weights(rows: np.ndarray, count: int, criterion: Criterion) -> np.ndarray:

@@ -15,22 +15,21 @@ Standard deviations of a sensor are half of what its maker permits as the larges
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
-from elastocal.application.calibrated import nominal_forward
-from elastocal.application.frames import BASE, ROBOT, scope_about, subtract_placement
+from elastocal.application.calibrated import OperatingConditions, calibrate_by_model, nominal_forward, pose_sensitivities
+from elastocal.application.frames import BASE, ROBOT, Scope, subtract_placement
 from elastocal.application.planning.cell import find_allowed
 from elastocal.application.planning.designs import (
     Criterion,
     add_prior,
     best_value,
     choose_greedily,
-    criterion,
-    efficiency,
+    d_efficiency,
     exchange_candidates,
     matrix_of,
     mean_squares,
@@ -46,6 +45,7 @@ from elastocal.errors import InputError
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import Estimate, Model
+from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import Observations, States
 from elastocal.fitting.parameters import parameters
 from elastocal.mechanics.components import WRENCH_NAMES
@@ -78,49 +78,41 @@ _FORBIDDEN = {
 REPEATED_POSES, REPEATS = 10, 4
 
 
-@dataclass(frozen=True)
-class Sensor:
-    """Standard deviations of one component of a measurement; no orientation where positions are measured only.
-
-    `words`: which instrument it stands for.
-    """
-
-    words: str
-    position_m: float
-    orientation_rad: float | None
-
-
 _TRACKER = "half of MPE 15 µm + 6 µm/m"
-# By what is measured.
+# By what is measured: the instrument, and standard deviations of a coordinate (m) and of an angle (rad) that it reads.
 SENSORS = {
-    "position": Sensor(f"laser tracker and reflector at 7.5 m, {_TRACKER} (Leica AT500)", _TRACKER_M, None),
-    "pose": Sensor(
-        f"laser tracker and 6DoF probe, {_TRACKER} at 7.5 m and of 0.01° (Leica T-Mac)", _TRACKER_M, math.radians(0.01) / 2
-    ),
+    "position": (f"laser tracker and reflector at 7.5 m, {_TRACKER} (Leica AT500)", _TRACKER_M, 0.0),
+    "pose": (f"laser tracker and 6DoF probe, {_TRACKER} at 7.5 m and of 0.01° (Leica T-Mac)", _TRACKER_M, math.radians(0.005)),
 }
 
 
 @dataclass(frozen=True)
 class Survey:
-    """What is measured in each configuration.
+    """What is measured in each configuration, and how well.
 
     `targets`: all are read under each load. `unknown_base`: whether the tracker's frame is fitted. `measured`: one of
-    "position", "pose". `shares`: shares of the force of a configuration under which it is read; (0,) without loads.
-    `position_m`, `orientation_rad`: standard deviation of each component of a measurement.
+    "position", "pose". `position_m`, `orientation_rad`: standard deviation of each component of a measurement. `force_N`: of
+    the load, 0 for none; `pulled` in any direction, or a weight that hangs down.
     """
 
     robot: Robot
     targets: tuple[Target, ...]
     unknown_base: bool
     measured: str
-    shares: tuple[float, ...]
     position_m: float
     orientation_rad: float
+    force_N: float = 0.0
+    pulled: bool = False
 
     @property
     def rows(self) -> int:
         """Numbers in a measurement of one target."""
         return 6 if self.measured == "pose" else 3
+
+    @property
+    def shares(self) -> tuple[float, ...]:
+        """Shares of the force under which each configuration is read."""
+        return ((0.0, 1.0, -1.0) if self.pulled else (0.0, 1.0)) if self.loaded else (0.0,)
 
     @property
     def numbers(self) -> int:
@@ -130,7 +122,12 @@ class Survey:
     @property
     def loaded(self) -> bool:
         """Whether any reading is under a load."""
-        return any(self.shares)
+        return self.force_N > 0.0
+
+    def forces(self, count: int, draws: np.random.Generator) -> np.ndarray:
+        """A force for each of some configurations, ndarray (N, 3), N, base axes."""
+        direction = draws.standard_normal((count, 3)) if self.pulled else np.array([self.robot.gravity_m_s2] * count)
+        return self.force_N * direction / np.linalg.norm(direction, axis=1, keepdims=True)
 
 
 def model_of(survey: Survey) -> tuple[Model, Estimate]:
@@ -183,22 +180,19 @@ def accuracy_rows(survey: Survey, reported_angles: np.ndarray, force: np.ndarray
     `reported_angles` (N, n): where it shall be known, rad. `force` (N, 3): under which it works there, N, base axes. Returns
     (N, 3, P): m, per plausible size of each parameter.
     """
-    alone = replace(survey, shares=(1.0,) if survey.loaded else (0.0,))
-    end = survey.robot.chain.end_effector
-    there = [target for target in survey.targets if target.point == end.name]
-    model, estimate = model_of(replace(alone, targets=(Target("end effector", end.name, end.offset_m),)))
-    bare = replace(model, fitted_frames=False)
-    seen = observe(replace(alone, targets=bare.targets), reported_angles, force)
-    moved = linearize(bare, estimate, seen, conditions(bare, estimate, seen.states)).sensitivities[:, :3]
-    plausible = [parameter.plausible for _, parameter in parameters(bare, estimate)]
-    moved = np.concatenate([moved, np.zeros_like(moved)], axis=1) * plausible
+    model, estimate = model_of(survey)
+    count = len(parameters(model, estimate))
+    noise = Noise("declared", survey.position_m, survey.orientation_rad, np.zeros(survey.robot.joints))
+    robot = calibrate_by_model(survey.robot, model, estimate, np.zeros((count, count)), noise)
+    moved = pose_sensitivities(robot, reported_angles, OperatingConditions(np.hstack([force, np.zeros_like(force)])))
     position, rotation = nominal_forward(survey.robot, reported_angles)
+    there = [target for target in survey.targets if target.point == survey.robot.chain.end_effector.name]
     offset = bool(there) and all(target.offset_m is None for target in there)
-    scope = replace(scope_about(position), frame=ROBOT if survey.unknown_base else BASE, offset_removed=offset)
-    rows = subtract_placement(scope, position, rotation, moved)[:, :3]
+    scope = Scope(ROBOT if survey.unknown_base else BASE, position.mean(axis=0), offset_removed=offset)
+    plausible = np.array([parameter.plausible for _, parameter in parameters(robot.model, robot.estimate)])
+    found = np.zeros((len(moved), 3, count))
     # Behind the parameters of base and reflectors.
-    found = np.zeros((len(rows), 3, len(parameters(*model_of(survey)))))
-    found[..., -len(plausible) :] = rows
+    found[..., -len(plausible) :] = subtract_placement(scope, position, rotation, moved * plausible)[:, :3]
     return found
 
 
@@ -217,28 +211,6 @@ def observe(survey: Survey, reported_angles: np.ndarray, force: np.ndarray) -> O
 
 
 @dataclass(frozen=True)
-class Loads:
-    """With what the robot is loaded, 0 for nothing: `pulled` in any direction, or by a weight that hangs down."""
-
-    force_N: float
-    pulled: bool
-
-    @property
-    def shares(self) -> tuple[float, ...]:
-        """Shares of the force at which each configuration is read."""
-        if not self.force_N:
-            return (0.0,)
-        return (0.0, 1.0, -1.0) if self.pulled else (0.0, 1.0)
-
-    def forces(self, count: int, down: np.ndarray, draws: np.random.Generator) -> np.ndarray:
-        """A force for each configuration, ndarray (N, 3), N, base axes."""
-        if not self.pulled:
-            return np.tile(self.force_N * down, (count, 1))
-        direction = draws.standard_normal((count, 3))
-        return self.force_N * direction / np.linalg.norm(direction, axis=1, keepdims=True)
-
-
-@dataclass(frozen=True)
 class Candidates:
     """Configurations (N, n) as the controller reports them, rad, each with a force (N, 3), N, base axes."""
 
@@ -254,7 +226,7 @@ class Candidates:
 class Plan:
     """What to measure: configurations that choose the parameters, in the order of a short tour; random ones that judge them.
 
-    `efficiency`: as in `designs.efficiency`. `accuracy_m` (poses,): RMS error of the end effector over the workspace that the
+    `efficiency`: as in `designs.d_efficiency`. `accuracy_m` (poses,): RMS error of the end effector over the workspace that the
     parameters' uncertainty leaves, as `accuracy` counts it, with the first 1, 2, .. of the fitted ones, best first. `random_m`
     (designs, poses): the same with random configurations.
     """
@@ -266,7 +238,7 @@ class Plan:
     random_m: np.ndarray
 
 
-def find_allowed_candidates(survey: Survey, cell: Cell, loads: Loads, count: int, seed: int) -> Candidates:
+def find_allowed_candidates(survey: Survey, cell: Cell, count: int, seed: int) -> Candidates:
     """Configurations within the limits that the cell allows.
 
     `count`: of candidates; fewer where the cell allows fewer. `seed`: of Halton's sequence, scrambled, and of the directions of
@@ -284,33 +256,32 @@ def find_allowed_candidates(survey: Survey, cell: Cell, loads: Loads, count: int
         least = min(fine, key=lambda name: fine[name].mean())
         found = f"none of {counted(len(reported), 'configuration')} allowed: {_FORBIDDEN[least]}"
         raise InputError("plan", least, found, "room for the arm and its targets")
-    down = np.array(robot.gravity_m_s2) / np.linalg.norm(robot.gravity_m_s2)
-    return Candidates(reported[good], loads.forces(len(good), down, np.random.default_rng(seed)))
+    return Candidates(reported[good], survey.forces(len(good), np.random.default_rng(seed)))
 
 
-def choose_plan(survey: Survey, some: Candidates, poses: int, held_out: int, kind: str, seed: int) -> Plan:
-    """Choose configurations.
+def choose_plan(survey: Survey, some: Candidates, poses: int, held_out: int, seed: int) -> Plan:
+    """Choose configurations by the determinant of the information (D-optimal).
 
-    `poses`, `held_out`: to fit, and to judge. `kind`: one of "D", "A", "I". Raises `InputError`: fewer candidates than poses,
-    poses that measure fewer numbers than there are parameters, or targets that no joint moves.
+    `poses`, `held_out`: to fit, and to judge. Raises `InputError`: fewer candidates than poses, poses that measure fewer
+    numbers than there are parameters or than a campaign has, or targets that no joint moves.
     """
     count, draws = len(some.joint_angles), np.random.default_rng(seed)
     if count < poses + held_out:
         found = f"{poses + held_out} of {counted(count, 'allowed configuration')}"
         raise InputError("plan", "poses", found, f"at most {count}, or more candidates")
     listed = parameters(*model_of(survey))
-    if poses < fewest_poses(survey):
+    fewest = max(-(-len(listed) // survey.numbers), FEWEST_TRAINING_POSES)
+    if poses < fewest:
         found = f"{poses}, which measure {counted(poses * survey.numbers, 'number')} for {counted(len(listed), 'parameter')}"
-        raise InputError("plan", "poses", found, f"at least {fewest_poses(survey)}")
+        raise InputError("plan", "poses", found, f"at least {fewest}")
     rows = information(survey, some.joint_angles, some.force)
     if np.abs(rows[..., [owner.startswith("joint_offset") for owner, _ in listed]]).max() < _LEAST_SEEN:
         raise InputError("plan", "targets", "targets that no joint moves", "a --target on what moves, off a lone axis")
     places = some.at(draws.permutation(count)[:_PLACES])
     accuracy = accuracy_rows(survey, places.joint_angles, places.force)
-    rule, weight = criterion(kind, accuracy), mean_squares(accuracy)
-    # A design by determinants is found fast and good by all criteria: a start for the exchange.
-    chosen = exchange_candidates(rows, choose_greedily(rows, poses, Criterion(None)), rule)
-    worth = efficiency(rule, matrix_of(rows, chosen), best_value(rows, poses, rule, chosen))
+    rule, weight = Criterion(None), mean_squares(accuracy)
+    chosen = exchange_candidates(rows, choose_greedily(rows, poses, rule), rule)
+    worth = d_efficiency(matrix_of(rows, chosen), best_value(rows, poses, rule, chosen))
     rest = np.setdiff1d(np.arange(count), chosen)
     judged = draws.choice(rest, held_out, replace=False)
     # The chosen, each that which lowers the error most.
@@ -323,11 +294,6 @@ def choose_plan(survey: Survey, some: Candidates, poses: int, held_out: int, kin
         accuracy_curve(rows, order, weight),
         random,
     )
-
-
-def fewest_poses(survey: Survey) -> int:
-    """Poses that measure as many numbers as there are parameters, and as a campaign must have."""
-    return max(-(-len(parameters(*model_of(survey))) // survey.numbers), FEWEST_TRAINING_POSES)
 
 
 def tour(joint_angles: np.ndarray, chosen: list[int]) -> list[int]:
