@@ -22,7 +22,7 @@ from elastocal.application.accuracy import (
     quantile_of_length,
     scope_of,
 )
-from elastocal.application.calibrated import NEUTRAL, forward, moves_robot
+from elastocal.application.calibrated import NEUTRAL, forward
 from elastocal.application.frames import BASE, ROBOT, Scope, subtract_placement
 from elastocal.effects.catalogue import candidates_on, moves_robot
 from elastocal.fitting.least_squares import fit
