@@ -11,6 +11,7 @@ from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg import lapack
 
 from elastocal.remainder.protocol import Prediction
 
@@ -31,18 +32,17 @@ def fitted(inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], se
 
     `inputs`, `residual`, `settings`, `seed`: as in `protocol.Regression`; nothing is drawn.
     """
-    found, target, most = [], residual.ravel(), -np.inf
+    target, most = residual.ravel(), -np.inf
     for pair in combinations(range(inputs.joint_angles.shape[1]), 2):
         columns = _columns(inputs, pair).reshape(len(target), -1)
-        values, vectors = np.linalg.eigh(columns.T @ columns)
-        values, along = np.maximum(values, 0.0), vectors.T @ (columns.T @ target)
-        for penalty in _PENALTIES * max(values.mean(), np.finfo(float).tiny):
-            left = max(target @ target - (along**2 / (values + penalty)).sum(), np.finfo(float).tiny)
-            probable = -len(target) * np.log(left) - np.log1p(values / penalty).sum()
+        gram, right = columns.T @ columns, columns.T @ target
+        for penalty in _PENALTIES * max(np.diag(gram).mean(), np.finfo(float).tiny):
+            lower, found, _ = lapack.dposv(gram + penalty * np.eye(len(right)), right, lower=1)
+            left = max(target @ target - right @ found, np.finfo(float).tiny)
+            probable = -len(target) * np.log(left) - np.log(np.diag(lower) ** 2 / penalty).sum()
             if probable > most:
-                most, found = probable, [pair, vectors @ (along / (values + penalty))]
-    pair, coefficients = found
-    yield from ((lambda there: Prediction(_columns(there, pair) @ coefficients)) for _ in settings)
+                most, best, coefficients = probable, pair, found
+    yield from ((lambda there: Prediction(_columns(there, best) @ coefficients)) for _ in settings)
 
 
 def _columns(inputs: Inputs, pair: tuple[int, int]) -> np.ndarray:
