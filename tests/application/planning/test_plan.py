@@ -115,3 +115,12 @@ def test_what_a_placement_of_the_base_takes_up_is_no_error_unless_the_base_is_kn
         # The first axis turns the whole arm, as a base does that was placed otherwise; but for the load, which stays.
         assert (first < 1e-2 * second) if unknown else (first > 0.3 * second)
         assert not size[[number for number, (owner, _) in enumerate(names) if owner.startswith(("frame", "target"))]].any()
+
+
+def test_an_unknown_offset_of_the_reflector_takes_up_the_last_link(survey):
+    some, sizes = made_candidates(survey, 40), []
+    for offset in (None, (0.0, 0.0, 0.0)):
+        one = replace(survey, targets=(replace(survey.targets[0], offset_m=offset),), unknown_base=False)
+        last = [owner == "link_geometry@6" and p.unit == "m" for owner, p in parameters(*model_of(one))]
+        sizes.append(np.abs(accuracy_rows(one, some.joint_angles, some.force)[..., last]).max())
+    assert sizes[0] < 1e-2 * sizes[1]
