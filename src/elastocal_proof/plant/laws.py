@@ -49,6 +49,11 @@ def changed(robot: PhysicalRobot, part: str, **changes: Any) -> PhysicalRobot:
     return replace(robot, **{part: replace(getattr(robot, part), **changes)})
 
 
+def geared(robot: PhysicalRobot, joint: int, law: Callable[[Schedule, np.ndarray], np.ndarray]) -> PhysicalRobot:
+    """With a law of the torque on this joint alone."""
+    return added(robot, "gears", (joint, lambda done, torque, _: law(done, torque[:, joint])))
+
+
 def direction(draws: Draws) -> np.ndarray:
     vector = draws.standard_normal(3)
     return vector / np.linalg.norm(vector)
@@ -74,12 +79,8 @@ def waving(robot: PhysicalRobot, joint: int, *waves: tuple[float, float, float])
 
 def stiff_by_angle(robot: PhysicalRobot, joint: int, of: int, size: float, phase: float) -> Applied:
     """The stiffness, not the compliance, is a cosine of an angle: theta = c (1 / (1 + e cos(q_of - phase)) - 1) tau."""
-    compliance = robot.compliance[joint]
-
-    def turn(done: Schedule, torque: np.ndarray, _: np.ndarray) -> np.ndarray:
-        return compliance * (1 / (1 + size * np.cos(done.angle[:, of] - phase)) - 1) * torque[:, joint]
-
-    return added(robot, "gears", (joint, turn)), {}
+    c = robot.compliance[joint]
+    return geared(robot, joint, lambda done, tau: c * (1 / (1 + size * np.cos(done.angle[:, of] - phase)) - 1) * tau), {}
 
 
 def usual_torque_Nm(robot: PhysicalRobot, joint: int) -> float:  # noqa: N802 - units in names keep their case
@@ -266,13 +267,13 @@ def compensator_stiffness(robot: PhysicalRobot, size: float, draws: Draws, joint
     anchor, crank, free = draws.uniform(0.3, 0.5), draws.uniform(0.15, 0.22), draws.uniform(0.15, 0.3)
     zero, compliance, product = draws.uniform(-np.pi, np.pi), robot.compliance[joint], anchor * crank
 
-    def turn(done: Schedule, torque: np.ndarray, _: np.ndarray) -> np.ndarray:
+    def turn(done: Schedule, torque: np.ndarray) -> np.ndarray:
         u = done.angle[:, joint] - zero
         s = np.sqrt(anchor**2 + crank**2 - 2.0 * product * np.cos(u))
         more = size * product * (np.cos(u) * (1.0 - free / s) + product * np.sin(u) ** 2 * free / s**3)
-        return (1.0 / (1.0 / compliance + more) - compliance) * torque[:, joint]
+        return (1.0 / (1.0 / compliance + more) - compliance) * torque
 
-    return added(robot, "gears", (joint, turn)), {}
+    return geared(robot, joint, turn), {}
 
 
 @kind("flange_flexibility", "rad/(N m)", 2e-7, nowhere, scale=(1.0, 0.0))
@@ -292,19 +293,17 @@ def stiffening(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> A
     starts = usual_torque_Nm(robot, joint) * np.sort(draws.uniform(0.1, 0.8, 3))
     drop = size * robot.compliance[joint] / 3
 
-    def turn(done: Schedule, torque: np.ndarray, _: np.ndarray) -> np.ndarray:
-        mine = torque[:, joint]
-        return -np.sign(mine) * drop * np.maximum(np.abs(mine)[:, None] - starts, 0.0).sum(axis=1)
+    def turn(_: Schedule, torque: np.ndarray) -> np.ndarray:
+        return -np.sign(torque) * drop * np.maximum(np.abs(torque)[:, None] - starts, 0.0).sum(axis=1)
 
-    return added(robot, "gears", (joint, turn)), {}
+    return geared(robot, joint, turn), {}
 
 
 @kind("lost_motion", "rad", 7e-5, each_joint)
 def lost_motion(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
     """Play, of a gap 2 D, between flanks that only a seal's weak spring bridges: theta = D clip(tau / tau_t, -1, 1)."""
     closing = usual_torque_Nm(robot, joint) * draws.uniform(0.02, 0.1)
-    gap = (joint, lambda _, torque, __: size * np.clip(torque[:, joint] / closing, -1.0, 1.0))
-    return added(robot, "gears", gap), {"half_play": size}
+    return geared(robot, joint, lambda _, torque: size * np.clip(torque / closing, -1.0, 1.0)), {"half_play": size}
 
 
 @kind("hysteresis", "rad", 5e-5, each_joint, needs=("approach",))
@@ -444,7 +443,7 @@ def cable_transmission(robot: PhysicalRobot, size: float, draws: Draws, joint: i
 def asymmetric_gear(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
     """Flanks of unlike shape: theta = k tau^2, alike for both signs of the torque."""
     size = size * sign(draws)
-    return added(robot, "gears", (joint, lambda _, torque, __: size * torque[:, joint] ** 2)), {}
+    return geared(robot, joint, lambda _, torque: size * torque**2), {}
 
 
 @kind(OUTSIDE + "slipping_zero", "rad", 5e-5, each_joint)
@@ -463,11 +462,7 @@ def slipping_zero(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -
 def warm_softening(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
     """A gear that softens as it warms: theta = c r (T - 20 °C) tau."""
     softer = size * robot.compliance[joint]
-
-    def turn(done: Schedule, torque: np.ndarray, _: np.ndarray) -> np.ndarray:
-        return softer * warmth_of_castings(done.time_s) * torque[:, joint]
-
-    return added(robot, "gears", (joint, turn)), {}
+    return geared(robot, joint, lambda done, torque: softer * warmth_of_castings(done.time_s) * torque), {}
 
 
 # A parallel rod: the stiffness of the shoulder depends on the angle of the elbow, or the other way round.
