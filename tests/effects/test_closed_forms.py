@@ -21,7 +21,8 @@ from elastocal.mechanics.kinematics import poses_and_jacobians
 from elastocal.mechanics.robot import Mass
 
 CHAINS = {"fanuc": None, "track": TRACK} | {name: OTHER_CHAINS[name] for name in ("fixed rotations", "seven joints", "ur10")}
-STATES, GRAVITY = 4, np.array([0.0, 0.0, -9.80665])
+# Of a robot that hangs askew.
+STATES, GRAVITY = 4, (3.0, -4.0, -8.0)
 # Nodes of an integral along a link.
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(20)
 LONG_M = 0.05
@@ -362,7 +363,8 @@ def arms(fanuc):
     for name, text in CHAINS.items():
         chain = fanuc.chain if text is None else chain_of(text)
         for kind in PLAIN, PULLED, WEIGHED:
-            arm, sites = Arm(chain, kind == PULLED), replace(equipped(chain), masses=MASSES if kind == WEIGHED else ())
+            arm, masses = Arm(chain, kind == PULLED), MASSES if kind == WEIGHED else ()
+            sites = replace(equipped(chain), masses=masses, gravity_m_s2=GRAVITY)
             at = np.zeros((STATES, sites.chain.coordinates))
             at[:, : arm.joints] = arm.states.joint_angles
             points = [replace(point, offset_m=(0.0, 0.0, 0.0)) for point in sites.chain.points]
@@ -371,59 +373,33 @@ def arms(fanuc):
     return found
 
 
-def shapes_of(law):
-    """The value where a fit starts, and one a quarter up the range."""
-    if not law.shapes:
-        return [()]
-    quarter = tuple(shape.lowest + (shape.highest - shape.lowest) / 4 for shape in law.shapes)
-    return [tuple(shape.start for shape in law.shapes), quarter]
-
-
 def compared(arms, chain, laws, closed):
-    """Key, name, dense displacement, what it makes of the points, and what it should, for each parameter of each law."""
+    """Key and name, what it makes of the points, and what it should, for each parameter of each law."""
     kind = PLAIN if laws(arms[chain, PLAIN][1].sites) else WEIGHED
     for law in laws(arms[chain, kind][1].sites):
         arm, around, jacobian = arms[chain, PULLED if law.detail.endswith("in the pull") else kind]
-        for shapes in shapes_of(law):
+        # Where a fit starts, and a quarter up the range.
+        quarter = [shape.lowest + (shape.highest - shape.lowest) / 4 for shape in law.shapes]
+        for shapes in ([shape.start for shape in law.shapes], quarter)[: 1 + bool(quarter)]:
             made = displacements(law, around, *shapes)
             for parameter, each in zip(law.parameters, made, strict=True):
-                expected = closed(arm, law, parameter.name, *shapes)
-                yield f"{law.key} {parameter.name}", each, jacobian, expected
+                found = np.einsum("sprc,sc->spr", jacobian, each)
+                yield f"{law.key} {parameter.name}", found, closed(arm, law, parameter.name, *shapes)
 
 
 def close(found, expected):
     return np.allclose(found, expected, rtol=0, atol=1e-7 * np.abs(expected).max() + 1e-14)
 
 
-def twist(jacobian, made):
-    return np.einsum("sprc,sc->spr", jacobian, made)
-
-
-def closed_form_of(effect):
-    if effect not in CLOSED_FORMS:
-        pytest.fail(f"{effect} has no closed form in {__file__}: add one, by name of its parameters, to CLOSED_FORMS")
-    return CLOSED_FORMS[effect]
-
-
 @pytest.mark.parametrize("chain", CHAINS)
 @pytest.mark.parametrize("effect", sorted(catalogue.effects()))
 def test_effect_is_its_closed_form(effect, chain, arms):
-    closed, laws = closed_form_of(effect), catalogue.effects()[effect].candidates
-    for key, made, jacobian, expected in compared(arms, chain, laws, closed):
-        found = twist(jacobian, made)
+    assert effect in CLOSED_FORMS, "it has no closed form: add one, by name of its parameters"
+    closed, laws = CLOSED_FORMS[effect], catalogue.effects()[effect].candidates
+    for key, found, expected in compared(arms, chain, laws, closed):
         assert close(found, expected), (key, np.abs(found - expected).max(), np.abs(expected).max())
-
-
-@pytest.mark.parametrize("effect", sorted(catalogue.effects()))
-def test_a_wrong_sign_factor_or_axis_of_any_parameter_would_be_seen(effect, arms):
-    """On an industrial arm: of the displacement as it is with another sign, 1 % larger, and on the next coordinate."""
-    closed, laws = closed_form_of(effect), catalogue.effects()[effect].candidates
-    looked_at = 0
-    for key, made, jacobian, expected in compared(arms, "fanuc", laws, closed):
-        for wrong in (-made, 1.01 * made, np.roll(made, 1, axis=1), np.roll(made, -1, axis=1)):
-            assert not close(twist(jacobian, wrong), expected), key
-        looked_at += 1
-    assert looked_at
+        # On an industrial arm nothing is compared with nothing.
+        assert chain != "fanuc" or expected.any(), key
 
 
 @pytest.mark.parametrize("chain", CHAINS)
@@ -432,5 +408,5 @@ def test_springs_of_the_declared_model_turn_each_joint_by_its_torque(chain, arms
         joint = int(name.removeprefix("c"))
         return arm.of_joint(joint, arm.torque[:, joint - 1])
 
-    for key, made, jacobian, expected in compared(arms, chain, lambda sites: [joint_compliance(sites)], closed):
-        assert expected.any() and close(twist(jacobian, made), expected), key
+    for key, found, expected in compared(arms, chain, lambda sites: [joint_compliance(sites)], closed):
+        assert expected.any() and close(found, expected), key

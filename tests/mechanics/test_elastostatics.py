@@ -19,13 +19,6 @@ from elastocal.mechanics.robot import Tube
 from elastocal.study.simulation import true_deflections
 
 
-def test_generalized_forces_are_the_transposed_jacobian_times_the_wrench():
-    rng = np.random.default_rng(2)
-    jacobian, wrench = rng.standard_normal((4, 5, 6, 7)), rng.standard_normal((4, 5, 6))
-    expected = np.stack([[jacobian[i, j].T @ wrench[i, j] for j in range(5)] for i in range(4)])
-    np.testing.assert_allclose(generalized_forces(jacobian, wrench), expected, rtol=0, atol=1e-14)
-
-
 def transported(wrench, from_position, to_position):
     """A wrench stated at another point of the same rigid body: M' = M + (p - p') x F."""
     force, moment = wrench[..., :3], wrench[..., 3:]
