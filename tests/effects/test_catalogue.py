@@ -99,6 +99,7 @@ def test_parameters_have_units_names_and_positive_plausible_sizes(chain):
             # A geometric series of values never comes to zero, evenly spaced ones may.
             assert shape.unit and (shape.lowest >= 0 if shape.tried else shape.lowest > 0)
             assert shape.lowest < shape.start < shape.highest
+            assert shape.unit != "s" or (shape.lowest, shape.start, shape.highest) == (900, 3600, 36000)
         # Or measurements at too few angles would pass for a test of it.
         assert not candidate.distinct_angles or candidate.joints or candidate.turning
 

@@ -30,9 +30,8 @@ def chain_texts(draw):
                 words.append(f"T{axis}({sign}{draw(st.integers(0, 2000)) / 1000:.3f})")
             else:
                 words.append(f"R{axis}({sign}{draw(st.integers(0, 360))}deg)")
-        words.append(
-            f"{draw(st.sampled_from('RRT'))}{draw(st.sampled_from('xyz'))}({draw(st.sampled_from(['', '-']))}q{joint})"
-        )
+        kind, axis, sign = (draw(st.sampled_from(choices)) for choices in ("RRT", "xyz", ["", "-"]))
+        words.append(f"{kind}{axis}({sign}q{joint})")
     return " ".join([*words, f"Tx({draw(st.integers(0, 500)) / 1000:.3f})", "[end]"])
 
 

@@ -125,6 +125,12 @@ def test_edit_reruns_what_depends_on_it_of(edit, cell):
     assert rerun <= planned and not untouched & planned
 
 
+def test_a_campaign_is_one_however_it_is_spelled(cell):
+    cell.path("link").symlink_to(cell.path(CELL))
+    for spelled in (cell.path(CELL), f"{CELL}/", f"./cells/../{CELL}", "link"):
+        assert cell.planned("diagnose", "--config", f"campaign={spelled}") <= {("diagnose",)}, spelled
+
+
 def test_a_broken_campaign_ends_with_one_line(unstarted, kuka):
     made_folder(unstarted.path(CELL), kuka, table=made_table(kuka, "made"))
     file = unstarted.path(CELL) / "measurements.csv"
