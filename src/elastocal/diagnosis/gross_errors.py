@@ -91,8 +91,8 @@ class Yardstick:
 class _Beside:
     """Rows of measurements beside a model, of which a sample and all that lie far off are looked at closely.
 
-    `residual` (N, rows). `far` (N,): whole distance in standard deviations of the sensor. `sample`, `closely` (N,): poses spread
-    over those kept; these, and what is as far off as a quarter of all. `parts`: which of the latter; their
+    `residual` (N, rows). `far` (N,): whole distance in standard deviations of the sensor. `sample`, `closely` (N,): poses
+    spread over those kept; these, and what is as far off as a quarter of all. `parts`: which of the latter; their
     linearisation; variance (m, rows, rows) of each, and that of a radian in each joint. `noise`: of one row.
     """
 
@@ -283,8 +283,8 @@ def _sentence(found: Deviations, campaign: Campaign, place: int) -> str:
 
 @dataclass(frozen=True)
 class Kept:
-    """The part of a case that is fitted, ``kept`` of all its measurements (N,), with its noise, and its declared model fitted to
-    what is `searched`: observations that a search looks at, no more than so many."""
+    """The part of a case that is fitted, ``kept`` of all its measurements (N,), with its noise, and its declared model fitted
+    to what is `searched`: observations that a search looks at, no more than so many."""
 
     case: Case
     kept: np.ndarray
