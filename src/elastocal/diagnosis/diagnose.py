@@ -337,6 +337,7 @@ def _document(
         "held": sorted({f"{o} {p.name}" for (o, p), held in zip(final.parameters, final.held, strict=True) if held}),
         "candidates_tested": len(tested),
         "untestable": untestable,
+        "converged": {"declared": declared.converged, "final": final.converged},
         "warnings": list(dict.fromkeys(remarks)),
         "settings": settings.document(),
     }

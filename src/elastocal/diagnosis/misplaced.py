@@ -82,7 +82,7 @@ def misplaced(fitted: Fit, campaign: Campaign) -> list[dict[str, Any]]:
     others: dict[str, set[str]] = {}
     last, at = explained(taken)
     # Along one axis of a place, or along all of them.
-    ways = [(n,) for n in shifts]
+    ways: list[tuple[int, ...]] = [(n,) for n in shifts]
     ways += [tuple(n for n in shifts if places[n] == place) for place in set(places.values())]
     while len(taken) < _MOST_AXES and (left := [way for way in ways if not set(way) & set(taken)]):
         tried = {way: explained([*taken, *way]) for way in left}
