@@ -19,9 +19,8 @@ import numpy as np
 from common import ROOT, Row, beside_yardstick, interleaved
 
 from elastocal.campaigns.importers import FOLDER_VARIABLE, importer
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.parameters import parameters
-from elastocal.fitting.registration import registered
+from elastocal.fitting.least_squares import fit, registered
+from elastocal.fitting.model import parameters
 from elastocal.fitting.tolerances import estimated_noise
 from elastocal.io.documents import read_document
 from elastocal.loop.whole import cases_in

@@ -26,8 +26,8 @@ from elastocal.application.calibrated import NEUTRAL, forward, moves_robot
 from elastocal.application.frames import BASE, ROBOT, scope_about, subtract_placement
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.least_squares import fit
+from elastocal.fitting.model import stepped
 from elastocal.fitting.noise import Noise
-from elastocal.fitting.parameters import stepped
 from elastocal.loop.whole import cases_in
 from elastocal.mechanics.sites import sites_of
 from elastocal.validation.held_out import position_residuals

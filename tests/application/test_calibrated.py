@@ -16,7 +16,7 @@ from elastocal.application.calibrated import (
     forward,
     pose_sensitivities,
 )
-from elastocal.fitting.parameters import stepped
+from elastocal.fitting.model import stepped
 from elastocal.mechanics.robot import Mass
 
 ONE_JOINT = "Tz(0.5) Ry(q1) Tx(0.8) [hand]"

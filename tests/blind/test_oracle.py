@@ -10,7 +10,7 @@ from made_blind_documents import PLAN
 from scipy.stats import chi2, multivariate_normal
 
 from elastocal.effects.catalogue import candidates_on
-from elastocal.fitting.case import noise_facts
+from elastocal.fitting.noise import noise_facts
 from elastocal.fitting.tolerances import estimated_noise
 from elastocal.loop.whole import cases_in, diagnosed
 from elastocal.mechanics.sites import sites_of

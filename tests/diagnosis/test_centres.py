@@ -12,8 +12,8 @@ from elastocal.diagnosis.centres import with_probable_centres, with_stated_centr
 from elastocal.diagnosis.kept_rows import Kept
 from elastocal.diagnosis.settings import Settings
 from elastocal.effects.catalogue import candidates_on
-from elastocal.fitting.case import Case
 from elastocal.fitting.least_squares import fit
+from elastocal.fitting.model import Case
 from elastocal.mechanics.robot import Mass
 
 MASSES = (

@@ -7,8 +7,8 @@ import pytest
 from made_campaigns import POINTS, Plan, made
 
 from elastocal.campaigns.columns import columns_of
-from elastocal.fitting.case import case_from, noise_facts, noise_from
-from elastocal.fitting.noise import Noise
+from elastocal.fitting.model import case_from
+from elastocal.fitting.noise import Noise, noise_facts, noise_from
 from elastocal.io.documents import read_document
 
 

@@ -11,9 +11,8 @@ from synthetic import NOISE, made_estimate, made_model, made_states, seen_exactl
 
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
-from elastocal.fitting.displacement import conditions, displaced_coordinates
 from elastocal.fitting.least_squares import fit
-from elastocal.fitting.prediction import predict
+from elastocal.fitting.prediction import conditions, displaced_coordinates, predict
 from elastocal.mechanics.elastostatics import exact_deflections, joint_torques
 from elastocal.mechanics.kinematics import poses
 

@@ -9,8 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from elastocal.fitting import factored
-from elastocal.fitting.factored import Displacements, Factored
-from elastocal.fitting.linearization import effect_columns
+from elastocal.fitting.linearization import Displacements, Factored, effect_columns
 
 
 class Laws:

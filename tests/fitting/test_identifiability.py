@@ -5,8 +5,8 @@ import pytest
 from fitted_models import model_of, names_held
 from synthetic import NOISE, made_estimate, made_states, seen_exactly, with_noise
 
-from elastocal.fitting.identifiability import identifiable, solve_normal
 from elastocal.fitting.least_squares import fit
+from elastocal.fitting.normal_equations import identifiable, solve_normal
 
 
 def solved(left, right, plausible, *given):

@@ -6,10 +6,10 @@ import numpy as np
 from synthetic import NOISE, candidate_on, made_estimate, made_model, made_states, seen_exactly, slopes, small_steps
 
 from elastocal.campaigns.campaign import Target
-from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.parameters import parameters
+from elastocal.fitting.model import parameters
+from elastocal.fitting.prediction import conditions
 
 
 def test_sensitivities_are_central_differences_of_the_residuals(full_case):

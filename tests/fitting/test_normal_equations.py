@@ -17,10 +17,10 @@ from fitted_models import (
 )
 from synthetic import made_estimate, made_states, seen_exactly, with_noise
 
-from elastocal.fitting.displacement import conditions
+from elastocal.fitting.model import parameters
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.normal_equations import Parts
-from elastocal.fitting.parameters import parameters
+from elastocal.fitting.prediction import conditions
 
 
 @pytest.mark.parametrize("pose_rad", [0.0, 3e-5])

@@ -6,7 +6,7 @@ from fitted_models import model_of
 from synthetic import made_estimate, made_model
 
 from elastocal.campaigns.campaign import Target
-from elastocal.fitting.parameters import limits, nonlinear_parameters, parameter_values, parameters, stepped
+from elastocal.fitting.model import limits, nonlinear_parameters, parameter_values, parameters, stepped
 
 
 def test_parameters_are_named_in_the_order_of_the_sensitivities(full_case):

@@ -9,9 +9,8 @@ from support import OTHER_CHAINS, chain_of
 from synthetic import made_estimate, made_model, made_states, seen_exactly
 
 from elastocal.effects.catalogue import candidates_on
-from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.prediction import residuals
+from elastocal.fitting.prediction import conditions, residuals
 
 
 def test_residual_is_what_was_added_to_the_measurements_seen_in_base_axes(full_case):

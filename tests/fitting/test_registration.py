@@ -8,7 +8,7 @@ from support import chain_of
 from synthetic import made_estimate, made_model, made_states, seen_exactly
 
 from elastocal.campaigns.campaign import Target
-from elastocal.fitting.registration import registered
+from elastocal.fitting.least_squares import registered
 
 KNOWN_M, KNOWN_RAD = 1e-6, 1e-6
 TWO = (Target("A", "6DoF", None), Target("B", "3DoF", None))

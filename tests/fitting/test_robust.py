@@ -11,10 +11,9 @@ from scipy.stats import chi2
 from synthetic import NOISE, made_estimate
 
 from elastocal.effects.protocol import Candidate, Parameter, Shape
-from elastocal.fitting.displacement import conditions
-from elastocal.fitting.least_squares import fit
+from elastocal.fitting.least_squares import fit, robustly
 from elastocal.fitting.noise import Noise
-from elastocal.fitting.robust import robustly
+from elastocal.fitting.prediction import conditions
 
 
 def robust_objective(found):

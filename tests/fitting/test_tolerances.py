@@ -11,9 +11,8 @@ from made_campaigns import Plan, made
 from planted import planted
 from scipy.spatial.transform import Rotation
 
-from elastocal.fitting.case import Case
 from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import declared_model
+from elastocal.fitting.model import Case, declared_model
 from elastocal.fitting.noise import FINEST
 from elastocal.fitting.observations import averaged
 from elastocal.fitting.tolerances import (

@@ -7,11 +7,11 @@ import pytest
 from synthetic import made_estimate, made_model, made_states, seen_exactly
 
 from elastocal.campaigns.campaign import Target
-from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.noise import Noise
+from elastocal.fitting.normal_equations import whitening
 from elastocal.fitting.observations import Observations
-from elastocal.fitting.whitening import whitening
+from elastocal.fitting.prediction import conditions
 
 TARGETS = tuple(Target(name, point, (0.1, 0.05, 0.0)) for name, point in (("A", "6DoF"), ("B", "3DoF"), ("C", "2DoF")))
 NOISE = Noise("repeats", 60e-6, 40e-6, 1e-6 * np.array([30.0, 40, 50, 60, 70, 0]))

@@ -9,8 +9,8 @@ from synthetic import NOISE, made_estimate, made_model
 from elastocal.campaigns.campaign import Target
 from elastocal.campaigns.columns import columns_of
 from elastocal.effects.catalogue import candidates_on
-from elastocal.fitting.fit_result import Fit
-from elastocal.fitting.parameters import parameters
+from elastocal.fitting.least_squares import Fit
+from elastocal.fitting.model import parameters
 from elastocal.io.json_files import write_json
 from elastocal.io.storage import TableSchema, read_table, write_table
 from elastocal.loop import diagnosis_tables as tables

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.stats import t as student
 
-from elastocal.validation.bootstrap_t import drawn_poses, log_ratio_interval
+from elastocal.validation.held_out import drawn_poses, log_ratio_interval
 
 ENDS = np.array([0.05, 0.95])
 

@@ -7,12 +7,12 @@ import pytest
 from planted import planted
 from synthetic import made_estimate, made_model, made_states, seen_exactly
 
-from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import select_states
-from elastocal.validation.fitted_range import beyond_campaign, beyond_loads, outside_fitted_range, predictive_variances
+from elastocal.fitting.prediction import conditions
+from elastocal.validation.placing import beyond_campaign, beyond_loads, outside_fitted_range, predictive_variances
 
 FOUND = ("joint_offset@2", "joint_offset@3", "payload", "base_compliance")
 

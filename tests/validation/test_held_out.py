@@ -9,10 +9,9 @@ from planted import ELBOW_AND_HAND, planted
 from scipy.stats import t as student
 from synthetic import made_estimate, made_model, made_states, seen_exactly, with_noise
 
-from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.noise import Noise
-from elastocal.fitting.prediction import predict
+from elastocal.fitting.prediction import conditions, predict
 from elastocal.validation.held_out import (
     METRICS,
     Errors,

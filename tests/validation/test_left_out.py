@@ -9,8 +9,8 @@ from synthetic import NOISE, made_estimate, made_model, made_states, seen_exactl
 
 from elastocal.campaigns.campaign import Target
 from elastocal.fitting.least_squares import evaluated, fit
+from elastocal.fitting.model import stepped
 from elastocal.fitting.observations import select_states, state_clusters
-from elastocal.fitting.parameters import stepped
 from elastocal.fitting.tolerances import with_size
 from elastocal.validation.held_out import position_errors, position_residuals, summary
 from elastocal.validation.left_out import certain_loss, cross_validated, left_out_squares, refits, split_rows, splits_of

@@ -7,7 +7,7 @@ import pytest
 from planted import planted
 from support import chain_of
 
-from elastocal.validation.span import (
+from elastocal.validation.conformity import (
     FEWEST_CONFIGURATIONS,
     LEAST_TRAVEL,
     LEAST_TURN_RAD,

@@ -31,18 +31,17 @@ from elastocal.application.calibrated import (
     square_root,
 )
 from elastocal.application.frames import BASE, FRAMES, ROBOT, Scope, find_absorbed, free_parts, placement
-from elastocal.fitting.displacement import conditions, displaced_coordinates
 from elastocal.fitting.linearization import linearize
+from elastocal.fitting.model import parameters
 from elastocal.fitting.noise import hidden_repeatability
-from elastocal.fitting.parameters import parameters
+from elastocal.fitting.prediction import conditions, displaced_coordinates
 from elastocal.mechanics.kinematics import jacobians, pose_differences, poses
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from elastocal.application.calibrated import CalibratedRobot
-    from elastocal.fitting.case import Case
-    from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.model import Case, Estimate, Model
     from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import States
     from elastocal.remainder.protocol import Predictor

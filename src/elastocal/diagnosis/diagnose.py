@@ -42,16 +42,15 @@ from elastocal.diagnosis.verdict import (
     with_related,
 )
 from elastocal.effects.catalogue import effects
-from elastocal.fitting.case import noise_facts
-from elastocal.fitting.displacement import joint_compliances
-from elastocal.fitting.least_squares import ON_THE_WAY, fit
+from elastocal.fitting.least_squares import ON_THE_WAY, SETTLED, fit
+from elastocal.fitting.model import parameter_values
+from elastocal.fitting.noise import noise_facts
 from elastocal.fitting.observations import sample_of
-from elastocal.fitting.parameters import parameter_values
-from elastocal.fitting.robust import SETTLED
+from elastocal.fitting.prediction import joint_compliances
 from elastocal.fitting.tolerances import effective_parameters
 from elastocal.random_streams import stream
 from elastocal.remainder.repeatable import repeatable_part
-from elastocal.validation.left_out import certain_loss, left_out_squares
+from elastocal.validation.left_out import left_out_squares
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -62,8 +61,8 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.kept_rows import Kept
     from elastocal.diagnosis.settings import Settings
     from elastocal.diagnosis.verdict import Hypothesis
-    from elastocal.fitting.case import Case
-    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.least_squares import Fit
+    from elastocal.fitting.model import Case
     from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import Observations
     from elastocal.remainder.repeatable import Repeatable
@@ -242,7 +241,8 @@ def _losses(bare: Fit, models: Sequence[Fit], observations: Observations, settin
         numbers, words = fitted.residual.size, ""
         if numbers < settings.numbers_a_parameter * effective_parameters(fitted):
             mine, others = (left_out_squares(each, observations) for each in (fitted, bare))
-            if certain_loss(mine, others):
+            off = mine - others
+            if off.mean() > off.std(ddof=1) / np.sqrt(len(off)):
                 rms = [f"{1e3 * np.sqrt(each.mean()):.2f} mm" for each in (mine, others)]
                 words = (
                     f"training poses left out in turn are off by {rms[0]} RMS by the {name}, by {rms[1]} with frames and"

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.search import Posterior
     from elastocal.diagnosis.verdict import Conclusion
     from elastocal.effects.protocol import Candidate, Parameter
-    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Model
     from elastocal.fitting.observations import Observations
 

@@ -22,20 +22,18 @@ import numpy as np
 from scipy.special import chdtri, fdtri, gammaincinv
 
 from elastocal.counting import counted
-from elastocal.fitting.displacement import conditions, observations_at_once
 from elastocal.fitting.linearization import linearize
+from elastocal.fitting.model import parameters
 from elastocal.fitting.noise import measurement_covariances
-from elastocal.fitting.observations import part_at, parts_of, select_states, single_observations, spread_poses
-from elastocal.fitting.parameters import parameters
-from elastocal.fitting.prediction import residuals
+from elastocal.fitting.observations import parts_of, select_states, single_observations, spread_poses
+from elastocal.fitting.prediction import conditions, residuals
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
     from elastocal.diagnosis.settings import Settings
-    from elastocal.fitting.case import Case
-    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.linearization import Linearization
-    from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.model import Case, Estimate, Model
     from elastocal.fitting.noise import Noise
 
 # Shares of the distances from which the scale is estimated: the second sees tails that are heavier than normal ones.
@@ -102,18 +100,16 @@ class _Beside:
         if near.all():
             closely, far = near, np.zeros(len(single))
         else:
-            for states, seen in parts_of(single, observations_at_once(model.rows, 0)):
-                part = part_at(single, states, seen)
+            for _, seen, part in parts_of(single, 0):
                 residual[seen] = residuals(model, estimate, part, conditions(model, estimate, part.states))
             far = np.linalg.norm(residual / np.repeat([noise.position_m, noise.orientation_rad], 3)[: model.rows], axis=1)
             closely = near | sample | (far > np.quantile(far[near], _SCALE_QUANTILES[-1]))
         some, parts = select_states(single, closely), []
-        for edges in parts_of(some, observations_at_once(model.rows, len(parameters(model, estimate)))):
-            part = part_at(some, *edges)
+        for _, seen, part in parts_of(some, len(parameters(model, estimate))):
             line, spread = linearize(model, estimate, part, conditions(model, estimate, part.states)), noise.spread(part)
-            jacobian = line.coordinate_jacobian[..., : model.sites.joints]
+            jacobian = line.joint_jacobian
             own = measurement_covariances(noise, jacobian[:, None], model.rows, None if spread is None else spread[:, None])
-            parts.append((edges[1], line, own, jacobian @ jacobian.transpose(0, 2, 1)))
+            parts.append((seen, line, own, jacobian @ jacobian.transpose(0, 2, 1)))
         residual[closely] = np.concatenate([line.residual for _, line, _, _ in parts])
         return cls(residual, far, sample, closely, parts)
 

@@ -14,17 +14,15 @@ from elastocal.counting import counted
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.gross_errors import Deviations, entries_of, held_out_gross_errors, warnings_of, yardstick_of
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.case import noise_from
-from elastocal.fitting.displacement import conditions
+from elastocal.fitting.noise import noise_from
 from elastocal.fitting.observations import single_observations, state_clusters
-from elastocal.fitting.prediction import measured_in_base, residuals
+from elastocal.fitting.prediction import conditions, measured_in_base, residuals
 from elastocal.random_streams import stream
 from elastocal.remainder.corrected import Plan, corrected, remainder_facts
-from elastocal.validation.fitted_range import outside_poses, repeat_warnings
+from elastocal.validation.conformity import count_configurations, joint_ranges
 from elastocal.validation.held_out import (
     METRICS,
     errors_by_range,
-    grown,
     intervals,
     noise_floor,
     position_errors,
@@ -32,16 +30,14 @@ from elastocal.validation.held_out import (
     summary,
 )
 from elastocal.validation.left_out import error_row, split_rows
-from elastocal.validation.placing import placed
-from elastocal.validation.span import count_configurations, joint_ranges
+from elastocal.validation.placing import outside_poses, placed, repeat_warnings
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from elastocal.campaigns.campaign import Measurements
     from elastocal.diagnosis.diagnose import Diagnosis, Step
-    from elastocal.fitting.case import Case
-    from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.model import Case, Estimate, Model
     from elastocal.remainder.corrected import Corrected
     from elastocal.validation.held_out import Errors
 
@@ -163,9 +159,10 @@ def heldout_errors(
             row |= {f"heldout_{name}_low": limit[name][0], f"heldout_{name}_high": limit[name][1]}
         row |= {f"heldout_{name.removesuffix('_m')}_over_floor": tested[name] / floor for name in METRICS}
         rows.append(row)
-    for name in grown(summary(errors[before].distance), summary(errors[after].distance)):
+    for name in METRICS:
         low, high = (1e3 * rows[number][f"heldout_{name}"] for number in (before, after))
-        warnings.append(f"the {_ERRORS[name]} {ABOUT_ERRORS} grew from {low:.3f} to {high:.3f} mm")
+        if high > low:
+            warnings.append(f"the {_ERRORS[name]} {ABOUT_ERRORS} grew from {low:.3f} to {high:.3f} mm")
     for last, row in pairwise(rows[before:]):
         if row["heldout_rms_m"] > last["heldout_rms_m"]:
             warnings.append(f"the step '{row['step']}' raised the RMS error {ABOUT_ERRORS}")

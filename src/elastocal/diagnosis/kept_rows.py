@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.linearize import Linearized
     from elastocal.diagnosis.settings import Settings
     from elastocal.diagnosis.statistics import WhiteRows
-    from elastocal.fitting.case import Case
-    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.least_squares import Fit
+    from elastocal.fitting.model import Case
     from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import Observations
 

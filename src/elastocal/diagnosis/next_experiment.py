@@ -31,11 +31,11 @@ from elastocal.diagnosis.alternatives import (
 from elastocal.diagnosis.refit import mean_square_left
 from elastocal.diagnosis.statistics import rows_alike
 from elastocal.diagnosis.verdict import ADEQUATE, NAMED, NOT_TESTABLE, mechanisms_of_models
-from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import effect_columns, linearize
+from elastocal.fitting.model import parameters
+from elastocal.fitting.normal_equations import whitening
 from elastocal.fitting.observations import Observations, States
-from elastocal.fitting.parameters import parameters
-from elastocal.fitting.whitening import whitening
+from elastocal.fitting.prediction import conditions
 from elastocal.mechanics.components import WRENCH_NAMES
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.search import Model
     from elastocal.diagnosis.settings import Settings
     from elastocal.effects.protocol import Displacing
-    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.noise import Noise
     from elastocal.mechanics.robot import Robot
 

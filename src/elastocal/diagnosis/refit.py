@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.fitting.least_squares import fit
-from elastocal.fitting.parameters import parameter_values
+from elastocal.fitting.model import parameter_values
+from elastocal.fitting.normal_equations import whitening
 from elastocal.fitting.tolerances import with_prior
-from elastocal.fitting.whitening import whitening
 
 # Of the mean square; each step leaves what the error common to a pose makes of it, which does not grow.
 _NOISE_STEPS, _NOISE_SETTLED = 20, 0.02
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.linearize import Linearized
     from elastocal.diagnosis.search import Model, Problem
     from elastocal.effects.protocol import Candidate
-    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import Observations
 

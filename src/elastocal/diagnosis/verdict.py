@@ -19,7 +19,7 @@ import numpy as np
 
 from elastocal.diagnosis.averaging import squares_beyond
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.fitting.displacement import joint_compliances
+from elastocal.fitting.prediction import joint_compliances
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Sequence
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.alarm import Alarm
     from elastocal.diagnosis.search import Model, Posterior, Problem
     from elastocal.diagnosis.settings import Settings
-    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.noise import Noise
     from elastocal.remainder.repeatable import Repeatable
 

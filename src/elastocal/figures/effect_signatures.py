@@ -14,8 +14,8 @@ from elastocal.effects.catalogue import effects
 from elastocal.effects.conditions import conditions_of
 from elastocal.effects.protocol import Candidate
 from elastocal.figures.style import PALETTE, panels, styled
-from elastocal.fitting.displacement import displace
 from elastocal.fitting.observations import States
+from elastocal.fitting.prediction import displace
 from elastocal.mechanics.kinematics import poses
 from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.sites import Sites, sites_of

@@ -1,4 +1,4 @@
-"""What the measurements are modelled by: nominal robot, frames, targets, any set of effects, and values of what is unknown."""
+"""What the measurements are modelled by, and everything that this leaves open as one vector of parameters."""
 
 from __future__ import annotations
 
@@ -6,23 +6,33 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
+from elastocal.campaigns.campaign import Campaign, assemble_campaign
+from elastocal.campaigns.columns import measurements_from
+from elastocal.effects.catalogue import candidates_on, declared_candidates
 from elastocal.effects.conditions import offered
 from elastocal.effects.elastic import joint_compliance
 from elastocal.effects.gravity import declared_weight
+from elastocal.effects.protocol import Candidate, Parameter, moved_and_turned
+from elastocal.fitting.observations import Observations, averaged, without_outlying_repeats
+from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.mechanics.sites import Sites, sites_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
+    from typing import Any
 
-    from elastocal.campaigns.campaign import Campaign, Target
-    from elastocal.effects.protocol import Candidate
+    from elastocal.campaigns.campaign import Target
     from elastocal.fitting.observations import States
+
+# Frames and targets may be anywhere in a workshop.
+_ANYWHERE_M, _ANYWHERE_RAD = 1.0, 1.0
 
 
 @dataclass(frozen=True)
 class Model:
-    """What is taken to make the measurements.
+    """What is taken to make the measurements: nominal robot, frames, targets and any set of effects.
 
     `targets`: as in the campaign; offsets and rotations that they do not have are fitted. `fitted_frames`: whether the
     placement of the base is unknown, one for each session. `rows`: 3 where positions are measured, 6 where poses are.
@@ -49,14 +59,16 @@ class Model:
         return any(effect.effect == "joint_compliance" for effect in self.effects)
 
     @property
+    def nominal_coefficients(self) -> tuple[np.ndarray, ...]:
+        """Where a fit starts: joint compliances at their nominal values, all else at zero."""
+        nominal, effects = self.nominal_compliance, self.effects
+        return tuple(nominal.copy() if e.effect == "joint_compliance" else np.zeros(len(e.parameters)) for e in effects)
+
+    @property
     def fitted_parts(self) -> list[tuple[int, slice]]:
         """Targets that are fitted, and which of shift and turn (x, y, z, rx, ry, rz) are."""
-        found = []
-        for number, target in enumerate(self.targets):
-            first, last = (0 if target.offset_m is None else 3), (self.rows if target.rotation is None else 3)
-            if first < last:
-                found.append((number, slice(first, last)))
-        return found
+        ends = [(0 if t.offset_m is None else 3, self.rows if t.rotation is None else 3) for t in self.targets]
+        return [(number, slice(first, last)) for number, (first, last) in enumerate(ends) if first < last]
 
     def offered(self, states: States) -> frozenset[str]:
         """What effects may need that some states and the campaign have: see `Candidate.needs`."""
@@ -94,13 +106,10 @@ class Estimate:
 
 
 def declared_model(campaign: Campaign, effects: Iterable[Candidate] = ()) -> Model:
-    """The model that a campaign declares.
-
-    `effects`: declared effects.
-    """
-    sites = sites_of(campaign.robot)
+    """The model that a campaign declares, with its declared effects."""
+    sites, measurements = sites_of(campaign.robot), campaign.measurements
     # Under an arm whose first joint turns, a base that yields and the sag of that arm are one thing until weights are known.
-    unknown = not sites.masses and not campaign.measurements.wrench.any()
+    unknown = not sites.masses and not measurements.wrench.any()
     sites = replace(sites, usual_weight=sites.prismatic[0] and unknown)
     springs = (joint_compliance(sites),) if campaign.compliance == "identify" else ()
     weight = (declared_weight(sites),) if sites.masses else ()
@@ -111,7 +120,110 @@ def declared_model(campaign: Campaign, effects: Iterable[Candidate] = ()) -> Mod
         6 if campaign.measured == "pose" else 3,
         campaign.robot.compliance,
         (*springs, *weight, *effects),
-        0.0 if campaign.measurements.time_s is None else float(campaign.measurements.time_s.min()),
-        (int(campaign.measurements.row.min()), int(campaign.measurements.row.max())) if len(campaign.measurements) else None,
+        0.0 if measurements.time_s is None else float(measurements.time_s.min()),
+        (int(measurements.row.min()), int(measurements.row.max())) if len(measurements) else None,
         campaign.robot.compliance_known,
     )
+
+
+def parameters(model: Model, estimate: Estimate) -> list[tuple[str, Parameter]]:
+    """Everything that is fitted, in the order of the sensitivities.
+
+    Returns (str, Parameter): what it belongs to ("frame 0", "target A", the key of an effect) and the parameter.
+    """
+    found, placed = [], moved_and_turned(_ANYWHERE_M, _ANYWHERE_RAD)
+    if model.fitted_frames:
+        found += [(f"frame {session}", parameter) for session in estimate.sessions for parameter in placed]
+    for number, parts in model.fitted_parts:
+        found += [(f"target {model.targets[number].name}", parameter) for parameter in placed[parts]]
+    for effect in model.effects:
+        found += [(effect.key, parameter) for parameter in effect.parameters]
+        found += [(effect.key, Parameter(s.name, s.unit, s.highest - s.lowest)) for s in effect.shapes]
+    return found
+
+
+def of_placement(owners: Iterable[str]) -> np.ndarray:
+    """Which of some owners of parameters are frames and targets, ndarray of bool."""
+    return np.array([owner.startswith(("frame ", "target ")) for owner in owners], bool)
+
+
+def limits(model: Model, estimate: Estimate) -> np.ndarray:
+    """Lowest and highest value of each of the `parameters`, ndarray (P, 2): the ranges of shapes, infinite for all others."""
+    ranges = {(effect.key, shape.name): (shape.lowest, shape.highest) for effect in model.effects for shape in effect.shapes}
+    listed = [ranges.get((owner, p.name), (-np.inf, np.inf)) for owner, p in parameters(model, estimate)]
+    return np.array(listed).reshape(-1, 2)
+
+
+def nonlinear_parameters(model: Model, estimate: Estimate) -> np.ndarray:
+    """Which of the `parameters` are shapes, which alone have limits, ndarray of bool (P,)."""
+    return np.isfinite(limits(model, estimate)).all(axis=1)
+
+
+def parameter_values(model: Model, estimate: Estimate) -> np.ndarray:
+    """Present values of the `parameters`, ndarray (P,); frames and targets are fitted by steps and count as zero."""
+    placed = of_placement(owner for owner, _ in parameters(model, estimate))
+    effects = [part for pair in zip(estimate.coefficients, estimate.shapes, strict=True) for part in pair]
+    return np.concatenate([np.zeros(placed.sum()), *effects])
+
+
+def stepped(model: Model, estimate: Estimate, step: np.ndarray) -> Estimate:
+    """An estimate after a step (P,) of all `parameters`; shapes stay in their ranges."""
+
+    def take(count: int) -> np.ndarray:
+        nonlocal step
+        taken, step = step[:count], step[count:]
+        return taken
+
+    frame_rotation, frame_position = estimate.frame_rotation.copy(), estimate.frame_position.copy()
+    if model.fitted_frames:
+        for number in range(len(estimate.sessions)):
+            shift, turn = take(3), take(3)
+            frame_position[number] += frame_rotation[number] @ shift
+            frame_rotation[number] = frame_rotation[number] @ Rotation.from_rotvec(turn).as_matrix()
+    target_offset, target_rotation = estimate.target_offset.copy(), estimate.target_rotation.copy()
+    for number, parts in model.fitted_parts:
+        moved = np.zeros(6)
+        moved[parts] = take(parts.stop - parts.start)
+        target_offset[number] += moved[:3]
+        target_rotation[number] = Rotation.from_rotvec(moved[3:]).as_matrix() @ target_rotation[number]
+    coefficients, shapes = [], []
+    for effect, values, shape in zip(model.effects, estimate.coefficients, estimate.shapes, strict=True):
+        coefficients.append(values + take(len(values)))
+        ends = np.array([(each.lowest, each.highest) for each in effect.shapes]).reshape(-1, 2)
+        shapes.append(np.clip(shape + take(len(shape)), *ends.T))
+    return Estimate(
+        estimate.sessions, frame_rotation, frame_position, target_offset, target_rotation, tuple(coefficients), tuple(shapes)
+    )
+
+
+@dataclass(frozen=True)
+class Case:
+    """A campaign ready to be fitted.
+
+    `campaign`: its measurements are those to fit. `observations`: their repeats averaged, without the outlying ones. `model`:
+    as declared. `candidates`: everything that the model might lack.
+    """
+
+    campaign: Campaign
+    observations: Observations
+    model: Model
+    candidates: dict[str, Candidate]
+
+    def select(self, kept: np.ndarray) -> Case:
+        """The same without some of the measurements; ndarray of bool (N,)."""
+        some = replace(self.campaign, measurements=self.campaign.measurements.select(kept))
+        return replace(self, campaign=some, observations=averaged(without_outlying_repeats(some.measurements)))
+
+
+def case_from(descriptions: Mapping[str, Any], columns: Mapping[str, np.ndarray]) -> Case:
+    """Put a campaign together from its tables.
+
+    `descriptions`: with ``campaign`` and ``robot``, as step 1 writes them. `columns`: of the measurements table.
+    """
+    source = descriptions["source"]
+    robot = robot_from_document(descriptions["robot"], source)
+    campaign = assemble_campaign(descriptions["campaign"], robot, measurements_from(columns), source)
+    sites = sites_of(campaign.robot)
+    model = declared_model(campaign, declared_candidates(campaign.declared, sites, source))
+    candidates = {key: c for key, c in candidates_on(sites).items() if c.effect not in campaign.declared}
+    return Case(campaign, averaged(without_outlying_repeats(campaign.measurements)), model, candidates)

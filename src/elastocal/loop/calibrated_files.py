@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from elastocal.application.accuracy import calibrate_on_case, regression_on, set_form
 from elastocal.campaigns.reading import campaign_files, read_descriptions
 from elastocal.errors import InputError
-from elastocal.fitting.case import noise_from
+from elastocal.fitting.noise import noise_from
 from elastocal.io.json_files import read_json
 from elastocal.io.origin import configuration_sha256
 from elastocal.io.records import check_sources, checksum, jobs_behind
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from elastocal.application.calibrated import CalibratedRobot
-    from elastocal.fitting.case import Case
+    from elastocal.fitting.model import Case
     from elastocal.io.records import JobRecord
 
 # Of results/loop/<campaign>/ and of reports/loop/<campaign>/, whose last file has all others behind it.

@@ -15,8 +15,7 @@ from elastocal.application.certificate import error_budget
 from elastocal.campaigns.reading import campaign_files
 from elastocal.diagnosis.misplaced import point_sentence
 from elastocal.io.records import checksum
-from elastocal.validation.conformity import PASS, UNDECIDED, predicted_conformity
-from elastocal.validation.span import joint_ranges, shortfalls
+from elastocal.validation.conformity import PASS, UNDECIDED, joint_ranges, predicted_conformity, shortfalls
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -25,7 +25,7 @@ from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge, residual_blocks, split_table
 from elastocal.diagnosis.misplaced import misplaced
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.case import Case, case_from
+from elastocal.fitting.model import Case, case_from
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_table, write_table

@@ -18,18 +18,16 @@ from elastocal.io.modules import modules_with
 from elastocal.mechanics.kinematics import poses_and_jacobians
 from elastocal.remainder.protocol import Folds, Inputs
 from elastocal.remainder.tuning import CONFIDENCE, NORMAL_WIDTH, Spread, shrunk, tuned
-from elastocal.validation.fitted_range import beyond_campaign
 from elastocal.validation.held_out import Errors, intervals, position_errors, position_residuals, summary
 from elastocal.validation.left_out import refits
-from elastocal.validation.placing import placed, same_campaign
+from elastocal.validation.placing import beyond_campaign, placed, same_campaign
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from typing import Any
 
-    from elastocal.fitting.case import Case
-    from elastocal.fitting.fit_result import Fit
-    from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.least_squares import Fit
+    from elastocal.fitting.model import Case, Estimate, Model
     from elastocal.fitting.observations import Observations, States
     from elastocal.remainder.protocol import Predictor, Regression
     from elastocal.remainder.tuning import Tuned

@@ -1,18 +1,14 @@
 """A model without one part of its observations: from the normal equations of all of them less those of the part.
 
-One Gauss-Newton step from the fit to all observations leads to the fit without a part [1]. What a parameter was is not carried
-over where only that part identifies it: it goes back to where a fit starts, to its prior. Where the errors of a few poses
-decide, the step is taken as it is; where a refit is asked for, exact residuals and their gradient after the step prove it, or
-lead on from there.
+One Gauss-Newton step from the fit to all observations leads to the fit without a part (Cook and Weisberg, Residuals and
+Influence in Regression, 2.2, 1982). What a parameter was is not carried over where only that part identifies it: it goes back
+to where a fit starts, to its prior. Where the errors of a few poses decide, the step is taken as it is; where a refit is asked
+for, exact residuals and their gradient after the step prove it, or lead on from there.
 
 Cross-validation over blocks and sessions says how far a model carries. Poses drawn at random have neighbours among those
 fitted, so their errors say how well a model interpolates; whole blocks of joint space left out say how well it extrapolates
-(block cross-validation [2]). The effects stay those that were chosen with all training poses: what is refitted is their size,
-so the errors carry the selection's optimism.
-
-[1] Cook, R. D. and Weisberg, S., Residuals and Influence in Regression, section 2.2, Chapman and Hall, 1982.
-[2] Roberts, D. R. et al., Cross-validation strategies for data with temporal, spatial, hierarchical, or phylogenetic structure,
-    Ecography 40, 2017.
+(Roberts et al., Ecography 40, 2017). The effects stay those that were chosen with all training poses: what is refitted is their
+size, so the errors carry the selection's optimism.
 """
 
 from __future__ import annotations
@@ -24,13 +20,10 @@ import numpy as np
 
 from elastocal.campaigns.holdout import FEWEST_TRAINING_POSES
 from elastocal.campaigns.joint_space import blocks_of_poses, configurations
-from elastocal.fitting.displacement import kept_conditions
-from elastocal.fitting.identifiability import solve_normal
-from elastocal.fitting.least_squares import ON_THE_WAY, fit
+from elastocal.fitting.least_squares import ON_THE_WAY, fit, registered, robustly, sizes_of
+from elastocal.fitting.model import nonlinear_parameters, of_placement, parameter_values, stepped
+from elastocal.fitting.normal_equations import solve_normal
 from elastocal.fitting.observations import select_states, state_clusters
-from elastocal.fitting.parameters import nonlinear_parameters, parameter_values, stepped
-from elastocal.fitting.registration import registered
-from elastocal.fitting.robust import robustly
 from elastocal.validation.held_out import Errors, intervals, position_errors, summary
 from elastocal.validation.placing import placed_estimate
 
@@ -38,9 +31,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from typing import Any
 
-    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Estimate
-    from elastocal.fitting.observations import Observations, States
+    from elastocal.fitting.observations import Observations
 
 # A step without a part is proven where the exact equations after it ask for a step below this in every parameter, in standard
 # errors, which is taken too. What is left is a share of that, from the weights of outliers and the curvature: no error of
@@ -76,55 +69,26 @@ def refits(fitted: Fit, observations: Observations, part: np.ndarray) -> Iterato
     model, noise = fitted.model, fitted.noise
     if len(observations) < len(fitted.weights):
         fitted = fit(model, observations, noise, fitted.estimate, reweighted=True, settled=ON_THE_WAY)
-    owners = [owner for owner, _ in fitted.parameters]
-    placing = np.array([owner.startswith(("frame ", "target ")) for owner in owners], bool)
+    found, owners = fitted.estimate, [owner for owner, _ in fitted.parameters]
     for number, (step, held) in zip(np.unique(part), _steps_without(fitted, observations, part), strict=True):
         within = part == number
         rest, left_out = select_states(observations, ~within), select_states(observations, within)
-        sessions = np.isin(fitted.estimate.sessions, rest.states.session)
-        gone = {f"frame {session}" for session in np.array(fitted.estimate.sessions)[~sessions]}
-        kept = np.array([owner not in gone for owner in owners], bool)
+        seen = np.isin(found.sessions, rest.states.session)
+        kept = ~np.isin(owners, [f"frame {session}" for session in np.array(found.sessions)[~seen]])
         refit = None
         # Where the rest does not say where a frame or a target is, the nominal robot does.
-        if not (held & placing & kept).any():
+        if not (held & of_placement(owners) & kept).any():
             start = replace(
-                fitted.estimate,
-                sessions=tuple(np.array(fitted.estimate.sessions)[sessions].tolist()),
-                frame_rotation=fitted.estimate.frame_rotation[sessions],
-                frame_position=fitted.estimate.frame_position[sessions],
+                found,
+                sessions=tuple(np.array(found.sessions)[seen].tolist()),
+                frame_rotation=found.frame_rotation[seen],
+                frame_position=found.frame_position[seen],
             )
             start = stepped(model, start, step[kept])
-            around = kept_conditions(model, start, rest)
-            refit = robustly(model, rest, around, noise, start, held[kept], reweighted=True, settled=_PROVEN)
+            refit = robustly(model, rest, noise, start, held[kept], reweighted=True, settled=_PROVEN)
         if refit is None or not refit.converged:
-            refit = fit(model, rest, noise, replace(registered(model, rest), shapes=fitted.estimate.shapes))
+            refit = fit(model, rest, noise, replace(registered(model, rest), shapes=found.shapes))
         yield Refit(within, rest, left_out, refit.estimate, placed_estimate(refit, left_out))
-
-
-def left_out_squares(fitted: Fit, observations: Observations) -> np.ndarray:
-    """Mean square position error of each configuration as all others predict it, m², ndarray (configurations,).
-
-    By the step alone, in closed form, with what is held as in the fit.
-    """
-    white = fitted.whitened(fitted.residual)
-    states = observations.states
-    configuration = configurations(states.joint_angles, state_clusters(states))[observations.cluster]
-    found = np.empty(configuration.max() + 1)
-    plain, whitened = (np.concatenate(parts) for parts in list(zip(*fitted.sensitivities(observations), strict=True))[1:])
-    for number in range(len(found)):
-        mine = configuration == number
-        rows = whitened[mine].reshape(mine.sum() * whitened.shape[1], len(fitted.held))
-        gain = fitted.covariance @ rows.T
-        inverse = np.linalg.pinv(np.eye(len(rows)) - rows @ gain, rcond=_ROUNDING, hermitian=True)
-        moved = plain[mine][:, :3] @ (gain @ (inverse @ white[mine].ravel()))
-        found[number] = ((fitted.residual[mine][:, :3] + moved) ** 2).sum(axis=1).mean()
-    return found
-
-
-def certain_loss(squares: np.ndarray, others: np.ndarray) -> bool:
-    """Whether mean squares exceed those of another model on the same poses by more than the difference's standard error."""
-    off = squares - others
-    return bool(off.mean() > off.std(ddof=1) / np.sqrt(len(off)))
 
 
 def _steps_without(fitted: Fit, observations: Observations, part: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -132,22 +96,19 @@ def _steps_without(fitted: Fit, observations: Observations, part: np.ndarray) ->
 
     `observations`: which it was fitted to. `part` (S,) of int.
     """
-    model, estimate, listed = fitted.model, fitted.estimate, [parameter for _, parameter in fitted.parameters]
+    model, estimate = fitted.model, fitted.estimate
     nonlinear, present = nonlinear_parameters(model, estimate), parameter_values(model, estimate)
-    nominal = [
-        model.nominal_compliance if e.effect == "joint_compliance" else np.zeros(len(e.parameters)) for e in model.effects
-    ]
-    start = parameter_values(model, replace(estimate, coefficients=tuple(nominal)))
     # As in a fit from there.
-    plausible = np.array([max(parameter.plausible, parameter.prior_std or 0.0) for parameter in listed])
-    plausible = np.maximum(plausible, np.where(nonlinear, 0.0, np.abs(start)))
-    parts, of_each = np.unique(part[observations.state], return_inverse=True)
-    grams, alongs = np.zeros((len(parts), len(listed), len(listed))), np.zeros((len(parts), len(listed)))
+    nominal = replace(estimate, coefficients=model.nominal_coefficients)
+    start, plausible = parameter_values(model, nominal), sizes_of(model, nominal)
+    of_each = np.unique(part, return_inverse=True)[1][observations.state]
+    count, size = of_each.max() + 1, len(plausible)
+    grams, alongs = np.zeros((count, size, size)), np.zeros((count, size))
     off = fitted.whitened(fitted.residual)
     for seen, _, white in fitted.sensitivities(observations):
         for number in np.unique(of_each[seen]):
             mine = of_each[seen] == number
-            rows = white[mine].reshape(mine.sum() * white.shape[1], len(listed)) * plausible
+            rows = white[mine].reshape(mine.sum() * white.shape[1], size) * plausible
             grams[number] += rows.T @ rows
             alongs[number] += rows.T @ off[seen][mine].ravel()
     gram, along, penalty = grams.sum(axis=0), alongs.sum(axis=0), fitted.prior_std**-2
@@ -161,69 +122,60 @@ def _steps_without(fitted: Fit, observations: Observations, part: np.ndarray) ->
         yield step, held
 
 
-@dataclass(frozen=True)
-class Split:
-    """A partition of the states of observations.
+def left_out_squares(fitted: Fit, observations: Observations) -> np.ndarray:
+    """Mean square position error of each configuration as all others predict it, m², ndarray (configurations,).
 
-    `labels`: name of each part. `part` (S,) of int: index into `labels`, of every state.
+    By the step alone, in closed form, with what is held as in the fit.
     """
-
-    name: str
-    labels: tuple[int, ...]
-    part: np.ndarray
-
-
-def splits_of(states: States) -> list[Split]:
-    """The partitions that some states allow: blocks of joint space and, where there are several, sessions.
-
-    Returns without those that leave too few configurations to fit.
-    """
-    pose = state_clusters(states)
-    configuration = configurations(states.joint_angles, pose)[pose]
-    sessions, session = np.unique(states.session, return_inverse=True)
-    found = [Split("session", tuple(sessions.tolist()), session.ravel())] if len(sessions) > 1 else []
-    if configuration.max() + 1 >= JOINT_SPACE_BLOCKS:
-        labels = tuple(range(1, JOINT_SPACE_BLOCKS + 1))
-        found.insert(0, Split("joint space", labels, blocks_of_poses(states.joint_angles, pose, JOINT_SPACE_BLOCKS)[pose]))
-    return [split for split in found if _fewest_left(split, configuration) >= FEWEST_TRAINING_POSES]
-
-
-def cross_validated(fitted: Fit, observations: Observations, part: np.ndarray) -> Errors:
-    """Position errors of observations, each predicted by a refit without the part that it belongs to.
-
-    Leave-one-block-out cross-validation, see `refits`.
-
-    `fitted`, `observations`, `part`: as in `refits`.
-    """
-    distance = np.empty(len(observations))
-    for refit in refits(fitted, observations, part):
-        errors = position_errors(fitted.model, refit.there, refit.left_out)
-        distance[refit.within[observations.state]] = errors.distance
-    return Errors(distance, observations.cluster)
+    white, states, found = fitted.whitened(fitted.residual), observations.states, []
+    configuration = configurations(states.joint_angles, state_clusters(states))[observations.cluster]
+    plain, whitened = (np.concatenate(parts) for parts in list(zip(*fitted.sensitivities(observations), strict=True))[1:])
+    for number in range(configuration.max() + 1):
+        mine = configuration == number
+        rows = whitened[mine].reshape(mine.sum() * whitened.shape[1], len(fitted.held))
+        gain = fitted.covariance @ rows.T
+        inverse = np.linalg.pinv(np.eye(len(rows)) - rows @ gain, rcond=_ROUNDING, hermitian=True)
+        moved = plain[mine][:, :3] @ (gain @ (inverse @ white[mine].ravel()))
+        found.append(((fitted.residual[mine][:, :3] + moved) ** 2).sum(axis=1).mean())
+    return np.array(found)
 
 
 def split_rows(
     declared: Fit, final: Fit, observations: Observations, replicates: int, stream: np.random.Generator
 ) -> list[dict[str, Any]]:
-    """Cross-validated errors of the declared and the final model over every split that the training poses allow.
+    """Leave-one-part-out errors of the declared and the final model, over blocks of joint space and sessions.
 
     `observations`: training poses, which both were fitted to. `replicates`: of the bootstrap over poses. Returns rows of
-    splits.csv: each part of each split, and "all" parts together. Intervals take poses as independent, which refits that share
-    most of their poses make only nearly true [1].
-
-    [1] Bengio, Y. and Grandvalet, Y., No unbiased estimator of the variance of K-fold cross-validation, Journal of Machine
-        Learning Research 5, 2004.
+    splits.csv: "all" parts together and each; without a split that leaves too few configurations to fit. Intervals take poses
+    as independent, which refits that share most of their poses make only nearly true (Bengio and Grandvalet 2004).
     """
-    rows = []
-    for split in splits_of(observations.states):
-        before = cross_validated(declared, observations, split.part)
-        after = before if final is declared else cross_validated(final, observations, split.part)
-        rows.append(error_row(split.name, "all", before, after, replicates, stream))
-        of_each = split.part[observations.state]
-        for number, label in enumerate(split.labels):
-            pair = _part(before, of_each == number), _part(after, of_each == number)
-            rows.append(error_row(split.name, label, *pair, replicates, stream))
+    states, rows = observations.states, []
+    pose, parts = state_clusters(states), {}
+    configuration = configurations(states.joint_angles, pose)[pose]
+    if configuration.max() + 1 >= JOINT_SPACE_BLOCKS:
+        parts["joint space"] = 1 + blocks_of_poses(states.joint_angles, pose, JOINT_SPACE_BLOCKS)[pose]
+    if np.ptp(states.session):
+        parts["session"] = states.session
+    for name, part in parts.items():
+        labels = np.unique(part)
+        if min(len(np.unique(configuration[part != label])) for label in labels) < FEWEST_TRAINING_POSES:
+            continue
+        before = cross_validated(declared, observations, part)
+        pair = before, before if final is declared else cross_validated(final, observations, part)
+        rows.append(error_row(name, "all", *pair, replicates, stream))
+        for label in labels.tolist():
+            seen = part[observations.state] == label
+            cluster = np.unique(before.cluster[seen], return_inverse=True)[1]
+            rows.append(error_row(name, label, *(Errors(each.distance[seen], cluster) for each in pair), replicates, stream))
     return rows
+
+
+def cross_validated(fitted: Fit, observations: Observations, part: np.ndarray) -> Errors:
+    """Position errors of observations, each predicted by a refit without the part that it belongs to; as of `refits`."""
+    distance = np.empty(len(observations))
+    for refit in refits(fitted, observations, part):
+        distance[refit.within[observations.state]] = position_errors(fitted.model, refit.there, refit.left_out).distance
+    return Errors(distance, observations.cluster)
 
 
 def error_row(
@@ -238,11 +190,3 @@ def error_row(
     change = reductions[1]
     row |= {"reduction": 1.0 - rms[1] / rms[0], "reduction_low": change.low, "reduction_high": change.high}
     return row | {"reduction_std_error": change.std_error}
-
-
-def _fewest_left(split: Split, configuration: np.ndarray) -> int:
-    return min(len(np.unique(configuration[split.part != number])) for number in range(len(split.labels)))
-
-
-def _part(errors: Errors, mask: np.ndarray) -> Errors:
-    return Errors(errors.distance[mask], np.unique(errors.cluster[mask], return_inverse=True)[1])

@@ -10,7 +10,7 @@ import numpy as np
 from elastocal.campaigns.columns import columns_of, measurements_from
 from elastocal.campaigns.holdout import measured_poses
 from elastocal.campaigns.joint_space import blocks_of_poses, configurations
-from elastocal.fitting.case import Case, case_from
+from elastocal.fitting.model import Case, case_from
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_table, write_table

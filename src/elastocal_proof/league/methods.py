@@ -17,9 +17,8 @@ from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_table, write_table
 from elastocal.loop.diagnosis_tables import diagnosis_facts, parameter_columns, step_fit
 from elastocal.remainder.corrected import Plan, corrected, regressions
-from elastocal.validation.fitted_range import outside_poses
 from elastocal.validation.held_out import position_residuals
-from elastocal.validation.placing import placed
+from elastocal.validation.placing import outside_poses, placed
 from elastocal_proof.league.folds import RANDOM, load_data_set, rounds
 from elastocal_proof.league.schemas import ENTRIES, FITS, MECHANISMS
 
@@ -27,8 +26,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from elastocal.diagnosis.diagnose import Diagnosis
-    from elastocal.fitting.case import Case
-    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.least_squares import Fit
+    from elastocal.fitting.model import Case
     from elastocal.fitting.observations import Observations
     from elastocal.remainder.protocol import Setting
 
