@@ -12,7 +12,7 @@ from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.next_experiment import propose
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.prediction import joint_compliances
+from elastocal.fitting.model import joint_compliances
 from elastocal.loop.whole import cases_in
 
 OFFSET = 1e-3

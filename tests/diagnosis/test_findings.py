@@ -10,7 +10,7 @@ from elastocal.data_checks.protocol import Fault, Value
 from elastocal.diagnosis.averaging import Averaged
 from elastocal.diagnosis.findings import fault_entry, implausible, location_words, oversized, parameter_entries, sag_entries
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.fitting.prediction import predict
+from elastocal.fitting.model import predict
 
 WORDS = {
     ("joint_offset", (3,)): "joint 3",

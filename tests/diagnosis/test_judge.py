@@ -8,8 +8,8 @@ import pytest
 from elastocal.diagnosis.diagnose import Diagnosis, Step
 from elastocal.diagnosis.judge import judge, residual_blocks, split_table
 from elastocal.fitting.least_squares import fit
+from elastocal.fitting.model import joint_compliances
 from elastocal.fitting.noise import Noise, noise_facts
-from elastocal.fitting.prediction import joint_compliances
 from elastocal.mechanics.elastostatics import generalized_forces
 from elastocal.mechanics.kinematics import poses, poses_and_jacobians
 from elastocal.validation.held_out import METRICS

@@ -13,7 +13,7 @@ from elastocal.diagnosis.linearize import lacking, linearized, shapes_looked_at_
 from elastocal.diagnosis.other import laws_of
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.least_squares import fit
-from elastocal.fitting.prediction import residuals
+from elastocal.fitting.model import residuals
 
 SETTINGS = Settings()
 KEYS = ("joint_offset@2", "joint_offset@3", "joint_tilt@2", "link_elasticity@3", "payload", "link_geometry@4")

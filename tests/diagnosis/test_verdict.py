@@ -30,8 +30,8 @@ from elastocal.diagnosis.verdict import (
     scatter_warnings,
     with_related,
 )
+from elastocal.fitting.model import joint_compliances
 from elastocal.fitting.noise import Noise
-from elastocal.fitting.prediction import joint_compliances
 
 SETTINGS = Settings()
 

@@ -26,7 +26,7 @@ from elastocal.effects import catalogue
 from elastocal.effects.catalogue import candidates_on, declared_candidates
 from elastocal.effects.conditions import with_total
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.prediction import conditions
+from elastocal.fitting.model import conditions
 from elastocal.mechanics.kinematics import poses
 
 # The table of the design, without the data family: that is no physics.

@@ -8,7 +8,7 @@ from synthetic import conditions_on, displacements, made_estimate, made_model, m
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
 from elastocal.effects.elastic import joint_compliance
-from elastocal.fitting.prediction import conditions, displaced_coordinates
+from elastocal.fitting.model import conditions, displaced_coordinates
 from elastocal.mechanics.sites import sites_of
 
 LINEAR = (

@@ -26,8 +26,7 @@ from elastocal.effects.conditions import conditions_of, offered, with_springs
 from elastocal.effects.gravity import declared_weight
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.model import parameters
-from elastocal.fitting.prediction import conditions, displaced_coordinates
+from elastocal.fitting.model import conditions, displaced_coordinates, parameters
 from elastocal.mechanics.chain import MeasuringPoint
 from elastocal.mechanics.kinematics import motion, poses
 from elastocal.mechanics.robot import Mass

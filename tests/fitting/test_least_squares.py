@@ -1,4 +1,4 @@
-"""Fits: known parameters come back, and errors are those of statsmodels and of repetition."""
+"""Fits: known parameters come back, errors are those of statsmodels, outliers do little harm, and steps converge."""
 
 from dataclasses import replace
 
@@ -8,6 +8,7 @@ import statsmodels.api as sm
 from fitted_models import (
     GANTRY_NOISES,
     TARGETS,
+    bent,
     gantry_covariance,
     gantry_model,
     gantry_states,
@@ -17,10 +18,16 @@ from fitted_models import (
     seen_off,
     waves,
 )
+from planted import two_loads_a_pose
 from scipy.linalg import block_diag
-from synthetic import NOISE, made_estimate, made_states, seen_exactly
+from scipy.optimize import minimize
+from scipy.stats import chi2
+from support import chain_of
+from synthetic import NOISE, made_estimate, made_model, made_states, seen_exactly, with_noise
 
-from elastocal.fitting.least_squares import fit, fit_frames
+from elastocal.campaigns.campaign import Target
+from elastocal.fitting.least_squares import fit, fit_frames, registered, robustly
+from elastocal.fitting.noise import Noise
 
 
 def assert_covariance(found, expected, atol):
@@ -165,3 +172,287 @@ def test_frames_are_fitted_to_targets_that_stay_as_they_were_found(fanuc, rows):
     for each in (found, others):
         for ours, theirs in zip(each.coefficients, fitted.estimate.coefficients, strict=True):
             np.testing.assert_array_equal(ours, theirs)
+
+
+def robust_objective(found):
+    """Huber's, of all observations of a fit without a prior, by the library's own norm."""
+    rows = found.model.rows
+    norm = sm.robust.norms.HuberT(np.sqrt(chi2.ppf(0.99, rows) / rows))
+    return rows * norm.rho(np.sqrt((found.whitener.apply(found.residual) ** 2).mean(axis=1))).sum()
+
+
+@pytest.mark.parametrize(("seed", "lag"), [(3, 1500.0), (24, 900.0), (25, 1500.0)])
+def test_steps_that_do_not_help_are_halved_until_the_fit_converges(fanuc, seed, lag, monkeypatch):
+    model, seen = bent(fanuc, seed, lag)
+    found = fit(model, seen, NOISE)
+    assert found.converged
+    monkeypatch.setattr("elastocal.fitting.least_squares._HALVINGS", 0)
+    whole = fit(model, seen, NOISE)
+    assert not whole.converged
+    assert robust_objective(found) < robust_objective(whole) - 0.01
+
+
+@pytest.mark.parametrize(("seed", "lag", "end"), [(4, 8000.0, 36000.0), (8, 3000.0, 900.0)])
+def test_fit_converges_at_the_end_of_the_range_of_a_shape(fanuc, seed, lag, end):
+    model, seen = bent(fanuc, seed, lag)
+    found = fit(model, seen, NOISE)
+    assert found.converged and found.estimate.shapes[0][0] == end
+    # The others are where they are best given that end: held there they do not move.
+    frozen = replace(model.effects[0], shapes=(), displacement=lambda around: model.effects[0].displacement(around, end))
+    without = replace(model, effects=(frozen,))
+    start = replace(found.estimate, shapes=(np.zeros(0),))
+    again = fit(without, seen, NOISE, start)
+    deviation = np.sqrt(again.covariance[-1, -1])
+    assert abs(again.estimate.coefficients[0][0] - found.estimate.coefficients[0][0]) < 2e-3 * deviation
+
+
+WEAK = [None, 3e-5, None]
+
+SENSOR = Noise("declared", 1e-4, 5e-5, np.zeros(3))
+
+
+def with_outliers(rows, count=40):
+    """Observations of a linear law, of which five are far off; design (S, 3, 3) and what is off, in positions and turns."""
+    rng = np.random.default_rng(95)
+    states = replace(gantry_states(count), repeats=np.ones(count, int))
+    left = waves(states.joint_angles, 3)
+    off = 1e-4 * rng.standard_normal((count, 3)) + left @ [4e-5, -8e-5, 1e-4]
+    off[[3, 11, 17, 30, 38]] += 1e-3 * np.array([[1, 0, 0], [0, -2, 0], [0, 0, 3], [2, 2, 0], [5, 0, 0]])
+    turned = 5e-5 * rng.standard_normal((count, 3)) if rows == 6 else None
+    model = gantry_model(linear_law(3, WEAK), rows=rows)
+    return model, seen_off(states, off, turned), left, off, turned
+
+
+def distances(off, turned, left, values, factor):
+    """Root mean square of what is left of each observation, in standard deviations of the noise taken."""
+    parts = [(off - left @ values) / 1e-4] if turned is None else [(off - left @ values) / 1e-4, turned / 5e-5]
+    return np.sqrt((np.concatenate(parts, axis=1) ** 2).mean(axis=1)) / factor
+
+
+@pytest.mark.parametrize("rows", [3, 6])
+def test_a_linear_problem_with_outliers_is_at_the_minimum_of_hubers_objective_with_its_priors(rows):
+    """By a general minimiser: each observation counts as its squares up to the 99 % quantile of its distance."""
+    model, seen, left, off, turned = with_outliers(rows)
+    corner = np.sqrt(chi2.ppf(0.99, rows) / rows)
+
+    def objective(scaled):
+        far = distances(off, turned, left, 1e-5 * scaled, 2.0)
+        huber = np.where(far <= corner, 0.5 * far**2, corner * far - 0.5 * corner**2)
+        return rows * huber.sum() + 0.5 * (1e-5 * scaled[1] / WEAK[1]) ** 2
+
+    expected = minimize(objective, np.zeros(3), method="BFGS", options={"gtol": 1e-8}).x
+    # Of a noise taken so large that its scale is not estimated from the measurements.
+    found = fit(model, seen, SENSOR.scaled(2.0))
+    deviation = np.sqrt(np.diag(found.covariance))
+    assert found.converged and (found.weights < 1).sum() >= 4
+    np.testing.assert_allclose(found.estimate.coefficients[0] / deviation, 1e-5 * expected / deviation, rtol=0, atol=5e-3)
+
+
+@pytest.mark.parametrize("rows", [3, 6])
+@pytest.mark.parametrize("taken", [0.2, 0.7, 1.0, 3.0])
+def test_weights_fall_with_the_distance_by_the_scale_of_the_errors_that_are_there(rows, taken):
+    """One up to the 99 % quantile, then its share; the scale is that of the median distance, but never below the noise."""
+    model, seen, left, off, turned = with_outliers(rows)
+    found = fit(model, seen, SENSOR.scaled(taken))
+    far = distances(off, turned, left, found.estimate.coefficients[0], taken)
+    scale = max(1.0, np.median(far) / np.sqrt(chi2.ppf(0.5, rows) / rows))
+    assert (scale > 1.3) == (taken < 0.75)
+    expected = np.minimum(1.0, np.sqrt(chi2.ppf(0.99, rows) / rows) * scale / far)
+    assert found.converged and (expected < 1).sum() >= 3
+    np.testing.assert_allclose(found.weights, expected, rtol=2e-3)
+    # The estimate solves the equations of these weights, its covariance is their inverse.
+    weighted = left.reshape(-1, 3) * np.repeat(found.weights, 3)[:, None] / (1e-4 * taken) ** 2
+    precision = weighted.T @ left.reshape(-1, 3) + np.diag([0.0, WEAK[1] ** -2, 0.0])
+    values = np.linalg.solve(precision, weighted.T @ off.ravel())
+    deviation = np.sqrt(np.diag(np.linalg.inv(precision)))
+    np.testing.assert_allclose(found.estimate.coefficients[0] / deviation, values / deviation, rtol=0, atol=5e-3 * scale)
+    np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), deviation, rtol=1e-6)
+
+
+def one_parameter(spread):
+    """A law of one parameter, observations whose errors are all of one size, in standard deviations; estimate and its error."""
+    states = replace(gantry_states(30), repeats=np.ones(30, int))
+    left = waves(states.joint_angles, 1)[..., 0]
+    off = 1e-4 * spread * np.random.default_rng(96).choice([-1.0, 1.0], (30, 3))
+    model = gantry_model(linear_law(1))
+    best, deviation = (left * off).sum() / (left**2).sum(), 1e-4 / np.sqrt((left**2).sum())
+    return model, seen_off(states, off), best, deviation
+
+
+@pytest.mark.parametrize(("spread", "settled"), [(0.5, None), (5.0, None), (0.5, 0.1), (5.0, 0.1)])
+@pytest.mark.parametrize(("share", "converged"), [(0.98, True), (-0.98, True), (1.02, False), (-1.02, False)])
+def test_a_fit_has_converged_where_its_step_is_below_a_share_of_the_standard_error(
+    spread, settled, share, converged, monkeypatch
+):
+    """A thousandth unless told otherwise; of measurements that scatter more than the noise, of their own standard error."""
+    model, seen, best, deviation = one_parameter(spread)
+    # All distances are alike but for what the one parameter takes: their median is their root mean square.
+    scale = max(1.0, spread / np.sqrt(chi2.ppf(0.5, 3) / 3))
+    options, largest = ({} if settled is None else {"settled": settled}), settled or 1e-3
+    start = made_estimate(model, size=0.0)
+    start = replace(start, coefficients=(np.array([best + share * largest * scale * deviation]),))
+    monkeypatch.setattr("elastocal.fitting.least_squares._STEPS", 1)
+    found = fit(model, seen, SENSOR, start, reweighted=True, **options)
+    assert found.converged == converged
+    # The last step is taken all the same: a linear problem is solved by it.
+    assert found.estimate.coefficients[0][0] == pytest.approx(best, abs=1e-3 * largest * deviation)
+    # One that starts anew gives all observations one weight first, and does not trust that step.
+    assert not fit(model, seen, SENSOR, start, **options).converged
+
+
+@pytest.mark.parametrize("frozen", [[True, False, False], [False, True, True]])
+def test_frozen_parameters_stay_and_the_others_are_best_beside_them(frozen):
+    model, seen, left, off, _ = with_outliers(3)
+    start = replace(made_estimate(model, size=0.0), coefficients=(np.array([2e-4, -1e-4, 3e-4]),))
+    found = robustly(model, seen, SENSOR, start, np.array(frozen))
+    values, free = found.estimate.coefficients[0], ~np.array(frozen)
+    np.testing.assert_array_equal(values[frozen], start.coefficients[0][frozen])
+    weighted = left.reshape(-1, 3) * np.repeat(found.weights, 3)[:, None] / 1e-8
+    pull = weighted.T @ (off - left @ values).ravel() - values * np.array([0.0, WEAK[1] ** -2, 0.0])
+    assert (np.abs(np.linalg.solve(np.linalg.inv(found.covariance[np.ix_(free, free)]), pull[free])) < 1e-5).all()
+    assert found.held.tolist() == frozen and not found.covariance[np.array(frozen)].any()
+
+
+# Of the sensor and of the joints, so that whitening takes a Jacobian.
+OF_JOINTS = Noise("repeats", 60e-6, 40e-6, np.full(6, 2e-5))
+
+
+@pytest.fixture(scope="module")
+def fitted(fanuc):
+    """Twelve poses with two loads and two targets each, and two measurements far off."""
+    model = model_of(fanuc, "joint_offset@3", "stiffening@2", targets=TARGETS)
+    seen = seen_exactly(model, made_estimate(model, seed=11), two_loads_a_pose(6, 12, seed=12))
+    seen = with_noise(seen, np.random.default_rng(13))
+    seen.position[[5, 20]] += 3e-3
+    return fit(model, seen, OF_JOINTS), seen
+
+
+def gathered(found, observations):
+    """Plain and whitened sensitivities of all parts, and the observations of each."""
+    parts = list(found.sensitivities(observations))
+    plain, white = (np.concatenate([part[number] for part in parts]) for number in (1, 2))
+    return plain, white, [np.arange(len(observations))[part[0]] for part in parts]
+
+
+def test_whitened_sensitivities_are_the_plain_ones_weighted_and_whitened_as_in_the_fit(fitted):
+    found, seen = fitted
+    plain, white, _ = gathered(found, seen)
+    assert found.weights[[5, 20]].max() < 0.2
+    np.testing.assert_allclose(white, found.whitened(plain), rtol=1e-9, atol=1e-9 * np.abs(white).max())
+
+
+def test_the_inverse_of_the_products_of_whitened_sensitivities_is_the_covariance(fitted):
+    found, seen = fitted
+    _, white, _ = gathered(found, seen)
+    free = ~found.held
+    rows = white.reshape(-1, len(free))[:, free]
+    expected = np.linalg.inv(rows.T @ rows)
+    deviation = np.sqrt(np.diag(expected))
+    scaled = (found.covariance[np.ix_(free, free)] - expected) / np.outer(deviation, deviation)
+    # The covariance is that of the last step, a thousandth of a standard error away.
+    np.testing.assert_allclose(scaled, 0.0, atol=1e-3)
+    assert not found.covariance[found.held].any()
+
+
+@pytest.mark.parametrize("most", [1, 9, 10_000])
+def test_parts_are_whole_poses_and_hold_each_observation_once(fitted, monkeypatch, most):
+    found, seen = fitted
+    whole = gathered(found, seen)
+    monkeypatch.setattr("elastocal.fitting.observations._MOST_HELD", 3 * 60 * most)
+    plain, white, members = gathered(found, seen)
+    assert (len(members) > 1) == (most < len(seen))
+    np.testing.assert_array_equal(np.concatenate(members), np.arange(len(seen)))
+    poses = [set(seen.cluster[part]) for part in members]
+    assert sum(map(len, poses)) == len(set().union(*poses)) == 12
+    np.testing.assert_allclose(plain, whole[0], rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(white, whole[1], rtol=1e-9, atol=1e-9 * np.abs(white).max())
+
+
+KNOWN_M, KNOWN_RAD = 1e-6, 1e-6
+
+TWO = (Target("A", "6DoF", None), Target("B", "3DoF", None))
+
+
+def unloaded(states):
+    states.wrench[:] = 0.0
+    return states
+
+
+def assert_known(found, true, rows=3):
+    for name in ("frame_position", "target_offset"):
+        np.testing.assert_allclose(getattr(found, name), getattr(true, name), rtol=0, atol=KNOWN_M)
+    np.testing.assert_allclose(found.frame_rotation, true.frame_rotation, rtol=0, atol=KNOWN_RAD)
+    if rows == 6:
+        np.testing.assert_allclose(found.target_rotation, true.target_rotation, rtol=0, atol=KNOWN_RAD)
+
+
+@pytest.mark.parametrize("rows", [3, 6])
+@pytest.mark.parametrize("sessions", [(0,), (2, 5)])
+@pytest.mark.parametrize("targets", [TWO[:1], TWO], ids=["one target", "two targets"])
+def test_frames_and_targets_are_found(fanuc, rows, sessions, targets):
+    model = made_model(fanuc.chain, targets, rows)
+    states = unloaded(made_states(6, 40, seed=1, sessions=len(sessions)))
+    states.session[:] = np.array(sessions)[states.session]
+    true = made_estimate(model, sessions, seed=2)
+    found = registered(model, seen_exactly(model, true, states))
+    assert found.sessions == sessions
+    assert_known(found, true, rows)
+
+
+def test_a_known_mount_keeps_its_turn_and_an_unknown_one_is_found(fanuc):
+    targets = (Target("A", "6DoF", None, (0.1, -1.5, 0.2)), Target("B", "4DoF", (0.1, 0.0, 0.2), None))
+    for fitted_frames in (False, True):
+        model = made_model(fanuc.chain, targets, rows=6, fitted_frames=fitted_frames)
+        states, true = unloaded(made_states(6, 15, seed=7)), made_estimate(model, seed=8)
+        found = registered(model, seen_exactly(model, true, states))
+        assert_known(found, true)
+        np.testing.assert_allclose(found.target_rotation, true.target_rotation, atol=1e-7)
+        np.testing.assert_array_equal(found.target_offset[1], (0.1, 0.0, 0.2))
+
+
+def test_frame_is_no_reflection_where_all_points_lie_in_a_plane():
+    chain = chain_of("Tz(0.3) Rz(q1) Tx(0.5) Rz(q2) Tx(0.5) [end]")
+    model = made_model(chain, (Target("A", "end", (0.0, 0.0, 0.0)),))
+    for seed in range(8):
+        states, true = unloaded(made_states(2, 20, seed=seed)), made_estimate(model, seed=seed + 10)
+        found = registered(model, seen_exactly(model, true, states))
+        np.testing.assert_allclose(np.linalg.det(found.frame_rotation), 1.0)
+        assert_known(found, true)
+
+
+def test_a_target_without_a_measurement_stays_where_it_was(fanuc):
+    """All of its measurements may be held out."""
+    model = made_model(fanuc.chain, TWO, 6)
+    states = unloaded(made_states(6, 40, seed=1))
+    true = made_estimate(model, seed=2)
+    seen = seen_exactly(model, true, states)
+    first = seen.target == 0
+    one = replace(
+        seen, state=seen.state[first], target=seen.target[first], position=seen.position[first], rotation=seen.rotation[first]
+    )
+    found = registered(model, one)
+    np.testing.assert_allclose(found.target_offset[0], true.target_offset[0], rtol=0, atol=KNOWN_M)
+    np.testing.assert_array_equal(found.target_offset[1], 0.0)
+
+
+@pytest.mark.parametrize("joint_rad", [0.0, 2e-5])
+def test_a_fit_of_more_states_than_are_kept_is_the_same_and_keeps_no_jacobian(fanuc, monkeypatch, joint_rad):
+    model = model_of(fanuc, "joint_offset@3", "stiffening@2", targets=TARGETS)
+    seen = with_noise(
+        seen_exactly(model, made_estimate(model, seed=64), two_loads_a_pose(6, 20, seed=65)), np.random.default_rng(66)
+    )
+    noise = replace(NOISE, joint_rad=np.full(6, joint_rad))
+    kept = fit(model, seen, noise)
+    monkeypatch.setattr("elastocal.fitting.least_squares._MOST_STATES", 10)
+    monkeypatch.setattr("elastocal.fitting.observations._MOST_HELD", 16 * 180)
+    found = fit(model, seen, noise)
+    assert kept.joint_jacobian is not None and found.joint_jacobian is None and found.conditions is None
+    deviation = np.sqrt(np.diag(kept.covariance))
+    values = [np.concatenate(each.estimate.coefficients) for each in (kept, found)]
+    assert (np.abs(values[0] - values[1]) < 2e-3 * deviation[-len(values[0]) :]).all()
+    np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), deviation, rtol=1e-4)
+    parts = [list(each.sensitivities(seen)) for each in (kept, found)]
+    assert len(parts[1]) > 1
+    for number in (1, 2):
+        one, other = (np.concatenate([part[number] for part in each]) for each in parts)
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-5 * np.abs(one).max())

@@ -13,7 +13,6 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.model import Case, declared_model
-from elastocal.fitting.noise import FINEST
 from elastocal.fitting.observations import averaged
 from elastocal.fitting.tolerances import (
     SIZES,
@@ -119,11 +118,3 @@ def test_noise_is_the_root_mean_square_of_the_residual_where_nothing_else_says_i
     assert noise.orientation_rad == pytest.approx(np.sqrt(((turned if oriented else off) ** 2).mean()), rel=1e-6)
     np.testing.assert_array_equal(noise.joint_rad, np.zeros(6))
     assert len(warnings) == 1 and "no repeats and no declared noise" in warnings[0]
-
-
-@pytest.mark.parametrize(("position_m", "orientation_rad"), [(70e-6, 0.0), (0.0, 20e-6)])
-def test_a_residual_finer_than_any_sensor_is_taken_as_what_a_sensor_resolves(fanuc, position_m, orientation_rad):
-    off, turned = errors(1, position_m), errors(2, orientation_rad)
-    noise, _ = estimated_noise(case_of(fanuc, off, turned))
-    for found, part in ((noise.position_m, off), (noise.orientation_rad, turned)):
-        assert found == pytest.approx(max(np.sqrt((part**2).mean()), FINEST), rel=1e-6)

@@ -11,8 +11,8 @@ from synthetic import made_estimate, made_model, made_states, seen_exactly
 
 import elastocal.remainder
 from elastocal.fitting.least_squares import fit
+from elastocal.fitting.model import target_points
 from elastocal.fitting.noise import Noise
-from elastocal.fitting.prediction import target_points
 from elastocal.mechanics.kinematics import poses
 from elastocal.remainder.corrected import Plan, corrected, fitted_again, inputs_of, regressions, remainder_facts
 from elastocal.validation.held_out import position_errors

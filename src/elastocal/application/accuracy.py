@@ -32,9 +32,8 @@ from elastocal.application.calibrated import (
 )
 from elastocal.application.frames import BASE, FRAMES, ROBOT, Scope, find_absorbed, free_parts, placement
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.model import parameters
+from elastocal.fitting.model import conditions, displaced_coordinates, parameters
 from elastocal.fitting.noise import hidden_repeatability
-from elastocal.fitting.prediction import conditions, displaced_coordinates
 from elastocal.mechanics.kinematics import jacobians, pose_differences, poses
 
 if TYPE_CHECKING:

@@ -17,9 +17,8 @@ from elastocal.application.frames import scope_in_base
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import effects
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.model import parameters
+from elastocal.fitting.model import conditions, displaced_coordinates, parameters
 from elastocal.fitting.observations import Observations, States
-from elastocal.fitting.prediction import conditions, displaced_coordinates
 from elastocal.mechanics.kinematics import poses
 from elastocal.remainder.corrected import beyond_regressed, inputs_of
 from elastocal.validation.placing import beyond_campaign, beyond_loads

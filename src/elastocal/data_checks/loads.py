@@ -15,9 +15,9 @@ from scipy.constants import g, pound_force
 
 from elastocal.data_checks.placement import at_targets, free_columns, rms, robust_sigma, robustly_placed, spread
 from elastocal.data_checks.protocol import Fault, Value
+from elastocal.fitting.model import measured_in_base
 from elastocal.fitting.normal_equations import solve_normal
 from elastocal.fitting.observations import single_observations, state_clusters
-from elastocal.fitting.prediction import measured_in_base
 from elastocal.mechanics.elastostatics import generalized_forces, regressor
 from elastocal.mechanics.kinematics import poses_and_jacobians
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.data_checks.placement import IMPLAUSIBLE_M, at_targets, placed, rms
-from elastocal.fitting.prediction import joint_compliances
+from elastocal.fitting.model import joint_compliances
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign

@@ -43,14 +43,13 @@ from elastocal.diagnosis.verdict import (
 )
 from elastocal.effects.catalogue import effects
 from elastocal.fitting.least_squares import ON_THE_WAY, SETTLED, fit
-from elastocal.fitting.model import parameter_values
+from elastocal.fitting.model import joint_compliances, parameter_values
 from elastocal.fitting.noise import noise_facts
 from elastocal.fitting.observations import sample_of
-from elastocal.fitting.prediction import joint_compliances
 from elastocal.fitting.tolerances import effective_parameters
 from elastocal.random_streams import stream
 from elastocal.remainder.repeatable import repeatable_part
-from elastocal.validation.left_out import left_out_squares
+from elastocal.validation.held_out import left_out_squares
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

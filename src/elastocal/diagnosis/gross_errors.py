@@ -23,10 +23,9 @@ from scipy.special import chdtri, fdtri, gammaincinv
 
 from elastocal.counting import counted
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.model import parameters
+from elastocal.fitting.model import conditions, parameters, residuals
 from elastocal.fitting.noise import measurement_covariances
 from elastocal.fitting.observations import parts_of, select_states, single_observations, spread_poses
-from elastocal.fitting.prediction import conditions, residuals
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements

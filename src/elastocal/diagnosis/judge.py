@@ -14,22 +14,23 @@ from elastocal.counting import counted
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.gross_errors import Deviations, entries_of, held_out_gross_errors, warnings_of, yardstick_of
 from elastocal.diagnosis.settings import Settings
+from elastocal.fitting.model import conditions, measured_in_base, residuals
 from elastocal.fitting.noise import noise_from
 from elastocal.fitting.observations import single_observations, state_clusters
-from elastocal.fitting.prediction import conditions, measured_in_base, residuals
 from elastocal.random_streams import stream
 from elastocal.remainder.corrected import Plan, corrected, remainder_facts
 from elastocal.validation.conformity import count_configurations, joint_ranges
 from elastocal.validation.held_out import (
     METRICS,
+    error_row,
     errors_by_range,
     intervals,
     noise_floor,
     position_errors,
     share_below_largest,
+    split_rows,
     summary,
 )
-from elastocal.validation.left_out import error_row, split_rows
 from elastocal.validation.placing import outside_poses, placed, repeat_warnings
 
 if TYPE_CHECKING:

@@ -32,10 +32,9 @@ from elastocal.diagnosis.refit import mean_square_left
 from elastocal.diagnosis.statistics import rows_alike
 from elastocal.diagnosis.verdict import ADEQUATE, NAMED, NOT_TESTABLE, mechanisms_of_models
 from elastocal.fitting.linearization import effect_columns, linearize
-from elastocal.fitting.model import parameters
+from elastocal.fitting.model import conditions, parameters
 from elastocal.fitting.normal_equations import whitening
 from elastocal.fitting.observations import Observations, States
-from elastocal.fitting.prediction import conditions
 from elastocal.mechanics.components import WRENCH_NAMES
 
 if TYPE_CHECKING:

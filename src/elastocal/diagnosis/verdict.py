@@ -19,7 +19,7 @@ import numpy as np
 
 from elastocal.diagnosis.averaging import squares_beyond
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.fitting.prediction import joint_compliances
+from elastocal.fitting.model import joint_compliances
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Sequence

@@ -14,8 +14,8 @@ from elastocal.effects.catalogue import effects
 from elastocal.effects.conditions import conditions_of
 from elastocal.effects.protocol import Candidate
 from elastocal.figures.style import PALETTE, panels, styled
+from elastocal.fitting.model import displaced_by
 from elastocal.fitting.observations import States
-from elastocal.fitting.prediction import displace
 from elastocal.mechanics.kinematics import poses
 from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.sites import Sites, sites_of
@@ -126,7 +126,8 @@ def _moved_mm(
     commanded = sites.chain.at(states.joint_angles)
     displaced = commanded.copy()
     sizes = np.array([(parameter.sign or 1) * parameter.plausible for parameter in candidate.parameters])
-    displace(displaced, candidate, sizes, [shape.start for shape in candidate.shapes], around)
+    for coordinate, by in displaced_by([(candidate, sizes, [shape.start for shape in candidate.shapes])], around).items():
+        displaced[:, coordinate] += by
     return 1e3 * (poses(sites.chain, displaced, point)[0] - poses(sites.chain, commanded, point)[0])
 
 

@@ -14,17 +14,19 @@ from elastocal.effects.conditions import at_states
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import (
     Estimate,
+    conditions,
     limits,
     nonlinear_parameters,
     of_placement,
     parameter_values,
     parameters,
+    residuals,
     stepped,
+    with_springs_of,
 )
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.normal_equations import Parts, solve_normal, whitening
 from elastocal.fitting.observations import parts_of, sample_of
-from elastocal.fitting.prediction import conditions, residuals, with_springs_of
 from elastocal.mechanics.kinematics import poses_of_points
 
 if TYPE_CHECKING:
@@ -118,7 +120,8 @@ class Fit:
         for states, seen, part in parts_of(observations, len(self.held)):
             around = self.conditions_of(part.states, states if len(part) < len(observations) else None)
             line = linearize(self.model, self.estimate, part, around)
-            white = whitening(part, line.joint_jacobian, self.noise)
+            jacobian = line.joint_jacobian if self.joint_jacobian is None else self.joint_jacobian[seen]
+            white = whitening(part, jacobian, self.noise)
             yield seen, line.sensitivities, white.apply(line.sensitivities * np.sqrt(self.weights[seen])[:, None, None])
 
     def conditions_of(self, states: States, chosen: slice | None = None) -> Conditions:

@@ -23,8 +23,8 @@ from scipy.sparse import csr_array
 
 from elastocal.effects.conditions import Conditions, with_springs, with_total
 from elastocal.effects.gravity import DECLARED_WEIGHT
-from elastocal.fitting.observations import groups_by_size
-from elastocal.fitting.prediction import (
+from elastocal.fitting.model import (
+    displaced_by,
     displaced_coordinates,
     joint_compliances,
     laws_of,
@@ -33,6 +33,7 @@ from elastocal.fitting.prediction import (
     target_points,
     with_springs_of,
 )
+from elastocal.fitting.observations import groups_by_size
 from elastocal.mechanics.kinematics import motion
 
 if TYPE_CHECKING:
@@ -303,7 +304,7 @@ def _shape_laws(
             continue
         step = _SHAPE_STEP * max(abs(shapes[number]), shape.lowest, 0.1 * shape.highest)
         off = step * (np.arange(len(shapes)) == number)
-        above, below = (_displaced_by([(effect, values, at)], conditions) for at in (shapes + off, shapes - off))
+        above, below = (displaced_by([(effect, values, at)], conditions) for at in (shapes + off, shapes - off))
         yield {c: (above.get(c, 0.0) - below.get(c, 0.0)) / (2 * step) for c in {*above, *below}}
 
 
@@ -320,7 +321,7 @@ def _spring_laws(spring: Candidate, model: Model, estimate: Estimate, around: Co
     ]
     if not others:
         return laws
-    present = _displaced_by(others, around)
+    present = displaced_by(others, around)
     coordinates = sorted(present)
     steps = np.array([_SPRING_STEP * parameter.plausible for parameter in spring.parameters])
     if springs:
@@ -329,7 +330,7 @@ def _spring_laws(spring: Candidate, model: Model, estimate: Estimate, around: Co
     else:
         sprung = _with_each_correction(around, coordinates, steps)
     for law, step, changed in zip(laws, steps, sprung, strict=True):
-        moved = _displaced_by(others, changed)
+        moved = displaced_by(others, changed)
         for coordinate in coordinates:
             change = (moved[coordinate] - present[coordinate]) / step
             if change.any():
@@ -344,13 +345,3 @@ def _with_each_correction(around: Conditions, coordinates: list[int], steps: np.
     for step, per_unit in zip(steps, around.gravity_of_corrections(coordinates), strict=True):
         total[coordinates] = present + step * per_unit
         yield with_total(around, total.T)
-
-
-def _displaced_by(effects: Iterable[tuple[Candidate, np.ndarray, np.ndarray]], around: Conditions) -> dict[int, np.ndarray]:
-    """What some effects do together to each coordinate that they displace."""
-    displaced: dict[int, np.ndarray] = {}
-    for effect, values, shapes in effects:
-        for value, law in zip(values, effect.displacement(around, *shapes), strict=True):
-            for coordinate, per_unit in law.items():
-                displaced[coordinate] = displaced.get(coordinate, 0.0) + value * per_unit
-    return displaced

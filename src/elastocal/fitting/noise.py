@@ -16,6 +16,7 @@ from scipy.linalg import helmert
 from scipy.special import gammaincinv
 
 from elastocal.fitting.linearization import linearize
+from elastocal.fitting.model import conditions
 from elastocal.fitting.observations import (
     each_approach,
     groups_by_size,
@@ -23,7 +24,6 @@ from elastocal.fitting.observations import (
     standard_uncertainty,
     without_outlying_repeats,
 )
-from elastocal.fitting.prediction import conditions
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

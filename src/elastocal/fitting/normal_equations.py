@@ -15,9 +15,9 @@ from scipy.linalg.lapack import dpotrf
 
 from elastocal.effects.conditions import at_states
 from elastocal.fitting.linearization import linearize
+from elastocal.fitting.model import conditions, displaced_coordinates, residuals
 from elastocal.fitting.noise import measurement_covariances, of_components
 from elastocal.fitting.observations import groups_by_size, parts_of
-from elastocal.fitting.prediction import conditions, displaced_coordinates, residuals
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions

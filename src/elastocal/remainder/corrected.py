@@ -12,14 +12,13 @@ import elastocal.remainder
 from elastocal.campaigns.campaign import BEST_REMAINDER
 from elastocal.campaigns.joint_space import blocks_of_poses, configurations
 from elastocal.fitting.least_squares import fit_frames
+from elastocal.fitting.model import target_points
 from elastocal.fitting.observations import sample_of, state_clusters
-from elastocal.fitting.prediction import target_points
 from elastocal.io.modules import modules_with
 from elastocal.mechanics.kinematics import poses_and_jacobians
 from elastocal.remainder.protocol import Folds, Inputs
 from elastocal.remainder.tuning import CONFIDENCE, NORMAL_WIDTH, Spread, shrunk, tuned
-from elastocal.validation.held_out import Errors, intervals, position_errors, position_residuals, summary
-from elastocal.validation.left_out import refits
+from elastocal.validation.held_out import Errors, intervals, position_errors, position_residuals, refits, summary
 from elastocal.validation.placing import beyond_campaign, placed, same_campaign
 
 if TYPE_CHECKING:

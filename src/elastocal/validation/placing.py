@@ -13,9 +13,8 @@ from elastocal.counting import counted
 from elastocal.effects.protocol import LOADED_JOINTS
 from elastocal.fitting.least_squares import fit_frames
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.model import of_placement
+from elastocal.fitting.model import conditions, of_placement
 from elastocal.fitting.observations import groups_by_size, parts_of, select_states, state_clusters
-from elastocal.fitting.prediction import conditions
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Measurements

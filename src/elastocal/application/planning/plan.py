@@ -44,9 +44,8 @@ from elastocal.effects.elastic import joint_compliance
 from elastocal.effects.gravity import declared_weight
 from elastocal.errors import InputError
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.model import Estimate, Model, parameters
+from elastocal.fitting.model import Estimate, Model, conditions, parameters
 from elastocal.fitting.observations import Observations, States
-from elastocal.fitting.prediction import conditions
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.sites import sites_of
 
