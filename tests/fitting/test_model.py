@@ -17,10 +17,8 @@ from elastocal.fitting.model import (
     case_from,
     conditions,
     declared_model,
-    displaced_coordinates,
     limits,
     nonlinear_parameters,
-    parameter_values,
     parameters,
     predict,
     residuals,
@@ -54,20 +52,6 @@ def described(campaign, config_folder, **changes):
 
 def case_of(campaign, config_folder, **changes):
     return case_from(described(campaign, config_folder, **changes), columns_of(campaign.measurements))
-
-
-def test_the_campaign_is_the_one_described(campaign, config_folder, kuka):
-    changes = {"noise": {"position_m": 1e-5}, "holdout": {"fraction": 0.2, "seed": 4}, "declared": ["hysteresis"]}
-    found = case_of(campaign, config_folder, compliance="identify", **changes).campaign
-    assert (found.name, found.measured, found.frame, found.compliance) == ("cell7", "pose", "tracker", "identify")
-    assert (found.declared, found.noise, found.holdout) == (("hysteresis",), changes["noise"], changes["holdout"])
-    assert [(target.name, target.point, target.offset_m) for target in found.targets] == [(f"T{n}", n, None) for n in POINTS]
-    assert found.robot.chain == kuka.chain
-    for name, values in vars(campaign.measurements).items():
-        if values is None:
-            assert getattr(found.measurements, name) is None, name
-        else:
-            np.testing.assert_array_equal(getattr(found.measurements, name), values, err_msg=name)
 
 
 def test_a_model_of_rigid_joints_knows_that_no_compliances_are_known(campaign, config_folder):
@@ -110,15 +94,6 @@ def test_declared_model_is_that_of_the_campaign(fanuc, measured, rows, frame, fi
     assert [effect.key for effect in model.effects][-1] == "joint_offset@2"
     np.testing.assert_array_equal(model.nominal_compliance, fanuc.compliance)
     assert model.time_zero_s == 5.0 and model.row_span == (4, 9)
-
-
-def test_declared_model_weighs_what_the_robot_file_weighs(fanuc):
-    bare = made_model(fanuc.chain, (Target("A", "6DoF", (0, 0, 0)),))
-    measurements = made_measurements(bare, np.random.default_rng(0), 2, 1, 0.0, 0.0)
-    robot = replace(fanuc, masses=(Mass(2, 100.0, (0.5, 0.0, 0.0), 0.1),), gravity_m_s2=(0.0, 0.0, 9.0), gear_ratio=(None,) * 6)
-    model = declared_model(Campaign("c", robot, "position", "base", TWO, "identify", (), None, {}, measurements))
-    assert [effect.key for effect in model.effects] == ["joint_compliance", "declared_weight"]
-    assert model.sites.masses == robot.masses and model.sites.gravity_m_s2 == (0.0, 0.0, 9.0)
 
 
 @pytest.mark.parametrize(
@@ -194,31 +169,6 @@ def test_only_shapes_have_limits_each_those_of_its_own_law(two_laws):
     assert np.isfinite(expected).sum() == 4
 
 
-@pytest.mark.parametrize(("step", "end"), [(-1e9, "lowest"), (1e9, "highest")])
-@pytest.mark.parametrize("place", [0, 2])
-def test_a_step_of_a_shape_ends_at_the_end_of_its_own_range(two_laws, place, step, end):
-    model, estimate = two_laws
-    whole = np.zeros(len(parameters(model, estimate)))
-    whole[owned(model, estimate, model.effects[place].key, "torque")] = step
-    there = stepped(model, estimate, whole)
-    assert there.shapes[place].tolist() == [getattr(model.effects[place].shapes[0], end)]
-    for number in {0, 1, 2} - {place}:
-        np.testing.assert_array_equal(there.shapes[number], estimate.shapes[number])
-
-
-def test_values_are_zero_for_frames_and_targets_and_those_of_coefficients_before_shapes(two_laws):
-    model, estimate = two_laws
-    whole = 1e-6 * np.arange(1.0, len(parameters(model, estimate)) + 1)
-    there = stepped(model, estimate, whole)
-    found = parameter_values(model, there)
-    np.testing.assert_array_equal(found[:9], np.zeros(9))
-    (play, taken_up), geometry, (beyond, meeting) = (
-        np.concatenate([a, b]) for a, b in zip(estimate.coefficients, estimate.shapes, strict=True)
-    )
-    before = np.array([play, taken_up, *geometry, beyond, meeting])
-    np.testing.assert_allclose(found[9:], before + whole[9:], rtol=1e-12, atol=0)
-
-
 def equilibrium(chain, compliance, states, weighing=None):
     """Turn of each joint where the springs hold the load at the pose to which it has turned them, by scipy's root finder."""
     end = replace(chain.end_effector, offset_m=(0, 0, 0))
@@ -245,25 +195,6 @@ def test_nominal_springs_deflect_as_equation_9_with_exact_kinematics(fanuc):
         np.testing.assert_allclose(rotation[seen.target == index], expected[1], rtol=0, atol=1e-9)
     bent = exact_deflections(fanuc.chain, states.joint_angles, turned, fanuc.chain.end_effector)
     assert np.abs(bent).max() > 1e-4
-
-
-def test_effects_add_up_on_the_coordinates_of_the_sites(fanuc):
-    known = candidates_on(made_model(fanuc.chain).sites)
-    offset, growth, frame = (known[key] for key in ("joint_offset@2", "stiffening@2", "base_compliance"))
-    model = made_model(fanuc.chain, compliance=fanuc.compliance, effects=(offset, growth, frame))
-    estimate, states = made_estimate(model, seed=10), made_states(6, 5, seed=11)
-    around = conditions(model, estimate, states)
-    found = displaced_coordinates(model, estimate, around)
-    torque = joint_torques(model.sites.chain, found, states.wrench, model.sites.chain.end_effector)[:, :6]
-    expected = states.joint_angles + fanuc.compliance * torque
-    (meeting,), load = estimate.shapes[1], torque[:, 1]
-    beyond = load - meeting * np.tanh(load / meeting)
-    expected[:, 1] += estimate.coefficients[0][0] + estimate.coefficients[1][0] * beyond
-    np.testing.assert_allclose(found[:, :6], expected, rtol=0, atol=1e-9)
-    at_base = found[:, list(model.sites.base)]
-    np.testing.assert_allclose(at_base[:, :2], estimate.coefficients[2][0] * states.wrench[:, :2], rtol=1e-9, atol=1e-18)
-    used = {*range(6), *model.sites.base}
-    assert not np.delete(found, list(used), axis=1).any()
 
 
 @pytest.mark.parametrize("name", OTHER_CHAINS)

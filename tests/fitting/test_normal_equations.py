@@ -45,12 +45,6 @@ def test_solution_with_a_prior_is_that_of_numpy_with_a_row_for_each_prior():
     assert not held.any()
 
 
-def test_parameters_are_held_given_those_before_them():
-    gram = 1e4 * np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-    np.testing.assert_array_equal(identifiable(gram, np.zeros(3, bool), np.zeros(3, bool)), [True, False, True])
-    np.testing.assert_array_equal(identifiable(gram, np.array([True, False, False]), np.zeros(3, bool)), [False, True, True])
-
-
 def informed(*covariance):
     """Information whose inverse is a covariance, in plausible sizes."""
     return np.linalg.inv(np.array(covariance))
@@ -178,16 +172,6 @@ def test_whitened_rows_are_those_of_a_dense_cholesky_factor(case, pose_rad, stat
     identity = np.eye(len(covariance)).reshape(len(seen), seen.rows, -1)
     factor = whitening(seen, jacobian, noise).apply(identity).reshape(covariance.shape)
     np.testing.assert_allclose(factor @ covariance @ factor.T, np.eye(len(covariance)), atol=1e-7)
-
-
-@pytest.mark.parametrize("noise", [OF_JOINTS, replace(OF_JOINTS, joint_rad=np.zeros(6)), replace(OF_JOINTS, pose_rad=1e-4)])
-def test_a_whitening_after_matrices_is_that_of_what_these_make(case, noise):
-    seen, jacobian = case
-    rng = np.random.default_rng(7)
-    maps = rng.standard_normal((len(seen), seen.rows, seen.rows))
-    values = rng.standard_normal((len(seen), seen.rows, 3))
-    by = whitening(seen, jacobian, noise)
-    np.testing.assert_allclose(by.after(maps).apply(values), by.apply(maps @ values), rtol=1e-8, atol=1e-6)
 
 
 @pytest.mark.parametrize("pose_rad", [0.0, 3e-5])

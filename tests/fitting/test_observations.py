@@ -11,7 +11,6 @@ from synthetic import measurements_of
 
 from elastocal.fitting.observations import (
     averaged,
-    each_approach,
     state_clusters,
     without_outlying_repeats,
 )
@@ -24,22 +23,6 @@ def measurements(keys, position=None, **others):
     places = dict(zip(names, np.array(keys).T, strict=True))
     position = place if position is None else np.array(position, float)
     return measurements_of(joint_angles=angles, wrench=wrench, position=position, **places, **others)
-
-
-def test_each_approach_is_a_state_and_knows_the_averaged_one():
-    keys = [(0, p, load, r, t) for p in (0, 1) for load in (0, 1) for r in (0, 1, 2) for t in (0, 1)]
-    taken = measurements(keys)
-    found, repeated = each_approach(taken)
-    together = averaged(taken)
-    assert len(found.states) == 12 and len(found) == 24
-    np.testing.assert_array_equal(repeated, np.repeat(np.arange(4), 3))
-    np.testing.assert_array_equal(found.states.pose, together.states.pose[repeated])
-    np.testing.assert_array_equal(found.states.load, together.states.load[repeated])
-    np.testing.assert_array_equal(found.states.repeats, 1)
-    for state in range(4):
-        for target in (0, 1):
-            mean = found.position[(repeated[found.state] == state) & (found.target == target)].mean(axis=0)
-            np.testing.assert_allclose(together.position[(together.state == state) & (together.target == target)][0], mean)
 
 
 def full_measurements(seed, loads=2):

@@ -59,29 +59,6 @@ def test_the_size_is_the_same_whatever_noise_was_taken_and_the_noise_comes_back(
     assert factor == pytest.approx(1.0 / share, rel=0.15)
 
 
-def test_the_evidence_in_closed_form_is_that_of_the_measurements(kuka):
-    """Marginal likelihood of the whitened residual, normal with covariance s2 I + X D X', frames flat: by determinants."""
-    campaign, model = campaign_of(kuka, 5e-4, poses=12, fitted_frames=True)
-    wide = wide_fit(campaign, model)
-    rows = np.concatenate([white.reshape(-1, len(wide.held)) for _, _, white in wide.sensitivities(campaign.observations)])
-    mine = np.array([parameter.sized for _, parameter in wide.parameters])
-    values = np.concatenate(wide.estimate.coefficients[-len(JOINTS) :])
-    seen = wide.whitened(wide.residual).ravel() + rows[:, mine] @ values
-    basis, _ = np.linalg.qr(rows[:, ~mine & ~wide.held], mode="complete")
-    apart = basis[:, (~mine & ~wide.held).sum() :]
-    left, right = apart.T @ rows[:, mine], apart.T @ seen
-
-    def evidence(size, factor):
-        covariance = factor**2 * np.eye(len(right)) + (1e-3 * size) ** 2 * left @ left.T
-        return -0.5 * (np.linalg.slogdet(covariance)[1] + right @ np.linalg.solve(covariance, right))
-
-    size, factor = most_probable(wide)
-    best = evidence(size, factor)
-    others = [evidence(size * step, factor) for step in (10**-0.25, 10**0.25)]
-    others += [evidence(size, factor * step) for step in (0.9, 1.1) if factor * step >= 1.0]
-    assert best >= max(others) - 1e-6
-
-
 def test_effective_parameters_are_the_trace_of_the_hat_matrix(kuka):
     campaign, model = campaign_of(kuka, 1e-4, poses=6)
     fitted = fit(with_size(model, 0.1), campaign.observations, campaign.declared.noise.scaled(30.0))

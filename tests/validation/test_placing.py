@@ -69,6 +69,13 @@ def test_variances_are_those_without_the_measurements_of_the_pose(fanuc):
     np.testing.assert_allclose(there, [variance[other.state == state].max() for state in range(8)], rtol=1e-6)
 
 
+def outside(fitted, own, other, **changes):
+    """Poses of other observations, with changes of their states, that lie outside the range of a fit's own."""
+    unseen = replace(other, states=replace(other.states, **changes))
+    cases = [SimpleNamespace(campaign=SimpleNamespace(name="c"), observations=part) for part in (own, unseen)]
+    return outside_poses(fitted, *cases)
+
+
 def test_poses_drawn_alike_are_seldom_outside_and_larger_loads_and_far_angles_always(fanuc):
     """Of 72 poses beside 14, 5 % by their angles and 1 in 15 by the variance: 8 expected, 19 four standard errors away.
 
@@ -77,15 +84,10 @@ def test_poses_drawn_alike_are_seldom_outside_and_larger_loads_and_far_angles_al
     alike = loaded = 0
     for seed in range(8):
         fitted, own, other = fitted_part(fanuc, seed, 14, 9)
-
-        def outside(**changes):
-            unseen = replace(other, states=replace(other.states, **changes))
-            cases = [SimpleNamespace(campaign=SimpleNamespace(name="c"), observations=part) for part in (own, unseen)]
-            return outside_poses(fitted, *cases)
-
-        alike += outside().sum()
-        loaded += outside(wrench=10 * other.states.wrench).sum()
-        assert outside(joint_angles=other.states.joint_angles + np.array([0, 0, 3.0, 0, 0, 0])).all()
+        states = other.states
+        alike += outside(fitted, own, other).sum()
+        loaded += outside(fitted, own, other, wrench=10 * states.wrench).sum()
+        assert outside(fitted, own, other, joint_angles=states.joint_angles + np.array([0, 0, 3.0, 0, 0, 0])).all()
     assert 1 <= alike <= 19
     # No range of angles tells a load ten times as large.
     assert loaded > 0.9 * 72
