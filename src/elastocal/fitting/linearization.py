@@ -1,13 +1,9 @@
 """Sensitivities of the measurements: the Jacobian of the chain times the displacement of its coordinates per parameter.
 
 An effect displaces coordinates of the sites, by an amount that belongs to the state; how a coordinate moves what is measured
-belongs to the measurement. In row r of state s a column of sensitivities is the sum over coordinates c of
-
-    J[r, c] f_c(s),
-
-so that products of two columns are sums over states of f_c(s) g_d(s) H_cd(s), with H = J'J of the rows of one state: as many
-terms as states, where the columns themselves have a term for each component of each target in it. Two columns differ by what
-they have in common times the rounding of one, as differences of squares do: 1e-16 of the larger.
+belongs to the measurement. In row r of state s a column of sensitivities is the sum over coordinates c of J[r, c] f_c(s), so
+that products of two columns are sums over states of f_c(s) g_d(s) H_cd(s), with H = J'J of the rows of one state: as many terms
+as states, where the columns themselves have a term for each component of each target in it.
 """
 
 from __future__ import annotations
@@ -47,10 +43,9 @@ if TYPE_CHECKING:
 _MANY_ENTRIES = 16
 # Numbers of products by state that are in memory at once.
 _AT_ONCE = 1_500_000
-# Relative step of the central difference in a shape parameter.
-_SHAPE_STEP = 1e-4
-# Of the forward difference in what loads the springs, in plausible sizes: laws of gears bend little over that.
-_SPRING_STEP = 1e-4
+# Relative step of the central difference in a shape parameter; of the forward difference in what loads the springs, in
+# plausible sizes: laws of gears bend little over that.
+_SHAPE_STEP, _SPRING_STEP = 1e-4, 1e-4
 # Parameters on which the laws of other effects depend: they turn a wrench into angles, or are part of the load.
 _SPRINGS = ("joint_compliance", DECLARED_WEIGHT)
 
@@ -92,13 +87,8 @@ class Factored:
     def of_columns(self, kept: np.ndarray) -> Factored:
         """The same of some of the columns, ndarray of bool (K,), which are numbered anew."""
         mine, number = kept[self.column], np.cumsum(kept) - 1
-        return replace(
-            self,
-            columns=int(kept.sum()),
-            values=self.values[mine],
-            coordinate=self.coordinate[mine],
-            column=number[self.column[mine]],
-        )
+        entries = self.values[mine], self.coordinate[mine], number[self.column[mine]]
+        return Factored(int(kept.sum()), *entries, self.jacobian, self.state)
 
     def at(self, seen: np.ndarray) -> Factored:
         """The same of some of the observations, ndarray of bool (M,), whose states are numbered anew."""

@@ -156,8 +156,7 @@ def of_placement(owners: Iterable[str]) -> np.ndarray:
 def limits(model: Model, estimate: Estimate) -> np.ndarray:
     """Lowest and highest value of each of the `parameters`, ndarray (P, 2): the ranges of shapes, infinite for all others."""
     ranges = {(effect.key, shape.name): (shape.lowest, shape.highest) for effect in model.effects for shape in effect.shapes}
-    listed = [ranges.get((owner, p.name), (-np.inf, np.inf)) for owner, p in parameters(model, estimate)]
-    return np.array(listed).reshape(-1, 2)
+    return np.array([ranges.get((o, p.name), (-np.inf, np.inf)) for o, p in parameters(model, estimate)]).reshape(-1, 2)
 
 
 def nonlinear_parameters(model: Model, estimate: Estimate) -> np.ndarray:
@@ -197,21 +196,17 @@ def stepped(model: Model, estimate: Estimate, step: np.ndarray) -> Estimate:
         coefficients.append(values + take(len(values)))
         ends = np.array([(each.lowest, each.highest) for each in effect.shapes]).reshape(-1, 2)
         shapes.append(np.clip(shape + take(len(shape)), *ends.T))
-    return Estimate(
-        estimate.sessions, frame_rotation, frame_position, target_offset, target_rotation, tuple(coefficients), tuple(shapes)
-    )
+    placed = frame_rotation, frame_position, target_offset, target_rotation
+    return Estimate(estimate.sessions, *placed, tuple(coefficients), tuple(shapes))
 
 
 def conditions(model: Model, estimate: Estimate, states: States, coordinates: np.ndarray | None = None) -> Conditions:
-    """What the effects of a model may depend on, in some states.
+    """What the effects of a model may depend on, in some states: loads at the displaced pose, by fixed-point iteration.
 
-    By fixed-point iteration: loads at the displaced pose, then the displacement under these loads.
-
-    `estimate`: its joint compliances and masses, where they are parameters, and where it takes the robot to, at which loads are
-    taken. `coordinates` (S, C): where the robot has yielded to; found without.
+    `coordinates` (S, C): where the robot has yielded to; found without.
     """
-    compliance, corrections = joint_compliances(model, estimate), mass_corrections(model, estimate)
-    around = conditions_of(model.sites, compliance, states, model.time_zero_s, corrections, model.row_span, coordinates)
+    springs = joint_compliances(model, estimate), mass_corrections(model, estimate)
+    around = conditions_of(model.sites, springs[0], states, model.time_zero_s, springs[1], model.row_span, coordinates)
     for _ in range(_PASSES if coordinates is None else 0):
         around = at_coordinates(around, displaced_coordinates(model, estimate, around))
     return around
@@ -274,14 +269,9 @@ def laws_of(effect: Candidate, shapes: Iterable[float], around: Conditions) -> l
     return around.of_angles[effect.key]
 
 
-def predict(
-    model: Model, estimate: Estimate, observations: Observations, conditions: Conditions
-) -> tuple[np.ndarray, np.ndarray]:
-    """Exact poses of the targets, in base axes: positions (M, 3) and rotations (M, 3, 3).
-
-    `conditions`: of the states of the observations.
-    """
-    coordinates = displaced_coordinates(model, estimate, conditions)
+def predict(model: Model, estimate: Estimate, observations: Observations, around: Conditions) -> tuple[np.ndarray, np.ndarray]:
+    """Exact poses of the targets, in base axes: positions (M, 3) and rotations (M, 3, 3); `around`: of their states."""
+    coordinates = displaced_coordinates(model, estimate, around)
     position, rotation = poses_of_points(model.sites.chain, coordinates, target_points(model, estimate))
     seen = observations.target, observations.state
     return position[seen], rotation[seen] @ estimate.target_rotation[observations.target]
@@ -332,10 +322,7 @@ class Case:
 
 
 def case_from(descriptions: Mapping[str, Any], columns: Mapping[str, np.ndarray]) -> Case:
-    """Put a campaign together from its tables.
-
-    `descriptions`: with ``campaign`` and ``robot``, as step 1 writes them. `columns`: of the measurements table.
-    """
+    """Put a campaign together from its description, as step 1 writes it, and the columns of its measurements table."""
     source = descriptions["source"]
     robot = robot_from_document(descriptions["robot"], source)
     campaign = assemble_campaign(descriptions["campaign"], robot, measurements_from(columns), source)

@@ -1,5 +1,4 @@
-"""Noise of the measurements: a sensor part, alike in all directions, and the repeatability of the joints, seen through the
-Jacobian.
+"""Noise of the measurements: a sensor part, alike in all directions, and the repeatability of the joints, by the Jacobian.
 
 Repeats of a state tell both: each repeat is a fresh approach, so that the joints come to rest a little differently and move all
 targets together, while the sensor errs for each target on its own.
@@ -165,11 +164,10 @@ def noise_from_repeats(model: Model, estimate: Estimate, measurements: Measureme
 
 
 def hidden_repeatability(model: Model, estimate: Estimate, measurements: Measurements) -> tuple[float, float]:
-    """How well joints repeat, all alike, where the sensor hides each of them: root mean square of what repeats leave possible,
-    and the degrees of freedom that its square has.
+    """How well joints repeat, rad, all alike, where the sensor hides each of them; degrees of freedom that its square has.
 
-    rad; by the restricted likelihood of `noise_from_repeats`, its maximum over the sensor's part, evenly over the deviation of
-    a joint. Zeros where there are too few repeats to say anything: then it is not known.
+    The root mean square of what repeats leave possible, by the restricted likelihood of `noise_from_repeats`, its maximum over
+    the sensor's part, evenly over the deviation of a joint. Zeros where there are too few repeats to say anything.
     """
     contrasts, sensors, joints = _contrasts(model, estimate, measurements), model.rows // 3, model.sites.joints
     if contrasts is None:
@@ -181,10 +179,8 @@ def hidden_repeatability(model: Model, estimate: Estimate, measurements: Measure
         total, slope = _negative_log_likelihood(np.concatenate([free, np.full(joints, np.log(joint))]), contrasts)
         return total, slope[:sensors]
 
-    bounds = [(at - 7, at + 1) for at in start]
-    likelihood = -np.array(
-        [scipy.optimize.minimize(value, start, (joint,), "L-BFGS-B", jac=True, bounds=bounds).fun for joint in deviations]
-    )
+    given = {"method": "L-BFGS-B", "jac": True, "bounds": [(at - 7, at + 1) for at in start]}
+    likelihood = -np.array([scipy.optimize.minimize(value, start, (joint,), **given).fun for joint in deviations])
     # Even steps of the logarithm: each stands for a range as wide as the deviation itself.
     weights = np.exp(likelihood - likelihood.max()) * deviations
     weights /= weights.sum()

@@ -183,11 +183,8 @@ class _Part:
 class Parts:
     """Measurements beside a model, whole or in parts of whole poses: what a step needs of them adds up over the parts.
 
-    Whitening in parts is that of the last step; where the noise has no part of the joints it is always the same. Of states that
-    are too many to keep their conditions, the coordinates are kept at which loads are taken.
-
-    `observations`: M of them. `around`: of all their states; None where these are too many to keep it. `plausible` (P,):
-    plausible size of each parameter.
+    Whitening in parts is that of the last step; where the noise has no part of the joints it is always the same. `around`: of
+    all states; None where these are too many to keep it. `plausible` (P,): plausible size of each parameter.
     """
 
     def __init__(
@@ -228,10 +225,7 @@ class Parts:
                 part.whitener = whitening(part.observations, None, self.noise)
 
     def normal_equations(self, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Gram matrix (P, P) of the whitened sensitivities, in plausible sizes, and their products with the residual, (P,).
-
-        Observations count by their weights, ndarray (M,).
-        """
+        """Gram matrix of the weighted, whitened sensitivities in plausible sizes, and their products with the residual."""
         size = len(self.plausible)
         gram, along, root = np.zeros((size, size)), np.zeros(size), np.sqrt(weights)
         for part in self.parts:
@@ -239,9 +233,7 @@ class Parts:
             right = part.whitener.apply(line.residual * mine[:, None])
             turned = part.whitener.after(_of_rotation_vectors(line.residual) * mine[:, None, None])
             if self.factors and size > _COLUMNS_A_COORDINATE * len(line.columns.spans):
-                part_gram, part_along = _products(line, turned, right)
-                gram += part_gram
-                along += part_along
+                _add_products(gram, along, line, turned, right)
             else:
                 left = turned.apply(line.sensitivities).reshape(right.size, size)
                 gram += left.T @ left
@@ -275,9 +267,7 @@ class Parts:
         return np.concatenate(found) if found else None
 
     def _residual(self, estimate: Estimate) -> np.ndarray:
-        return np.concatenate(
-            [residuals(self.model, estimate, part.observations, self._around(part, estimate)) for part in self.parts]
-        )
+        return np.concatenate([residuals(self.model, estimate, p.observations, self._around(p, estimate)) for p in self.parts])
 
     def _whitened(self, residual: np.ndarray) -> np.ndarray:
         return np.concatenate([part.whitener.apply(residual[part.seen]) for part in self.parts])
@@ -315,18 +305,17 @@ class Parts:
             part.around, part.jacobian = line.conditions, line.joint_jacobian
 
 
-def _products(line: Linearization, turned: Whitening, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Gram matrix of the whitened sensitivities and their products with the whitened residual, without the sensitivities."""
-    columns = replace(line.columns, jacobian=turned.apply(line.coordinate_jacobian))
+def _add_products(gram: np.ndarray, along: np.ndarray, line: Linearization, turned: Whitening, right: np.ndarray) -> None:
+    """Add the products of the whitened sensitivities with each other and with the whitened residual, by their factors."""
+    columns, at = replace(line.columns, jacobian=turned.apply(line.coordinate_jacobian)), line.of_targets
     beside = np.concatenate([turned.apply(line.target_columns), right[..., None]], axis=2)
-    gram, cross, at = columns.gram(), columns.times(beside), line.of_targets
-    own = np.tensordot(beside, beside, ((0, 1), (0, 1)))
+    cross, own = columns.times(beside), np.tensordot(beside, beside, ((0, 1), (0, 1)))
+    gram += columns.gram()
     gram[:, at] += cross[:, :-1]
     gram[at] += cross[:, :-1].T
     gram[np.ix_(at, at)] += own[:-1, :-1]
-    along = cross[:, -1]
+    along += cross[:, -1]
     along[at] += own[:-1, -1]
-    return gram, along
 
 
 def _of_rotation_vectors(residual: np.ndarray) -> np.ndarray:
@@ -335,8 +324,7 @@ def _of_rotation_vectors(residual: np.ndarray) -> np.ndarray:
     Where a pose turns by -w, its rotation vector r grows by w + r x w / 2 + O(r^2): Bortz's equation (IEEE Trans. Aerosp.
     Electron. Syst. 7, 1971).
     """
-    count, rows = residual.shape
-    maps = np.tile(np.eye(rows), (count, 1, 1))
-    if rows > 3:
+    maps = np.tile(np.eye(residual.shape[1]), (len(residual), 1, 1))
+    if residual.shape[1] > 3:
         maps[:, 3:, 3:] += 0.5 * np.cross(residual[:, None, 3:], np.eye(3)).transpose(0, 2, 1)
     return maps

@@ -86,12 +86,8 @@ def position_residuals(model: Model, estimate: Estimate, observations: Observati
 
 def summary(distance: np.ndarray) -> dict[str, np.ndarray]:
     """Mean, RMS, 95th percentile and maximum, each (...), of distances (..., M)."""
-    return {
-        "mean_m": distance.mean(axis=-1),
-        "rms_m": np.sqrt((distance**2).mean(axis=-1)),
-        "p95_m": np.quantile(distance, 0.95, axis=-1),
-        "max_m": distance.max(axis=-1),
-    }
+    mean, rms = distance.mean(axis=-1), np.sqrt((distance**2).mean(axis=-1))
+    return dict(zip(METRICS, (mean, rms, np.quantile(distance, 0.95, axis=-1), distance.max(axis=-1)), strict=True))
 
 
 @dataclass(frozen=True)
@@ -111,12 +107,10 @@ def intervals(
 ) -> tuple[list[dict[str, np.ndarray]], list[Reduction]]:
     """95 % intervals of the summary, for as few poses as a campaign holds out.
 
-    Poses are the independent units; measurements of one pose share errors. Mean and RMS, and the ratio of two RMS, have
-    bootstrap-t intervals over poses, studentized by the delete-one-pose jackknife on the logarithmic scale (Efron and
-    Tibshirani, An Introduction to the Bootstrap, 11.3 and 12.5; for clusters Cameron, Gelbach and Miller 2008), and those of
-    Student's t with the same standard error where poses are very few or many. Quantiles of so few poses have none: the maximum
-    has none that a bootstrap could give (Bickel and Freedman 1981), see `share_below_largest`. Why these, and what they cover:
-    ``docs/held_out_intervals.md``.
+    Measurements of one pose share errors. Mean and RMS, and the ratio of two RMS, have bootstrap-t intervals over poses,
+    studentized by the delete-one-pose jackknife on the logarithmic scale (Efron and Tibshirani, An Introduction to the
+    Bootstrap, 11.3 and 12.5; for clusters Cameron, Gelbach and Miller 2008), and those of Student's t with the same standard
+    error where poses are very few or many. Quantiles of so few poses have none. What they cover: docs/held_out_intervals.md.
 
     `errors`: of several models for the same observations; every replicate draws the same poses for all. `reference`: which of
     them the reductions count from. Returns `intervals`, (2,) for each of `errors` and metric, m, not a number where there is

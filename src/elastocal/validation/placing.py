@@ -46,8 +46,8 @@ def same_campaign(case: Case, part: Case) -> bool:
 def placed_estimate(fitted: Fit, observations: Observations) -> Estimate:
     """The estimate of a fit for other observations of its targets, whose sessions it may not have seen.
 
-    A tracker set up anew stands somewhere else: the frame of such a session is fitted to the very observations that test it,
-    six numbers of each session, and so its errors come out slightly too small. Everything else stays.
+    The frame of such a session is fitted to the very observations that test it, six numbers of each session, and so its errors
+    come out slightly too small. Everything else stays.
     """
     found = fitted.estimate
     unseen = ~np.isin(observations.states.session, found.sessions)
@@ -129,16 +129,14 @@ def beyond_loads(fitted_states: States, wrench: np.ndarray, times: float = 1.0) 
 def predictive_variances(
     fitted: Fit, observations: Observations, model: Model, estimate: Estimate, unseen: Observations
 ) -> tuple[np.ndarray, np.ndarray]:
-    """How surely a fit predicts positions: those of its own poses, each left out in turn, and those of other states.
+    """How surely a fit predicts positions: its own poses (P,), each left out in turn, and other states (S,).
 
-    The variance comes from the parameters alone, each with its normal prior or else one of its plausible size: what the
-    measurements do not identify is as uncertain as that, and a pose that alone identifies a parameter does not make all
-    others look sure. It is the leverage of a prediction, here in m²; poses are left out by case deletion (Cook and Weisberg
-    1982) with Woodbury's identity.
+    The variance of the least sure reading, m², comes from the parameters alone, each with its normal prior or else one of its
+    plausible size: what the measurements do not identify is as uncertain as that, and a pose that alone identifies a parameter
+    does not make all others look sure. It is the leverage of a prediction; poses are left out by case deletion (Cook and
+    Weisberg 1982) with Woodbury's identity. Frames and targets count only where they are those of the fit.
 
-    `observations`: which it was fitted to. `estimate`: of the fit, for the other observations. Frames and targets count only
-    where they are those of the fit. Returns `own` (P,): m², of the least sure reading of each pose; `other` (S,): m², of the
-    least sure reading of each state. Zero without parameters.
+    `observations`: which it was fitted to. `estimate`: of the fit, for the other observations.
     """
     listed, own, other = fitted.parameters, np.zeros(len(observations)), np.zeros(len(unseen))
     shared = model.targets == fitted.model.targets and set(unseen.states.session) <= set(observations.states.session)
@@ -168,8 +166,7 @@ def _through(root: np.ndarray, rows: np.ndarray) -> np.ndarray:
 
 
 def _variances_left_out(projected: np.ndarray, rows: np.ndarray, cluster: np.ndarray) -> np.ndarray:
-    """Variance (M,) of positions whose sensitivities through the root of the covariance are `projected` (M, 3, P), with the
-    measurements of their own poses left out of the fit, of which `rows` (M, rows, P) are those whitened."""
+    """Variance (M,) of positions without their own poses, by sensitivities through a root, plain (M, 3, P) and whitened."""
     variance, width = (projected**2).sum(axis=(1, 2)), projected.shape[2]
     for members in groups_by_size(cluster):
         own, asked = (each[members].reshape(len(members), -1, width) for each in (rows, projected))
