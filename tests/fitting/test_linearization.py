@@ -46,6 +46,8 @@ def test_products_are_those_of_the_columns_written_out_however_many_states_are_t
         for coordinate, values in law.items():
             dense[..., number] += sizes[number] * columns.jacobian[..., coordinate] * values[columns.state, None]
     np.testing.assert_allclose(columns.dense(), dense, atol=1e-12)
+    np.testing.assert_allclose(columns.of_columns(sizes > 1.2).dense(), dense[..., sizes > 1.2], atol=1e-12)
+    np.testing.assert_allclose(columns.at(columns.state > 0).dense(), dense[columns.state > 0], atol=1e-12)
     right = np.random.default_rng(1).standard_normal((*dense.shape[:2], 2))
     # States of one pose one after the other, not all poses of one size.
     pose = columns.state // 2

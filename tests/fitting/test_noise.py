@@ -53,11 +53,12 @@ def test_repeats_of_positions_that_are_stated_to_be_worse_are_weighed_accordingl
     extra = np.sqrt(24.0) * SENSOR_M * np.random.default_rng(5).standard_normal(fine.position.shape)
     position = np.where(worse[:, None], coarse.position + extra, fine.position)
     stated = replace(fine, position=position, u95_m=1.959964 * np.where(worse, 5.0, 1.0) * SENSOR_M)
-    found = noise_from_repeats(model, estimate, stated)
-    usual = SENSOR_M * np.sqrt((25.0 + 1.0) / 2.0)
+    # Of the worse poses two of five repeats: unweighed contrasts would say 14 % less.
+    found = noise_from_repeats(model, estimate, stated.select(~worse | (fine.repeat < 2)))
+    usual = SENSOR_M * np.sqrt((2 * 25.0 + 5 * 1.0) / 7.0)
     assert found.usual_m == pytest.approx(usual, rel=1e-6)
-    # 2160 contrasts: 5 % is three standard errors. Unweighed, the figure rests on the coarse half alone.
-    np.testing.assert_allclose(found.position_m, usual, rtol=0.05)
+    # 1350 contrasts: 6 % is three standard errors.
+    np.testing.assert_allclose(found.position_m, usual, rtol=0.06)
 
 
 HANDS = tuple(Target(name, "hand", (0.0, 0.0, 0.0)) for name in "AB")
@@ -96,10 +97,11 @@ def test_few_repeats_have_the_pooled_standard_deviation_of_states_with_different
     rng = np.random.default_rng(21)
     off, turned = SENSOR_M * rng.standard_normal((3, 4, 2, 3)), SENSOR_RAD * rng.standard_normal((3, 4, 2, 3))
     measurements = off_by(model, off, turned if rows == 6 else None)
-    # Pose 0 has two repeats of one target, pose 1 three of both, pose 2 four of one.
+    # Pose 0 has two repeats of one target, pose 1 three of both and one of the first alone, which tells nothing, pose 2 four.
     repeats, targets = np.array([2, 3, 4]), np.array([1, 2, 1])
     there = (measurements.repeat < repeats[measurements.pose]) & (measurements.target < targets[measurements.pose])
-    found = noise_from_repeats(model, estimate, measurements.select(there))
+    alone = (measurements.pose == 1) & (measurements.repeat == 3) & (measurements.target == 0)
+    found = noise_from_repeats(model, estimate, measurements.select(there | alone))
     parts = [values[pose, : repeats[pose], : targets[pose]] for values in (off, turned) for pose in range(3)]
     squares = [((part - part.mean(axis=0)) ** 2).sum() for part in parts]
     freedom = 3 * ((repeats - 1) * targets).sum()

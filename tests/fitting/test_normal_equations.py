@@ -21,7 +21,7 @@ from synthetic import NOISE, made_estimate, made_model, made_states, seen_exactl
 from elastocal.campaigns.campaign import Target
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.model import conditions, parameters
+from elastocal.fitting.model import conditions, parameters, residuals, stepped
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.normal_equations import Parts, identifiable, solve_normal, whitening
 from elastocal.fitting.observations import Observations
@@ -227,3 +227,18 @@ def test_normal_equations_of_a_linear_problem_are_those_written_out(kind, at_onc
         blocks = [inverse[3 * n : 3 * n + 3, 3 * n : 3 * n + 3] for n in range(20)]
         expected = [np.sqrt(row @ block @ row / 3) for row, block in zip(residual, blocks, strict=True)]
         np.testing.assert_allclose(parts.distance(), expected, rtol=1e-7)
+
+
+def test_squares_of_another_estimate_are_whitened_in_the_axes_in_which_the_step_began(fanuc):
+    model = model_of(fanuc, targets=TARGETS)
+    estimate = made_estimate(model, seed=3)
+    seen = with_noise(seen_exactly(model, estimate, made_states(6, 9, seed=4)), np.random.default_rng(5))
+    parts = Parts(model, seen, OF_JOINTS, conditions(model, estimate, seen.states), np.ones(12))
+    parts.linearize(estimate)
+    parts.whiten()
+    there = stepped(model, estimate, np.array([0, 0, 0, 0.3, -0.2, 0.1, *[0.0] * 6]))
+    residual = residuals(model, there, seen, conditions(model, there, seen.states))
+    turned = residual @ there.frame_rotation[0].T @ estimate.frame_rotation[0]
+    expected = (whitening(seen, parts.jacobian(), OF_JOINTS).apply(turned) ** 2).sum()
+    assert parts.squares(np.ones(len(seen)), there) == pytest.approx(expected, rel=1e-6)
+    assert parts.squares(np.ones(len(seen)), there) != pytest.approx((parts.whitener().apply(residual) ** 2).sum(), rel=1e-3)

@@ -221,6 +221,14 @@ def test_a_step_that_equations_after_it_do_not_prove_is_followed_by_others(fanuc
         np.testing.assert_allclose(*errors, atol=1e-3 * NOISE.position_m)
 
 
+def test_a_refit_that_does_not_converge_is_made_from_nothing(fanuc, monkeypatch):
+    fitted, seen = loaded_in(fanuc, np.ones(24, bool))
+    monkeypatch.setattr("elastocal.validation.held_out.robustly", lambda *given, **options: replace(fitted, converged=False))
+    refit = next(refits(fitted, seen, np.arange(24) // 6))
+    (found,), (from_nothing,) = (each.coefficients for each in (refit.estimate, fit(fitted.model, refit.rest, NOISE).estimate))
+    np.testing.assert_array_equal(found, from_nothing)
+
+
 def test_a_target_that_only_the_part_left_out_shows_is_placed_as_from_nothing(fanuc):
     part = np.arange(24) // 6
     fitted, seen = loaded_in(fanuc, np.ones(24, bool))
