@@ -82,7 +82,8 @@ class Factored:
         values, sizes = np.empty((len(entries), states)), np.ones(len(laws)) if sizes is None else sizes
         for place, (_, coordinate, column) in zip(values, entries, strict=True):
             np.multiply(laws[column][coordinate], sizes[column], out=place)
-        return cls(len(laws), values, *np.array(entries, int).reshape(-1, 3).T[1:], jacobian, state)
+        _, coordinates, columns = np.array(entries, int).reshape(-1, 3).T
+        return cls(len(laws), values, coordinates, columns, jacobian, state)
 
     def of_columns(self, kept: np.ndarray) -> Factored:
         """The same of some of the columns, ndarray of bool (K,), which are numbered anew."""

@@ -179,8 +179,8 @@ def hidden_repeatability(model: Model, estimate: Estimate, measurements: Measure
         total, slope = _negative_log_likelihood(np.concatenate([free, np.full(joints, np.log(joint))]), contrasts)
         return total, slope[:sensors]
 
-    given = {"method": "L-BFGS-B", "jac": True, "bounds": [(at - 7, at + 1) for at in start]}
-    likelihood = -np.array([scipy.optimize.minimize(value, start, (joint,), **given).fun for joint in deviations])
+    minimize, bounds = scipy.optimize.minimize, [(at - 7, at + 1) for at in start]
+    likelihood = -np.array([minimize(value, start, (d,), "L-BFGS-B", jac=True, bounds=bounds).fun for d in deviations])
     # Even steps of the logarithm: each stands for a range as wide as the deviation itself.
     weights = np.exp(likelihood - likelihood.max()) * deviations
     weights /= weights.sum()
@@ -246,7 +246,7 @@ def _contrasts(model: Model, estimate: Estimate, measurements: Measurements) -> 
     line = linearize(bare, at, some, conditions(bare, at, some.states))
     # As if all positions were alike; repeats of a state are taken to be.
     spread = np.ones(len(some)) if some.position_std is None else some.position_std / _usual(measurements)
-    scale, sensors, squares, found = of_components(spread, model.rows), model.rows // 3, 0.0, []
+    scale, sensors, squares, found = of_components(spread, model.rows), model.rows // 3, np.zeros(model.rows // 3), []
     targets_of = np.bincount(some.state)[some.state]
     for members in groups_by_size(np.unique(repeated[chosen], return_inverse=True)[1][some.state]):
         for count in np.unique(targets_of[members[:, 0]]):

@@ -193,8 +193,9 @@ class Parts:
         self.model, self.observations, self.noise, self.plausible = model, observations, noise, plausible
         self.parts = [_Part(*edges) for edges in parts_of(observations, len(plausible))]
         self.whole = len(self.parts) == 1 and around is not None
-        for part in self.parts if around is not None else ():
-            part.around = around if self.whole else at_states(around, part.states)
+        if around is not None:
+            for part in self.parts:
+                part.around = around if self.whole else at_states(around, part.states)
         # What is whitened over several states has no factors any more, one of which belongs to the state.
         self.factors = not noise.pose_rad or observations.cluster.max() + 1 == len(observations.states)
 

@@ -321,8 +321,9 @@ def split_rows(
         rows.append(error_row(name, "all", *pair, replicates, stream))
         for label in labels.tolist():
             seen = part[observations.state] == label
-            cluster = np.unique(before.cluster[seen], return_inverse=True)[1]
-            rows.append(error_row(name, label, *(Errors(each.distance[seen], cluster) for each in pair), replicates, stream))
+            cluster = np.unique(observations.cluster[seen], return_inverse=True)[1]
+            before, after = (Errors(each.distance[seen], cluster) for each in pair)
+            rows.append(error_row(name, label, before, after, replicates, stream))
     return rows
 
 
