@@ -180,11 +180,12 @@ def _observations(measurements: Measurements, key: np.ndarray) -> Observations:
     )
     rotation = None
     if measurements.rotation_vector is not None:
-        # Of rotations close to each other, the mean turn from the first: a step towards the Riemannian mean (Moakher 2002).
         each = Rotation.from_rotvec(measurements.rotation_vector)
-        reference = each[first_pair]
-        turn = _means((each * reference[pair_of].inv()).as_rotvec(), pair_of)
-        rotation = (Rotation.from_rotvec(turn) * reference).as_matrix()
+        mean = each[first_pair]
+        if len(first_pair) < len(measurements):
+            # Of rotations close to each other, the mean turn from the first: a step towards the Riemannian mean (Moakher 2002).
+            mean = Rotation.from_rotvec(_means((each * mean[pair_of].inv()).as_rotvec(), pair_of)) * mean
+        rotation = mean.as_matrix()
     # Of repeats that are averaged the mean square, as if they were alike.
     spread = None if measurements.u95_m is None else np.sqrt(_means(standard_uncertainty(measurements.u95_m) ** 2, pair_of))
     return Observations(states, state, target, _means(measurements.position, pair_of), rotation, spread)
