@@ -10,19 +10,20 @@ from scipy.spatial.transform import Rotation
 from scipy.special import gammaincinv
 
 from elastocal.campaigns.campaign import NOT_TURNED
-from elastocal.effects.conditions import at_states
+from elastocal.effects.conditions import at_states, with_springs
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import (
     Estimate,
     conditions,
+    joint_compliances,
     limits,
+    mass_corrections,
     nonlinear_parameters,
     of_placement,
     parameter_values,
     parameters,
     residuals,
     stepped,
-    with_springs_of,
 )
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.normal_equations import Parts, solve_normal, whitening
@@ -293,7 +294,7 @@ def robustly(
             stuck = True
     line, around = measurements.parts[0].line, None
     if line is not None:
-        around = with_springs_of(model, estimate, line.conditions)
+        around = with_springs(line.conditions, joint_compliances(model, estimate), mass_corrections(model, estimate))
         residual = residuals(model, estimate, observations, around)
     else:
         measurements.linearize(estimate)

@@ -27,7 +27,6 @@ from elastocal.fitting.model import (
     mass_corrections,
     off_measured,
     target_points,
-    with_springs_of,
 )
 from elastocal.fitting.observations import groups_by_size
 from elastocal.mechanics.kinematics import motion
@@ -38,6 +37,8 @@ if TYPE_CHECKING:
     from elastocal.effects.protocol import Candidate, Displacing
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.observations import Observations
+
+    Laws = Sequence[Mapping[int, np.ndarray]]
 
 # Entries of a coordinate that make a product of their own worth its call.
 _MANY_ENTRIES = 16
@@ -68,14 +69,7 @@ class Factored:
     state: np.ndarray
 
     @classmethod
-    def of(
-        cls,
-        laws: Sequence[Mapping[int, np.ndarray]],
-        jacobian: np.ndarray,
-        state: np.ndarray,
-        states: int,
-        sizes: np.ndarray | None = None,
-    ) -> Factored:
+    def of(cls, laws: Laws, jacobian: np.ndarray, state: np.ndarray, states: int, sizes: np.ndarray | None = None) -> Factored:
         """Gather laws, one for each column, each a displacement of some coordinates in S `states`, times `sizes` (K,)."""
         count = Counter(coordinate for law in laws for coordinate in law)
         entries = sorted((-count[coordinate], coordinate, column) for column, law in enumerate(laws) for coordinate in law)
@@ -236,7 +230,7 @@ def linearize(model: Model, estimate: Estimate, observations: Observations, cond
     Sensitivities are analytic, but for shapes (central differences) and for what springs do by way of other effects (forward
     differences).
     """
-    around = with_springs_of(model, estimate, conditions)
+    around = with_springs(conditions, joint_compliances(model, estimate), mass_corrections(model, estimate))
     coordinates = displaced_coordinates(model, estimate, around)
     count, rows, chain, points = len(observations), model.rows, model.sites.chain, target_points(model, estimate)
     moved = motion(chain, coordinates, (*model.sites.followed, *points))
@@ -271,17 +265,11 @@ def linearize(model: Model, estimate: Estimate, observations: Observations, cond
 
 
 def effect_columns(
-    effects: Iterable[tuple[Displacing, Iterable[float]]],
-    conditions: Conditions,
-    coordinate_jacobian: np.ndarray,
-    state: np.ndarray,
+    effects: Iterable[tuple[Displacing, Iterable[float]]], around: Conditions, jacobian: np.ndarray, state: np.ndarray
 ) -> np.ndarray:
-    """Sensitivities of the measurements to the linear parameters of effects with values of their shapes, (M, rows, D).
-
-    `coordinate_jacobian` (M, rows, C). `state` (M,): state of each observation.
-    """
-    laws = [law for effect, shapes in effects for law in effect.displacement(conditions, *shapes)]
-    return Factored.of(laws, coordinate_jacobian, state, len(conditions.joint_angles)).dense()
+    """Sensitivities (M, rows, D) to the linear parameters of effects, with their shapes, by a `coordinate_jacobian`."""
+    laws = [law for effect, shapes in effects for law in effect.displacement(around, *shapes)]
+    return Factored.of(laws, jacobian, state, len(around.joint_angles)).dense()
 
 
 def _shape_laws(

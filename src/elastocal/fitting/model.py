@@ -229,17 +229,12 @@ def _values_of(name: str, model: Model, estimate: Estimate, otherwise: np.ndarra
     return otherwise
 
 
-def with_springs_of(model: Model, estimate: Estimate, conditions: Conditions) -> Conditions:
-    """Conditions with the joint compliances and masses of an estimate, where they are parameters."""
-    return with_springs(conditions, joint_compliances(model, estimate), mass_corrections(model, estimate))
-
-
 def displaced_coordinates(model: Model, estimate: Estimate, conditions: Conditions) -> np.ndarray:
     """Coordinates of the sites in each state, ndarray (S, C): joint angles, springs under load and effects.
 
     Springs yield to the total load, the external one and the weight that the robot file declares.
     """
-    around = with_springs_of(model, estimate, conditions)
+    around = with_springs(conditions, joint_compliances(model, estimate), mass_corrections(model, estimate))
     displaced = model.sites.chain.at(around.joint_angles)
     if not model.identifies_compliance:
         displaced[:, : model.sites.joints] += around.total[:, : model.sites.joints] * model.nominal_compliance

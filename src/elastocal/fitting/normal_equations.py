@@ -218,11 +218,10 @@ class Parts:
         """Take loads and whitening at the present estimate."""
         self.origin = self.estimate
         for part in self.parts:
-            if part.line is not None:
-                self._keep(part, part.line)
-            elif not part.whitener.blocks and (self.noise.pose_rad or self.noise.joint_rad.any()):
+            first, joints = not part.whitener.blocks, self.noise.pose_rad or self.noise.joint_rad.any()
+            if part.line is not None or (first and joints):
                 self._linearized(part)
-            elif not part.whitener.blocks:
+            elif first:
                 part.whitener = whitening(part.observations, None, self.noise)
 
     def normal_equations(self, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -292,18 +291,17 @@ class Parts:
         part.coordinates = moved, displaced[:, moved]
 
     def _linearized(self, part: _Part) -> Linearization:
-        around = self._around(part, self.estimate)
-        line = linearize(self.model, self.estimate, part.observations, around)
-        if part.around is None:
-            self._keep_coordinates(part, self.estimate, around)
-        self._keep(part, line)
-        return line
-
-    def _keep(self, part: _Part, line: Linearization) -> None:
-        """Of so many states that conditions are not kept neither is the Jacobian."""
+        """At the present estimate, by which whitening and loads are then taken; a Jacobian is kept where conditions are."""
+        line = part.line
+        if line is None:
+            around = self._around(part, self.estimate)
+            line = linearize(self.model, self.estimate, part.observations, around)
+            if part.around is None:
+                self._keep_coordinates(part, self.estimate, around)
         part.whitener = whitening(part.observations, line.joint_jacobian, self.noise)
         if part.around is not None:
             part.around, part.jacobian = line.conditions, line.joint_jacobian
+        return line
 
 
 def _add_products(gram: np.ndarray, along: np.ndarray, line: Linearization, turned: Whitening, right: np.ndarray) -> None:
