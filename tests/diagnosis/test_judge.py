@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from elastocal.diagnosis.diagnose import Diagnosis, Step
-from elastocal.diagnosis.judge import judge, residual_blocks, split_table
+from elastocal.diagnosis.judge import judge, residual_blocks
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.model import joint_compliances
 from elastocal.fitting.noise import Noise, noise_facts
@@ -136,20 +136,6 @@ def test_poses_outside_the_fitted_range_are_counted_flagged_and_warned_of(made):
     assert not training["outside_range"].any()
     assert unseen["outside_range"][unseen["pose"] == first].all()
     assert len(np.unique(unseen["pose"][unseen["outside_range"]])) == beyond["poses"]
-
-
-def test_splits_stand_beside_the_held_out_errors(made):
-    case, held_out, steps = made
-    rows = split_table(diagnosis_of(case, steps), held_out, 1)
-    assert [row["split"] for row in rows] == ["held out", *5 * ["joint space"]]
-    found = judged(steps, case, held_out).document["heldout"]
-    assert (rows[0]["before_rms_m"], rows[0]["after_rms_m"]) == (found["before"]["rms_m"], found["after"]["rms_m"])
-    assert rows[1]["after_rms_m"] < 0.5 * rows[1]["before_rms_m"]
-    # The wall: what the held-out poses hold changes nothing but the first row.
-    observations = held_out.observations
-    spoiled = replace(held_out, observations=replace(observations, position=observations.position + 0.01))
-    again = split_table(diagnosis_of(case, steps), spoiled, 1)
-    assert [one["after_rms_m"] == other["after_rms_m"] for one, other in zip(rows, again, strict=True)] == [False, *5 * [True]]
 
 
 def test_a_remainder_is_judged_where_the_campaign_asks_for_one_and_the_data_are_sound(made):

@@ -7,7 +7,6 @@ from made_loop_tables import (
     parameter_table,
     remainder_facts,
     residual_table,
-    split_rows,
     step_rows,
     verdict_document,
 )
@@ -42,7 +41,6 @@ def facts_of(verdict, **changed):
     found = [effect["name"] for effect in verdict["effects"] if effect["adopted"]]
     given = {
         "steps": step_rows(effects=found),
-        "splits": split_rows(changed=bool(found)),
         "experiment": [],
         "table": residual_table(),
         "descriptions": campaign_descriptions(),

@@ -101,19 +101,6 @@ def step_rows(effects=("lost_motion",), largest_m=3e-4):
     return rows
 
 
-def split_rows(changed=True, blocks=4):
-    """Rows of splits.csv: the held-out poses, and blocks of joint space."""
-    rows = []
-    for split, block in [("held out", "all"), ("joint space", "all"), *(("joint space", k + 1) for k in range(blocks))]:
-        row = {"split": split, "block": block, "poses": 10}
-        for stage, size in (("before", 1.2e-4), ("after", 0.8e-4 if changed else 1.2e-4)):
-            row |= {f"{stage}_rms_m": size, f"{stage}_rms_m_low": 0.8 * size, f"{stage}_rms_m_high": 1.3 * size}
-        fall = 1 - row["after_rms_m"] / row["before_rms_m"]
-        row |= {"reduction": fall, "reduction_low": fall - 0.1, "reduction_high": fall + 0.1, "reduction_std_error": 0.05}
-        rows.append(row)
-    return rows
-
-
 def experiment_rows(effect="link_elasticity", count=10):
     """Rows of next_experiment.csv."""
     rows = []

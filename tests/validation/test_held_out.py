@@ -17,7 +17,6 @@ from elastocal.fitting.tolerances import with_size
 from elastocal.validation.held_out import (
     METRICS,
     Errors,
-    cross_validated,
     errors_by_range,
     intervals,
     left_out_squares,
@@ -26,7 +25,6 @@ from elastocal.validation.held_out import (
     position_residuals,
     refits,
     share_below_largest,
-    split_rows,
     summary,
 )
 
@@ -252,48 +250,28 @@ def of_sessions(robot, poses=24, sessions=3):
     return fit(model, seen, NOISE), seen
 
 
+def left_out_errors(fitted, seen, part):
+    """Distance of each observation from its prediction by a refit without its part."""
+    distance = np.empty(len(seen))
+    for refit in refits(fitted, seen, part):
+        distance[refit.within[seen.state]] = position_errors(fitted.model, refit.there, refit.left_out).distance
+    return distance
+
+
 def test_errors_are_those_of_a_fit_to_the_rest(fanuc):
     campaign = planted(fanuc, {"joint_offset@3": [1e-3]}, poses=16)
     seen, fitted = campaign.observations, campaign.declared
     part = np.arange(16).repeat(2) // 4
-    found = cross_validated(fitted, seen, part)
+    found = left_out_errors(fitted, seen, part)
     for number in range(4):
         rest, left = (select_states(seen, mask) for mask in (part != number, part == number))
         refit = fit(fitted.model, rest, fitted.noise)
         expected, mask = position_errors(fitted.model, refit.estimate, left).distance, part[seen.state] == number
         # A ten thousandth of what the rest leaves unsure of the prediction, and that is less than the noise.
-        np.testing.assert_allclose(found.distance[mask], expected, atol=1e-4 * fitted.noise.position_m)
-    np.testing.assert_array_equal(found.cluster, seen.cluster)
+        np.testing.assert_allclose(found[mask], expected, atol=1e-4 * fitted.noise.position_m)
 
 
 def test_a_session_left_out_is_placed_by_itself(fanuc):
     fitted, seen = of_sessions(fanuc)
-    found = cross_validated(fitted, seen, seen.states.session)
-    assert summary(found.distance)["rms_m"] == pytest.approx(np.sqrt(3) * NOISE.position_m, rel=0.25)
-
-
-@pytest.mark.parametrize(
-    ("poses", "sessions", "splits"), [(6, 1, []), (7, 1, ["joint space"]), (24, 3, ["joint space", "session"])]
-)
-def test_splits_are_those_that_leave_poses_enough_to_fit(fanuc, poses, sessions, splits):
-    fitted, seen = of_sessions(fanuc, poses, sessions)
-    rows = split_rows(fitted, fitted, seen, 50, np.random.default_rng(1))
-    blocks = {"joint space": ["all", 1, 2, 3, 4], "session": ["all", 0, 1, 2]}
-    assert [(row["split"], row["block"]) for row in rows] == [(split, block) for split in splits for block in blocks[split]]
-    assert [row["poses"] for row in rows if row["split"] == "session"] == [24, 8, 8, 8][: 4 * ("session" in splits)]
-
-
-def test_rows_say_each_block_and_all_and_that_a_missing_effect_was_found(fanuc):
-    campaign = planted(fanuc, {"joint_offset@3": [1e-3]}, poses=20)
-    declared, added = campaign.declared, [campaign.candidates["joint_offset@3"]]
-    model, start = declared.model.with_effects(added), declared.estimate.with_effects(added)
-    final = fit(model, campaign.observations, declared.noise, start)
-    rows = split_rows(declared, final, campaign.observations, 200, np.random.default_rng(1))
-    assert [(row["split"], row["block"]) for row in rows] == [("joint space", block) for block in ("all", 1, 2, 3, 4)]
-    assert [row["poses"] for row in rows] == [20, 5, 5, 5, 5]
-    for row in rows:
-        assert row["before_rms_m"] > 5 * row["after_rms_m"]
-        assert row["after_rms_m_low"] < row["after_rms_m"] < row["after_rms_m_high"]
-        assert 0.5 < row["reduction_low"] < row["reduction"] < row["reduction_high"] < 1
-    pooled = np.mean([row["after_rms_m"] ** 2 for row in rows[1:]])
-    assert rows[0]["after_rms_m"] ** 2 == pytest.approx(pooled)
+    found = left_out_errors(fitted, seen, seen.states.session)
+    assert summary(found)["rms_m"] == pytest.approx(np.sqrt(3) * NOISE.position_m, rel=0.25)

@@ -22,13 +22,11 @@ from elastocal.remainder.corrected import Plan, corrected, remainder_facts
 from elastocal.validation.conformity import count_configurations, joint_ranges
 from elastocal.validation.held_out import (
     METRICS,
-    error_row,
     errors_by_range,
     intervals,
     noise_floor,
     position_errors,
     share_below_largest,
-    split_rows,
     summary,
 )
 from elastocal.validation.placing import outside_poses, placed, repeat_warnings
@@ -200,18 +198,6 @@ def _declared(steps: Sequence[Step]) -> int:
 
 def _summary(errors: Errors) -> dict[str, float]:
     return {name: float(value) for name, value in summary(errors.distance).items()}
-
-
-def split_table(diagnosis: Diagnosis, held_out: Case, seed: int) -> list[dict[str, Any]]:
-    """Errors on the held-out poses beside those that cross-validation of the training poses predicts.
-
-    `held_out`: of the verdict. `seed`: as in `judge`. Returns rows of splits.csv.
-    """
-    case, before, after = diagnosis.case, diagnosis.declared, diagnosis.final
-    draws = stream(seed, case.campaign.name, "splits", 0)
-    unseen = [position_errors(*placed(fitted, case, held_out), held_out.observations) for fitted in (before, after)]
-    rows = [error_row("held out", "all", unseen[0], unseen[1], _REPLICATES, draws)]
-    return rows + split_rows(before, after, case.observations, _REPLICATES, draws)
 
 
 def residual_blocks(diagnosis: Diagnosis, verdict: Verdict) -> Iterator[dict[str, np.ndarray]]:

@@ -4,10 +4,6 @@ One Gauss-Newton step from the fit to all observations, by their normal equation
 it (Cook and Weisberg, Residuals and Influence in Regression, 2.2, 1982). What a parameter was is not carried over where only
 that part identifies it: it goes back to where a fit starts, to its prior. Where the errors of a few poses decide, the step is
 taken as it is; where a refit is asked for, exact residuals and their gradient after the step prove it, or lead on from there.
-
-Cross-validation over blocks and sessions says how far a model carries: poses drawn at random have neighbours among those
-fitted, whole blocks of joint space left out say how well it extrapolates (Roberts et al., Ecography 40, 2017). The effects stay
-those that were chosen with all training poses, so the errors carry the selection's optimism.
 """
 
 from __future__ import annotations
@@ -18,8 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import stdtrit
 
-from elastocal.campaigns.holdout import FEWEST_TRAINING_POSES
-from elastocal.campaigns.joint_space import blocks_of_poses, configurations
+from elastocal.campaigns.joint_space import configurations
 from elastocal.fitting.least_squares import ON_THE_WAY, fit, registered, robustly, sizes_of
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import conditions, nonlinear_parameters, of_placement, parameter_values, residuals, stepped
@@ -53,8 +48,6 @@ _ROUNDING = 1e-12
 _PROVEN = 0.01
 # What a pose alone determines, such as the frame of a session of one pose, is no error of it: shares below are rounding.
 _SHARE = 1e-9
-# A quarter of the poses is about the share that campaigns hold out at random, so that both errors come from as many poses.
-JOINT_SPACE_BLOCKS = 4
 
 
 @dataclass(frozen=True)
@@ -294,56 +287,3 @@ def left_out_squares(fitted: Fit, observations: Observations) -> np.ndarray:
         moved = plain[mine][:, :3] @ (gain @ (inverse @ white[mine].ravel()))
         found.append(((fitted.residual[mine][:, :3] + moved) ** 2).sum(axis=1).mean())
     return np.array(found)
-
-
-def split_rows(
-    declared: Fit, final: Fit, observations: Observations, replicates: int, stream: np.random.Generator
-) -> list[dict[str, Any]]:
-    """Leave-one-part-out errors of the declared and the final model, over blocks of joint space and sessions.
-
-    `observations`: training poses, which both were fitted to. `replicates`: of the bootstrap over poses. Returns rows of
-    splits.csv: "all" parts together and each; without a split that leaves too few configurations to fit. Intervals take poses
-    as independent, which refits that share most of their poses make only nearly true (Bengio and Grandvalet 2004).
-    """
-    states, rows = observations.states, []
-    pose, parts = state_clusters(states), {}
-    configuration = configurations(states.joint_angles, pose)[pose]
-    if configuration.max() + 1 >= JOINT_SPACE_BLOCKS:
-        parts["joint space"] = 1 + blocks_of_poses(states.joint_angles, pose, JOINT_SPACE_BLOCKS)[pose]
-    if np.ptp(states.session):
-        parts["session"] = states.session
-    for name, part in parts.items():
-        labels = np.unique(part)
-        if min(len(np.unique(configuration[part != label])) for label in labels) < FEWEST_TRAINING_POSES:
-            continue
-        before = cross_validated(declared, observations, part)
-        pair = before, before if final is declared else cross_validated(final, observations, part)
-        rows.append(error_row(name, "all", *pair, replicates, stream))
-        for label in labels.tolist():
-            seen = part[observations.state] == label
-            cluster = np.unique(observations.cluster[seen], return_inverse=True)[1]
-            before, after = (Errors(each.distance[seen], cluster) for each in pair)
-            rows.append(error_row(name, label, before, after, replicates, stream))
-    return rows
-
-
-def cross_validated(fitted: Fit, observations: Observations, part: np.ndarray) -> Errors:
-    """Position errors of observations, each predicted by a refit without the part that it belongs to; as of `refits`."""
-    distance = np.empty(len(observations))
-    for refit in refits(fitted, observations, part):
-        distance[refit.within[observations.state]] = position_errors(fitted.model, refit.there, refit.left_out).distance
-    return Errors(distance, observations.cluster)
-
-
-def error_row(
-    split: str, block: str | int, before: Errors, after: Errors, replicates: int, stream: np.random.Generator
-) -> dict[str, Any]:
-    """One row of splits.csv."""
-    limits, reductions = intervals([before, after], replicates, stream)
-    row: dict[str, Any] = {"split": split, "block": block, "poses": before.poses}
-    rms = [summary(errors.distance)["rms_m"] for errors in (before, after)]
-    for stage, value, limit in zip(("before", "after"), rms, limits, strict=True):
-        row |= {f"{stage}_rms_m": value, f"{stage}_rms_m_low": limit["rms_m"][0], f"{stage}_rms_m_high": limit["rms_m"][1]}
-    change = reductions[1]
-    row |= {"reduction": 1.0 - rms[1] / rms[0], "reduction_low": change.low, "reduction_high": change.high}
-    return row | {"reduction_std_error": change.std_error}
