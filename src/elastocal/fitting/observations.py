@@ -100,10 +100,7 @@ def averaged(measurements: Measurements) -> Observations:
 
 
 def each_approach(measurements: Measurements) -> tuple[Observations, np.ndarray]:
-    """Observations of every single approach: repeats are states of their own.
-
-    Returns `repeated` (S,): number of the state that would hold this approach if repeats were averaged.
-    """
+    """Observations of every single approach, and (S,) in which state it would be if repeats were averaged."""
     key = _approached_alike(measurements)
     single = np.column_stack([key, measurements.repeat])
     return _observations(measurements, single), groups_of(key[groups_of(single)[0]])[1]

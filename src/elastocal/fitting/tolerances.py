@@ -111,9 +111,6 @@ def most_probable(wide: Fit) -> tuple[float, float]:
 
 
 def effective_parameters(fitted: Fit) -> float:
-    """Numbers that measurements have to determine: free parameters, those with a prior by the share that the prior leaves open.
-
-    Trace of the hat matrix of a ridge regression (Hastie, Tibshirani and Friedman, Elements of Statistical Learning, 3.4.1).
-    """
+    """Free parameters, with a prior the share that it leaves open: trace of a ridge's hat matrix (Hastie et al., 3.4.1)."""
     free = ~fitted.held
     return float(free.sum() - (np.diag(fitted.covariance)[free] / fitted.prior_std[free] ** 2).sum())

@@ -160,10 +160,9 @@ def _log_ratios(weights: np.ndarray, over: np.ndarray, under: np.ndarray) -> tup
 
 
 def share_below_largest(poses: int) -> float:
-    """Share of all poses whose errors stay below the largest error seen, at 95 % confidence; free of any distribution.
+    """Share of all poses whose errors stay below the largest of so many, at 95 % confidence, whatever their distribution.
 
-    The one-sided tolerance limit of a sample's maximum (Wilks, Annals of Mathematical Statistics 12, 1941), of poses drawn as
-    those of later use are.
+    The one-sided tolerance limit of a sample's maximum (Wilks, Annals of Mathematical Statistics 12, 1941).
     """
     return float((1.0 - _CONFIDENCE) ** (1.0 / poses))
 
