@@ -25,8 +25,8 @@ from elastocal.campaigns.campaign import Target
 from elastocal.effects import catalogue
 from elastocal.effects.catalogue import candidates_on, declared_candidates
 from elastocal.effects.conditions import with_total
-from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
+from elastocal.fitting.model import conditions
 from elastocal.mechanics.kinematics import poses
 
 # The table of the design, without the data family: that is no physics.

@@ -6,7 +6,7 @@ from synthetic import made_estimate, made_model, made_states
 
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.elastic import joint_compliance
-from elastocal.fitting.displacement import conditions, displaced_coordinates
+from elastocal.fitting.model import conditions, displaced_coordinates
 
 
 def test_carriage_yields_to_the_force_along_its_track():

@@ -16,7 +16,7 @@ from scipy.constants import g, pound_force
 
 from elastocal.data_checks.placement import Placement, jacobians_at_targets, placed, rms, robust_sigma, robustly_placed, spread
 from elastocal.data_checks.protocol import Fault, Value
-from elastocal.fitting.identifiability import solve_normal
+from elastocal.fitting.normal_equations import solve_normal
 from elastocal.fitting.observations import state_clusters
 from elastocal.mechanics.elastostatics import generalized_forces, regressor
 from elastocal.mechanics.kinematics import jacobians

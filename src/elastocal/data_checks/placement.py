@@ -10,10 +10,9 @@ import numpy as np
 from scipy.special import chdtri
 
 from elastocal.campaigns.campaign import groups_of
-from elastocal.fitting.model import declared_model
+from elastocal.fitting.least_squares import nominal_poses, registered_to
+from elastocal.fitting.model import declared_model, measured_in_base
 from elastocal.fitting.observations import select_states, single_observations
-from elastocal.fitting.prediction import measured_in_base
-from elastocal.fitting.registration import nominal_poses, registered_to
 from elastocal.mechanics.kinematics import poses_and_jacobians, rotation_vectors
 
 if TYPE_CHECKING:

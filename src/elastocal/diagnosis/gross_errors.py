@@ -21,14 +21,13 @@ from elastocal.counting import counted
 from elastocal.diagnosis.evidence import Grid
 from elastocal.diagnosis.linearize import Linearized, linearized
 from elastocal.diagnosis.statistics import WhiteRows
-from elastocal.fitting.displacement import conditions, observations_at_once
 from elastocal.fitting.least_squares import evaluated, fit
 from elastocal.fitting.linearization import Linearization, linearize
+from elastocal.fitting.model import conditions, parameters, residuals
 from elastocal.fitting.noise import Noise, measurement_covariances
 from elastocal.fitting.observations import (
     Observations,
     measured_in,
-    part_at,
     parts_of,
     sample_of,
     select_states,
@@ -36,16 +35,15 @@ from elastocal.fitting.observations import (
     spread_poses,
     without_outlying_repeats,
 )
-from elastocal.fitting.parameters import parameters
-from elastocal.fitting.prediction import residuals
 from elastocal.fitting.tolerances import estimated_noise, fit_declared
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
     from elastocal.diagnosis.settings import Settings
-    from elastocal.fitting.case import Case
-    from elastocal.fitting.fit_result import Fit
-    from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.least_squares import Fit
+    from elastocal.fitting.linearization import Linearization
+    from elastocal.fitting.model import Case, Estimate, Model
+    from elastocal.fitting.noise import Noise
 
 # Shares of the distances from which the scale is estimated: the second sees tails that are heavier than normal ones.
 _SCALE_QUANTILES = (0.5, 0.75)
@@ -108,18 +106,16 @@ class _Beside:
         single, sample = single_observations(measurements), kept.copy()
         sample[kept] = spread_poses(select_states(single, kept), _MOST)
         near, residual = spread_poses(single, _MOST), np.empty((len(single), model.rows))
-        for edges in parts_of(single, observations_at_once(model.rows, 0)):
-            part = part_at(single, *edges)
-            residual[edges[1]] = residuals(model, estimate, part, conditions(model, estimate, part.states))
+        for _, seen, part in parts_of(single, 0):
+            residual[seen] = residuals(model, estimate, part, conditions(model, estimate, part.states))
         far = np.linalg.norm(residual / np.repeat([noise.position_m, noise.orientation_rad], 3)[: model.rows], axis=1)
         closely = near | sample | (far > np.quantile(far[near], _SCALE_QUANTILES[-1]))
         some, parts = select_states(single, closely), []
-        for edges in parts_of(some, observations_at_once(model.rows, len(parameters(model, estimate)))):
-            part = part_at(some, *edges)
+        for _, seen, part in parts_of(some, len(parameters(model, estimate))):
             line, spread = linearize(model, estimate, part, conditions(model, estimate, part.states)), noise.spread(part)
-            jacobian = line.coordinate_jacobian[..., : model.sites.joints]
+            jacobian = line.joint_jacobian
             own = measurement_covariances(noise, jacobian[:, None], model.rows, None if spread is None else spread[:, None])
-            parts.append((edges[1], line, own, jacobian @ jacobian.transpose(0, 2, 1)))
+            parts.append((seen, line, own, jacobian @ jacobian.transpose(0, 2, 1)))
         return cls(residual, far, sample, closely, parts, noise)
 
     def yardstick(self, fitted: Fit, kept: np.ndarray) -> Yardstick:

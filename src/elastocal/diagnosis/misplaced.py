@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.fitting.parameters import parameter_values
+from elastocal.fitting.model import parameter_values
 from elastocal.fitting.tolerances import SIZES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from elastocal.campaigns.campaign import Campaign, Target
-    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.least_squares import Fit
 
 # Usual sizes that a bad case reaches (`effects.sizes.Size.most`).
 _MOST_SIZES = 3.0

@@ -22,8 +22,8 @@ from elastocal.diagnosis.refit import Averaged, squares_beyond
 from elastocal.effects.catalogue import effects
 from elastocal.effects.protocol import Candidate, Parameter, Shape
 from elastocal.effects.sizes import lever_m
-from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.linearization import effect_columns
+from elastocal.fitting.model import joint_compliances
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.linearize import Linearized
     from elastocal.diagnosis.search import Alarm, Model, Posterior, Problem
     from elastocal.diagnosis.settings import Settings
-    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import Observations
     from elastocal.remainder.repeatable import Repeatable

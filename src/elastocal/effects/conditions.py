@@ -53,7 +53,7 @@ class Conditions:
     time_s: np.ndarray | None = None
     temperature_c: np.ndarray | None = None
     progress: np.ndarray | None = None
-    of_angles: dict[str, dict[int, tuple[np.ndarray, np.ndarray]]] = field(default_factory=dict, repr=False, compare=False)
+    of_angles: dict[str, list[dict[int, np.ndarray]]] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def always(self) -> np.ndarray:
