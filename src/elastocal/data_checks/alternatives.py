@@ -103,24 +103,22 @@ def _length(misfit: np.ndarray) -> float:
 
 def _best(written: Reading, readings: Sequence[Reading], measure: Measure) -> tuple[float, Fault] | None:
     """Fault of the first of those that fit best, if it convinces, beside what fits alike; and what it leaves, m."""
-    before, misfits = written.misfit(measure), np.array([reading.misfit(measure) for reading in readings])
-    together = np.array([_length(misfit) for misfit in misfits])
-    # One of two faults may concern positions alone, or orientations alone.
-    for key in (together, *(misfits.T + 1e-3 * together)):
-        alike = np.flatnonzero(key <= max(_ALIKE * key.min(), key.min() + _ALIKE_M))
-        hypothesis = readings[alike[0]].hypothesis
-        best = _read(written.campaign, hypothesis, robustly_placed)
-        after, estimate = best.misfit(measure), best.placement.estimate
-        if evidence := _evidence(before, after, best):
-            detail, decisive = hypothesis.detail, True
-            if detail == "frame":
-                detail, decisive = _elsewhere(estimate, _length(before) / max(_length(after), 1e-12))
-            elif detail == "targets":
-                detail, decisive = _other_targets(written.placement.estimate, estimate, best.campaign.targets)
-            poses = Value("poses compared", float(len(np.unique(best.campaign.measurements.pose))), "–")
-            others = tuple(readings[n].hypothesis.detail for n in alike[1 : 1 + _MOST_ALIKE])
-            return _length(after), Fault(hypothesis.name, hypothesis.joints, detail, (poses,), evidence, (), decisive, others)
-    return None
+    before, together = written.misfit(measure), np.array([_length(reading.misfit(measure)) for reading in readings])
+    alike = np.flatnonzero(together <= max(_ALIKE * together.min(), together.min() + _ALIKE_M))
+    hypothesis = readings[alike[0]].hypothesis
+    best = _read(written.campaign, hypothesis, robustly_placed)
+    after, estimate = best.misfit(measure), best.placement.estimate
+    evidence = _evidence(before, after, best)
+    if evidence is None:
+        return None
+    detail, decisive = hypothesis.detail, True
+    if detail == "frame":
+        detail, decisive = _elsewhere(estimate, _length(before) / max(_length(after), 1e-12))
+    elif detail == "targets":
+        detail, decisive = _other_targets(written.placement.estimate, estimate, best.campaign.targets)
+    poses = Value("poses compared", float(len(np.unique(best.campaign.measurements.pose))), "–")
+    others = tuple(readings[n].hypothesis.detail for n in alike[1 : 1 + _MOST_ALIKE])
+    return _length(after), Fault(hypothesis.name, hypothesis.joints, detail, (poses,), evidence, (), decisive, others)
 
 
 def _evidence(before: np.ndarray, after: np.ndarray, reading: Reading) -> tuple[float, float] | None:

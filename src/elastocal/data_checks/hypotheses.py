@@ -120,9 +120,8 @@ def _lengths(campaign: Campaign) -> Iterator[Hypothesis]:
     known = [target.name for target in campaign.targets if target.offset_m is not None and any(target.offset_m)]
     groups = [known, *([name] for name in known if len(known) > 1)] if known else []
     for names, (unit, metres) in product(groups, _LENGTHS.items()):
-        which = f"the offset of {names[0]} looks" if len(names) == 1 < len(known) else "the target offsets look"
-        which = "the target offset looks" if len(known) == 1 else which
-        detail = f"{which} like {unit}: measurements fit {metres:g} times what is written for {', '.join(names)}"
+        read = f"measurements fit {metres:g} times what is written"
+        detail = f"the target offset of {', '.join(names)} looks like {unit}: {read}"
         yield Hypothesis("wrong_unit", detail, partial(_with_offsets, names, metres))
 
 
