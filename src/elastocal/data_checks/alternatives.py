@@ -39,9 +39,8 @@ if TYPE_CHECKING:
 _IMPLAUSIBLE = np.array([IMPLAUSIBLE_M, IMPLAUSIBLE_RAD])
 # What a correction leaves as it is may come out this much larger by chance.
 _NO_WORSE = 1.2
-# Hypotheses whose misfits differ by less than this share, or by less than a tracker could tell, fit alike.
-_ALIKE, _ALIKE_M = 1.1, 1e-4
-_MOST_ALIKE = 5
+# Hypotheses whose misfits differ by less than this share, or by less than a tracker could tell, fit alike; so many are said.
+_ALIKE, _ALIKE_M, _MOST_ALIKE = 1.1, 1e-4, 5
 # A base that stands less far off than this may be the zero of the first joint or the height of the column: for physics to
 # tell, and a warning here. Ten times what geometric errors of industrial robots reach.
 _NEAR_M, _NEAR_RAD = 0.05, 0.05
@@ -56,10 +55,7 @@ class Reading:
     placement: Placement
 
     def misfit(self, measure: Measure) -> np.ndarray:
-        """What is left of positions (m) and orientations (rad) of the target that fits worst, ndarray (2,).
-
-        The others say nothing of its mount.
-        """
+        """What is left of positions (m) and orientations (rad) of the target that fits worst, ndarray (2,)."""
         targets, left = self.campaign.measurements.target, (self.placement.distance, self.placement.turn)
         each = [targets == target for target in np.unique(targets)]
         return np.array([0.0 if part is None else max(measure(part[mine]) for mine in each) for part in left])
@@ -147,10 +143,7 @@ def _elsewhere(fitted_frames: Estimate, better: float) -> tuple[str, bool]:
 
 
 def _other_targets(before: Estimate, after: Estimate, targets: Sequence[Target]) -> tuple[str, bool]:
-    """Sentence of targets that sit elsewhere or are turned, and whether that is too far for physics.
-
-    The sentence says which keys of campaign.yaml are to be unknown.
-    """
+    """Sentence of targets that sit elsewhere or are turned, with the remedy, and whether that is too far for physics."""
     turns = Rotation.from_matrix(before.target_rotation.transpose(0, 2, 1) @ after.target_rotation).magnitude()
     away = np.linalg.norm(after.target_offset - before.target_offset, axis=1)
     found = {}
