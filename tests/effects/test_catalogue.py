@@ -144,21 +144,6 @@ def test_sensitivities_of_every_candidate_are_central_differences(chain):
         np.testing.assert_allclose(found / scale, expected / scale, rtol=0, atol=1e-5, err_msg=candidate.key)
 
 
-def test_displacement_is_that_of_each_state_by_itself(chain):
-    """What an effect does in one state must not hang on which other states are looked at."""
-    whole = made_states(chain.coordinates, 12, seed=6)
-    kept = np.arange(12) > 4
-    part = type(whole)(**{name: value[kept] for name, value in vars(whole).items()})
-    some, every = conditions_on(chain, part), conditions_on(chain, whole)
-    for candidate in candidates_on(every.sites).values():
-        # A step is where it is in the rows that there are.
-        if candidate.effect == "setup_step":
-            continue
-        start = [shape.start for shape in candidate.shapes]
-        expected = displacements(candidate, every, *start)[:, kept]
-        np.testing.assert_allclose(displacements(candidate, some, *start), expected, rtol=1e-12, atol=1e-12)
-
-
 def test_effects_that_need_a_load_do_nothing_without_and_the_others_do_something(chain):
     states = made_states(chain.coordinates, 6, seed=7)
     states.wrench[:] = 0.0

@@ -103,10 +103,7 @@ def robustly_placed(campaign: Campaign) -> Placement:
 
 
 def spread(campaign: Campaign, poses: int = MANY_POSES) -> Campaign:
-    """A campaign with its measurements of some poses all over it, at the lowest load of each.
-
-    `poses`: at most so many of each target in each session.
-    """
+    """A campaign with measurements of so many poses of each target in each session at most, at the lowest load of each."""
     seen, chosen = campaign.measurements, []
     for members in of_each_target(seen):
         order = members[np.lexsort((seen.repeat[members], seen.load[members], seen.pose[members]))]
