@@ -20,9 +20,8 @@ from common import ROOT, Row, beside_yardstick, interleaved
 
 from elastocal.campaigns.importers import FOLDER_VARIABLE, importer
 from elastocal.campaigns.writing import write_campaign
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.parameters import parameters
-from elastocal.fitting.registration import registered
+from elastocal.fitting.least_squares import fit, registered
+from elastocal.fitting.model import parameters
 from elastocal.fitting.tolerances import estimated_noise
 from elastocal.io.documents import read_document
 from elastocal.loop.whole import cases_in

@@ -18,7 +18,7 @@ from elastocal.campaigns.reading import read_robot
 from elastocal.campaigns.simulation import Plan as Survey
 from elastocal.campaigns.simulation import draw_measurements
 from elastocal.campaigns.writing import write_campaign
-from elastocal.fitting.case import Case
+from elastocal.fitting.model import Case
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.tolerances import fit_declared
 from elastocal.loop.whole import cases_in

@@ -26,8 +26,8 @@ from elastocal.application.calibrated import NEUTRAL, forward
 from elastocal.application.frames import BASE, ROBOT, Scope, subtract_placement
 from elastocal.effects.catalogue import candidates_on, moves_robot
 from elastocal.fitting.least_squares import fit
+from elastocal.fitting.model import stepped
 from elastocal.fitting.noise import Noise
-from elastocal.fitting.parameters import stepped
 from elastocal.loop.whole import cases_in
 from elastocal.mechanics.sites import sites_of
 from elastocal.validation.held_out import position_residuals

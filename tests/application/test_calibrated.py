@@ -16,7 +16,7 @@ from elastocal.application.calibrated import (
     forward,
     pose_sensitivities,
 )
-from elastocal.fitting.parameters import stepped
+from elastocal.fitting.model import stepped
 from elastocal.mechanics.kinematics import pose_differences
 from elastocal.mechanics.robot import Mass
 

@@ -136,13 +136,11 @@ def known_targets(fanuc, factor=1.0, which=slice(None)):
     return replace(plain, targets=targets, measurements=seen)
 
 
-@pytest.mark.parametrize(
-    ("which", "words"), [(slice(None), "the target offsets look"), (slice(3, 4), "the offset of T6DoF looks")]
-)
+@pytest.mark.parametrize(("which", "words"), [(slice(None), "T2DoF, T3DoF, T4DoF, T6DoF"), (slice(3, 4), "T6DoF")])
 def test_target_offsets_in_millimetres_are_named(fanuc, which, words):
     campaign = known_targets(fanuc, 1000.0, which)
     (fault,) = other_readings(campaign)
-    assert fault.name == "wrong_unit" and fault.detail.startswith(f"{words} like millimetres")
+    assert fault.name == "wrong_unit" and fault.detail.startswith(f"the target offset of {words} looks like millimetres")
 
 
 def test_a_target_that_sits_elsewhere_is_named_with_its_place(fanuc):

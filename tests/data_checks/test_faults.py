@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_campaigns import POINTS, Plan, made, with_geometric_errors, with_measured, with_other_compliances
+from scipy.spatial.transform import Rotation
 
 from elastocal.data_checks.faults import constant_columns, faults, implausible_measurements, shuffled_rows
 
@@ -100,6 +101,17 @@ def test_measurements_that_belong_nowhere_are_not_shuffled(campaign):
     rng, position = np.random.default_rng(3), campaign.measurements.position.copy()
     position[rng.choice(len(position), 20, replace=False)] += rng.normal(0.0, 0.3, (20, 3))
     assert shuffled_rows(with_measured(campaign, position=position)) == []
+
+
+def test_a_robot_off_along_a_dense_path_is_not_shuffled(fanuc):
+    """Each row then fits in the place of another by chance, as near as a half of the 2.5 mm between them."""
+    campaign = made(fanuc, 1, Plan(poses=300, loads=0, oriented=False), moving={joint: 0 for joint in range(1, 6)})
+    path = campaign.measurements.select(campaign.measurements.target == 3)
+    step = 0.0025 / np.linalg.norm(path.position[0, :2])
+    angles = np.outer(np.arange(300) * step, np.eye(6)[0])
+    turned = angles[:, 0] - path.joint_angles[:, 0] + 12.5 * step
+    position = Rotation.from_rotvec(np.outer(turned, [0.0, 0.0, 1.0])).apply(path.position)
+    assert shuffled_rows(replace(campaign, measurements=replace(path, joint_angles=angles, position=position))) == []
 
 
 @pytest.mark.parametrize("tracker", [True, False])

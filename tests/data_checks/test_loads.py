@@ -116,6 +116,16 @@ def test_no_unit_is_found_for_compliances_that_are_only_off(ratios):
     assert wrong_loads(made_deflections(ratios=ratios)) == []
 
 
+def test_a_joint_that_hardly_deflects_anything_does_not_hide_the_unit():
+    deflected = made_deflections(force=KILOGRAM, moment=KILOGRAM, noise=1e-4)
+    quiet = np.where(np.arange(JOINTS) == 5, 0.03, 1.0)
+    seen = deflected.seen - KILOGRAM * (deflected.by_force + deflected.by_moment)[:, 5]
+    (fault,) = wrong_loads(
+        replace(deflected, seen=seen, by_force=deflected.by_force * quiet, by_moment=deflected.by_moment * quiet)
+    )
+    assert fault.parameters[0].value == KILOGRAM
+
+
 def test_of_two_units_within_reach_the_one_by_which_compliances_are_nearest_nominal_is_named_first():
     # 1.4 times pounds-force are 0.63 times kilogram-force, and 1.55 times 0.70.
     (fault,) = wrong_loads(made_deflections(force=POUND, moment=POUND, ratios=1.4))

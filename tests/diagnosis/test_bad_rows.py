@@ -1,12 +1,16 @@
 """A campaign with a few bad rows: the verdict is that of the clean file, and the rows are named with their line."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from analysed_robots import ROBOTS, analysed
+from made_folders import PLAN, made_folder, made_table
 
 from elastocal.application.calibrated import nominal_forward
 from elastocal.campaigns.writing import write_campaign
-from elastocal.loop.whole import diagnosed
+from elastocal.exchange.measurement_table import ImportOptions, read_measurement_table
+from elastocal.loop.whole import cases_in, diagnosed
 
 NOISE_M, POSES = 5e-5, 60
 HELD_OUT = [5, 9, 14, 18, 23, 27, 31, 36, 40, 44, 47, 49, 52, 54, 56, 57, 59, 60]
@@ -105,3 +109,57 @@ def test_a_bad_row_that_is_held_out_is_named_and_both_errors_are_given(tmp_path,
     assert heldout["after"]["rms_m"] < 1.1 * clean["heldout"]["after"]["rms_m"]
     assert heldout["with_gross_errors"]["after"]["rms_m"] > 100 * heldout["after"]["rms_m"]
     assert any("line 15" in warning for warning in found["warnings"])
+
+
+UNITS = {"q": "rad", "f": "N", "m": "Nm", "x": "m", "y": "m", "z": "m"}
+
+
+def imported(folder, table, lost):
+    """A campaign of a table without numbers of poses, as an importer makes it; rows that are lost read zeros throughout."""
+    names = [name for name in table if name[0] in UNITS]
+    rows = np.column_stack([table[name] for name in names])
+    rows[lost] = 0.0
+    folder.mkdir(parents=True)
+    heads = ",".join(f"{name} [{UNITS[name[0]]}]" for name in names)
+    np.savetxt(folder / "table.csv", rows, "%.12g", ",", header=heads, comments="")
+    robot = analysed("kuka")
+    found = read_measurement_table(folder / "table.csv", ImportOptions(target="6DoF"), robot)
+    target = {"6DoF": {"point": "6DoF", "offset_m": [0, 0, 0]}}
+    return made_folder(folder, robot, table=found.table, targets=target, compliance="nominal")
+
+
+def facts_of(verdict):
+    """All that a row that is held out may not change."""
+    effects = [{key: entry[key] for key in ("name", "joints", "probability", "parameters")} for entry in verdict["effects"]]
+    return {key: verdict[key] for key in ("verdict", "probabilities", "kept", "misfit", "noise", "settings")} | {"e": effects}
+
+
+def assert_a_lost_held_out_row_changes_nothing(folder, number, whole):
+    """Of 24 poses, of every second campaign under two loads, whose joint 3 is off."""
+    forces = ((0.0, (0,)), (800.0, (0, 1)))[number % 2]
+    plan = replace(PLAN, points=("6DoF",), poses=24, force_N=forces[0], ladder=forces[1], repeats=1, repeated_poses=0)
+    table = made_table(analysed("kuka"), "made", number, plan, 3e-4 * (number % 5))
+    order = np.lexsort([table["load"], table["pose"]])
+    table = {name: column[order] for name, column in table.items()}
+    clean = imported(folder / "clean", table, [])
+    rows = cases_in(clean, ROBOTS)[1].campaign.measurements.row
+    lost = int(np.random.default_rng(number).choice(rows))
+    damaged = imported(folder / "damaged", table, [lost - 1])
+    before, after = (cases_in(each, ROBOTS)[0].campaign.measurements for each in (clean, damaged))
+    for name in ("position", "joint_angles", "wrench", "row"):
+        np.testing.assert_array_equal(getattr(before, name), getattr(after, name), err_msg=f"{number}: {name}")
+    if whole:
+        verdicts = [diagnosed(each, ROBOTS, 1) for each in (clean, damaged)]
+        assert facts_of(verdicts[0]) == facts_of(verdicts[1]), number
+        assert named_rows(verdicts[1]) == sorted({*named_rows(verdicts[0]), lost}), number
+
+
+def test_a_lost_row_that_is_held_out_parts_no_pose_anew_and_changes_nothing_of_the_verdict(tmp_path):
+    for number in range(20):
+        assert_a_lost_held_out_row_changes_nothing(tmp_path / str(number), number, number < 2)
+
+
+@pytest.mark.slow
+def test_of_200_campaigns_none_says_anything_else_with_a_lost_row_that_is_held_out(tmp_path):
+    for number in range(200):
+        assert_a_lost_held_out_row_changes_nothing(tmp_path / str(number), number, True)

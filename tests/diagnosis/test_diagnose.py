@@ -121,10 +121,15 @@ def test_frames_alone_are_kept_where_they_predict_left_out_poses_better(kuka, co
     settings = replace(Settings(), numbers_a_parameter=np.inf)
     usual = diagnose(case, settings, 1)
     assert usual.document["kept"] != "frames" and not any("left out in turn" in line for line in usual.document["warnings"])
-    # Were they to lose.
-    monkeypatch.setattr(module, "certain_loss", lambda squares, others: True)
-    found = diagnose(case, settings, 1)
-    assert found.document["kept"] == "frames" and found.steps[-1].kind == "kept" and found.final.model.effects == ()
+    # Were they to lose by less and by more than the standard error of the difference, a fifth.
+    off = np.linspace(-1.0, 1.0, 25)
+    off /= off.std(ddof=1)
+    for excess in (0.15, 0.25):
+        squares = np.full(25, 3.0), 3.0 + off + excess
+        monkeypatch.setattr(module, "left_out_squares", lambda each, _, squares=squares: squares[bool(each.model.effects)])
+        found = diagnose(case, settings, 1)
+        assert (found.document["kept"] == "frames") == (excess > 0.2)
+    assert found.steps[-1].kind == "kept" and found.final.model.effects == ()
     assert any("left out in turn" in line and "frames and targets alone" in line for line in found.document["warnings"])
     heldout = judge(found, held_out, 1).document["heldout"]
     assert heldout["after"]["rms_m"] == pytest.approx(heldout["uncalibrated"]["rms_m"], rel=1e-3)

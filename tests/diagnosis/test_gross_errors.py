@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bad_rows import damaged
+from made_folders import PLAN, made_folder, made_table
 from scipy.stats import binom, chi2
 
 from elastocal.diagnosis.gross_errors import beyond_chance, entries_of, first_kept, fitted_to, gross_errors
 from elastocal.diagnosis.settings import Settings
+from elastocal.loop.whole import cases_in
 
 SETTINGS = Settings()
 NOISE_M, BAD = 6e-5, 11
@@ -90,3 +92,12 @@ def test_a_repeat_that_is_in_no_average_stays_out(case):
     state = list(zip(measurements.pose, measurements.load, measurements.target, strict=True))
     repeated = [place for place, key in enumerate(state) if state.count(key) > 2][:1]
     assert not first_kept(damaged(case, dict.fromkeys(repeated, 2.0)), SETTINGS).kept[repeated].any()
+
+
+@pytest.mark.parametrize("error_rad", [3e-4, 1e-3])
+def test_no_row_is_a_gross_error_where_all_measurements_of_a_pose_err_together(error_rad, kuka, config_folder, tmp_path):
+    table = made_table(kuka, "made", plan=replace(PLAN, poses=40))
+    drawn = error_rad * np.random.default_rng(0).standard_normal((max(table["pose"]) + 1, 6))
+    table |= {f"q{joint}": table[f"q{joint}"] + drawn[table["pose"], joint - 1] for joint in range(1, 7)}
+    whole, _ = cases_in(made_folder(tmp_path / "made", kuka, table=table), config_folder / "robots")
+    assert first_kept(whole, SETTINGS).kept.all()

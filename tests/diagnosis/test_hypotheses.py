@@ -181,3 +181,15 @@ def test_a_law_goes_by_its_own_cause_alone(joint, law, what):
     chosen = ((joint,), law) if joint else ((), f"{law} shift")
     one, other = (waves(displacements(each, chosen, states)) for each in (states, moved))
     assert (np.abs(one - other).max() > 0.02 * min(JOINT_RAD, BASE_M)) == (what in DEPENDS[joint, law])
+
+
+def test_plausible_sizes_fall_with_the_order_of_a_harmonic_and_signs_are_those_of_physics(catalogue):
+    chosen = [c for c in catalogue if c.effect in ("transmission_harmonic", "stiffening", "base_compliance")]
+    units = units_of([(c, [tuple(shape.start for shape in c.shapes)]) for c in chosen], [], SETTINGS)
+    for unit, candidate in zip(units, chosen, strict=True):
+        orders = np.array([parameter.order for parameter in candidate.parameters])
+        expected = [parameter.plausible for parameter in candidate.parameters] * orders**-SETTINGS.harmonic_decay
+        np.testing.assert_allclose(unit.sizes, expected)
+        assert unit.signs.tolist() == [parameter.sign for parameter in candidate.parameters]
+    assert max(unit.sizes.max() / unit.sizes.min() for unit in units) > 1.1
+    assert any(unit.signs.any() for unit in units)

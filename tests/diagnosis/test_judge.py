@@ -7,10 +7,9 @@ import pytest
 
 from elastocal.diagnosis.diagnose import Diagnosis, Step
 from elastocal.diagnosis.judge import judge, residual_blocks
-from elastocal.fitting.case import noise_facts
-from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.least_squares import fit
-from elastocal.fitting.noise import Noise
+from elastocal.fitting.model import joint_compliances
+from elastocal.fitting.noise import Noise, noise_facts
 from elastocal.mechanics.elastostatics import generalized_forces
 from elastocal.mechanics.kinematics import poses, poses_and_jacobians
 from elastocal.validation.held_out import METRICS
@@ -104,6 +103,39 @@ def test_figures_before_and_after(made):
     assert about_errors(found) == []
     again = judged(steps, case, held_out)
     assert again.document["heldout"] == found.document["heldout"]
+
+
+def test_a_step_that_makes_predictions_worse_is_a_warning(made):
+    case, held_out, (bare, declared, final) = made
+    worse = bare, replace(declared, fitted=final.fitted), replace(final, fitted=declared.fitted)
+    said = about_errors(judged(worse, case, held_out))
+    assert any(warning.startswith("the RMS error of the validation poses grew from") for warning in said)
+    assert said[-1] == "the step 'with joint_offset' raised the RMS error of the validation poses"
+
+
+def test_poses_outside_the_fitted_range_are_counted_flagged_and_warned_of(made):
+    """A whole turn brings the joint out of its range and the target nowhere else."""
+    case, held_out, steps = made
+    observations, measurements = held_out.observations, held_out.campaign.measurements
+    first = observations.states.pose.min()
+
+    def turned(states):
+        away = 2.0 * np.pi * (states.pose == first)[:, None] * (np.arange(case.campaign.robot.joints) == 2)
+        return replace(states, joint_angles=states.joint_angles + away)
+
+    moved = replace(observations, states=turned(observations.states))
+    campaign = replace(held_out.campaign, measurements=turned(measurements))
+    away = replace(held_out, observations=moved, campaign=campaign)
+    found = judged(steps, case, away)
+    beyond, poses = found.document["heldout"]["outside_range"], found.document["heldout"]["poses"]
+    assert 1 <= beyond["poses"] < poses
+    assert max(beyond[where]["after"]["rms_m"] for where in ("outside", "inside")) < 1e-3
+    assert found.document["gross_errors"] == []
+    assert f"{beyond['poses']} of {poses} validation poses lie outside" in found.document["warnings"][-1]
+    training, unseen = blocks_of(diagnosis_of(case, steps), away)
+    assert not training["outside_range"].any()
+    assert unseen["outside_range"][unseen["pose"] == first].all()
+    assert len(np.unique(unseen["pose"][unseen["outside_range"]])) == beyond["poses"]
 
 
 def test_a_remainder_is_judged_where_the_campaign_asks_for_one_and_the_data_are_sound(made):

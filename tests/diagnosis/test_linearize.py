@@ -18,9 +18,8 @@ from elastocal.diagnosis.linearize import (
 )
 from elastocal.diagnosis.settings import Settings
 from elastocal.effects.catalogue import candidates_on
-from elastocal.fitting.case import Case
 from elastocal.fitting.least_squares import fit
-from elastocal.fitting.prediction import residuals
+from elastocal.fitting.model import Case, residuals
 from elastocal.mechanics.robot import Mass
 
 SETTINGS = Settings()

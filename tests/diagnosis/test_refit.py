@@ -215,3 +215,15 @@ def test_squares_beyond_the_others_are_what_is_left_where_the_others_fit_them_wi
     assert squares_beyond(problem, Model((0,), 0.0, np.array([0.3]), 0.0), {"a"})[0][1] == pytest.approx(
         squares_explained(problem, Model((0,), 0.0, np.array([0.3]), 0.0))["a"]
     )
+
+
+def test_no_effect_is_fitted_under_a_wider_prior_than_it_had_before_the_measurements(found):
+    _, _, line, models = found
+    best = models.models[0]
+    unit = line.problem.units[best.units[0]]
+    before = line.problem.grid.root_mean_square(unit)
+    sizes = [0.5 * before, before, SETTINGS.scales[-1]]
+    assert before < SETTINGS.scales[-1]
+    chosen = [selected(line, replace(best, scales=np.array([size])))[0][0] for size in sizes]
+    deviations = [candidate.parameters[0].prior_std / unit.sizes[0] for candidate in chosen]
+    np.testing.assert_allclose(deviations, [0.5 * before, before, before], rtol=1e-12)

@@ -145,8 +145,8 @@ def test_a_mechanism_counts_at_all_its_locations_at_once_too():
     """With one law at each; of two laws each, and only of those that are at every location once."""
     candidates = {detail: SimpleNamespace(detail=detail) for detail in ("", "two slopes")}
     units = (
-        made_unit("stiffening", (1,), 0, candidate=candidates[""], smallest=1),
-        made_unit("stiffening", (2,), [1, 2], candidate=candidates[""]),
+        made_unit("stiffening", (1,), 0, candidate=candidates[""], smallest=1, log_prior=np.log(0.5)),
+        made_unit("stiffening", (2,), [1, 2], candidate=candidates[""], log_prior=np.log(0.5)),
         made_unit("stiffening", (1,), 3, candidate=candidates["two slopes"]),
         made_unit("payload", (), 4, candidate=candidates[""]),
     )
@@ -160,4 +160,6 @@ def test_a_mechanism_counts_at_all_its_locations_at_once_too():
         evaluate(some, [unit], grid, log_pose, [0.1]).log_evidence - nothing + problem.prior.log_odds_of(members)
         for unit, members in tested
     ]
+    # One choice among the variants, not one at each location.
+    total[-1] -= np.log(0.5)
     assert found.statistic == pytest.approx(log_sum_exp(np.array(total)), abs=1e-6)

@@ -31,8 +31,7 @@ from elastocal.diagnosis.verdict import (
     sag_entries,
     with_related,
 )
-from elastocal.fitting.displacement import joint_compliances
-from elastocal.fitting.prediction import predict
+from elastocal.fitting.model import joint_compliances, predict
 
 SETTINGS = Settings()
 

@@ -25,8 +25,8 @@ from elastocal.campaigns.campaign import Target
 from elastocal.effects import catalogue
 from elastocal.effects.catalogue import candidates_on, declared_candidates
 from elastocal.effects.conditions import with_total
-from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
+from elastocal.fitting.model import conditions
 from elastocal.mechanics.kinematics import poses
 
 # The table of the design, without the data family: that is no physics.
@@ -143,21 +143,6 @@ def test_sensitivities_of_every_candidate_are_central_differences(chain):
         found = linearize(model, estimate, seen, around).sensitivities @ steps.T
         scale = np.maximum(np.abs(expected).max(axis=(0, 1)), 1e-300)
         np.testing.assert_allclose(found / scale, expected / scale, rtol=0, atol=1e-5, err_msg=candidate.key)
-
-
-def test_displacement_is_that_of_each_state_by_itself(chain):
-    """What an effect does in one state must not hang on which other states are looked at."""
-    whole = made_states(chain.coordinates, 12, seed=6)
-    kept = np.arange(12) > 4
-    part = type(whole)(**{name: value[kept] for name, value in vars(whole).items()})
-    some, every = conditions_on(chain, part), conditions_on(chain, whole)
-    for candidate in candidates_on(every.sites).values():
-        # A step is where it is in the rows that there are.
-        if candidate.effect == "setup_step":
-            continue
-        start = [shape.start for shape in candidate.shapes]
-        expected = displacements(candidate, every, *start)[:, kept]
-        np.testing.assert_allclose(displacements(candidate, some, *start), expected, rtol=1e-12, atol=1e-12)
 
 
 def test_effects_that_need_a_load_do_nothing_without_and_the_others_do_something(chain):

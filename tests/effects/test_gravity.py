@@ -19,9 +19,8 @@ from synthetic import (
 from elastocal.effects.catalogue import candidates_on
 from elastocal.effects.conditions import conditions_of, offered, with_springs
 from elastocal.effects.gravity import declared_weight
-from elastocal.fitting.displacement import conditions, displaced_coordinates
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.parameters import parameters
+from elastocal.fitting.model import conditions, displaced_coordinates, parameters
 from elastocal.mechanics.kinematics import motion
 from elastocal.mechanics.robot import Mass
 from elastocal.mechanics.sites import sites_of

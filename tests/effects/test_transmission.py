@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from support import chain_of
 from synthetic import (
-    candidate_on,
     conditions_on,
     displacements,
     equipped,
@@ -14,8 +13,6 @@ from synthetic import (
 )
 
 from elastocal.effects.catalogue import candidates_on
-from elastocal.effects.transmission import transmission_harmonic
-from elastocal.mechanics.sites import sites_of
 
 
 def test_order_may_lie_anywhere_between_two_integers_and_away_from_both(fanuc):
@@ -31,28 +28,6 @@ def test_order_may_lie_anywhere_between_two_integers_and_away_from_both(fanuc):
     made = displacements(bands[1], around, 2.7)
     angle = states.joint_angles[:, 2]
     np.testing.assert_allclose(made[:, :, 2], [wave(k * angle) for k in (2.7, 5.4) for wave in (np.cos, np.sin)], rtol=1e-13)
-
-
-def test_harmonics_are_cosines_and_sines_of_all_orders_up_to_36(fanuc):
-    orders = {joint: [] for joint in range(1, 7)}
-    for candidate in transmission_harmonic.candidates(sites_of(fanuc)):
-        (joint,) = candidate.joints
-        orders[joint] += [parameter.name for parameter in candidate.parameters]
-        # Four samples a period of its shortest wave.
-        assert candidate.distinct_angles == 4 * int(orders[joint][-1].removeprefix("sin_").removesuffix("q"))
-    expected = [f"{wave}_{order}q" for order in range(1, 37) for wave in ("cos", "sin")]
-    assert all(found == expected for found in orders.values())
-
-
-def test_play_is_mostly_taken_up_before_the_slopes_of_a_stiffening_gear_meet(fanuc):
-    """Where both laws reach they are one, for two slopes are play and a spring: it shall be a small part of either range."""
-    for joint in range(1, 7):
-        (taken_up,), (meeting,) = (
-            candidate_on(fanuc.chain, f"{name}").shapes for name in (f"lost_motion@{joint}", f"stiffening@{joint}[two slopes]")
-        )
-        assert taken_up.lowest < taken_up.start < meeting.lowest < taken_up.highest < meeting.start < meeting.highest
-        both = np.log(taken_up.highest / meeting.lowest)
-        assert all(both < 0.3 * np.log(shape.highest / shape.lowest) for shape in (taken_up, meeting))
 
 
 # An arm of two metres that turns about the vertical; eight kilograms a cubic metre of reach suit it.

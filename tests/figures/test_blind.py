@@ -72,9 +72,9 @@ def test_every_error_is_drawn_where_its_model_stands():
         for part in PARTS
         for number, model in enumerate(MODELS)
     ]
-    figure = closed_loop(pd.DataFrame(rows))
+    figure = closed_loop(pd.DataFrame(rows), {"gp180": "Yaskawa GP180", "kuka": "KUKA KR 270"})
     assert [axis.get_title() for axis in figure.axes] == ["unloaded", "under loads", "milling path"]
-    assert legend_entries(figure) == ["gp180", "kuka"]
+    assert legend_entries(figure) == ["Yaskawa GP180", "KUKA KR 270"]
     words = row_labels(figure.axes[0])
     assert words[0] == "uncorrected" and words[-1].startswith("true model")
     drawn = figure.axes[0].containers[0].lines[0]

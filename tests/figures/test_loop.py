@@ -67,6 +67,13 @@ def test_arrows_begin_at_their_state_and_are_its_mean_residual_enlarged_as_the_a
         np.testing.assert_allclose(drawn, off[:, axes] * key.U / 200e-6, rtol=1e-9, atol=1e-12)
 
 
+def test_where_nothing_changed_the_residuals_are_drawn_once():
+    table = residual_table()
+    same = table | {f"after_d{axis}": table[f"before_d{axis}"] for axis in "xyz"}
+    drawn = [{quiver.get_gid() for quiver in quivers(arrows(each).axes[0])} for each in (table, same)]
+    assert drawn == [{"before", "after"}, {"before"}]
+
+
 def lines_of(axis, gid):
     return [line.get_xydata().tolist() for line in axis.lines if line.get_gid() == gid]
 

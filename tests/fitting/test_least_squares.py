@@ -1,4 +1,4 @@
-"""Fits: known parameters come back, and errors are those of statsmodels and of repetition."""
+"""Fits: known parameters come back, errors are those of statsmodels, outliers do little harm, and steps converge."""
 
 from dataclasses import replace
 
@@ -8,6 +8,7 @@ import statsmodels.api as sm
 from fitted_models import (
     GANTRY_NOISES,
     TARGETS,
+    bent,
     gantry_covariance,
     gantry_model,
     gantry_states,
@@ -17,18 +18,15 @@ from fitted_models import (
     seen_off,
     waves,
 )
+from planted import two_loads_a_pose
 from scipy.linalg import block_diag
-from synthetic import NOISE, made_estimate, made_states, seen_exactly
+from scipy.stats import chi2
+from support import chain_of
+from synthetic import NOISE, made_estimate, made_model, made_states, seen_exactly, with_noise
 
-from elastocal.fitting.least_squares import fit, fit_frames
-
-
-def assert_covariance(found, expected, atol):
-    """Covariances agree in units of the standard errors, which are returned."""
-    deviation = np.sqrt(np.diag(expected))
-    unit = np.outer(deviation, deviation)
-    np.testing.assert_allclose(found.covariance / unit, expected / unit, rtol=0, atol=atol)
-    return deviation
+from elastocal.campaigns.campaign import Target
+from elastocal.fitting.least_squares import fit, fit_frames, registered, sizes_of
+from elastocal.fitting.noise import Noise
 
 
 @pytest.mark.parametrize("rows", [3, 6])
@@ -105,33 +103,18 @@ def test_a_linear_problem_has_the_generalized_least_squares_solution_with_its_pr
     found = fit(model, seen, noise, begin[start])
     assert found.converged and not found.held.any() and (found.weights == 1.0).all()
     np.testing.assert_allclose(found.estimate.coefficients[0] / deviation, expected / deviation, rtol=0, atol=1e-5)
-    assert_covariance(found, covariance, 1e-7)
+    np.testing.assert_allclose(
+        found.covariance / np.outer(deviation, deviation), covariance / np.outer(deviation, deviation), atol=1e-7
+    )
     np.testing.assert_allclose(found.residual.ravel(), right - left @ expected, rtol=0, atol=1e-5 * noise.position_m)
 
 
 @pytest.mark.parametrize("plausible", [1e-8, 1.0])
-def test_what_has_a_prior_is_determined_by_it_where_the_data_do_not_and_nothing_else_is(plausible):
-    """However small its plausible size: its prior says how large it may be. Without a prior it is held at zero."""
-    priors = [None, None, None, 3e-6]
-    noise = GANTRY_NOISES["sensor"]
-    states = gantry_states(40)
-    right = np.random.default_rng(94).uniform(-1e-4, 1e-4, (40, 3)) / np.sqrt(states.repeats)[:, None]
-    expected, covariance = generalized_least_squares(
-        waves(states.joint_angles, 4).reshape(120, -1), right.ravel(), gantry_covariance(states, noise), priors
-    )
-    # The data would tell it to a few times its prior.
-    assert 0.5 < np.sqrt(covariance[3, 3]) / 3e-6 < 1.0
-    law = linear_law(4, priors)
-    last = replace(law.parameters[3], plausible=plausible)
-    found = fit(gantry_model(replace(law, parameters=(*law.parameters[:3], last))), seen_off(states, right), noise)
-    deviation = np.sqrt(np.diag(covariance))
-    assert not found.held.any()
-    np.testing.assert_allclose(found.estimate.coefficients[0] / deviation, expected / deviation, rtol=0, atol=1e-5)
-    np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), deviation, rtol=1e-6)
-    without = replace(law, parameters=(*law.parameters[:3], replace(last, prior_std=None)))
-    freed = fit(gantry_model(without), seen_off(states, right), noise)
-    assert freed.held.tolist() == [False, False, False, plausible < 1e-6]
-    assert (freed.estimate.coefficients[0][3] == 0.0) == (plausible < 1e-6)
+def test_what_has_a_prior_or_starts_larger_is_as_large_as_these_say_however_small_its_plausible_size(plausible):
+    model = gantry_model(linear_law(3, [None, 3e-6, None], plausible))
+    start = replace(made_estimate(model, size=0.0), coefficients=(np.array([0.0, 0.0, -2e-7]),))
+    expected = [plausible, max(plausible, 3e-6), max(plausible, 2e-7)]
+    np.testing.assert_array_equal(sizes_of(model, start), expected)
 
 
 def test_a_fit_to_more_than_it_starts_from_is_that_to_all_of_them(monkeypatch):
@@ -165,3 +148,179 @@ def test_frames_are_fitted_to_targets_that_stay_as_they_were_found(fanuc, rows):
     for each in (found, others):
         for ours, theirs in zip(each.coefficients, fitted.estimate.coefficients, strict=True):
             np.testing.assert_array_equal(ours, theirs)
+
+
+def robust_objective(found):
+    """Huber's, of all observations of a fit without a prior, by the library's own norm."""
+    rows = found.model.rows
+    norm = sm.robust.norms.HuberT(np.sqrt(chi2.ppf(0.99, rows) / rows))
+    return rows * norm.rho(np.sqrt((found.whitener.apply(found.residual) ** 2).mean(axis=1))).sum()
+
+
+@pytest.mark.parametrize(("seed", "lag"), [(3, 1500.0), (24, 900.0), (25, 1500.0)])
+def test_steps_that_do_not_help_are_halved_until_the_fit_converges(fanuc, seed, lag, monkeypatch):
+    model, seen = bent(fanuc, seed, lag)
+    found = fit(model, seen, NOISE)
+    assert found.converged
+    monkeypatch.setattr("elastocal.fitting.least_squares._HALVINGS", 0)
+    whole = fit(model, seen, NOISE)
+    assert not whole.converged
+    assert robust_objective(found) < robust_objective(whole) - 0.01
+
+
+@pytest.mark.parametrize(("seed", "lag", "end"), [(4, 8000.0, 36000.0), (8, 3000.0, 900.0)])
+def test_fit_converges_at_the_end_of_the_range_of_a_shape(fanuc, seed, lag, end):
+    model, seen = bent(fanuc, seed, lag)
+    found = fit(model, seen, NOISE)
+    assert found.converged and found.estimate.shapes[0][0] == end
+    # The others are where they are best given that end: held there they do not move.
+    frozen = replace(model.effects[0], shapes=(), displacement=lambda around: model.effects[0].displacement(around, end))
+    without = replace(model, effects=(frozen,))
+    start = replace(found.estimate, shapes=(np.zeros(0),))
+    again = fit(without, seen, NOISE, start)
+    deviation = np.sqrt(again.covariance[-1, -1])
+    assert abs(again.estimate.coefficients[0][0] - found.estimate.coefficients[0][0]) < 2e-3 * deviation
+
+
+WEAK = [None, 3e-5, None]
+
+SENSOR = Noise("declared", 1e-4, 5e-5, np.zeros(3))
+
+
+def with_outliers(rows, count=40):
+    """Observations of a linear law, of which five are far off; design (S, 3, 3) and what is off, in positions and turns."""
+    rng = np.random.default_rng(95)
+    states = replace(gantry_states(count), repeats=np.ones(count, int))
+    left = waves(states.joint_angles, 3)
+    off = 1e-4 * rng.standard_normal((count, 3)) + left @ [4e-5, -8e-5, 1e-4]
+    off[[3, 11, 17, 30, 38]] += 1e-3 * np.array([[1, 0, 0], [0, -2, 0], [0, 0, 3], [2, 2, 0], [5, 0, 0]])
+    turned = 5e-5 * rng.standard_normal((count, 3)) if rows == 6 else None
+    model = gantry_model(linear_law(3, WEAK), rows=rows)
+    return model, seen_off(states, off, turned), left, off, turned
+
+
+def distances(off, turned, left, values, factor):
+    """Root mean square of what is left of each observation, in standard deviations of the noise taken."""
+    parts = [(off - left @ values) / 1e-4] if turned is None else [(off - left @ values) / 1e-4, turned / 5e-5]
+    return np.sqrt((np.concatenate(parts, axis=1) ** 2).mean(axis=1)) / factor
+
+
+@pytest.mark.parametrize("rows", [3, 6])
+@pytest.mark.parametrize("taken", [0.2, 0.7, 1.0, 3.0])
+def test_weights_fall_with_the_distance_by_the_scale_of_the_errors_that_are_there(rows, taken):
+    """One up to the 99 % quantile, then its share; the scale is that of the median distance, but never below the noise."""
+    model, seen, left, off, turned = with_outliers(rows)
+    found = fit(model, seen, SENSOR.scaled(taken))
+    far = distances(off, turned, left, found.estimate.coefficients[0], taken)
+    scale = max(1.0, np.median(far) / np.sqrt(chi2.ppf(0.5, rows) / rows))
+    assert (scale > 1.3) == (taken < 0.75)
+    expected = np.minimum(1.0, np.sqrt(chi2.ppf(0.99, rows) / rows) * scale / far)
+    assert found.converged and (expected < 1).sum() >= 3
+    np.testing.assert_allclose(found.weights, expected, rtol=2e-3)
+    # The estimate solves the equations of these weights, its covariance is their inverse.
+    weighted = left.reshape(-1, 3) * np.repeat(found.weights, 3)[:, None] / (1e-4 * taken) ** 2
+    precision = weighted.T @ left.reshape(-1, 3) + np.diag([0.0, WEAK[1] ** -2, 0.0])
+    values = np.linalg.solve(precision, weighted.T @ off.ravel())
+    deviation = np.sqrt(np.diag(np.linalg.inv(precision)))
+    np.testing.assert_allclose(found.estimate.coefficients[0] / deviation, values / deviation, rtol=0, atol=5e-3 * scale)
+    np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), deviation, rtol=1e-6)
+
+
+@pytest.mark.parametrize("settled", [1e-3, 0.1])
+@pytest.mark.parametrize("spread", [0.5, 5.0])
+@pytest.mark.parametrize(("share", "converged"), [(0.98, True), (-0.98, True), (1.02, False), (-1.02, False)])
+def test_a_fit_has_converged_where_its_step_is_below_a_share_of_the_standard_error(
+    spread, settled, share, converged, monkeypatch
+):
+    """Of measurements that scatter more than the noise, of their own standard error: all errors are of one size."""
+    states = replace(gantry_states(30), repeats=np.ones(30, int))
+    left = waves(states.joint_angles, 1)[..., 0]
+    off = 1e-4 * spread * np.random.default_rng(96).choice([-1.0, 1.0], (30, 3))
+    model, seen = gantry_model(linear_law(1)), seen_off(states, off)
+    best, deviation = (left * off).sum() / (left**2).sum(), 1e-4 / np.sqrt((left**2).sum())
+    # All distances are alike but for what the one parameter takes: their median is their root mean square.
+    scale = max(1.0, spread / np.sqrt(chi2.ppf(0.5, 3) / 3))
+    start = replace(made_estimate(model, size=0.0), coefficients=(np.array([best + share * settled * scale * deviation]),))
+    monkeypatch.setattr("elastocal.fitting.least_squares._STEPS", 1)
+    found = fit(model, seen, SENSOR, start, reweighted=True, settled=settled)
+    assert found.converged == converged
+    # The last step is taken all the same: a linear problem is solved by it.
+    assert found.estimate.coefficients[0][0] == pytest.approx(best, abs=1e-3 * settled * deviation)
+    # One that starts anew gives all observations one weight first, and does not trust that step.
+    assert not fit(model, seen, SENSOR, start, settled=settled).converged
+
+
+def unloaded(states):
+    states.wrench[:] = 0.0
+    return states
+
+
+def assert_known(found, true, rows=3):
+    for name in ("frame_position", "target_offset", "frame_rotation", *(["target_rotation"] if rows == 6 else [])):
+        np.testing.assert_allclose(getattr(found, name), getattr(true, name), rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("rows", [3, 6])
+@pytest.mark.parametrize("sessions", [(0,), (2, 5)])
+@pytest.mark.parametrize("seen_of", [2, 1], ids=["two targets", "one target, another without a measurement"])
+def test_frames_and_targets_are_found_from_nothing(fanuc, rows, sessions, seen_of):
+    """All measurements of a target may be held out: it stays where it was."""
+    model, states = model_of(fanuc, targets=TARGETS, rows=rows), unloaded(made_states(6, 40, seed=1, sessions=len(sessions)))
+    states.session[:] = np.array(sessions)[states.session]
+    true = made_estimate(model, sessions, seed=2)
+    seen = seen_exactly(model, true, states)
+    mine = seen.target < seen_of
+    rotation = None if seen.rotation is None else seen.rotation[mine]
+    seen = replace(seen, state=seen.state[mine], target=seen.target[mine], position=seen.position[mine], rotation=rotation)
+    if seen_of == 1:
+        true = replace(true, target_offset=true.target_offset * [[1], [0]])
+        true.target_rotation[1] = np.eye(3)
+    found = registered(model, seen)
+    assert found.sessions == sessions
+    assert_known(found, true, rows)
+
+
+@pytest.mark.parametrize("fitted_frames", [False, True])
+def test_a_known_mount_keeps_its_turn_and_an_unknown_one_is_found(fanuc, fitted_frames):
+    targets = (Target("A", "6DoF", None, (0.1, -1.5, 0.2)), Target("B", "4DoF", (0.1, 0.0, 0.2), None))
+    model = made_model(fanuc.chain, targets, rows=6, fitted_frames=fitted_frames)
+    states, true = unloaded(made_states(6, 15, seed=7)), made_estimate(model, seed=8)
+    found = registered(model, seen_exactly(model, true, states))
+    assert_known(found, true, 6)
+    np.testing.assert_array_equal(found.target_offset[1], (0.1, 0.0, 0.2))
+
+
+def test_frame_is_no_reflection_where_all_points_lie_in_a_plane():
+    model = made_model(chain_of("Tz(0.3) Rz(q1) Tx(0.5) Rz(q2) Tx(0.5) [end]"), (Target("A", "end", (0.0, 0.0, 0.0)),))
+    for seed in range(8):
+        states, true = unloaded(made_states(2, 20, seed=seed)), made_estimate(model, seed=seed + 10)
+        assert_known(registered(model, seen_exactly(model, true, states)), true)
+
+
+@pytest.mark.parametrize("joint_rad", [0.0, 2e-5])
+def test_a_fit_of_more_states_than_are_kept_is_the_same_and_keeps_no_jacobian(fanuc, monkeypatch, joint_rad):
+    model = model_of(fanuc, "joint_offset@3", "stiffening@2", targets=TARGETS)
+    seen = seen_exactly(model, made_estimate(model, seed=64), two_loads_a_pose(6, 20, seed=65))
+    seen = with_noise(seen, np.random.default_rng(66))
+    seen.position[[5, 20]] += 3e-3
+    noise = replace(NOISE, joint_rad=np.full(6, joint_rad))
+    kept = fit(model, seen, noise)
+    monkeypatch.setattr("elastocal.fitting.least_squares._MOST_STATES", 10)
+    monkeypatch.setattr("elastocal.fitting.observations._MOST_HELD", 16 * 180)
+    found = fit(model, seen, noise)
+    assert kept.joint_jacobian is not None and found.joint_jacobian is None and found.conditions is None
+    deviation = np.sqrt(np.diag(kept.covariance))
+    values = [np.concatenate(each.estimate.coefficients) for each in (kept, found)]
+    assert (np.abs(values[0] - values[1]) < 5e-3 * deviation[-len(values[0]) :]).all()
+    np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), deviation, rtol=1e-4)
+    parts = [list(zip(*each.sensitivities(seen), strict=True)) for each in (kept, found)]
+    assert len(parts[1][0]) > 1
+    poses = [set(seen.cluster[part]) for part in parts[1][0]]
+    assert sum(map(len, poses)) == len(set().union(*poses)) == 20
+    for number in (1, 2):
+        one, other = (np.concatenate(part[number]) for part in parts)
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-5 * np.abs(one).max())
+    monkeypatch.undo()
+    for each in (kept, found):
+        ((_, plain, white),) = each.sensitivities(seen)
+        np.testing.assert_allclose(white, each.whitened(plain), rtol=0, atol=1e-5 * np.abs(white).max())

@@ -1,4 +1,4 @@
-"""Normal equations by central differences of the weighted squares, and in closed form where the problem is linear."""
+"""Normal equations: whitened by a dense factor, by differences, in closed form; what cannot be told is held and named."""
 
 from dataclasses import replace
 
@@ -12,15 +12,166 @@ from fitted_models import (
     gantry_states,
     linear_law,
     model_of,
+    names_held,
     seen_off,
     waves,
 )
-from synthetic import made_estimate, made_states, seen_exactly, with_noise
+from synthetic import NOISE, made_estimate, made_model, made_states, seen_exactly, with_noise
 
-from elastocal.fitting.displacement import conditions
+from elastocal.campaigns.campaign import Target
+from elastocal.fitting.least_squares import fit
+from elastocal.fitting.linearization import linearize
+from elastocal.fitting.model import conditions, parameters, residuals, stepped
 from elastocal.fitting.noise import Noise
-from elastocal.fitting.normal_equations import Parts
-from elastocal.fitting.parameters import parameters
+from elastocal.fitting.normal_equations import Parts, identifiable, solve_normal, whitening
+from elastocal.fitting.observations import Observations
+
+
+def solved(left, right, plausible, *given):
+    """By the normal equations of whitened sensitivities and residual."""
+    scaled = left * plausible
+    return solve_normal(scaled.T @ scaled, scaled.T @ right, plausible, *given)
+
+
+def test_solution_with_a_prior_is_that_of_numpy_with_a_row_for_each_prior():
+    rng = np.random.default_rng(45)
+    left, right, present = 10 * rng.standard_normal((8, 6)), rng.standard_normal(8), rng.standard_normal(6)
+    penalty = np.array([0.0, 0.0, 4.0, 9.0, 25.0, 1.0])
+    root = np.diag(np.sqrt(penalty))
+    rows, ends = np.concatenate([left, root]), np.concatenate([right, -root @ present])
+    step, covariance, held = solved(left, right, np.full(6, 2.0), False, penalty, present)
+    np.testing.assert_allclose(step, np.linalg.lstsq(rows, ends)[0], rtol=1e-9)
+    np.testing.assert_allclose(covariance, np.linalg.inv(rows.T @ rows), rtol=1e-9, atol=1e-15)
+    assert not held.any()
+
+
+def informed(*covariance):
+    """Information whose inverse is a covariance, in plausible sizes."""
+    return np.linalg.inv(np.array(covariance))
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+@pytest.mark.parametrize(("correlation", "kept"), [(0.49, [False, True]), (0.51, [True, False])])
+def test_a_shape_is_given_up_for_another_from_a_correlation_of_a_half_on(correlation, kept, sign):
+    """Of either sign. The other has a standard error of 1.05 beside the shape, and is told without it."""
+    shared = sign * correlation * 1.05 * 0.5
+    gram = informed([1.05**2, shared], [shared, 0.5**2])
+    assert 1 / np.sqrt(gram[0, 0]) < 1.0
+    np.testing.assert_array_equal(identifiable(gram, np.zeros(2, bool), np.array([False, True])), kept)
+
+
+@pytest.mark.parametrize(("error", "kept"), [(0.999, True), (1.001, False)])
+@pytest.mark.parametrize("beside", [0.0, 0.6])
+def test_a_standard_error_of_the_plausible_size_is_the_largest_that_is_estimated(error, kept, beside):
+    """Alone as beside another parameter that is known better."""
+    gram = informed([0.01, 0.1 * error * beside], [0.1 * error * beside, error**2])
+    np.testing.assert_array_equal(identifiable(gram, np.zeros(2, bool), np.zeros(2, bool)), [True, kept])
+
+
+@pytest.mark.parametrize(
+    ("key", "held"),
+    [
+        ("joint_offset@1", ["joint_offset@1 offset"]),
+        # To positions of one target, a turn of the last joint is a shift of the target.
+        ("joint_offset@6", ["joint_offset@6 offset"]),
+        ("link_geometry@6", [f"link_geometry@6 {name}" for name in ("dx", "dy", "dz", "rx", "ry", "rz")]),
+    ],
+)
+def test_what_the_frame_or_the_target_makes_as_well_is_held_and_named(fanuc, key, held):
+    model = model_of(fanuc, key, "joint_offset@3")
+    true = made_estimate(model, seed=13)
+    seen = with_noise(seen_exactly(model, true, made_states(6, 40, seed=14)), np.random.default_rng(15))
+    found = fit(model, seen, NOISE)
+    assert names_held(found) == held
+    assert not found.estimate.coefficients[0].any()
+    assert not found.covariance[found.held].any() and not found.covariance[:, found.held].any()
+    # It is not shrunk towards zero by a penalty: without it the fit is the very same.
+    without = fit(model_of(fanuc, "joint_offset@3"), seen, NOISE)
+    np.testing.assert_allclose(found.estimate.coefficients[1], without.estimate.coefficients[0], rtol=1e-9)
+    np.testing.assert_allclose(found.covariance[~found.held][:, ~found.held], without.covariance, rtol=1e-6, atol=1e-22)
+
+
+@pytest.mark.parametrize("off", [-2.0, 0.0, 2.0])
+def test_a_prior_of_the_plausible_size_alone_identifies_nothing_however_it_rounds(off):
+    gram = np.diag([50.0, 1.0 + off * np.finfo(float).eps, 3.0])
+    none = np.zeros(3, bool)
+    np.testing.assert_array_equal(identifiable(gram, none, none), [True, False, True])
+
+
+def test_kept_are_those_of_one_pivot_after_the_other_where_ranks_are_deficient():
+    rng, given_up = np.random.default_rng(48), 0
+    for _ in range(200):
+        size = int(rng.integers(2, 12))
+        left = rng.standard_normal((int(rng.integers(1, size + 4)), size)) * 10.0 ** rng.uniform(-1, 3, size)
+        gram, kept = left.T @ left, []
+        for number in range(size):
+            before = gram[kept, number]
+            rest = gram[number, number] - before @ np.linalg.solve(gram[np.ix_(kept, kept)], before)
+            if rest > max(1.0, 1e-11 * gram[number, number]):
+                kept.append(number)
+        none = np.zeros(size, bool)
+        found = np.flatnonzero(identifiable(gram, none, none)).tolist()
+        # Those that come later may take what told their predecessors.
+        assert set(found) <= set(kept)
+        if (np.diag(np.linalg.inv(gram[np.ix_(kept, kept)])) <= 1.0).all():
+            assert found == kept
+            given_up += len(kept) < size
+    assert given_up > 20
+
+
+THREE = tuple(Target(name, point, (0.1, 0.05, 0.0)) for name, point in (("A", "6DoF"), ("B", "3DoF"), ("C", "2DoF")))
+
+OF_JOINTS = Noise("repeats", 60e-6, 40e-6, 1e-6 * np.array([30.0, 40, 50, 60, 70, 0]))
+
+
+@pytest.fixture(params=[3, 6], ids=["positions", "poses"])
+def case(request, fanuc):
+    """Observations of one to three targets a state, averaged over one to four repeats, and their Jacobian."""
+    model = made_model(fanuc.chain, THREE, request.param, fitted_frames=False)
+    states = made_states(6, 7, seed=1)
+    states.repeats[:] = [1, 4, 2, 3, 1, 2, 4]
+    whole = seen_exactly(model, made_estimate(model), states)
+    kept = np.array([0, 1, 2, 4, 6, 7, 8, 9, 12, 13, 14, 17, 18, 19, 20])
+    rotation = None if whole.rotation is None else whole.rotation[kept]
+    seen = Observations(states, whole.state[kept], whole.target[kept], whole.position[kept], rotation)
+    estimate = made_estimate(model)
+    jacobian = linearize(model, estimate, seen, conditions(model, estimate, states)).coordinate_jacobian[..., :6]
+    return seen, jacobian
+
+
+def dense_covariance(seen, jacobian, noise):
+    """Covariance of all rows, written out from what the noise means."""
+    rows = seen.rows
+    joints, common = jacobian.reshape(-1, 6) * noise.joint_rad, jacobian.reshape(-1, 6) * noise.pose_rad
+    state, pose = np.repeat(seen.state, rows), np.repeat(seen.cluster, rows)
+    sensor = np.tile(([noise.position_m] * 3 + [noise.orientation_rad] * 3)[:rows], len(seen))
+    if seen.position_std is not None:
+        of_positions = np.tile(np.arange(rows) < 3, len(seen))
+        sensor = sensor * np.where(of_positions, np.repeat(seen.position_std, rows) / noise.usual_m, 1.0)
+    one = (joints @ joints.T) * (state[:, None] == state) + np.diag(sensor**2)
+    # What a pose has in common no repeat averages.
+    return one / seen.states.repeats[state] + (common @ common.T) * (pose[:, None] == pose)
+
+
+@pytest.mark.parametrize("stated", [False, True], ids=["alike", "each of its own"])
+@pytest.mark.parametrize("pose_rad", [0.0, 2e-5, 1e-3])
+def test_whitened_rows_are_those_of_a_dense_cholesky_factor(case, pose_rad, stated):
+    """Poses of one state and of three, which share an error of the joints where there is one."""
+    seen, jacobian = case
+    seen = replace(seen, states=replace(seen.states, pose=np.array([0, 1, 1, 1, 2, 2, 3])))
+    noise = replace(OF_JOINTS, pose_rad=pose_rad)
+    if stated:
+        seen = replace(seen, position_std=np.random.default_rng(3).uniform(2e-5, 3e-4, len(seen)))
+        noise = replace(noise, usual_m=1e-4)
+    covariance = dense_covariance(seen, jacobian, noise)
+    values = np.random.default_rng(2).standard_normal((len(seen), seen.rows, 5))
+    found = whitening(seen, jacobian, noise).apply(values).reshape(-1, 5)
+    # A factor of a covariance is unique but for the order of its rows: what is whitened has the same products.
+    expected = values.reshape(-1, 5).T @ np.linalg.solve(covariance, values.reshape(-1, 5))
+    np.testing.assert_allclose(found.T @ found, expected, rtol=1e-7, atol=1e-7 * np.abs(expected).max())
+    identity = np.eye(len(covariance)).reshape(len(seen), seen.rows, -1)
+    factor = whitening(seen, jacobian, noise).apply(identity).reshape(covariance.shape)
+    np.testing.assert_allclose(factor @ covariance @ factor.T, np.eye(len(covariance)), atol=1e-7)
 
 
 @pytest.mark.parametrize("pose_rad", [0.0, 3e-5])
@@ -51,16 +202,14 @@ def test_products_by_factors_are_those_of_the_columns_written_out(fanuc, offset,
 def test_normal_equations_of_a_linear_problem_are_those_written_out(kind, at_once, monkeypatch):
     """Weights come before the covariance is divided out; in parts of whole poses as in one."""
     if at_once:
-        monkeypatch.setattr("elastocal.fitting.displacement._MOST_HELD", 100)
-        monkeypatch.setattr("elastocal.fitting.displacement._MOST_AT_ONCE", at_once)
-        monkeypatch.setattr("elastocal.fitting.normal_equations.observations_at_once", lambda rows, columns: at_once)
+        monkeypatch.setattr("elastocal.fitting.observations._MOST_HELD", 3 * 60 * at_once)
     noise, states, plausible = GANTRY_NOISES[kind], gantry_states(20, 8), np.array([0.1, 2.0, 0.5])
     rng = np.random.default_rng(98)
     left, off, weights = waves(states.joint_angles, 3), 1e-4 * rng.standard_normal((20, 3)), rng.uniform(0.2, 1.0, 20)
     model, seen = gantry_model(linear_law(3)), seen_off(states, off)
     estimate = replace(made_estimate(model), coefficients=(np.array([1e-4, -2e-4, 3e-5]),))
     parts = Parts(model, seen, noise, conditions(model, estimate, states), plausible)
-    assert len(parts.slices) == 1 if at_once is None else len(parts.slices) > 2
+    assert len(parts.parts) == 1 if at_once is None else len(parts.parts) > 2
     parts.linearize(estimate)
     parts.whiten()
     residual = off - left @ estimate.coefficients[0]
@@ -80,17 +229,16 @@ def test_normal_equations_of_a_linear_problem_are_those_written_out(kind, at_onc
         np.testing.assert_allclose(parts.distance(), expected, rtol=1e-7)
 
 
-@pytest.mark.parametrize("poses", [5, 10])
-def test_an_error_of_the_pose_counts_in_the_distances_of_a_whole_pose_together(poses):
-    """Squares of all observations of a pose by the covariance of the pose: what they share is no distance of each."""
-    noise, states = GANTRY_NOISES["poses"], gantry_states(20, poses)
-    off = 1e-4 * np.random.default_rng(99).standard_normal((20, 3))
-    model = gantry_model(linear_law(1))
-    estimate = replace(made_estimate(model), coefficients=(np.zeros(1),))
-    parts = Parts(model, seen_off(states, off), noise, conditions(model, estimate, states), np.ones(1))
+def test_squares_of_another_estimate_are_whitened_in_the_axes_in_which_the_step_began(fanuc):
+    model = model_of(fanuc, targets=TARGETS)
+    estimate = made_estimate(model, seed=3)
+    seen = with_noise(seen_exactly(model, estimate, made_states(6, 9, seed=4)), np.random.default_rng(5))
+    parts = Parts(model, seen, OF_JOINTS, conditions(model, estimate, seen.states), np.ones(12))
     parts.linearize(estimate)
     parts.whiten()
-    inverse = np.linalg.inv(gantry_covariance(states, noise))
-    squares = off.ravel() * (inverse @ off.ravel())
-    expected = np.bincount(np.repeat(states.pose, 3), squares)
-    np.testing.assert_allclose(np.bincount(states.pose, 3 * parts.distance() ** 2), expected, rtol=1e-7)
+    there = stepped(model, estimate, np.array([0, 0, 0, 0.3, -0.2, 0.1, *[0.0] * 6]))
+    residual = residuals(model, there, seen, conditions(model, there, seen.states))
+    turned = residual @ there.frame_rotation[0].T @ estimate.frame_rotation[0]
+    expected = (whitening(seen, parts.jacobian(), OF_JOINTS).apply(turned) ** 2).sum()
+    assert parts.squares(np.ones(len(seen)), there) == pytest.approx(expected, rel=1e-6)
+    assert parts.squares(np.ones(len(seen)), there) != pytest.approx((parts.whitener().apply(residual) ** 2).sum(), rel=1e-3)

@@ -1,6 +1,6 @@
 """Observations: what is averaged with what, in which order, and with which rotations."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,9 +11,6 @@ from synthetic import measurements_of
 
 from elastocal.fitting.observations import (
     averaged,
-    each_approach,
-    groups_by_size,
-    select_states,
     state_clusters,
     without_outlying_repeats,
 )
@@ -26,22 +23,6 @@ def measurements(keys, position=None, **others):
     places = dict(zip(names, np.array(keys).T, strict=True))
     position = place if position is None else np.array(position, float)
     return measurements_of(joint_angles=angles, wrench=wrench, position=position, **places, **others)
-
-
-def test_each_approach_is_a_state_and_knows_the_averaged_one():
-    keys = [(0, p, load, r, t) for p in (0, 1) for load in (0, 1) for r in (0, 1, 2) for t in (0, 1)]
-    taken = measurements(keys)
-    found, repeated = each_approach(taken)
-    together = averaged(taken)
-    assert len(found.states) == 12 and len(found) == 24
-    np.testing.assert_array_equal(repeated, np.repeat(np.arange(4), 3))
-    np.testing.assert_array_equal(found.states.pose, together.states.pose[repeated])
-    np.testing.assert_array_equal(found.states.load, together.states.load[repeated])
-    np.testing.assert_array_equal(found.states.repeats, 1)
-    for state in range(4):
-        for target in (0, 1):
-            mean = found.position[(repeated[found.state] == state) & (found.target == target)].mean(axis=0)
-            np.testing.assert_allclose(together.position[(together.state == state) & (together.target == target)][0], mean)
 
 
 def full_measurements(seed, loads=2):
@@ -90,23 +71,6 @@ def test_averages_are_those_of_each_session_pose_load_side_and_target_by_hand(se
         np.testing.assert_allclose(value, getattr(again.states, name), rtol=0, atol=1e-14)
 
 
-@given(st.lists(st.booleans(), min_size=12, max_size=12).filter(any))
-def test_selected_states_are_those_of_the_selected_measurements(kept):
-    taken, kept = full_measurements(0), np.array(kept)
-    whole = averaged(taken)
-    chosen = {
-        key
-        for key, k in zip(zip(whole.states.session, whole.states.pose, whole.states.load, strict=True), kept, strict=True)
-        if k
-    }
-    mask = np.array([key in chosen for key in zip(taken.session, taken.pose, taken.load, strict=True)])
-    expected, found = averaged(taken.select(mask)), select_states(whole, kept)
-    for field in fields(expected.states):
-        np.testing.assert_allclose(getattr(found.states, field.name), getattr(expected.states, field.name), atol=1e-14)
-    for name in ("state", "target", "position", "rotation"):
-        np.testing.assert_allclose(getattr(found, name), getattr(expected, name), atol=1e-14)
-
-
 def repeated(repeats, poses=30, seed=0, targets=2, single=0):
     """Measurements with unit noise of poses with so many repeats, and of further ones without."""
     keys = [(0, p, 0, r, t) for p in range(poses + single) for r in range(repeats if p < poses else 1) for t in range(targets)]
@@ -134,13 +98,3 @@ def test_a_wild_repeat_leaves_and_all_others_stay(repeats, off):
 def test_clean_noise_loses_nothing(repeats):
     """Of 3,600 poses: a rate of 1 in 1,000 is seen with a power of 0.97."""
     assert sum(len(rows_lost(repeated(repeats, poses=60, seed=seed))) for seed in range(60)) == 0
-
-
-@pytest.mark.parametrize("group", [[0, 0, 1, 3, 3, 4], [3, 0, 4, 3, 0, 1]], ids=["rising", "in any order"])
-def test_groups_of_one_size_stand_together_with_their_places_rising(group):
-    group = np.array(group)
-    single, pairs = groups_by_size(group)
-    np.testing.assert_array_equal(group[single], [[1], [4]])
-    np.testing.assert_array_equal(group[pairs], [[0, 0], [3, 3]])
-    assert (np.diff(pairs, axis=1) > 0).all()
-    assert sorted([*single.ravel(), *pairs.ravel()]) == list(range(6))

@@ -11,10 +11,8 @@ from made_campaigns import Plan, made
 from planted import planted
 from scipy.spatial.transform import Rotation
 
-from elastocal.fitting.case import Case
 from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import declared_model
-from elastocal.fitting.noise import FINEST
+from elastocal.fitting.model import Case, declared_model
 from elastocal.fitting.observations import averaged
 from elastocal.fitting.tolerances import (
     SIZES,
@@ -61,29 +59,6 @@ def test_the_size_is_the_same_whatever_noise_was_taken_and_the_noise_comes_back(
     assert factor == pytest.approx(1.0 / share, rel=0.15)
 
 
-def test_the_evidence_in_closed_form_is_that_of_the_measurements(kuka):
-    """Marginal likelihood of the whitened residual, normal with covariance s2 I + X D X', frames flat: by determinants."""
-    campaign, model = campaign_of(kuka, 5e-4, poses=12, fitted_frames=True)
-    wide = wide_fit(campaign, model)
-    rows = np.concatenate([white.reshape(-1, len(wide.held)) for _, _, white in wide.sensitivities(campaign.observations)])
-    mine = np.array([parameter.sized for _, parameter in wide.parameters])
-    values = np.concatenate(wide.estimate.coefficients[-len(JOINTS) :])
-    seen = wide.whitened(wide.residual).ravel() + rows[:, mine] @ values
-    basis, _ = np.linalg.qr(rows[:, ~mine & ~wide.held], mode="complete")
-    apart = basis[:, (~mine & ~wide.held).sum() :]
-    left, right = apart.T @ rows[:, mine], apart.T @ seen
-
-    def evidence(size, factor):
-        covariance = factor**2 * np.eye(len(right)) + (1e-3 * size) ** 2 * left @ left.T
-        return -0.5 * (np.linalg.slogdet(covariance)[1] + right @ np.linalg.solve(covariance, right))
-
-    size, factor = most_probable(wide)
-    best = evidence(size, factor)
-    others = [evidence(size * step, factor) for step in (10**-0.25, 10**0.25)]
-    others += [evidence(size, factor * step) for step in (0.9, 1.1) if factor * step >= 1.0]
-    assert best >= max(others) - 1e-6
-
-
 def test_effective_parameters_are_the_trace_of_the_hat_matrix(kuka):
     campaign, model = campaign_of(kuka, 1e-4, poses=6)
     fitted = fit(with_size(model, 0.1), campaign.observations, campaign.declared.noise.scaled(30.0))
@@ -120,11 +95,3 @@ def test_noise_is_the_root_mean_square_of_the_residual_where_nothing_else_says_i
     assert noise.orientation_rad == pytest.approx(np.sqrt(((turned if oriented else off) ** 2).mean()), rel=1e-6)
     np.testing.assert_array_equal(noise.joint_rad, np.zeros(6))
     assert len(warnings) == 1 and "no repeats and no declared noise" in warnings[0]
-
-
-@pytest.mark.parametrize(("position_m", "orientation_rad"), [(70e-6, 0.0), (0.0, 20e-6)])
-def test_a_residual_finer_than_any_sensor_is_taken_as_what_a_sensor_resolves(fanuc, position_m, orientation_rad):
-    off, turned = errors(1, position_m), errors(2, orientation_rad)
-    noise, _ = estimated_noise(case_of(fanuc, off, turned))
-    for found, part in ((noise.position_m, off), (noise.orientation_rad, turned)):
-        assert found == pytest.approx(max(np.sqrt((part**2).mean()), FINEST), rel=1e-6)

@@ -7,7 +7,7 @@ from elastocal.campaigns.campaign import columns_of
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import residual_blocks
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.case import case_from
+from elastocal.fitting.model import case_from
 from elastocal.io.json_files import write_json
 from elastocal.io.storage import write_table
 from elastocal.loop import diagnosis_tables as tables

@@ -13,7 +13,7 @@ PARAMS = {"seed": 1, "states": 4, "figures": FIGURES}
 STEPS = (*ANALYSIS, "draw_campaign", "compile_loop_report")
 # Names of the rules' files by which others know them; what is not listed is a Parquet table.
 SUFFIXES = dict.fromkeys(("descriptions", "diagnosis", "verdict"), ".json")
-SUFFIXES |= dict.fromkeys(("before_after", "splits", "experiment", "candidates"), ".csv") | {"report": ".pdf", "page": ".html"}
+SUFFIXES |= dict.fromkeys(("before_after", "experiment", "candidates"), ".csv") | {"report": ".pdf", "page": ".html"}
 
 
 class Files:

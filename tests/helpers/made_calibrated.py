@@ -9,8 +9,7 @@ from elastocal.application.calibrated import calibrate_by_model
 from elastocal.effects.catalogue import candidates_on
 from elastocal.effects.elastic import joint_compliance
 from elastocal.effects.gravity import declared_weight
-from elastocal.fitting.model import Estimate, Model
-from elastocal.fitting.parameters import parameters
+from elastocal.fitting.model import Estimate, Model, parameters
 from elastocal.mechanics.sites import sites_of
 
 # What a good arm has, of each family that an afternoon finds.

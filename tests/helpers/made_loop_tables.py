@@ -103,18 +103,6 @@ def step_rows(effects=("lost_motion",), largest_m=3e-4):
     return rows
 
 
-def split_rows(changed):
-    """Rows of splits.csv: the held-out poses, and four blocks of joint space."""
-    rows, sizes = [], {"before": 1.2e-4, "after": 0.8e-4 if changed else 1.2e-4}
-    fall = 1 - sizes["after"] / sizes["before"]
-    for split, block in [("held out", "all"), ("joint space", "all"), *(("joint space", k) for k in range(1, 5))]:
-        row = {"split": split, "block": block, "poses": 10, "reduction": fall, "reduction_std_error": 0.05}
-        for stage, size in sizes.items():
-            row |= {f"{stage}_rms_m": size, f"{stage}_rms_m_low": 0.8 * size, f"{stage}_rms_m_high": 1.3 * size}
-        rows.append(row | {"reduction_low": fall - 0.1, "reduction_high": fall + 0.1})
-    return rows
-
-
 def experiment_rows(count=10):
     """Rows of next_experiment.csv."""
     return [DATA["experiment"] | {"pose": n, "separation": 10.0 + n, "resolved": 0.5 + 0.04 * n} for n in range(count)]
@@ -192,7 +180,6 @@ def facts_of(verdict, **changed):
     found = [effect["name"] for effect in verdict["effects"] if effect["adopted"]]
     given = {
         "steps": step_rows(effects=found),
-        "splits": split_rows(changed=bool(found)),
         "experiment": [],
         "table": residual_table(),
         "descriptions": DATA["descriptions"],

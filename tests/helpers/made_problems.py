@@ -8,7 +8,7 @@ from elastocal.diagnosis.hypotheses import OTHER, OWN, Law, Unit
 from elastocal.diagnosis.search import Problem
 from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.statistics import WhiteRows, products_of, statistics_of
-from elastocal.fitting.factored import Displacements, Factored
+from elastocal.fitting.linearization import Factored
 
 
 @dataclass(frozen=True)
@@ -30,11 +30,9 @@ class Rows:
     def white(self):
         """Observations of one row and one state each: every column displaces a coordinate of its own, by one."""
         rows, columns = self.candidates.shape
-        displacements = Displacements.of([{column: np.ones(rows)} for column in range(columns)], np.ones(columns), rows)
         declared, jacobian, candidates = (part[:, None] for part in (self.declared, self.jacobian, self.candidates))
-        return WhiteRows(
-            declared, Factored(displacements, candidates, np.arange(rows)), self.residual[:, None], jacobian, self.pose
-        )
+        made = Factored.of([{column: np.ones(rows)} for column in range(columns)], candidates, np.arange(rows), rows)
+        return WhiteRows(declared, made, self.residual[:, None], jacobian, self.pose)
 
     @property
     def products(self):

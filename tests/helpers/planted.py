@@ -7,8 +7,7 @@ from synthetic import NOISE, made_estimate, made_model, made_states, seen_exactl
 
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
-from elastocal.fitting.fit_result import Fit
-from elastocal.fitting.least_squares import fit
+from elastocal.fitting.least_squares import Fit, fit
 from elastocal.fitting.observations import Observations
 
 # At known places, so that nothing but the effects is to be identified.

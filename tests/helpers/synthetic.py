@@ -10,12 +10,9 @@ from elastocal.effects.catalogue import candidates_on
 from elastocal.effects.conditions import conditions_of
 from elastocal.effects.elastic import joint_compliance
 from elastocal.effects.gravity import declared_weight
-from elastocal.fitting.displacement import conditions
-from elastocal.fitting.model import Estimate, Model
+from elastocal.fitting.model import Estimate, Model, conditions, parameters, predict, residuals, stepped
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import Observations, States
-from elastocal.fitting.parameters import parameters, stepped
-from elastocal.fitting.prediction import predict, residuals
 from elastocal.mechanics.kinematics import poses
 from elastocal.mechanics.robot import Compensator
 from elastocal.mechanics.sites import sites_of

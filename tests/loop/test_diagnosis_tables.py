@@ -13,8 +13,8 @@ from synthetic import NOISE, made_estimate, made_model
 from elastocal.campaigns.campaign import Target, columns_of
 from elastocal.diagnosis.diagnose import Step
 from elastocal.effects.catalogue import candidates_on
-from elastocal.fitting.fit_result import Fit
-from elastocal.fitting.parameters import parameters
+from elastocal.fitting.least_squares import Fit
+from elastocal.fitting.model import parameters
 from elastocal.io.json_files import write_json
 from elastocal.io.storage import read_table, write_table
 from elastocal.loop import diagnosis_tables as tables

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support import ODD_CHAINS, OTHER_CHAINS, TRACK, chain_of, homogeneous, random_angles
+from support import ODD_CHAINS, OTHER_CHAINS, TRACK, chain_of, random_angles
 
 from elastocal.mechanics.kinematics import poses, poses_and_jacobians
 from elastocal.mechanics.sites import sites_of
@@ -58,22 +58,6 @@ def test_point_at_the_end_of_a_link_moves_with_it(fanuc, point, link):
     np.testing.assert_allclose(columns_at(sites, angles, point, sites.link_end[link]), expected, rtol=0, atol=ROUNDING)
     if link < sites.joints:
         assert not columns_at(sites, angles, point, [*sites.tilt[link], *sites.link_end[link + 1]]).any()
-
-
-def far_end_by_products(chain, link):
-    """Vector of a link in the frame of its far end, by matrix products."""
-    joints = [index for index, t in enumerate(chain.transforms) if t.coordinate is not None]
-    starts, stops = [0, *(index + 1 for index in joints)], [*joints, len(chain.transforms)]
-    product = np.eye(4)
-    for transform in chain.transforms[starts[link] : stops[link]]:
-        product = product @ homogeneous(transform.kind, transform.axis, transform.constant)
-    return product[:3, :3].T @ product[:3, 3]
-
-
-def test_link_vectors_are_those_of_matrix_products(chain):
-    found = sites_of(chain).link_vectors_m
-    expected = [far_end_by_products(chain, link) for link in range(chain.coordinates + 1)]
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-15)
 
 
 CARRIED = {

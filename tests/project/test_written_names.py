@@ -21,6 +21,7 @@ from elastocal.application.calibrated import nominal_forward
 from elastocal.command.main import app
 from elastocal.errors import InputError
 from elastocal.figures import style
+from elastocal.io import json_files
 from elastocal.report import certificate
 
 pytestmark = pytest.mark.slow
@@ -158,7 +159,7 @@ def test_what_stands_at_a_name_that_is_written_is_refused_and_stays(checkout, na
 
 @pytest.mark.parametrize("command", ["plan", "export", "certificate"])
 def test_a_command_that_is_killed_leaves_the_old_files_or_none(checkout, names_written, tmp_path, monkeypatch, command):
-    """Killed while it draws: what it wrote has no final name; the next run replaces all of the old ones."""
+    """Killed while it draws or writes: what it wrote has no final name; the next run replaces all of the old ones."""
     top = shutil.copytree(checkout, tmp_path / "top", symlinks=True)
     monkeypatch.chdir(top)
     words = COMMANDS[command][0]
@@ -169,6 +170,7 @@ def test_a_command_that_is_killed_leaves_the_old_files_or_none(checkout, names_w
     if not child:
         monkeypatch.setattr(style, "save", lambda *_: os._exit(9))
         monkeypatch.setattr(certificate, "write_certificate", lambda *_: os._exit(9))
+        monkeypatch.setattr(json_files, "write_json", lambda *_: os._exit(9))
         run(*words)
         os._exit(0)
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 9

@@ -11,10 +11,9 @@ from synthetic import made_estimate, made_model, made_states, seen_exactly
 
 import elastocal.remainder
 from elastocal.effects.catalogue import candidates_on
-from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit
+from elastocal.fitting.model import conditions, predict, target_points
 from elastocal.fitting.noise import Noise
-from elastocal.fitting.prediction import predict, target_points
 from elastocal.mechanics.kinematics import poses
 from elastocal.remainder.corrected import Plan, corrected, fitted_again, inputs_of, regressions, remainder_facts
 from elastocal.validation.held_out import position_errors

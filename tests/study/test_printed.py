@@ -18,6 +18,8 @@ def test_a_p_value_is_that_of_one_more_study():
     fitted = OLS(np.append(VALUES, 1.5), np.column_stack([np.ones(6), dummy])).fit()
     assert Predicted(VALUES, False, 0.0).p_value(1.5) == pytest.approx(fitted.pvalues[1], rel=1e-9)
     assert Predicted(VALUES, False, 0.0).p_value(float(VALUES.mean())) == pytest.approx(1.0)
+    # A rounded figure is less certain.
+    assert Predicted(VALUES, False, 2.0).p_value(1.5) > Predicted(VALUES, False, 0.0).p_value(1.5)
 
 
 def test_the_figures_of_tables_3_and_4_are_found_with_their_units():

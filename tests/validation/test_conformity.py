@@ -1,9 +1,24 @@
-"""Pass, fail or undecided by the robots that a fit leaves possible."""
+"""What poses must span; pass, fail or undecided by the robots that a fit leaves possible."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from planted import planted
+from support import chain_of
 
-from elastocal.validation.conformity import FAIL, PASS, UNDECIDED, predicted_conformity
+from elastocal.validation.conformity import (
+    FAIL,
+    FEWEST_CONFIGURATIONS,
+    LEAST_TRAVEL,
+    LEAST_TURN_RAD,
+    PASS,
+    UNDECIDED,
+    count_configurations,
+    joint_ranges,
+    predicted_conformity,
+    shortfalls,
+)
 
 
 @pytest.mark.parametrize(("tolerance", "decision"), [(1.3e-4, PASS), (0.7e-4, FAIL), (1e-4, UNDECIDED)])
@@ -13,3 +28,54 @@ def test_a_prediction_is_decided_by_the_robots_that_it_leaves_possible(tolerance
     assert found.decision == decision and found.poses == 30
     assert found.limit_m == pytest.approx(1e-4 * (1.0 + 0.1 * 1.645), rel=0.01)
     assert found.risk_above == pytest.approx((rms > tolerance).mean(), abs=1e-3)
+
+
+@pytest.fixture(scope="module")
+def states(kuka):
+    return planted(kuka, {}, seed=7, poses=12).observations.states
+
+
+def turned(states, joint, size):
+    angles = states.joint_angles.copy()
+    angles[:, joint] = np.linspace(0.1, 0.1 + size, len(angles))
+    return replace(states, joint_angles=angles)
+
+
+def test_loads_and_repeats_of_a_pose_are_one_configuration(states):
+    assert count_configurations(states) == 12
+    alike = np.tile(states.joint_angles[:1], (len(states), 1))
+    assert count_configurations(replace(states, joint_angles=alike)) == 1
+
+
+def test_fewer_configurations_than_a_judgement_needs_are_too_few(kuka, states):
+    (sentence,) = shortfalls(FEWEST_CONFIGURATIONS - 1, states, kuka)
+    assert sentence == "too few: 7 configurations, where at least 8 must judge"
+
+
+@pytest.mark.parametrize(("share", "count"), [(0.9, 1), (1.1, 0)])
+def test_a_joint_that_hardly_turned_is_too_close(kuka, states, share, count):
+    found = shortfalls(FEWEST_CONFIGURATIONS, turned(states, 3, share * LEAST_TURN_RAD), kuka)
+    assert len(found) == count and all("joint 4 moved by 26°, and 29° are needed" in sentence for sentence in found)
+
+
+@pytest.mark.parametrize(("share", "count"), [(0.9, 1), (1.1, 0)])
+def test_a_rail_needs_a_share_of_its_travel(kuka, states, share, count):
+    rails = chain_of("Tx(q1) Ty(q2) Tz(q3) [hand]")
+    gantry = replace(kuka, chain=rails, joint_limits=np.array([[0.0, 4.0]] * 3))
+    moved = replace(states, joint_angles=np.linspace(0.0, [[share * LEAST_TRAVEL * 4.0, 2.0, 2.0]], len(states))[:, 0])
+    found = shortfalls(FEWEST_CONFIGURATIONS, moved, gantry)
+    assert len(found) == count and all("too close: joint 1 moved by 0.36 m, and 0.4 m are needed" in each for each in found)
+
+
+def test_the_least_turn_is_that_over_which_a_sine_changes_by_half_its_amplitude():
+    """At most by that: about the extremes of the sine less."""
+    turn = np.linspace(-np.pi, np.pi, 100_001)
+    change = np.abs(np.sin(turn + 0.5 * LEAST_TURN_RAD) - np.sin(turn - 0.5 * LEAST_TURN_RAD)).max()
+    assert change == pytest.approx(0.5, abs=1e-6)
+
+
+def test_joint_ranges_are_smallest_and_largest_angles_in_degrees(kuka, states):
+    found = joint_ranges(states, kuka)
+    assert {entry["unit"] for entry in found} == {"deg"}
+    spans = [entry["high"] - entry["low"] for entry in found]
+    np.testing.assert_allclose(spans, np.rad2deg(np.ptp(states.joint_angles, axis=0)), rtol=1e-12)

@@ -1,14 +1,22 @@
-"""Frames and targets of other measurements."""
+"""Frames and targets of other measurements; poses outside the range of the fitted ones, by leaving each out indeed."""
+
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from planted import planted
 from synthetic import made_estimate, made_model, made_states, seen_exactly, with_noise
 
 from elastocal.fitting.least_squares import fit, fit_frames
+from elastocal.fitting.linearization import linearize
+from elastocal.fitting.model import conditions
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import select_states
 from elastocal.validation.held_out import position_errors
-from elastocal.validation.placing import placed_estimate
+from elastocal.validation.placing import beyond_campaign, beyond_loads, outside_poses, placed_estimate, predictive_variances
+
+FOUND = ("joint_offset@2", "joint_offset@3", "payload", "base_compliance")
 
 
 @pytest.mark.parametrize("rows", [3, 6])
@@ -23,7 +31,6 @@ def test_a_session_that_the_fit_has_not_seen_gets_a_frame_of_its_own_and_nothing
     fitted = fit(model, select_states(seen, known), Noise("declared", 6e-5, 6e-5, np.zeros(6)))
     placed = placed_estimate(fitted, seen)
     there = fit_frames(fitted, model, select_states(seen, ~known), own_targets=False)
-    np.testing.assert_array_equal(there.target_offset, fitted.estimate.target_offset)
     np.testing.assert_array_equal(placed.frame_position[1], there.frame_position[0])
     assert placed.sessions == (2, 5, 7)
     np.testing.assert_array_equal(placed.target_offset, fitted.estimate.target_offset)
@@ -32,6 +39,87 @@ def test_a_session_that_the_fit_has_not_seen_gets_a_frame_of_its_own_and_nothing
     distance = position_errors(model, placed, seen).distance
     assert np.sqrt((distance[~known] ** 2).mean()) < 1.3 * np.sqrt(3) * 6e-5
     if rows == 6:
-        turn = placed.frame_rotation[1].T @ true.frame_rotation[1]
-        np.testing.assert_allclose(turn, np.eye(3), atol=2e-4)
+        np.testing.assert_allclose(placed.frame_rotation[1].T @ true.frame_rotation[1], np.eye(3), atol=2e-4)
     assert placed_estimate(fitted, select_states(seen, known)) is fitted.estimate
+
+
+def fitted_part(robot, seed, fitted, unseen):
+    """A fit of four effects to some poses, and observations of these and of others."""
+    campaign = planted(robot, {}, seed=seed, poses=fitted + unseen)
+    known = campaign.observations.states.pose < fitted
+    own, other = (select_states(campaign.observations, mask) for mask in (known, ~known))
+    added = [campaign.candidates[key] for key in FOUND]
+    declared = campaign.declared
+    return fit(declared.model.with_effects(added), own, declared.noise, declared.estimate.with_effects(added)), own, other
+
+
+def test_variances_are_those_without_the_measurements_of_the_pose(fanuc):
+    fitted, own, other = fitted_part(fanuc, 1, 9, 4)
+    found, there = predictive_variances(fitted, own, fitted.model, fitted.estimate, other)
+    line = linearize(fitted.model, fitted.estimate, own, fitted.conditions)
+    white, prior = fitted.whitened(line.sensitivities), [p.plausible**-2.0 for _, p in fitted.parameters]
+    for pose in range(9):
+        rest, here = white[own.cluster != pose], line.sensitivities[own.cluster == pose, :3]
+        covariance = np.linalg.inv(np.einsum("mrp,mrq->pq", rest, rest) + np.diag(prior))
+        assert found[pose] == pytest.approx(np.einsum("mrp,pq,mrq->m", here, covariance, here).max(), rel=1e-6)
+    covariance = np.linalg.inv(np.einsum("mrp,mrq->pq", white, white) + np.diag(prior))
+    around = conditions(fitted.model, fitted.estimate, other.states)
+    away = linearize(fitted.model, fitted.estimate, other, around).sensitivities[:, :3]
+    variance = np.einsum("mrp,pq,mrq->m", away, covariance, away)
+    np.testing.assert_allclose(there, [variance[other.state == state].max() for state in range(8)], rtol=1e-6)
+
+
+def outside(fitted, own, other, **changes):
+    """Poses of other observations, with changes of their states, that lie outside the range of a fit's own."""
+    unseen = replace(other, states=replace(other.states, **changes))
+    cases = [SimpleNamespace(campaign=SimpleNamespace(name="c"), observations=part) for part in (own, unseen)]
+    return outside_poses(fitted, *cases)
+
+
+def test_poses_drawn_alike_are_seldom_outside_and_larger_loads_and_far_angles_always(fanuc):
+    """Of 72 poses beside 14, 5 % by their angles and 1 in 15 by the variance: 8 expected, 19 four standard errors away.
+
+    Three times as many are seen with a power of 0.85.
+    """
+    alike = loaded = 0
+    for seed in range(8):
+        fitted, own, other = fitted_part(fanuc, seed, 14, 9)
+        states = other.states
+        alike += outside(fitted, own, other).sum()
+        loaded += outside(fitted, own, other, wrench=10 * states.wrench).sum()
+        assert outside(fitted, own, other, joint_angles=states.joint_angles + np.array([0, 0, 3.0, 0, 0, 0])).all()
+    assert 1 <= alike <= 19
+    # No range of angles tells a load ten times as large.
+    assert loaded > 0.9 * 72
+
+
+def test_frames_of_other_sessions_do_not_count(fanuc):
+    """Whatever the frame of another session is called, only the effects say how sure the model is there."""
+    campaign = planted(fanuc, {}, seed=3, poses=20, fitted_frames=True)
+    observations = campaign.observations
+    states = replace(observations.states, session=np.where(observations.states.pose < 15, 0, 4))
+    observations = replace(observations, states=states)
+    own, other = (select_states(observations, states.session == number) for number in (0, 4))
+    fitted = fit(campaign.declared.model, own, campaign.declared.noise)
+    elsewhere = replace(fitted.estimate, sessions=(4,))
+    own_variance, variance = predictive_variances(fitted, own, fitted.model, elsewhere, other)
+    assert own_variance.shape == (15,) and variance.shape == (10,)
+    assert (variance > 0).any() and np.isfinite(variance).all()
+    # Unloaded, the compliances say nothing, and the frame, which would, is not counted.
+    assert (variance[other.states.load == 0] == 0).all()
+    # Nor is anything unsure of a model that leaves nothing open.
+    known = replace(campaign.declared.model, fitted_frames=False, effects=())
+    bare = fit(known, own, campaign.declared.noise)
+    assert not bare.parameters and not np.concatenate(predictive_variances(bare, own, known, bare.estimate, other)).any()
+
+
+def test_poses_forces_and_moments_beyond_those_of_a_campaign_are_marked(fanuc):
+    states = planted(fanuc, {}, seed=3, poses=20).observations.states
+    angles, wrench = states.joint_angles[:4].copy(), np.zeros((4, 6))
+    assert not beyond_campaign(states, angles, None).any()
+    force, moment = (np.linalg.norm(states.wrench[:, part], axis=1).max() for part in (slice(0, 3), slice(3, 6)))
+    wrench[1, 2], wrench[2, 4], wrench[3, 0] = -1.1 * force, 1.1 * moment, force
+    angles[0, 2] = states.joint_angles[:, 2].max() + 1.0
+    assert beyond_campaign(states, angles, wrench).tolist() == [True, True, True, False]
+    assert beyond_loads(states, np.tile([0.0, 1.5 * force, 0, 0, 0, 2.1 * moment], (1, 1)), 2.0).all()
+    assert not beyond_loads(states, np.tile([0.0, 1.5 * force, 0, 0, 0, 1.9 * moment], (1, 1)), 2.0).any()

@@ -98,7 +98,7 @@ def test_no_step_before_the_judgement_reads_held_out_poses(diagnosed):
     whole = {rule for rule, files in inputs.items() if any(file.startswith(CELL) for file in files)}
     assert whole == {"read_campaign"}
     # What the judgement makes goes to reports, to no step before it.
-    judged = {f"reports/loop/made/{name}" for name in ("verdict.json", "before_after.csv", "splits.csv", "residuals.parquet")}
+    judged = {f"reports/loop/made/{name}" for name in ("verdict.json", "before_after.csv", "residuals.parquet")}
     for rule in STEPS[: STEPS.index("judge_campaign")]:
         assert not inputs[rule] & judged
 

@@ -56,6 +56,7 @@ rule summarize_closed_loop:
 rule draw_closed_loop:
     input:
         summary=rules.summarize_closed_loop.output.summary,
+        robots=rules.summarize_closed_loop.input.robots,
         sources=sources("elastocal_proof.figures.blind.draw_closed_loop"),
     output:
         figure="reports/closed_loop/closed_loop.pdf",

@@ -29,7 +29,9 @@ def closure(script: Path, source: Path, *named: str) -> list[Path]:
     modules |= {found for name in modules for found in _upstream(name)}
     # With a module come the packages above it.
     names = {package for name in modules for package in accumulate(name.split("."), "{}.{}".format)}
-    return sorted(files - {script} | {_file(name, source) for name in names if name.split(".")[0] in PACKAGES})
+    files |= {_file(name, source) for name in names if name.split(".")[0] in PACKAGES}
+    # And the table beside it that has its name.
+    return sorted(files - {script} | {table for file in files if (table := file.with_suffix(".json")).is_file()})
 
 
 @cache

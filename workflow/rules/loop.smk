@@ -15,7 +15,6 @@ LOOP_FIGURES = {
 LOOP_REPORTS = [
     "verdict.json",
     "before_after.csv",
-    "splits.csv",
     "candidates.csv",
     "residuals.parquet",
     "next_experiment.csv",
@@ -104,7 +103,6 @@ rule judge_campaign:
             shows="Errors before and after",
             kind="table",
         ),
-        splits="reports/loop/{campaign}/splits.csv",
         residuals="reports/loop/{campaign}/residuals.parquet",
     params:
         step="elastocal.loop.whole.judge_campaign",

@@ -38,7 +38,6 @@ rule compile_loop_report:
     input:
         verdict=rules.judge_campaign.output.verdict,
         before_after=rules.judge_campaign.output.before_after,
-        splits=rules.judge_campaign.output.splits,
         residuals=rules.judge_campaign.output.residuals,
         experiment="reports/loop/{campaign}/next_experiment.csv",
         diagnosis=rules.diagnose_campaign.output.diagnosis,

@@ -16,7 +16,7 @@ from elastocal.report.loop_page import loop_page, write_loop_page
 def compile_loop_report(job: Job) -> None:
     verdict, descriptions = read_json(job.input.verdict), read_json(job.input.descriptions)
     robot = robot_from_document(descriptions["robot"])
-    rows = [pd.read_csv(path).to_dict("records") for path in (job.input.before_after, job.input.splits, job.input.experiment)]
+    rows = [pd.read_csv(path).to_dict("records") for path in (job.input.before_after, job.input.experiment)]
     table = read_residuals(job.input.residuals, robot.joints)
     parameters = final_parameters(read_json(job.input.diagnosis), read_table(job.input.steps, STEPS))
     facts = loop_facts(verdict, *rows, table, descriptions, parameters)

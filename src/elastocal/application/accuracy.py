@@ -30,18 +30,16 @@ from elastocal.application.calibrated import (
 )
 from elastocal.application.frames import BASE, FRAMES, ROBOT, Scope, find_absorbed, free_parts, placement, root_mean_square
 from elastocal.effects.catalogue import moves_robot
-from elastocal.fitting.displacement import conditions, displaced_coordinates
 from elastocal.fitting.linearization import linearize
+from elastocal.fitting.model import conditions, displaced_coordinates, parameters
 from elastocal.fitting.noise import hidden_repeatability
-from elastocal.fitting.parameters import parameters
 from elastocal.mechanics.kinematics import jacobians, pose_differences, poses
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from elastocal.application.calibrated import CalibratedRobot
-    from elastocal.fitting.case import Case
-    from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.model import Case, Estimate, Model
     from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import States
     from elastocal.remainder.protocol import Predictor

@@ -16,17 +16,16 @@ import numpy as np
 from elastocal.application.frames import BASE, Scope, root_mean_square, subtract_placement
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import moves_robot
-from elastocal.fitting.displacement import conditions, displaced_coordinates
 from elastocal.fitting.linearization import linearize
+from elastocal.fitting.model import conditions, displaced_coordinates, parameters
 from elastocal.fitting.observations import Observations, States
-from elastocal.fitting.parameters import parameters
 from elastocal.mechanics.kinematics import pose_differences, poses
 from elastocal.remainder.corrected import beyond_regressed, inputs_of
-from elastocal.validation.fitted_range import beyond_campaign, beyond_loads
+from elastocal.validation.placing import beyond_campaign, beyond_loads
 
 if TYPE_CHECKING:
     from elastocal.application.frames import Scope
-    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.noise import Noise
     from elastocal.mechanics.robot import Robot

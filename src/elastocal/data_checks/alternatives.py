@@ -39,9 +39,8 @@ if TYPE_CHECKING:
 _IMPLAUSIBLE = np.array([IMPLAUSIBLE_M, IMPLAUSIBLE_RAD])
 # What a correction leaves as it is may come out this much larger by chance.
 _NO_WORSE = 1.2
-# Hypotheses whose misfits differ by less than this share, or by less than a tracker could tell, fit alike.
-_ALIKE, _ALIKE_M = 1.1, 1e-4
-_MOST_ALIKE = 5
+# Hypotheses whose misfits differ by less than this share, or by less than a tracker could tell, fit alike; so many are said.
+_ALIKE, _ALIKE_M, _MOST_ALIKE = 1.1, 1e-4, 5
 # A base that stands less far off than this may be the zero of the first joint or the height of the column: for physics to
 # tell, and a warning here. Ten times what geometric errors of industrial robots reach.
 _NEAR_M, _NEAR_RAD = 0.05, 0.05
@@ -56,10 +55,7 @@ class Reading:
     placement: Placement
 
     def misfit(self, measure: Measure) -> np.ndarray:
-        """What is left of positions (m) and orientations (rad) of the target that fits worst, ndarray (2,).
-
-        The others say nothing of its mount.
-        """
+        """What is left of positions (m) and orientations (rad) of the target that fits worst, ndarray (2,)."""
         targets, left = self.campaign.measurements.target, (self.placement.distance, self.placement.turn)
         each = [targets == target for target in np.unique(targets)]
         return np.array([0.0 if part is None else max(measure(part[mine]) for mine in each) for part in left])
@@ -103,24 +99,22 @@ def _length(misfit: np.ndarray) -> float:
 
 def _best(written: Reading, readings: Sequence[Reading], measure: Measure) -> tuple[float, Fault] | None:
     """Fault of the first of those that fit best, if it convinces, beside what fits alike; and what it leaves, m."""
-    before, misfits = written.misfit(measure), np.array([reading.misfit(measure) for reading in readings])
-    together = np.array([_length(misfit) for misfit in misfits])
-    # One of two faults may concern positions alone, or orientations alone.
-    for key in (together, *(misfits.T + 1e-3 * together)):
-        alike = np.flatnonzero(key <= max(_ALIKE * key.min(), key.min() + _ALIKE_M))
-        hypothesis = readings[alike[0]].hypothesis
-        best = _read(written.campaign, hypothesis, robustly_placed)
-        after, estimate = best.misfit(measure), best.placement.estimate
-        if evidence := _evidence(before, after, best):
-            detail, decisive = hypothesis.detail, True
-            if detail == "frame":
-                detail, decisive = _elsewhere(estimate, _length(before) / max(_length(after), 1e-12))
-            elif detail == "targets":
-                detail, decisive = _other_targets(written.placement.estimate, estimate, best.campaign.targets)
-            poses = Value("poses compared", float(len(np.unique(best.campaign.measurements.pose))), "–")
-            others = tuple(readings[n].hypothesis.detail for n in alike[1 : 1 + _MOST_ALIKE])
-            return _length(after), Fault(hypothesis.name, hypothesis.joints, detail, (poses,), evidence, (), decisive, others)
-    return None
+    before, together = written.misfit(measure), np.array([_length(reading.misfit(measure)) for reading in readings])
+    alike = np.flatnonzero(together <= max(_ALIKE * together.min(), together.min() + _ALIKE_M))
+    hypothesis = readings[alike[0]].hypothesis
+    best = _read(written.campaign, hypothesis, robustly_placed)
+    after, estimate = best.misfit(measure), best.placement.estimate
+    evidence = _evidence(before, after, best)
+    if evidence is None:
+        return None
+    detail, decisive = hypothesis.detail, True
+    if detail == "frame":
+        detail, decisive = _elsewhere(estimate, _length(before) / max(_length(after), 1e-12))
+    elif detail == "targets":
+        detail, decisive = _other_targets(written.placement.estimate, estimate, best.campaign.targets)
+    poses = Value("poses compared", float(len(np.unique(best.campaign.measurements.pose))), "–")
+    others = tuple(readings[n].hypothesis.detail for n in alike[1 : 1 + _MOST_ALIKE])
+    return _length(after), Fault(hypothesis.name, hypothesis.joints, detail, (poses,), evidence, (), decisive, others)
 
 
 def _evidence(before: np.ndarray, after: np.ndarray, reading: Reading) -> tuple[float, float] | None:
@@ -149,10 +143,7 @@ def _elsewhere(fitted_frames: Estimate, better: float) -> tuple[str, bool]:
 
 
 def _other_targets(before: Estimate, after: Estimate, targets: Sequence[Target]) -> tuple[str, bool]:
-    """Sentence of targets that sit elsewhere or are turned, and whether that is too far for physics.
-
-    The sentence says which keys of campaign.yaml are to be unknown.
-    """
+    """Sentence of targets that sit elsewhere or are turned, with the remedy, and whether that is too far for physics."""
     turns = Rotation.from_matrix(before.target_rotation.transpose(0, 2, 1) @ after.target_rotation).magnitude()
     away = np.linalg.norm(after.target_offset - before.target_offset, axis=1)
     found = {}

@@ -28,7 +28,7 @@ from elastocal.data_checks.protocol import Fault, Value
 from elastocal.fitting.observations import state_clusters
 
 if TYPE_CHECKING:
-    from elastocal.campaigns.campaign import Campaign, Measurements
+    from elastocal.campaigns.campaign import Campaign
 
 # Below the last digit that any sensor writes (0.1 µm) and any controller reports (1e-6 rad or so).
 _SAME_M, _SAME_RAD, _FEWEST_POSES = 1e-6, 1e-6, 3
@@ -37,10 +37,8 @@ _SAME_M, _SAME_RAD, _FEWEST_POSES = 1e-6, 1e-6, 3
 _OUT_OF_PLACE, _FEWEST_IN_PLACE, _IN_PLACE = 20.0, 10, 5.0
 # A place is no chance if it is so much nearer than other poses are to each other; so for this share of the rows.
 _NO_CHANCE, _MOST, _FEWEST_ROWS = 0.25, 0.8, 2
-# Places closer than this are one place; and no robot nor tracker reaches so far.
-_SAME_PLACE_M, _SESSIONS_APART_M = 1e-3, 1e5
-# Orientations distinguish places as points at this distance from the target would, m.
-_ARM_M = 0.5
+# Places closer than this are one place; orientations distinguish them as points at this distance from the target would.
+_SAME_PLACE_M, _ARM_M = 1e-3, 0.5
 # Five times what no geometric error and no deflection makes.
 _FARTHEST_M, _FARTHEST_RAD = 5 * IMPLAUSIBLE_M, 5 * IMPLAUSIBLE_RAD
 
@@ -108,7 +106,7 @@ def shuffled_rows(campaign: Campaign) -> list[Fault]:
     rows = np.flatnonzero(out)
     if len(rows) < _FEWEST_ROWS:
         return []
-    places = [_places(measurements, *pose)[rows] for pose in (beside.measured, beside.predicted)]
+    places = [_places(*pose)[rows] for pose in (beside.measured, beside.predicted)]
     predicted, (left, number) = places[1], map(np.asarray, cKDTree(places[0]).query(places[1]))
     source = rows[number]
     back = (left < level) & (left < _NO_CHANCE * _spacing(predicted)) & (source != rows)
@@ -126,20 +124,20 @@ def shuffled_rows(campaign: Campaign) -> list[Fault]:
     return [Fault("shuffled_rows", (), detail, (share,), (before, after), concerned, True)]
 
 
-def _places(measurements: Measurements, position: np.ndarray, rotation: np.ndarray | None) -> np.ndarray:
-    """Positions and, where they are measured, orientations as points whose distances are in m, sessions far apart."""
+def _places(position: np.ndarray, rotation: np.ndarray | None) -> np.ndarray:
+    """Positions and, where they are measured, orientations as points whose distances are in m."""
     # A small angle changes the nine entries, taken together, by the square root of two times itself.
     turned = [] if rotation is None else [_ARM_M / np.sqrt(2) * rotation.reshape(-1, 9)]
-    return np.column_stack([position, _SESSIONS_APART_M * measurements.session, *turned])
+    return np.column_stack([position, *turned])
 
 
 def _spacing(points: np.ndarray) -> np.ndarray:
-    """How far from each of some points (N, .) the next place of its session is, 0 where there is none, ndarray (N,), m."""
+    """How far from each of some points (N, .) the next place is, 0 where there is none, ndarray (N,), m."""
     # One of each place.
     places = points[np.unique(np.round(points / _SAME_PLACE_M), axis=0, return_index=True)[1]]
     near = np.reshape(cKDTree(places).query(points, k=min(4, len(places)))[0], (len(points), -1))
     other = np.where(near > 2 * _SAME_PLACE_M, near, np.inf).min(axis=1)
-    return np.where(other < _SESSIONS_APART_M / 2, other, 0.0)
+    return np.where(np.isfinite(other), other, 0.0)
 
 
 def implausible_measurements(campaign: Campaign) -> list[Fault]:

@@ -12,9 +12,9 @@ from itertools import permutations, product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from scipy.spatial.transform import Rotation
 
+from elastocal.campaigns.campaign import groups_of
 from elastocal.data_checks.placement import spread
 
 if TYPE_CHECKING:
@@ -90,8 +90,11 @@ def shifts(campaign: Campaign) -> list[Hypothesis]:
     }
     found = []
     for (kind, keys), steps in product(alike.items(), (1, -1)):
-        order, source = np.argsort(measurements.row, kind="stable"), np.empty(len(measurements), int)
-        source[order] = pd.Series(order).groupby([key[order] for key in keys]).shift(steps, fill_value=-1)
+        order, source = np.argsort(measurements.row, kind="stable"), np.full(len(measurements), -1)
+        number = groups_of(np.column_stack(keys))[1][order]
+        for members in (order[number == group] for group in range(number.max() + 1)):
+            first, second = members[:-1], members[1:]
+            source[second if steps > 0 else first] = first if steps > 0 else second
         # Rows whose columns would come from before the first or from behind the last are left out.
         there = partial(np.take, indices=np.maximum(source, 0), axis=0)
         moved = columns(position=there, rotation_vector=there)(campaign).measurements.select(source >= 0)
@@ -120,9 +123,8 @@ def _lengths(campaign: Campaign) -> Iterator[Hypothesis]:
     known = [target.name for target in campaign.targets if target.offset_m is not None and any(target.offset_m)]
     groups = [known, *([name] for name in known if len(known) > 1)] if known else []
     for names, (unit, metres) in product(groups, _LENGTHS.items()):
-        which = f"the offset of {names[0]} looks" if len(names) == 1 < len(known) else "the target offsets look"
-        which = "the target offset looks" if len(known) == 1 else which
-        detail = f"{which} like {unit}: measurements fit {metres:g} times what is written for {', '.join(names)}"
+        read = f"measurements fit {metres:g} times what is written"
+        detail = f"the target offset of {', '.join(names)} looks like {unit}: {read}"
         yield Hypothesis("wrong_unit", detail, partial(_with_offsets, names, metres))
 
 

@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 from scipy.constants import g, pound_force
 
+from elastocal.campaigns.campaign import groups_of
 from elastocal.data_checks.placement import Placement, jacobians_at_targets, placed, rms, robust_sigma, robustly_placed, spread
 from elastocal.data_checks.protocol import Fault, Value
-from elastocal.fitting.identifiability import solve_normal
+from elastocal.fitting.normal_equations import solve_normal
 from elastocal.fitting.observations import state_clusters
 from elastocal.mechanics.elastostatics import generalized_forces, regressor
 from elastocal.mechanics.kinematics import jacobians
@@ -90,8 +90,8 @@ def deflections(campaign: Campaign) -> Deflections | None:
     parts = [residual[..., None], *(regressor(jacobian, each) * campaign.robot.compliance for each in torques)]
     pose = state_clusters(measurements)
     rows = [part.reshape(len(measurements), -1) for part in parts]
-    group = [pose, measurements.target]
-    centred = [part - pd.DataFrame(part).groupby(group).transform("mean").to_numpy() for part in rows]
+    group = groups_of(np.column_stack([pose, measurements.target]))[1]
+    centred = [_centred(part, group) for part in rows]
     if sum((part**2).sum() for part in centred[1:]) <= _DIFFERING * sum((part**2).sum() for part in rows[1:]):
         # Less what frames, targets and joint offsets can explain of them.
         free = np.concatenate([jacobian, *_of_frames_and_targets(campaign, whole)], axis=-1)
@@ -100,6 +100,13 @@ def deflections(campaign: Campaign) -> Deflections | None:
         centred = [values - basis @ (basis.T @ values) for values in flat]
     seen, by_force, by_moment = (values.reshape(residual.size, -1) for values in centred)
     return Deflections(seen[:, 0], by_force, by_moment, int(pose.max()) + 1)
+
+
+def _centred(values: np.ndarray, group: np.ndarray) -> np.ndarray:
+    """Values (N, .) less the mean of their group."""
+    total = np.zeros((group.max() + 1, values.shape[1]))
+    np.add.at(total, group, values)
+    return values - (total / np.bincount(group)[:, None])[group]
 
 
 def _of_frames_and_targets(campaign: Campaign, beside: Placement) -> list[np.ndarray]:

@@ -10,10 +10,9 @@ import numpy as np
 from scipy.special import chdtri
 
 from elastocal.campaigns.campaign import groups_of
-from elastocal.fitting.model import declared_model
+from elastocal.fitting.least_squares import nominal_poses, registered_to
+from elastocal.fitting.model import declared_model, measured_in_base
 from elastocal.fitting.observations import select_states, single_observations
-from elastocal.fitting.prediction import measured_in_base
-from elastocal.fitting.registration import nominal_poses, registered_to
 from elastocal.mechanics.kinematics import poses_and_jacobians, rotation_vectors
 
 if TYPE_CHECKING:
@@ -104,10 +103,7 @@ def robustly_placed(campaign: Campaign) -> Placement:
 
 
 def spread(campaign: Campaign, poses: int = MANY_POSES) -> Campaign:
-    """A campaign with its measurements of some poses all over it, at the lowest load of each.
-
-    `poses`: at most so many of each target in each session.
-    """
+    """A campaign with measurements of so many poses of each target in each session at most, at the lowest load of each."""
     seen, chosen = campaign.measurements, []
     for members in of_each_target(seen):
         order = members[np.lexsort((seen.repeat[members], seen.load[members], seen.pose[members]))]

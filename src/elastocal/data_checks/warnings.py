@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.data_checks.placement import IMPLAUSIBLE_M, jacobians_at_targets, placed, rms
-from elastocal.fitting.displacement import joint_compliances
+from elastocal.fitting.model import joint_compliances
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign
-    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.least_squares import Fit
 
 # Compliances of a robot and those published for its make differ by up to two or so; five is a unit, a sign or another effect
 # that was taken for a joint's. What is usual for a robot's size is itself known to a factor of five.

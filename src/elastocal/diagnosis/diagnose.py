@@ -17,23 +17,22 @@ from elastocal.diagnosis.linearize import linearized, looked_at_closely, with_pr
 from elastocal.diagnosis.search import alarm_of, initial_screening, posterior
 from elastocal.diagnosis.verdict import Evidence
 from elastocal.effects.catalogue import effects
-from elastocal.fitting.case import Case, noise_facts
-from elastocal.fitting.displacement import joint_compliances
-from elastocal.fitting.least_squares import ON_THE_WAY, fit
+from elastocal.fitting.least_squares import ON_THE_WAY, SETTLED, fit
+from elastocal.fitting.model import Case, joint_compliances, parameter_values
+from elastocal.fitting.noise import noise_facts
 from elastocal.fitting.observations import Observations, sample_of
-from elastocal.fitting.parameters import parameter_values
-from elastocal.fitting.robust import SETTLED
 from elastocal.fitting.tolerances import effective_parameters
 from elastocal.random_streams import stream
 from elastocal.remainder.repeatable import Repeatable, repeatable_part
-from elastocal.validation.left_out import certain_loss, left_out_squares
+from elastocal.validation.held_out import left_out_squares
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from elastocal.campaigns.campaign import Measurements
     from elastocal.diagnosis.settings import Settings
-    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.least_squares import Fit
+    from elastocal.fitting.model import Case
     from elastocal.fitting.noise import Noise
 
 # Mechanisms that are added one at a time, each by a fit; of more, only the first.
@@ -185,7 +184,8 @@ def _losses(bare: Fit, models: Sequence[Fit], observations: Observations, settin
         effective, words = effective_parameters(fitted), ""
         if fitted.residual.size < settings.numbers_a_parameter * effective:
             mine, others = (left_out_squares(each, observations) for each in (fitted, bare))
-            if certain_loss(mine, others):
+            off = mine - others
+            if off.mean() > off.std(ddof=1) / np.sqrt(len(off)):
                 rms = [f"{1e3 * np.sqrt(each.mean()):.2f} mm" for each in (mine, others)]
                 words = (
                     f"training poses left out in turn are off by {rms[0]} RMS by the {name}, by {rms[1]} with frames and"
@@ -337,6 +337,7 @@ def _document(
         "held": sorted({f"{o} {p.name}" for (o, p), held in zip(final.parameters, final.held, strict=True) if held}),
         "candidates_tested": len(tested),
         "untestable": untestable,
+        "converged": {"declared": declared.converged, "final": final.converged},
         "warnings": list(dict.fromkeys(remarks)),
         "settings": settings.document(),
     }

@@ -21,14 +21,13 @@ from elastocal.counting import counted
 from elastocal.diagnosis.evidence import Grid
 from elastocal.diagnosis.linearize import Linearized, linearized
 from elastocal.diagnosis.statistics import WhiteRows
-from elastocal.fitting.displacement import conditions, observations_at_once
 from elastocal.fitting.least_squares import evaluated, fit
 from elastocal.fitting.linearization import Linearization, linearize
+from elastocal.fitting.model import conditions, parameters, residuals
 from elastocal.fitting.noise import Noise, measurement_covariances
 from elastocal.fitting.observations import (
     Observations,
     measured_in,
-    part_at,
     parts_of,
     sample_of,
     select_states,
@@ -36,16 +35,15 @@ from elastocal.fitting.observations import (
     spread_poses,
     without_outlying_repeats,
 )
-from elastocal.fitting.parameters import parameters
-from elastocal.fitting.prediction import residuals
 from elastocal.fitting.tolerances import estimated_noise, fit_declared
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
     from elastocal.diagnosis.settings import Settings
-    from elastocal.fitting.case import Case
-    from elastocal.fitting.fit_result import Fit
-    from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.least_squares import Fit
+    from elastocal.fitting.linearization import Linearization
+    from elastocal.fitting.model import Case, Estimate, Model
+    from elastocal.fitting.noise import Noise
 
 # Shares of the distances from which the scale is estimated: the second sees tails that are heavier than normal ones.
 _SCALE_QUANTILES = (0.5, 0.75)
@@ -91,40 +89,39 @@ class Yardstick:
 class _Beside:
     """Rows of measurements beside a model, of which a sample and all that lie far off are looked at closely.
 
-    `residual` (N, rows). `far` (N,): whole distance in standard deviations of the sensor, no less than that in those of a row.
-    `near`, `closely` (N,) of bool: poses spread over all; these, and what is as far off as a quarter of them. `parts`: which of
-    the latter; their linearisation; variance (m, rows, rows) of each, and that of a radian in each joint. `noise`: of one row.
+    `residual` (N, rows). `far` (N,): whole distance in standard deviations of the sensor. `sample`, `closely` (N,): poses
+    spread over those kept; these, and what is as far off as a quarter of all. `parts`: which of the latter; their
+    linearisation; variance (m, rows, rows) of each, and that of a radian in each joint. `noise`: of one row.
     """
 
     residual: np.ndarray
     far: np.ndarray
-    near: np.ndarray
+    sample: np.ndarray
     closely: np.ndarray
     parts: list[tuple[slice, Linearization, np.ndarray, np.ndarray]]
     noise: Noise
 
     @classmethod
-    def of(cls, model: Model, estimate: Estimate, measurements: Measurements, noise: Noise) -> _Beside:
-        single = single_observations(measurements)
+    def of(cls, model: Model, estimate: Estimate, measurements: Measurements, noise: Noise, kept: np.ndarray) -> _Beside:
+        single, sample = single_observations(measurements), kept.copy()
+        sample[kept] = spread_poses(select_states(single, kept), _MOST)
         near, residual = spread_poses(single, _MOST), np.empty((len(single), model.rows))
-        for edges in parts_of(single, observations_at_once(model.rows, 0)):
-            part = part_at(single, *edges)
-            residual[edges[1]] = residuals(model, estimate, part, conditions(model, estimate, part.states))
+        for _, seen, part in parts_of(single, 0):
+            residual[seen] = residuals(model, estimate, part, conditions(model, estimate, part.states))
         far = np.linalg.norm(residual / np.repeat([noise.position_m, noise.orientation_rad], 3)[: model.rows], axis=1)
-        closely = near | (far > np.quantile(far[near], _SCALE_QUANTILES[-1]))
+        closely = near | sample | (far > np.quantile(far[near], _SCALE_QUANTILES[-1]))
         some, parts = select_states(single, closely), []
-        for edges in parts_of(some, observations_at_once(model.rows, len(parameters(model, estimate)))):
-            part = part_at(some, *edges)
+        for _, seen, part in parts_of(some, len(parameters(model, estimate))):
             line, spread = linearize(model, estimate, part, conditions(model, estimate, part.states)), noise.spread(part)
-            jacobian = line.coordinate_jacobian[..., : model.sites.joints]
+            jacobian = line.joint_jacobian
             own = measurement_covariances(noise, jacobian[:, None], model.rows, None if spread is None else spread[:, None])
-            parts.append((edges[1], line, own, jacobian @ jacobian.transpose(0, 2, 1)))
-        return cls(residual, far, near, closely, parts, noise)
+            parts.append((seen, line, own, jacobian @ jacobian.transpose(0, 2, 1)))
+        return cls(residual, far, sample, closely, parts, noise)
 
     def yardstick(self, fitted: Fit, kept: np.ndarray) -> Yardstick:
         """As `yardstick_of`, by the rows that were fitted, (N,) of bool."""
-        free, mine, rows = ~fitted.held, (self.near & kept)[self.closely], fitted.model.rows
-        negligible = not (self.near | ~kept).all() or not free.any()
+        free, mine, rows = ~fitted.held, self.sample[self.closely], fitted.model.rows
+        negligible = self.sample.sum() < kept.sum() or not free.any()
         sizes = np.array([p.plausible for _, p in fitted.parameters])[free]
         best = (np.inf, Yardstick(self.noise, None))
         for share in _POSE_SHARES if fitted.noise.pose_rad else (0.0,):
@@ -179,7 +176,8 @@ def yardstick_of(fitted: Fit, noise: Noise, measurements: Measurements) -> Yards
     (an S-estimate; Davies, Annals of Statistics 1987): the rest may be that of the very errors that are looked for, or of a law
     that is not linear.
     """
-    return _Beside.of(fitted.model, fitted.estimate, measurements, noise).yardstick(fitted, np.ones(len(measurements), bool))
+    every = np.ones(len(measurements), bool)
+    return _Beside.of(fitted.model, fitted.estimate, measurements, noise, every).yardstick(fitted, every)
 
 
 def beyond_chance(distance: np.ndarray, rows: int, kept: np.ndarray, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
@@ -213,7 +211,7 @@ def most_by_chance(count: int, rows: int, settings: Settings, freedom: float = n
 
 def gross_errors(fitted: Fit, noise: Noise, measurements: Measurements, kept: np.ndarray, settings: Settings) -> Deviations:
     """Judge the rows of a campaign by a fit to those that are ``kept``, (N,), and the noise declared or shown by repeats."""
-    rows = _Beside.of(fitted.model, fitted.estimate, measurements, noise)
+    rows = _Beside.of(fitted.model, fitted.estimate, measurements, noise, kept)
     distance = rows.distances(rows.yardstick(fitted, kept), kept)
     return Deviations(rows.residual, *beyond_chance(distance, fitted.model.rows, kept, settings))
 
@@ -223,15 +221,15 @@ def held_out_gross_errors(
 ) -> Deviations:
     """Judge held-out rows by the rule of `gross_errors`, in the model and estimate that were carried to them.
 
-    Where a prediction is extrapolated, ``outside`` (N,), it is first the model that errs: such a row has to be farther off, and
-    farther than most of such rows.
+    Where a prediction is extrapolated, ``outside`` (N,), the model errs first: such a row has to be farther off, and farther
+    than most of them.
     """
     model, estimate = there
     measurements = held_out.campaign.measurements
     if model is not fitted.model or estimate is not fitted.estimate:
         yardstick = replace(yardstick, covariance=None)
     every = np.ones(len(measurements), bool)
-    rows = _Beside.of(model, estimate, measurements, yardstick.noise)
+    rows = _Beside.of(model, estimate, measurements, yardstick.noise, every)
     distance, gross = beyond_chance(rows.distances(yardstick, ~every), model.rows, every, settings)
     least = settings.extrapolated_error
     if outside.sum() >= _FEWEST_TO_COMPARE:
@@ -281,10 +279,8 @@ def _sentence(found: Deviations, campaign: Campaign, place: int) -> str:
 
 @dataclass(frozen=True)
 class Kept:
-    """The part of a case that is fitted, ``kept`` of all its measurements (N,), with its noise and declared model.
-
-    `searched`: observations that a search looks at, no more than so many; `declared` is the fit to these.
-    """
+    """The part of a case that is fitted, ``kept`` of all its measurements (N,), with its noise, and its declared model fitted
+    to what is `searched`: observations that a search looks at, no more than so many."""
 
     case: Case
     kept: np.ndarray
@@ -353,9 +349,9 @@ def extreme_loads(measurements: Measurements, settings: Settings) -> np.ndarray:
 def improbable(line: Linearized) -> np.ndarray:
     """Which observations all candidates together do not explain, ndarray of bool (M,).
 
-    The whitened residual has the covariance I + X D X' + W S W', with X the declared sensitivities, D their priors, W those
-    of all candidates and S their mean square sizes. Observations are taken out, the worst first, until what is left agrees;
-    then those come back that it predicts.
+    The whitened residual has the covariance I + X D X' + W S W', with X the declared sensitivities, D their priors, W those of
+    all candidates, S their mean square sizes. The worst are taken out until what is left agrees; then those that it predicts
+    come back.
     """
     rows, settings = line.rows, line.settings
     observed, own = rows.residual.shape

@@ -155,8 +155,8 @@ def units_of(
         shares = np.ones(1) if len(values) == 1 else candidate.shapes[0].shares([value for (value,) in values])
         for shapes, log_share in zip(values, np.log(shares / variants[candidate.effect, candidate.location]), strict=True):
             columns = np.arange(start, start + len(sizes))
-            law = candidate.effect, candidate.location, candidate, shapes, columns, sizes, signs
-            units.append(Unit(*law, float(log_share), largest=largest))
+            where = candidate.effect, candidate.location
+            units.append(Unit(*where, candidate, shapes, columns, sizes, signs, float(log_share), largest=largest))
             start += len(sizes)
     kinds = Counter((bool(law.location), law.name) for law in laws)
     for law in laws:
@@ -251,7 +251,8 @@ def _principal(
     """So many principal components (S, count) of random functions of the inputs of such a variance, in proportion to the load
     or without it, less what has a name in the catalogue."""
     known = inputs.of(campaign)
-    lengths = np.exp(draws.uniform(*np.log(_LENGTH_SCALES), _DRAWN))
+    low, high = np.log(_LENGTH_SCALES)
+    lengths = np.exp(draws.uniform(low, high, _DRAWN))
     frequency, phase = draws.standard_normal((known.shape[1], _DRAWN)) / lengths, draws.uniform(0, 2 * np.pi, _DRAWN)
     size = np.sqrt(2.0 * variance / _DRAWN) if known.shape[1] else 0.0
     random = size * np.cos(known @ frequency + phase)

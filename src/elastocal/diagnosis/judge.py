@@ -13,23 +13,21 @@ from elastocal.counting import counted
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.gross_errors import Deviations, entries_of, held_out_gross_errors, warnings_of, yardstick_of
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.case import Case, noise_from
-from elastocal.fitting.displacement import conditions
+from elastocal.fitting.model import Case, conditions, measured_in_base, residuals
+from elastocal.fitting.noise import noise_from
 from elastocal.fitting.observations import single_observations, state_clusters
-from elastocal.fitting.prediction import measured_in_base, residuals
 from elastocal.random_streams import stream
 from elastocal.remainder.corrected import Corrected, Plan, corrected, remainder_facts
 from elastocal.validation import held_out as figures
-from elastocal.validation.fitted_range import outside_poses, repeat_warnings
-from elastocal.validation.left_out import error_row, split_rows
-from elastocal.validation.placing import placed
-from elastocal.validation.span import count_configurations, joint_ranges
+from elastocal.validation.conformity import count_configurations, joint_ranges
+from elastocal.validation.placing import outside_poses, placed, repeat_warnings
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from elastocal.diagnosis.diagnose import Diagnosis, Step
-    from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.model import Case, Estimate, Model
+    from elastocal.remainder.corrected import Corrected
 
 _REPLICATES = 1000
 # What warnings of errors that grew are known by.
@@ -146,9 +144,10 @@ def heldout_errors(
             low, high = limit[name]
             row |= {f"heldout_{name}": tested[name], f"heldout_{name}_low": low, f"heldout_{name}_high": high}
         rows.append(row | {f"heldout_{name.removesuffix('_m')}_over_floor": tested[name] / floor for name in figures.METRICS})
-    for name in figures.grown(figures.summary(errors[before].distance), figures.summary(errors[after].distance)):
+    for name in figures.METRICS:
         low, high = (1e3 * rows[number][f"heldout_{name}"] for number in (before, after))
-        warnings.append(f"the {_ERRORS[name]} {ABOUT_ERRORS} grew from {low:.3f} to {high:.3f} mm")
+        if high > low:
+            warnings.append(f"the {_ERRORS[name]} {ABOUT_ERRORS} grew from {low:.3f} to {high:.3f} mm")
     for last, row in pairwise(rows[before:]):
         if row["heldout_rms_m"] > last["heldout_rms_m"]:
             warnings.append(f"the step '{row['step']}' raised the RMS error {ABOUT_ERRORS}")
@@ -184,18 +183,6 @@ def _declared(steps: Sequence[Step]) -> int:
 
 def _summary(errors: figures.Errors) -> dict[str, float]:
     return {name: float(value) for name, value in figures.summary(errors.distance).items()}
-
-
-def split_table(diagnosis: Diagnosis, held_out: Case, seed: int) -> list[dict[str, Any]]:
-    """Errors on the held-out poses beside those that cross-validation of the training poses predicts.
-
-    `held_out`: of the verdict. `seed`: as in `judge`. Returns rows of splits.csv.
-    """
-    case, before, after = diagnosis.case, diagnosis.declared, diagnosis.final
-    draws = stream(seed, case.campaign.name, "splits", 0)
-    unseen = [figures.position_errors(*placed(fitted, case, held_out), held_out.observations) for fitted in (before, after)]
-    rows = [error_row("held out", "all", unseen[0], unseen[1], _REPLICATES, draws)]
-    return rows + split_rows(before, after, case.observations, _REPLICATES, draws)
 
 
 def residual_blocks(diagnosis: Diagnosis, verdict: Verdict) -> Iterator[dict[str, np.ndarray]]:

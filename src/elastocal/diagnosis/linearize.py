@@ -15,12 +15,11 @@ from elastocal.diagnosis.search import Problem, pose_errors_within_reach
 from elastocal.diagnosis.statistics import Products, Statistics, WhiteRows, products_of, statistics_of
 from elastocal.effects.gravity import DECLARED_WEIGHT
 from elastocal.errors import InputError
-from elastocal.fitting.factored import Displacements, Factored
 from elastocal.fitting.least_squares import fit
-from elastocal.fitting.linearization import linearize
+from elastocal.fitting.linearization import Factored, linearize
+from elastocal.fitting.model import nonlinear_parameters, parameter_values
+from elastocal.fitting.normal_equations import whitening
 from elastocal.fitting.observations import Observations, spread_poses
-from elastocal.fitting.parameters import nonlinear_parameters, parameter_values
-from elastocal.fitting.whitening import whitening
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.settings import Settings
     from elastocal.effects.conditions import Conditions
     from elastocal.effects.protocol import Candidate
-    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Model
 
     Shapes = tuple[float, ...]
@@ -112,7 +111,7 @@ class Linearized:
         """
         fitted, some = self.about, self.observations
         line = linearize(fitted.model, fitted.estimate, some, self.around)
-        jacobian, root = fitted.jacobian_at(line, slice(None)), np.sqrt(fitted.weights)
+        jacobian, root = line.joint_jacobian, np.sqrt(fitted.weights)
         whitener = whitening(some, jacobian, fitted.noise.of_measurements)
 
         def white(values: np.ndarray) -> np.ndarray:
@@ -120,7 +119,7 @@ class Linearized:
 
         found = np.isin([owner for owner, _ in fitted.parameters], list(self.candidates))
         residual = line.residual + line.moved_by(np.where(found, self._values, 0.0))
-        nothing = Factored(Displacements.of([], np.zeros(0), len(some.states)), white(line.coordinate_jacobian), some.state)
+        nothing = Factored.of([], white(line.coordinate_jacobian), some.state, len(some.states))
         rows = WhiteRows(white(line.sensitivities_to(~found)), nothing, white(residual), white(jacobian), some.cluster)
         return rows, line.conditions
 
@@ -132,8 +131,8 @@ class Linearized:
         laws = [law for candidate, shapes in tried for law in candidate.displacement(conditions, *shapes)]
         laws += [law for against in self.against for law in against.displacement(conditions)]
         sizes = np.concatenate([unit.sizes for unit in self.units])
-        displacements = Displacements.of(laws, sizes, len(self.observations.states))
-        return replace(rows, candidates=replace(rows.candidates, displacements=displacements))
+        jacobian, state = rows.candidates.jacobian, rows.candidates.state
+        return replace(rows, candidates=Factored.of(laws, jacobian, state, len(self.observations.states), sizes))
 
     @cached_property
     def products(self) -> Products:

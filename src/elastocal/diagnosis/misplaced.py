@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.fitting.parameters import parameter_values
+from elastocal.fitting.model import parameter_values
 from elastocal.fitting.tolerances import SIZES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from elastocal.campaigns.campaign import Campaign, Target
-    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.least_squares import Fit
 
 # Usual sizes that a bad case reaches (`effects.sizes.Size.most`).
 _MOST_SIZES = 3.0
@@ -82,7 +82,7 @@ def misplaced(fitted: Fit, campaign: Campaign) -> list[dict[str, Any]]:
     others: dict[str, set[str]] = {}
     last, at = explained(taken)
     # Along one axis of a place, or along all of them.
-    ways = [(n,) for n in shifts]
+    ways: list[tuple[int, ...]] = [(n,) for n in shifts]
     ways += [tuple(n for n in shifts if places[n] == place) for place in set(places.values())]
     while len(taken) < _MOST_AXES and (left := [way for way in ways if not set(way) & set(taken)]):
         tried = {way: explained([*taken, *way]) for way in left}

@@ -28,10 +28,10 @@ from elastocal.diagnosis.evidence import log_sum_exp
 from elastocal.diagnosis.refit import mean_square_left
 from elastocal.diagnosis.statistics import normal_equations
 from elastocal.diagnosis.verdict import ADEQUATE, NAMED, NOT_TESTABLE, Evidence, mechanisms_of_models
-from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import effect_columns, linearize
+from elastocal.fitting.model import conditions
+from elastocal.fitting.normal_equations import whitening
 from elastocal.fitting.observations import Observations, States
-from elastocal.fitting.whitening import whitening
 from elastocal.mechanics.components import WRENCH_NAMES
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.hypotheses import Unit
     from elastocal.diagnosis.linearize import Linearized
     from elastocal.diagnosis.search import Model
-    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.noise import Noise
     from elastocal.mechanics.robot import Robot
 

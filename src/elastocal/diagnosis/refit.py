@@ -20,16 +20,16 @@ from elastocal.diagnosis.evidence import Joint
 from elastocal.diagnosis.search import UNLIKELY, Model, Posterior, Problem
 from elastocal.diagnosis.statistics import Statistics, normal_equations
 from elastocal.fitting.least_squares import fit
-from elastocal.fitting.parameters import parameter_values
+from elastocal.fitting.model import parameter_values
+from elastocal.fitting.normal_equations import whitening
 from elastocal.fitting.tolerances import with_prior
-from elastocal.fitting.whitening import whitening
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
     from elastocal.diagnosis.linearize import Linearized
     from elastocal.effects.protocol import Candidate
-    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import Observations
 

@@ -24,7 +24,7 @@ from elastocal.fitting.observations import groups_by_size
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from elastocal.fitting.factored import Factored
+    from elastocal.fitting.linearization import Factored
 
 # Products of one pose with all columns that are in memory at once.
 _AT_ONCE = 1_000_000

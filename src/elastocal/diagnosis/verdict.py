@@ -22,8 +22,8 @@ from elastocal.diagnosis.refit import Averaged, squares_beyond
 from elastocal.effects.catalogue import effects
 from elastocal.effects.protocol import Candidate, Parameter, Shape
 from elastocal.effects.sizes import lever_m
-from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.linearization import effect_columns
+from elastocal.fitting.model import joint_compliances
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.linearize import Linearized
     from elastocal.diagnosis.search import Alarm, Model, Posterior, Problem
     from elastocal.diagnosis.settings import Settings
-    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import Observations
     from elastocal.remainder.repeatable import Repeatable
@@ -353,12 +353,12 @@ def parameter_entries(member: Candidate, final: Fit, averages: Averaged) -> list
         for parameter, value, index in zip(unknowns, values, mine, strict=True)
     ]
     as_masses = final.model.identifies_compliance or member.family != "gravity"
-    return entries if as_masses else [_product(entry, final.model) if entry["unit"] in _OF_MASS else entry for entry in entries]
+    return entries if as_masses else [_product(entry, final) if entry["unit"] in _OF_MASS else entry for entry in entries]
 
 
-def _product(entry: dict[str, Any], model: Model) -> dict[str, Any]:
+def _product(entry: dict[str, Any], final: Fit) -> dict[str, Any]:
     """The entry of a mass, or of a first moment, times the compliance of the joint that a weight at the end turns most."""
-    sites, compliance = model.sites, model.nominal_compliance
+    sites, compliance = final.model.sites, final.model.nominal_compliance
     turned = [c * lever_m(sites, j) if sites.carried_links(j) else 0.0 for j, c in enumerate(compliance)]
     joint = int(np.argmax(turned))
     owner, name = entry["name"].rsplit(" ", 1)

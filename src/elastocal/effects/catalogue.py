@@ -28,10 +28,7 @@ def effects() -> dict[str, Effect]:
 
 
 def candidates_on(sites: Sites) -> dict[str, Candidate]:
-    """Every way in which an effect of the catalogue can act on a robot.
-
-    Returns by their keys.
-    """
+    """Every way in which an effect of the catalogue can act on a robot, by their keys."""
     found = [candidate for each in effects().values() for candidate in each.candidates(sites)]
     require_unique([candidate.key for candidate in found])
     return {candidate.key: candidate for candidate in found}
@@ -44,10 +41,7 @@ def moves_robot(candidate: Candidate) -> bool:
 
 
 def declared_candidates(names: Iterable[str], sites: Sites, source: str = "declared") -> list[Candidate]:
-    """All candidates of the effects that a campaign declares.
-
-    `source`: named in errors. Raises `InputError`: an effect that the catalogue does not have.
-    """
+    """All candidates of the effects that a campaign declares; `InputError` with the `source`: one that there is not."""
     for name in names:
         if name not in effects():
             raise InputError(source, "declared", repr(name), ", ".join(effects()))

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from elastocal.fitting.observations import States
 
-    Coordinates = range | list[int] | np.ndarray
+    Coordinates = slice | list[int] | np.ndarray
 
 # For each mass that the robot file declares: of the mass itself, and of its first moments along the axes of its frame.
 MASS_PARAMETERS = 4
@@ -53,7 +53,7 @@ class Conditions:
     time_s: np.ndarray | None = None
     temperature_c: np.ndarray | None = None
     progress: np.ndarray | None = None
-    of_angles: dict[str, dict[int, tuple[np.ndarray, np.ndarray]]] = field(default_factory=dict, repr=False, compare=False)
+    of_angles: dict[str, list[dict[int, np.ndarray]]] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def always(self) -> np.ndarray:
@@ -99,14 +99,15 @@ class Conditions:
 
         Yields (number of the coordinates, S).
         """
+        on = self._falling_on(coordinates)
         for number in range(len(self.mass_corrections)):
             body, kind = divmod(number, MASS_PARAMETERS)
-            rotation, after = self.motion.rotation[self._bodies][body], self.sites.followed[self.sites.joints + 2 + body].after
+            rotation, after = self.motion.rotation[self._bodies][body], self.sites.followed[self._bodies][body].after
             if kind:
-                yield self._weighing(coordinates, after, rotation[:, kind - 1], 0.0)
+                yield _weighing(*on, after, rotation[:, kind - 1])
             else:
                 centre = np.tensordot(self.sites.masses[body].centre_m, rotation, (0, 1))
-                yield self._weighing(coordinates, after, self.motion.position[self._bodies][body] + centre)
+                yield _weighing(*on, after, self.motion.position[self._bodies][body] + centre, 1.0)
 
     @cached_property
     def total(self) -> np.ndarray:
@@ -118,26 +119,22 @@ class Conditions:
     @cached_property
     def mass_torques(self) -> np.ndarray:
         """Torque on each joint per unit of each of the `mass_corrections`, ndarray (4 m, S, n)."""
-        return np.array(list(self.gravity_of_corrections(range(self.sites.joints)))).swapaxes(1, 2)
+        return np.array(list(self.gravity_of_corrections(slice(self.sites.joints)))).swapaxes(1, 2)
 
     @cached_property
     def weight(self) -> np.ndarray:
         """Torque on each joint of one kilogram at the far end of each link, ndarray (n + 1, S, n)."""
-        joints, ends = range(self.sites.joints), enumerate(self.sites.followed[1 : self.sites.joints + 2], 1)
-        return np.array([self._weighing(joints, end.after, self.motion.position[number]).T for number, end in ends])
+        on, ends = self._falling_on(slice(self.sites.joints)), self.sites.followed[1 : self.sites.joints + 2]
+        return np.array([_weighing(*on, end.after, r, 1.0).T for end, r in zip(ends, self.motion.position[1:], strict=False)])
 
     def weight_moment(self, link: int, axis: int) -> np.ndarray:
         """Torque on each joint of a first moment of one kg m along an axis of the frame at the far end of a link, (S, n)."""
-        after, moment = self.sites.followed[1 + link].after, self.motion.rotation[1 + link][:, axis]
-        return self._weighing(range(self.sites.joints), after, moment, 0.0).T
+        on, after = self._falling_on(slice(self.sites.joints)), self.sites.followed[1 + link].after
+        return _weighing(*on, after, self.motion.rotation[1 + link][:, axis]).T
 
-    def _weighing(self, coordinates: Coordinates, after: int, first_moment: np.ndarray, mass: float = 1.0) -> np.ndarray:
-        """Force on some coordinates of a mass and its first moment (3, S) behind so many transforms, ndarray (., S)."""
-        chosen = slice(coordinates.start, coordinates.stop) if isinstance(coordinates, range) else coordinates
-        falling, turning = self._falling
-        on_each = sum(turning[i][chosen] * first_moment[i] for i in range(3)) + mass * falling[chosen]
-        on_each[self.motion.place[chosen] >= after] = 0.0
-        return on_each
+    def _falling_on(self, coordinates: Coordinates) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
+        """What `_weighing` needs of some coordinates."""
+        return self._falling[0][coordinates], [each[coordinates] for each in self._falling[1]], self.motion.place[coordinates]
 
     @cached_property
     def end_rotation(self) -> np.ndarray:
@@ -174,6 +171,17 @@ class Conditions:
         angular = twist[3:]
         turning = [gravity[i - 2] * angular[i - 1] - gravity[i - 1] * angular[i - 2] for i in range(3)]
         return sum(gravity[i] * twist[i] for i in range(3)), turning
+
+
+def _weighing(
+    falling: np.ndarray, turning: list[np.ndarray], place: np.ndarray, after: int, first_moment: np.ndarray, mass: float = 0.0
+) -> np.ndarray:
+    """Force on some coordinates of a mass and its first moment (3, S) behind so many transforms, ndarray (., S)."""
+    on_each = np.asarray(sum(turning[i] * first_moment[i] for i in range(3)))
+    if mass:
+        on_each += mass * falling
+    on_each[place >= after] = 0.0
+    return on_each
 
 
 def progress_of(states: States, row_span: tuple[int, int] | None = None) -> np.ndarray:

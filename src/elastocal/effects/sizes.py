@@ -34,10 +34,9 @@ _LEAST_LEVER_M, _RATED_OVER_MASS = 0.5, 1 / 6
 class Size:
     """How large one quantity of an effect is on real robots.
 
-    `share`: size in the SI unit of the parameter, or in the unit of the arm `of`. `sign`: that physics
-    gives, 0 for either. `most`: times the size that a bad case reaches: once where the size is one that makers inspect for,
-    since what exceeds it is not delivered; several times where it rests on a unit of the arm that is a guess itself, on
-    wear, or on what people do.
+    `share`: size in the SI unit of the parameter, or in the unit of the arm `of`. `sign`: that physics gives, 0 for either.
+    `most`: times the size that a bad case reaches: once where makers inspect for the size; several times where it rests on a
+    unit of the arm that is a guess itself, on wear, or on what people do.
     """
 
     quantity: str
@@ -48,10 +47,7 @@ class Size:
     most: float = 3.0
 
     def on(self, sites: Sites, *joints: int) -> float:
-        """Size on an arm, in the SI unit of the parameter.
-
-        `joints`: from 0, by whose compliance it is sized: of several the geometric mean.
-        """
+        """Size on an arm, in the SI unit of the parameter; `joints`: from 0, by whose mean compliance it is sized."""
         return self.share * _UNITS[self.of](sites, joints)
 
 
@@ -68,10 +64,7 @@ def lever_m(sites: Sites, joint: int) -> float:
 
 
 def full_torque_Nm(sites: Sites, joint: int) -> float:  # noqa: N802 - units in names keep their case
-    """Torque of the rated payload at the end of the outstretched arm and of the weight of its links.
-
-    By it laws of gears are scaled. `joint`: from 0. Derived here: each force acts at its longest lever.
-    """
+    """Torque on a joint, from 0, of the rated payload and of the weight of its links, each at its longest lever."""
     pull = rated_kg(sites) * float(np.linalg.norm(sites.gravity_m_s2)) * lever_m(sites, joint)
     return pull + sites.longest_weight_torque_Nm(joint)
 

@@ -14,7 +14,7 @@ from elastocal.effects.catalogue import effects
 from elastocal.effects.conditions import conditions_of
 from elastocal.effects.protocol import Candidate
 from elastocal.figures.style import PALETTE, panels, styled
-from elastocal.fitting.displacement import displace
+from elastocal.fitting.model import displaced_by
 from elastocal.fitting.observations import States
 from elastocal.mechanics.kinematics import poses
 from elastocal.mechanics.robot import Robot
@@ -90,7 +90,9 @@ def signature(name: str, robot: Robot) -> Signature:
         )
         around, commanded = conditions_of(sites, robot.compliance, states, row_span=(0, 1)), sites.chain.at(angles)
         displaced = commanded.copy()
-        displace(displaced, candidate, sizes, [shape.start for shape in candidate.shapes], around)
+        shapes = [shape.start for shape in candidate.shapes]
+        for coordinate, by in displaced_by([(candidate, sizes, shapes)], around).items():
+            displaced[:, coordinate] += by
         return 1e3 * (poses(sites.chain, displaced, point)[0] - poses(sites.chain, commanded, point)[0])
 
     moved = {"by angle": moved_mm(turned), "by angle, loaded": moved_mm(turned, _PULL_N), "by force": moved_mm(still, _FORCE_N)}

@@ -1,89 +1,236 @@
-"""Sensitivities of the measurements: the Jacobian of the chain times the displacement of its coordinates per parameter."""
+"""Sensitivities of the measurements: the Jacobian of the chain times the displacement of its coordinates per parameter.
+
+An effect displaces coordinates of the sites, by an amount that belongs to the state; how a coordinate moves what is measured
+belongs to the measurement. In row r of state s a column of sensitivities is the sum over coordinates c of J[r, c] f_c(s), so
+that products of two columns are sums over states of f_c(s) g_d(s) H_cd(s), with H = J'J of the rows of one state: as many terms
+as states, where the columns themselves have a term for each component of each target in it.
+"""
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from elastocal.effects.conditions import Conditions, with_springs, with_total
 from elastocal.effects.gravity import DECLARED_WEIGHT
-from elastocal.fitting.displacement import (
+from elastocal.fitting.model import (
+    displaced_by,
     displaced_coordinates,
     joint_compliances,
     laws_of,
     mass_corrections,
-    with_springs_of,
+    off_measured,
+    target_points,
 )
-from elastocal.fitting.factored import Displacements, Factored
-from elastocal.fitting.prediction import differences, measured_in_base, target_points
+from elastocal.fitting.observations import groups_by_size
 from elastocal.mechanics.kinematics import motion
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from elastocal.effects.protocol import Candidate, Displacing
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.observations import Observations
 
-# Relative step of the central difference in a shape parameter.
-_SHAPE_STEP = 1e-4
-# Of the forward difference in what loads the springs, in plausible sizes: laws of gears bend little over that.
-_SPRING_STEP = 1e-4
+    Laws = Sequence[Mapping[int, np.ndarray]]
+
+# Entries of a coordinate that make a product of their own worth its call.
+_MANY_ENTRIES = 16
+# Numbers of products by state that are in memory at once.
+_AT_ONCE = 1_500_000
+# Relative step of the central difference in a shape parameter; of the forward difference in what loads the springs, in
+# plausible sizes: laws of gears bend little over that.
+_SHAPE_STEP, _SPRING_STEP = 1e-4, 1e-4
 # Parameters on which the laws of other effects depend: they turn a wrench into angles, or are part of the load.
 _SPRINGS = ("joint_compliance", DECLARED_WEIGHT)
+
+
+@dataclass(frozen=True)
+class Factored:
+    """Rows of K columns that displace coordinates, in two factors.
+
+    Entries tell what a column does to a coordinate; those of one coordinate lie side by side, those of many first. `columns`:
+    K. `values` (E, S): displacement of one coordinate by one column, in each state. `coordinate`, `column` (E,) of int.
+    `jacobian` (M, rows, C): of each observation with respect to the coordinates, whitened or not. `state` (M,) of int: its
+    state.
+    """
+
+    columns: int
+    values: np.ndarray
+    coordinate: np.ndarray
+    column: np.ndarray
+    jacobian: np.ndarray
+    state: np.ndarray
+
+    @classmethod
+    def of(cls, laws: Laws, jacobian: np.ndarray, state: np.ndarray, states: int, sizes: np.ndarray | None = None) -> Factored:
+        """Gather laws, one for each column, each a displacement of some coordinates in S `states`, times `sizes` (K,)."""
+        count = Counter(coordinate for law in laws for coordinate in law)
+        entries = sorted((-count[coordinate], coordinate, column) for column, law in enumerate(laws) for coordinate in law)
+        values, sizes = np.empty((len(entries), states)), np.ones(len(laws)) if sizes is None else sizes
+        for place, (_, coordinate, column) in zip(values, entries, strict=True):
+            np.multiply(laws[column][coordinate], sizes[column], out=place)
+        _, coordinates, columns = np.array(entries, int).reshape(-1, 3).T
+        return cls(len(laws), values, coordinates, columns, jacobian, state)
+
+    def of_columns(self, kept: np.ndarray) -> Factored:
+        """The same of some of the columns, ndarray of bool (K,), which are numbered anew."""
+        mine, number = kept[self.column], np.cumsum(kept) - 1
+        entries = self.values[mine], self.coordinate[mine], number[self.column[mine]]
+        return Factored(int(kept.sum()), *entries, self.jacobian, self.state)
+
+    def at(self, seen: np.ndarray) -> Factored:
+        """The same of some of the observations, ndarray of bool (M,), whose states are numbered anew."""
+        states, state = np.unique(self.state[seen], return_inverse=True)
+        return replace(self, values=self.values[:, states], jacobian=self.jacobian[seen], state=state)
+
+    @cached_property
+    def spans(self) -> list[tuple[int, slice]]:
+        """Coordinates that are displaced, and the entries of each."""
+        first = np.flatnonzero(np.diff(self.coordinate, prepend=-1)).tolist()
+        return [(int(self.coordinate[a]), slice(a, b)) for a, b in pairwise([*first, len(self.coordinate)])]
+
+    @cached_property
+    def _fold(self) -> csr_array:
+        """Ones where an entry is of a column, sparse (K, E)."""
+        entries = len(self.column)
+        return csr_array((np.ones(entries), (self.column, np.arange(entries))), (self.columns, entries))
+
+    def _products(self, right: np.ndarray | None = None) -> Iterator[tuple[slice, np.ndarray]]:
+        """J' times some rows (M, rows, q), or times J itself, summed over each state, of some states at a time.
+
+        Yields the states, and ndarray (S', C', q) for the coordinates that are displaced.
+        """
+        left = self.jacobian[..., [coordinate for coordinate, _ in self.spans]]
+        right = left if right is None else right
+        shape, states = (left.shape[2], right.shape[2]), self.values.shape[1]
+        step = max(_AT_ONCE // max(shape[0] * shape[1], 1), 1)
+        groups = groups_by_size(self.state)
+        for start in range(0, states, step):
+            found = np.zeros((min(step, states - start), *shape))
+            for each in groups:
+                state = self.state[each[:, 0]] - start
+                inside = (state >= 0) & (state < step)
+                mine = each if inside.all() else each[inside]
+                height = each.shape[1] * left.shape[1]
+                rows, others = (part[mine].reshape(len(mine), height, part.shape[2]) for part in (left, right))
+                found[state[inside]] = rows.transpose(0, 2, 1) @ others
+            yield slice(start, start + step), found
+
+    def gram(self) -> np.ndarray:
+        """Products of the columns with each other, ndarray (K, K)."""
+        entries = np.zeros((len(self.values),) * 2)
+        for states, products in self._products():
+            entries += self._gram_of_entries(self.values[:, states], np.ascontiguousarray(products.transpose(1, 2, 0)))
+        return self._fold @ (self._fold @ entries).T
+
+    def _gram_of_entries(self, values: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+        spans, found = self.spans, np.empty((len(values), len(values)))
+        place = np.repeat(np.arange(len(spans)), [span.stop - span.start for _, span in spans])
+        large = sum(span.stop - span.start >= _MANY_ENTRIES for _, span in spans)
+        for number, (_, span) in enumerate(spans):
+            # Coordinates from this one on, for the others are alike: those of many entries one by one, those of few together.
+            for other in range(number, large):
+                beside = spans[other][1]
+                np.matmul(values[span] * pairs[number, other], values[beside].T, out=found[span, beside])
+            first = max(number, large)
+            rest = slice(spans[first][1].start if first < len(spans) else len(values), None)
+            found[span, rest] = values[span] @ (values[rest] * pairs[number][place[rest]]).T
+            found[span.start :, span] = found[span, span.start :].T
+        return found
+
+    def times(self, right: np.ndarray) -> np.ndarray:
+        """Products of the columns with other rows (M, rows, q), ndarray (K, q)."""
+        found = np.zeros((len(self.values), right.shape[2]))
+        for states, products in self._products(right):
+            for number, (_, span) in enumerate(self.spans):
+                found[span] += self.values[span, states] @ products[:, number]
+        return self._fold @ found
+
+    def times_by_pose(self, right: np.ndarray, pose: np.ndarray) -> np.ndarray:
+        """Products of the columns with other rows (M, rows, n), of the measurements of each pose, ndarray (G, n, K).
+
+        `pose` (M,) of int: 0 .. G-1; all measurements of a state are of one pose.
+        """
+        shape = int(pose.max()) + 1, right.shape[2]
+        of_state = np.zeros(self.values.shape[1], int)
+        of_state[self.state] = pose
+        found = np.zeros((len(self.values), *shape))
+        for states, products in self._products(right):
+            for members in groups_by_size(of_state[states]):
+                at = of_state[states][members[:, 0]]
+                for number, (_, span) in enumerate(self.spans):
+                    some = self.values[span, states][:, members].transpose(1, 0, 2)
+                    found[span, at] += (some @ products[members, number]).transpose(1, 0, 2)
+        folded = self._fold @ found.reshape(len(found), shape[0] * shape[1])
+        return np.ascontiguousarray(folded.T).reshape(*shape, self.columns)
+
+    def dense(self) -> np.ndarray:
+        """The columns themselves, ndarray (M, rows, K); the observations of each lie side by side."""
+        jacobian = self.jacobian.transpose(2, 1, 0)
+        found = np.zeros((self.columns, jacobian.shape[1], len(self.state)))
+        for coordinate, column, values in zip(self.coordinate, self.column, self.values, strict=True):
+            found[column] += jacobian[coordinate] * values[self.state]
+        return found.transpose(2, 1, 0)
 
 
 @dataclass(frozen=True)
 class Linearization:
     """A model about an estimate, for M observations.
 
-    `residual` (M, rows): measured less predicted, base axes, m and rad. `coordinate_jacobian` (M, rows, C): of each target with
-    respect to the coordinates of the sites. `displacements`: what each of the P `parameters` does to the coordinates; nothing
-    by those of targets. `target_columns` (M, rows, Q): sensitivities to the parameters of targets. `of_targets` (Q,) of int:
-    which parameters these are. `state` (M,) of int: state of each observation. `conditions`: where the robot has yielded to, by
-    this estimate.
+    `residual` (M, rows): measured less predicted, base axes, m and rad. `columns`: sensitivities to the P `parameters`, zero to
+    those of targets. `target_columns` (M, rows, Q): sensitivities to the parameters of targets. `of_targets` (Q,) of int: which
+    parameters these are. `conditions`: where the robot has yielded to, by this estimate.
     """
 
     residual: np.ndarray
-    coordinate_jacobian: np.ndarray
-    displacements: Displacements
+    columns: Factored
     target_columns: np.ndarray
     of_targets: np.ndarray
-    state: np.ndarray
     conditions: Conditions
+
+    @property
+    def coordinate_jacobian(self) -> np.ndarray:
+        """Of each target with respect to the coordinates of the sites, ndarray (M, rows, C)."""
+        return self.columns.jacobian
+
+    @property
+    def joint_jacobian(self) -> np.ndarray:
+        """Of each target with respect to the joints, ndarray (M, rows, n)."""
+        return self.columns.jacobian[..., : self.conditions.sites.joints]
 
     @cached_property
     def sensitivities(self) -> np.ndarray:
         """With respect to `parameters`, ndarray (M, rows, P)."""
-        return self.sensitivities_to(np.ones(self.displacements.columns, bool))
+        return self.sensitivities_to(np.ones(self.columns.columns, bool))
 
     def sensitivities_to(self, kept: np.ndarray) -> np.ndarray:
         """With respect to some of the parameters, ndarray of bool (P,)."""
-        found = Factored(self.displacements.of_columns(kept), self.coordinate_jacobian, self.state).dense()
-        mine = kept[self.of_targets]
+        found, mine = self.columns.of_columns(kept).dense(), kept[self.of_targets]
         found[..., (np.cumsum(kept) - 1)[self.of_targets[mine]]] = self.target_columns[..., mine]
         return found
 
     def moved_by(self, values: np.ndarray) -> np.ndarray:
         """By how much predictions move where parameters grow by some values (P,), those of targets left out; (M, rows)."""
-        displacements = self.displacements
-        moved = np.zeros((self.coordinate_jacobian.shape[2], displacements.values.shape[1]))
-        np.add.at(moved, displacements.coordinate, values[displacements.column, None] * displacements.values)
-        return (self.coordinate_jacobian @ moved.T[self.state, :, None])[..., 0]
+        columns = self.columns
+        moved = np.zeros((columns.jacobian.shape[2], columns.values.shape[1]))
+        np.add.at(moved, columns.coordinate, values[columns.column, None] * columns.values)
+        return (columns.jacobian @ moved.T[columns.state, :, None])[..., 0]
 
 
 def linearize(model: Model, estimate: Estimate, observations: Observations, conditions: Conditions) -> Linearization:
-    """Residuals of a model and their sensitivities.
+    """Residuals of a model and their sensitivities; arguments as of `predict`.
 
     Sensitivities are analytic, but for shapes (central differences) and for what springs do by way of other effects (forward
     differences).
-
-    `model`, `estimate`, `observations`, `conditions`: as in `predict`.
     """
-    around = with_springs_of(model, estimate, conditions)
+    around = with_springs(conditions, joint_compliances(model, estimate), mass_corrections(model, estimate))
     coordinates = displaced_coordinates(model, estimate, around)
     count, rows, chain, points = len(observations), model.rows, model.sites.chain, target_points(model, estimate)
     moved = motion(chain, coordinates, (*model.sites.followed, *points))
@@ -96,50 +243,33 @@ def linearize(model: Model, estimate: Estimate, observations: Observations, cond
         at = moved.position[number][:, state]
         position[seen], rotation[seen] = at.T, np.moveaxis(moved.rotation[number][..., state], -1, 0)
         jacobian[..., seen] = moved.jacobian(point.after, at, rows, state)
-    residual = differences(
-        measured_in_base(estimate, observations), position, rotation @ estimate.target_rotation[observations.target]
-    )
-    jacobian = np.moveaxis(jacobian, -1, 0)
+    residual = off_measured(estimate, observations, position, rotation @ estimate.target_rotation[observations.target])
     laws: list[Mapping[int, np.ndarray]] = []
-    if model.fitted_frames:
-        for session in estimate.sessions:
-            in_session = (observations.states.session == session).astype(float)
-            laws += [{coordinate: in_session} for coordinate in model.sites.base]
-    columns = [_target_columns(rotation, rows, observations.target == index)[..., parts] for index, parts in model.fitted_parts]
-    target_columns = np.concatenate([np.zeros((count, rows, 0)), *columns], axis=2)
-    of_targets = len(laws) + np.arange(target_columns.shape[2])
+    for session in estimate.sessions if model.fitted_frames else ():
+        in_session = (observations.states.session == session).astype(float)
+        laws += [{coordinate: in_session} for coordinate in model.sites.base]
+    # A target's shift along the axes of its measuring point and, for poses, its turn about them, where it is seen.
+    target_columns = np.zeros((count, rows, sum(parts.stop - parts.start for _, parts in model.fitted_parts)))
+    of_targets, first = len(laws) + np.arange(target_columns.shape[2]), 0
+    for index, parts in model.fitted_parts:
+        seen = observations.target == index
+        for part in range(parts.start, parts.stop, 3):
+            target_columns[seen, part : part + 3, first : first + 3] = rotation[seen]
+            first += 3
     laws += [{} for _ in of_targets]
     for effect, values, shapes in zip(model.effects, estimate.coefficients, estimate.shapes, strict=True):
         laws += _spring_laws(effect, model, estimate, around) if effect.effect in _SPRINGS else laws_of(effect, shapes, around)
         laws += _shape_laws(effect, values, shapes, around)
-    displacements = Displacements.of(laws, np.ones(len(laws)), len(observations.states))
-    return Linearization(
-        residual, jacobian, displacements, target_columns, of_targets, observations.state, replace(around, motion=moved)
-    )
+    columns = Factored.of(laws, np.moveaxis(jacobian, -1, 0), observations.state, len(observations.states))
+    return Linearization(residual, columns, target_columns, of_targets, replace(around, motion=moved))
 
 
 def effect_columns(
-    effects: Iterable[tuple[Displacing, Iterable[float]]],
-    conditions: Conditions,
-    coordinate_jacobian: np.ndarray,
-    state: np.ndarray,
+    effects: Iterable[tuple[Displacing, Iterable[float]]], around: Conditions, jacobian: np.ndarray, state: np.ndarray
 ) -> np.ndarray:
-    """Sensitivities of the measurements to the linear parameters of effects.
-
-    `effects` (Displacing, sequence of float): with their shape parameters. `coordinate_jacobian` (M, rows, C). `state` (M,):
-    state of each observation. Returns (M, rows, D).
-    """
-    laws = [law for effect, shapes in effects for law in effect.displacement(conditions, *shapes)]
-    displacements = Displacements.of(laws, np.ones(len(laws)), len(conditions.joint_angles))
-    return Factored(displacements, coordinate_jacobian, state).dense()
-
-
-def _target_columns(rotation: np.ndarray, rows: int, seen: np.ndarray) -> np.ndarray:
-    """Shift of a target along the axes of its measuring point and, for poses, its turn about them, where it is seen."""
-    columns = np.zeros((len(rotation), rows, rows))
-    for first in range(0, rows, 3):
-        columns[seen, first : first + 3, first : first + 3] = rotation[seen]
-    return columns
+    """Sensitivities (M, rows, D) to the linear parameters of effects, with their shapes, by a `coordinate_jacobian`."""
+    laws = [law for effect, shapes in effects for law in effect.displacement(around, *shapes)]
+    return Factored.of(laws, jacobian, state, len(around.joint_angles)).dense()
 
 
 def _shape_laws(
@@ -152,32 +282,34 @@ def _shape_laws(
             yield {}
             continue
         step = _SHAPE_STEP * max(abs(shapes[number]), shape.lowest, 0.1 * shape.highest)
-        sides = []
-        for sign in (1, -1):
-            moved = shapes.copy()
-            moved[number] += sign * step
-            sides.append(_displaced_by([(effect, values, moved)], conditions))
-        above, below = sides
+        off = step * (np.arange(len(shapes)) == number)
+        above, below = (displaced_by([(effect, values, at)], conditions) for at in (shapes + off, shapes - off))
         yield {c: (above.get(c, 0.0) - below.get(c, 0.0)) / (2 * step) for c in {*above, *below}}
 
 
 def _spring_laws(spring: Candidate, model: Model, estimate: Estimate, around: Conditions) -> list[dict[int, np.ndarray]]:
-    """Displacements per unit of compliances or of errors of masses, with all that they do by way of other effects."""
-    laws = spring.displacement(around)
-    through = _through_compliance if spring.effect == "joint_compliance" else _through_load
-    others = [found for found in zip(model.effects, estimate.coefficients, estimate.shapes, strict=True) if through(found[0])]
+    """Displacements per unit of compliances or of errors of masses, with all that they do by way of other effects.
+
+    Compliances turn other loads into angles; errors of masses are part of the load that other effects go with.
+    """
+    laws, springs = spring.displacement(around), spring.effect == "joint_compliance"
+    others = [
+        found
+        for found in zip(model.effects, estimate.coefficients, estimate.shapes, strict=True)
+        if (found[0].family in ("gravity", "load") if springs else "load" in found[0].needs and found[0].effect not in _SPRINGS)
+    ]
     if not others:
         return laws
-    present = _displaced_by(others, around)
+    present = displaced_by(others, around)
     coordinates = sorted(present)
     steps = np.array([_SPRING_STEP * parameter.plausible for parameter in spring.parameters])
-    if spring.effect == "joint_compliance":
+    if springs:
         values, corrections = joint_compliances(model, estimate), mass_corrections(model, estimate)
         sprung: Iterator[Conditions] = (with_springs(around, values + row, corrections) for row in np.diag(steps))
     else:
         sprung = _with_each_correction(around, coordinates, steps)
     for law, step, changed in zip(laws, steps, sprung, strict=True):
-        moved = _displaced_by(others, changed)
+        moved = displaced_by(others, changed)
         for coordinate in coordinates:
             change = (moved[coordinate] - present[coordinate]) / step
             if change.any():
@@ -192,23 +324,3 @@ def _with_each_correction(around: Conditions, coordinates: list[int], steps: np.
     for step, per_unit in zip(steps, around.gravity_of_corrections(coordinates), strict=True):
         total[coordinates] = present + step * per_unit
         yield with_total(around, total.T)
-
-
-def _displaced_by(effects: Iterable[tuple[Candidate, np.ndarray, np.ndarray]], around: Conditions) -> dict[int, np.ndarray]:
-    """What some effects do together to each coordinate that they displace."""
-    displaced: dict[int, np.ndarray] = {}
-    for effect, values, shapes in effects:
-        for value, law in zip(values, effect.displacement(around, *shapes), strict=True):
-            for coordinate, per_unit in law.items():
-                displaced[coordinate] = displaced.get(coordinate, 0.0) + value * per_unit
-    return displaced
-
-
-def _through_compliance(effect: Candidate) -> bool:
-    """Whether an effect is a load that the joint compliances turn into angles."""
-    return effect.family in ("gravity", "load")
-
-
-def _through_load(effect: Candidate) -> bool:
-    """Whether an effect goes with the total load."""
-    return "load" in effect.needs and effect.effect not in _SPRINGS

@@ -1,4 +1,4 @@
-"""What the measurements are modelled by: nominal robot, frames, targets, any set of effects, and values of what is unknown."""
+"""What the measurements are modelled by, all that this leaves open as one vector of parameters, and what it predicts."""
 
 from __future__ import annotations
 
@@ -6,23 +6,38 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from elastocal.effects.conditions import offered
+from elastocal.campaigns.campaign import Campaign, assemble_campaign, measurements_from
+from elastocal.effects.catalogue import candidates_on, declared_candidates
+from elastocal.effects.conditions import MASS_PARAMETERS, at_coordinates, conditions_of, offered, with_springs
 from elastocal.effects.elastic import joint_compliance
-from elastocal.effects.gravity import declared_weight
+from elastocal.effects.gravity import DECLARED_WEIGHT, declared_weight
+from elastocal.effects.protocol import Candidate, Parameter, moved_and_turned
+from elastocal.fitting.observations import Observations, averaged, without_outlying_repeats
+from elastocal.mechanics.kinematics import pose_differences, poses_of_points
+from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.mechanics.sites import Sites, sites_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
+    from typing import Any
 
-    from elastocal.campaigns.campaign import Campaign, Target
-    from elastocal.effects.protocol import Candidate
+    from elastocal.campaigns.campaign import Target
+    from elastocal.effects.conditions import Conditions
     from elastocal.fitting.observations import States
+    from elastocal.mechanics.chain import MeasuringPoint
+
+# Frames and targets may be anywhere in a workshop.
+_ANYWHERE_M, _ANYWHERE_RAD = 1.0, 1.0
+# Fixed-point iterations of the load at the displaced pose. Each shrinks what is left by deflection over reach, some 1 / 500 at
+# 3 kN, from ten micrometres at the commanded pose.
+_PASSES = 2
 
 
 @dataclass(frozen=True)
 class Model:
-    """What is taken to make the measurements.
+    """What is taken to make the measurements: nominal robot, frames, targets and any set of effects.
 
     `targets`: as in the campaign; offsets and rotations that they do not have are fitted. `fitted_frames`: whether the
     placement of the base is unknown, one for each session. `rows`: 3 where positions are measured, 6 where poses are.
@@ -49,14 +64,16 @@ class Model:
         return any(effect.effect == "joint_compliance" for effect in self.effects)
 
     @property
+    def nominal_coefficients(self) -> tuple[np.ndarray, ...]:
+        """Where a fit starts: joint compliances at their nominal values, all else at zero."""
+        nominal, effects = self.nominal_compliance, self.effects
+        return tuple(nominal.copy() if e.effect == "joint_compliance" else np.zeros(len(e.parameters)) for e in effects)
+
+    @property
     def fitted_parts(self) -> list[tuple[int, slice]]:
         """Targets that are fitted, and which of shift and turn (x, y, z, rx, ry, rz) are."""
-        found = []
-        for number, target in enumerate(self.targets):
-            first, last = (0 if target.offset_m is None else 3), (self.rows if target.rotation is None else 3)
-            if first < last:
-                found.append((number, slice(first, last)))
-        return found
+        ends = [(0 if t.offset_m is None else 3, self.rows if t.rotation is None else 3) for t in self.targets]
+        return [(number, slice(first, last)) for number, (first, last) in enumerate(ends) if first < last]
 
     def offered(self, states: States) -> frozenset[str]:
         """What effects may need that some states and the campaign have: see `Candidate.needs`."""
@@ -94,13 +111,10 @@ class Estimate:
 
 
 def declared_model(campaign: Campaign, effects: Iterable[Candidate] = ()) -> Model:
-    """The model that a campaign declares.
-
-    `effects`: declared effects.
-    """
-    sites = sites_of(campaign.robot)
+    """The model that a campaign declares, with its declared effects."""
+    sites, measurements = sites_of(campaign.robot), campaign.measurements
     # Under an arm whose first joint turns, a base that yields and the sag of that arm are one thing until weights are known.
-    unknown = not sites.masses and not campaign.measurements.wrench.any()
+    unknown = not sites.masses and not measurements.wrench.any()
     sites = replace(sites, usual_weight=sites.prismatic[0] and unknown)
     springs = (joint_compliance(sites),) if campaign.compliance == "identify" else ()
     weight = (declared_weight(sites),) if sites.masses else ()
@@ -111,7 +125,202 @@ def declared_model(campaign: Campaign, effects: Iterable[Candidate] = ()) -> Mod
         6 if campaign.measured == "pose" else 3,
         campaign.robot.compliance,
         (*springs, *weight, *effects),
-        0.0 if campaign.measurements.time_s is None else float(campaign.measurements.time_s.min()),
-        (int(campaign.measurements.row.min()), int(campaign.measurements.row.max())) if len(campaign.measurements) else None,
+        0.0 if measurements.time_s is None else float(measurements.time_s.min()),
+        (int(measurements.row.min()), int(measurements.row.max())) if len(measurements) else None,
         campaign.robot.compliance_known,
     )
+
+
+def parameters(model: Model, estimate: Estimate) -> list[tuple[str, Parameter]]:
+    """Everything that is fitted, in the order of the sensitivities.
+
+    Returns (str, Parameter): what it belongs to ("frame 0", "target A", the key of an effect) and the parameter.
+    """
+    found, placed = [], moved_and_turned(_ANYWHERE_M, _ANYWHERE_RAD)
+    if model.fitted_frames:
+        found += [(f"frame {session}", parameter) for session in estimate.sessions for parameter in placed]
+    for number, parts in model.fitted_parts:
+        found += [(f"target {model.targets[number].name}", parameter) for parameter in placed[parts]]
+    for effect in model.effects:
+        found += [(effect.key, parameter) for parameter in effect.parameters]
+        found += [(effect.key, Parameter(s.name, s.unit, s.highest - s.lowest)) for s in effect.shapes]
+    return found
+
+
+def of_placement(owners: Iterable[str]) -> np.ndarray:
+    """Which of some owners of parameters are frames and targets, ndarray of bool."""
+    return np.array([owner.startswith(("frame ", "target ")) for owner in owners], bool)
+
+
+def limits(model: Model, estimate: Estimate) -> np.ndarray:
+    """Lowest and highest value of each of the `parameters`, ndarray (P, 2): the ranges of shapes, infinite for all others."""
+    ranges = {(effect.key, shape.name): (shape.lowest, shape.highest) for effect in model.effects for shape in effect.shapes}
+    return np.array([ranges.get((o, p.name), (-np.inf, np.inf)) for o, p in parameters(model, estimate)]).reshape(-1, 2)
+
+
+def nonlinear_parameters(model: Model, estimate: Estimate) -> np.ndarray:
+    """Which of the `parameters` are shapes, which alone have limits, ndarray of bool (P,)."""
+    return np.isfinite(limits(model, estimate)).all(axis=1)
+
+
+def parameter_values(model: Model, estimate: Estimate) -> np.ndarray:
+    """Present values of the `parameters`, ndarray (P,); frames and targets are fitted by steps and count as zero."""
+    placed = of_placement(owner for owner, _ in parameters(model, estimate))
+    effects = [part for pair in zip(estimate.coefficients, estimate.shapes, strict=True) for part in pair]
+    return np.concatenate([np.zeros(placed.sum()), *effects])
+
+
+def stepped(model: Model, estimate: Estimate, step: np.ndarray) -> Estimate:
+    """An estimate after a step (P,) of all `parameters`; shapes stay in their ranges."""
+
+    def take(count: int) -> np.ndarray:
+        nonlocal step
+        taken, step = step[:count], step[count:]
+        return taken
+
+    frame_rotation, frame_position = estimate.frame_rotation.copy(), estimate.frame_position.copy()
+    if model.fitted_frames:
+        for number in range(len(estimate.sessions)):
+            shift, turn = take(3), take(3)
+            frame_position[number] += frame_rotation[number] @ shift
+            frame_rotation[number] = frame_rotation[number] @ Rotation.from_rotvec(turn).as_matrix()
+    target_offset, target_rotation = estimate.target_offset.copy(), estimate.target_rotation.copy()
+    for number, parts in model.fitted_parts:
+        moved = np.zeros(6)
+        moved[parts] = take(parts.stop - parts.start)
+        target_offset[number] += moved[:3]
+        target_rotation[number] = Rotation.from_rotvec(moved[3:]).as_matrix() @ target_rotation[number]
+    coefficients, shapes = [], []
+    for effect, values, shape in zip(model.effects, estimate.coefficients, estimate.shapes, strict=True):
+        coefficients.append(values + take(len(values)))
+        ends = np.array([(each.lowest, each.highest) for each in effect.shapes]).reshape(-1, 2)
+        shapes.append(np.clip(shape + take(len(shape)), *ends.T))
+    placed = frame_rotation, frame_position, target_offset, target_rotation
+    return Estimate(estimate.sessions, *placed, tuple(coefficients), tuple(shapes))
+
+
+def conditions(model: Model, estimate: Estimate, states: States, coordinates: np.ndarray | None = None) -> Conditions:
+    """What the effects of a model may depend on, in some states: loads at the displaced pose, by fixed-point iteration.
+
+    `coordinates` (S, C): where the robot has yielded to; found without.
+    """
+    springs = joint_compliances(model, estimate), mass_corrections(model, estimate)
+    around = conditions_of(model.sites, springs[0], states, model.time_zero_s, springs[1], model.row_span, coordinates)
+    for _ in range(_PASSES if coordinates is None else 0):
+        around = at_coordinates(around, displaced_coordinates(model, estimate, around))
+    return around
+
+
+def joint_compliances(model: Model, estimate: Estimate) -> np.ndarray:
+    """Joint compliances of an estimate, ndarray (n,), rad/(N m): the identified ones where they are parameters."""
+    return _values_of("joint_compliance", model, estimate, model.nominal_compliance)
+
+
+def mass_corrections(model: Model, estimate: Estimate) -> np.ndarray:
+    """By how much the declared masses of an estimate are off the robot file, ndarray (4 m,): see `Conditions`."""
+    return _values_of(DECLARED_WEIGHT, model, estimate, np.zeros(MASS_PARAMETERS * len(model.sites.masses)))
+
+
+def _values_of(name: str, model: Model, estimate: Estimate, otherwise: np.ndarray) -> np.ndarray:
+    for effect, values in zip(model.effects, estimate.coefficients, strict=True):
+        if effect.effect == name:
+            return values
+    return otherwise
+
+
+def displaced_coordinates(model: Model, estimate: Estimate, conditions: Conditions) -> np.ndarray:
+    """Coordinates of the sites in each state, ndarray (S, C): joint angles, springs under load and effects.
+
+    Springs yield to the total load, the external one and the weight that the robot file declares.
+    """
+    around = with_springs(conditions, joint_compliances(model, estimate), mass_corrections(model, estimate))
+    displaced = model.sites.chain.at(around.joint_angles)
+    if not model.identifies_compliance:
+        displaced[:, : model.sites.joints] += around.total[:, : model.sites.joints] * model.nominal_compliance
+    effects = zip(model.effects, estimate.coefficients, estimate.shapes, strict=True)
+    # The errors of masses are part of the total load.
+    for coordinate, by in displaced_by((each for each in effects if each[0].effect != DECLARED_WEIGHT), around).items():
+        displaced[:, coordinate] += by
+    return displaced
+
+
+def displaced_by(effects: Iterable[tuple[Candidate, np.ndarray, Iterable[float]]], around: Conditions) -> dict[int, np.ndarray]:
+    """What effects, with their linear parameters (D,) and their shapes (F,), do together to each coordinate, (S,)."""
+    displaced: dict[int, np.ndarray] = {}
+    for effect, values, shapes in effects:
+        for value, law in zip(values, laws_of(effect, shapes, around), strict=True):
+            for coordinate, per_unit in law.items():
+                displaced[coordinate] = displaced.get(coordinate, 0.0) + value * per_unit
+    return displaced
+
+
+def laws_of(effect: Candidate, shapes: Iterable[float], around: Conditions) -> list[dict[int, np.ndarray]]:
+    """Displacements per unit of each linear parameter of an effect, those that no step changes as they were found before."""
+    if not effect.fixed:
+        return effect.displacement(around, *shapes)
+    if effect.key not in around.of_angles:
+        around.of_angles[effect.key] = effect.displacement(around)
+    return around.of_angles[effect.key]
+
+
+def predict(model: Model, estimate: Estimate, observations: Observations, around: Conditions) -> tuple[np.ndarray, np.ndarray]:
+    """Exact poses of the targets, in base axes: positions (M, 3) and rotations (M, 3, 3); `around`: of their states."""
+    coordinates = displaced_coordinates(model, estimate, around)
+    position, rotation = poses_of_points(model.sites.chain, coordinates, target_points(model, estimate))
+    seen = observations.target, observations.state
+    return position[seen], rotation[seen] @ estimate.target_rotation[observations.target]
+
+
+def target_points(model: Model, estimate: Estimate) -> list[MeasuringPoint]:
+    """The targets as points of the kinematic chain, where an estimate has them."""
+    points = [model.sites.chain.point(target.point) for target in model.targets]
+    return [replace(point, offset_m=tuple(at)) for point, at in zip(points, estimate.target_offset, strict=True)]
+
+
+def residuals(model: Model, estimate: Estimate, observations: Observations, conditions: Conditions) -> np.ndarray:
+    """Measured less predicted, ndarray (M, rows): base axes, m and, where poses are measured, rad; arguments of `predict`."""
+    return off_measured(estimate, observations, *predict(model, estimate, observations, conditions))
+
+
+def off_measured(estimate: Estimate, observations: Observations, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+    """Measured less predicted, as `residuals`, of poses (M, 3), (M, 3, 3) as by `predict`."""
+    measured, turned = measured_in_base(estimate, observations)
+    return measured - position if turned is None else pose_differences(measured, turned, position, rotation)
+
+
+def measured_in_base(estimate: Estimate, observations: Observations) -> tuple[np.ndarray, np.ndarray | None]:
+    """Measured positions (M, 3) and rotations (M, 3, 3), taken from the frames of the sessions into base axes."""
+    session = np.searchsorted(estimate.sessions, observations.states.session[observations.state])
+    into_base = estimate.frame_rotation[session].transpose(0, 2, 1)
+    position = (into_base @ (observations.position - estimate.frame_position[session])[..., None])[..., 0]
+    return position, None if observations.rotation is None else into_base @ observations.rotation
+
+
+@dataclass(frozen=True)
+class Case:
+    """A campaign ready to be fitted.
+
+    `campaign`: its measurements are those to fit. `observations`: their repeats averaged, without the outlying ones. `model`:
+    as declared. `candidates`: everything that the model might lack.
+    """
+
+    campaign: Campaign
+    observations: Observations
+    model: Model
+    candidates: dict[str, Candidate]
+
+    def select(self, kept: np.ndarray) -> Case:
+        """The same without some of the measurements; ndarray of bool (N,)."""
+        some = replace(self.campaign, measurements=self.campaign.measurements.select(kept))
+        return replace(self, campaign=some, observations=averaged(without_outlying_repeats(some.measurements)))
+
+
+def case_from(descriptions: Mapping[str, Any], columns: Mapping[str, np.ndarray]) -> Case:
+    """Put a campaign together from its description, as step 1 writes it, and the columns of its measurements table."""
+    source = descriptions["source"]
+    robot = robot_from_document(descriptions["robot"], source)
+    campaign = assemble_campaign(descriptions["campaign"], robot, measurements_from(columns), source)
+    sites = sites_of(campaign.robot)
+    model = declared_model(campaign, declared_candidates(campaign.declared, sites, source))
+    candidates = {key: c for key, c in candidates_on(sites).items() if c.effect not in campaign.declared}
+    return Case(campaign, averaged(without_outlying_repeats(campaign.measurements)), model, candidates)

@@ -1,29 +1,23 @@
-"""Normal equations of a step, added up over measurements that are held whole or come in parts of whole poses."""
+"""Normal equations of a step of generalized least squares: whitened, added up over the measurements, and solved.
+
+Generalized least squares (Aitken, Proc. R. Soc. Edinburgh 55, 1935) divides residuals and sensitivities by the noise of the
+states in which they were taken; what the data do not identify is held at its value.
+"""
 
 from __future__ import annotations
 
 from copy import copy
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg.lapack import dpotrf
 
-from elastocal.effects.conditions import at_states, with_springs
-from elastocal.fitting.displacement import (
-    conditions,
-    displaced_coordinates,
-    held_at_once,
-    joint_compliances,
-    keeps_conditions,
-    kept_conditions,
-    mass_corrections,
-    observations_at_once,
-)
-from elastocal.fitting.factored import Factored
-from elastocal.fitting.fit_result import Fit
+from elastocal.effects.conditions import at_states
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.observations import part_at, parts_of
-from elastocal.fitting.prediction import residuals
-from elastocal.fitting.whitening import joined, whitening
+from elastocal.fitting.model import conditions, displaced_coordinates, residuals
+from elastocal.fitting.noise import measurement_covariances, of_components
+from elastocal.fitting.observations import groups_by_size, parts_of
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -31,91 +25,215 @@ if TYPE_CHECKING:
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import Observations
-    from elastocal.fitting.whitening import Scaling, Whitening
 
-
+# Correlation beyond which a parameter is not identifiable because of a shape.
+_BOUND_TO_SHAPE = 0.5
 # Columns for each coordinate from which on products by factors cost less than those of the columns written out.
 _COLUMNS_A_COORDINATE = 4
+
+
+def solve_normal(
+    gram: np.ndarray,
+    along: np.ndarray,
+    plausible: np.ndarray,
+    frozen: bool | np.ndarray = False,
+    penalty: float | np.ndarray = 0.0,
+    present: float | np.ndarray = 0.0,
+    nonlinear: bool | np.ndarray = False,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Least squares over the parameters that the data identify, from the normal equations.
+
+    A parameter whose standard error would exceed its plausible size, first beside those before it and then beside all, keeps
+    its value. Nothing is regularised but what carries a prior, as in generalized ridge regression (Hoerl and Kennard,
+    Technometrics 12, 1970).
+
+    `gram` (P, P): products of whitened sensitivities in plausible sizes with each other. `along` (P,): with the whitened
+    residual. `plausible` (P,): plausible size of each parameter. `frozen` (P,) of bool: parameters not to move. `penalty` (P,):
+    one over the variance of the prior about zero; 0 for none. `present` (P,): values from which the step is taken. `nonlinear`
+    (P,) of bool: as in `identifiable`. Returns `step` (P,): zero where held; `covariance` (P, P); `held` (P,) of bool.
+    """
+    gram = gram + np.diag(np.broadcast_to(penalty, len(plausible)) * plausible**2)
+    along = along - plausible * np.broadcast_to(penalty * present, len(plausible))
+    held = ~identifiable(gram, *(np.broadcast_to(flags, len(plausible)) for flags in (frozen, nonlinear)))
+    free = np.flatnonzero(~held)
+    step, covariance = np.zeros(len(plausible)), np.zeros((len(plausible),) * 2)
+    if len(free):
+        inverse = np.linalg.inv(np.linalg.cholesky(gram[np.ix_(free, free)]))
+        step[free] = plausible[free] * (inverse.T @ (inverse @ along[free]))
+        covariance[np.ix_(free, free)] = np.outer(plausible[free], plausible[free]) * (inverse.T @ inverse)
+    return step, covariance, held
+
+
+def identifiable(gram: np.ndarray, frozen: np.ndarray, nonlinear: np.ndarray) -> np.ndarray:
+    """Which parameters the data distinguish from zero at their plausible size: first given those before them, then given all.
+
+    Forward selection in the order given, by the pivots of a Cholesky decomposition, then backward elimination.
+
+    `gram` (P, P): information on the parameters, each in units of its plausible size. `frozen` (P,) of bool: left out from the
+    start. `nonlinear` (P,) of bool: shapes: given up before a parameter that they are bound to, as that of their law is where
+    it is nearly a straight line. Returns (P,) of bool.
+    """
+    kept = np.flatnonzero(~frozen).tolist()
+    while (first := _first_without_information(gram[np.ix_(kept, kept)])) is not None:
+        kept.pop(first)
+    # Parameters that came later may have taken from what identified their predecessors.
+    while kept:
+        covariance = np.linalg.inv(gram[np.ix_(kept, kept)])
+        deviation = np.sqrt(np.diag(covariance))
+        worst = int(np.argmax(deviation))
+        if deviation[worst] <= 1.0:
+            break
+        correlation = np.where(nonlinear[kept], np.abs(covariance[worst]) / (deviation[worst] * deviation), 0.0)
+        shape = int(np.argmax(correlation))
+        kept.pop(shape if correlation[shape] > _BOUND_TO_SHAPE else worst)
+    return np.isin(np.arange(len(gram)), kept)
+
+
+def _first_without_information(gram: np.ndarray) -> int | None:
+    """The first of some parameters that those before it leave not enough information on; None where there is none."""
+    if not len(gram):
+        return None
+    # Where a pivot is not positive, LAPACK says which (from 1), and has those before it.
+    factor, number = dpotrf(gram, lower=1)
+    known = number - 1 if number else len(gram)
+    left_over = np.diag(factor)[:known] ** 2
+    # Rounding of the squares counts as nothing, nor that of a prior which alone makes one.
+    lacking = left_over <= np.maximum(1.0 + 1e-12, 1e-11 * np.diag(gram)[:known])
+    if lacking.any():
+        return int(np.argmax(lacking))
+    return known if number else None
+
+
+@dataclass(frozen=True)
+class Whitening:
+    """What turns correlated rows into independent ones of unit variance.
+
+    `blocks` (ndarray (G, k), ndarray (G, k * rows, k * rows)): for what errs together, k observations each: their indices, and
+    the inverse Cholesky factor of their covariance.
+    """
+
+    blocks: tuple[tuple[np.ndarray, np.ndarray], ...]
+
+    def apply(self, values: np.ndarray) -> np.ndarray:
+        """Whitened values (M, rows, ...)."""
+        (members, factor), *others = self.blocks
+        if not others and (members.ravel() == np.arange(len(values))).all():
+            # One after the other: nothing to gather.
+            return (factor @ values.reshape(*factor.shape[:2], -1)).reshape(values.shape)
+        whitened = np.empty(values.shape)
+        for members, factor in self.blocks:
+            stacked = values[members].reshape(*factor.shape[:2], -1)
+            whitened[members] = (factor @ stacked).reshape(*members.shape, *values.shape[1:])
+        return whitened
+
+    def after(self, maps: np.ndarray) -> Whitening:
+        """What whitens values to each of whose observations a matrix is applied first, ndarray (M, rows, rows)."""
+        blocks = []
+        for members, factor in self.blocks:
+            by_member = factor.reshape(len(members), -1, members.shape[1], maps.shape[1]).swapaxes(1, 2)
+            blocks.append((members, (by_member @ maps[members]).swapaxes(1, 2).reshape(factor.shape)))
+        return Whitening(tuple(blocks))
+
+
+def whitening(observations: Observations, jacobian: np.ndarray | None, noise: Noise) -> Whitening:
+    """Whitening of averaged observations.
+
+    Those of a state share the approach; where poses have an error in common, those of all states of a pose share it.
+
+    `jacobian` (M, rows, n): with respect to the joints; where they do not err it is not looked at. `noise`: of one measurement.
+    """
+    rows, spread, repeats = observations.rows, noise.spread(observations), observations.states.repeats[observations.state]
+    if not noise.pose_rad and not noise.joint_rad.any():
+        std = np.tile(noise.sensor_std(rows), (len(observations), 1))
+        if spread is not None:
+            std *= of_components(spread, rows)
+        return Whitening(((np.arange(len(std))[:, None], (np.sqrt(repeats)[:, None] / std)[..., None] * np.eye(rows)),))
+    assert jacobian is not None
+    blocks = []
+    for members in groups_by_size(observations.cluster if noise.pose_rad else observations.state):
+        stacked = jacobian[members].reshape(len(members), members.shape[1] * rows, -1)
+        state = np.repeat(observations.state[members], rows, axis=1)
+        alike = (state[:, :, None] == state[:, None, :]) / np.repeat(repeats[members], rows, axis=1)[:, None, :]
+        common = noise.pose_rad**2 * (stacked @ stacked.transpose(0, 2, 1))
+        each = None if spread is None else spread[members]
+        covariance = alike * measurement_covariances(noise, jacobian[members], rows, each) + common
+        blocks.append((members, np.linalg.inv(np.linalg.cholesky(covariance))))
+    return Whitening(tuple(blocks))
+
+
+@dataclass
+class _Part:
+    """Some observations beside a model.
+
+    `states`, `seen`: which. `around`: of their states; None where these are too many to keep it: then `coordinates`, at which
+    loads are taken: which are displaced (C',), and to where (S, C'). `line`: at the present estimate, where it is kept.
+    `jacobian` (M', rows, n): with respect to the joints, by which `whitener` was found.
+    """
+
+    states: slice
+    seen: slice
+    observations: Observations
+    around: Conditions | None = None
+    coordinates: tuple[np.ndarray, np.ndarray] | None = None
+    line: Linearization | None = None
+    jacobian: np.ndarray | None = None
+    whitener: Whitening = Whitening(())
 
 
 class Parts:
     """Measurements beside a model, whole or in parts of whole poses: what a step needs of them adds up over the parts.
 
-    Whitening in parts is that of the last step; where the noise has no part of the joints it is always the same. Of states that
-    are too many to keep their conditions, the coordinates are kept at which loads are taken.
-
-    `observations`: M of them. `around`: of all their states; None where these are too many to keep it. `plausible` (P,):
-    plausible size of each parameter.
+    Whitening in parts is that of the last step; where the noise has no part of the joints it is always the same. `around`: of
+    all states; None where these are too many to keep it. `plausible` (P,): plausible size of each parameter.
     """
 
     def __init__(
         self, model: Model, observations: Observations, noise: Noise, around: Conditions | None, plausible: np.ndarray
     ) -> None:
         self.model, self.observations, self.noise, self.plausible = model, observations, noise, plausible
-        held = held_at_once(observations, len(plausible))
-        most = len(observations) if held else observations_at_once(observations.rows, len(plausible))
-        self.slices = parts_of(observations, most)
-        self.whole = len(self.slices) == 1 and around is not None
-        self.parts = [observations] if self.whole else [part_at(observations, *edges) for edges in self.slices]
-        self.around: list[Conditions | None] = [around] if self.whole else [None] * len(self.parts)
-        if not self.whole and around is not None:
-            self.around = [at_states(around, states) for states, _ in self.slices]
+        self.parts = [_Part(*edges) for edges in parts_of(observations, len(plausible))]
+        self.whole = len(self.parts) == 1 and around is not None
+        if around is not None:
+            for part in self.parts:
+                part.around = around if self.whole else at_states(around, part.states)
         # What is whitened over several states has no factors any more, one of which belongs to the state.
         self.factors = not noise.pose_rad or observations.cluster.max() + 1 == len(observations.states)
-        self.coordinates: dict[int, tuple[np.ndarray, np.ndarray]] = {}
-        self.whiteners: dict[int, Whitening | Scaling] = {}
-        # Of so many states that conditions are not kept neither are these.
-        self.jacobians: dict[int, np.ndarray] | None = None if around is None else {}
-        self.line: Linearization | None = None
 
     def copy(self) -> Parts:
         """The same, which goes its own way from here."""
         other = copy(self)
-        other.around, other.coordinates, other.whiteners = self.around.copy(), self.coordinates.copy(), self.whiteners.copy()
-        other.jacobians = None if self.jacobians is None else self.jacobians.copy()
+        other.parts = [copy(part) for part in self.parts]
         return other
 
     def linearize(self, estimate: Estimate) -> None:
         """Go to an estimate."""
         self.estimate = estimate
         if self.whole:
-            self.line = linearize(self.model, estimate, self.observations, self._around(0))
-            self.residual = self.line.residual
+            self.parts[0].line = linearize(self.model, estimate, self.observations, self._around(self.parts[0], estimate))
+            self.residual = self.parts[0].line.residual
         else:
-            self.residual = np.concatenate(
-                [residuals(self.model, estimate, part, self._around(number)) for number, part in enumerate(self.parts)]
-            )
+            self.residual = self._residual(estimate)
 
     def whiten(self) -> None:
         """Take loads and whitening at the present estimate."""
         self.origin = self.estimate
-        if self.line is not None:
-            self.around = [self.line.conditions]
-            jacobian = self.line.coordinate_jacobian[..., : self.model.sites.joints]
-            self.jacobians, self.whiteners = {0: jacobian}, {0: whitening(self.observations, jacobian, self.noise)}
-        elif not self.whiteners:
-            for number, part in enumerate(self.parts):
-                if self.noise.pose_rad or self.noise.joint_rad.any():
-                    self._linearized(number, part)
-                else:
-                    self.whiteners[number] = whitening(part, None, self.noise)
+        for part in self.parts:
+            first, joints = not part.whitener.blocks, self.noise.pose_rad or self.noise.joint_rad.any()
+            if part.line is not None or (first and joints):
+                self._linearized(part)
+            elif first:
+                part.whitener = whitening(part.observations, None, self.noise)
 
     def normal_equations(self, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Gram matrix (P, P) of the whitened sensitivities, in plausible sizes, and their products with the residual, (P,).
-
-        Observations count by their weights, ndarray (M,).
-        """
+        """Gram matrix of the weighted, whitened sensitivities in plausible sizes, and their products with the residual."""
         size = len(self.plausible)
         gram, along, root = np.zeros((size, size)), np.zeros(size), np.sqrt(weights)
-        for number, (part, (_, seen)) in enumerate(zip(self.parts, self.slices, strict=True)):
-            line = self._linearized(number, part) if self.line is None else self.line
-            whitener, mine = self.whiteners[number], root[seen]
-            right = whitener.apply(line.residual * mine[:, None])
-            turned = whitener.after(_of_rotation_vectors(line.residual) * mine[:, None, None])
-            if self.factors and size > _COLUMNS_A_COORDINATE * len(line.displacements.spans):
-                part_gram, part_along = _products(line, turned, right)
-                gram += part_gram
-                along += part_along
+        for part in self.parts:
+            line, mine = part.line or self._linearized(part), root[part.seen]
+            right = part.whitener.apply(line.residual * mine[:, None])
+            turned = part.whitener.after(_of_rotation_vectors(line.residual) * mine[:, None, None])
+            if self.factors and size > _COLUMNS_A_COORDINATE * len(line.columns.spans):
+                _add_products(gram, along, line, turned, right)
             else:
                 left = turned.apply(line.sensitivities).reshape(right.size, size)
                 gram += left.T @ left
@@ -124,104 +242,88 @@ class Parts:
 
     def distance(self) -> np.ndarray:
         """Whitened distance of each observation from the prediction, ndarray (M,)."""
-        return np.sqrt(np.concatenate([(part**2).mean(axis=1) for part in self._whitened(self.residual)]))
+        return np.sqrt((self._whitened(self.residual) ** 2).mean(axis=1))
 
     def squares(self, weights: np.ndarray, estimate: Estimate | None = None) -> float:
         """Sum of squares of the residual, weighted and whitened as in `normal_equations`; of this or another estimate."""
-        residual = self.residual
-        if estimate is not None:
-            found = [residuals(self.model, estimate, part, self._around(n, estimate)) for n, part in enumerate(self.parts)]
-            residual = np.concatenate(found)
-        residual = self._in_axes_of_step(residual, self.estimate if estimate is None else estimate)
-        return float(sum((part**2).sum() for part in self._whitened(residual * np.sqrt(weights)[:, None])))
-
-    def _in_axes_of_step(self, residual: np.ndarray, estimate: Estimate) -> np.ndarray:
-        """A residual in the base axes of an estimate in those of the one by which it is whitened."""
+        residual = self.residual if estimate is None else self._residual(estimate)
+        # A residual in the base axes of an estimate in those of the one by which it is whitened.
+        estimate = estimate or self.estimate
         turn = self.origin.frame_rotation.transpose(0, 2, 1) @ estimate.frame_rotation
-        if (turn == np.eye(3)).all():
-            return residual
-        states, state = self.observations.states, self.observations.state
-        session = np.searchsorted(estimate.sessions, states.session[state])
-        vectors = residual.reshape(len(residual), -1, 3)
-        return (vectors @ turn[session].transpose(0, 2, 1)).reshape(residual.shape)
+        if (turn != np.eye(3)).any():
+            session = np.searchsorted(estimate.sessions, self.observations.states.session[self.observations.state])
+            vectors = residual.reshape(len(residual), -1, 3)
+            residual = (vectors @ turn[session].transpose(0, 2, 1)).reshape(residual.shape)
+        return float((self._whitened(residual * np.sqrt(weights)[:, None]) ** 2).sum())
 
-    def fit(self, estimate: Estimate, held: np.ndarray, covariance: np.ndarray, weights: np.ndarray, converged: bool) -> Fit:
-        """The `Fit` of these measurements."""
-        model, around = self.model, None
-        if self.line is not None:
-            springs = joint_compliances(model, estimate), mass_corrections(model, estimate)
-            around = with_springs(self.line.conditions, *springs)
-            residual = residuals(model, estimate, self.observations, around)
-        else:
-            self.linearize(estimate)
-            residual = self.residual
-            around = kept_conditions(model, estimate, self.observations) if keeps_conditions(self.observations) else None
-        whitener = joined([*self.whiteners.values()], [seen.start for _, seen in self.slices])
-        jacobian = None if self.jacobians is None else np.concatenate([*self.jacobians.values()])
-        around = around if keeps_conditions(self.observations) else None
-        return Fit(model, estimate, self.noise, held, covariance, weights, whitener, residual, jacobian, around, converged)
+    def whitener(self) -> Whitening:
+        """Of all observations."""
+        pairs = [(members + part.seen.start, factor) for part in self.parts for members, factor in part.whitener.blocks]
+        return Whitening(tuple(pairs))
 
-    def _around(self, number: int, estimate: Estimate | None = None) -> Conditions:
-        kept = self.around[number]
-        if kept is not None:
-            return kept
-        states, estimate = self.parts[number].states, estimate or self.estimate
-        if number not in self.coordinates:
+    def jacobian(self) -> np.ndarray | None:
+        """Of all observations with respect to the joints, ndarray (M, rows, n); None where it was not kept."""
+        found = [part.jacobian for part in self.parts if part.jacobian is not None]
+        return np.concatenate(found) if found else None
+
+    def _residual(self, estimate: Estimate) -> np.ndarray:
+        return np.concatenate([residuals(self.model, estimate, p.observations, self._around(p, estimate)) for p in self.parts])
+
+    def _whitened(self, residual: np.ndarray) -> np.ndarray:
+        return np.concatenate([part.whitener.apply(residual[part.seen]) for part in self.parts])
+
+    def _around(self, part: _Part, estimate: Estimate) -> Conditions:
+        """Conditions as they are kept; or at the coordinates that are, or found, which are then kept."""
+        if part.around is not None:
+            return part.around
+        states = part.observations.states
+        if part.coordinates is None:
             around = conditions(self.model, estimate, states)
-            self._keep_coordinates(number, estimate, around)
+            self._keep_coordinates(part, estimate, around)
             return around
-        moved, displaced = self.coordinates[number]
         coordinates = np.zeros((len(states), self.model.sites.chain.coordinates))
-        coordinates[:, moved] = displaced
+        coordinates[:, part.coordinates[0]] = part.coordinates[1]
         return conditions(self.model, estimate, states, coordinates)
 
-    def _keep_coordinates(self, number: int, estimate: Estimate, around: Conditions) -> None:
+    def _keep_coordinates(self, part: _Part, estimate: Estimate, around: Conditions) -> None:
         displaced = displaced_coordinates(self.model, estimate, around)
         moved = np.flatnonzero(displaced.any(axis=0))
-        self.coordinates[number] = moved, displaced[:, moved]
+        part.coordinates = moved, displaced[:, moved]
 
-    def _linearized(self, number: int, part: Observations) -> Linearization:
-        around = self._around(number)
-        line = linearize(self.model, self.estimate, part, around)
-        if self.around[number] is None:
-            self._keep_coordinates(number, self.estimate, around)
-        else:
-            self.around[number] = line.conditions
-        jacobian = line.coordinate_jacobian[..., : self.model.sites.joints]
-        if self.jacobians is not None:
-            self.jacobians[number] = jacobian
-        self.whiteners[number] = whitening(part, jacobian, self.noise)
+    def _linearized(self, part: _Part) -> Linearization:
+        """At the present estimate, by which whitening and loads are then taken; a Jacobian is kept where conditions are."""
+        line = part.line
+        if line is None:
+            around = self._around(part, self.estimate)
+            line = linearize(self.model, self.estimate, part.observations, around)
+            if part.around is None:
+                self._keep_coordinates(part, self.estimate, around)
+        part.whitener = whitening(part.observations, line.joint_jacobian, self.noise)
+        if part.around is not None:
+            part.around, part.jacobian = line.conditions, line.joint_jacobian
         return line
 
-    def _whitened(self, residual: np.ndarray) -> list[np.ndarray]:
-        pairs = zip(self.whiteners.values(), self.slices, strict=True)
-        return [whitener.apply(residual[seen]) for whitener, (_, seen) in pairs]
 
-
-def _products(line: Linearization, turned: Whitening | Scaling, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Gram matrix of the whitened sensitivities and their products with the whitened residual, without the sensitivities."""
-    columns = Factored(line.displacements, turned.apply(line.coordinate_jacobian), line.state)
+def _add_products(gram: np.ndarray, along: np.ndarray, line: Linearization, turned: Whitening, right: np.ndarray) -> None:
+    """Add the products of the whitened sensitivities with each other and with the whitened residual, by their factors."""
+    columns, at = replace(line.columns, jacobian=turned.apply(line.coordinate_jacobian)), line.of_targets
     beside = np.concatenate([turned.apply(line.target_columns), right[..., None]], axis=2)
-    gram, cross, at = columns.gram(), columns.times(beside), line.of_targets
-    own = np.tensordot(beside, beside, ((0, 1), (0, 1)))
+    cross, own = columns.times(beside), np.tensordot(beside, beside, ((0, 1), (0, 1)))
+    gram += columns.gram()
     gram[:, at] += cross[:, :-1]
     gram[at] += cross[:, :-1].T
     gram[np.ix_(at, at)] += own[:-1, :-1]
-    along = cross[:, -1]
+    along += cross[:, -1]
     along[at] += own[:-1, -1]
-    return gram, along
 
 
 def _of_rotation_vectors(residual: np.ndarray) -> np.ndarray:
     """Matrices (M, rows, rows) that turn sensitivities of poses into those of the residual itself.
 
-    Where a pose turns by -w, its rotation vector r grows by w + r x w / 2 + O(r^2): Bortz's equation [1].
-
-    [1] Bortz, J. E., A new mathematical formulation for strapdown inertial navigation, IEEE Transactions on Aerospace and
-        Electronic Systems AES-7, 1971.
+    Where a pose turns by -w, its rotation vector r grows by w + r x w / 2 + O(r^2): Bortz's equation (IEEE Trans. Aerosp.
+    Electron. Syst. 7, 1971).
     """
-    count, rows = residual.shape
-    maps = np.tile(np.eye(rows), (count, 1, 1))
-    if rows > 3:
+    maps = np.tile(np.eye(residual.shape[1]), (len(residual), 1, 1))
+    if residual.shape[1] > 3:
         maps[:, 3:, 3:] += 0.5 * np.cross(residual[:, None, 3:], np.eye(3)).transpose(0, 2, 1)
     return maps

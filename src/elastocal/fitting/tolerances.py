@@ -1,10 +1,9 @@
 """Tolerances of what a campaign declares: every fit of its geometry has one prior, whose size the measurements say.
 
 A robot is off its drawing by so many times what is plausible; one number for all declared geometry, by type II maximum
-likelihood [1], together with how many times the noise taken the measurements scatter. Both come of the declared model alone,
-so that all models of a campaign, with effects and without, have the same geometry beforehand.
-
-[1] Good, I. J., The Estimation of Probabilities: An Essay on Modern Bayesian Methods, MIT Press, 1965.
+likelihood (Good, The Estimation of Probabilities, 1965), together with how many times the noise taken the measurements
+scatter. Both come of the declared model alone, so that all models of a campaign, with effects and without, have the same
+geometry beforehand.
 """
 
 from __future__ import annotations
@@ -14,19 +13,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.fitting.least_squares import ON_THE_WAY, STARTED_FROM, fit
+from elastocal.fitting.least_squares import ON_THE_WAY, STARTED_FROM, fit, registered
+from elastocal.fitting.model import parameter_values
 from elastocal.fitting.noise import FINEST, Noise, chosen_noise
 from elastocal.fitting.observations import sample_of
-from elastocal.fitting.parameters import parameter_values
-from elastocal.fitting.registration import registered
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from elastocal.effects.protocol import Candidate
-    from elastocal.fitting.case import Case
-    from elastocal.fitting.fit_result import Fit
-    from elastocal.fitting.model import Model
+    from elastocal.fitting.least_squares import Fit
+    from elastocal.fitting.model import Case, Model
     from elastocal.fitting.observations import Observations
 
 # Sizes of declared geometry, in plausible sizes: measured robots exceed data-sheet tolerances tenfold, and none is ten times
@@ -36,8 +33,6 @@ SIZES = np.geomspace(0.1, 10.0, 9)
 _FACTORS = np.geomspace(1.0, 1e4, 185)
 # Shares of a prior's variance that measurements leave below this are rounding.
 _ROUNDING = 1e-14
-
-
 # Noise that is taken before anything is known of it, m and rad.
 _ASSUMED = 1e-4
 
@@ -45,7 +40,7 @@ _ASSUMED = 1e-4
 def estimated_noise(case: Case) -> tuple[Noise, list[str]]:
     """Noise from repeats or as declared, from the residual of the declared model where there is neither; and warnings."""
     start = registered(case.model, case.observations)
-    noise, warnings = chosen_noise(case.campaign, case.model, start, case.campaign.measurements)
+    noise, warnings = chosen_noise(case.campaign, case.model, start)
     if noise is None:
         assumed = Noise("residual", _ASSUMED, _ASSUMED, np.zeros(case.campaign.robot.joints))
         # The widest prior leaves nearly what none would leave, without parameters that nothing determines.
@@ -54,8 +49,7 @@ def estimated_noise(case: Case) -> tuple[Noise, list[str]]:
         typical = [max(float(np.sqrt((part**2).mean())), FINEST) for part in (left[:, :3], left[:, -3:])]
         noise = replace(assumed, position_m=typical[0], orientation_rad=typical[1])
         # What parameters have taken of it is given back.
-        wide = fit(model, case.observations, noise, start, settled=ON_THE_WAY)
-        noise = noise.scaled(most_probable(wide)[1])
+        noise = noise.scaled(most_probable(fit(model, case.observations, noise, start, settled=ON_THE_WAY))[1])
     return noise, warnings
 
 
@@ -72,30 +66,24 @@ def declared_geometry(model: Model) -> set[str]:
     return {
         effect.effect
         for effect in model.effects
-        if effect.family != "declared"
-        and all(parameter.prior_std is None or parameter.sized for parameter in effect.parameters)
+        if effect.family != "declared" and all(p.prior_std is None or p.sized for p in effect.parameters)
     }
 
 
 def with_size(model: Model, size: float) -> Model:
     """A declared model with priors of a size, in plausible sizes, on its geometry."""
     sized = declared_geometry(model)
-    effects = tuple(
-        with_prior(effect, [size * parameter.plausible for parameter in effect.parameters])
-        if effect.effect in sized
-        else effect
+    effects = [
+        with_prior(effect, [size * p.plausible for p in effect.parameters]) if effect.effect in sized else effect
         for effect in model.effects
-    )
-    return replace(model, effects=effects)
+    ]
+    return replace(model, effects=tuple(effects))
 
 
 def with_prior(candidate: Candidate, deviations: Sequence[float] | np.ndarray) -> Candidate:
     """A candidate with normal priors about zero whose standard deviations were estimated."""
-    parameters = tuple(
-        replace(parameter, prior_std=float(deviation), sized=True)
-        for parameter, deviation in zip(candidate.parameters, deviations, strict=True)
-    )
-    return replace(candidate, parameters=parameters)
+    pairs = zip(candidate.parameters, deviations, strict=True)
+    return replace(candidate, parameters=tuple(replace(p, prior_std=float(std), sized=True) for p, std in pairs))
 
 
 def most_probable(wide: Fit) -> tuple[float, float]:
@@ -105,7 +93,7 @@ def most_probable(wide: Fit) -> tuple[float, float]:
     its covariance in units of the prior are independent. The noise is no less than the noise taken.
     """
     mine = np.flatnonzero(np.array([parameter.sized for _, parameter in wide.parameters], bool) & ~wide.held)
-    prior = np.array([wide.parameters[number][1].prior_std for number in mine], float)
+    prior = wide.prior_std[mine]
     left, axes = np.linalg.eigh(wide.covariance[np.ix_(mine, mine)] / np.outer(prior, prior))
     left = np.clip(left, _ROUNDING, 1.0)
     shift, seen = axes.T @ (parameter_values(wide.model, wide.estimate)[mine] / prior), 1.0 / left - 1.0
@@ -123,9 +111,6 @@ def most_probable(wide: Fit) -> tuple[float, float]:
 
 
 def effective_parameters(fitted: Fit) -> float:
-    """Numbers that measurements have to determine: free parameters, those with a prior by the share that the prior leaves open.
-
-    Trace of the hat matrix of a ridge regression (Hastie, Tibshirani and Friedman, Elements of Statistical Learning, 3.4.1).
-    """
+    """Free parameters, with a prior the share that it leaves open: trace of a ridge's hat matrix (Hastie et al., 3.4.1)."""
     free = ~fitted.held
     return float(free.sum() - (np.diag(fitted.covariance)[free] / fitted.prior_std[free] ** 2).sum())

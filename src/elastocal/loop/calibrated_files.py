@@ -28,22 +28,20 @@ from elastocal.application.frames import root_mean_square
 from elastocal.campaigns.reading import campaign_files, read_descriptions
 from elastocal.diagnosis.misplaced import point_sentence
 from elastocal.errors import InputError
-from elastocal.fitting.case import noise_from
+from elastocal.fitting.noise import noise_from
 from elastocal.io.json_files import read_json
 from elastocal.io.origin import configuration_sha256
 from elastocal.io.records import check_sources, checksum, jobs_behind
 from elastocal.loop.diagnosis_tables import load_case, rows_left_out, step_model
 from elastocal.remainder.corrected import fitted_again
 from elastocal.remainder.tuning import Spread
-from elastocal.validation.conformity import PASS, UNDECIDED, predicted_conformity
-from elastocal.validation.span import joint_ranges, shortfalls
+from elastocal.validation.conformity import PASS, UNDECIDED, joint_ranges, predicted_conformity, shortfalls
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
-    from elastocal.fitting.case import Case
-    from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.model import Case, Estimate, Model
     from elastocal.fitting.noise import Noise
     from elastocal.io.records import JobRecord
     from elastocal.mechanics.robot import Robot

@@ -13,10 +13,9 @@ from elastocal.diagnosis.diagnose import Diagnosis, Step, diagnose
 from elastocal.diagnosis.next_experiment import propose
 from elastocal.diagnosis.search import initial_screening
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.case import case_from, noise_facts, noise_from
 from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import Estimate
-from elastocal.fitting.parameters import parameters
+from elastocal.fitting.model import Estimate, case_from, parameters
+from elastocal.fitting.noise import noise_facts, noise_from
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_table, write_table
@@ -28,9 +27,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
     from pathlib import Path
 
-    from elastocal.fitting.case import Case
-    from elastocal.fitting.fit_result import Fit
-    from elastocal.fitting.model import Model
+    from elastocal.fitting.least_squares import Fit
+    from elastocal.fitting.model import Case, Model
 
 
 # Parts of an estimate in diagnosis.json: arrays, and an array for each effect.

@@ -20,18 +20,18 @@ from elastocal.diagnosis.gross_errors import entries_of, first_kept, gross_error
 from elastocal.diagnosis.linearize import linearized
 from elastocal.diagnosis.misplaced import misplaced
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.case import Case, case_from
-from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.least_squares import fit
+from elastocal.fitting.model import Case, case_from, joint_compliances
 from elastocal.fitting.tolerances import effective_parameters
 from elastocal.loop.loading import load_campaign
-from elastocal.validation.fitted_range import repeat_warnings
+from elastocal.validation.placing import repeat_warnings
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from elastocal.campaigns.campaign import Measurements
-    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.least_squares import Fit
+    from elastocal.fitting.model import Case
 
 # Held-out poses of which a 95 % interval of an RMS is wider than a factor of two.
 FEWEST_HELD_OUT = 6

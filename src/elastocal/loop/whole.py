@@ -19,10 +19,10 @@ from elastocal.application.calibrated import effect_costs
 from elastocal.campaigns.campaign import columns_of
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.diagnose import diagnose
-from elastocal.diagnosis.judge import judge, residual_blocks, split_table
+from elastocal.diagnosis.judge import judge, residual_blocks
 from elastocal.diagnosis.misplaced import misplaced
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.case import Case, case_from
+from elastocal.fitting.model import Case, case_from
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import write_table
@@ -54,7 +54,6 @@ def judge_campaign(job: Any) -> None:
     verdict = judged(found, held_out, job.params.seed)
     write_json(job.output.verdict, verdict.document, allow_nan=False)
     write_csv(job.output.before_after, pd.DataFrame(verdict.rows))
-    write_csv(job.output.splits, pd.DataFrame(split_table(found, verdict.held_out, job.params.seed)))
     schema = residuals(case.campaign.robot.joints)
     write_table(job.output.residuals, schema, residual_blocks(found, verdict), provenance(job.params, **job.wildcards))
 

@@ -147,8 +147,13 @@ def poses_and_jacobians(
 
 
 def jacobians(chain: Chain, coordinates: np.ndarray, point: MeasuringPoint) -> np.ndarray:
-    """Geometric Jacobian of a measuring point, (..., 6, n): the last of what `poses_and_jacobians` returns."""
-    return poses_and_jacobians(chain, coordinates, point)[2]
+    """Geometric Jacobian of a measuring point, (..., 6, n), as by `poses_and_jacobians`, where its pose is not needed."""
+    components, batch = _component_first(coordinates)
+    jacobian = np.empty((6, chain.coordinates, components.shape[1]))
+    for part in _blocks(components.shape[1]):
+        frames = _walk(chain, components[:, part], point.after)
+        _store_twists(chain, frames, point, _place_point(frames, point)[1], jacobian[:, :, part])
+    return _batch_first(jacobian, batch)
 
 
 @dataclass(frozen=True)

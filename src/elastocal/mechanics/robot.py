@@ -43,8 +43,7 @@ class Tube:
 class Link:
     """A rigid stretch of the chain between two joints, and the tube that it is taken for.
 
-    `after`: how many transforms of the chain come before its far end. `vector_m`: from its near to its far end, in the frame of
-    the chain there.
+    `after`: transforms of the chain before its far end. `vector_m`: from its near end to that, in the frame of the chain there.
     """
 
     after: int

@@ -91,10 +91,9 @@ def robot_from_document(document: Mapping[str, Any], source: str = "robot") -> R
 
 
 def document_of(robot: Robot) -> dict[str, Any]:
-    """A robot as the contents of its file, the inverse of `robot_from_document`.
+    """A robot without elastic links as the contents of its file, the inverse of `robot_from_document`.
 
-    `robot`: without elastic links: their tubes are no data of an arm but of a study. Returns keys as in ``schemas/robot.yaml``;
-    optional ones only where they say something. Lengths stand in the chain as numbers.
+    Optional keys only where they say something; lengths stand in the chain as numbers.
     """
     counted_otherwise = (robot.reported_matrix != np.eye(robot.joints)).any() or robot.reported_offset.any()
     reported = {
@@ -118,11 +117,10 @@ def document_of(robot: Robot) -> dict[str, Any]:
 
 
 def joint_limits(limits_deg: Sequence[Sequence[float]] | None, chain: Chain, source: str) -> np.ndarray:
-    """Joint limits in rad, of prismatic joints in m.
+    """Joint limits (n, 2) in rad, of prismatic joints in m; a turn either way where nothing is known.
 
-    `limits_deg` (float, float): lower and upper limit of each joint; of prismatic ones in metres. None where nothing is known:
-    a turn either way. `chain`: whose joints they are. `source`: named in errors. Returns (n, 2). Raises `InputError` where
-    there are too few or too many, a lower limit is not below the upper one, or those of a prismatic joint lack.
+    `limits_deg`: lower and upper limit of each joint; of prismatic ones in metres. Raises `InputError` where there are too few
+    or too many, a lower limit is not below the upper one, or those of a prismatic joint lack.
     """
     if limits_deg is None and any(chain.prismatic):
         joint = chain.prismatic.index(True) + 1
@@ -147,9 +145,9 @@ def _masses(described: Sequence[dict[str, Any]], joints: int, source: str) -> tu
             raise InputError(source, f"masses[{index}].link", str(entry["link"]), allowed)
     masses = [Mass(**entry | {"centre_m": tuple(map(float, entry["centre_m"]))}) for entry in described]
     masses.sort(key=attrgetter("link"))
-    for one, other in pairwise(masses):
-        if one.link == other.link:
-            raise InputError(source, "masses", f"link {one.link} twice", "each link once, with all that it carries")
+    twice = next((one.link for one, other in pairwise(masses) if one.link == other.link), None)
+    if twice is not None:
+        raise InputError(source, "masses", f"link {twice} twice", "each link once, with all that it carries")
     return tuple(masses)
 
 
@@ -185,8 +183,5 @@ def _links(chain: Chain, described: Mapping[str, Any] | None, source: str) -> tu
     for size in tubes:
         if 2 * size["wall_m"] > size["outer_diameter_m"]:
             raise InputError(source, "links.tubes", f"wall_m {size['wall_m']}", "at most half the outer_diameter_m")
-    each = tubes if len(tubes) > 1 else tubes * len(rigid)
-    return tuple(
-        Link(*stretch, Tube(size["outer_diameter_m"], size["wall_m"], *moduli))
-        for stretch, size in zip(rigid, each, strict=True)
-    )
+    each = [Tube(size["outer_diameter_m"], size["wall_m"], *moduli) for size in tubes] * (len(rigid) // len(tubes))
+    return tuple(Link(*stretch, tube) for stretch, tube in zip(rigid, each, strict=True))

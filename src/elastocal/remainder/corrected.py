@@ -12,27 +12,23 @@ import elastocal.remainder
 from elastocal.campaigns.campaign import BEST_REMAINDER
 from elastocal.campaigns.holdout import blocks_of_poses, configurations
 from elastocal.effects.catalogue import effects, moves_robot
-from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit_frames
 from elastocal.fitting.linearization import effect_columns
+from elastocal.fitting.model import conditions, target_points
 from elastocal.fitting.observations import sample_of, state_clusters
-from elastocal.fitting.prediction import target_points
 from elastocal.io.modules import modules_with
 from elastocal.mechanics.kinematics import poses_and_jacobians
 from elastocal.remainder.protocol import Folds, Inputs
 from elastocal.remainder.tuning import CONFIDENCE, NORMAL_WIDTH, Spread, shrunk, tuned
-from elastocal.validation.fitted_range import beyond_campaign
-from elastocal.validation.held_out import Errors, intervals, position_errors, position_residuals, summary
-from elastocal.validation.left_out import refits
-from elastocal.validation.placing import placed, same_campaign
+from elastocal.validation.held_out import Errors, intervals, position_errors, position_residuals, refits, summary
+from elastocal.validation.placing import beyond_campaign, placed, same_campaign
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from typing import Any
 
-    from elastocal.fitting.case import Case
-    from elastocal.fitting.fit_result import Fit
-    from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.least_squares import Fit
+    from elastocal.fitting.model import Case, Estimate, Model
     from elastocal.fitting.observations import Observations, States
     from elastocal.remainder.protocol import Predictor, Regression
     from elastocal.remainder.tuning import Tuned

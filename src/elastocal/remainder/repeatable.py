@@ -33,7 +33,7 @@ from elastocal.remainder.two_joints import of_two
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.observations import Observations
     from elastocal.remainder.protocol import Inputs
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -49,9 +48,8 @@ NEGLIGIBLE = 1 / 3
 # The last digit of a cost.
 _FINEST_M = 1e-6
 # More than these would fill pages that nobody reads; the tables have them all.
-_MOST_NAMES, _MOST_PARAMETERS, _SHOWN_PARAMETERS, _MOST_BLOCKS = 8, 16, 10, 12
+_MOST_NAMES, _MOST_PARAMETERS, _SHOWN_PARAMETERS = 8, 16, 10
 METRICS = ("mean", "rms", "p95", "max")
-_SPLITS = {"joint space": "block of joint space", "session": "session"}
 # Where a standard error is above this share of the prior's, the measurements say hardly more than the prior.
 MOSTLY_PRIOR = 0.7
 # Letters of a list of places beyond which only the first few are shown.
@@ -96,7 +94,6 @@ def campaign_sentences(
 def loop_facts(
     verdict: Mapping[str, Any],
     steps: Sequence[Mapping[str, Any]],
-    splits: Sequence[dict[str, Any]],
     experiment: Sequence[Mapping[str, Any]],
     table: Mapping[str, np.ndarray],
     descriptions: Mapping[str, Any],
@@ -104,8 +101,8 @@ def loop_facts(
 ) -> dict[str, Any]:
     """Facts for the report of a campaign.
 
-    `verdict`: contents of verdict.json. `steps`, `splits`, `experiment`: rows of before_after.csv, splits.csv and
-    next_experiment.csv. `table`, `parameters` (N,): columns of the residuals and of the parameters of the final model.
+    `verdict`: contents of verdict.json. `steps`, `experiment`: rows of before_after.csv and next_experiment.csv.
+    `table`, `parameters` (N,): columns of the residuals and of the parameters of the final model.
     `descriptions`: contents of campaign.json. Returns JSON-serialisable; strings ready to print, lists for tables.
     """
     faulty, heldout = data_at_fault(verdict), verdict["heldout"]
@@ -126,7 +123,6 @@ def loop_facts(
         "measured": measured_rows(table, descriptions),
         "floor": say.length(heldout["noise_floor_rms_m"]),
         "steps": step_rows(steps, heldout["noise_floor_rms_m"]),
-        "splits": split_rows(splits),
         "effects": [effect_facts(effect, heldout) for effect in verdict["effects"]],
         "experiment": experiment_facts(experiment),
         "compliances": compliance_rows(verdict["compliance_urad_per_Nm"]),
@@ -284,30 +280,6 @@ def step_rows(steps: Sequence[Mapping[str, Any]], floor_m: float | None) -> dict
         row = {"name": say.in_words(step["step"]), "kind": step["kind"], "parameters": str(int(step["parameters"]))}
         rows.append(row | {"training": f"{train:.3f}" if unit == "mm" else f"{train:.0f}", "cells": cells})
     return {"unit": unit, "rows": rows}
-
-
-def split_rows(splits: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Rows of the splits table: what was left out, poses, RMS error before and after, reduction; errors with intervals.
-
-    The held-out poses stand in the table of the steps.
-    """
-    splits = [row for row in splits if row["split"] != "held out"]
-    if not splits:
-        return {"unit": "mm", "rows": [], "left_out": 0, "changed": False}
-    factor, unit = _error_unit([row[f"{stage}_rms_m"] for row in splits for stage in ("before", "after")])
-    changed = any(row["before_rms_m"] != row["after_rms_m"] for row in splits)
-    counts = Counter(row["split"] for row in splits)
-    shown = [row for row in splits if row["block"] == "all" or counts[row["split"]] <= _MOST_BLOCKS]
-    rows = []
-    for row in shown:
-        together, name = row["block"] == "all", _SPLITS[row["split"]]
-        what = f"every {name} in turn" if together else f"{name} {row['block']}"
-        cells = [_cell(row, f"{stage}_rms_m", factor, unit) for stage in ("before", "after")[: 1 + changed]]
-        if changed:
-            fall, interval = _cell(row, "reduction", 100, "%")
-            cells.append([f"{fall} %", interval])
-        rows.append({"name": what, "together": together, "poses": str(int(row["poses"])), "cells": cells})
-    return {"unit": unit, "rows": rows, "left_out": len(splits) - len(shown), "changed": changed}
 
 
 def experiment_facts(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

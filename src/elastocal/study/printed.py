@@ -216,7 +216,8 @@ def joint_table(studies: pd.DataFrame, reference: pd.DataFrame, length: int) -> 
     Returns joints (fixed joints or all joints), cells, differ (after Holm's correction), studies; below (p below the level) and
     statistic (Fisher's), each with the median and the largest of the studies and the p value.
     """
-    rows, printed = [], [*reference[reference.table.isin(["3", "4"])].itertuples()]
+    rows = []
+    printed: list[Any] = [*reference[reference.table.isin(["3", "4"])].itertuples()]
     for joints in ("fixed joints", "all joints"):
         fixed = joints == "fixed joints"
         found = [(predict_scatter(studies, f.robot, f.strategy, f.quantity, length, fixed), f.value) for f in printed]

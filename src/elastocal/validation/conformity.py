@@ -1,12 +1,54 @@
-"""Whether a robot keeps a tolerance, and the risk of being wrong: guarded acceptance after JCGM 106."""
+"""Whether errors say enough of a robot's use, and whether it keeps a tolerance: guarded acceptance after JCGM 106."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from elastocal.campaigns.holdout import configurations
+from elastocal.counting import counted
+from elastocal.fitting.observations import state_clusters
+
+if TYPE_CHECKING:
+    from elastocal.campaigns.campaign import Measurements
+    from elastocal.fitting.observations import States
+    from elastocal.mechanics.robot import Robot
+
+# With so many configurations the largest error bounds 69 % of all others at 95 % confidence; fewer show little more than half.
+FEWEST_CONFIGURATIONS = 8
+# Over this turn an error that goes with the sine of a joint's angle changes by half of its amplitude: over less it is hardly
+# distinguishable from a constant.
+LEAST_TURN_RAD = 2.0 * np.arcsin(0.25)
+# The same of a rail, as a share of its travel.
+LEAST_TRAVEL = 0.1
 PASS, FAIL, UNDECIDED = "pass", "fail", "undecided"
+
+
+def count_configurations(states: States | Measurements) -> int:
+    """How many configurations states or measurements are of."""
+    return int(configurations(states.joint_angles, state_clusters(states)).max()) + 1
+
+
+def joint_ranges(states: States, robot: Robot) -> list[dict[str, Any]]:
+    """Smallest and largest angle of each joint with its unit, degrees or of a rail m, JSON-serialisable."""
+    ends = np.array([states.joint_angles.min(axis=0), states.joint_angles.max(axis=0)]).T
+    units = [(pair, "m") if rail else (np.rad2deg(pair), "deg") for pair, rail in zip(ends, robot.chain.prismatic, strict=True)]
+    return [{"low": float(low), "high": float(high), "unit": unit} for (low, high), unit in units]
+
+
+def shortfalls(judged: int, fitted: States, robot: Robot) -> list[str]:
+    """Why errors at some configurations say too little of a robot: they are too few, or a joint hardly moved."""
+    found = []
+    if judged < FEWEST_CONFIGURATIONS:
+        found.append(f"too few: {counted(judged, 'configuration')}, where at least {FEWEST_CONFIGURATIONS} must judge")
+    moved, rails = np.ptp(fitted.joint_angles, axis=0), np.array(robot.chain.prismatic)
+    least = np.where(rails, LEAST_TRAVEL * np.ptp(robot.joint_limits, axis=1), LEAST_TURN_RAD)
+    for joint in np.flatnonzero(moved < least):
+        sizes = [f"{size:.3g} m" if rails[joint] else f"{np.rad2deg(size):.0f}°" for size in (moved[joint], least[joint])]
+        found.append(f"too close: joint {joint + 1} moved by {sizes[0]}, and {sizes[1]} are needed")
+    return found
 
 
 @dataclass(frozen=True)
@@ -31,17 +73,11 @@ def predicted_conformity(rms_m: np.ndarray, poses: int, tolerance_m: float, acce
     """Decide by the RMS over some poses of robots (draws,) that a fit leaves possible.
 
     The robot passes where the risk that its RMS lies above the tolerance is at most the accepted one, fails where the risk that
-    it lies below is, and is undecided between: acceptance and rejection with guard bands [1].
-
-    [1] JCGM 106:2012, Evaluation of measurement data: the role of measurement uncertainty in conformity assessment, section
-        8.3.
+    it lies below is, and is undecided between: acceptance and rejection with guard bands (JCGM 106:2012, 8.3).
     """
     value, limit = float(np.sqrt((rms_m**2).mean())), float(np.quantile(rms_m, 1.0 - accepted_risk))
     # One more than were drawn, so that no finite number of draws gives certainty.
     risk = float((1.0 + (rms_m > tolerance_m).sum()) / (2.0 + len(rms_m)))
+    decision = PASS if risk <= accepted_risk else FAIL if risk >= 1.0 - accepted_risk else UNDECIDED
     guard = tolerance_m * (1.0 - value / limit) if limit > 0.0 else 0.0
-    return Conformity(_decision(risk, accepted_risk), tolerance_m, value, limit, guard, risk, accepted_risk, poses)
-
-
-def _decision(risk: float, accepted: float) -> str:
-    return PASS if risk <= accepted else FAIL if risk >= 1.0 - accepted else UNDECIDED
+    return Conformity(decision, tolerance_m, value, limit, guard, risk, accepted_risk, poses)

@@ -1,4 +1,4 @@
-"""A fit carried to other measurements: their frames and targets, and the effects that can act there."""
+"""A fit carried to other measurements: their frames and targets, the effects that can act there, and where it extrapolates."""
 
 from __future__ import annotations
 
@@ -6,16 +6,24 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg import blas
 
+from elastocal.campaigns.holdout import beyond_range, find_repeated
+from elastocal.counting import counted
 from elastocal.effects.protocol import LOADED_JOINTS
 from elastocal.fitting.least_squares import fit_frames
-from elastocal.fitting.observations import select_states
+from elastocal.fitting.linearization import linearize
+from elastocal.fitting.model import conditions, of_placement
+from elastocal.fitting.observations import groups_by_size, parts_of, select_states, state_clusters
 
 if TYPE_CHECKING:
-    from elastocal.fitting.case import Case
-    from elastocal.fitting.fit_result import Fit
-    from elastocal.fitting.model import Estimate, Model
+    from elastocal.campaigns.campaign import Measurements
+    from elastocal.fitting.least_squares import Fit
+    from elastocal.fitting.model import Case, Estimate, Model
     from elastocal.fitting.observations import Observations, States
+
+# A share of forces and moments, and N or N m: forces of one cell are stated to a few digits.
+_ROUNDING = 1e-3
 
 
 def placed(fitted: Fit, case: Case, part: Case) -> tuple[Model, Estimate]:
@@ -38,19 +46,19 @@ def same_campaign(case: Case, part: Case) -> bool:
 def placed_estimate(fitted: Fit, observations: Observations) -> Estimate:
     """The estimate of a fit for other observations of its targets, whose sessions it may not have seen.
 
-    A tracker set up anew stands somewhere else: the frame of such a session is fitted to the very observations that test it,
-    six numbers of each session, and so its errors come out slightly too small. Everything else stays.
+    The frame of such a session is fitted to the very observations that test it, six numbers of each session, and so its errors
+    come out slightly too small. Everything else stays.
     """
     found = fitted.estimate
     unseen = ~np.isin(observations.states.session, found.sessions)
     if not unseen.any():
         return found
     there = fit_frames(fitted, fitted.model, select_states(observations, unseen), own_targets=False)
-    sessions = (*found.sessions, *there.sessions)
+    sessions = np.array([*found.sessions, *there.sessions])
     order = np.argsort(sessions)
     return replace(
         found,
-        sessions=tuple(sessions[number] for number in order),
+        sessions=tuple(sessions[order].tolist()),
         frame_rotation=np.concatenate([found.frame_rotation, there.frame_rotation])[order],
         frame_position=np.concatenate([found.frame_position, there.frame_position])[order],
     )
@@ -61,11 +69,115 @@ def carried_over(fitted: Fit, model: Model, states: States) -> Fit:
 
     `states`: of the other campaign.
     """
-    there = model.offered(states) | {*LOADED_JOINTS, "external load"}
+    there, estimate = model.offered(states) | {*LOADED_JOINTS, "external load"}, fitted.estimate
     kept = [n for n, effect in enumerate(fitted.model.effects) if not effect.of_setup and effect.needs <= there]
     known = replace(fitted.model, effects=tuple(fitted.model.effects[n] for n in kept))
-    coefficients, shapes = fitted.estimate.coefficients, fitted.estimate.shapes
-    estimate = replace(
-        fitted.estimate, coefficients=tuple(coefficients[n] for n in kept), shapes=tuple(shapes[n] for n in kept)
-    )
-    return replace(fitted, model=known, estimate=estimate)
+    coefficients, shapes = (tuple(values[n] for n in kept) for values in (estimate.coefficients, estimate.shapes))
+    return replace(fitted, model=known, estimate=replace(estimate, coefficients=coefficients, shapes=shapes))
+
+
+def outside_poses(fitted: Fit, case: Case, held_out: Case) -> np.ndarray:
+    """Which poses lie outside the range of those that a model was fitted to, where it has to extrapolate.
+
+    Either a joint stands beyond the fitted poses by more than chance explains, see `joint_space.beyond_range`; or the model
+    predicts the position less surely than it would have predicted any pose it was fitted to, had that pose been left out. The
+    second finds what ranges joint by joint miss: corners between the poses, loads, times and temperatures beyond those fitted.
+    Poses drawn like the fitted ones pass that maximum with probability 1 / (P + 1) at most, as all are exchangeable: the
+    argument of conformal prediction (Vovk, Gammerman and Shafer 2005).
+
+    `case`: which it was fitted to. Returns (P,) of bool: by `Observations.cluster`.
+    """
+    unseen = held_out.observations
+    if not same_campaign(case, held_out):
+        fitted = carried_over(fitted, held_out.model, unseen.states)
+    own, other = predictive_variances(fitted, case.observations, *placed(fitted, case, held_out), unseen)
+    outside = beyond_campaign(case.observations.states, unseen.states.joint_angles, None) | (other > own.max(initial=0.0))
+    return np.bincount(state_clusters(unseen.states), outside) > 0
+
+
+def repeat_warnings(fitted_states: States | Measurements, states: States | Measurements) -> list[str]:
+    """What to say of poses for the test whose configurations were fitted as well, see `joint_space.find_repeated`, if any."""
+    again = find_repeated(_angles_of_poses(fitted_states), _angles_of_poses(states))
+    if not again.any():
+        return []
+    many = counted(len(again), "validation pose")
+    count = f"{again.sum()} of {many}" if not again.all() else f"all {many}"
+    return [f"{count} repeat configurations that were fitted: these errors say nothing of other poses"]
+
+
+def _angles_of_poses(states: States | Measurements) -> np.ndarray:
+    """Joint angles of each pose, (P, n): its loads and repeats share them."""
+    return states.joint_angles[np.unique(state_clusters(states), return_index=True)[1]]
+
+
+def beyond_campaign(fitted_states: States, joint_angles: np.ndarray, wrench: np.ndarray | None) -> np.ndarray:
+    """Poses and loads beyond those that a campaign measured, before any fit is at hand.
+
+    `joint_angles` (N, n): of the chain, rad. `wrench` (N, 6): N, N m; none where nothing loads the robot. Returns (N,) of bool:
+    by the joint angles as in `outside_poses`, or by its loads.
+    """
+    outside = beyond_range(_angles_of_poses(fitted_states), joint_angles)
+    return outside if wrench is None else outside | beyond_loads(fitted_states, wrench)
+
+
+def beyond_loads(fitted_states: States, wrench: np.ndarray, times: float = 1.0) -> np.ndarray:
+    """Forces or moments, of wrenches (N, 6), that are larger than so many times any of the campaign: bool (N,)."""
+    sizes, largest = (np.linalg.norm(each.reshape(-1, 2, 3), axis=2) for each in (wrench, fitted_states.wrench))
+    return (sizes > (1.0 + _ROUNDING) * times * largest.max(axis=0) + _ROUNDING).any(axis=1)
+
+
+def predictive_variances(
+    fitted: Fit, observations: Observations, model: Model, estimate: Estimate, unseen: Observations
+) -> tuple[np.ndarray, np.ndarray]:
+    """How surely a fit predicts positions: its own poses (P,), each left out in turn, and other states (S,).
+
+    The variance of the least sure reading, m², comes from the parameters alone, each with its normal prior or else one of its
+    plausible size: what the measurements do not identify is as uncertain as that, and a pose that alone identifies a parameter
+    does not make all others look sure. It is the leverage of a prediction; poses are left out by case deletion (Cook and
+    Weisberg 1982) with Woodbury's identity. Frames and targets count only where they are those of the fit.
+
+    `observations`: which it was fitted to. `estimate`: of the fit, for the other observations.
+    """
+    listed, own, other = fitted.parameters, np.zeros(len(observations)), np.zeros(len(unseen))
+    shared = model.targets == fitted.model.targets and set(unseen.states.session) <= set(observations.states.session)
+    kept = shared | ~of_placement(owner for owner, _ in listed)
+    plausible = np.array([parameter.prior_std or parameter.plausible for _, parameter in listed])
+    if not listed:
+        return _largest(own, observations.cluster), _largest(other, unseen.state)
+    gram = np.eye(len(listed))
+    for _, _, white in fitted.sensitivities(observations):
+        rows = (white * plausible).reshape(-1, len(listed))
+        gram += rows.T @ rows
+    root, cluster = np.linalg.inv(np.linalg.cholesky(gram)), observations.cluster
+    for seen, plain, white in fitted.sensitivities(observations):
+        projected, rows = _through(root, plain[:, :3] * (plausible * kept)), _through(root, white * plausible)
+        own[seen] = _variances_left_out(projected, rows, cluster[seen])
+    for _, seen, part in parts_of(unseen, len(listed)):
+        there = linearize(model, estimate, part, conditions(model, estimate, part.states)).sensitivities[:, :3]
+        # Effects come last in the order of the parameters, whatever frames and targets stand before them.
+        there = there[..., there.shape[-1] - kept.sum() :] * plausible[kept]
+        other[seen] = ((there @ root[:, kept].T) ** 2).sum(axis=(1, 2))
+    return _largest(own, cluster), _largest(other, unseen.state)
+
+
+def _through(root: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Rows (M, r, P) times the transpose of a lower triangular matrix (P, P), without its zeros, laid out as BLAS wants it."""
+    return blas.dtrmm(1.0, root.T, rows.reshape(-1, rows.shape[2]).T, lower=0, trans_a=1).T.reshape(rows.shape)
+
+
+def _variances_left_out(projected: np.ndarray, rows: np.ndarray, cluster: np.ndarray) -> np.ndarray:
+    """Variance (M,) of positions without their own poses, by sensitivities through a root, plain (M, 3, P) and whitened."""
+    variance, width = (projected**2).sum(axis=(1, 2)), projected.shape[2]
+    for members in groups_by_size(cluster):
+        own, asked = (each[members].reshape(len(members), -1, width) for each in (rows, projected))
+        across = asked @ own.transpose(0, 2, 1)
+        left = np.eye(own.shape[1]) - own @ own.transpose(0, 2, 1)
+        gained = (across * np.linalg.solve(left, across.transpose(0, 2, 1)).transpose(0, 2, 1)).sum(axis=-1)
+        variance[members] += gained.reshape(*members.shape, -1).sum(axis=-1)
+    return variance
+
+
+def _largest(values: np.ndarray, group: np.ndarray) -> np.ndarray:
+    found = np.zeros(group.max() + 1)
+    np.maximum.at(found, group, values)
+    return found

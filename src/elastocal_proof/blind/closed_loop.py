@@ -51,8 +51,8 @@ if TYPE_CHECKING:
 
     from elastocal.application.calibrated import CalibratedRobot
     from elastocal.diagnosis.diagnose import Diagnosis
-    from elastocal.fitting.case import Case
-    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.least_squares import Fit
+    from elastocal.fitting.model import Case
     from elastocal.mechanics.robot import Robot
     from elastocal_proof.plant.bad_rows import Slip
     from elastocal_proof.plant.campaigns import Table

@@ -28,11 +28,12 @@ from elastocal.diagnosis.linearize import linearized
 from elastocal.diagnosis.refit import fit_with_sizes
 from elastocal.diagnosis.search import initial_screening
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.case import Case, noise_from
+from elastocal.fitting.model import Case
+from elastocal.fitting.noise import noise_from
 from elastocal.fitting.tolerances import fit_declared
 from elastocal.io.json_files import read_json, write_json
 from elastocal.loop.whole import cases_in
-from elastocal.validation.fitted_range import outside_poses
+from elastocal.validation.placing import outside_poses
 from elastocal_proof.blind.cases import NAMED, absent_on, defects_of, yardstick_of
 from elastocal_proof.blind.cases import Case as BlindCase
 from elastocal_proof.blind.folders import load_ground_truth
@@ -44,7 +45,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from elastocal.effects.protocol import Candidate
-    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.least_squares import Fit
     from elastocal_proof.blind.cases import Plan
     from elastocal_proof.plant.physical_robot import PhysicalRobot
     from elastocal_proof.plant.sizing import Yardstick

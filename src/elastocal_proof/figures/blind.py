@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import StrMethodFormatter
 
+from elastocal.campaigns.reading import read_robot
 from elastocal.figures.style import PALETTE, ink_on, note, panels, save, styled
 from elastocal.io.origin import Origin
 from elastocal_proof.blind.cases import PROOF, TUNED
@@ -19,7 +21,7 @@ from elastocal_proof.blind.scores import leading
 from elastocal_proof.blind.summary import rows_of, with_target
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
@@ -175,8 +177,11 @@ def draw_blind(job: Any) -> None:
 
 
 @styled
-def closed_loop(table: pd.DataFrame) -> Figure:
-    """What a robot misses after its targets were corrected, by part and by the model that corrected them."""
+def closed_loop(table: pd.DataFrame, names: Mapping[str, str]) -> Figure:
+    """What a robot misses after its targets were corrected, by part and by the model that corrected them.
+
+    `names`: of the robots, by those of their files.
+    """
     robots = [robot for robot in dict.fromkeys(table["robot"]) if robot != "all"]
     figure, axes = panels(1, len(_PARTS), 62, sharey=True, sharex=True)
     for axis, (part, words) in zip(axes[0], _PARTS.items(), strict=True):
@@ -184,7 +189,9 @@ def closed_loop(table: pd.DataFrame) -> Figure:
             mine = table[(table["part"] == part) & (table["robot"] == robot)].set_index("model").loc[list(_MODELS)]
             place = np.arange(len(_MODELS))[::-1] + 0.22 * (0.5 * (len(robots) - 1) - number)
             limits = np.abs(mine[["rms_mm_low", "rms_mm_high"]].to_numpy().T - mine["rms_mm"].to_numpy())
-            axis.errorbar(mine["rms_mm"], place, xerr=limits, fmt="o", ms=3.5, lw=1.2, color=PALETTE[number], label=robot)
+            axis.errorbar(
+                mine["rms_mm"], place, xerr=limits, fmt="o", ms=3.5, lw=1.2, color=PALETTE[number], label=names[robot]
+            )
         axis.set_xscale("log")
         axis.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
         axis.set_title(words)
@@ -197,4 +204,6 @@ def closed_loop(table: pd.DataFrame) -> Figure:
 
 def draw_closed_loop(job: Any) -> None:
     """The picture, from reports/closed_loop/closed_loop.csv."""
-    save(closed_loop(pd.read_csv(job.input.summary)), job.output.figure, job.output.picture, Origin(**job.config["origin"]))
+    names = {Path(path).stem: read_robot(Path(path)).name for path in job.input.robots}
+    figure = closed_loop(pd.read_csv(job.input.summary), names)
+    save(figure, job.output.figure, job.output.picture, Origin(**job.config["origin"]))

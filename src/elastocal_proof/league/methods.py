@@ -13,7 +13,7 @@ from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.refit import squares_explained
 from elastocal.diagnosis.settings import Settings
 from elastocal.errors import InputError
-from elastocal.fitting.case import Case, case_from
+from elastocal.fitting.model import Case, case_from
 from elastocal.fitting.tolerances import estimated_noise, fit_declared
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.provenance import provenance
@@ -24,9 +24,8 @@ from elastocal.loop.schemas import measurements
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.random_streams import stream
 from elastocal.remainder.corrected import Plan, corrected, regressions
-from elastocal.validation.fitted_range import outside_poses
 from elastocal.validation.held_out import position_residuals
-from elastocal.validation.placing import placed
+from elastocal.validation.placing import outside_poses, placed
 from elastocal_proof.league.schemas import ENTRIES, FITS, FOLDS, MECHANISMS
 
 if TYPE_CHECKING:
@@ -35,7 +34,8 @@ if TYPE_CHECKING:
 
     from elastocal.campaigns.campaign import Measurements
     from elastocal.diagnosis.diagnose import Diagnosis
-    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.least_squares import Fit
+    from elastocal.fitting.model import Case
 
     Columns = Mapping[str, np.ndarray]
 

@@ -20,11 +20,9 @@ from elastocal.application.planning.plan import (
 )
 from elastocal.campaigns.campaign import Target
 from elastocal.errors import InputError
-from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit
+from elastocal.fitting.model import conditions, parameters, predict
 from elastocal.fitting.noise import Noise
-from elastocal.fitting.parameters import parameters
-from elastocal.fitting.prediction import predict
 from elastocal.mechanics.robot_file import robot_from_document
 
 

@@ -42,12 +42,10 @@ from elastocal.effects.catalogue import declared_candidates
 from elastocal.effects.elastic import joint_compliance
 from elastocal.effects.gravity import declared_weight
 from elastocal.errors import InputError
-from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.model import Estimate, Model
+from elastocal.fitting.model import Estimate, Model, conditions, parameters
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import Observations, States
-from elastocal.fitting.parameters import parameters
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.sites import sites_of
 
