@@ -15,14 +15,3 @@ def at_once():
     begin = time.process_time()
     yield
     assert time.process_time() - begin < _AT_ONCE_S
-
-
-def growth(few, many):
-    """CPU time of the second function over that of the first, the least of three calls of each, in turn."""
-    least = [float("inf")] * 2
-    for _ in range(3):
-        for number, function in enumerate((few, many)):
-            begin = time.process_time()
-            function()
-            least[number] = min(least[number], time.process_time() - begin)
-    return least[1] / least[0]

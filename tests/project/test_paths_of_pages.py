@@ -9,7 +9,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [
-    *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "paper/paper.md")),
+    *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CODE_OF_CONDUCT.md", "paper/paper.md")),
     *sorted((ROOT / "docs").rglob("*.md")),
     *(ROOT / name for name in ("config/README.md", "benchmarks/README.md")),
 ]
@@ -17,7 +17,7 @@ PAGES = [
 PATH = re.compile(r"`((?:[\w.-]+/)*[\w-]+\.(?:py|smk|yaml|csv|typ|txt|toml|cff|lock|sh)|(?:[\w.-]+/)+)`")
 # What commands make, what a reader has, and places for names of one's own.
 MADE = re.compile(
-    r"^(?:(?:reports|results|profiles|site|data/(?:simulated|campaigns|public))/|campaigns/(?!importers))|^(?:/|\.)|NAME|CAMPAIGN|a/(?:test_)?b\.py$"
+    r"^(?:(?:reports|results|profiles|site|data/(?:simulated|campaigns|public))/|campaigns/(?!importers))|^(?:/|\.)|NAME|CAMPAIGN|\.rst$|a/(?:test_)?b\.py$"
 )
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 PACKAGE, PROOF = ROOT / "src/elastocal", ROOT / "src/elastocal_proof"
@@ -25,7 +25,10 @@ TOPS = [ROOT, ROOT / "src", PACKAGE, PROOF, PACKAGE / "diagnosis", PROOF / "blin
 
 
 def paths_of(page):
-    return sorted({path for path in PATH.findall(page.read_text(encoding="utf-8")) if "/" in path and not MADE.search(path)})
+    """Those in backticks and those that links lead to."""
+    text = page.read_text(encoding="utf-8")
+    links = {link for link in re.findall(r"\]\(([^)#\s]+)\)", text) if "://" not in link}
+    return {path for path in links | {*PATH.findall(text)} if (path in links or "/" in path) and not MADE.search(path)}
 
 
 def test_every_path_that_a_page_names_is_there():
