@@ -8,10 +8,8 @@ from elastocal.effects import catalogue
 
 TESTS = Path(__file__).resolve().parent
 SOURCES = [TESTS.parent / "src" / name for name in ("elastocal", "elastocal_proof")]
-PACKAGE = SOURCES[0]
+# Tests of the catalogue and of closed forms go through all of them.
 EFFECTS = {f"effects/{effect.listed.__module__.rpartition('.')[2]}.py" for effect in catalogue.effects().values()}
-# Each of these goes through the catalogue: an effect that is new is tested by itself, or fails by its name.
-OF_EVERY_EFFECT = ("effects/test_closed_forms.py", "effects/test_catalogue.py")
 
 
 def modules():
@@ -28,18 +26,8 @@ def test_a_module_has_a_file_of_tests_of_its_name(module):
     assert there, f"{module} has no tests in {mirror.relative_to(TESTS.parent)}"
 
 
-def test_no_module_of_the_proof_has_the_tests_of_one_of_the_tool():
-    """A room of one name in both packages has one folder of tests."""
-    assert len(modules()) == len(set(modules()))
-
-
 @pytest.mark.parametrize("room", [path for top in SOURCES for path in top.rglob("__init__.py")], ids=str)
 def test_a_room_that_only_says_what_it_is_needs_no_tests(room):
     """What an `__init__` would do is in no mirror."""
     text = room.read_text(encoding="utf-8")
     assert "\ndef " not in text and "\nclass " not in text
-
-
-@pytest.mark.parametrize("path", OF_EVERY_EFFECT)
-def test_effects_are_tested_one_by_one_as_the_catalogue_lists_them(path):
-    assert "catalogue.effects()" in (TESTS / path).read_text(encoding="utf-8")

@@ -7,8 +7,6 @@ import pinocchio as pin
 import pytest
 from support import ODD_CHAINS, OTHER_CHAINS, PinocchioPoint, robot_of
 from synthetic import (
-    conditions_on,
-    displacements,
     made_estimate,
     made_model,
     made_states,
@@ -17,7 +15,7 @@ from synthetic import (
 )
 
 from elastocal.effects.catalogue import candidates_on
-from elastocal.effects.conditions import conditions_of, offered, with_springs
+from elastocal.effects.conditions import conditions_of, offered
 from elastocal.effects.gravity import declared_weight
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import conditions, displaced_coordinates, parameters
@@ -96,23 +94,6 @@ def test_masses_and_compliances_have_exact_sensitivities_with_all_that_they_load
     moving = largest > 0
     assert moving.sum() >= 6 * identified + 20
     np.testing.assert_allclose(found[..., moving] / largest[moving], expected[..., moving] / largest[moving], rtol=0, atol=2e-4)
-
-
-@pytest.mark.parametrize("name", ["fanuc", *ODD_CHAINS])
-@pytest.mark.parametrize("some", [slice(None), slice(2, None, 3), slice(1, 2)])
-def test_growth_of_gravity_with_each_correction_is_its_slope_on_the_coordinates_asked_for(fanuc, name, some):
-    robot = weighed(fanuc if name == "fanuc" else robot_of(ODD_CHAINS[name]))
-    around = conditions_on(robot, made_states(robot.joints, 5, seed=8))
-    coordinates = np.arange(around.sites.chain.coordinates)[some]
-    found = list(around.gravity_of_corrections(coordinates))
-    assert len(found) == len(around.mass_corrections) >= 4
-    for number, grown in enumerate(found):
-        step = np.zeros(len(around.mass_corrections))
-        step[number] = 0.5
-        change = (with_springs(around, around.compliance, step).gravity - around.gravity)[:, coordinates] / 0.5
-        np.testing.assert_allclose(grown, change.T, rtol=0, atol=1e-10)
-    made = displacements(declared_weight(around.sites), around)[..., : robot.joints]
-    np.testing.assert_allclose(made, around.mass_torques * around.compliance, rtol=1e-14)
 
 
 def test_priors_are_those_of_the_robot_file(fanuc):

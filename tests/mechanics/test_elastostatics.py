@@ -19,25 +19,6 @@ from elastocal.mechanics.robot import Tube
 from elastocal.study.simulation import true_deflections
 
 
-def transported(wrench, from_position, to_position):
-    """A wrench stated at another point of the same rigid body: M' = M + (p - p') x F."""
-    force, moment = wrench[..., :3], wrench[..., 3:]
-    return np.concatenate([force, moment + np.cross(from_position - to_position, force)], axis=-1)
-
-
-def test_wrench_at_a_partial_point_gives_the_torques_of_the_end_effector_jacobian(robot):
-    loads = random_loads(robot, 2, 4)
-    end = robot.chain.end_effector
-    torques = joint_torques(robot.chain, loads.joint_angles, loads.wrench, end)
-    at_end = poses(robot.chain, loads.joint_angles, end)[0]
-    for point in robot.chain.points:
-        there = poses(robot.chain, loads.joint_angles, point)[0]
-        found = joint_torques(robot.chain, loads.joint_angles, transported(loads.wrench, at_end, there), point)
-        before = len(robot.chain.moved_by(point))
-        np.testing.assert_allclose(found[..., :before], torques[..., :before], rtol=0, atol=1e-9)
-        assert (found[..., before:] == 0).all()
-
-
 def test_offset_that_turns_with_the_tool_loads_the_joints_as_a_force_at_that_target(robot):
     loads = random_loads(robot, 2, 4)
     force, end = loads.wrench[..., :3], robot.chain.end_effector

@@ -49,13 +49,11 @@ def test_a_document_reads_its_data_and_pictures_as_they_were_given(written, pict
     "document, data, pictures, error, message",
     [
         ("made.typ", {"facts": float("nan")}, [], ValueError, "JSON"),
-        ("made.typ", {"facts": float("inf")}, [], ValueError, "JSON"),
         ("made.typ", DATA, ["missing.pdf"], FileNotFoundError, "missing.pdf"),
         ("made.typ", DATA, [], typst.TypstError, "picture.pdf"),
         ("broken.typ", {}, [], typst.TypstError, "nothing-of-this-name"),
         ("unknown.typ", {}, [], FileNotFoundError, "unknown.typ"),
     ],
-    ids=["not a number", "infinite", "no such picture", "picture not given", "broken document", "no such document"],
 )
 def test_what_cannot_be_compiled_leaves_the_earlier_pdf_as_it_was(written, document, data, pictures, error, message):
     (written / "report.pdf").write_text("earlier", encoding="utf-8")

@@ -10,8 +10,6 @@ from pathlib import Path
 import pytest
 from study_folder import Study
 
-from elastocal.command.main import app
-
 ROOT = Path(__file__).resolve().parents[2]
 SECTION = "## From a robot and a tracker to a corrected robot"
 
@@ -36,8 +34,6 @@ def test_each_command_and_option_of_the_readme_is_one_of_the_script():
     # A plan before a diagnosis, a diagnosis before what is made of it.
     order = [named(words) for words in run]
     assert order.index("plan") < order.index("check") < order.index("diagnose") < order.index("correct")
-    known = {command.callback.__name__ for command in app.registered_commands}
-    assert {name for name in map(named, shown) if " " not in name} <= known
     used = {named(words): set() for words in run}
     for words in run:
         used[named(words)] |= {word for word in words if word.startswith("--")}
