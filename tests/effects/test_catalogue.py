@@ -41,7 +41,6 @@ TABLE = {
     "drift": "thermal_growth, temperature_gradient, frame_drift, setup_step",
 }
 FAMILIES = {name: family for family, names in TABLE.items() for name in names.split(", ")}
-CAUSES = ("temperature", "time")
 CHAINS = ["fanuc", "fixed rotations", *ODD_CHAINS]
 UNITS = {
     *("rad", "m", "N", "kg", "kg m", "1", "rad/rad", "m/m", "1/K", "m/h", "rad/h"),

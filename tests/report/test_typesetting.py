@@ -4,9 +4,9 @@ from importlib import resources
 
 import pytest
 import typst
+from drawn_figures import empty_pictures
 from jinja2 import UndefinedError
 
-from elastocal.figures.style import panels
 from elastocal.report.typesetting import compile_document, sentences
 from elastocal.report.words import FILTERS
 
@@ -32,15 +32,8 @@ def written(tmp_path, monkeypatch):
     return results
 
 
-@pytest.fixture(scope="module")
-def picture(tmp_path_factory):
-    path = tmp_path_factory.mktemp("figures") / "picture.pdf"
-    panels(1, 1, 20)[0].savefig(path)
-    return path.as_posix()
-
-
-def test_a_document_reads_its_data_and_pictures_as_they_were_given(written, picture):
-    compile_document(written / "made.pdf", "made.typ", DATA, [picture])
+def test_a_document_reads_its_data_and_pictures_as_they_were_given(written, tmp_path):
+    compile_document(written / "made.pdf", "made.typ", DATA, empty_pictures(tmp_path, ["picture"]))
     assert (written / "made.pdf").read_bytes().startswith(b"%PDF")
     assert [file.name for file in written.iterdir()] == ["made.pdf"]
 
