@@ -58,7 +58,10 @@ def test_what_a_job_wrote_is_checked_by_the_next(job):
     ("fault", "line"),
     [
         (InputError("a.csv", "row 1", "x", "y"), "a.csv: row 1: found x; allowed: y"),
-        (OSError(errno.ENOSPC, "No space left on device"), f"{OUTPUT}: found No space left on device; allowed: a place with"),
+        (
+            OSError(errno.ENOSPC, "No space left on device"),
+            f"{OUTPUT}: found No space left on device; allowed: a file or folder",
+        ),
         (PermissionError(errno.EROFS, "Read-only file system", "results/x"), "results/x: found Read-only file system; "),
         (MemoryError(), "memory: found none left; allowed: a smaller file, more memory, or fewer jobs"),
     ],
