@@ -77,8 +77,8 @@ def test_a_process_predicts_within_the_noise_and_its_intervals_hold_and_grow_out
 
 def test_a_process_with_values_at_few_places_still_learns_from_all_observations(monkeypatch):
     """A tenth of the places: the error stays half of that of a process that knows these observations alone."""
-    (inputs, residual), (there, _) = made_inputs(400, seed=1), made_inputs(300, seed=2, width=1.3)
-    found = {}
+    (inputs, residual), (there, _), found = made_inputs(400, seed=1), made_inputs(300, seed=2, width=1.3), {}
+    monkeypatch.setattr(regressions, "_AT_ONCE", 150)
     for most, count in ((400, 400), (40, 400), (40, 40)):
         monkeypatch.setattr(regressions, "_MOST", most)
         process = fitted("gaussian_process", inputs.select(slice(count)), residual[:count])
