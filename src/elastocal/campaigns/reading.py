@@ -179,13 +179,13 @@ def find_degrees(reported: np.ndarray, robot: Robot) -> np.ndarray:
     low, high = robot.joint_limits.T
     farthest = max(FARTHEST_RAD, np.abs(robot.joint_limits).max())
 
-    def inside(reported: np.ndarray, margin: float = 0.0) -> np.ndarray:
+    def off(reported: np.ndarray) -> np.ndarray:
         angles = robot.model_angles(reported)
-        return (angles >= low - margin) & (angles <= high + margin)
+        return np.asarray(np.maximum(low - angles, angles - high))
 
     # An angle that its opposite would bring inside the limits has rather a wrong sign, which is for the diagnosis to trace.
-    beyond = ~inside(reported, _BEYOND_LIMITS_RAD) & ~inside(-reported, _BEYOND_LIMITS_RAD)
-    return np.asarray((np.abs(reported) > farthest) | (beyond & inside(np.radians(reported))))
+    beyond = np.minimum(off(reported), off(-reported)) > _BEYOND_LIMITS_RAD
+    return np.asarray((np.abs(reported) > farthest) | (beyond & (off(np.radians(reported)) <= 0)))
 
 
 def _check_angles(reported: np.ndarray, table: Cells, robot: Robot) -> None:
