@@ -62,6 +62,8 @@ def test_residuals_of_poses_stand_beside_the_measurements_in_the_positions_that_
     whole = columns_of(some)
     assert all((columns[name] == whole[name]).all() for name in ("row", "q2", "mz", "time_s"))
     assert columns["outside_range"].tolist() == [False, True]
+    own = {"held_out", "gross_error", "outside_range", *(name for name in columns if name.startswith(("before", "after")))}
+    assert columns.keys() - own == {*PLAIN, "time_s"}
 
 
 @given(st.lists(st.tuples(st.integers(-2, 2), st.integers(-2, 2), st.integers(0, 1)), min_size=1, max_size=30))
