@@ -1,22 +1,17 @@
 """The compiled arm and its equilibria against the analysis' own model, pinocchio, MuJoCo's inverse dynamics, closed forms."""
 
-from dataclasses import replace
 from itertools import cycle
 
 import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
-from analysed_robots import ROBOTS, analysed
-from arms_at_rest import STATES, angles_and_wrenches, arm_of, at_rest, forces_at
+from arms_at_rest import angles_and_wrenches, arm_of, at_rest, forces_at
 from support import OTHER_CHAINS, robot_of
 
 from elastocal.errors import InputError
-from elastocal.mechanics.elastostatics import extended_chain, spring_compliance, with_tube
 from elastocal.mechanics.elastostatics import generalized_forces as joint_torques
 from elastocal.mechanics.kinematics import pose_differences, poses, poses_and_jacobians
-from elastocal.mechanics.robot import Tube
-from elastocal_proof.plant.arm import arm_from_file
 from elastocal_proof.plant.machine import (
     Compensator,
     Mass,
@@ -77,30 +72,6 @@ def test_chains_of_three_to_seven_joints_that_turn_backwards_are_read_and_bend_a
     assert_unloaded_poses_alike(arm, robot, angles)
     wanted = linear_deflections(robot.chain, angles, wrench, np.diag(robot.compliance))
     np.testing.assert_allclose(deflections(arm, angles, wrench), wanted, atol=2e-8)
-
-
-def test_a_tube_in_segments_bends_twists_and_stretches_as_the_catalogues_cantilever():
-    arm, robot = arm_from_file(ROBOTS / "kuka.yaml"), analysed("kuka")
-    tube = Tube(0.25, 0.02, 70e9, 26e9)
-    robot = replace(robot, links=with_tube(analysed("kuka_extended"), tube).links)
-    inner = tube.outer_diameter_m - 2 * tube.wall_m
-    second = np.pi * (tube.outer_diameter_m**4 - inner**4) / 64
-    area = np.pi * (tube.outer_diameter_m**2 - inner**2) / 4
-    mine = TaperedTube(70e9 * second, 2 * 26e9 * second, 70e9 * area)
-    long = {number: mine for number, stretch in enumerate(arm.stretches) if stretch.vector_m.any()}
-    angles, wrench = angles_and_wrenches(arm, force=10.0)
-    chain = extended_chain(robot)
-    coordinates = np.zeros((STATES, chain.coordinates))
-    coordinates[:, : arm.joints] = angles
-    wanted = linear_deflections(chain, coordinates, wrench, spring_compliance(robot))
-    worst = []
-    for segments in (2, 4, 8):
-        found = deflections(arm, angles, wrench, structure=Structure(tubes=long, segments=segments))
-        off = np.linalg.norm((found - wanted)[..., :3], axis=-1)
-        worst.append(np.sqrt((off**2).mean() / (np.linalg.norm(wanted[..., :3], axis=-1) ** 2).mean()))
-    # The midpoint rule misses l^3 / 12 n^2 EI of l^3 / 3 EI.
-    assert worst[2] < 5e-4
-    assert worst[0] / worst[1] == pytest.approx(4.0, rel=0.1)
 
 
 def test_weight_turns_the_joints_as_pinocchio_says(arm):
