@@ -69,10 +69,9 @@ def test_the_regression_corrects_what_physics_does_not_have(elastocal, regressed
     commands = robot.reported_angles(0.5 * (states.joint_angles[1:] + states.joint_angles[:-1]))
     position, _ = nominal_forward(robot, commands)
     path = path_of(commands, tmp_path, **columns_of(commands))
+    words = "correct", "smooth", path, "--output", tmp_path / "t.csv", "--partial", "--allow-large-steps"
     for flags, corrected in (((), found), (("--physics-only",), found.by_physics())):
-        result = elastocal(
-            "correct", "smooth", path, "--output", tmp_path / "t.csv", "--partial", "--allow-large-steps", *flags
-        )
+        result = elastocal(*words, *flags)
         assert ("Gaussian process" in result.stderr) == (not flags)
         targets = pd.read_csv(tmp_path / "t.csv")
         good = (targets["status"] == "ok").to_numpy()

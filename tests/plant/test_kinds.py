@@ -22,10 +22,8 @@ def test_every_effect_of_the_catalogue_can_be_a_defect():
 def test_a_defect_of_no_size_leaves_the_robot_as_it_was_and_a_plausible_one_does_not(yardstick, fanuc_specimen, kind):
     defect = drawn_defect(kind, fanuc_specimen.arm, 3)
     tiny = replace(defect, size=1e-9 * defect.size)
-    assert yardstick.signal(with_defects(fanuc_specimen, [tiny])).rms_m < 1e-9
-    signal = yardstick.signal(with_defects(fanuc_specimen, [defect]))
-    assert signal.raw > 0.1
-    assert 0 <= signal.retained <= signal.raw * (1 + 1e-9)
+    small, signal = (yardstick.signal(with_defects(fanuc_specimen, [each])) for each in (tiny, defect))
+    assert small.rms_m < 1e-9 and signal.raw > 0.1 and 0 <= signal.retained <= signal.raw * (1 + 1e-9)
 
 
 def test_a_defect_is_refused_where_it_cannot_be_or_is_too_large(fanuc_specimen):
