@@ -1,5 +1,6 @@
 """Joint angles for wanted poses: found again, within limits, without jumps, or known to be out of reach."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +9,7 @@ from analysed_robots import analysed
 
 from elastocal.application.inverse_kinematics import (
     SOLVED_M,
+    _least_motion,
     allowed_steps,
     along_path,
     find_beyond_limits,
@@ -31,6 +33,23 @@ def test_a_path_about_the_base_does_not_swing_where_a_turn_lies_within_the_limit
     assert left.max() < SOLVED_M and not find_beyond_limits(robot, found).any()
     np.testing.assert_allclose(np.degrees(found[:, 0]), np.degrees(angles[:, 0]), atol=1e-4)
     assert np.degrees(np.abs(np.diff(found, axis=0)).sum()) == pytest.approx(12.0, abs=1e-3)
+
+
+def test_the_least_motion_is_the_best_of_all_ways_through_all_postures_and_turns():
+    draws = np.random.default_rng(2)
+    counts, limits, weight = (1, 2, 3), np.array([[-4.0, 4.0], [-4.0, 7.0], [-4.0, 14.0]]), 1e4
+    for _ in range(10):
+        lowest, allowed = draws.uniform(-3, 3, (2, 4, 3)), draws.uniform(0.5, 3, (3, 3))
+        copies = [lowest[..., j, None] + 2 * np.pi * np.arange(count) for j, count in enumerate(counts)]
+        turns = 2 * np.pi * np.array(list(itertools.product(*map(range, counts))))
+        ways = np.stack([(lowest[:, row, None] + turns).reshape(-1, 3) for row in range(4)], axis=1)
+        shortest = np.where((ways[:, 0] > limits[:, 1]).any(axis=1), np.inf, 0.0)
+        for row in range(1, 4):
+            step = np.abs(ways[:, None, row] - ways[None, :, row - 1])
+            cost = (step + weight * np.maximum(step - allowed[row - 1], 0.0)).sum(axis=2)
+            shortest = (cost + shortest).min(axis=1) + np.where((ways[:, row] > limits[:, 1]).any(axis=1), np.inf, 0.0)
+        step = np.abs(np.diff(_least_motion(copies, limits, np.zeros((2, 4)), allowed), axis=0))
+        assert (step + weight * np.maximum(step - allowed, 0.0)).sum() == pytest.approx(shortest.min(), abs=1e-2)
 
 
 def test_a_step_may_be_five_times_what_the_path_turns_and_ten_degrees():
