@@ -22,7 +22,7 @@ from elastocal.fitting.model import Case
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.tolerances import fit_declared
 from elastocal.loop.whole import cases_in
-from elastocal.remainder.corrected import Plan, corrected, inputs_of
+from elastocal.remainder.corrected import corrected, inputs_of
 from elastocal.remainder.repeatable import repeatable_part
 from elastocal.validation.held_out import position_residuals
 from elastocal.validation.placing import placed
@@ -92,10 +92,10 @@ if __name__ == "__main__":
             if asked.check:
                 continue
             alone = position_residuals(*placed(fitted, case, held_out), held_out.observations)
-            found = corrected(Plan("auto", blocks=False, within_range=True, seed=seed), fitted, case, held_out)
+            found = corrected(fitted, case, held_out, "auto", blocks=False, within_range=True, seed=seed)
             squares = [(off**2).sum(axis=1) for off in (alone, found.residual, chance)]
             off = squares[1] - squares[0]
-            used += found.chosen.regression is not None
+            used += found.predictor is not None
             worse += off.mean() > off.std(ddof=1) / np.sqrt(len(off)) > 0.0
             errors.append([each.mean() for each in squares])
         rates = ", ".join(f"p <= {level}: {np.mean(np.array(p_values) <= level):.3f}" for level in LEVELS)

@@ -80,20 +80,15 @@ def test_what_cannot_be_corrected_is_named():
     assert np.isfinite(found.joint_angles).all()
 
 
-def turned_about_the_base(robot, first, last):
-    """Reported angles of seven postures, the first axis going from one angle to another, degrees."""
-    angles = np.tile(robot.joint_limits.mean(axis=1) + BENT, (7, 1))
-    angles[:, 0] = np.radians(np.linspace(first, last, 7))
-    return robot.reported_angles(angles)
-
-
 @pytest.mark.parametrize("name", ["kuka", "abb"])
 def test_a_stated_posture_and_its_turn_are_kept_or_refused(name):
     robot = make_robot(name, *EFFECTS)
     limits = robot.robot.joint_limits.copy()
     limits[0] = np.radians([-185.0, 185.0])
     robot = replace(robot, robot=replace(robot.robot, joint_limits=limits))
-    angles = turned_about_the_base(robot.robot, -180.6, -168.6)
+    angles = np.tile(robot.robot.joint_limits.mean(axis=1) + BENT, (7, 1))
+    angles[:, 0] = np.radians(np.linspace(-180.6, -168.6, 7))
+    angles = robot.robot.reported_angles(angles)
     position, rotation = nominal_forward(robot.robot, angles)
     found = find_joint_targets(robot, position, rotation, NEUTRAL, np.repeat(angles[:1], 7, axis=0))
     assert (found.status == OK).all() and np.abs(found.joint_angles - angles).max() < 0.02

@@ -20,10 +20,6 @@ from elastocal.mechanics.kinematics import poses
 BENT = np.array([0.0, 0.2, 0.1, 0.3, 0.7, 0.0])
 
 
-def find_poses(robot, angles):
-    return poses(robot.chain, angles, robot.chain.end_effector)
-
-
 @pytest.mark.parametrize("name", ["kuka", "gp180", "abb"])
 def test_a_path_about_the_base_does_not_swing_where_a_turn_lies_within_the_limits(name):
     """Seven targets 2 degrees apart about the base's vertical, the first axis limited to 185 degrees either way."""
@@ -33,7 +29,7 @@ def test_a_path_about_the_base_does_not_swing_where_a_turn_lies_within_the_limit
     robot = replace(robot, joint_limits=limits)
     angles = np.tile(limits.mean(axis=1) + BENT, (7, 1))
     angles[:, 0] = np.radians(np.linspace(-180.6, -168.6, 7))
-    found, left = along_path(robot, *find_poses(robot, angles))
+    found, left = along_path(robot, *poses(robot.chain, angles, robot.chain.end_effector))
     assert left.max() < SOLVED_M and not find_beyond_limits(robot, found).any()
     np.testing.assert_allclose(np.degrees(found[:, 0]), np.degrees(angles[:, 0]), atol=1e-4)
     assert np.degrees(np.abs(np.diff(found, axis=0)).sum()) == pytest.approx(12.0, abs=1e-3)
@@ -60,4 +56,5 @@ def test_a_step_may_be_five_times_what_the_path_turns_and_ten_degrees():
     robot = analysed("gp180")
     angles = np.tile(robot.joint_limits.mean(axis=1) + BENT, (2, 1))
     angles[1, 0] += np.radians(3.0)
-    np.testing.assert_allclose(np.degrees(allowed_steps(robot, *find_poses(robot, angles))), 25.0)
+    found = allowed_steps(robot, *poses(robot.chain, angles, robot.chain.end_effector))
+    np.testing.assert_allclose(np.degrees(found), 25.0)

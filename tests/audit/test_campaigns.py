@@ -43,7 +43,7 @@ def found_in(run):
     return failed([*simulated(run, DRAWN, "cell"), *split(run, TRAINING, "cell")])
 
 
-def test_a_simulated_campaign_is_drawn_again(drawn):
+def test_a_simulated_campaign_is_drawn_again_and_no_measured_one(drawn):
     assert found_in(drawn) == [] and len([*simulated(drawn, DRAWN, "cell")]) == 4
 
 
@@ -62,9 +62,7 @@ def test_a_simulated_campaign_is_drawn_again(drawn):
 def test_a_value_altered_is_found(drawn, file, column, change, checked):
     with altered(drawn.folder, file, (column, 4), change):
         assert checked in found_in(drawn)
-
-
-def test_a_measured_campaign_is_not_drawn(drawn):
+    # One that was measured is not.
     (drawn.folder / "config/campaigns/cell.yaml").write_text("source: public\n", encoding="utf-8")
     assert [*simulated(drawn, DRAWN, "cell")] == []
 

@@ -16,10 +16,6 @@ def found_in(run):
     return failed([*checks, *estimates(run, IDENTIFIED, "two", "hand", "100")])
 
 
-def test_data_and_estimates_as_they_were_made_hold(run):
-    assert found_in(run) == []
-
-
 @pytest.mark.parametrize(
     ("file", "column", "change", "expected"),
     [
@@ -32,16 +28,10 @@ def test_data_and_estimates_as_they_were_made_hold(run):
         (IDENTIFIED, "compliance_2", lambda v: np.nan, "compliances of data set 1, length 3"),
     ],
 )
-def test_an_altered_value_is_found(run, file, column, change, expected):
+def test_data_and_estimates_as_they_were_made_hold_and_an_altered_value_is_found(run, file, column, change, expected):
+    assert found_in(run) == []
     with altered(run.folder, file, (column, 7), change):
         assert expected in found_in(run)
-
-
-def test_one_stage_is_the_normal_equations():
-    matrix = np.random.default_rng(1).normal(size=(9, 2))
-    gain, condition = solve_staged([{"points": ["a"], "joints": [1, 2]}], {"a": matrix}, 2)
-    np.testing.assert_allclose(gain, np.linalg.solve(matrix.T @ matrix, matrix.T))
-    assert condition == pytest.approx(np.linalg.cond(matrix))
 
 
 def test_errors_of_a_stage_reach_the_next_one():

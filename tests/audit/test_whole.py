@@ -39,7 +39,8 @@ def test_a_file_of_another_run_or_robot_is_found(folder, change, checked):
     assert failed(provenance(folder, FILE)) == [checked]
 
 
-def test_an_altered_and_a_missing_file_are_found(folder):
+def test_an_altered_a_missing_and_an_unreadable_file_are_found_and_an_empty_folder_is_no_finished_run(folder):
+    assert [finding.holds for finding in audit(folder)] == [False]
     write(folder)
     digest = recorded(folder.folder)[FILE]
     with open(folder.folder / FILE, "ab") as file:
@@ -47,13 +48,7 @@ def test_an_altered_and_a_missing_file_are_found(folder):
     assert not intact(folder, FILE, digest).holds
     (folder.folder / FILE).unlink()
     assert intact(folder, FILE, digest).note == "it is missing"
-
-
-def test_an_empty_folder_is_no_finished_run(folder):
-    assert [finding.holds for finding in audit(folder)] == [False]
-
-
-def test_a_file_that_cannot_be_read_is_a_finding_and_no_traceback(folder):
+    # One that cannot be read is a finding and no traceback.
     (folder.folder / FILE).write_bytes(b"no table")
     forge(folder.folder, FILE)
     found = audit(folder)
@@ -71,9 +66,7 @@ def test_the_page_says_first_whether_all_holds_and_what_was_not_worked_out_again
     assert "results/identified/*/*um/*.parquet" in again and "In <strong>1 files</strong>" in again
     assert "reports/figures/*.pdf" in apart and "reports/figures/*.pdf" not in again
     assert all(check.__doc__ for _, check in CHECKS)
-
-
-def test_what_does_not_hold_is_shown_and_nothing_of_it_is_run():
+    # What does not hold is shown, and nothing of it is run.
     text = page_of(as_table([GOOD, BAD]), {})
     assert "1 of 2 checks do not hold." in text and "column &lt;dev&gt;" in text and "http" not in text
     assert "What was not worked out again" not in text

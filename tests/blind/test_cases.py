@@ -57,15 +57,12 @@ def test_the_full_size_has_the_nulls_effects_levels_and_robots_that_the_protocol
     assert len({case.name for case in cases}) == len(cases)
 
 
-def test_only_the_full_size_shows_the_robots_of_the_proof_and_cases_to_develop_on_are_in_no_other():
-    for size in ("smoke", "quick", "development"):
-        assert {case.robots for case in cases_of(PLAN, size, 1)} == {"tuned"}
-    developed = {case.seed for case in cases_of(PLAN, "development", 1)}
-    assert not developed & {case.seed for size in ("quick", "full") for case in cases_of(PLAN, size, 1)}
-
-
-def test_names_and_seeds_follow_from_seed_and_key_alone():
-    cases = cases_of(PLAN, "quick", 1)
+def test_only_the_full_size_shows_the_proofs_robots_and_names_and_seeds_follow_from_seed_and_key_alone():
+    sizes = {size: cases_of(PLAN, size, 1) for size in ("smoke", "quick", "development", "full")}
+    assert {case.robots for size, some in sizes.items() if size != "full" for case in some} == {"tuned"}
+    # Cases to develop on are in no other.
+    developed, cases = {case.seed for case in sizes["development"]}, sizes["quick"]
+    assert not developed & {case.seed for case in (*cases, *sizes["full"])}
     assert cases == cases_of(PLAN, "quick", 1) == sorted(cases, key=lambda case: case.name)
     # Pinned: sealed documents of earlier runs hold what follows from these.
     of_old = [case for case in cases if case.setting != "many_poses" and "two_angles" not in case.key]

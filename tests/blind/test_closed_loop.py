@@ -23,12 +23,12 @@ from elastocal_proof.blind.closed_loop import (
 from elastocal_proof.blind.folders import write_blind_campaign
 
 
-@pytest.fixture(scope="module")
-def table():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "_POSES", 6)
-        patch.setattr(module, "_PATH", 12)
-        return pd.DataFrame(closed_loop(ROBOTS / "gp180.yaml", "compensator_torque", 768481013))
+@pytest.fixture
+def made(monkeypatch):
+    """The loop of one robot at few poses."""
+    monkeypatch.setattr(module, "_POSES", 6)
+    monkeypatch.setattr(module, "_PATH", 12)
+    return lambda **more: pd.DataFrame(closed_loop(ROBOTS / "gp180.yaml", "compensator_torque", 768481013, **more))
 
 
 def rms(table, model):
@@ -36,7 +36,8 @@ def rms(table, model):
 
 
 @pytest.mark.slow
-def test_every_pose_is_commanded_by_every_model_and_the_model_found_is_nearer_than_the_declared_one(table):
+def test_every_pose_is_commanded_by_every_model_and_the_model_found_is_nearer_than_the_declared_one(made):
+    table = made()
     assert table.groupby(["part", "model"]).size().to_dict() == {
         (part, model): 12 if part == "milling" else 6 for part in PARTS for model in MODELS
     }
@@ -54,16 +55,14 @@ def test_every_hidden_effect_moves_the_robot_and_needs_no_covariate():
 
 
 @pytest.mark.slow
-def test_with_slips_the_floor_is_the_same_in_the_declared_base_and_the_campaign_has_a_lost_beam(monkeypatch):
-    monkeypatch.setattr(module, "_POSES", 6)
-    monkeypatch.setattr(module, "_PATH", 12)
+def test_with_slips_the_floor_is_the_same_in_the_declared_base_and_the_campaign_has_a_lost_beam(made, monkeypatch):
     written = []
     monkeypatch.setattr(module, "write_blind_campaign", lambda *a, **k: written.append(write_blind_campaign(*a, **k)))
-    slipped = pd.DataFrame(closed_loop(ROBOTS / "gp180.yaml", "compensator_torque", 768481013, slips=True))
+    slipped = made(slips=True)
     assert 1e-6 < rms(slipped, TRUE) < 4e-5
     # A tilt of 0.3 mrad and a shift that the uncorrected robot does not know of.
     assert rms(slipped, UNCORRECTED) > 1e-3
-    ((slip,),) = [made["bad_rows"] for made in written]
+    ((slip,),) = [each["bad_rows"] for each in written]
     assert slip["kind"] in ("zeros", "held_point") and len(slip["rows"]) == 1
 
 
@@ -85,19 +84,11 @@ def made_rows(true_rms_m, decision="pass", verdict="named", frame="base"):
     return rows.assign(frame=frame, decision=decision, verdict=verdict, **stated)
 
 
-def share(found, question, frame="all"):
-    (row,) = found[
-        (found["question"] == question) & (found["frame"] == frame) & (found["part"] == "random") & (found["verdict"] == "all")
-    ].to_dict("records")
-    return row
-
-
 def test_shares_are_of_the_cases_that_a_question_concerns_with_exact_intervals():
     found = coverage(pd.concat([made_rows([1e-5, 2e-5, 5e-5]), made_rows([3.5e-5], "fail", "several", "tracker")]))
-    rms = share(found, "rms below its 95 % bound")
-    assert (rms["cases"], rms["hits"]) == (4, 2)
-    assert (rms["low"], rms["high"]) == pytest.approx((0.0676, 0.9324), abs=1e-4)
-    denied = share(found, "pass that the truth denies")
-    assert (denied["cases"], denied["hits"]) == (3, 1)
-    assert share(found, "fail that the truth denies")["hits"] == 1
-    assert share(found, "rms below its 95 % bound", "tracker")["hits"] == 0
+    found = found[(found["part"] == "random") & (found["verdict"] == "all")].set_index(["question", "frame"])
+    below, denied = found.loc[("rms below its 95 % bound", "all")], found.loc[("pass that the truth denies", "all")]
+    assert (below["cases"], below["hits"], denied["cases"], denied["hits"]) == (4, 2, 3, 1)
+    assert (below["low"], below["high"]) == pytest.approx((0.0676, 0.9324), abs=1e-4)
+    assert found.loc[("fail that the truth denies", "all"), "hits"] == 1
+    assert found.loc[("rms below its 95 % bound", "tracker"), "hits"] == 0

@@ -46,22 +46,17 @@ def seen(request, tmp_path_factory):
     case = case_from(descriptions, columns_of(training))
     declared = fit(case.model, case.observations, estimated_noise(case)[0])
     candidates = [c for c in case.candidates.values() if not c.shapes]
-    return declared, case.observations, directions(declared, case.observations, candidates)
+    return directions(declared, case.observations, candidates)
 
 
-def test_effects_with_the_same_span_are_those_set_aside(seen):
-    _, _, found = seen
+def test_effects_with_the_same_span_are_those_set_aside_and_compliances_take_up_a_wrong_force_scale(seen):
     same = set()
-    for one, columns in found:
-        for other, others in found:
+    for one, columns in seen:
+        for other, others in seen:
             within = columns.shape[1] and np.linalg.norm(columns - others @ (others.T @ columns), 2) < _SINE
             if one.effect != other.effect and within and columns.shape == others.shape:
                 same.add(((one.effect, one.joints), other.effect))
     told = {(place, other) for place, other in EXACT_ALIASES.items() if place[0] not in ("force_scale", "link_weight")}
     assert same == told
-
-
-def test_nothing_of_a_wrong_force_scale_is_left_off_the_compliances(seen):
-    _, _, found = seen
-    columns = [part for candidate, part in found if candidate.effect == "force_scale"]
+    columns = [part for candidate, part in seen if candidate.effect == "force_scale"]
     assert columns and not sum(part.shape[1] for part in columns)

@@ -20,30 +20,19 @@ def robot():
     return hidden_robot(UR10, 4, ["joint_tilt"])[0]
 
 
-def sheet_of(angles):
-    joints = {f"q{j + 1}": angle for j, angle in enumerate(angles.T)}
-    return pd.DataFrame(
-        {"pose": range(len(angles)), "load": 0, "repeat": 0, "target": "T"} | joints | dict.fromkeys(WRENCH, 0.0)
-    )
-
-
 DOCUMENT = {"targets": {"T": {"point": "6DoF", "offset_m": (0.0, 0.0, 0.0)}}, "frame": "base", "measured": "pose"}
 
 
-@pytest.fixture(scope="module")
-def angles():
-    return np.random.default_rng(1).uniform(-1, 1, (5, 6))
-
-
-def test_a_sheet_is_filled_near_where_the_declared_robot_is_and_by_where_commands_reach(robot, angles, tmp_path):
+def test_a_sheet_is_filled_near_where_the_declared_robot_is_and_by_where_commands_reach(robot, tmp_path):
+    angles = np.random.default_rng(1).uniform(-1, 1, (5, 6))
     declared, path = analysed("ur10"), tmp_path / "sheet.csv"
-    sheet_of(angles).to_csv(path, index=False)
+    joints = {f"q{j + 1}": angle for j, angle in enumerate(angles.T)} | dict.fromkeys(WRENCH, 0.0)
+    pd.DataFrame({"pose": range(5), "load": 0, "repeat": 0, "target": "T"} | joints).to_csv(path, index=False)
     assert fill_sheet(path, DOCUMENT, robot, 1) == 5
     filled = pd.read_csv(path)
     position, rotation = poses(declared.chain, declared.model_angles(angles), declared.chain.end_effector)
     off = np.linalg.norm(filled[["x", "y", "z"]].to_numpy() - position, axis=1)
-    assert off.max() < 0.02
-    assert off.min() > 1e-5
+    assert off.min() > 1e-5 and off.max() < 0.02
     turn = Rotation.from_rotvec(filled[["rx", "ry", "rz"]].to_numpy()) * Rotation.from_matrix(rotation).inv()
     assert turn.magnitude().max() < 0.05
     noise = filled[["x", "y", "z"]].to_numpy() - reached(robot, angles, np.zeros((5, 6)), 9)[0]
@@ -88,4 +77,4 @@ def test_a_sheet_that_is_none_is_one_line(robot, tmp_path, text, words):
     path = tmp_path / "measurements.csv"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=words):
-        fill_sheet(path, {"targets": {}, "frame": "base", "measured": "pose"}, robot, 1)
+        fill_sheet(path, DOCUMENT, robot, 1)

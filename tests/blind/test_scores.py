@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 from made_blind_documents import PLAN, effect, frame, oracle, said, silence, truth, verdict
-from scipy.stats import binomtest
 
-from elastocal_proof.blind.scores import intervals_of, is_true, rate, score, stated
+from elastocal_proof.blind.scores import intervals_of, is_true, score, stated
 
 TILTED = {"misplaced": {"shift_m": [0.0, 0.0, 2e-4], "turn_rad": [3e-4, 0.0, 0.0]}}
 PAYLOAD, NOTHING = truth(("payload",)), truth()
@@ -46,18 +45,6 @@ def test_outcome_is(name):
     sealed, found, expected = OUTCOMES[name]
     row = score(PLAN, sealed, found)
     assert {key for key in COUNTED if row[key] is True} == expected
-
-
-def test_robots_of_the_plan_that_were_tuned_on_prove_nothing():
-    assert [score(PLAN, truth(robot=robot), silence())["robots"] for robot in ("kuka", "irb7600")] == ["tuned", "proof"]
-
-
-@pytest.mark.parametrize("hits, cases", [(0, 10), (1, 3), (7, 20), (59, 59), (150, 400)])
-def test_the_interval_of_a_share_is_the_exact_one_of_the_binomial(hits, cases):
-    found, exact = rate([True] * hits + [False] * (cases - hits)), binomtest(hits, cases).proportion_ci(0.95, "exact")
-    assert (found["hits"], found["cases"], found["rate"]) == (hits, cases, pytest.approx(hits / cases))
-    assert (found["low"], found["high"]) == pytest.approx((exact.low, exact.high), rel=1e-9)
-    assert np.isnan(rate([])["rate"]) and (rate([])["low"], rate([])["high"]) == (0.0, 1.0)
 
 
 GREW = "the RMS error of the validation poses grew from 0.100 to 0.110 mm"
@@ -155,10 +142,3 @@ def test_an_interval_holds_what_lies_within_two_standard_errors_of_the_right_eff
     # Student's t is wider where the noise has few degrees of freedom.
     few = verdict("named", effect("joint_offset", 3, parameters=[("offset", 3.3e-4, 1e-5)]), freedom=3)
     assert of_effect(offset, few)[0]["holds"]
-
-
-def test_compliances_count_whatever_was_found_in_the_usual_setting():
-    for document, found in ((NOTHING, silence()), (PAYLOAD, said("named", "payload")), (PAYLOAD, silence())):
-        assert len(intervals_of(PLAN, document, found)) == 6
-    assert not any(row["holds"] for row in intervals_of(PLAN, NOTHING, silence(compliance=1.3)))
-    assert intervals_of(PLAN, truth(setting="force_3kN"), silence()) == []

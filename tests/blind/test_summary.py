@@ -1,12 +1,8 @@
 """Every figure beside its target, over every case that belongs to it and no other; and the tables of the pictures."""
 
-import numpy as np
-import pandas as pd
 import pytest
 from made_blind_documents import effect, oracle, said, silence, summary, truth, verdict
 from scipy.stats import beta
-
-from elastocal_proof.blind.summary import calibration, calibration_error
 
 PAYLOAD = said("named", "payload")
 ONE = truth(("payload",))
@@ -55,18 +51,6 @@ def test_pairs_are_held_against_what_the_best_analyst_finds_of_the_same_cases(ri
     assert row.cases == 40 and row.rate == pytest.approx(right / 36) and row.holds == holds
     assert row.low < row.rate < row.high or right == 36
     assert table.loc["both of two effects at 200 each, by the best analyst"].hits == 36
-
-
-def test_calibrated_statements_have_the_error_of_chance_and_overconfident_ones_more():
-    """Of 2,000 cases: by chance about 1.5 %; statements whose odds are squared are off by over 8 %, five times as much."""
-    rng = np.random.default_rng(5)
-    probability = rng.uniform(0.3, 1.0, 2000)
-    correct = rng.random(2000) < probability
-    found = calibration(pd.DataFrame({"stated": probability, "correct": correct}), 1)
-    assert 0.005 < found["by_chance"]["rate"] < 0.025
-    assert found["calibration_error"]["rate"] < 2 * found["by_chance"]["rate"]
-    bold = probability**2 / (probability**2 + (1 - probability) ** 2)
-    assert calibration_error(bold, correct) > 0.08
 
 
 def test_that_something_remains_is_held_against_where_it_does_and_where_nothing_does():

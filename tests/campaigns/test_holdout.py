@@ -3,7 +3,6 @@
 import time
 
 import numpy as np
-import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -45,17 +44,12 @@ def test_a_block_of_neighbours_is_held_out_by_its_seed(cell):
     assert cell.read().holdout == {"blocks": 3, "seed": 1}
 
 
-@pytest.mark.parametrize(
-    ("holdout", "fitted", "held_out"),
-    [
-        ({"poses": [0, 2, 4, 6, 8]}, 5, 5),
-        ({"fraction": 0.5}, 5, 5),
-        # Rounded to whole poses.
-        ({"fraction": 0.16}, 8, 2),
-        ({"blocks": 2}, 5, 5),
-    ],
-)
-def test_five_poses_to_fit_and_two_held_out_are_enough(cell, holdout, fitted, held_out):
+# Rounded to whole poses; five to fit and two held out are enough.
+ENOUGH = [({"poses": [0, 2, 4, 6, 8]}, 5, 5), ({"fraction": 0.5}, 5, 5), ({"fraction": 0.16}, 8, 2), ({"blocks": 2}, 5, 5)]
+
+
+@pytest.mark.parametrize(("holdout", "fitted", "held_out"), ENOUGH)
+def test_whole_poses_are_held_out(cell, holdout, fitted, held_out):
     assert tuple(map(len, parts(cell, **holdout))) == (fitted, held_out)
 
 
@@ -104,7 +98,7 @@ def test_poses_of_one_configuration_are_fitted_or_held_out_together(cell, holdou
     assert parts(cell)[1] == once | {(session, pose + POSES) for session, pose in once}
 
 
-def test_thirty_poses_of_one_configuration_are_refused(cell):
+def test_poses_of_one_configuration_alone_are_refused_soon(cell):
     for name in [name for name in cell.table if name.startswith("q")]:
         cell.table[name] = [cell.table[name][0]] * len(cell.table[name])
     with refused(cell.source, "holdout", "1 configuration to fit and 0 held out", "at least 5 to fit"):
@@ -115,19 +109,14 @@ def test_thirty_poses_of_one_configuration_are_refused(cell):
     assert time.process_time() - begun < 10.0
 
 
-def test_blocks_are_clusters_where_there_are_some():
+def test_blocks_are_clusters_whatever_the_order_of_the_poses_and_whole_turns():
     rng = np.random.default_rng(1)
     centres = np.array([[0, 0, 0], [2, 0, 1], [0, 2, -1], [-2, -2, 0]])
     of = rng.permutation(np.repeat(np.arange(4), 6))
-    found = blocks(centres[of] + 0.05 * rng.standard_normal((24, 3)), 4)
-    assert len({(block, centre) for block, centre in zip(found, of, strict=True)}) == 4
-
-
-def test_blocks_do_not_depend_on_the_order_of_the_poses_nor_on_whole_turns():
-    rng = np.random.default_rng(2)
-    angles, order = rng.uniform(-2, 2, (23, 6)), rng.permutation(23)
+    angles, order = centres[of] + 0.05 * rng.standard_normal((24, 3)), rng.permutation(24)
     found = blocks(angles, 4)
-    np.testing.assert_array_equal(blocks(angles[order] + 2 * np.pi * rng.integers(-1, 2, (23, 6)), 4), found[order])
+    assert len({(block, centre) for block, centre in zip(found, of, strict=True)}) == 4
+    np.testing.assert_array_equal(blocks(angles[order] + 2 * np.pi * rng.integers(-1, 2, (24, 3)), 4), found[order])
 
 
 @pytest.mark.parametrize(("poses", "joints"), [(2, 1), (5, 6), (20, 2), (60, 6)])
@@ -154,21 +143,12 @@ def test_a_pose_repeats_another_where_no_joint_stands_elsewhere_than_one_pose_ma
     assert not find_repeated(fitted, np.diag(fitted[:6])[None] * np.ones((1, 6))).any()
 
 
-def test_repeats_of_a_pose_are_one_configuration_in_the_order_of_the_poses():
-    rng = np.random.default_rng(5)
-    apart = rng.uniform(-2, 2, (12, 6))
-    near = apart[5] + 1.1 * SAME_POSE_RAD * np.eye(6)[:3]
-    angles = np.concatenate([apart, near, apart[8:11] + 0.9 * SAME_POSE_RAD])
-    order = rng.permutation(18)
-    found = configurations(np.repeat(angles[order], 2, axis=0), np.repeat(np.arange(18), 2))
-    names = np.concatenate([np.arange(15), [8, 9, 10]])[order]
-    np.testing.assert_array_equal(found, pd.factorize(names)[0])
-
-
-def test_a_row_is_alike_to_the_first_that_began_a_number_near_it():
+def test_a_row_is_alike_to_the_first_that_began_a_number_near_it_and_poses_are_so_by_their_means():
     points, leaders, expected = np.random.default_rng(5).uniform(0, 1, (300, 2)), [], []
     for row in points:
         alike = [number for number, first in enumerate(leaders) if np.abs(row - first).max() <= 0.1]
         leaders += [] if alike else [row]
         expected.append(alike[0] if alike else len(leaders) - 1)
     np.testing.assert_array_equal(number_alike(points, 0.1), expected)
+    spread = (SAME_POSE_RAD / 0.1) * np.repeat(points, 2, axis=0) + np.tile([[1.0], [-1.0]], (300, 1))
+    np.testing.assert_array_equal(configurations(spread, np.repeat(np.arange(300), 2)), expected)

@@ -39,34 +39,17 @@ def place(monkeypatch, tmp_path):
     return {"folder": tmp_path / "cache", "box": tmp_path / "box"}
 
 
-@pytest.fixture
-def served(monkeypatch, tmp_path):
-    """Folder that a server on this machine offers in place of the public one."""
-    folder = tmp_path / "served"
-    (folder / "data").mkdir(parents=True)
-
-    class Quiet(http.server.SimpleHTTPRequestHandler):
-        def log_message(self, *_):
-            pass
-
-    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=folder))
-    thread = threading.Thread(target=server.serve_forever)
-    thread.start()
-    monkeypatch.setattr(PublicFile, "address", f"http://127.0.0.1:{server.server_port}/{MINE.path}")
-    yield folder / "data" / "values.csv"
-    server.shutdown()
-    thread.join()
-    server.server_close()
+def missing(place):
+    return find_missing(["mine"], {"mine": MINE}, place["folder"], place["box"])
 
 
 def test_a_file_of_the_given_folder_is_used_where_it_lies_and_refused_with_other_contents(place, monkeypatch, tmp_path):
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
-    assert find_missing(["mine"], {"mine": MINE}, place["folder"], place["box"]) == MINE.local
+    assert missing(place) == MINE.local
     given = tmp_path / MINE.local
     given.parent.mkdir()
     given.write_bytes(CONTENTS)
-    assert fetch("mine", {"mine": MINE}, **place) == given and not place["folder"].exists()
-    assert find_missing(["mine"], {"mine": MINE}, place["folder"], place["box"]) is None
+    assert fetch("mine", {"mine": MINE}, **place) == given and not place["folder"].exists() and missing(place) is None
     given.write_bytes(CONTENTS + b"\n")
     with refused(given, "", "SHA-256", MINE.sha256, MINE.address):
         fetch("mine", {"mine": MINE}, **place)
@@ -74,21 +57,28 @@ def test_a_file_of_the_given_folder_is_used_where_it_lies_and_refused_with_other
         fetch("yours", {"mine": MINE}, **place)
 
 
-def test_what_no_folder_has_is_downloaded_once_with_the_known_contents(place, served, monkeypatch, tmp_path):
-    assert find_missing(["mine"], {"mine": MINE}, place["folder"], place["box"]) is None
-    with refused(PublicFile.address, "", "404", FOLDER_VARIABLE, MINE.local):
-        fetch("mine", {"mine": MINE}, **place)
-    served.write_bytes(b"something else")
-    with refused(PublicFile.address, "", "other contents", "SHA-256"):
-        fetch("mine", {"mine": MINE}, **place)
-    assert list(place["folder"].iterdir()) == []
-    served.write_bytes(CONTENTS)
-    kept = fetch("mine", {"mine": MINE}, **place)
+def test_what_no_folder_has_is_downloaded_once_with_the_known_contents(place, monkeypatch, tmp_path):
+    served = tmp_path / "served" / MINE.path
+    served.parent.mkdir(parents=True)
+    handler = partial(http.server.SimpleHTTPRequestHandler, directory=tmp_path / "served")
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        threading.Thread(target=server.serve_forever).start()
+        monkeypatch.setattr(PublicFile, "address", f"http://127.0.0.1:{server.server_port}/{MINE.path}")
+        try:
+            assert missing(place) is None
+            with refused(PublicFile.address, "", "404", FOLDER_VARIABLE, MINE.local):
+                fetch("mine", {"mine": MINE}, **place)
+            served.write_bytes(b"something else")
+            with refused(PublicFile.address, "", "other contents", "SHA-256"):
+                fetch("mine", {"mine": MINE}, **place)
+            assert list(place["folder"].iterdir()) == []
+            served.write_bytes(CONTENTS)
+            kept = fetch("mine", {"mine": MINE}, **place)
+        finally:
+            server.shutdown()
     assert kept.parent == place["folder"] and kept.read_bytes() == CONTENTS
-    served.unlink()
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "empty"))
-    assert fetch("mine", {"mine": MINE}, **place) == kept
-    assert find_missing(["mine"], {"mine": MINE}, place["folder"], place["box"]) is None
+    assert fetch("mine", {"mine": MINE}, **place) == kept and missing(place) is None
 
 
 def test_what_comes_with_the_project_is_used_stated_and_not_looked_for_in_the_network(place):
@@ -111,8 +101,8 @@ def test_importers_name_robots_and_campaigns_name_their_files():
         importer("nobody", CONFIG, "mine.yaml")
 
 
-def made(tmp_path, name, path, *others):
-    ALL[name].write_campaign([path, *others], tmp_path / "campaign", ROBOTS, name)
+def made(tmp_path, name, *paths, **test):
+    ALL[name].write_campaign(paths, tmp_path / "campaign", ROBOTS, name, **test)
     return read_campaign(tmp_path / "campaign", ROBOTS)
 
 
@@ -140,6 +130,10 @@ def test_sessions_of_the_fanuc_are_campaigns_alone_and_one_of_one_robot_together
         np.testing.assert_array_equal(measurements.pose, counted[session])
         assert {both.targets[index].name for index in measurements.target} == set(("ABC", "DEF")[session])
         assert measurements.repeat.max() == (REPEATS - 1, 0)[session]
+    # Dealt out in turn, folds hold every pose of every session once, each spread over the campaign.
+    folds = [made(tmp_path, "fanuc_joint", static[0], cpa[0], fold={"number": n, "of": 3}).holdout["poses"] for n in (1, 2, 3)]
+    there = [[session, pose] for session in (0, 1) for pose in range(POSES)]
+    assert [folds[n % 3][n // 3] for n in range(len(there))] == there and sum(map(len, folds)) == len(there)
 
 
 @pytest.mark.parametrize(("joints", "robot"), [(6, "ur5"), (7, "wam")])
@@ -165,14 +159,12 @@ def series(tmp_path, **changes):
     angles = rng.uniform(-3, 3, (9, 6)).round(9)
     angles = np.vstack([angles, angles[[2, 5]] + 4e-5])
     position, degrees = rng.uniform(-3000, 3000, (11, 3)).round(5), rng.uniform(-89, 89, (11, 3)).round(6)
-    joints = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
     columns = {"Timestamp": [f"2020071416{39 + i // 6}{10 * (i % 6):02d}" for i in range(11)], "other": np.zeros(11)}
-    columns |= {f"{name}_joint": column for name, column in zip(joints, angles.T, strict=True)}
+    columns |= dict(zip(read_document(CONFIG / "public_data.yaml")["ur10_ipa"]["table"]["angles"], angles.T, strict=True))
     columns |= {f"measurement_{axis}": position[:, i] for i, axis in enumerate("xyz")}
     columns |= {f"measurement_r{axis}": degrees[:, i] for i, axis in enumerate("xyz")}
     columns |= {"measurement_temperature": 20 + 0.25 * np.arange(11)} | changes
-    kept = {name: column for name, column in columns.items() if column is not None}
-    return text(tmp_path / "series.csv", kept, ";", ","), angles, position, degrees
+    return text(tmp_path / "series.csv", columns, ";", ","), angles, position, degrees
 
 
 def test_series_of_the_ur10_become_campaigns_of_poses_with_time_and_temperature(tmp_path):

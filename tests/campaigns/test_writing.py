@@ -13,22 +13,14 @@ from elastocal.mechanics.robot_file import robot_from_document
 
 
 @pytest.mark.parametrize("kind", ["csv", "parquet"])
-def test_written_campaign_is_the_one_read(cell, tmp_path, kind):
-    first = cell.read()
-    document = cell.document | {"robot": "planar"}
-    write_campaign(tmp_path / "again", document, cell.table, 3, kind)
-    second = read_campaign(tmp_path / "again", cell.robots)
+def test_written_campaign_is_the_one_read_and_one_that_cannot_be_written_leaves_it(cell, tmp_path, kind):
+    first, folder, document = cell.read(), tmp_path / "again", cell.document | {"robot": "planar"}
+    write_campaign(folder, document, cell.table, 3, kind)
+    second = read_campaign(folder, cell.robots)
     assert_same(first.measurements, second.measurements)
     assert second.targets == first.targets
-    assert sorted(path.name for path in (tmp_path / "again").iterdir()) == ["campaign.yaml", f"measurements.{kind}"]
-
-
-@pytest.mark.parametrize("kind", ["csv", "parquet"])
-def test_campaign_that_cannot_be_written_leaves_the_one_before_it(cell, tmp_path, kind):
-    folder, document = tmp_path / "again", cell.document | {"robot": "planar"}
-    cell.write()
-    write_campaign(folder, document, cell.table, 3, kind)
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    assert sorted(before) == ["campaign.yaml", f"measurements.{kind}"]
     with refused((folder / f"measurements.{kind}").as_posix(), "header", "'q4'"):
         write_campaign(folder, document, cell.table | {"q4": cell.table["q3"]}, 3, kind)
     with pytest.raises((ValueError, pa.ArrowException), match=r"argument|length"):
@@ -36,20 +28,14 @@ def test_campaign_that_cannot_be_written_leaves_the_one_before_it(cell, tmp_path
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
 
 
-def arm():
-    return robot_from_document(yaml.safe_load(robot_template()), "robot.yaml")
-
-
-@pytest.mark.parametrize(("schema", "text"), [("robot", robot_template()), ("campaign", campaign_template("cell", arm()))])
-def test_every_key_is_explained_and_those_left_out_are_valid_once_uncommented(schema, text):
-    known, lines, shown = read_schema(schema)["properties"], text.splitlines(), yaml.safe_load(text)
-    check_document(shown, schema, "template")
-    assert set(known) <= {line.removeprefix("# ").partition(":")[0] for line in lines}
-    for number, line in enumerate(lines):
-        if line.startswith("# ") and line[2:].partition(":")[0] in known:
-            assert lines[number - 1].startswith("# "), "explained above"
-            check_document(shown | yaml.safe_load(line[2:]), schema, line)
-
-
-def test_the_sheet_has_the_columns_that_every_campaign_needs():
+def test_every_key_is_explained_and_those_left_out_are_valid_once_uncommented():
+    arm = robot_from_document(yaml.safe_load(robot_template()), "robot.yaml")
+    for schema, text in (("robot", robot_template()), ("campaign", campaign_template("cell", arm))):
+        known, lines, shown = read_schema(schema)["properties"], text.splitlines(), yaml.safe_load(text)
+        check_document(shown, schema, "template")
+        assert set(known) <= {line.removeprefix("# ").partition(":")[0] for line in lines}
+        for number, line in enumerate(lines):
+            if line.startswith("# ") and line[2:].partition(":")[0] in known:
+                assert lines[number - 1].startswith("# "), "explained above"
+                check_document(shown | yaml.safe_load(line[2:]), schema, line)
     assert sheet_template(2) == "pose,load,repeat,target,q1,q2,fx,fy,fz,mx,my,mz,x,y,z\n"

@@ -2,7 +2,7 @@
 
 import io
 from importlib import metadata
-from importlib.metadata import PackageNotFoundError, PathDistribution
+from importlib.metadata import PathDistribution
 
 import pytest
 from analysed_robots import ROBOTS
@@ -41,20 +41,22 @@ def test_lines_are_printed_as_they_are_but_for_what_would_steer_a_terminal():
     assert console.file.getvalue() == "    [bold] a\\x1b[2Jb\\u202ec 4.00\u00a0mm\n"
 
 
-@pytest.fixture
-def installed(tmp_path, monkeypatch):
-    """The package in a folder of no checkout, with the record of a wheel; the folder of its pipeline."""
+def test_an_installed_package_has_its_pipeline_and_the_results_are_in_the_working_directory(tmp_path, monkeypatch):
+    """The package in a folder of no checkout, with the record of a wheel."""
     monkeypatch.setattr(module, "__file__", str(tmp_path / "lib" / "elastocal" / "command" / "terminal.py"))
     monkeypatch.setattr(metadata, "distribution", lambda name: PathDistribution(tmp_path / "lib" / f"{name}-1.dist-info"))
     (tmp_path / "lib" / "elastocal-1.dist-info").mkdir(parents=True)
     record = "elastocal/__init__.py,,\n../share/elastocal/Snakefile,,\n"
     (tmp_path / "lib" / "elastocal-1.dist-info" / "RECORD").write_text(record)
-    found = tmp_path / "share" / "elastocal"
-    found.mkdir(parents=True)
-    (found / "Snakefile").write_text("")
+    installed = tmp_path / "share" / "elastocal"
+    installed.mkdir(parents=True)
+    (installed / "Snakefile").write_text("")
     (tmp_path / "mine").mkdir()
     monkeypatch.chdir(tmp_path / "mine")
-    return found
+    assert pipeline() == installed and workplace() == tmp_path / "mine"
+    (installed / "Snakefile").unlink()
+    with pytest.raises(InputError, match="no Snakefile here or above"):
+        pipeline()
 
 
 def test_a_checkout_above_the_working_directory_is_found_before_that_of_the_package(tmp_path, monkeypatch):
@@ -65,20 +67,6 @@ def test_a_checkout_above_the_working_directory_is_found_before_that_of_the_pack
     (tmp_path / "Snakefile").write_text("")
     monkeypatch.chdir(tmp_path / "campaigns" / "cell7")
     assert pipeline() == workplace() == tmp_path and robots() == tmp_path / "config" / "robots"
-
-
-def test_an_installed_package_has_its_pipeline_and_the_results_are_in_the_working_directory(installed, tmp_path, monkeypatch):
-    assert pipeline() == installed and workplace() == tmp_path / "mine"
-    (installed / "Snakefile").unlink()
-    with pytest.raises(InputError, match="no Snakefile here or above"):
-        pipeline()
-
-    def not_installed(name):
-        raise PackageNotFoundError(name)
-
-    monkeypatch.setattr(metadata, "distribution", not_installed)
-    with pytest.raises(InputError, match="no Snakefile here or above"):
-        pipeline()
 
 
 def test_results_of_another_environment_come_with_a_warning(in_checkout, capsys):

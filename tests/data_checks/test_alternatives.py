@@ -7,7 +7,7 @@ import pytest
 from made_campaigns import Plan, made, with_measured, with_other_compliances
 from scipy.spatial.transform import Rotation
 
-from elastocal.data_checks.alternatives import other_readings
+from elastocal.data_checks.alternatives import other_interpretations
 from elastocal.mechanics.kinematics import poses
 
 
@@ -24,7 +24,7 @@ def campaign(fanuc):
 def test_a_joint_counted_the_other_way_round_is_named(fanuc, joint, tracker):
     campaign = softer_by_chance(fanuc, tracker)
     angles = campaign.measurements.joint_angles * (1.0 - 2.0 * np.eye(6)[joint])
-    (fault,) = other_readings(with_measured(campaign, joint_angles=angles))
+    (fault,) = other_interpretations(with_measured(campaign, joint_angles=angles))
     assert (fault.name, fault.joints, fault.decisive) == ("wrong_sign", (joint + 1,), True)
     before, after = fault.evidence
     assert before > 0.02 and after < 1e-3
@@ -34,7 +34,7 @@ def test_a_joint_counted_the_other_way_round_is_named(fanuc, joint, tracker):
 def test_a_joint_counted_from_its_neighbour_is_named_with_it(campaign, sign, words):
     angles = campaign.measurements.joint_angles.copy()
     angles[:, 2] += sign * angles[:, 1]
-    (fault,) = other_readings(with_measured(campaign, joint_angles=angles))
+    (fault,) = other_interpretations(with_measured(campaign, joint_angles=angles))
     assert fault.joints == (2, 3)
     assert words in fault.detail
 
@@ -47,12 +47,12 @@ def test_the_sign_is_that_of_the_column_of_the_file(fanuc):
     reported = (campaign.measurements.joint_angles - robot.reported_offset) @ reported_matrix
     reported[:, 2] *= -1
     angles = reported @ reported_matrix + robot.reported_offset
-    (fault,) = other_readings(with_measured(campaign, joint_angles=angles))
+    (fault,) = other_interpretations(with_measured(campaign, joint_angles=angles))
     assert fault.joints == (3,)
 
 
 def test_orientations_turned_round_are_named(campaign):
-    (fault,) = other_readings(with_measured(campaign, rotation_vector=-campaign.measurements.rotation_vector))
+    (fault,) = other_interpretations(with_measured(campaign, rotation_vector=-campaign.measurements.rotation_vector))
     assert fault.joints == ()
     assert "rotation vectors" in fault.detail
 
@@ -79,28 +79,28 @@ EXCHANGED = {
 @pytest.mark.parametrize("words", EXCHANGED)
 def test_exchanged_axes_of_positions_are_named(campaign, words):
     written = campaign.measurements.position @ np.array(EXCHANGED[words], float).T
-    (fault,) = other_readings(with_measured(campaign, position=written))
+    (fault,) = other_interpretations(with_measured(campaign, position=written))
     assert (fault.name, fault.decisive) == ("swapped_axes", True)
     assert fault.detail.endswith(f"measurements fit with {words}")
 
 
 @pytest.mark.parametrize(("factor", "unit"), [(1000, "millimetres"), (0.1, "tenth")])
 def test_positions_in_another_unit_are_named(campaign, factor, unit):
-    (fault,) = other_readings(with_measured(campaign, position=factor * campaign.measurements.position))
+    (fault,) = other_interpretations(with_measured(campaign, position=factor * campaign.measurements.position))
     assert (fault.name, fault.decisive) == ("wrong_unit", True) and unit in fault.detail
     assert f"fit {1 / factor:g} times" in fault.detail
 
 
 @pytest.mark.parametrize(("factor", "words"), [(0.5, "halves"), (2.0, "doubles"), (180 / np.pi, "degrees")])
 def test_scaled_rotation_vectors_are_named(campaign, factor, words):
-    (fault,) = other_readings(with_measured(campaign, rotation_vector=factor * campaign.measurements.rotation_vector))
+    (fault,) = other_interpretations(with_measured(campaign, rotation_vector=factor * campaign.measurements.rotation_vector))
     assert fault.name == "wrong_unit" and "rotation vectors" in fault.detail and words in fault.detail
 
 
 @pytest.mark.parametrize(("letters", "words"), [("XYZ", "moved x, y, z"), ("xyz", "roll, pitch, yaw")])
 def test_angles_in_the_columns_of_the_rotation_vector_are_named(campaign, letters, words):
     angles = Rotation.from_rotvec(campaign.measurements.rotation_vector).as_euler(letters)
-    (fault,) = other_readings(with_measured(campaign, rotation_vector=angles))
+    (fault,) = other_interpretations(with_measured(campaign, rotation_vector=angles))
     assert words in fault.detail
 
 
@@ -109,7 +109,7 @@ def test_each_session_has_a_transform_of_its_own(fanuc):
     measurements, rotation = campaign.measurements, ELSEWHERE[0]
     session = (measurements.pose >= 10).astype(np.int32)
     position = rotation.apply(measurements.position) + np.where(session[:, None], [0.0, 3.0, 0.0], [1.0, 0.0, 0.0])
-    (fault,) = other_readings(with_measured(campaign, session=session, position=position))
+    (fault,) = other_interpretations(with_measured(campaign, session=session, position=position))
     # That of the session that stands farther off.
     assert fault.name == "wrong_frame" and "would stand 3 m away, turned by 76.4°" in fault.detail
 
@@ -139,7 +139,7 @@ def known_targets(fanuc, factor=1.0, which=slice(None)):
 @pytest.mark.parametrize(("which", "words"), [(slice(None), "T2DoF, T3DoF, T4DoF, T6DoF"), (slice(3, 4), "T6DoF")])
 def test_target_offsets_in_millimetres_are_named(fanuc, which, words):
     campaign = known_targets(fanuc, 1000.0, which)
-    (fault,) = other_readings(campaign)
+    (fault,) = other_interpretations(campaign)
     assert fault.name == "wrong_unit" and fault.detail.startswith(f"the target offset of {words} looks like millimetres")
 
 
@@ -147,7 +147,7 @@ def test_a_target_that_sits_elsewhere_is_named_with_its_place(fanuc):
     campaign = known_targets(fanuc)
     moved = replace(campaign.targets[3], offset_m=(0.3, 0.1, 0.0))
     campaign = replace(campaign, targets=(*campaign.targets[:3], moved))
-    (fault,) = other_readings(of_the_end(campaign))
+    (fault,) = other_interpretations(of_the_end(campaign))
     assert fault.name == "wrong_target" and "T6DoF would sit" in fault.detail
     # From (0.3, 0.1, 0) to (0.1, -0.1, 0.05).
     assert "would sit 287 mm from there" in fault.detail
@@ -158,14 +158,16 @@ def test_a_last_link_that_is_a_little_longer_than_its_file_stops_nothing(fanuc, 
     last = replace(fanuc.chain.transforms[-1], constant=fanuc.chain.transforms[-1].constant + error_m)
     longer = replace(fanuc, chain=replace(fanuc.chain, transforms=(*fanuc.chain.transforms[:-1], last)))
     campaign = made(fanuc, 1, Plan(poses=14, oriented=False), longer)
-    (fault,) = other_readings(of_the_end(campaign))
+    (fault,) = other_interpretations(of_the_end(campaign))
     assert (fault.name, fault.decisive) == ("wrong_target", decisive)
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.004, 0.03])
 def test_a_base_that_stands_a_little_off_stops_nothing(fanuc, shift):
     campaign = made(fanuc, 1, Plan(poses=14))
-    found = other_readings(with_measured(campaign, position=campaign.measurements.position + np.array([0.0, 0.0, shift])))
+    found = other_interpretations(
+        with_measured(campaign, position=campaign.measurements.position + np.array([0.0, 0.0, shift]))
+    )
     assert not [fault for fault in found if fault.decisive]
     assert len(found) == (shift > 0.02)
 
@@ -175,21 +177,24 @@ def test_what_fits_as_well_is_listed_as_an_alternative(fanuc):
     campaign = made(fanuc, 1, Plan(poses=14, tracker=True))
     seen = campaign.measurements
     exchanged = {name: getattr(seen, name)[:, [1, 0, 2]] for name in ("position", "rotation_vector")}
-    (fault,) = other_readings(with_measured(campaign, **exchanged))
+    (fault,) = other_interpretations(with_measured(campaign, **exchanged))
     assert fault.name == "swapped_axes" and len(fault.alternatives) >= 3
     assert all("rotation vectors likewise" in words for words in fault.alternatives)
 
 
 def test_measurements_of_nothing_are_mended_by_nothing(campaign):
     rng = np.random.default_rng(5)
-    assert other_readings(with_measured(campaign, position=rng.normal(0.0, 1.0, campaign.measurements.position.shape))) == []
+    assert (
+        other_interpretations(with_measured(campaign, position=rng.normal(0.0, 1.0, campaign.measurements.position.shape)))
+        == []
+    )
 
 
 def test_a_robot_that_hardly_moves_is_not_fitted_by_gathering_measurements_in_one_place(fanuc):
     campaign = made(fanuc, 1, Plan(poses=8, loads=1, tracker=True, oriented=False))
     angles = 0.3 + 1e-3 * np.random.default_rng(2).normal(size=(8, 6))
     position, pose = np.random.default_rng(3).normal(0.0, 1.0, (8, 3)), campaign.measurements.pose
-    assert other_readings(with_measured(campaign, joint_angles=angles[pose], position=position[pose])) == []
+    assert other_interpretations(with_measured(campaign, joint_angles=angles[pose], position=position[pose])) == []
 
 
 @pytest.mark.parametrize(("degrees", "moved_m"), [(8, 0.0), (180, 0.05)])
@@ -199,11 +204,11 @@ def test_a_mount_that_is_turned_otherwise_is_named_with_the_remedy_and_fitted_on
     campaign = made(fanuc, 1, Plan(poses=14))
     turn = Rotation.from_rotvec([0.0, 0.6 * np.radians(degrees), 0.8 * np.radians(degrees)])
     written = with_turned_mount(campaign, turn, moved_m)
-    (fault,) = other_readings(written)
+    (fault,) = other_interpretations(written)
     assert (fault.name, fault.decisive) == ("wrong_target", True)
     assert f"T6DoF would be turned by {degrees}" in fault.detail and "rotation: unknown" in fault.detail
     assert ("offset_m: unknown" in fault.detail) == bool(moved_m)
     if not moved_m:
         for right in (None, tuple(turn.as_rotvec())):
             mount = replace(campaign.targets[3], rotation=right)
-            assert other_readings(replace(written, targets=(*campaign.targets[:3], mount))) == []
+            assert other_interpretations(replace(written, targets=(*campaign.targets[:3], mount))) == []

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_campaigns import Plan, made, with_measured
 
-from elastocal.data_checks.alternatives import other_readings
+from elastocal.data_checks.alternatives import other_interpretations
 from elastocal.data_checks.hypotheses import discrete, fitted, shifts
 
 
@@ -30,7 +30,7 @@ def test_measured_columns_of_each_target_or_pose_moved_by_one_are_named(fanuc, k
         members = np.flatnonzero(groups == group)
         source[members] = np.roll(members, steps)
     turned = measurements.rotation_vector[source]
-    (fault,) = other_readings(with_measured(campaign, position=measurements.position[source], rotation_vector=turned))
+    (fault,) = other_interpretations(with_measured(campaign, position=measurements.position[source], rotation_vector=turned))
     # Of two loads of a pose each second row is of the next pose: both words say so.
     assert (fault.name, fault.decisive) == ("shuffled_rows", True)
     assert fault.detail.endswith("up" if steps > 0 else "down")

@@ -88,6 +88,9 @@ def test_a_row_is_in_si_units_and_names_come_along(tmp_path):
     result = read(tmp_path, text, angles="rad", lengths="mm")
     assert (result.document["joint_names"], result.document["name"]) == (["base", "rest"], "two")
     assert_stands(result, [(math.pi / 2, 0.25, -0.1, -1.5), (0, 0, 0, 6.2)], modified=False)
+    # Units stand behind names in brackets or in a row of their own, too.
+    for head in ("[rad],d [mm],a (mm),alpha(rad)", ",d,a,alpha\n[rad],[mm],[mm],(rad)", "_rad,d,a_mm,alpha\nrad,mm,mm,rad"):
+        assert_stands(read(tmp_path, f"theta_offset{head}\n0,0.1,0.2,1.5\n"), [(0, 1e-4, 2e-4, 1.5)], modified=False)
     text = "maker;d_m;a_m;alpha_deg;dynamics\nx;0.1;0;90;a,b\n"
     assert "not used: maker, dynamics" in read(tmp_path, text, ignore=("maker", "dynamics")).notes
 
@@ -127,24 +130,6 @@ def test_degrees_where_radians_are_stated_and_what_is_no_table_are_refused(tmp_p
             robot_from_dh(table(tmp_path, text, name), options=PLAIN)
 
 
-ROW = "0,0.1,0.2,1.5"
-
-
-@pytest.mark.parametrize(
-    "head",
-    [
-        "theta_offset [rad],d [mm],a (mm),alpha(rad)",
-        "theta_offset,d,a,alpha\n[rad],[mm],[mm],(rad)",
-        "theta_offset_rad,d,a_mm,alpha\nrad,mm,mm,rad",
-    ],
-)
-def test_units_stand_behind_names_in_brackets_or_in_a_row_of_their_own(tmp_path, head):
-    result = read(tmp_path, f"{head}\n{ROW}\n")
-    assert_stands(result, [(0, 1e-4, 2e-4, 1.5)], modified=False)
-    assert "d in mm" in result.notes[0] and "alpha in rad" in result.notes[0]
-
-
-PARTS = ("shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3")
 KEYS = ("x", "y", "z", "roll", "pitch", "yaw")
 ORIGINS = {
     "shoulder": (0, 0, 0.0888794492754001, 0, 0, -9.62e-06),
@@ -158,7 +143,7 @@ ORIGINS = {
 
 @pytest.mark.parametrize("order", [1, -1])
 def test_a_calibrated_arm_is_where_its_origins_put_it(tmp_path, order):
-    described = {name: dict(zip(KEYS, ORIGINS[name], strict=True)) for name in PARTS[::order]} | {"hash": "calib_7"}
+    described = {name: dict(zip(KEYS, ORIGINS[name], strict=True)) for name in [*ORIGINS][::order]} | {"hash": "calib_7"}
     path = table(tmp_path, yaml.safe_dump({"kinematics": described}, sort_keys=False), "calib.yaml")
     result = robot_from_dh(path, name="ur5")
     robot = robot_from_document(yaml.safe_load(robot_text(result)))
@@ -169,7 +154,7 @@ def test_a_calibrated_arm_is_where_its_origins_put_it(tmp_path, order):
     position, rotation = poses(robot.chain, q, robot.chain.end_effector)
     for number, angles in enumerate(q):
         at = pin.SE3.Identity()
-        for name, angle in zip(PARTS, angles, strict=True):
+        for name, angle in zip(ORIGINS, angles, strict=True):
             *shift, roll, pitch, yaw = ORIGINS[name]
             at = at * pin.SE3(pin.rpy.rpyToMatrix(roll, pitch, yaw), np.array(shift, float)) * screw("z", angle, 0.0)
         np.testing.assert_allclose(position[number], at.translation, rtol=0, atol=1e-9)

@@ -11,7 +11,6 @@ from support import refused
 from elastocal.exchange.robot_text import (
     check_imported,
     displacement_words,
-    express_axis,
     refuse_existing,
     robot_text,
     write_robot,
@@ -34,26 +33,15 @@ def result(tmp_path):
     return check_imported(DOCUMENT, tmp_path / "x.urdf", "by hand", ["masses are guessed"])
 
 
-def test_the_text_gives_back_the_document_whatever_the_file_is_called(tmp_path, result):
+def test_the_text_gives_back_the_document_under_a_head_whatever_the_file_is_called(tmp_path, result):
+    lines = robot_text(result).splitlines()
     assert yaml.safe_load(robot_text(result)) == DOCUMENT
+    assert lines[0] == "# From x.urdf (sha256 3fc9b689459d738f), by hand." and "# Masses are guessed." in lines
+    assert any("No compliances" in line for line in lines) and any("payload_kg" in line for line in lines)
+    assert all(len(line) <= 128 for line in lines)
     path = tmp_path / "x\u2028payload_kg: 9"
     path.write_text("")
     assert yaml.safe_load(robot_text(check_imported(DOCUMENT, path, "by hand", ()))) == DOCUMENT
-
-
-def test_the_head_says_where_it_came_from_and_what_it_lacks(result):
-    lines = robot_text(result).splitlines()
-    assert lines[0] == "# From x.urdf (sha256 3fc9b689459d738f), by hand."
-    assert "# Masses are guessed." in lines
-    assert any("No compliances" in line for line in lines) and any("payload_kg" in line for line in lines)
-    assert all(len(line) <= 128 for line in lines)
-
-
-def test_what_a_robot_file_may_not_say_is_refused_by_the_other_file(tmp_path):
-    path = tmp_path / "x.csv"
-    path.write_text("")
-    with refused(path, "chain", "metres"):
-        check_imported(DOCUMENT | {"chain": "Tz(500) Rz(q1) Tz(q2) [flange]"}, path, "by hand", ())
 
 
 def test_nothing_is_replaced_unless_it_shall_be(tmp_path, result):
@@ -61,6 +49,8 @@ def test_nothing_is_replaced_unless_it_shall_be(tmp_path, result):
     refuse_existing(path, False)
     write_robot(result, path)
     assert yaml.safe_load(path.read_text()) == DOCUMENT
+    with refused(path, "chain", "metres"):
+        check_imported(DOCUMENT | {"chain": "Tz(500) Rz(q1) Tz(q2) [flange]"}, path, "by hand", ())
     with refused(path, "", "already", "--force"):
         refuse_existing(path, False)
     refuse_existing(path, True)
@@ -80,14 +70,3 @@ def test_a_displacement_is_what_its_words_make(roll, pitch, yaw, shift):
     position, rotation = poses(chain, np.zeros((1, 1)), chain.end_effector)
     np.testing.assert_allclose(position[0], shift, rtol=0, atol=1e-11)
     np.testing.assert_allclose(rotation[0], transform[:3, :3], rtol=0, atol=1e-11)
-
-
-@given(st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda v: np.linalg.norm(v) > 1e-3), st.floats(-3, 3))
-def test_a_turn_about_any_axis_is_between_a_rotation_and_its_inverse(axis, turn):
-    unit = np.array(axis) / np.linalg.norm(axis)
-    before, letter, sign, after, turned = express_axis(np.array(axis))
-    chain = parse_chain(" ".join([*before, f"R{letter}({sign}q1)", *after, "[E]"]), {}, "x")
-    rotation = poses(chain, np.array([[turn]]), chain.end_effector)[1][0]
-    np.testing.assert_allclose(rotation, pin.exp3(turn * unit), rtol=0, atol=1e-11)
-    if before:
-        np.testing.assert_allclose(turned[:, 2], unit, rtol=0, atol=1e-11)

@@ -26,6 +26,8 @@ def test_poses_are_read_loads_and_covariates_where_they_are(tmp_path):
     header = HEADER + ",fx,fy,fz,mx,my,mz,q1,q2,temperature_c"
     found = read_target_path(write_path(tmp_path, header, [row + ",1,2,3,4,5,6,0.1,0.2,21" for row in ROWS]), 2)
     np.testing.assert_array_equal(found.wrench[1], [1, 2, 3, 4, 5, 6])
+    forces = read_target_path(write_path(tmp_path, HEADER + ",fx,fy,fz", [row + ",1,2,3" for row in ROWS]), 2)
+    np.testing.assert_array_equal(forces.wrench, [[1, 2, 3, 0, 0, 0]] * 2)
     np.testing.assert_array_equal(found.start[0], [0.1, 0.2])
     np.testing.assert_array_equal(found.temperature_c, [21, 21])
 
@@ -36,6 +38,7 @@ def test_poses_are_read_loads_and_covariates_where_they_are(tmp_path):
         ("x,y,z,rx,ry", "1,0,0,0,0", "line 1", ["no column 'rz'"]),
         (HEADER + ",q3", "1,0,0,0,0,0,1", "line 1", ["unknown column 'q3'"]),
         (HEADER + ",fx", "1,0,0,0,0,0,1", "line 1", ["fx without fy, fz"]),
+        (HEADER + ",fx,fy,fz,mx", "1,0,0,0,0,0,1,2,3,4", "line 1", ["mx without my, mz"]),
         (HEADER, "1,0,left,0,0,0", "line 2, column z", ["'left'"]),
         ("# made by hand\n" + HEADER, "1,0,1e999,0,0,0", "line 3, column z", ["'1e999'"]),
         (HEADER, "1100,0,0,0,0,0", "line 2", ["1100", "metres"]),
@@ -48,13 +51,6 @@ def test_poses_are_read_loads_and_covariates_where_they_are(tmp_path):
 def test_a_fault_is_refused_with_its_place(tmp_path, header, row, key, words):
     with refused((tmp_path / "path.csv").as_posix(), key, *words):
         read_target_path(write_path(tmp_path, header, [row]), 2)
-
-
-def test_forces_without_moments_have_moments_of_zero(tmp_path):
-    found = read_target_path(write_path(tmp_path, HEADER + ",fx,fy,fz", [row + ",1,2,3" for row in ROWS]), 2)
-    np.testing.assert_array_equal(found.wrench, [[1, 2, 3, 0, 0, 0]] * 2)
-    with refused(tmp_path, "line 1", "mx without my, mz"):
-        read_target_path(write_path(tmp_path, HEADER + ",fx,fy,fz,mx", [row + ",1,2,3,4" for row in ROWS]), 2)
 
 
 def test_joint_angles_in_degrees_are_refused_as_such(tmp_path):

@@ -84,46 +84,26 @@ def ended_by_itself(study):
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
 
 
-def killed(study, victim, files, draws):
-    """Start a run, kill a part of it once there are so many files; False where none is there by then, or it had ended.
+def killed(study, victim, moments, draws):
+    """Kill a part of a run at one of the moments, drawn again until there was something to kill; the moment, in files.
 
     `victim`: one of "job", "snakemake", "group". `draws`: chooses the job.
     """
-    run = started(study, files)
-    hit = run.poll() is None
-    if hit and victim == "group":
-        os.killpg(run.pid, signal.SIGKILL)
-    elif hit and victim == "snakemake":
-        run.kill()
-    elif hit:
-        jobs = psutil.Process(run.pid).children(recursive=True)
-        # One that has ended meanwhile is not hit, and its run ends well.
-        with suppress(psutil.NoSuchProcess, IndexError):
-            draws.choice(jobs).kill()
-    code = run.wait()
-    assert hit or code == 0, f"a run that nobody killed ended with {code}"
-    return code != 0
-
-
-def killed_for_sure(study, victim, moments, draws):
-    """Kill a part of a run at one of the moments, drawn again until there was something to kill; the moment, in files."""
-    while True:
+    code = 0
+    while code == 0:
         cleared(study)
         files = draws.choice(moments)
-        if killed(study, victim, files, draws):
-            return files
-
-
-def two_at_once(study, expected, files):
-    """The second starts when the first has made so many files. One of them may be refused; what they leave is that of one."""
-    cleared(study)
-    first = started(study, files)
-    second = started(study)
-    codes = first.wait(), second.wait()
-    assert 0 in codes, codes
-    ended_by_itself(study)
-    assert contents(study) == expected
-    return codes
+        run = started(study, files)
+        hit = run.poll() is None
+        # A job that has ended meanwhile is not hit, and its run ends well.
+        with suppress(psutil.NoSuchProcess, IndexError):
+            if hit and victim == "group":
+                os.killpg(run.pid, signal.SIGKILL)
+            elif hit:
+                (run if victim == "snakemake" else draws.choice(psutil.Process(run.pid).children(recursive=True))).kill()
+        code = run.wait()
+        assert hit or code == 0, f"a run that nobody killed ended with {code}"
+    return files
 
 
 def soak(folder, kills, seed):
@@ -136,13 +116,20 @@ def soak(folder, kills, seed):
     counts = dict.fromkeys(VICTIMS, 0)
     for number in range(kills):
         victim = VICTIMS[number % 3]
-        at = killed_for_sure(study, victim, range(files), draws)
+        at = killed(study, victim, range(files), draws)
         counts[victim] += 1
         ended_by_itself(study)
         assert contents(study) == expected, (victim, at)
         print(f"{number + 1}: {victim} killed at {at} files, finished, identical", flush=True)
     for apart in (0, 1, files // 2):
-        print(f"two runs {apart} files apart: exit codes {two_at_once(study, expected, apart)}, identical", flush=True)
+        # The second starts when the first has made so many files. One of them may be refused; what they leave is that of one.
+        cleared(study)
+        first, second = started(study, apart), started(study)
+        codes = first.wait(), second.wait()
+        assert 0 in codes, codes
+        ended_by_itself(study)
+        assert contents(study) == expected
+        print(f"two runs {apart} files apart: exit codes {codes}, identical", flush=True)
     print(f"kills survived: {counts}")
 
 

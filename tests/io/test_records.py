@@ -65,9 +65,8 @@ def test_any_altered_byte_is_found_by_the_next_job_and_by_all_who_follow(output,
     content = bytearray(altered.read_bytes())
     content[place] ^= 1
     altered.write_bytes(content)
-    with refused(
-        altered.as_posix(), "", "other contents than were written", f"(delete {'it' if output == ALTERED[output] else output}"
-    ):
+    delete = f"(delete {'it' if output == ALTERED[output] else output}"
+    with refused(altered.as_posix(), "", "other contents than were written", delete):
         input_digests([CODE, output])
     with refused(altered.as_posix(), "", "other contents than were written"):
         jobs_behind([DRAWN])

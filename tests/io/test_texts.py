@@ -8,15 +8,12 @@ from support import refused
 from elastocal.io.texts import LARGEST_NUMBER, plain_number, read_bytes, read_text
 
 
-def test_contents_are_read_up_to_a_bound(tmp_path):
+def test_contents_are_read_up_to_a_bound_and_what_might_never_end_is_not_opened(tmp_path):
     path = tmp_path / "a.txt"
     path.write_bytes(b"12345")
     assert read_bytes(path, 5) == b"12345"
     with refused(path, "", "more than 4 bytes", "a table of at most 4 bytes"):
         read_bytes(path, 4, "a table")
-
-
-def test_what_might_never_end_is_not_opened(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "zero").symlink_to("/dev/zero")
     (tmp_path / "loop").symlink_to("loop")

@@ -10,23 +10,6 @@ from elastocal_proof.league.table import league_page, league_table
 ROBOTS = {"A robot": ["one"], "Another": ["two"]}
 
 
-@pytest.fixture(scope="module")
-def table():
-    return league_table(made_results(), ROBOTS, "geometry", 1)
-
-
-def row(table, data="one", split="random", method="half"):
-    return table[(table["data"] == data) & (table["split"] == split) & (table["method"] == method)].iloc[0]
-
-
-def test_ratios_count_from_the_reference_and_from_the_best_on_the_same_poses(table):
-    """Errors of the same draws, half as large: the ratio is exact and so is its interval."""
-    found, reference, process = row(table), row(table, method="geometry"), row(table, method="process")
-    assert found["ratio"] == pytest.approx(0.5) and found["ratio_low"] == pytest.approx(0.5) == found["ratio_high"]
-    assert reference["ratio"] == 1.0 and found["ratio_to_best"] == 1.0
-    assert process["ratio_to_best"] == pytest.approx(1.2) == process["ratio_to_best_low"]
-
-
 METHODS = {
     "geometry": Method("geometry", words="geometry"),
     "half": Method("diagnosis", words="ours"),

@@ -42,7 +42,7 @@ def test_the_robot_is_that_of_the_final_fit(checkout):
     assert (found.calibrated.noise.joint_rad >= expected.noise.joint_rad).all()
     assert found.calibrated.scope.frame == ("robot" if found.case.model.fitted_frames else "base")
     assert found.verdict["campaign"] == found.name == "made"
-    assert found.calibrated.scope.form_m == found.verdict["accuracy"]["form_m"]
+    assert found.calibrated.scope.form_m == pytest.approx(found.verdict["accuracy"]["form_m"], rel=1e-9)
 
 
 def test_the_regression_comes_back_and_physics_alone_has_its_own_accuracy(regressed_checkout):

@@ -2,14 +2,12 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from analysed_robots import ROBOTS
 from made_folders import made_folder, made_table
 from small_data import service_arm_folder
 
 from elastocal.loop.overview import overview
-from elastocal.mechanics.kinematics import poses
 
 
 @pytest.fixture(scope="module")
@@ -45,14 +43,3 @@ def test_parameters_that_are_many_for_the_poses_are_said_and_how_many_poses_it_t
     parameters, effective, numbers = (int(words[place]) for place in (5, words.index("about") + 1, words.index("by") + 1))
     assert few.startswith("24 poses") and numbers == 72 and 9 <= effective < parameters
     assert int(few.split("Measure about ")[1].split(" ")[0]) > 48
-
-
-def test_positions_that_a_controller_worked_out_are_said_to_be_no_measurements(kuka, tmp_path):
-    table = made_table(kuka, "o")
-    chain, at = kuka.chain, kuka.model_angles(np.column_stack([table[f"q{joint}"] for joint in range(1, 7)]))
-    for point in chain.points:
-        mine = table["target"] == point.name
-        if mine.any():
-            for axis, values in zip("xyz", poses(chain, at[mine], point)[0].T, strict=True):
-                table[axis][mine] = values.round(6)
-    assert "no measurements" in overview(made_folder(tmp_path / "made", kuka, table=table), ROBOTS).attention[0]

@@ -47,6 +47,7 @@ KINDS = {
     "several": (offset_and_harmonic, USUAL, {}),
     "unexplained": (foreign, BOTH_SENSES, {}),
     "not_testable": (hidden, PLAN, NOTHING_KNOWN),
+    "named": (lambda table: table | {"q3": -table["q3"]}, PLAN, {}),
 }
 NAMES = {"several": ["joint_offset", "transmission_harmonic"]}
 
@@ -63,10 +64,17 @@ def folder_of(path, robot, kind):
     return made_folder(path / "made", robot, table=table, **settings)
 
 
-@pytest.mark.parametrize("kind", slow_but(["several"], KINDS))
+@pytest.mark.parametrize("kind", slow_but(["several", "named"], KINDS))
 def test_verdict_is(kind, kuka, tmp_path):
     verdict = diagnosed(folder_of(tmp_path, kuka, kind), ROBOTS, 1)
     json.dumps(verdict, allow_nan=False)
+    if kind == "named":
+        # What is left of measurements that are wrong in themselves is no statement on the model.
+        (effect,) = verdict["effects"]
+        assert (effect["name"], effect["family"], verdict["verdict"]) == ("wrong_sign", "data", "named")
+        assert verdict["candidates_tested"] == 0 and verdict["probabilities"] is None
+        assert not [warning for warning in verdict["warnings"] if "times the noise" in warning]
+        return
     probabilities, heldout = verdict["probabilities"], verdict["heldout"]
     assert verdict["verdict"] == kind, probabilities
     assert sorted(effect["name"] for effect in verdict["effects"]) == NAMES.get(kind, [])

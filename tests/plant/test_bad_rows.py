@@ -35,9 +35,8 @@ def planted(campaign, kind, seed, count=3):
 
 def changed(before, after):
     """Columns and rows in which two tables differ."""
-    off = {name: np.flatnonzero(before[name] != after[name]) for name in before}
-    columns = {name for name, rows in off.items() if len(rows)}
-    return columns, set(np.concatenate([off[name] for name in columns]).tolist()) if columns else set()
+    off = {name: np.flatnonzero(before[name] != after[name]).tolist() for name in before}
+    return {name for name, rows in off.items() if rows}, {row for rows in off.values() for row in rows}
 
 
 @pytest.mark.parametrize("kind", SLIPS)

@@ -8,13 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
-import pytest
 from analysed_robots import ROBOTS
 
 from elastocal_proof.plant.arm import arm_from_file, rotation_vector
 from elastocal_proof.plant.campaigns import Design, schedule_of
 from elastocal_proof.plant.kinds import KINDS, drawn_defect, truth_of, with_defects
-from elastocal_proof.plant.laws import wound
 from elastocal_proof.plant.physical_robot import seen_poses, specimen
 
 GOLDEN = ROBOTS.parents[1] / "tests/golden/plant_defects.csv"
@@ -53,12 +51,3 @@ def test_every_defect_does_what_it_did():
     if os.environ.get("GOLDEN") == "write":
         table.to_csv(GOLDEN, index=False)
     pd.testing.assert_frame_equal(table, pd.read_csv(GOLDEN), rtol=1e-6, atol=1e-13)
-
-
-@pytest.mark.parametrize("before", [-1.0, 0.0, 0.4, 1.0])
-def test_friction_is_wound_along_the_closed_form_of_its_first_loading(before):
-    """dz = dx where it is unloaded, and dz = dx (1 - z^2), whose integral is atanh, where it is loaded further."""
-    loading = wound(np.array([abs(before)]), np.array([0.3]))[0]
-    wanted = np.tanh(np.arctanh(min(abs(before), 1 - 1e-12)) + 0.3)
-    assert loading == pytest.approx(wanted, abs=1e-4)
-    assert wound(np.array([1.0]), np.array([-0.3]))[0] == pytest.approx(0.7, abs=1e-6)

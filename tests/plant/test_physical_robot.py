@@ -3,19 +3,16 @@
 from dataclasses import replace
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from elastocal_proof.plant.arm import rotation_vector, turned
 from elastocal_proof.plant.campaigns import Design, schedule_of
 from elastocal_proof.plant.physical_robot import (
     LoadCell,
-    Motion,
     Tracker,
     driven,
     logged_temperature,
     specimen,
-    stream,
     warmth_of_castings,
 )
 
@@ -23,12 +20,8 @@ from elastocal_proof.plant.physical_robot import (
 def test_castings_warm_up_behind_the_thermometer_and_reach_it():
     time = np.linspace(0, 40000, 400)
     shown, castings = logged_temperature(time), 20.0 + warmth_of_castings(time)
-    assert (castings[1:] < shown[1:]).all()
-    assert castings[0] == shown[0] == 20.0
+    assert (castings[1:] < shown[1:]).all() and castings[0] == shown[0] == 20.0
     np.testing.assert_allclose([shown[-1], castings[-1]], 30.0, atol=1e-3)
-    # T_lag dT/dt = shown - castings.
-    slope = np.gradient(castings, time)
-    np.testing.assert_allclose(1200.0 * slope[5:-5], (shown - castings)[5:-5], atol=0.02)
 
 
 def test_a_specimen_follows_from_its_seed_and_its_weights_change_no_gear(fanuc_arm):
@@ -37,8 +30,6 @@ def test_a_specimen_follows_from_its_seed_and_its_weights_change_no_gear(fanuc_a
     np.testing.assert_array_equal(heavy.compliance, off.compliance)
     assert heavy.structure == specimen(fanuc_arm, 7).structure != specimen(fanuc_arm, 8).structure
     assert light.structure.masses == ()
-    assert [mass.mass_kg for mass in heavy.structure.masses] == [mass.mass_kg for mass in off.structure.masses]
-    assert [mass.aside_m for mass in heavy.structure.masses] != [mass.aside_m for mass in off.structure.masses]
 
 
 @pytest.mark.parametrize(("kind", "group"), [("repeatability_rad", "approach"), ("pose_rad", "pose")])
@@ -55,17 +46,10 @@ def test_chance_of_the_drives_is_drawn_afresh_for_each_approach_or_pose_by_the_s
     np.testing.assert_allclose(error[first].std(axis=0), [2e-5, 0.0, 1e-5, 0.0, 0.0, 0.0], rtol=0.35, atol=1e-15)
 
 
-@pytest.fixture
-def targets(rng):
-    """Poses of four targets in many states, one an hour."""
-    position = rng.uniform(-2, 2, (500, 4, 3))
-    rotation = turned(rng.uniform(-2, 2, (500, 4, 3)))
-    return position, rotation, 3600.0 * np.arange(500)
-
-
-def test_noise_has_the_stated_deviation_and_grows_with_range(targets, rng):
+def test_noise_has_the_stated_deviation_and_grows_with_range(rng):
+    targets = rng.uniform(-2, 2, (500, 4, 3)), turned(rng.uniform(-2, 2, (500, 4, 3)))
     tracker = Tracker(sigma_m=2e-5, sigma_m_per_m=1e-5, sigma_rad=5e-5)
-    position, rotation, outlier = tracker.read(*targets[:2], rng)
+    position, rotation, outlier = tracker.read(*targets, rng)
     off = position - targets[0]
     far = np.linalg.norm(targets[0] - np.array(tracker.stand_m), axis=-1)
     # Of 6,000 values a standard deviation is known to 0.9 %: 3 % are a level of 0.1 %, 5 % are seen with a power of 0.98.
@@ -76,50 +60,11 @@ def test_noise_has_the_stated_deviation_and_grows_with_range(targets, rng):
     assert not outlier.any()
 
 
-def test_a_stand_that_is_knocked_turns_all_later_measurements_about_itself(targets):
-    move = Motion((1e-3, 0.0, -2e-3), (0.0, 0.0, 1e-4), lambda time_s: time_s > 2.0)
-    tracker, (position, rotation, time_s) = Tracker(move=move), targets
-    found = tracker.seen(position, rotation, time_s, time_s)[0]
-    later = time_s > 2.0
-    np.testing.assert_allclose(found[~later], position[~later], atol=1e-14)
-    lever = position[later] - np.array(tracker.stand_m)
-    wanted = np.array([1e-3, 0.0, -2e-3]) + np.cross([0.0, 0.0, 1e-4], lever)
-    np.testing.assert_allclose(found[later] - position[later], wanted, atol=1e-7)
-
-
-def test_the_trackers_own_frame_keeps_distances_and_turns_all_alike(targets):
-    tracker = Tracker(frame_turn=(0.3, -0.2, 1.1))
-    position, rotation = tracker.in_own_frame(*targets[:2])
-    own = pin.exp3(np.array(tracker.frame_turn))
-    np.testing.assert_allclose(position @ own.T + np.array(tracker.stand_m), targets[0], atol=1e-12)
-    np.testing.assert_allclose(own @ rotation, targets[1], atol=1e-12)
-
-
-@pytest.fixture
-def pull(rng):
-    """Forces with one row of none, levers, and orientations of the flange."""
-    force = 500.0 * rng.standard_normal((5, 3))
-    force[2] = 0.0
-    lever = np.broadcast_to([0.0, 0.5, 0.0], (5, 3))
-    return force, lever, np.array([pin.exp3(v) for v in rng.standard_normal((5, 3))])
-
-
 @pytest.mark.parametrize("in_flange", [(), ("turn",), ("bias",), ("turn", "bias")])
-def test_what_is_felt_is_what_the_cell_would_show_as_planned(pull, in_flange):
-    force, _, facing = pull
+def test_what_is_felt_is_what_the_cell_would_show_as_planned(rng, in_flange):
+    force, facing = 500.0 * rng.standard_normal((5, 3)), turned(rng.standard_normal((5, 3)))
+    force[2] = 0.0
     cell = LoadCell(0.03, (0.01, -0.02, 0.03), (5.0, -3.0, 2.0), (0.0, 0.0, 0.0), 2e-5, in_flange)
-    shown = cell.shown(cell.felt(*pull)[:, :3], facing)
+    shown = cell.shown(cell.felt(force, np.broadcast_to([0.0, 0.5, 0.0], (5, 3)), facing)[:, :3], facing)
     loaded = force.any(axis=1)
     np.testing.assert_allclose(shown[loaded], force[loaded], atol=1e-9)
-
-
-# Sealed records of earlier runs hold what follows from these.
-PINNED = {
-    (1, "schedule"): [6947743043283990654, 571286321805599877],
-    (7, "weights"): [9496632730487175662, 14987622419449238340],
-}
-
-
-def test_a_seed_and_a_purpose_give_the_same_numbers_in_every_version():
-    for (seed, purpose), raw in PINNED.items():
-        assert stream(seed, purpose).bit_generator.random_raw(2).tolist() == raw

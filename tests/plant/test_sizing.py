@@ -16,8 +16,8 @@ from elastocal_proof.plant.sizing import Yardstick, size_for
 @pytest.mark.parametrize("quantity", ["raw", "retained"])
 @pytest.mark.parametrize("kind", ["joint_offset", "stiffening", "link_elasticity", "outside:foot_slip"])
 def test_a_defect_is_sized_to_its_non_centrality(yardstick, fanuc_specimen, kind, quantity, target):
-    defect = replace(drawn_defect(kind, fanuc_specimen.arm, 3), joints={"stiffening": (2,)}.get(kind, (2,)))
-    defect = replace(defect, joints=defect.joints if defect.joints in KINDS[kind].locations(fanuc_specimen.arm) else ())
+    joints = () if kind.startswith("outside") else (2,)
+    defect = replace(drawn_defect(kind, fanuc_specimen.arm, 3), joints=joints)
 
     def robot_of_size(size):
         return with_defects(fanuc_specimen, [replace(defect, size=size)])
@@ -73,7 +73,7 @@ def test_the_retained_signal_is_what_a_fit_of_the_compliances_leaves(fanuc_speci
     assert yardstick.signal(bad).retained == pytest.approx(left @ left, rel=1e-3)
 
 
-def shifted(robot, *shift, turn=(0.0, 0.0, 0.0)):
+def shifted(robot, shift, turn):
     """All that the tracker reads is moved as one body."""
     return replace(robot, tracker=replace(robot.tracker, move=Motion(shift, turn)))
 
@@ -82,13 +82,13 @@ def test_a_tracker_farther_away_makes_the_same_shift_weigh_less(weightless, sche
     tracker = replace(weightless.tracker, sigma_m=0.0, sigma_m_per_m=1e-5)
     robot = replace(weightless, tracker=tracker)
     yardstick = Yardstick(robot, schedule, targets=[0])
-    change = yardstick.seen_and_left(shifted(robot, 1e-4, 0.0, 0.0))[0].reshape(-1, 6)[:, 0]
+    change = yardstick.seen_and_left(shifted(robot, (1e-4, 0.0, 0.0), (0.0, 0.0, 0.0)))[0].reshape(-1, 6)[:, 0]
     distance = np.linalg.norm(yardstick.poses[0][:, 0] - np.array(tracker.stand_m), axis=-1)
     np.testing.assert_allclose(change, 10.0 / distance[schedule.training])
 
 
 def test_a_free_frame_absorbs_any_motion_as_one_body_and_a_known_one_does_not(weightless, schedule):
-    bad = shifted(weightless, 1e-4, -2e-4, 5e-5, turn=(2e-5, 1e-5, -3e-5))
+    bad = shifted(weightless, (1e-4, -2e-4, 5e-5), (2e-5, 1e-5, -3e-5))
     free, known = (Yardstick(weightless, schedule, free_frame=free).signal(bad) for free in (True, False))
     assert free.raw == pytest.approx(known.raw)
     # To second order of a turn of 40 urad at some metres.

@@ -60,7 +60,7 @@ def test_what_a_job_wrote_is_checked_by_the_next(job):
         (InputError("a.csv", "row 1", "x", "y"), "a.csv: row 1: found x; allowed: y"),
         (
             OSError(errno.ENOSPC, "No space left on device"),
-            f"{OUTPUT}: found No space left on device; allowed: a file",
+            f"{OUTPUT}: found No space left on device; allowed: a file or folder",
         ),
         (PermissionError(errno.EROFS, "Read-only file system", "results/x"), "results/x: found Read-only file system; "),
     ],

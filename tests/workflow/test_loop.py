@@ -73,7 +73,7 @@ def test_each_file_behind_a_report_that_was_changed_is_found_by_every_command(ce
     # Texts for people are read by no job.
     files = [name for name in own if cell.path(name).is_file() and not name.startswith(("results/logs/", "results/timings/"))]
     files = [*sorted({*files}), "src/elastocal/diagnosis/search.py", "config/robots/kuka.yaml"]
-    assert {name.split("/")[0] for name in files} == {"cells", "results", "reports", "src", "config"} and len(files) >= 40
+    assert {name.split("/")[0] for name in files} == {"cells", "results", "reports", "src", "config"} and len(files) > 35
     monkeypatch.chdir(cell.folder)
     assert diagnosed_campaign(Path(CELL)).name == "made"
     for number, name in enumerate(files):

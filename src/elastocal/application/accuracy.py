@@ -42,8 +42,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.model import Case, Estimate, Model
     from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import States
-    from elastocal.remainder.protocol import Predictor
-    from elastocal.remainder.tuning import Spread
+    from elastocal.remainder.regressions import Predictor
 
 REGION = "the poses and loads that were fitted"
 # Of every bound, one-sided, as GUM and JCGM 106 have it; and how sure held-out poses must be that a prediction is too small
@@ -190,11 +189,10 @@ def _by_regression(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Where a regression acts, (N,), and the squared error that it leaves there without the tracker's noise, (2, N), m²: on the
     average, and for intervals."""
-    acts, predicted = regression_at(calibrated, reported_angles, operating)
+    acts, asked = regression_at(calibrated, reported_angles, operating)
     found, more = np.zeros((2, len(acts))), calibrated.remainder
-    if more is not None and predicted is not None:
-        std = predicted.std
-        assert std is not None, "every regression that was chosen has intervals"
+    if more is not None and asked is not None:
+        std = more.predictor.std(asked)
         for number, times in enumerate((more.typical, 1.0)):
             found[number, acts] = np.maximum((times**2 * std**2 - more.sensor_m**2).sum(axis=1), 0.0)
     return acts, found
@@ -259,20 +257,18 @@ def calibrate_on_case(
     return replace(found, scope=replace(scope, repeated_freedom=freedom))
 
 
-def regression_on(
-    case: Case, estimate: Estimate, predictor: Predictor | None, spread: Spread | None, noise_m: float
-) -> Remainder | None:
+def regression_on(case: Case, estimate: Estimate, predictor: Predictor, typical: float, noise_m: float) -> Remainder | None:
     """A regression on what a model leaves of a case, for the end effector; none where no target was on it.
 
     `noise_m`: of the tracker, as the campaign knows it: where the model leaves something, the fit takes it for noise.
     """
     end = case.campaign.robot.chain.end_effector
     mine = [number for number, target in enumerate(case.campaign.targets) if target.point == end.name]
-    if predictor is None or spread is None or not mine:
+    if not mine:
         return None
     place = min(estimate.target_offset[mine], key=lambda offset: float(np.linalg.norm(offset - end.offset_m)))
     sensor = noise_m * float(np.sqrt((1.0 / case.observations.states.repeats).mean()))
-    return Remainder(predictor, place, sensor, spread.typical)
+    return Remainder(predictor, place, sensor, typical)
 
 
 def scope_of(calibrated: CalibratedRobot, model: Model, estimate: Estimate, covariance: np.ndarray, states: States) -> Scope:

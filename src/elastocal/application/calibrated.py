@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.noise import Noise
     from elastocal.mechanics.robot import Robot
-    from elastocal.remainder.protocol import Prediction, Predictor
+    from elastocal.remainder.regressions import Inputs, Predictor
 
 # States at a time: what a walk along all sites makes of them stays in the processor's cache.
 _AT_ONCE = 1024
@@ -44,7 +44,7 @@ class Remainder:
     """A regression on what the model leaves, added to it where joints and loads were fitted.
 
     `place` (3,): of the target in the end effector's measuring point for which it was fitted, m. `sensor_m`: deviation of the
-    tracker's noise in a coordinate of what it was fitted to, which its intervals contain. `typical`: as of `tuning.Spread`.
+    tracker's noise in a coordinate of what it was fitted to, which its intervals contain. `typical`: see `corrected.spread_of`.
     """
 
     predictor: Predictor
@@ -198,16 +198,16 @@ def forward(
 def regressed(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> np.ndarray:
     """Displacement of the end effector by the regression on the remainder, ndarray (N, 3), m, base axes; 0 where none acts."""
     found = np.zeros((len(reported_angles), 3))
-    acts, predicted = regression_at(calibrated, reported_angles, operating)
-    if predicted is not None:
-        found[acts] = predicted.mean
+    acts, asked = regression_at(calibrated, reported_angles, operating)
+    if calibrated.remainder is not None and asked is not None:
+        found[acts] = calibrated.remainder.predictor.mean(asked)
     return found
 
 
 def regression_at(
     calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions
-) -> tuple[np.ndarray, Prediction | None]:
-    """At which commands (N, n) a regression on the remainder is added, ndarray of bool (N,), and what it predicts there."""
+) -> tuple[np.ndarray, Inputs | None]:
+    """At which commands (N, n) a regression on the remainder is added, ndarray of bool (N,), and what it is shown there."""
     more = calibrated.remainder
     if more is None:
         return np.zeros(len(reported_angles), bool), None
@@ -216,7 +216,7 @@ def regression_at(
     seen = observations_of(states_of(calibrated, reported_angles[acts], operating.part(acts)))
     asked = inputs_of(calibrated.model, calibrated.estimate, seen)
     place = np.broadcast_to(more.place, (len(asked), 3))
-    return acts, more.predictor(replace(asked, others=np.hstack([asked.others[:, :-3], place])))
+    return acts, replace(asked, others=np.hstack([asked.others[:, :-3], place]))
 
 
 def come_to_rest(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -149,31 +149,33 @@ def targets_from(described: Mapping[str, Any], chain: Chain, source: str) -> tup
 _IDENTITY = ("session", "pose", "load", "repeat", "target", "row")
 
 
-def columns_of(measurements: Measurements) -> dict[str, np.ndarray]:
-    """Columns of the measurements table, dict of str to ndarray (N,)."""
+def _columns_by_part(joints: int) -> dict[str, Sequence[str]]:
+    """Columns of the measurements table by the part of `Measurements` that they hold."""
+    angles, approach = ([f"{letter}{j}" for j in range(1, joints + 1)] for letter in ("q", "approach"))
+    parts = {name: (name,) for name in _IDENTITY} | {"joint_angles": angles, "wrench": WRENCH_NAMES, "position": "xyz"}
+    parts |= {"rotation_vector": ("rx", "ry", "rz"), "approach": approach}
+    return parts | {name: (name,) for name in ("time_s", "temperature_c", "u95_m")}
+
+
+def columns_of(measurements: Measurements, parts: Collection[str] = ()) -> dict[str, np.ndarray]:
+    """Columns of the measurements table, dict of str to ndarray (N,); of some parts alone where they are named."""
     count, joints = measurements.joint_angles.shape
-    columns = _identity(measurements) | _commanded(measurements)
-    columns |= dict(zip("xyz", measurements.position.T, strict=True))
-    columns |= dict(zip(("rx", "ry", "rz"), _or_missing(measurements.rotation_vector, (count, 3)).T, strict=True))
-    approach = _or_missing(measurements.approach, (count, joints))
-    columns |= {f"approach{j + 1}": approach[:, j] for j in range(joints)}
-    return columns | {name: _or_missing(getattr(measurements, name), (count,)) for name in ("time_s", "temperature_c", "u95_m")}
+    columns: dict[str, np.ndarray] = {}
+    for part, names in _columns_by_part(joints).items():
+        values = getattr(measurements, part)
+        if not parts or part in parts:
+            whole = np.full((count, len(names)), np.nan) if values is None else values.reshape(count, len(names))
+            columns |= dict(zip(names, whole.T, strict=True))
+    return columns
 
 
 def measurements_from(columns: Mapping[str, np.ndarray]) -> Measurements:
     """Measurements from the columns of their table, dict of str to ndarray (N,)."""
-    joints = sum(name.startswith("approach") for name in columns)
-    return Measurements(
-        **{name: columns[name] for name in _IDENTITY},
-        joint_angles=np.column_stack([columns[f"q{j}"] for j in range(1, joints + 1)]),
-        wrench=np.column_stack([columns[name] for name in WRENCH_NAMES]),
-        position=np.column_stack([columns[axis] for axis in "xyz"]),
-        rotation_vector=_or_none(np.column_stack([columns[f"r{axis}"] for axis in "xyz"])),
-        approach=_or_none(np.column_stack([columns[f"approach{j}"] for j in range(1, joints + 1)])),
-        time_s=_or_none(columns["time_s"]),
-        temperature_c=_or_none(columns["temperature_c"]),
-        u95_m=_or_none(columns["u95_m"]),
-    )
+    found: dict[str, Any] = {}
+    for part, names in _columns_by_part(sum(name.startswith("approach") for name in columns)).items():
+        whole = columns[part] if part in columns else np.column_stack([columns[name] for name in names])
+        found[part] = None if whole.dtype.kind == "f" and np.isnan(whole).all() else whole
+    return Measurements(**found)
 
 
 def residual_columns(
@@ -190,32 +192,15 @@ def residual_columns(
     `stages` (N, rows): residuals "before", of the declared model, and "after", of the found one, m and rad. Returns (N,).
     """
     count = len(measurements)
-    columns = _identity(measurements)
+    columns = columns_of(measurements, _IDENTITY)
     columns |= {"held_out": np.full(count, held_out), "gross_error": np.full(count, gross_errors), "outside_range": outside}
-    columns |= {"time_s": _or_missing(measurements.time_s, (count,))} | _commanded(measurements)
+    columns |= columns_of(measurements, ("time_s",)) | columns_of(measurements, ("joint_angles", "wrench"))
     columns |= dict(zip("xyz", position.T, strict=True))
     for stage, residual in stages.items():
         whole = np.full((count, 6), np.nan)
         whole[:, : residual.shape[1]] = residual
         columns |= {f"{stage}_{name}": whole[:, k] for k, name in enumerate(COMPONENT_NAMES)}
     return columns
-
-
-def _identity(measurements: Measurements) -> dict[str, np.ndarray]:
-    return {name: getattr(measurements, name) for name in _IDENTITY}
-
-
-def _commanded(measurements: Measurements) -> dict[str, np.ndarray]:
-    angles = {f"q{joint}": values for joint, values in enumerate(measurements.joint_angles.T, 1)}
-    return angles | dict(zip(WRENCH_NAMES, measurements.wrench.T, strict=True))
-
-
-def _or_missing(values: np.ndarray | None, shape: tuple[int, ...]) -> np.ndarray:
-    return np.full(shape, np.nan) if values is None else values
-
-
-def _or_none(values: np.ndarray) -> np.ndarray | None:
-    return None if np.isnan(values).all() else values
 
 
 def groups_of(keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

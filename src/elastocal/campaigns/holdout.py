@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from elastocal.campaigns.campaign import DOCUMENT, Campaign, Measurements, groups_of
+from elastocal.campaigns.measurements import is_file_in
 from elastocal.counting import counted
 from elastocal.errors import InputError
-
-if TYPE_CHECKING:
-    from scipy.spatial import cKDTree
 
 _HOLDOUTS = ("fraction", "blocks", "session", "poses", "campaign")
 # Below these a fit or a test says nothing.
@@ -72,16 +70,31 @@ def held_out_mask(holdout: Mapping[str, Any], measurements: Measurements, report
     # A pose that was lost is a configuration of its own, and none that stands at zero.
     angles = np.where(nothing[index, None], _NOWHERE_RAD + index[:, None], measurements.joint_angles)
     configuration = configurations(angles, index)
-    chosen = np.zeros(len(pairs), bool)
-    if "campaign" not in holdout:
-        chosen = _chosen_poses(holdout, measurements, pairs, configuration, index, source)
+    chosen, count = np.zeros(len(pairs), bool), configuration.max() + 1
+    for entry in holdout.get("poses", ()):
+        match = (pairs == entry).all(axis=1) if isinstance(entry, list | tuple) else pairs[:, 1] == entry
+        if not match.any():
+            allowed = f"poses that were measured, {pairs[:, 1].min()}..{pairs[:, 1].max()}"
+            raise InputError(source, "holdout.poses", str(entry), allowed)
+        chosen |= match
+    for session in np.atleast_1d(holdout.get("session", [])):
+        if session not in pairs[:, 0]:
+            allowed = f"sessions that were measured: {', '.join(map(str, np.unique(pairs[:, 0])))}"
+            raise InputError(source, "holdout.session", str(session), allowed)
+        chosen |= pairs[:, 0] == session
+    draws = np.random.Generator(np.random.PCG64(holdout.get("seed", 0)))
+    if "fraction" in holdout:
+        chosen = np.isin(configuration, draws.permutation(count)[: round(holdout["fraction"] * count)])
+    if parts := holdout.get("blocks"):
+        if parts > count:
+            raise InputError(source, "holdout.blocks", str(parts), f"at most as many as configurations, {count}")
+        chosen = blocks_of_poses(measurements.joint_angles, index, parts) == draws.integers(parts)
     fitted, tested = (len(np.unique(configuration[part])) for part in (~chosen, chosen))
     fewest = 0 if "campaign" in holdout else FEWEST_HELD_OUT_POSES
     if fitted < FEWEST_TRAINING_POSES or tested < fewest:
         found = f"{counted(fitted, 'configuration')} to fit and {tested} held out"
         least = f"at least {FEWEST_TRAINING_POSES} to fit" + (f" and {fewest} held out" if fewest else "")
-        allowed = f"{least}; poses with the same joint angles are one"
-        raise InputError(source, "holdout", found, allowed)
+        raise InputError(source, "holdout", found, f"{least}; poses with the same joint angles are one")
     return chosen[index]
 
 
@@ -90,53 +103,6 @@ def measured_poses(measurements: Measurements) -> tuple[np.ndarray, np.ndarray]:
     pairs = np.column_stack([measurements.session, measurements.pose])
     first, index = groups_of(pairs)
     return pairs[first], index
-
-
-def _chosen_poses(
-    holdout: Mapping[str, Any],
-    measurements: Measurements,
-    pairs: np.ndarray,
-    configuration: np.ndarray,
-    index: np.ndarray,
-    source: str,
-) -> np.ndarray:
-    """Mask (P,) of the poses that are held out; `pairs` and `index` as of `measured_poses`."""
-    count, chosen = configuration.max() + 1, np.zeros(len(pairs), bool)
-    if "poses" in holdout:
-        for entry in holdout["poses"]:
-            match = (pairs == entry).all(axis=1) if isinstance(entry, list | tuple) else pairs[:, 1] == entry
-            if not match.any():
-                allowed = f"poses that were measured, {pairs[:, 1].min()}..{pairs[:, 1].max()}"
-                raise InputError(source, "holdout.poses", str(entry), allowed)
-            chosen |= match
-        return chosen
-    if "session" in holdout:
-        wanted, there = np.atleast_1d(holdout["session"]), np.unique(pairs[:, 0])
-        for session in wanted:
-            if session not in there:
-                allowed = f"sessions that were measured: {', '.join(map(str, there))}"
-                raise InputError(source, "holdout.session", str(session), allowed)
-        return np.isin(pairs[:, 0], wanted)
-    draws = np.random.Generator(np.random.PCG64(holdout["seed"]))
-    if "blocks" in holdout:
-        if holdout["blocks"] > count:
-            raise InputError(source, "holdout.blocks", str(holdout["blocks"]), f"at most as many as configurations, {count}")
-        return blocks_of_poses(measurements.joint_angles, index, holdout["blocks"]) == draws.integers(holdout["blocks"])
-    return np.isin(configuration, draws.permutation(count)[: round(holdout["fraction"] * count)])
-
-
-def is_file(path: str | Path) -> bool:
-    """Whether a path is that of a regular file; False too for what no path can be."""
-    try:
-        return Path(path).is_file()
-    except (OSError, ValueError):
-        # A name that is too long, or with a null character.
-        return False
-
-
-def is_file_in(path: str | Path, *folders: str | Path) -> bool:
-    """Whether a path is that of a regular file in or below one of some folders; links are followed, on both sides."""
-    return is_file(path) and any(Path(path).resolve().is_relative_to(Path(folder).resolve()) for folder in folders)
 
 
 # Measurements of one pose share their joint angles up to what a controller's servo error can differ: a joint that moves less
@@ -199,11 +165,14 @@ def configurations(joint_angles: np.ndarray, pose: np.ndarray) -> np.ndarray:
 
 def number_alike(points: np.ndarray, within: float) -> np.ndarray:
     """Number of each row (N, n), 0 for the first: one for rows that agree to `within` with the row that began it."""
+    # Its import takes a tenth of each start of Snakemake, whose rules read campaign.yaml and need no tree.
+    from scipy.spatial import cKDTree
+
     # Equal rows lead or follow together: a tree of a hundred thousand equal points takes minutes.
     first, same = groups_of(points)
     order = np.argsort(first)
     different = points[first[order]]
-    tree = _tree(different)
+    tree = cKDTree(different)
     # What is farther from all others is not asked for its neighbours, and the neighbours of all are never held at once.
     nearest, _ = tree.query(different, k=[2], p=np.inf, distance_upper_bound=np.nextafter(within, 1.0))
     alone = np.isinf(np.ravel(nearest))
@@ -251,11 +220,6 @@ def beyond_range(fitted_angles: np.ndarray, joint_angles: np.ndarray) -> np.ndar
 
 def find_repeated(fitted_angles: np.ndarray, joint_angles: np.ndarray) -> np.ndarray:
     """Whether states (S, n) have in every joint the angle of a same one of those fitted (P, n), rad: ndarray of bool (S,)."""
-    return np.isfinite(_tree(fitted_angles).query(joint_angles, p=np.inf, distance_upper_bound=SAME_POSE_RAD)[0])
-
-
-def _tree(points: np.ndarray) -> cKDTree:
-    # Its import takes a tenth of each start of Snakemake, whose rules read campaign.yaml and need no tree.
     from scipy.spatial import cKDTree
 
-    return cKDTree(points)
+    return np.isfinite(cKDTree(fitted_angles).query(joint_angles, p=np.inf, distance_upper_bound=SAME_POSE_RAD)[0])

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -53,7 +53,7 @@ class PublicFile:
 def find_missing(names: Iterable[str], files: Mapping[str, PublicFile], kept: str | Path, box: str | Path) -> str | None:
     """The first of some files that is missing where `FOLDER_VARIABLE` stands for a network, see `fetch`; None without it."""
     for name in names if os.environ.get(FOLDER_VARIABLE) else ():
-        if _at_hand(files[name], box) is None and not (Path(kept) / _name_copy(name, files[name])).is_file():
+        if _at_hand(files[name], box) is None and not Path(kept, _name_copy(name, files[name])).is_file():
             return files[name].local
     return None
 
@@ -99,8 +99,7 @@ def fetch(name: str, files: Mapping[str, PublicFile], folder: str | Path, box: s
     return Path(kept)
 
 
-@dataclass(frozen=True)
-class PublicMeasurements:
+class PublicMeasurements(NamedTuple):
     """N measurements: `angles` (N, n) as the controller reports them, rad; `positions` (N, 3) by target, m; `others` (N,)."""
 
     angles: np.ndarray
@@ -113,16 +112,14 @@ def _read_text(table: Mapping[str, Any], path: str | Path) -> PublicMeasurements
     # Neither pandas nor the parts of scipy load at each start of Snakemake, whose rules ask importers for their files alone.
     import pandas as pd
 
-    separator, names, kind = table.get("separator", ","), table.get("names"), table["kind"]
+    separator, kind, angles_of = table.get("separator", ","), table["kind"], table["angles"]
     separator = r"\s+" if separator == "blanks" else separator
+    needed = {name for parts in table["positions"].values() for part in parts for name in part} | {*angles_of[:6]}
     try:
-        text = pd.read_csv(path, sep=separator, decimal=table.get("decimal", "."), names=names, index_col=False)
-        needed = [name for parts in table["positions"].values() for part in parts for name in part]
-        there = [name for name in table["angles"] if name in text]
-        for name in (*table["angles"][:6], *needed):
-            if name not in text:
-                raise InputError(path, "header", f"no column {name!r}", kind)
-        angles = text[there].to_numpy(float)
+        text = pd.read_csv(path, sep=separator, decimal=table.get("decimal", "."), names=table.get("names"), index_col=False)
+        if missing := sorted(needed - {*text}):
+            raise InputError(path, "header", f"no column {missing[0]!r}", kind)
+        angles = text[[name for name in angles_of if name in text]].to_numpy(float)
         positions = {
             target: 1e-3 * sum(text[part].to_numpy(float) for part in parts) for target, parts in table["positions"].items()
         }
@@ -159,14 +156,15 @@ def _read_motoman(path: str | Path) -> PublicMeasurements:
     return PublicMeasurements(rows[:, 7:13], {"reflector": rows[:, 19:22]}, {})
 
 
+_MAT_FILES = {"fanuc_static": _read_fanuc_static, "motoman": _read_motoman}
+
+
 @dataclass(frozen=True)
 class Importer:
-    """What makes campaigns of a public source.
+    """What makes campaigns of a public source: an entry of ``public_data.yaml``, whose schema says what its keys mean.
 
-    `files`: of the source, by the names that a campaign of config/campaigns has for them. `read`: a file of them. `robots`: of
-    config/robots, for arms of six joints and, last, of more. `noise`: as in ``campaign.yaml``. `same_pose_rad`: as in
-    `pose_and_repeat`. `parts`: importers whose files, one of each, are the sessions of one campaign; each robot's file then
-    says how its source counts the angles.
+    `files`: by the names that campaigns have for them, those of its parts too. `read`: makes measurements of a
+    file, of those with parts of one of the first.
     """
 
     files: Mapping[str, PublicFile]
@@ -182,33 +180,34 @@ class Importer:
         return (*self.robots, *(robot for part in self.parts for robot in part.robots))
 
     def write_campaign(
-        self,
-        paths: Sequence[str | Path],
-        folder: str | Path,
-        robots_folder: str | Path,
-        name: str,
-        holdout: Mapping[str, Any] | None = None,
+        self, paths: Sequence[str | Path], folder: str | Path, robots_folder: str | Path, name: str, **test: Mapping[str, Any]
     ) -> None:
-        """Write one file, or one of each part, as a campaign's folder; `holdout` is as in ``campaign.yaml``."""
+        """Write one file, or one of each part, as a campaign's folder.
+
+        `test`: ``holdout`` as in ``campaign.yaml``, or ``fold``: which `number`, from 1, `of` so many folds is held out, whose
+        poses are dealt out in turn: cross-validation by whole poses (Geisser, The predictive sample reuse method with
+        applications, JASA 70, 1975).
+        """
         tables, targets, joints = [], list[str](), 6
         for session, (part, path) in enumerate(zip(self.parts or (self,), paths, strict=True)):
-            measured = part.read(path)
-            angles, joints = measured.angles, measured.angles.shape[1]
+            angles, positions, others = part.read(path)
+            joints = angles.shape[1]
             pose, repeat = pose_and_repeat(angles, part.same_pose_rad)
             if self.parts:
                 angles = read_robot(Path(robots_folder) / f"{part.robots[0]}.yaml").model_angles(angles)
             # One row for each target of each measurement.
-            names, rows = list(measured.positions), np.repeat(np.arange(len(pose)), len(measured.positions))
+            names, rows = list(positions), np.repeat(np.arange(len(pose)), len(positions))
             table = {"session": np.full(len(rows), session)} if self.parts else {}
             table |= {"pose": pose[rows], "load": np.zeros(len(rows), int), "repeat": repeat[rows]}
             table |= {"target": np.tile(names, len(pose))} | {f"q{j + 1}": column[rows] for j, column in enumerate(angles.T)}
-            positions = np.stack([*measured.positions.values()], axis=1).reshape(-1, 3)
-            tables.append(table | dict(zip("xyz", positions.T, strict=True)) | dict(measured.others))
+            place = np.stack([*positions.values()], axis=1).reshape(-1, 3)
+            tables.append(table | dict(zip("xyz", place.T, strict=True)) | dict(others))
             targets += names
+        whole = {column: np.concatenate([table[column] for table in tables]) for column in tables[0]}
         document: dict[str, Any] = {
             "campaign": name,
             "robot": self.robots[-1] if joints > 6 else self.robots[0],
-            "measured": "pose" if "rx" in tables[0] else "position",
+            "measured": "pose" if "rx" in whole else "position",
             "frame": "tracker",
             "targets": {target: {"point": f"{joints}DoF", "offset_m": "unknown"} for target in targets},
             "compliance": "nominal",
@@ -216,8 +215,10 @@ class Importer:
             "declared": ["joint_offset", "link_geometry"],
         }
         document |= {"noise": dict(self.noise)} if self.noise else {}
-        document |= {"holdout": dict(holdout)} if holdout else {}
-        whole = {column: np.concatenate([table[column] for table in tables]) for column in tables[0]}
+        if fold := test.get("fold"):
+            pairs = np.unique(np.column_stack([whole.get("session", 0 * whole["pose"]), whole["pose"]]), axis=0)
+            test = {"holdout": {"poses": pairs[fold["number"] - 1 :: fold["of"]].tolist()}}
+        document |= {key: dict(value) for key, value in test.items()}
         write_campaign(folder, document, whole, joints)
 
 
@@ -229,12 +230,6 @@ def pose_and_repeat(joint_angles: np.ndarray, tolerance_rad: float = 0.0) -> tup
     return pose, pd.Series(pose).groupby(pose).cumcount().to_numpy()
 
 
-_MAT_FILES: dict[str, Callable[[str | Path], PublicMeasurements]] = {
-    "fanuc_static": _read_fanuc_static,
-    "motoman": _read_motoman,
-}
-
-
 @cache
 def read_importers(path: Path) -> dict[str, Importer]:
     """Importers of ``public_data.yaml`` by the names that ``importer`` of a campaign may have."""
@@ -243,16 +238,14 @@ def read_importers(path: Path) -> dict[str, Importer]:
     found: dict[str, Importer] = {}
     for name, entry in document.items():
         files = {each: PublicFile(**(entry["source"] | file)) for each, file in entry.get("files", {}).items()}
-        read = partial(_read_text, entry["table"]) if "table" in entry else _MAT_FILES.get(name, _no_file)
         parts = tuple(found[part] for part in entry.get("parts", ()))
+        own = partial(_read_text, entry["table"]) if "table" in entry else _MAT_FILES.get(name)
+        if (read := parts[0].read if parts else own) is None:
+            raise InputError(path, name, "no format", "a table, or parts that have one")
         files |= {each: file for part in parts for each, file in part.files.items()}
         stated = {key: entry[key] for key in ("noise", "same_pose_rad") if key in entry}
         found[name] = Importer(files, read, tuple(entry["robots"]), **stated, parts=parts)
     return found
-
-
-def _no_file(path: str | Path) -> PublicMeasurements:
-    raise InputError(path, "", "no format", "an importer with a table, or parts that have one")
 
 
 def importer(name: str, config: str | Path, source: str | Path) -> Importer:

@@ -3,7 +3,8 @@
 import csv
 import itertools
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+import os
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from elastocal.counting import counted
 from elastocal.errors import InputError, closest_first
 from elastocal.io.atomic_writes import atomic_write
 from elastocal.io.storage import Column
+from elastocal.io.texts import kind_of
 from elastocal.mechanics.components import WRENCH, WRENCH_NAMES
 
 # A diagnosis of a million measurements takes 2 GB (benchmarks); a tracker's stream is averaged before.
@@ -33,7 +35,6 @@ ROTATION = ("rx", "ry", "rz")
 TICK = "done"
 SHOWN = {"deg": math.radians(1.0), "mm": 1e-3}
 SHOWN_TO = 2e-3
-
 
 # A turn and a half, of a rotation vector; nor does a joint of a serial arm report more, unless its limits say so.
 FARTHEST_RAD = 3.0 * np.pi
@@ -60,9 +61,29 @@ def file_columns(joints: int) -> dict[str, Column]:
     return {column.name: column for column in columns}
 
 
-def sheet_columns(joints: int) -> set[str]:
-    """Names of the columns of a sheet for people, which a file of measurements may have beside `file_columns`."""
-    return {TICK, *(f"q{j}_{unit}" for j in range(1, joints + 1) for unit in SHOWN)}
+def is_file(path: str | Path) -> bool:
+    """Whether a path is that of a regular file; False too for what no path can be."""
+    try:
+        return Path(path).is_file()
+    except (OSError, ValueError):
+        # A name that is too long, or with a null character.
+        return False
+
+
+def is_file_in(path: str | Path, *folders: str | Path) -> bool:
+    """Whether a path is that of a regular file in or below one of some folders; links are followed, on both sides."""
+    return is_file(path) and any(Path(path).resolve().is_relative_to(Path(folder).resolve()) for folder in folders)
+
+
+def files_there(folder: str | Path, *names: str) -> list[Path]:
+    """Files of these names in a folder; a link out of it, a pipe and the like are refused."""
+    there = [path for name in names if os.path.lexists(path := Path(folder) / name)]
+    for path in there:
+        if not is_file(path):
+            raise InputError(path, "", f"{kind_of(os.lstat(path).st_mode)} that leads to no file", "the file itself")
+        if not is_file_in(path, folder):
+            raise InputError(path, "", "a link out of the campaign's folder", "the file itself")
+    return there
 
 
 def read_measurements(folder: Path, joints: int, measured: str) -> Cells:
@@ -72,29 +93,23 @@ def read_measurements(folder: Path, joints: int, measured: str) -> Cells:
     file that cannot be read, a column that is missing, unknown or there twice, a row of another length, more than
     `MOST_MEASUREMENTS` rows, or angles that are others than those shown beside.
     """
-    there = [path for path in (folder / CSV, folder / PARQUET) if path.is_file()]
+    there = files_there(folder, CSV, PARQUET)
     if len(there) != 1:
-        found = "both" if there else "neither"
-        raise InputError(folder.as_posix(), "", f"{found} {CSV} {'and' if there else 'nor'} {PARQUET}", "one of them")
+        found = f"both {CSV} and {PARQUET}" if there else f"neither {CSV} nor {PARQUET}"
+        raise InputError(folder.as_posix(), "", found, "one of them")
     table, known = _read(there[0], joints), file_columns(joints)
     if len(table.rows) == 0:
         raise InputError(there[0], "", "no row of data", "one row for each measurement of one target")
     angles, approach = ([f"{letter}{j}" for j in range(1, joints + 1)] for letter in ("q", "approach"))
     required = ["pose", "load", "repeat", "target", *angles, "x", "y", "z", *(ROTATION if measured == "pose" else ())]
-    for group in (WRENCH_NAMES, approach):
-        required += group if any(name in table.columns for name in group) else []
-    for name in required:
-        if name not in table.columns:
-            unit = f" in {known[name].unit}" if known[name].unit else ""
-            raise InputError(table.path, "header", f"no column {name!r}", f"{name}: {known[name].meaning}{unit}")
+    required += [name for group in (WRENCH_NAMES, approach) if {*group} & table.columns.keys() for name in group]
+    if missing := next((name for name in required if name not in table.columns), None):
+        unit = f" in {known[missing].unit}" if known[missing].unit else ""
+        raise InputError(table.path, "header", f"no column {missing!r}", f"{missing}: {known[missing].meaning}{unit}")
     for name, unit in itertools.product(angles, SHOWN):
         if (beside := f"{name}_{unit}") in table.columns:
-            values = table.numbers(name) / SHOWN[unit]
-            wrong = np.abs(values - table.numbers(beside)) > SHOWN_TO
-            if wrong.any():
-                index = int(np.argmax(wrong))
-                allowed = f"{values[index]:.3f}, which is {name}, or a file without the column {beside}"
-                raise table.fault(index, beside, allowed)
+            wrong = np.abs(table.numbers(name) / SHOWN[unit] - table.numbers(beside)) > SHOWN_TO
+            table.refuse(wrong, [beside], f"what is {name} in {unit}, or a file without the column {beside}")
     return table
 
 
@@ -103,33 +118,29 @@ def described_by(folder: Path) -> tuple[list[str], str]:
 
     No targets where there is no measurement. Raises `InputError`: a file that is no table of measurements.
     """
-    there = next((path for path in (folder / CSV, folder / PARQUET) if path.is_file()), None)
-    if there is None:
-        return [], "position"
     try:
-        table = _read(there, MOST_JOINTS)
+        table = next((_read(path, MOST_JOINTS) for path in files_there(folder, CSV, PARQUET)), None)
     except InputError as error:
         if error.found != A_HEADER_ALONE:
             raise
+        table = None
+    if table is None:
         return [], "position"
     names = dict.fromkeys(name for name in (table.texts("target") if "target" in table.columns else ()) if name)
     return list(names), "pose" if {*ROTATION} <= table.columns.keys() else "position"
 
 
 def check_column_names(names: Collection[str], joints: int, path: str) -> None:
-    """Refuse a column that the format does not have, or that is there twice.
-
-    `path`: named in errors. Raises `InputError`: the first such column.
-    """
-    known, beside = file_columns(joints), sheet_columns(joints)
+    """Refuse the first column that is there twice, or that neither the format nor a sheet has; `path` is named in errors."""
+    known = file_columns(joints)
+    allowed = {*known, TICK, *(f"q{j}_{unit}" for j in range(1, joints + 1) for unit in SHOWN)}
     if twice := next((name for place, name in enumerate(names) if name in [*names][:place]), None):
         raise InputError(path, "header", f"column {twice!r} twice", "each column once")
-    for name in names:
-        if name not in known and name not in beside:
-            # That q7 is unknown helps little where it is not stated how many joints the robot has.
-            of = f", for {joints} joints" if name.rstrip("0123456789") in ("q", "approach") else ""
-            missing = [other for other in known if other not in names]
-            raise InputError(path, "header", f"the unknown column {name!r}", closest_first(name, missing) + of)
+    if name := next((name for name in names if name not in allowed), None):
+        # That q7 is unknown helps little where it is not stated how many joints the robot has.
+        of = f", for {joints} joints" if name.rstrip("0123456789") in ("q", "approach") else ""
+        missing = [other for other in known if other not in names]
+        raise InputError(path, "header", f"the unknown column {name!r}", closest_first(name, missing) + of)
 
 
 def write_measurements(path: str | Path, table: Mapping[str, Sequence[Any] | np.ndarray], joints: int) -> None:
@@ -138,14 +149,21 @@ def write_measurements(path: str | Path, table: Mapping[str, Sequence[Any] | np.
     `path`: holds CSV where its name is `CSV`, else Parquet. `table`: columns of one length, named as in `file_columns`.
     """
     columns = [column for name, column in file_columns(joints).items() if name in table]
+    cells = [np.asarray(table[column.name]).tolist() for column in columns]
     with atomic_write(path) as partial:
-        (_write_csv if Path(path).name == CSV else _write_parquet)(partial, columns, table)
+        if Path(path).name == CSV:
+            with open(partial, "w", encoding="utf-8", newline="") as file:
+                # repr of a float is the shortest text that reads back as the same number.
+                rows = zip(*cells, strict=True)
+                csv.writer(file, lineterminator="\n").writerows(itertools.chain([[column.name for column in columns]], rows))
+            return
+        schema = [pa.field(c.name, pa.type_for_alias(c.type), False, {"unit": c.unit, "meaning": c.meaning}) for c in columns]
+        arrays = [pa.array(values, field.type) for values, field in zip(cells, schema, strict=True)]
+        whole = pa.Table.from_arrays(arrays, schema=pa.schema(schema))
+        pq.write_table(whole, partial, compression="zstd", write_page_checksum=True)
 
 
 def _read(path: Path, joints: int) -> Cells:
-    if (size := path.stat().st_size) > _MOST_BYTES:
-        allowed = f"at most {_MOST_BYTES}, which hold {MOST_MEASUREMENTS} measurements"
-        raise InputError(path, "", counted(size, "byte"), allowed)
     return (_read_csv if path.name == CSV else _read_parquet)(path.as_posix(), joints)
 
 
@@ -158,6 +176,8 @@ def _read_csv(path: str, joints: int) -> Cells:
 
 def _read_parquet(path: str, joints: int) -> Cells:
     texts = {TICK, *(name for name, column in file_columns(joints).items() if column.type == "string")}
+    if (size := os.path.getsize(path)) > _MOST_BYTES:
+        raise InputError(path, "", counted(size, "byte"), f"at most {_MOST_BYTES}, which hold {MOST_MEASUREMENTS} measurements")
     try:
         # pyarrow's own complaint of a column that is there twice is a list of all columns.
         with pq.ParquetFile(path) as file:
@@ -171,11 +191,9 @@ def _read_parquet(path: str, joints: int) -> Cells:
             if not (is_number or (pa.types.is_string(word) and field.name in texts)):
                 allowed = "numbers, or text" if field.name in texts else "numbers"
                 raise InputError(path, f"column {field.name}", f"type {field.type}", allowed)
-        if groups > _MOST_ROW_GROUPS:
-            raise InputError(path, "", f"{groups} row groups", f"at most {_MOST_ROW_GROUPS}")
-        if count > MOST_MEASUREMENTS:
-            allowed = f"at most {MOST_MEASUREMENTS} (the mean of a tracker's stream at each pose is one measurement)"
-            raise InputError(path, "", f"{count} rows of data", allowed)
+        for number, what, most in ((groups, "row groups", _MOST_ROW_GROUPS), (count, "rows of data", MOST_MEASUREMENTS)):
+            if number > most:
+                raise InputError(path, "", f"{number} {what}", f"at most {most}")
         # As dictionaries texts take the memory that they take in the file.
         there = [name for name in fields.names if name in texts]
         table = pq.read_table(path, read_dictionary=there, page_checksum_verification=True, partitioning=None)
@@ -184,17 +202,3 @@ def _read_parquet(path: str, joints: int) -> Cells:
         raise InputError(path, "", f"no readable Parquet file ({error})", "a Parquet file") from None
     columns = dict(zip(table.column_names, table.columns, strict=True))
     return Cells(path, columns, np.arange(1, table.num_rows + 1, dtype=np.int32))
-
-
-def _write_csv(path: str, columns: Iterable[Column], table: Mapping[str, Sequence[Any] | np.ndarray]) -> None:
-    with open(path, "w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([column.name for column in columns])
-        # repr of a float is the shortest text that reads back as the same number.
-        writer.writerows(zip(*(np.asarray(table[column.name]).tolist() for column in columns), strict=True))
-
-
-def _write_parquet(path: str, columns: Iterable[Column], table: Mapping[str, Sequence[Any] | np.ndarray]) -> None:
-    fields = [pa.field(c.name, pa.type_for_alias(c.type), False, {"unit": c.unit, "meaning": c.meaning}) for c in columns]
-    arrays = [pa.array(np.asarray(table[field.name]).tolist(), field.type) for field in fields]
-    pq.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields)), path, compression="zstd", write_page_checksum=True)

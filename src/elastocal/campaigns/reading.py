@@ -5,7 +5,6 @@ of one target. All that is wrong on its face is refused here, in one line; a uni
 wrong is left for the diagnosis to trace.
 """
 
-import os
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -27,17 +26,14 @@ from elastocal.campaigns.holdout import (
     SAME_POSE_RAD,
     held_out_mask,
     holdout_from,
-    is_file,
-    is_file_in,
     measured_poses,
     other_folder,
 )
-from elastocal.campaigns.measurements import CSV, FARTHEST_RAD, PARQUET, ROTATION, read_measurements
+from elastocal.campaigns.measurements import CSV, FARTHEST_RAD, PARQUET, ROTATION, files_there, is_file_in, read_measurements
 from elastocal.campaigns.tables import Cells
 from elastocal.counting import counted
 from elastocal.errors import InputError, closest_first
 from elastocal.io.documents import check_document, read_document
-from elastocal.io.texts import kind_of
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.robot_file import robot_from_document
@@ -50,8 +46,7 @@ def read_campaign(folder: str | Path, robots_folder: str | Path, effects: Collec
     `effects`: names that ``declared`` may have; not checked without. Raises `InputError`: the first fault found: file, row and
     column or key, what stands there and what may.
     """
-    folder = Path(folder)
-    source = (folder / DOCUMENT).as_posix()
+    folder, source = Path(folder), Path(folder, DOCUMENT).as_posix()
     document, robot_path = read_descriptions(folder, robots_folder)
     robot = read_robot(robot_path)
     targets = targets_from(document["targets"], robot.chain, source)
@@ -59,12 +54,10 @@ def read_campaign(folder: str | Path, robots_folder: str | Path, effects: Collec
     for index, name in enumerate(document.get("declared", ())):
         if effects is not None and name not in set(effects):
             raise InputError(source, f"declared[{index}]", repr(name), closest_first(name, sorted(effects)))
-    _tables(folder)
     table = read_measurements(folder, robot.joints, document["measured"])
     measurements = _measurements(table, robot, targets, document["measured"])
     _check_measurements(measurements, table, robot, targets, source)
-    _check_compliance(document, robot, robot_path, measurements, source)
-    _check_noise(document, measurements, robot.joints, source)
+    _check_stated(document, measurements, robot, robot_path.name, source)
     held_out_mask(holdout, measurements, robot.reported_offset, source)
     place = {"table": Path(table.path).name, "header_line": table.header_line}
     return assemble_campaign(document | {"holdout": holdout} | place, robot, measurements, source)
@@ -72,30 +65,28 @@ def read_campaign(folder: str | Path, robots_folder: str | Path, effects: Collec
 
 def read_descriptions(folder: str | Path, robots_folder: str | Path) -> tuple[dict[str, Any], Path]:
     """What a campaign says of itself, as its schema has it, and where its robot is described."""
-    source = (Path(folder) / DOCUMENT).as_posix()
-    _check_place(Path(source), folder)
+    source = Path(folder, DOCUMENT).as_posix()
+    files_there(folder, DOCUMENT)
     document = read_document(source)
     check_document(document, "campaign", source)
-    return document, _robot_path(document["robot"], Path(folder), robots_folder, source)
+    name, known = document["robot"], sorted(file.stem for file in Path(robots_folder).glob("*.yaml"))
+    path = Path(robots_folder) / f"{name}.yaml" if name in known else Path(folder) / name
+    if not is_file_in(path, folder, robots_folder):
+        listed = f"{Path(robots_folder).as_posix()}: {closest_first(name, known)}"
+        allowed = f"a file in this folder, named relative to this folder, or a robot of {listed}"
+        raise InputError(source, "robot", repr(name), allowed)
+    return document, path
 
 
 def campaign_files(folder: str | Path, robots_folder: str | Path) -> list[str]:
     """Files that a campaign is read from, those of the campaign that holds its test included."""
     document, robot_path = read_descriptions(folder, robots_folder)
-    files = [Path(folder) / DOCUMENT, *_tables(Path(folder)), robot_path]
+    files = [Path(folder) / DOCUMENT, *files_there(folder, CSV, PARQUET), robot_path]
     if other := document.get("holdout", {}).get("campaign"):
         there = other_folder(other, Path(folder), files[0].as_posix())
         # What tests the other one is no part of this one: two campaigns may test each other.
-        files += [there / DOCUMENT, *_tables(there), read_descriptions(there, robots_folder)[1]]
+        files += [there / DOCUMENT, *files_there(there, CSV, PARQUET), read_descriptions(there, robots_folder)[1]]
     return [path.as_posix() for path in files]
-
-
-def _tables(folder: Path) -> list[Path]:
-    """Files of measurements in a folder; a link out of it, a pipe and the like are refused."""
-    there = [path for kind in (CSV, PARQUET) if os.path.lexists(path := folder / kind)]
-    for path in there:
-        _check_place(path, folder)
-    return there
 
 
 def read_robot(path: str | Path) -> Robot:
@@ -123,54 +114,21 @@ def held_out_campaign(
     return other
 
 
-def folds_of(folder: str | Path, robots_folder: str | Path, number: int, of: int) -> dict[str, Any]:
-    """Poses of fold `number`, from 1, `of` so many, dealt out in turn: as in ``holdout`` of ``campaign.yaml``.
-
-    K-fold cross-validation by whole poses: Geisser, The predictive sample reuse method with applications, JASA 70, 1975.
-    """
-    pairs = measured_poses(read_campaign(folder, robots_folder).measurements)[0]
-    return {"poses": pairs[number - 1 :: of].tolist()}
-
-
-def _check_compliance(
-    document: Mapping[str, Any], robot: Robot, robot_path: Path, measurements: Measurements, source: str
-) -> None:
-    """Refuse loads on a robot whose compliances are neither known nor identified; without loads its joints count as rigid."""
+def _check_stated(document: Mapping[str, Any], measurements: Measurements, robot: Robot, robot_file: str, source: str) -> None:
+    """Refuse loads on unknown compliances that are not identified, noise declared twice or not at all, or of other joints."""
     nominal = document.get("compliance", "nominal") == "nominal"
     if nominal and not robot.compliance_known and measurements.wrench.any():
-        found = f"nominal, but no compliance_urad_per_Nm in {robot_path.name}, and loads"
+        found = f"nominal, but no compliance_urad_per_Nm in {robot_file}, and loads"
         raise InputError(source, "compliance", found, "identify, or nominal with compliance_urad_per_Nm in the robot file")
-
-
-def _check_noise(document: Mapping[str, Any], measurements: Measurements, joints: int, source: str) -> None:
-    """Refuse noise of positions that is declared twice or not at all, and repeatabilities of other joints."""
-    declared = document.get("noise")
-    if declared is None:
+    if (declared := document.get("noise")) is None:
         return
     if "position_m" in declared and measurements.u95_m is not None:
         raise InputError(source, "noise.position_m", "beside a column u95_m of the measurements", "one of them")
     if "position_m" not in declared and measurements.u95_m is None:
         raise InputError(source, "noise", "no position_m", "position_m, or a column u95_m of the measurements")
     each = declared.get("joint_rad", 0.0)
-    if isinstance(each, list) and len(each) != joints:
-        raise InputError(source, "noise.joint_rad", counted(len(each), "number"), f"one for all joints, or {joints}")
-
-
-def _robot_path(name: str, folder: Path, robots_folder: str | Path, source: str) -> Path:
-    known = sorted(file.stem for file in Path(robots_folder).glob("*.yaml"))
-    path = Path(robots_folder) / f"{name}.yaml" if name in known else folder / name
-    if not is_file_in(path, folder, robots_folder):
-        listed = f"{Path(robots_folder).as_posix()}: {closest_first(name, known)}"
-        allowed = f"a file in this folder, named relative to this folder, or a robot of {listed}"
-        raise InputError(source, "robot", repr(name), allowed)
-    return path
-
-
-def _check_place(path: Path, folder: str | Path) -> None:
-    if is_file(path) and not is_file_in(path, folder):
-        raise InputError(path, "", "a link out of the campaign's folder", "the file itself")
-    if os.path.lexists(path) and not is_file(path):
-        raise InputError(path, "", f"{kind_of(os.lstat(path).st_mode)} that leads to no file", "the file itself")
+    if isinstance(each, list) and len(each) != robot.joints:
+        raise InputError(source, "noise.joint_rad", counted(len(each), "number"), f"one for all joints, or {robot.joints}")
 
 
 def _measurements(table: Cells, robot: Robot, targets: Sequence[Target], measured: str) -> Measurements:
@@ -184,10 +142,7 @@ def _measurements(table: Cells, robot: Robot, targets: Sequence[Target], measure
     approach = None
     if "approach1" in table.columns:
         approach = table.matrix(f"approach{j}" for j in range(1, robot.joints + 1))
-        wrong = ~np.isin(approach, (-1.0, 0.0, 1.0))
-        if wrong.any():
-            index, joint = np.argwhere(wrong)[0]
-            raise table.fault(index, f"approach{joint + 1}", "-1, 0 or 1")
+        table.refuse(~np.isin(approach, (-1.0, 0.0, 1.0)), [f"approach{j}" for j in range(1, robot.joints + 1)], "-1, 0 or 1")
         # Where a joint of the model follows two reported ones that came from opposite sides, its own sense is not known.
         approach = np.sign(approach @ robot.reported_matrix.T)
     return Measurements(
@@ -224,25 +179,22 @@ def find_degrees(reported: np.ndarray, robot: Robot) -> np.ndarray:
     low, high = robot.joint_limits.T
     farthest = max(FARTHEST_RAD, np.abs(robot.joint_limits).max())
 
-    def inside(reported: np.ndarray, margin: float = 0.0) -> np.ndarray:
+    def off(reported: np.ndarray) -> np.ndarray:
         angles = robot.model_angles(reported)
-        return (angles >= low - margin) & (angles <= high + margin)
+        return np.asarray(np.maximum(low - angles, angles - high))
 
     # An angle that its opposite would bring inside the limits has rather a wrong sign, which is for the diagnosis to trace.
-    beyond = ~inside(reported, _BEYOND_LIMITS_RAD) & ~inside(-reported, _BEYOND_LIMITS_RAD)
-    return np.asarray((np.abs(reported) > farthest) | (beyond & inside(np.radians(reported))))
+    beyond = np.minimum(off(reported), off(-reported)) > _BEYOND_LIMITS_RAD
+    return np.asarray((np.abs(reported) > farthest) | (beyond & (off(np.radians(reported)) <= 0)))
 
 
 def _check_angles(reported: np.ndarray, table: Cells, robot: Robot) -> None:
     """Refuse degrees in more than single rows of angles (N, n) as the controller reports them."""
-    low, high = robot.joint_limits.T
     wrong = find_degrees(reported, robot)
     if wrong.any(axis=1).mean() > _SINGLE_ROWS:
         index, joint = np.argwhere(wrong)[0]
-        allowed = (
-            f"rad, not degrees, of a joint that goes from {low[joint]:.2f} to {high[joint]:.2f} rad"
-            " (counted otherwise: reported_joints of the robot file)"
-        )
+        limits = "from {:.2f} to {:.2f} rad".format(*robot.joint_limits[joint])
+        allowed = f"rad, not degrees, of a joint that goes {limits} (counted otherwise: reported_joints of the robot file)"
         raise table.fault(index, f"q{joint + 1}", allowed)
 
 
@@ -258,45 +210,29 @@ def _check_measurements(measurements: Measurements, table: Cells, robot: Robot, 
         found = f"{', '.join(words[:-1])}, target {targets[key[index, -1]].name} again"
         raise table.fault(index, "", f"each once (first in {table.place(first[group[index]])})", found)
     unloaded = measurements.load == 0
-    if "fx" not in table.columns and not unloaded.all():
-        raise table.fault(int(np.argmin(unloaded)), "load", f"0 where there are no columns {', '.join(WRENCH_NAMES)}")
-    wrong = unloaded[:, None] & (measurements.wrench != 0)
-    if wrong.any():
-        index, component = np.argwhere(wrong)[0]
-        found = f"{measurements.wrench[index, component]:g} with load 0"
-        raise table.fault(index, WRENCH_NAMES[component], "0 where load is 0", found)
+    if "fx" not in table.columns:
+        table.refuse(~unloaded, ["load"], f"0 where there are no columns {', '.join(WRENCH_NAMES)}")
+    table.refuse(unloaded[:, None] & (measurements.wrench != 0), WRENCH_NAMES, "0 where load is 0")
     pose_of = measured_poses(measurements)[1]
-    first = np.unique(pose_of, return_index=True)[1]
-    reported = table.matrix(f"q{j}" for j in range(1, robot.joints + 1))
-    away = np.abs(reported - reported[first[pose_of]])
-    wrong = away > SAME_POSE_RAD
-    if wrong.any():
-        index, joint = np.argwhere(wrong)[0]
-        earlier = table.place(first[pose_of[index]])
-        found = f"{reported[index, joint]:g}, {away[index, joint]:.3g} rad from {earlier} of the same pose"
-        raise table.fault(index, f"q{joint + 1}", f"measurements of one pose within {SAME_POSE_RAD} rad", found)
-    _check_units(measurements, table, robot, targets)
+    angles = [f"q{j}" for j in range(1, robot.joints + 1)]
+    reported, first = table.matrix(angles), np.unique(pose_of, return_index=True)[1]
+    apart = np.abs(reported - reported[first[pose_of]]) > SAME_POSE_RAD
+    if apart.any():
+        earlier = table.place(first[pose_of[np.argwhere(apart)[0, 0]]])
+        table.refuse(apart, angles, f"within {SAME_POSE_RAD} rad of {earlier}, which is of the same pose")
+    tool = max((np.linalg.norm(target.offset_m) for target in targets if target.offset_m is not None), default=_LONGEST_TOOL_M)
+    reach = tool + sum(abs(transform.constant) for transform in robot.chain.transforms if transform.kind == "T")
+    for session in np.unique(measurements.session):
+        position = np.where((measurements.session == session)[:, None], measurements.position, np.nan)
+        away = np.abs(position - np.nanmedian(position, axis=0))
+        if np.nanquantile(away.max(axis=1), 1.0 - _SINGLE_ROWS) > _FARTHEST_REACHES * reach:
+            allowed = f"metres, not millimetres; the robot reaches {reach:.3g} m"
+            table.refuse(away == np.nanmax(away), "xyz", allowed)
+    if measurements.rotation_vector is not None:
+        angle = np.linalg.norm(measurements.rotation_vector, axis=1)
+        allowed = f"a rotation vector in rad, not degrees, {FARTHEST_RAD:.3g} at most"
+        table.refuse(angle == max(angle.max(), FARTHEST_RAD), ["rx, ry, rz"], allowed, f"a turn of {angle.max():.4g}")
     for index, target in enumerate(targets):
         if not (measurements.target == index).any():
             allowed = f"targets that {Path(table.path).name} has measurements of"
             raise InputError(source, f"targets.{target.name}", "no measurement of it", allowed)
-
-
-def _check_units(measurements: Measurements, table: Cells, robot: Robot, targets: Sequence[Target]) -> None:
-    tool = max((np.linalg.norm(target.offset_m) for target in targets if target.offset_m is not None), default=_LONGEST_TOOL_M)
-    reach = tool + sum(abs(transform.constant) for transform in robot.chain.transforms if transform.kind == "T")
-    for session in np.unique(measurements.session):
-        members = np.flatnonzero(measurements.session == session)
-        position = measurements.position[members]
-        away = np.abs(position - np.median(position, axis=0))
-        if np.quantile(away.max(axis=1), 1.0 - _SINGLE_ROWS) > _FARTHEST_REACHES * reach:
-            index, axis = np.unravel_index(np.argmax(away), away.shape)
-            found = f"{position[index, axis]:g}, {away[index, axis]:.4g} from the middle of the measurements"
-            allowed = f"metres, not millimetres; the robot reaches {reach:.3g} m"
-            raise table.fault(members[index], "xyz"[axis], allowed, found)
-    if measurements.rotation_vector is not None:
-        angle = np.linalg.norm(measurements.rotation_vector, axis=1)
-        if angle.max() > FARTHEST_RAD:
-            turned = int(np.argmax(angle))
-            allowed = f"a rotation vector in rad, not degrees, {FARTHEST_RAD:.3g} at most"
-            raise table.fault(turned, "rx, ry, rz", allowed, f"a turn of {angle[turned]:.4g}")

@@ -51,7 +51,9 @@ def user_campaign(config: Mapping[str, Any], robots_folder: str | Path, results:
     """
     if not config.get("campaign"):
         return {}
-    folder = _one_spelling(config["campaign"])
+    # Snakemake takes a folder that is called 2026 for a number, and another spelling of one folder for another one.
+    place, here = Path(str(config["campaign"])).resolve(), Path.cwd()
+    folder = (place.relative_to(here) if place.is_relative_to(here) else place).as_posix()
     for path in campaign_files(folder, robots_folder):
         if set(path) & set("{}"):
             raise InputError(path, "", "braces", "a path without braces, which Snakemake takes for wildcards")
@@ -59,23 +61,12 @@ def user_campaign(config: Mapping[str, Any], robots_folder: str | Path, results:
     name, source = document["campaign"], f"{folder}/{DOCUMENT}"
     if name in named_campaigns(config):
         raise InputError(source, "campaign", repr(name), "a name that no campaign of config.yaml has")
-    earlier = _folder_of_results(Path(results) / name)
+    try:
+        earlier = Path(read_json(Path(results, name, "campaign.json"))["source"]).parent
+    except (OSError, ValueError, KeyError, TypeError):
+        # No results, or such as do not say of what they are.
+        earlier = None
     if earlier is not None and earlier.is_dir() and not earlier.samefile(folder):
         found = f"{name!r}, whose results are of {earlier.as_posix()}"
         raise InputError(source, "campaign", found, f"another name, or first take away {Path(results, name).as_posix()}")
     return {name: folder}
-
-
-def _one_spelling(folder: object) -> str:
-    """A folder as the names of the files in it begin: another spelling of the same one would make every result anew."""
-    # Snakemake takes a folder that is called 2026 for a number.
-    path = Path(str(folder)).resolve()
-    return (path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path).as_posix()
-
-
-def _folder_of_results(folder: Path) -> Path | None:
-    """Folder of the campaign that results are of, None where they do not say."""
-    try:
-        return Path(read_json(folder / "campaign.json")["source"]).parent
-    except (OSError, ValueError, KeyError, TypeError):
-        return None

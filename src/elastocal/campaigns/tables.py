@@ -6,6 +6,7 @@ Neither `csv.Sniffer`, which guesses, nor pandas, which knows no lines, can ask 
 import codecs
 import csv
 import re
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -88,12 +89,14 @@ class Cells:
 
     def fault(self, index: int, name: str, allowed: str, found: str | None = None) -> InputError:
         """InputError of one cell, or without `name` of a row; `index` counts the rows."""
-        return InputError(
-            self.path,
-            f"{self.place(index)}{f', column {self.headers.get(name, name)}' if name else ''}",
-            _show(self.columns[name][index].as_py()) if found is None else found,
-            allowed,
-        )
+        place = self.place(index) + (f", column {self.headers.get(name, name)}" if name else "")
+        return InputError(self.path, place, _show(self.columns[name][index].as_py()) if found is None else found, allowed)
+
+    def refuse(self, wrong: np.ndarray, names: Sequence[str], allowed: str, found: str | None = None) -> None:
+        """Refuse the first cell that is wrong, of bool (N, len(names)) or of one column (N,)."""
+        if wrong.any():
+            index, column = np.argwhere(wrong.reshape(len(wrong), -1))[0]
+            raise self.fault(int(index), names[column], allowed, found)
 
     def place(self, index: int) -> str:
         """Where a row stands in the file."""
@@ -107,21 +110,15 @@ class Cells:
         except pa.ArrowInvalid:
             # A cell is none, or written as a spreadsheet does.
             found = [plain_number(str(cell)) for cell in self.columns[name].to_pylist()]
-            if None in found:
-                raise self.fault(found.index(None), name, A_NUMBER) from None
-            values = np.array(found, float)
+            values = np.array([np.nan if number is None else number for number in found])
         # Not a number is no more than anything either.
-        sound = np.abs(values) <= LARGEST_NUMBER
-        if not sound.all():
-            raise self.fault(int(np.argmin(sound)), name, A_NUMBER)
+        self.refuse(~(np.abs(values) <= LARGEST_NUMBER), [name], A_NUMBER)
         return self.bounded(name, values * self.scales.get(name, 1.0))
 
     def bounded(self, name: str, values: np.ndarray) -> np.ndarray:
         """The same values (N,) of a column, all of which physics allows."""
         least, largest, why = BOUNDS.get(name, (-np.inf, np.inf, ""))
-        wrong = ~((values >= least) & (values <= largest))
-        if wrong.any():
-            raise self.fault(int(np.argmax(wrong)), name, f"{least:g} to {largest:g} {why}")
+        self.refuse(~((values >= least) & (values <= largest)), [name], f"{least:g} to {largest:g} {why}")
         return values
 
     def matrix(self, names: Iterable[str]) -> np.ndarray:
@@ -131,9 +128,7 @@ class Cells:
     def integers(self, name: str) -> np.ndarray:
         """ndarray of int32 (N,)."""
         values = self.numbers(name)
-        wrong = (values != np.round(values)) | (np.abs(values) >= 2**31)
-        if wrong.any():
-            raise self.fault(int(np.argmax(wrong)), name, f"an integer, up to {2**31 - 1}")
+        self.refuse((values != np.round(values)) | (np.abs(values) >= 2**31), [name], f"an integer, up to {2**31 - 1}")
         return values.astype(np.int32)
 
     def texts(self, name: str) -> list[str]:
@@ -199,8 +194,7 @@ def read_text_table(
     if not kept:
         raise InputError(source, "", "nothing but comments and blank lines", "a header and one row for each measurement")
     if names:
-        header = 0
-        separator = stated.separator or next((name for name, mark in SEPARATORS.items() if mark in kept[0][1]), "comma")
+        separator, header = _marks_in(kept[0][1], stated, "comma")[0], 0
     else:
         separator, header, line = _find_header(kept, comments, is_header, stated, wanted, source)
         names = _split_cells(line, separator, source, header)
@@ -213,27 +207,24 @@ def read_text_table(
         while len(cells) > len(names) and not cells[-1]:
             cells.pop()
         if len(cells) != len(names):
-            raise InputError(
-                source, f"line {number}", counted(len(cells), "cell"), f"{len(names)}, one for each column of {where}"
-            )
+            allowed = f"{len(names)}, one for each column of {where}"
+            raise InputError(source, f"line {number}", counted(len(cells), "cell"), allowed)
     units = dict(zip(names, (rows and units_in(rows[0][1])) or (), strict=False))
     rows = rows[1:] if units else rows
     if not rows:
         raise InputError(source, "", A_HEADER_ALONE, "one row for each measurement")
-    for name in ignored:
-        if name not in names:
-            raise InputError(source, where, f"no column {name!r} to ignore", closest_first(name, list(dict.fromkeys(names))))
-    columns: dict[str, tuple[str, ...]] = {}
-    nameless = 0
-    for place, (name, each) in enumerate(zip(names, zip(*(cells for _, cells in rows), strict=True), strict=True), 1):
-        if name == f"column {place}" and not any(each) and name not in ignored:
-            nameless += 1
-        elif name in columns:
-            allowed = f"each column once (import csv --ignore {name!r} leaves out those that nobody needs)"
-            raise InputError(source, where, f"column {name!r} twice", allowed)
-        elif name not in ignored:
-            columns[name] = each
-    numbers = [number for number, _ in rows]
+    if unknown := next((name for name in ignored if name not in names), None):
+        raise InputError(source, where, f"no column {unknown!r} to ignore", closest_first(unknown, list(dict.fromkeys(names))))
+    numbers, cells_of = [number for number, _ in rows], [*zip(*(cells for _, cells in rows), strict=True)]
+    wanted_cells = [
+        (n, name, cells) for n, (name, cells) in enumerate(zip(names, cells_of, strict=True), 1) if name not in ignored
+    ]
+    there = [(name, cells) for n, name, cells in wanted_cells if any(cells) or name != f"column {n}"]
+    columns = dict(there)
+    if len(columns) < len(there):
+        twice = Counter(name for name, _ in there).most_common(1)[0][0]
+        allowed = f"each column once (import csv --ignore {twice!r} leaves out those that nobody needs)"
+        raise InputError(source, where, f"column {twice!r} twice", allowed)
     decimal, comma = stated.decimal or _find_decimal(columns, numbers, separator, source), _DECIMAL["comma"]
     if decimal == "comma":
         columns = {
@@ -244,18 +235,28 @@ def read_text_table(
         (len(table) - len(rows) - bool(units), "row", "of empty cells"),
         (sum(number < header for number, _ in filled), "line", "above the header"),
         (sum(number > header for number, _ in comments), "line", "of comments below the header"),
-        (nameless, "column", "without name and values"),
+        (len(wanted_cells) - len(there), "column", "without name and values"),
     )
     left_out = tuple(f"{counted(number, noun)} {what}" for number, noun, what in unread if number)
-    dialect = Dialect(separator, decimal, header or None, encoding)
     below = {name: unit for name, unit in units.items() if unit and name in columns}
-    return TextTable(source, dialect, columns, tuple(numbers), left_out, below)
+    return TextTable(source, Dialect(separator, decimal, header or None, encoding), columns, tuple(numbers), left_out, below)
 
 
 def _read_lines(path: str | Path, encoding: str | None) -> tuple[list[str], str]:
-    """Lines as editors count them; control characters and marks that turn the order of letters are refused."""
+    """Lines as editors count them, and the encoding: the stated one, that of a byte order mark, or UTF-8.
+
+    Refused are control characters and marks that turn the order of letters.
+    """
     content = read_bytes(path, LARGEST_BYTES, "a table with a line for each measurement")
-    text, encoding = _decode(content, path, encoding)
+    found = encoding or next((name for mark, name in _MARKS if content.startswith(mark)), "utf-8")
+    try:
+        text = decoded(content, path, found).removeprefix("\ufeff")
+    except InputError as error:
+        allowed = "UTF-8 (iconv -f cp1252 -t utf-8), or in import csv --encoding cp1252, shift_jis, gb18030 or such"
+        raise InputError(path, error.key, error.found, allowed if found == "utf-8" else error.allowed) from None
+    except (LookupError, ValueError) as error:
+        known = "an encoding as Python calls it, such as utf-8, cp1252, cp437, mac-roman, shift_jis, gb18030 or utf-16-le"
+        raise InputError("--encoding", "", f"{encoding!r}: {error}", known) from None
     count = text.count("\n") + text.count("\r") - text.count("\r\n") + (text[-1:] not in ("\n", "\r"))
     if count > MOST_LINES:
         allowed = f"at most {MOST_LINES} (the mean of a tracker's stream at each pose is one measurement)"
@@ -265,42 +266,25 @@ def _read_lines(path: str | Path, encoding: str | None) -> tuple[list[str], str]
         if character := steering(line.replace("\t", " ")):
             allowed = "printable characters, in UTF-8, or in UTF-16 with a byte order mark"
             raise InputError(path, f"line {number}", f"the character {character!a}", allowed)
-    lines = lines[:-1] if lines[-1] == "" else lines
-    return lines, encoding
+    return lines, found
 
 
-def _decode(content: bytes, path: str | Path, encoding: str | None) -> tuple[str, str]:
-    """Text of a file and its encoding: the stated one, that of a byte order mark, or UTF-8."""
-    found = encoding or next((name for mark, name in _MARKS if content.startswith(mark)), "utf-8")
-    try:
-        return decoded(content, path, found).removeprefix("\ufeff"), found
-    except InputError as error:
-        if found != "utf-8":
-            raise
-        allowed = "UTF-8 (iconv -f cp1252 -t utf-8), or in import csv --encoding cp1252, shift_jis, gb18030 or such"
-        raise InputError(path, error.key, error.found, allowed) from None
-    except (LookupError, ValueError) as error:
-        known = "an encoding as Python calls it, such as utf-8, cp1252, cp437, mac-roman, shift_jis, gb18030 or utf-16-le"
-        raise InputError("--encoding", "", f"{encoding!r}: {error}", known) from None
+def _marks_in(line: str, stated: Dialect, *otherwise: str) -> list[str]:
+    """Separators that a line may have: the stated one, else those that stand in it."""
+    return [stated.separator] if stated.separator else [*(n for n, mark in SEPARATORS.items() if mark in line), *otherwise]
 
 
 def _find_header(
     kept: _Lines, comments: _Lines, is_header: Callable[[Sequence[str]], bool], stated: Dialect, wanted: str, source: str
 ) -> tuple[str, int, str]:
     """Separator, and number and text of the line that names the columns."""
-
-    def marks_in(line: str) -> list[str]:
-        return [stated.separator] if stated.separator else [name for name, mark in SEPARATORS.items() if mark in line]
-
     if stated.header is not None:
-        line = dict((*kept, *comments)).get(stated.header)
-        if not line:
-            raise InputError(source, f"line {stated.header}", "no header", "the line that names the columns")
-        return next(iter(marks_in(line)), "comma"), stated.header, line
+        if line := dict((*kept, *comments)).get(stated.header):
+            return _marks_in(line, stated, "comma")[0], stated.header, line
+        raise InputError(source, f"line {stated.header}", "no header", "the line that names the columns")
     for number, line in (*kept, *comments):
-        for name in marks_in(line):
-            if is_header(_split_cells(line, name)):
-                return name, number, line
+        if name := next((name for name in _marks_in(line, stated) if is_header(_split_cells(line, name))), None):
+            return name, number, line
     raise InputError(source, f"line {kept[0][0]}", repr(kept[0][1][:60]), wanted)
 
 

@@ -39,16 +39,6 @@ def write_campaign(
         write_text(partial / DOCUMENT, text)
 
 
-_WIDTH = 110
-# An arm of six joints; its name says that it is nobody's.
-_ROBOT: dict[str, Any] = {
-    "name": "to be replaced",
-    "chain": "Tz(l1) Rz(q1) Tx(l2) Ry(q2) Tx(l3) [2DoF] Ry(q3) Tz(l4) Tx(l5) Rx(q4) [4DoF] Ry(q5) Rx(q6) Tx(l6) [6DoF]",
-    "lengths_m": {"l1": 0.675, "l2": 0.35, "l3": 1.15, "l4": -0.041, "l5": 1.2, "l6": 0.24},
-    "joint_limits_deg": [[-185, 185], [-140, -5], [-120, 155], [-350, 350], [-122.5, 122.5], [-350, 350]],
-}
-
-
 def campaign_template(name: str, robot: Robot, targets: Sequence[str] = (), measured: str = "position") -> str:
     """Text of a campaign.yaml to fill in.
 
@@ -68,8 +58,9 @@ def campaign_template(name: str, robot: Robot, targets: Sequence[str] = (), meas
 
 
 def robot_template() -> str:
-    """Text of a robot.yaml to replace what is in it."""
-    return _explain("robot", _ROBOT)
+    """Text of a robot.yaml to replace what is in it: an arm of six joints whose name says that it is nobody's."""
+    rules = read_schema("robot")["properties"]
+    return _explain("robot", {key: rules[key]["examples"][0] for key in ("name", "chain", "lengths_m", "joint_limits_deg")})
 
 
 def sheet_template(joints: int) -> str:
@@ -80,12 +71,9 @@ def sheet_template(joints: int) -> str:
 
 def _explain(schema: str, document: Mapping[str, Any]) -> str:
     """A document as YAML in which each key of its schema is explained; those that it leaves out stand as comments."""
-    lines = [f"# {read_schema(schema)['title']}. Keys behind # are optional."]
+    text = f"# {read_schema(schema)['title']}. Keys behind # are optional.\n"
     for key, rule in read_schema(schema)["properties"].items():
-        meaning = rule.get("description", key)
-        lines += ["", *textwrap.wrap(meaning, _WIDTH, initial_indent="# ", subsequent_indent="# ")]
-        if key in document:
-            lines.append(f"{key}: {one_line(document[key])}")
-        else:
-            lines.append(f"# {key}: {one_line(rule['examples'][0])}")
-    return "\n".join(lines) + "\n"
+        meaning = textwrap.fill(rule.get("description", key), 110, initial_indent="# ", subsequent_indent="# ")
+        entry = f"{key}: {one_line(document[key])}" if key in document else f"# {key}: {one_line(rule['examples'][0])}"
+        text += f"\n{meaning}\n{entry}\n"
+    return text

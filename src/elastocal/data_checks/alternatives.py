@@ -47,7 +47,7 @@ _NEAR_M, _NEAR_RAD = 0.05, 0.05
 
 
 @dataclass(frozen=True)
-class Reading:
+class Interpretation:
     """A campaign read by a hypothesis, and where it then lies beside the nominal robot."""
 
     hypothesis: Hypothesis
@@ -61,7 +61,7 @@ class Reading:
         return np.array([0.0 if part is None else max(measure(part[mine]) for mine in each) for part in left])
 
 
-def other_readings(campaign: Campaign) -> list[Fault]:
+def other_interpretations(campaign: Campaign) -> list[Fault]:
     """The simplest way to read the file otherwise that lets absurd measurements fit, beside those that fit as well; or none."""
     few, by_rows, loaded = spread(campaign, POSES), shifts(campaign), campaign.measurements.load > 0
     found = _mended(few, [*discrete(few), *by_rows], fitted(few))
@@ -79,7 +79,7 @@ def _mended(campaign: Campaign, *tried: Sequence[Hypothesis]) -> list[Fault]:
     lists = [[_read(campaign, each, placed) for each in some] for some in tried if some] if measures else []
     for measure in measures:
         best: list[tuple[float, Fault]] = []
-        for left, fault in filter(None, (_best(written, readings, measure) for readings in lists)):
+        for left, fault in filter(None, (_best(written, interpretations, measure) for interpretations in lists)):
             if not best or left < best[-1][0] / FAR_BETTER:
                 best.append((left, fault))
         if best:
@@ -87,9 +87,9 @@ def _mended(campaign: Campaign, *tried: Sequence[Hypothesis]) -> list[Fault]:
     return []
 
 
-def _read(campaign: Campaign, hypothesis: Hypothesis, place: Callable[[Campaign], Placement]) -> Reading:
+def _read(campaign: Campaign, hypothesis: Hypothesis, place: Callable[[Campaign], Placement]) -> Interpretation:
     read = hypothesis.read(campaign)
-    return Reading(hypothesis, read, place(read))
+    return Interpretation(hypothesis, read, place(read))
 
 
 def _length(misfit: np.ndarray) -> float:
@@ -97,11 +97,14 @@ def _length(misfit: np.ndarray) -> float:
     return float(np.hypot(misfit[0], IMPLAUSIBLE_M / IMPLAUSIBLE_RAD * misfit[1]))
 
 
-def _best(written: Reading, readings: Sequence[Reading], measure: Measure) -> tuple[float, Fault] | None:
+def _best(written: Interpretation, interpretations: Sequence[Interpretation], measure: Measure) -> tuple[float, Fault] | None:
     """Fault of the first of those that fit best, if it convinces, beside what fits alike; and what it leaves, m."""
-    before, together = written.misfit(measure), np.array([_length(reading.misfit(measure)) for reading in readings])
+    before, together = (
+        written.misfit(measure),
+        np.array([_length(interpretation.misfit(measure)) for interpretation in interpretations]),
+    )
     alike = np.flatnonzero(together <= max(_ALIKE * together.min(), together.min() + _ALIKE_M))
-    hypothesis = readings[alike[0]].hypothesis
+    hypothesis = interpretations[alike[0]].hypothesis
     best = _read(written.campaign, hypothesis, robustly_placed)
     after, estimate = best.misfit(measure), best.placement.estimate
     evidence = _evidence(before, after, best)
@@ -113,13 +116,15 @@ def _best(written: Reading, readings: Sequence[Reading], measure: Measure) -> tu
     elif detail == "targets":
         detail, decisive = _other_targets(written.placement.estimate, estimate, best.campaign.targets)
     poses = Value("poses compared", float(len(np.unique(best.campaign.measurements.pose))), "–")
-    others = tuple(readings[n].hypothesis.detail for n in alike[1 : 1 + _MOST_ALIKE])
+    others = tuple(interpretations[n].hypothesis.detail for n in alike[1 : 1 + _MOST_ALIKE])
     return _length(after), Fault(hypothesis.name, hypothesis.joints, detail, (poses,), evidence, (), decisive, others)
 
 
-def _evidence(before: np.ndarray, after: np.ndarray, reading: Reading) -> tuple[float, float] | None:
+def _evidence(before: np.ndarray, after: np.ndarray, interpretation: Interpretation) -> tuple[float, float] | None:
     """RMS before and after, of positions or else of orientations; None where a correction does not convince."""
-    predicted = [reading.placement.predicted[0][members] for members in of_each_target(reading.campaign.measurements)]
+    predicted = [
+        interpretation.placement.predicted[0][members] for members in of_each_target(interpretation.campaign.measurements)
+    ]
     extent = max(rms(np.linalg.norm(points - points.mean(axis=0), axis=1)) for points in predicted)
     # Where the robot hardly moves, anything that gathers the measurements in one place would fit.
     limit = np.minimum(before / FAR_BETTER, np.minimum(_IMPLAUSIBLE, [extent / FAR_BETTER, np.inf]))

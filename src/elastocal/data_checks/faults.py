@@ -1,4 +1,4 @@
-"""Every fault of the data, looked for before any physics: constant columns, other readings, loads, shuffled rows, nonsense.
+"""Every fault of the data, sought before any physics: constant columns, other interpretations, loads, shuffled rows, nonsense.
 
 Where it is ambiguous none is found: a false alarm stops a trace that was right, a miss only leaves it to what comes after.
 """
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
-from elastocal.data_checks.alternatives import other_readings
+from elastocal.data_checks.alternatives import other_interpretations
 from elastocal.data_checks.loads import deflections, wrong_loads
 from elastocal.data_checks.placement import (
     FAR_BETTER,
@@ -46,7 +46,7 @@ _FARTHEST_M, _FARTHEST_RAD = 5 * IMPLAUSIBLE_M, 5 * IMPLAUSIBLE_RAD
 def faults(campaign: Campaign) -> tuple[Fault, ...]:
     """Every fault that the measurements of a campaign show; none is looked for where another one makes that meaningless."""
     found: list[Fault] = []
-    for find in (constant_columns, other_readings):
+    for find in (constant_columns, other_interpretations):
         found += find(campaign)
         if any(fault.decisive for fault in found):
             return tuple(found)

@@ -172,7 +172,7 @@ def _by(matrix: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
 
 
 def columns(**functions: Callable[[np.ndarray], np.ndarray]) -> Callable[[Campaign], Campaign]:
-    """Reading of a campaign with functions of columns of its measurements in their places, as far as they are there."""
+    """Interpretation of a campaign with functions of columns of its measurements in their places, as far as they are there."""
 
     def read(campaign: Campaign) -> Campaign:
         there = {name: getattr(campaign.measurements, name) for name in functions}

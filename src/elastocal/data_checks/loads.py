@@ -37,7 +37,7 @@ _ROUNDING_M = 1e-9
 _APART, _REJECTIONS = 6.0, 4
 # Below this share of their square, loads of one pose do not differ.
 _DIFFERING = 1e-6
-# Newtons and newton metres for each unit in which loads may have been written, and what is said of it.
+# Newtons and newton metres for each unit in which loads may have been written, and the words for it.
 UNITS = (
     (1.0, 1.0, ""),
     (g, g, "the loads look like kilogram-force: measurements fit 9.81 times the written loads"),

@@ -22,7 +22,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import solve_triangular
+from scipy.linalg import lapack, solve_triangular
 from scipy.special import log_ndtr
 
 if TYPE_CHECKING:
@@ -244,6 +244,25 @@ def _ascended(statistics: Statistics, present: Joint, profiles: np.ndarray) -> J
     return None
 
 
+# Above so many columns LAPACK's inverse of positive matrices, called for each of them, costs less than all of numpy's together.
+_MANY_COLUMNS = 30
+
+
+def _inverses(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Inverses (T, D, D) of symmetric positive matrices, and the logarithms of their determinants (T,)."""
+    if matrices.shape[1] < _MANY_COLUMNS:
+        return np.linalg.inv(matrices), np.linalg.slogdet(matrices)[1]
+    found, log_dets = np.empty_like(matrices), np.empty(len(matrices))
+    for number, matrix in enumerate(matrices):
+        # The transpose is laid out as LAPACK wants it.
+        factor = lapack.dpotrf(matrix.T, lower=0, clean=1)[0]
+        log_dets[number] = 2.0 * np.log(np.diag(factor)).sum()
+        upper = lapack.dpotri(factor, lower=0, overwrite_c=1)[0]
+        np.add(upper, upper.T, out=found[number])
+        np.fill_diagonal(found[number], np.diag(upper))
+    return found, log_dets
+
+
 class Joint:
     """Density of the measurements under one model with one size for each unit.
 
@@ -259,8 +278,7 @@ class Joint:
         signs = np.concatenate([np.zeros(0, int), *(unit.signs for unit in units)])
         self.starts = np.concatenate([[0], np.cumsum([len(unit.columns) for unit in units], dtype=int)])
         deviations = np.repeat(self.scales, np.diff(self.starts))
-        inner = _with_priors(statistics.gram, columns, deviations)
-        self.covariance, self.log_det = np.linalg.inv(inner), np.linalg.slogdet(inner)[1]
+        self.covariance, self.log_det = _inverses(_with_priors(statistics.gram, columns, deviations))
         along = deviations * statistics.along[:, columns]
         self.mean = (self.covariance @ along[..., None])[..., 0]
         self.squares = statistics.squares - (along * self.mean).sum(axis=1)

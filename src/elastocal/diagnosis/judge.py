@@ -17,7 +17,7 @@ from elastocal.fitting.model import Case, conditions, measured_in_base, residual
 from elastocal.fitting.noise import noise_from
 from elastocal.fitting.observations import single_observations, state_clusters
 from elastocal.random_streams import stream
-from elastocal.remainder.corrected import Corrected, Plan, corrected, remainder_facts
+from elastocal.remainder.corrected import Corrected, corrected, remainder_facts
 from elastocal.validation import held_out as figures
 from elastocal.validation.conformity import count_configurations, joint_ranges
 from elastocal.validation.placing import outside_poses, placed, repeat_warnings
@@ -96,8 +96,8 @@ def as_delivered(diagnosis: Diagnosis, held_out: Case, seed: int) -> Corrected |
     if campaign.remainder == NO_REMAINDER or data_at_fault(diagnosis.document):
         return None
     # Poses held out at random have neighbours among those fitted; others have none, nor may those that set the intervals.
-    plan = Plan(campaign.remainder, blocks="fraction" not in campaign.holdout, within_range=True, seed=seed)
-    return corrected(plan, diagnosis.final, diagnosis.case, held_out)
+    final, case, blocks = diagnosis.final, diagnosis.case, "fraction" not in campaign.holdout
+    return corrected(final, case, held_out, campaign.remainder, blocks=blocks, within_range=True, seed=seed)
 
 
 def without_gross_errors(diagnosis: Diagnosis, held_out: Case) -> tuple[Deviations, Case, np.ndarray]:

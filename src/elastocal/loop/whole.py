@@ -90,11 +90,11 @@ def calibrated_by(
     case, final = diagnosis.case, diagnosis.final
     residual = position_residuals(*placed(final, case, held_out), held_out.observations)
     noise_m, more = final.noise.position_m, None
-    if delivered is not None and delivered.chosen.regression:
+    if delivered is not None and delivered.predictor is not None:
         noise_m = diagnosis.document["noise"]["position_m"]
         if not physics_only:
             residual = delivered.residual
-            more = regression_on(case, final.estimate, delivered.chosen.predictor, delivered.chosen.spread, noise_m)
+            more = regression_on(case, final.estimate, delivered.predictor, delivered.chosen["spread"]["typical"], noise_m)
     found = calibrate_on_case(case, final.model, final.estimate, final.covariance, final.noise, more)
     found = set_form(found, diagnosis.document["other_models_m"] or 0.0)
     return judge_by_held_out(found, held_out, residual, noise_m)

@@ -25,19 +25,15 @@ import numpy as np
 from elastocal.campaigns.holdout import SAME_POSE_RAD, configurations
 from elastocal.fitting.least_squares import ON_THE_WAY, fit
 from elastocal.fitting.observations import sample_of, state_clusters
-from elastocal.remainder.corrected import inputs_of
-from elastocal.remainder.ridge_harmonics import by_harmonics
-from elastocal.remainder.tuning import FEWEST_CONFIGURATIONS, gain_of
-from elastocal.remainder.two_joints import of_two
+from elastocal.remainder.corrected import FEWEST_CONFIGURATIONS, gain_of, inputs_of
+from elastocal.remainder.regressions import by_harmonics, of_two
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.observations import Observations
-    from elastocal.remainder.protocol import Inputs
-
-    Functions = Callable[[Inputs], np.ndarray]
+    from elastocal.remainder.regressions import Inputs
 
 # How often something repeatable is said to remain where only chance does.
 LEVEL = 0.01
@@ -82,29 +78,30 @@ def repeatable_part(fitted: Fit, observations: Observations, seed: int) -> Repea
         return None
     fold, inputs = draws.permutation(count) % _FOLDS, inputs_of(fitted.model, fitted.estimate, some)
     kinds = _kinds(inputs, int(np.clip(count, _FEWEST, _MOST)), draws)
-    sizes, parameters = [kind(inputs.select(np.arange(1))).shape[2] for kind in kinds], len(fitted.held)
-    alongs, grams = [np.zeros((count, size)) for size in sizes], [np.zeros((_FOLDS, size, size)) for size in sizes]
-    acrosses = [np.zeros((_FOLDS, size, parameters)) for size in sizes]
+    sizes, parameters = [kind(inputs.select(slice(1))).shape[2] for kind in kinds], len(fitted.held)
+    # Of each kind of functions the products with residuals by configurations, with themselves and with sensitivities by folds.
+    sums = [[np.zeros(s) for s in ((count, n), (_FOLDS, n, n), (_FOLDS, n, parameters))] for n in sizes]
     followed, leverage = np.zeros((count, parameters)), np.zeros(count)
     white_residual, weight = fitted.whitened(fitted.residual), np.sqrt(fitted.weights)[:, None, None]
     for seen, plain, white in fitted.sensitivities(some):
-        mine, w = group[seen], weight[seen]
+        mine, w, there = group[seen], weight[seen], inputs.select(seen)
         np.add.at(followed, mine, np.einsum("mrp,mr->mp", white, white_residual[seen]))
         np.add.at(leverage, mine, ((white @ fitted.covariance) * white).sum(axis=2).mean(axis=1))
-        for kind, along, gram, across in zip(kinds, alongs, grams, acrosses, strict=True):
-            functions = w * kind(inputs.select(seen))
+        slopes, parts = w * plain[:, :3], [fold[mine] == k for k in range(_FOLDS)]
+        for kind, (along, gram, across) in zip(kinds, sums, strict=True):
+            functions = w * kind(there)
             np.add.at(along, mine, (functions * w * fitted.residual[seen, :3, None]).sum(axis=1))
-            for k in range(_FOLDS):
-                rows = functions[fold[mine] == k].reshape(-1, functions.shape[2]).T
+            for k, part in enumerate(parts):
+                rows = functions[part].reshape(-1, functions.shape[2]).T
                 gram[k] += rows @ rows.T
-                across[k] += rows @ (w * plain[:, :3])[fold[mine] == k].reshape(rows.shape[1], parameters)
+                across[k] += rows @ slopes[part].reshape(rows.shape[1], parameters)
     # A configuration that the fit follows has errors larger than its residuals.
     free = np.maximum(1.0 - leverage / np.bincount(group), 1.0 / count)
     signs = draws.choice([-1.0, 1.0], (_DRAWS, count)) / np.sqrt(free)
     held_back = draws.normal(size=(_DRAWS, parameters)) / fitted.prior_std
     moved = (held_back - signs @ followed) @ fitted.covariance
     judged = []
-    for along, gram, across in zip(alongs, grams, acrosses, strict=True):
+    for along, gram, across in sums:
         of_folds = [(along[fold == k], signs[:, fold == k], across[k]) for k in range(_FOLDS)]
         right = np.stack([np.vstack([own.sum(axis=0), sign @ own + moved @ other.T]) for own, sign, other in of_folds])
         for score, coefficients in _left_out(gram, right):
@@ -114,10 +111,10 @@ def repeatable_part(fitted: Fit, observations: Observations, seed: int) -> Repea
     scores = (scores - scores[:, 1:].mean(axis=1, keepdims=True)) / scores[:, 1:].std(axis=1, keepdims=True)
     best, (_, of_residual, of_itself) = scores.max(axis=0), judged[np.argmax(scores[:, 0])]
     p_value, gain = float((best >= best[0]).mean()), gain_of(of_residual, of_itself, len(some), _FOLDS)
-    return Repeatable(float(best[0]), p_value, p_value <= LEVEL, LEVEL, gain.rms_m, gain.rms_std_error_m, count)
+    return Repeatable(float(best[0]), p_value, p_value <= LEVEL, LEVEL, gain["rms_m"], gain["rms_std_error_m"], count)
 
 
-def _kinds(inputs: Inputs, most: int, draws: np.random.Generator) -> list[Functions]:
+def _kinds(inputs: Inputs, most: int, draws: np.random.Generator) -> list[Callable[[Inputs], np.ndarray]]:
     """Functions of the joints, each kind (M, 3, D): waves of each joint as its deviations; displacements that are smooth in all
     joints together (random Fourier features [1]); and of each two joints' angles, deviations of those joints that move the
     targets most.

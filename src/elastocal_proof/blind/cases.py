@@ -274,7 +274,7 @@ def _share_of_plausible(robot: PhysicalRobot, defect: Defect) -> float:
 
 
 def make_case(case: Case, blind_folder: str | Path, sealed_folder: str | Path, robots_folder: str | Path) -> str:
-    """Make the campaign of a case and its sealed truth, by its name in each folder; returns the SHA-256 of the truth."""
+    """Make the campaign of a case and its sealed ground truth, by its name in each folder; returns the SHA-256 of that."""
     robot, design = case.specimen(robots_folder), case.design
     yardstick = yardstick_of(case, robot) if case.effects else None
     sized = defects_of(case, robot, yardstick) if yardstick else []

@@ -23,7 +23,8 @@ from elastocal.loop.loading import load_whole_campaign
 from elastocal.loop.schemas import measurements
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.random_streams import stream
-from elastocal.remainder.corrected import Plan, corrected, regressions
+from elastocal.remainder.corrected import corrected
+from elastocal.remainder.regressions import REGRESSIONS
 from elastocal.validation.held_out import position_residuals
 from elastocal.validation.placing import outside_poses, placed
 from elastocal_proof.league.schemas import ENTRIES, FITS, FOLDS, MECHANISMS
@@ -109,8 +110,8 @@ def rounds(split: str, data: DataSet, others: Sequence[DataSet] = ()) -> Iterato
 def method_from(described: Mapping[str, Any], name: str, source: str) -> Method:
     """A method as a configuration describes it. Raises `InputError`: a regression that the catalogue does not have."""
     method = Method(**described)
-    if method.regression is not None and method.regression not in regressions():
-        raise InputError(source, f"league.methods.{name}.regression", repr(method.regression), ", ".join(regressions()))
+    if method.regression is not None and method.regression not in REGRESSIONS:
+        raise InputError(source, f"league.methods.{name}.regression", repr(method.regression), ", ".join(REGRESSIONS))
     return method
 
 
@@ -132,9 +133,9 @@ def entered(
     if method.regression is None:
         residual = position_residuals(*placed(fitted, case, held_out), seen)
     else:
-        plan = Plan(method.regression, blocks=split != RANDOM, within_range=method.within_range, seed=seed)
-        found = corrected(plan, fitted, case, held_out)
-        residual, std, setting = found.residual, found.std, found.chosen.setting
+        blocks, within_range = split != RANDOM, method.within_range
+        found = corrected(fitted, case, held_out, method.regression, blocks=blocks, within_range=within_range, seed=seed)
+        residual, std, setting = found.residual, found.std, found.chosen["setting"]
     columns = {name: getattr(seen.states, name)[seen.state] for name in ("session", "pose", "load")}
     columns |= {"target": seen.target, "outside_range": outside_poses(fitted, case, held_out)[seen.cluster]}
     for head, values in (("d", residual), ("std_", np.full_like(residual, np.nan) if std is None else std)):

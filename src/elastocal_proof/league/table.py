@@ -10,7 +10,7 @@ import pandas as pd
 from elastocal.campaigns.campaign import groups_of
 from elastocal.counting import counted
 from elastocal.random_streams import stream
-from elastocal.remainder.tuning import NORMAL_WIDTH
+from elastocal.remainder.corrected import NORMAL_WIDTH
 from elastocal.validation.held_out import Errors, intervals, share_below_largest, summary
 from elastocal_proof.league.methods import BLOCKS, DIAGNOSIS, RANDOM, SESSION
 

@@ -1,0 +1,315 @@
+"""Regressions on the residuals of a fitted model: the catalogue, what each of them is shown, and what it predicts.
+
+Each is a function of inputs of M observations, their residuals (M, 3), m, base axes, settings, and the seed of whatever it
+draws; it yields a predictor for each setting in turn.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from itertools import combinations
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.linalg import lapack
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+
+    Setting = Mapping[str, Any]
+
+# Observations whose columns or covariances are held at once; trees of a forest.
+_AT_ONCE, _TREES = 500, 100
+# Penalties of functions of two joints, in mean squares of a column.
+_PENALTIES = np.logspace(-4.0, 2.0, 7)
+# Hyperparameters come from so many observations: a step towards them costs the third power of their number, and 800 take eight
+# times as long for errors that differ by 2 % either way (UR5 and UR10).
+_MOST_FOR_HYPERPARAMETERS = 300
+# Observations at which the process has values, drawn at random; their covariance takes 32 MB. Held-out RMS of UR10 A (8,350
+# observations) after geometry: 0.169 mm with 1,000 in 0.5 s, 0.141 with 2,000 in 1.7 s, 0.122 with all in 14 s and 0.56 GB.
+_MOST = 2_000
+# Variance of the process, lengths in standard deviations of each input, from wiggles between neighbours to one trend across all
+# poses, and variance of the noise: where the search starts, and its bounds.
+_VARIANCE, _LENGTH, _NOISE = (1.0, 1e-3, 1e3), (1.0, 0.05, 100.0), (0.5, 1e-4, 10.0)
+# By which share of the likelihood's logarithm the last steps of the search raise it: scipy's own 2e-9 stops on a plateau, whose
+# way out changes of the residuals by 1e-8 decided (the simulated KUKA: a regression or none).
+_LAST_GAIN = 1e-11
+# Of the variance: added to the diagonal, so that rounding leaves it positive definite.
+_JITTER = 1e-8
+# An input that differs by less than this over all poses says nothing: rad, N, m, s, degC.
+_STILL = 1e-10
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """What a regression may know of an observation; arrays of M.
+
+    `joint_angles` (M, n): rad. `others` (M, k): wrench and place of the target in its measuring point; neither time nor
+    temperature, of which a correction knows nothing. `jacobian` (M, 3, C): of the target's position with respect to the joints,
+    first, and whatever else of the chain may be displaced: base and links; base axes, m per rad or m; then what effects of the
+    model do, see `corrected.inputs_of`.
+    """
+
+    joint_angles: np.ndarray
+    others: np.ndarray
+    jacobian: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.joint_angles)
+
+    @property
+    def columns(self) -> np.ndarray:
+        """ndarray (M, n + k): joint angles, then the others."""
+        return np.hstack([self.joint_angles, self.others])
+
+    def select(self, chosen: np.ndarray | slice) -> Inputs:
+        """The inputs of some observations."""
+        return Inputs(self.joint_angles[chosen], self.others[chosen], self.jacobian[chosen])
+
+
+@dataclass(frozen=True)
+class Predictor:
+    """A fitted regression, by functions of inputs of other observations.
+
+    `mean`: predicted residuals (M, 3), m, base axes. `std`: standard deviation (M, 3) of a new measurement about them, not a
+    number where the regression states none.
+    """
+
+    mean: Callable[[Inputs], np.ndarray]
+    std: Callable[[Inputs], np.ndarray] = lambda there: np.full((len(there), 3), np.nan)
+
+
+@dataclass(frozen=True)
+class Regression:
+    """An entry of the catalogue.
+
+    `words`: as people call it. `settings`: among which poses that a fit has not seen choose; one where it chooses itself.
+    """
+
+    words: str
+    fitted: Callable[[Inputs, np.ndarray, Sequence[Setting], int], Iterator[Predictor]]
+    settings: Sequence[Setting] = ({},)
+
+
+def ridge_harmonics(inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], seed: int) -> Iterator[Predictor]:
+    """Harmonics of each joint's angle as deviations of that joint, beside geometry, by ridge regression.
+
+    What gears, encoders and runout can do to a joint, without saying what: a Fourier series of every joint carried to the
+    target by the Jacobian, and constant displacements of base and links, which resemble each other; all coefficients with one
+    penalty [1], in mean squares of a column. One decomposition serves all penalties.
+
+    [1] Hoerl, A. E. and Kennard, R. W., Ridge regression: biased estimation for nonorthogonal problems, Technometrics 12, 1970.
+    """
+
+    def columns(some: Inputs, orders: int) -> np.ndarray:
+        return np.concatenate([some.jacobian, by_harmonics(some, orders)], axis=2)
+
+    @cache
+    def decomposed(size: int) -> tuple[np.ndarray, np.ndarray]:
+        return np.linalg.eigh(gram[:size, :size])
+
+    most, joints = max(setting["orders"] for setting in settings), inputs.joint_angles.shape[1]
+    size = inputs.jacobian.shape[2] + 2 * most * joints
+    gram, right = np.zeros((size, size)), np.zeros(size)
+    for part in _parts(inputs):
+        rows = columns(inputs.select(part), most).reshape(-1, size)
+        gram += rows.T @ rows
+        right += rows.T @ residual[part].ravel()
+    for setting in settings:
+        # Orders come first among the harmonics, so that fewer of them are the first columns.
+        size = inputs.jacobian.shape[2] + 2 * setting["orders"] * joints
+        values, vectors = decomposed(size)
+        shrunk = np.maximum(values, 0.0) + setting["penalty"] * max(values.mean(), np.finfo(float).tiny)
+        found = vectors @ (vectors.T @ right[:size] / shrunk)
+
+        def mean(there: Inputs, coefficients: np.ndarray = found, orders: int = setting["orders"]) -> np.ndarray:
+            return _stacked(columns(there.select(part), orders) @ coefficients for part in _parts(there))
+
+        yield Predictor(mean)
+
+
+def two_joints(inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], seed: int) -> Iterator[Predictor]:
+    """Functions of two joints' angles at once as deviations of joints, beside geometry: what no catalogue of one joint's has.
+
+    Ridge regression whose pair of joints and penalty have the largest marginal likelihood, with the noise profiled [1].
+
+    [1] MacKay, D. J. C., Bayesian interpolation, Neural Computation 4, 1992.
+    """
+
+    def functions(some: Inputs, pair: tuple[int, int]) -> np.ndarray:
+        return of_two(some, pair, np.arange(some.joint_angles.shape[1]))
+
+    target, geometry, most = residual.ravel(), inputs.jacobian.reshape(residual.size, -1), -np.inf
+    common, along = geometry.T @ geometry, geometry.T @ target
+    for pair in combinations(range(inputs.joint_angles.shape[1]), 2):
+        rows = functions(inputs, pair).reshape(residual.size, -1)
+        mixed, right = geometry.T @ rows, np.concatenate([along, rows.T @ target])
+        gram = np.block([[common, mixed], [mixed.T, rows.T @ rows]])
+        for penalty in _PENALTIES * max(np.diag(gram).mean(), np.finfo(float).tiny):
+            lower, found, _ = lapack.dposv(gram + penalty * np.eye(len(right)), right, lower=1)
+            left = max(target @ target - right @ found, np.finfo(float).tiny)
+            probable = -residual.size * np.log(left) - np.log(np.diag(lower) ** 2 / penalty).sum()
+            if probable > most:
+                most, best, coefficients = probable, pair, found
+    split = inputs.jacobian.shape[2]
+    yield Predictor(lambda there: there.jacobian @ coefficients[:split] + functions(there, best) @ coefficients[split:])
+
+
+def extra_trees(inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], seed: int) -> Iterator[Predictor]:
+    """Extremely randomized trees: averages of neighbours in boxes, for whatever is not smooth [1]; for all axes together.
+
+    [1] Geurts, P., Ernst, D. and Wehenkel, L., Extremely randomized trees, Machine Learning 63, 2006.
+    """
+    # Most of what needs the catalogue grows no tree.
+    from sklearn.tree import ExtraTreeRegressor
+
+    (setting,), columns, target = settings, inputs.columns.astype(np.float32), np.ascontiguousarray(residual)
+    draws = np.random.RandomState(seed)
+    seeds = [draws.randint(np.iinfo(np.int32).max) for _ in range(_TREES)]
+    # One by one: a forest would look at the same inputs again for each of its trees.
+    trees = [ExtraTreeRegressor(random_state=each, **setting).fit(columns, target, check_input=False) for each in seeds]
+
+    def mean(there: Inputs) -> np.ndarray:
+        asked = there.columns.astype(np.float32)
+        return np.mean([tree.predict(asked, check_input=False) for tree in trees], axis=0)
+
+    yield Predictor(mean)
+
+
+def gaussian_process(inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], seed: int) -> Iterator[Predictor]:
+    """A Gaussian process: smooth in all inputs, with intervals that grow away from the poses that were measured.
+
+    One process for all three axes, each with its own size: a Matérn kernel with a length for each input, and noise, which have
+    the largest marginal likelihood. Its variance far from all poses is that of the residuals themselves, so that what it has
+    not seen it calls unknown [1]. With many observations it is projected onto its values at some of them (section 8.3.4 of
+    [1]), which is exact where these are all.
+
+    [1] Rasmussen, C. E. and Williams, C. K. I., Gaussian Processes for Machine Learning, chapters 2, 4, 5 and 8, MIT Press,
+        2006.
+    """
+    from scipy.optimize import Bounds, minimize
+
+    draws, columns = np.random.default_rng(seed), inputs.columns
+    taken = np.flatnonzero(columns.std(axis=0) > _STILL)
+    middle, spread = columns[:, taken].mean(axis=0), columns[:, taken].std(axis=0)
+
+    def scaled(some: Inputs) -> np.ndarray:
+        return (some.columns[:, taken] - middle) / spread
+
+    known = scaled(inputs)
+    few, many = (np.sort(draws.permutation(len(known))[:most]) for most in (_MOST_FOR_HYPERPARAMETERS, _MOST))
+    offset, size = residual.mean(axis=0), residual.std(axis=0)
+    size = np.where(size > 0.0, size, 1.0)
+    standard = (residual - offset) / size
+    ranges = np.log([_VARIANCE, *[_LENGTH] * len(taken), _NOISE])
+    # A length at its bound is an input without influence, not a failure.
+    args, bounds = (known[few], standard[few]), Bounds(*ranges[:, 1:].T)
+    found = minimize(_surprise, ranges[:, 0], args, "L-BFGS-B", jac=True, bounds=bounds, options={"ftol": _LAST_GAIN}).x
+    variance, *lengths, noise = np.exp(found)
+    places = known[many] / lengths
+    lower = lapack.dpotrf(variance * (_matern(places, places)[0] + _JITTER * np.eye(len(many))), lower=1)[0]
+
+    def features(asked: np.ndarray) -> np.ndarray:
+        return lapack.dtrtrs(lower, variance * _matern(places, asked / lengths)[0], lower=1)[0]
+
+    gram, right = noise * np.eye(len(many)), np.zeros((len(many), 3))
+    for part in _parts(inputs):
+        rows = features(known[part])
+        gram += rows @ rows.T
+        right += rows @ standard[part]
+    factor = lapack.dpotrf(gram, lower=1)[0]
+    weights = variance * lapack.dtrtrs(lower, lapack.dpotrs(factor, right, lower=1)[0], lower=1, trans=1)[0] * size
+
+    def mean(there: Inputs) -> np.ndarray:
+        asked = scaled(there)
+        return _stacked(_matern(asked[part] / lengths, places)[0] @ weights + offset for part in _parts(there))
+
+    def std(there: Inputs) -> np.ndarray:
+        asked, found = scaled(there), [np.zeros(0)]
+        for part in _parts(there):
+            rows = features(asked[part])
+            unsure = noise * (lapack.dtrtrs(factor, rows, lower=1)[0] ** 2).sum(axis=0)
+            found.append(variance + noise - (rows**2).sum(axis=0) + unsure)
+        return np.sqrt(np.maximum(np.concatenate(found), 0.0))[:, None] * size
+
+    yield Predictor(mean, std)
+
+
+REGRESSIONS = {
+    # What the method's authors use for regression: all inputs at each node, and no node of fewer observations is split.
+    "extra_trees": Regression(
+        "forest of extremely randomized trees", extra_trees, ({"min_samples_split": 5, "max_features": 1.0},)
+    ),
+    "gaussian_process": Regression("Gaussian process", gaussian_process),
+    "ridge_harmonics": Regression(
+        "ridge regression on harmonics of the joint angles",
+        ridge_harmonics,
+        tuple({"orders": n, "penalty": float(each)} for n in (1, 2, 6, 12, 36) for each in np.logspace(-5.0, 3.0, 9)),
+    ),
+    "two_joints": Regression("ridge regression on functions of two joints' angles", two_joints),
+}
+
+
+def by_harmonics(inputs: Inputs, orders: int) -> np.ndarray:
+    """Displacement of the target by one radian of each harmonic, (M, 3, 2 n orders), lower orders first."""
+    phase = np.arange(1, orders + 1)[:, None] * inputs.joint_angles[:, None, :]
+    harmonics = np.stack([np.sin(phase), np.cos(phase)], axis=2)
+    along = inputs.jacobian[:, :, None, None, : inputs.joint_angles.shape[1]]
+    return (along * harmonics[:, None]).reshape(len(inputs), 3, -1)
+
+
+def of_two(inputs: Inputs, pair: tuple[int, int], moved: np.ndarray) -> np.ndarray:
+    """What products of the first waves of two joints' angles, and the second of each, do as deviations of joints: (M, 3, D)."""
+    angles = inputs.joint_angles[:, pair]
+    first = np.stack([np.ones_like(angles), np.sin(angles), np.cos(angles)], axis=1)
+    products = (first[:, :, None, 0] * first[:, None, :, 1]).reshape(len(inputs), -1)
+    functions = np.hstack([products, np.sin(2.0 * angles), np.cos(2.0 * angles)])
+    return (inputs.jacobian[:, :, moved, None] * functions[:, None, None]).reshape(len(inputs), 3, -1)
+
+
+def _parts(inputs: Inputs) -> list[slice]:
+    return [slice(first, first + _AT_ONCE) for first in range(0, len(inputs), _AT_ONCE)]
+
+
+def _stacked(parts: Iterator[np.ndarray]) -> np.ndarray:
+    """Rows of three of all parts, and none of no part."""
+    return np.concatenate([np.zeros((0, 3)), *parts])
+
+
+def _matern(some: np.ndarray, others: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Matérn's correlation of order 5/2, and the slope by which it falls with half of a squared distance: ndarray (N, M)."""
+    square = (some**2).sum(axis=1)[:, None] + (others**2).sum(axis=1) - 2.0 * some @ others.T
+    root = np.sqrt(np.maximum(5.0 * square, 0.0))
+    slope = (1.0 + root) * np.exp(-root)
+    return slope + root**2 / 3.0 * np.exp(-root), 5.0 / 3.0 * slope
+
+
+def _surprise(logarithms: np.ndarray, inputs: np.ndarray, standard: np.ndarray) -> tuple[float, np.ndarray]:
+    """Minus the logarithm of a Gaussian process's marginal likelihood, and its gradient: its equations 5.8 and 5.9.
+
+    A length moves the covariance by a product of the slope and squared differences of one input, whose sum over all pairs is a
+    product of matrices.
+
+    `inputs` (N, k). `standard` (N, 3): residuals of mean 0 and size 1.
+    """
+    variance, *lengths, noise = np.exp(logarithms)
+    (count, axes), scaled = standard.shape, inputs / lengths
+    correlation, slope = _matern(scaled, scaled)
+    covariance = variance * correlation
+    covariance[np.diag_indices(count)] = variance + noise + _JITTER
+    lower, failed = lapack.dpotrf(covariance.T, lower=1, overwrite_a=1)
+    if failed:
+        return np.inf, np.zeros(len(logarithms))
+    along = lapack.dpotrs(lower, standard, lower=1)[0]
+    value = 0.5 * (standard * along).sum() + axes * (np.log(np.diag(lower)).sum() + 0.5 * count * np.log(2.0 * np.pi))
+    inverse = lapack.dpotri(lower, lower=1, overwrite_c=1)[0]
+    # LAPACK leaves the other triangle as it was.
+    inverse = np.tril(inverse)
+    inverse += np.tril(inverse, -1).T
+    inverse *= -axes
+    inverse += along @ along.T
+    of_noise, of_variance = noise * np.trace(inverse), variance * np.vdot(inverse.T, correlation)
+    slope *= inverse
+    of_lengths = 2.0 * variance * (slope.sum(axis=1) @ scaled**2 - (scaled * (slope @ scaled)).sum(axis=0))
+    return float(value), -0.5 * np.array([of_variance, *of_lengths, of_noise])
