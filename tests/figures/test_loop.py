@@ -88,22 +88,18 @@ def test_bars_for_every_model_and_measure_from_top_to_bottom_with_diamonds_for_f
     assert first.get_yticks().tolist() == sorted(first.get_yticks()) and first.get_ylim()[0] > first.get_ylim()[1]
     for axis, metric in zip(figure.axes, METRICS, strict=True):
         assert [bar.get_width() for bar in axis.patches] == pytest.approx([1e6 * step[f"heldout_{metric}_m"] for step in steps])
-        drawn = [len(lines_of(axis, gid)) for gid in ("interval", "open interval", "noise floor")]
-        assert drawn == [len(steps), len(steps) if metric == "p95" else 0, 1]
+        assert [len(lines_of(axis, gid)) for gid in ("interval", "noise floor")] == [len(steps), 1]
         diamonds = [line.get_xydata()[0].tolist() for line in axis.lines if line.get_marker() == "D"]
         rows = [bar.get_y() + bar.get_height() / 2 for bar in axis.patches]
         expected = [[1e6 * step[f"train_{metric}_m"], row] for step, row in zip(steps, rows, strict=True)]
         assert diamonds == [pytest.approx(point) for point in expected]
 
 
-def test_an_interval_reaches_from_end_to_end_is_open_above_or_is_not_drawn():
+def test_an_interval_reaches_from_end_to_end_or_is_not_drawn():
     steps = step_rows(effects=())
-    mean, _, p95, largest = before_after(steps).axes
+    mean, *_, largest = before_after(steps).axes
     for step, (one, other) in zip(steps, lines_of(mean, "interval"), strict=True):
         assert [one[0], other[0]] == pytest.approx([1e6 * step["heldout_mean_m_low"], 1e6 * step["heldout_mean_m_high"]])
-    # Of few poses the 95th percentile has no upper end: its line ends at the value, where an arrow points on.
-    for step, (_, end), (arrow,) in zip(steps, lines_of(p95, "interval"), lines_of(p95, "open interval"), strict=True):
-        assert end[0] == arrow[0] == pytest.approx(1e6 * step["heldout_p95_m"])
     assert np.isnan([x for line in lines_of(largest, "interval") for x, _ in line]).all()
 
 

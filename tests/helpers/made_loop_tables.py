@@ -95,8 +95,8 @@ def step_rows(effects=("lost_motion",), largest_m=3e-4):
         row = {"step": name, "kind": kind, "parameters": 6 * min(number, 1) + number}
         for metric, factor in {"mean": 0.5, "rms": 0.6, "p95": 0.9, "max": 1.0}.items():
             row |= {f"train_{metric}_m": 0.9 * factor * size, f"heldout_{metric}_m": factor * size}
-            # As of few poses: the 95th percentile is open above, the maximum has no interval.
-            low, high = {"p95": (0.8, np.inf), "max": (np.nan, np.nan)}.get(metric, (0.8, 1.2))
+            # Quantiles have no interval.
+            low, high = (0.8, 1.2) if metric in ("mean", "rms") else (np.nan, np.nan)
             row |= {f"heldout_{metric}_m_low": low * factor * size, f"heldout_{metric}_m_high": high * factor * size}
             row |= {f"heldout_{metric}_over_floor": factor * size / 5e-5}
         rows.append(row)

@@ -139,7 +139,7 @@ def test_every_script_is_of_a_rule_and_a_rule_watches_the_sources_of_its_own():
 
 # Imports of a script, or of a step, in a process of its own: files of the sources that are loaded then.
 _LOADED = """
-import ast, json, sys
+import ast, importlib, json, sys
 from pathlib import Path
 root, script, step = Path(sys.argv[1]), *sys.argv[2].split(":")
 sys.path.insert(0, str(root / "workflow" / "scripts"))
@@ -147,9 +147,11 @@ body = ast.parse((root / "workflow" / "scripts" / script).read_text()).body
 exec(compile(ast.Module([node for node in body if isinstance(node, (ast.Import, ast.ImportFrom))], []), script, "exec"), {})
 exec(f"import {step}" if step else "")
 # What is a catalogue looks up the modules beside it when it is asked.
-for name in [name for name, module in sys.modules.items() if {"modules_with", "module_names"} & {*vars(module)}]:
+for name in [name for name, module in sys.modules.items() if "module_names" in vars(module)]:
     if name != "elastocal.io.modules":
-        sys.modules["elastocal.io.modules"].modules_with("__name__", sys.modules[name.rpartition(".")[0]])
+        package = sys.modules[name.rpartition(".")[0]]
+        for each in sys.modules["elastocal.io.modules"].module_names(package):
+            importlib.import_module(f"{package.__name__}.{each}")
 files = [Path(m.__file__) for m in list(sys.modules.values()) if getattr(m, "__file__", None)]
 print(json.dumps(sorted(f.relative_to(root).as_posix() for f in files if f.is_relative_to(root))))
 """

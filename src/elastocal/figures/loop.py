@@ -153,10 +153,7 @@ def before_after(steps: Sequence[Mapping[str, Any]], noise_floor_m: float | None
         for row, step in zip(rows, steps, strict=True):
             value, low, high = (scale * step[f"heldout_{metric}_m{end}"] for end in ("", "_low", "_high"))
             axis.barh(row, value, height=0.42, color=LOOKS[step["kind"]][0])
-            # An arrow where the interval is open above; nothing where there is none.
-            axis.plot([low, value if np.isinf(high) else high], [row, row], color="black", linewidth=1.1, gid="interval")
-            if np.isinf(high):
-                axis.plot(value, row, ">", color="black", markersize=4, gid="open interval")
+            axis.plot([low, high], [row, row], color="black", linewidth=1.1, gid="interval")
             axis.plot(scale * step[f"train_{metric}_m"], row, **_DIAMOND)
         if noise_floor_m:
             axis.axvline(scale * noise_floor_m, color="black", linestyle=":", linewidth=1.2, gid="noise floor")

@@ -107,11 +107,6 @@ class Robot:
         """Number of joints."""
         return self.chain.coordinates
 
-    @property
-    def counts_each_joint(self) -> bool:
-        """Whether the controller counts each joint by itself, in either sense and in steps of its own size."""
-        return bool(np.allclose(np.abs(self.reported_matrix), np.eye(self.joints), atol=0.0))
-
     def model_angles(self, reported: np.ndarray) -> np.ndarray:
         """The chain's joint angles (..., n) from those that the controller reports, rad."""
         return reported @ self.reported_matrix.T + self.reported_offset

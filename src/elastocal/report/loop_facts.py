@@ -266,7 +266,7 @@ def _cell(row: Mapping[str, Any], name: str, factor: float, unit: str) -> list[s
     )
     if np.isnan(low) or np.isnan(high):
         return [number, "–"]
-    return [number, f"≥ {ends[0]}" if np.isinf(high) else f"[{ends[0]}, {ends[1]}]"]
+    return [number, f"[{ends[0]}, {ends[1]}]"]
 
 
 def step_rows(steps: Sequence[Mapping[str, Any]], floor_m: float | None) -> dict[str, Any]:
