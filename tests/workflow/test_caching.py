@@ -169,8 +169,8 @@ def test_the_import_closure_is_what_a_script_loads(scripts, unstarted):
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True, timeout=HUNG_S)
         found = closure(unstarted.path("workflow/scripts") / script, unstarted.path("src"), *([step] if step else []))
         names = [file.relative_to(unstarted.folder).as_posix() for file in found]
-        # Steps load what reads tables into frames when they are called.
-        later = {"src/elastocal/io/data_frames.py"} if step else set()
+        # What reads tables into frames is loaded when it is called.
+        later = {"src/elastocal/io/data_frames.py"}
         # A table that a module reads beside it counts as the module does.
         assert ("src/elastocal/diagnosis/settings.json" in names) == ("src/elastocal/diagnosis/settings.py" in names)
         assert sorted({*json.loads(done.stdout)} | (later & {*names})) == [name for name in names if name.endswith(".py")], each

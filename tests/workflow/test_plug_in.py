@@ -6,6 +6,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
+UR10 = """\
+name: UR10
+chain: >-
+  Tz(0.1273) Rz(q1) Ty(0.1639) Ry(q2) Tx(0.612) [2DoF] Ry(q3) Tx(0.5723) [3DoF] Ry(q4) Rz(q5) Tz(-0.1157) [5DoF]
+  Ry(q6) Ty(0.0922) [6DoF]
+joint_limits_deg: [[-360, 360], [-360, 360], [-180, 180], [-360, 360], [-360, 360], [-360, 360]]
+compliance_urad_per_Nm: [11, 12, 13, 21, 22, 23]
+"""
 SIX_AFTER_FIVE = """\
 name: 6DoF after 5DoF
 stages:
@@ -20,9 +28,14 @@ def table(study, name):
     return pd.read_csv(study.path(name))
 
 
+def add(study, name, text):
+    study.path(name).write_text(text, encoding="utf-8")
+
+
 def test_another_robot_strategy_and_noise_level_make_a_study_of_their_own(unstarted):
     """A robot and points that the paper knows nothing of, without any of its robots, through every table and figure."""
-    unstarted.path("config/strategies/6DoF-after-5DoF.yaml").write_text(SIX_AFTER_FIVE, encoding="utf-8")
+    add(unstarted, "config/robots/ur10.yaml", UR10)
+    add(unstarted, "config/strategies/6DoF-after-5DoF.yaml", SIX_AFTER_FIVE)
     unstarted.configure({"robots": ["ur10"], "strategies": ["6DoF", "6DoF-after-5DoF"], "noise_um": [12.5, 200]})
     unstarted.run("paper", "study")
     assert set(table(unstarted, "reports/tables/table1.csv").robot) == {"ur10"}
