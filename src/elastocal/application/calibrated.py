@@ -225,7 +225,7 @@ def come_to_rest(
     """Where the robot yields to by its model: coordinates (N, C) of its sites, and position and rotation as by `forward`.
 
     `near` (N, C): coordinates at which the loads are taken, of states that differ little. Without, loads act where the robot
-    has yielded to them, by the fixed-point iteration of `displacement.conditions`.
+    has yielded to them, by the fixed-point iteration of `model.conditions`.
     """
     fitted, states = (calibrated.model, calibrated.estimate), states_of(calibrated, reported_angles, operating)
     coordinates, chain = displaced_coordinates(*fitted, conditions(*fitted, states, near)), calibrated.model.sites.chain

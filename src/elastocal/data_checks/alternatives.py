@@ -99,10 +99,8 @@ def _length(misfit: np.ndarray) -> float:
 
 def _best(written: Interpretation, interpretations: Sequence[Interpretation], measure: Measure) -> tuple[float, Fault] | None:
     """Fault of the first of those that fit best, if it convinces, beside what fits alike; and what it leaves, m."""
-    before, together = (
-        written.misfit(measure),
-        np.array([_length(interpretation.misfit(measure)) for interpretation in interpretations]),
-    )
+    before = written.misfit(measure)
+    together = np.array([_length(interpretation.misfit(measure)) for interpretation in interpretations])
     alike = np.flatnonzero(together <= max(_ALIKE * together.min(), together.min() + _ALIKE_M))
     hypothesis = interpretations[alike[0]].hypothesis
     best = _read(written.campaign, hypothesis, robustly_placed)
@@ -122,9 +120,8 @@ def _best(written: Interpretation, interpretations: Sequence[Interpretation], me
 
 def _evidence(before: np.ndarray, after: np.ndarray, interpretation: Interpretation) -> tuple[float, float] | None:
     """RMS before and after, of positions or else of orientations; None where a correction does not convince."""
-    predicted = [
-        interpretation.placement.predicted[0][members] for members in of_each_target(interpretation.campaign.measurements)
-    ]
+    position, measurements = interpretation.placement.predicted[0], interpretation.campaign.measurements
+    predicted = [position[members] for members in of_each_target(measurements)]
     extent = max(rms(np.linalg.norm(points - points.mean(axis=0), axis=1)) for points in predicted)
     # Where the robot hardly moves, anything that gathers the measurements in one place would fit.
     limit = np.minimum(before / FAR_BETTER, np.minimum(_IMPLAUSIBLE, [extent / FAR_BETTER, np.inf]))

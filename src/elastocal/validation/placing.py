@@ -79,7 +79,7 @@ def carried_over(fitted: Fit, model: Model, states: States) -> Fit:
 def outside_poses(fitted: Fit, case: Case, held_out: Case) -> np.ndarray:
     """Which poses lie outside the range of those that a model was fitted to, where it has to extrapolate.
 
-    Either a joint stands beyond the fitted poses by more than chance explains, see `joint_space.beyond_range`; or the model
+    Either a joint stands beyond the fitted poses by more than chance explains, see `holdout.beyond_range`; or the model
     predicts the position less surely than it would have predicted any pose it was fitted to, had that pose been left out. The
     second finds what ranges joint by joint miss: corners between the poses, loads, times and temperatures beyond those fitted.
     Poses drawn like the fitted ones pass that maximum with probability 1 / (P + 1) at most, as all are exchangeable: the
@@ -96,7 +96,7 @@ def outside_poses(fitted: Fit, case: Case, held_out: Case) -> np.ndarray:
 
 
 def repeat_warnings(fitted_states: States | Measurements, states: States | Measurements) -> list[str]:
-    """What to say of poses for the test whose configurations were fitted as well, see `joint_space.find_repeated`, if any."""
+    """What to say of poses for the test whose configurations were fitted as well, see `holdout.find_repeated`, if any."""
     again = find_repeated(_angles_of_poses(fitted_states), _angles_of_poses(states))
     if not again.any():
         return []
