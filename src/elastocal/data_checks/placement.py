@@ -13,7 +13,7 @@ from elastocal.campaigns.campaign import groups_of
 from elastocal.fitting.least_squares import nominal_poses, registered_to
 from elastocal.fitting.model import declared_model, measured_in_base
 from elastocal.fitting.observations import select_states, single_observations
-from elastocal.mechanics.kinematics import poses_and_jacobians, rotation_vectors
+from elastocal.mechanics.kinematics import position_jacobians, rotation_vectors
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
@@ -114,13 +114,9 @@ def spread(campaign: Campaign, poses: int = MANY_POSES) -> Campaign:
 
 def jacobians_at_targets(campaign: Campaign, estimate: Estimate) -> np.ndarray:
     """How the target of each measurement moves with the joints, ndarray (N, 3, n)."""
-    chain, measurements = campaign.robot.chain, campaign.measurements
-    found = np.empty((len(measurements), 3, campaign.robot.joints))
-    for index, target in enumerate(campaign.targets):
-        mine = measurements.target == index
-        point = replace(chain.point(target.point), offset_m=tuple(estimate.target_offset[index]))
-        found[mine] = poses_and_jacobians(chain, measurements.joint_angles[mine], point)[2][:, :3]
-    return found
+    chain, seen, offsets = campaign.robot.chain, campaign.measurements, estimate.target_offset
+    points = [replace(chain.point(t.point), offset_m=tuple(at)) for t, at in zip(campaign.targets, offsets, strict=True)]
+    return position_jacobians(chain, seen.joint_angles, points, seen.target)
 
 
 def rms(values: np.ndarray) -> float:

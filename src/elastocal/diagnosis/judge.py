@@ -64,7 +64,7 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     rows, heldout, warnings = heldout_errors(steps, case, part, outside, seed)
     of_all, heldout["with_gross_errors"] = [row["heldout_rms_m"] for row in rows], None
     if left_out:
-        whole = [_summary(error) for error in _errors(steps, case, held_out)[1]]
+        whole = [figures.summary(error.distance) for error in _errors(steps, case, held_out)[1]]
         of_all = [error["rms_m"] for error in whole]
         heldout["with_gross_errors"] = {"before": whole[_declared(steps)], "after": whole[-1]}
         warnings.append(
@@ -153,9 +153,9 @@ def heldout_errors(
             warnings.append(f"the step '{row['step']}' raised the RMS error {ABOUT_ERRORS}")
     by_range = figures.errors_by_range({"before": errors[before], "after": errors[after]}, outside)
     heldout = {
-        "uncalibrated": _summary(errors[0]) | {"reduction_ci95": [of_calibration.low, of_calibration.high]},
-        "before": _summary(errors[before]),
-        "after": _summary(errors[after]),
+        "uncalibrated": figures.summary(errors[0].distance) | {"reduction_ci95": [of_calibration.low, of_calibration.high]},
+        "before": figures.summary(errors[before].distance),
+        "after": figures.summary(errors[after].distance),
         "noise_floor_rms_m": None if np.isnan(floor) else floor,
         "reduction_ci95": [reductions[after].low, reductions[after].high],
         "reduction_std_error": reductions[after].std_error,
@@ -179,10 +179,6 @@ def _errors(steps: Sequence[Step], case: Case, held_out: Case) -> tuple[list[tup
 
 def _declared(steps: Sequence[Step]) -> int:
     return next(number for number, step in enumerate(steps) if step.kind == "declared")
-
-
-def _summary(errors: figures.Errors) -> dict[str, float]:
-    return {name: float(value) for name, value in figures.summary(errors.distance).items()}
 
 
 def residual_blocks(diagnosis: Diagnosis, verdict: Verdict) -> Iterator[dict[str, np.ndarray]]:

@@ -75,7 +75,7 @@ def _errors(part: pd.DataFrame, draws: np.random.Generator) -> dict[str, float]:
     row: dict[str, float] = {"poses": errors[0].poses}
     for stage, error, limit in zip(_STAGES, errors, limits, strict=True):
         for name, value in summary(error.distance).items():
-            row[f"{stage}_{name.removesuffix('_m')}_mm"] = 1e3 * float(value)
+            row[f"{stage}_{name.removesuffix('_m')}_mm"] = 1e3 * value
         row[f"{stage}_rms_low_mm"], row[f"{stage}_rms_high_mm"] = 1e3 * limit["rms_m"]
     row["rms_reduction_low"], row["rms_reduction_high"] = reductions[1].low, reductions[1].high
     return row

@@ -156,6 +156,16 @@ def jacobians(chain: Chain, coordinates: np.ndarray, point: MeasuringPoint) -> n
     return _batch_first(jacobian, batch)
 
 
+def position_jacobians(
+    chain: Chain, coordinates: np.ndarray, points: Sequence[MeasuringPoint], which: np.ndarray
+) -> np.ndarray:
+    """How the measuring point `which` (M,) of some moves with the coordinates (M, n) of the chain, ndarray (M, 3, n)."""
+    found = np.empty((len(which), 3, chain.coordinates))
+    for number, point in enumerate(points):
+        found[which == number] = jacobians(chain, coordinates[which == number], point)[:, :3]
+    return found
+
+
 @dataclass(frozen=True)
 class Motion:
     """Poses of some points of a chain, and how each transform that moves would move everything behind it; component first.

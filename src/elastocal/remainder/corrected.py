@@ -24,7 +24,7 @@ from elastocal.fitting.least_squares import fit_frames
 from elastocal.fitting.linearization import effect_columns
 from elastocal.fitting.model import conditions, target_points
 from elastocal.fitting.observations import sample_of, state_clusters
-from elastocal.mechanics.kinematics import poses_and_jacobians
+from elastocal.mechanics.kinematics import position_jacobians
 from elastocal.remainder.regressions import REGRESSIONS, Inputs, Predictor
 from elastocal.validation.held_out import Errors, intervals, position_errors, position_residuals, refits, summary
 from elastocal.validation.placing import beyond_campaign, placed, same_campaign
@@ -83,11 +83,13 @@ def corrected(
     """
     there, (model, estimate) = held_out.observations, placed(fitted, case, held_out)
     names = [name for name in REGRESSIONS if regression in (name, BEST_REMAINDER)]
-    chosen = _chosen(fitted, sample_of(case.observations, _MOST_TO_CHOOSE), names, blocks, seed)
-    outside = beyond_regressed(case.observations.states, there.states.joint_angles, there.states.wrench)[there.state]
+    every, some = case.observations, sample_of(case.observations, _MOST_TO_CHOOSE)
+    inputs = inputs_of(fitted.model, fitted.estimate, some)
+    chosen = _chosen(fitted, some, inputs, names, blocks, seed)
+    outside = beyond_regressed(every.states, there.states.joint_angles, there.states.wrench)[there.state]
     mean, std, predictor = np.zeros((len(there), 3)), None, None
     if chosen["regression"]:
-        inputs = inputs_of(fitted.model, fitted.estimate, case.observations)
+        inputs = inputs if some is every else inputs_of(fitted.model, fitted.estimate, every)
         predictor = fitted_again(chosen, inputs, fitted.residual[:, :3])
         asked = inputs_of(model, estimate, there)
         mean, std = np.where(outside[:, None] & within_range, 0.0, predictor.mean(asked)), predictor.std(asked)
@@ -109,7 +111,9 @@ def beyond_regressed(fitted: States, joint_angles: np.ndarray, wrench: np.ndarra
     return beyond_campaign(fitted, middle + (joint_angles - middle) / (1.0 + 2.0 * _BESIDE), wrench)
 
 
-def _chosen(fitted: Fit, observations: Observations, names: Sequence[str], blocks: bool, seed: int) -> dict[str, Any]:
+def _chosen(
+    fitted: Fit, observations: Observations, inputs: Inputs, names: Sequence[str], blocks: bool, seed: int
+) -> dict[str, Any]:
     """As `tuned`, of training poses in folds, with the model fitted anew without each."""
     states, model = observations.states, fitted.model
     pose, each = state_clusters(states), observations.cluster
@@ -122,7 +126,7 @@ def _chosen(fitted: Fit, observations: Observations, names: Sequence[str], block
         mine = refit.within[observations.state]
         without[number, ~mine] = position_residuals(model, refit.estimate, refit.rest)
         without[number, mine] = position_residuals(model, refit.there, refit.left_out)
-    inputs, whole = inputs_of(model, fitted.estimate, observations), position_residuals(model, fitted.estimate, observations)
+    whole = position_residuals(model, fitted.estimate, observations)
     return tuned(names, inputs, configuration[each], fold[each], whole, without, seed)
 
 
@@ -138,29 +142,33 @@ def fitted_again(chosen: Mapping[str, Any], inputs: Inputs, residual: np.ndarray
     return Predictor(lambda there: chosen["left_out"]["factor"] * found.mean(there), std)
 
 
-def inputs_of(model: Model, estimate: Estimate, observations: Observations) -> Inputs:
-    """Inputs of a regression, from the nominal chain and the places of the targets; `estimate` says where these sit.
+def geometric_inputs_of(model: Model, estimate: Estimate, observations: Observations) -> Inputs:
+    """Inputs of a regression, from the nominal chain and the places of the targets alone; `estimate` says where these sit."""
+    states, chain, seen = observations.states, model.sites.chain, observations.state
+    coordinates = chain.at(states.joint_angles)[seen]
+    jacobian = position_jacobians(chain, coordinates, target_points(model, estimate), observations.target)
+    others = np.hstack([states.wrench[seen], estimate.target_offset[observations.target]])
+    return Inputs(states.joint_angles[seen], others, jacobian)
 
-    What the model's effects do stands beside the Jacobian: an effect that was adopted wrongly has taken its part of an error
-    that no effect is, and a regression that cannot give it back has the rest of the error and the effect to make up for.
+
+def inputs_of(model: Model, estimate: Estimate, observations: Observations) -> Inputs:
+    """Inputs of a regression on what a model leaves: `geometric_inputs_of`, and what the model's effects do.
+
+    The latter stands beside the Jacobian: an effect that was adopted wrongly has taken its part of an error that no effect is,
+    and a regression that cannot give it back has the rest of the error and the effect to make up for.
     """
-    states, chain = observations.states, model.sites.chain
-    coordinates = chain.at(states.joint_angles)[observations.state]
-    jacobian = np.empty((len(observations), 3, chain.coordinates))
-    for number, point in enumerate(target_points(model, estimate)):
-        mask = observations.target == number
-        jacobian[mask] = poses_and_jacobians(chain, coordinates[mask], point)[2][:, :3]
+    inputs = geometric_inputs_of(model, estimate, observations)
     found = [
         (effect, shapes)
         for effect, shapes in zip(model.effects, estimate.shapes, strict=True)
         if effect.effect in effects() and moves_robot(effect) and _UNKNOWN_OF_TASKS.isdisjoint(effect.needs)
     ]
-    if found:
-        sizes = np.array([parameter.plausible for effect, _ in found for parameter in effect.parameters])
-        columns = effect_columns(found, conditions(model, estimate, states), jacobian, observations.state)
-        jacobian = np.concatenate([jacobian, columns * sizes / _RAD_OF_A_SIZE], axis=2)
-    others = np.hstack([states.wrench[observations.state], estimate.target_offset[observations.target]])
-    return Inputs(states.joint_angles[observations.state], others, jacobian)
+    if not found:
+        return inputs
+    sizes = np.array([parameter.plausible for effect, _ in found for parameter in effect.parameters])
+    around = conditions(model, estimate, observations.states)
+    columns = effect_columns(found, around, inputs.jacobian, observations.state)
+    return replace(inputs, jacobian=np.concatenate([inputs.jacobian, columns * sizes / _RAD_OF_A_SIZE], axis=2))
 
 
 def remainder_facts(
@@ -187,7 +195,7 @@ def remainder_facts(
         half_width = {name: float(np.median(part)) if part.size else None for name, part in each.items()}
     return {
         **found.chosen,
-        "errors": {name: float(value) for name, value in summary(with_it.distance).items()},
+        "errors": summary(with_it.distance),
         "rms_ci95_m": [float(end) for end in limits[1]["rms_m"]],
         "reduction_ci95": [reductions[1].low, reductions[1].high],
         "physics": 1.0 - squares[1] / squares[0],

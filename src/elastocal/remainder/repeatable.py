@@ -25,7 +25,7 @@ import numpy as np
 from elastocal.campaigns.holdout import SAME_POSE_RAD, configurations
 from elastocal.fitting.least_squares import ON_THE_WAY, fit
 from elastocal.fitting.observations import sample_of, state_clusters
-from elastocal.remainder.corrected import FEWEST_CONFIGURATIONS, gain_of, inputs_of
+from elastocal.remainder.corrected import FEWEST_CONFIGURATIONS, gain_of, geometric_inputs_of
 from elastocal.remainder.regressions import by_harmonics, of_two
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def repeatable_part(fitted: Fit, observations: Observations, seed: int) -> Repea
     count, draws = int(group.max()) + 1, np.random.default_rng(seed)
     if count < FEWEST_CONFIGURATIONS:
         return None
-    fold, inputs = draws.permutation(count) % _FOLDS, inputs_of(fitted.model, fitted.estimate, some)
+    fold, inputs = draws.permutation(count) % _FOLDS, geometric_inputs_of(fitted.model, fitted.estimate, some)
     kinds = _kinds(inputs, int(np.clip(count, _FEWEST, _MOST)), draws)
     sizes, parameters = [kind(inputs.select(slice(1))).shape[2] for kind in kinds], len(fitted.held)
     # Of each kind of functions the products with residuals by configurations, with themselves and with sensitivities by folds.

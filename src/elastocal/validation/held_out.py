@@ -77,10 +77,10 @@ def position_residuals(model: Model, estimate: Estimate, observations: Observati
     return np.concatenate([residuals(model, estimate, p, conditions(model, estimate, p.states))[:, :3] for p in parts])
 
 
-def summary(distance: np.ndarray) -> dict[str, np.ndarray]:
-    """Mean, RMS, 95th percentile and maximum, each (...), of distances (..., M)."""
-    mean, rms = distance.mean(axis=-1), np.sqrt((distance**2).mean(axis=-1))
-    return dict(zip(METRICS, (mean, rms, np.quantile(distance, 0.95, axis=-1), distance.max(axis=-1)), strict=True))
+def summary(distance: np.ndarray) -> dict[str, float]:
+    """Mean, RMS, 95th percentile and maximum of distances (M,)."""
+    found = distance.mean(), np.sqrt((distance**2).mean()), np.quantile(distance, 0.95), distance.max()
+    return dict(zip(METRICS, map(float, found), strict=True))
 
 
 @dataclass(frozen=True)
@@ -188,8 +188,8 @@ def errors_by_range(errors: Mapping[str, Errors], outside: np.ndarray) -> dict[s
     """
     found: dict[str, Any] = {"poses": int(outside.sum())}
     for name, poses in (("inside", ~outside), ("outside", outside)):
-        parts = {stage: summary(one.distance[poses[one.cluster]]) for stage, one in errors.items()} if poses.any() else {}
-        found[name] = {stage: {key: float(each) for key, each in part.items()} for stage, part in parts.items()} or None
+        there = errors if poses.any() else {}
+        found[name] = {stage: summary(one.distance[poses[one.cluster]]) for stage, one in there.items()} or None
     return found
 
 
