@@ -12,7 +12,7 @@ from elastocal.data_checks.faults import faults
 from elastocal.data_checks.protocol import Fault
 from elastocal.data_checks.warnings import fitted_compliance_warnings
 from elastocal.diagnosis import refit, verdict
-from elastocal.diagnosis.gross_errors import Deviations, Kept, entries_of, first_kept, fitted_to, gross_errors, warnings_of
+from elastocal.diagnosis.gross_errors import Deviations, Kept, entries_of, first_kept, fitted_to, gross_errors, searched_of, warnings_of
 from elastocal.diagnosis.linearize import linearized, looked_at_closely, with_probable_centres
 from elastocal.diagnosis.search import alarm_of, initial_screening, posterior
 from elastocal.diagnosis.verdict import Evidence
@@ -20,7 +20,7 @@ from elastocal.effects.catalogue import effects
 from elastocal.fitting.least_squares import ON_THE_WAY, SETTLED, fit
 from elastocal.fitting.model import Case, joint_compliances, parameter_values
 from elastocal.fitting.noise import noise_facts
-from elastocal.fitting.observations import Observations, sample_of
+from elastocal.fitting.observations import Observations
 from elastocal.fitting.tolerances import effective_parameters
 from elastocal.random_streams import stream
 from elastocal.remainder.repeatable import Repeatable, repeatable_part
@@ -110,8 +110,7 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         if (remaining == part.kept).all() or number + 1 == settings.gross_error_rounds:
             break
         # The model found looks at all rows once more, without these, before another search is made.
-        like = None if (remaining & ~part.kept).any() else part.searched
-        some = sample_of(case.select(remaining).observations, settings.searched_observations, like)
+        some = searched_of(case, case.select(remaining), settings)
         about = fit(about.model, some, about.noise, about.estimate, True, ON_THE_WAY)
         errors = gross_errors(about, part.noise, measurements, remaining, settings)
         good |= ~remaining & ~errors.gross

@@ -301,10 +301,14 @@ def fitted_to(case: Case, kept: np.ndarray, settings: Settings, last: Kept | Non
         return last
     part = case.select(kept)
     noise, warnings = estimated_noise(part)
-    # Where rows only leave, the rest of the last sample.
-    like = last.searched if last is not None and not (kept & ~last.kept).any() else None
-    searched = sample_of(part.observations, settings.searched_observations, like)
+    searched = searched_of(case, part, settings)
     return Kept(part, kept, noise, warnings, fit_declared(part.model, searched, noise), searched)
+
+
+def searched_of(case: Case, part: Case, settings: Settings) -> Observations:
+    """What a search looks at of a part of a case: at the same poses whatever is kept, so that only gross errors move a fit."""
+    most = settings.searched_observations
+    return sample_of(part.observations, most, sample_of(case.observations, most))
 
 
 def first_kept(case: Case, settings: Settings) -> Kept:

@@ -156,7 +156,8 @@ def predictive_variances(
         there = linearize(model, estimate, part, conditions(model, estimate, part.states)).sensitivities[:, :3]
         # Effects come last in the order of the parameters, whatever frames and targets stand before them.
         there = there[..., there.shape[-1] - kept.sum() :] * plausible[kept]
-        other[seen] = ((there @ root[:, kept].T) ** 2).sum(axis=(1, 2))
+        flat = there.reshape(-1, there.shape[2]) @ root[:, kept].T
+        other[seen] = (flat**2).sum(axis=1).reshape(len(part), 3).sum(axis=1)
     return _largest(own, cluster), _largest(other, unseen.state)
 
 
