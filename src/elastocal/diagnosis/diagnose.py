@@ -12,7 +12,16 @@ from elastocal.data_checks.faults import faults
 from elastocal.data_checks.protocol import Fault
 from elastocal.data_checks.warnings import fitted_compliance_warnings
 from elastocal.diagnosis import refit, verdict
-from elastocal.diagnosis.gross_errors import Deviations, Kept, entries_of, first_kept, fitted_to, gross_errors, searched_of, warnings_of
+from elastocal.diagnosis.gross_errors import (
+    Deviations,
+    Kept,
+    entries_of,
+    first_kept,
+    fitted_to,
+    gross_errors,
+    searched_of,
+    warnings_of,
+)
 from elastocal.diagnosis.linearize import linearized, looked_at_closely, with_probable_centres
 from elastocal.diagnosis.search import alarm_of, initial_screening, posterior
 from elastocal.diagnosis.verdict import Evidence

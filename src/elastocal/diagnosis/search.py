@@ -127,7 +127,7 @@ class Posterior:
 
 
 def solve_positive(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Solution of equations with a symmetric positive matrix, by Cholesky's factor; of no equations none, where LAPACK balks."""
+    """Solution of equations with a symmetric positive matrix, by Cholesky's factor; of none, at which LAPACK balks, nothing."""
     return lapack.dposv(matrix, right)[1] if len(matrix) else right
 
 

@@ -89,11 +89,10 @@ class Products:
         return replace(self, rows=self.rows.at(np.zeros(len(self.beside), bool)), beside=self.beside[:0])
 
     def by_pose(self) -> Iterator[tuple[np.ndarray, WhiteRows, np.ndarray, np.ndarray]]:
-        """B_p (G, a, P + K + 1) along the a principal axes of C_p that a pose can show, and its eigenvalues (G, a), of some poses
-        at a time.
+        """B_p (G, a, P + K + 1) along principal axes of C_p, and its eigenvalues (G, a), of some poses at a time.
 
-        With which of all rows are theirs, and these, their Jacobian along the same axes. There are no more axes than joints, nor
-        than numbers that are measured in any pose.
+        With which of all rows are theirs, and these, their Jacobian along the same axes: as many as joints, or as numbers that
+        are measured in any pose, if these are fewer.
         """
         rows, count = self.rows, self.declared
         width, poses = self.gram.shape[0], int(rows.pose.max()) + 1
