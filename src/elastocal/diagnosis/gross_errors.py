@@ -21,7 +21,7 @@ from elastocal.counting import counted
 from elastocal.diagnosis.evidence import Grid
 from elastocal.diagnosis.linearize import Linearized, linearized
 from elastocal.diagnosis.statistics import WhiteRows
-from elastocal.fitting.least_squares import evaluated, fit
+from elastocal.fitting.least_squares import ON_THE_WAY, SETTLED, evaluated, fit
 from elastocal.fitting.linearization import Linearization, linearize
 from elastocal.fitting.model import conditions, parameters, residuals
 from elastocal.fitting.noise import Noise, measurement_covariances
@@ -289,10 +289,14 @@ class Kept:
     declared: Fit
     searched: Observations
 
-    def declared_to_all(self) -> Fit:
-        """The declared model fitted to all that is kept."""
-        found, every = self.declared, self.case.observations
-        return found if self.searched is every else fit(found.model, every, self.noise, found.estimate, reweighted=True)
+    def to_all(self, found: Fit) -> Fit:
+        """A model that is fitted to what is searched, fitted to all that is kept.
+
+        From an estimate that some measurements lead to, a step or two by all of them are as good as the fit's end (one-step
+        M-estimators; Bickel, One-step Huber estimates in the linear model, JASA 1975).
+        """
+        enough = SETTLED if self.searched is self.case.observations else ON_THE_WAY
+        return fit(found.model, self.case.observations, found.noise, found.estimate, reweighted=True, settled=enough)
 
 
 def fitted_to(case: Case, kept: np.ndarray, settings: Settings, last: Kept | None = None) -> Kept:
