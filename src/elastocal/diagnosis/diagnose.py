@@ -141,15 +141,14 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         # Its statistics make room for those of the next search.
         found = None
     errors = replace(errors, gross=~part.kept)
-    case, noise, some = part.case, part.noise, part.searched is not part.case.observations
-    declared = part.to_all(part.declared) if some else part.declared
+    case, noise, declared = part.case, part.noise, part.to_all(part.declared)
     bare = fit(replace(case.model, effects=()), case.observations, noise, settled=ON_THE_WAY)
     steps = [Step("frames and targets", "frames", bare), Step("declared model", "declared", declared)]
     final, lost, contradicting, repeatable = declared, list[str](), list[str](), None
     warnings = [*part.warnings]
     if found:
         final = about
-        if some or about is not found.fitted:
+        if about is not found.fitted or part.searched is not case.observations:
             final = part.to_all(about)
         named, word = found.conclusion.best.named, found.conclusion.verdict
         found = replace(found, conclusion=verdict.with_related(found.conclusion, verdict.oversized(final, named)))

@@ -21,7 +21,7 @@ from elastocal.counting import counted
 from elastocal.diagnosis.evidence import Grid
 from elastocal.diagnosis.linearize import Linearized, linearized
 from elastocal.diagnosis.statistics import WhiteRows
-from elastocal.fitting.least_squares import ON_THE_WAY, SETTLED, evaluated, fit
+from elastocal.fitting.least_squares import ON_THE_WAY, evaluated, fit
 from elastocal.fitting.linearization import Linearization, linearize
 from elastocal.fitting.model import conditions, parameters, residuals
 from elastocal.fitting.noise import Noise, measurement_covariances
@@ -295,8 +295,10 @@ class Kept:
         From an estimate that some measurements lead to, a step or two by all of them are as good as the fit's end (one-step
         M-estimators; Bickel, One-step Huber estimates in the linear model, JASA 1975).
         """
-        enough = SETTLED if self.searched is self.case.observations else ON_THE_WAY
-        return fit(found.model, self.case.observations, found.noise, found.estimate, reweighted=True, settled=enough)
+        every = self.case.observations
+        if self.searched is not every:
+            return fit(found.model, every, found.noise, found.estimate, reweighted=True, settled=ON_THE_WAY)
+        return found if found is self.declared else fit(found.model, every, found.noise, found.estimate, reweighted=True)
 
 
 def fitted_to(case: Case, kept: np.ndarray, settings: Settings, last: Kept | None = None) -> Kept:

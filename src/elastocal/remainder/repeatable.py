@@ -86,11 +86,11 @@ def repeatable_part(fitted: Fit, observations: Observations, seed: int) -> Repea
     for seen, plain, white in fitted.sensitivities(some):
         mine, w, there = group[seen], weight[seen], inputs.select(seen)
         np.add.at(followed, mine, np.einsum("mrp,mr->mp", white, white_residual[seen]))
-        flat = white.reshape(-1, parameters)
+        flat = white.reshape(len(white) * white.shape[1], parameters)
         spread = ((flat @ fitted.covariance) * flat).sum(axis=1)
         np.add.at(leverage, mine, spread.reshape(white.shape[:2]).mean(axis=1))
         parts = [fold[mine] == k for k in range(_FOLDS)]
-        slopes = [(w[part] * plain[part, :3]).reshape(-1, parameters) for part in parts]
+        slopes = [(w[part] * plain[part, :3]).reshape(3 * part.sum(), parameters) for part in parts]
         for kind, (along, gram, across) in zip(kinds, sums, strict=True):
             functions = w * kind(there)
             np.add.at(along, mine, (functions * w * fitted.residual[seen, :3, None]).sum(axis=1))
