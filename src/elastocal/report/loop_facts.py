@@ -149,7 +149,7 @@ def cost_words(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> str:
     if cost is None:
         known = effects().get(effect["name"])
         moves = known is None or known.moves_robot
-        return "not in the final model" if moves else "an error of the measurement, not of the robot"
+        return "in no command" if moves else "an error of the measurement, not of the robot"
     if cost > NEGLIGIBLE * heldout["after"]["rms_m"]:
         return f"{say.millimetres(cost)} mm"
     # No finer than a micrometre, and what was found is not nothing.

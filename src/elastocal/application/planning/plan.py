@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from elastocal.application.calibrated import OperatingConditions, calibrate_by_model, nominal_forward, pose_sensitivities
+from elastocal.application.calibrated import calibrate_by_model, nominal_forward, pose_sensitivities
 from elastocal.application.frames import BASE, ROBOT, Scope, subtract_placement
 from elastocal.application.planning.cell import find_allowed
 from elastocal.application.planning.designs import (
@@ -182,7 +182,7 @@ def accuracy_rows(survey: Survey, reported_angles: np.ndarray, force: np.ndarray
     count = len(parameters(model, estimate))
     noise = Noise("declared", survey.position_m, survey.orientation_rad, np.zeros(survey.robot.joints))
     robot = calibrate_by_model(survey.robot, model, estimate, np.zeros((count, count)), noise)
-    moved = pose_sensitivities(robot, reported_angles, OperatingConditions(np.hstack([force, np.zeros_like(force)])))
+    moved = pose_sensitivities(robot, reported_angles, np.hstack([force, np.zeros_like(force)]))
     position, rotation = nominal_forward(survey.robot, reported_angles)
     there = [target for target in survey.targets if target.point == survey.robot.chain.end_effector.name]
     offset = bool(there) and all(target.offset_m is None for target in there)
