@@ -41,7 +41,7 @@ def facts(**changed):
 
 
 EVERY = facts()
-FIGURES = ["figure2", "figure3", "figure4", "figure5a", "figure5c", "scores_against_paper", "ladder", "designs", "costs"]
+FIGURES = ["figure2", "figure3", "figure4", "figure5a", "figure5c", "scores_against_paper", "ladder", "designs"]
 BIBLIOGRAPHY = Path(__file__).resolve().parents[2] / "paper" / "paper.bib"
 HEAD = {
     "table1": ["robot", "c1"],

@@ -47,7 +47,7 @@ rule state_answers:
         extended=rules.tabulate_extended.output.table,
         studies=rules.tabulate_studies.output.table,
         joint=rules.compare_with_studies.output.joint,
-        break_even=rules.tabulate_costs.output.break_even,
+        break_even=rules.tabulate_costs.output.table,
         simulated=rules.tabulate_simulated_designs.output.table,
         citation=placed(ROOT / "CITATION.cff"),
         template=placed(PACKAGES / "elastocal" / "report" / "study.txt"),

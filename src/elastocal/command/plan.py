@@ -180,7 +180,6 @@ def _worth(survey: Survey, options: _Options, found: Plan) -> list[str]:
         f"Assumed noise: {1e6 * survey.position_m:.3g} µm"
         + (f", {1e6 * survey.orientation_rad:.3g} µrad" if pose else "")
         + ("." if stated else f"; {SENSORS[survey.measured][0]}."),
-        f"D-efficiency: at least {100 * found.efficiency:.0f} % of the best design with as many poses.",
     ]
 
 

@@ -8,7 +8,7 @@ its break-even.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -38,8 +38,6 @@ BUDGET = table(
 _AGAIN = "/again"
 # Of a normal distribution: 95 % within.
 QUANTILE = 1.96
-# Costs of a configuration, in measurements, at which curves are given: from none to a robot that is loaded by hand.
-_CONFIGURATION_COSTS = (0.0, *np.logspace(-2, 1.5, 43).round(4).tolist())
 
 
 def budget_blocks(study: StudyInMemory, point_sets: PointSets) -> Iterator[dict[str, np.ndarray | str]]:
@@ -211,23 +209,6 @@ def break_even_table(
     return rows_as_frame(rows, (*columns, "break_even", "break_even_low", "break_even_high"))
 
 
-def cost_table(found: Frames, point_sets: PointSets, accuracy_um: float, weights: Mapping[str, np.ndarray]) -> pd.DataFrame:
-    """What an accuracy costs by each set of points over the first one, by the cost of a configuration.
-
-    `weights`: as in `break_even_table`. Costs are in measurements, the ratio to the first set has its 95 % interval.
-    """
-    rows: list[tuple[Any, ...]] = []
-    against = next(iter(point_sets))
-    for robot, frame in found.items():
-        needed = find_needed_by_set(frame, point_sets, accuracy_um, weights[robot])
-        for each in _CONFIGURATION_COSTS:
-            costs = {points: n * (each + len(point_sets[points])) for points, n in needed.items() if np.isfinite(n[0])}
-            for points, cost in costs.items():
-                ratio = cost / costs[against] if against in costs else np.full_like(cost, np.nan)
-                rows.append((robot, points, each, *_interval(ratio)))
-    return rows_as_frame(rows, ("robot", "points", "configuration_cost", "ratio", "ratio_low", "ratio_high"))
-
-
 def _interval(values: np.ndarray) -> tuple[float, float, float]:
     """A value, the first, with its 95 % interval over replicates."""
     low, high = np.quantile(values[1:], [0.025, 0.975], method="nearest")
@@ -252,11 +233,7 @@ def tabulate_costs(job: Job) -> None:
         robot: bootstrap_weights(asked.weights["seed"], robot, sorted(set(frame.data_set)), asked.weights["replicates"])
         for robot, frame in found.items()
     }
-    write_csvs(
-        job,
-        costs=cost_table(found, asked.point_sets, asked.accuracies_um[0], weights),
-        break_even=break_even_table(found, asked.point_sets, asked.accuracies_um, weights),
-    )
+    write_csvs(job, table=break_even_table(found, asked.point_sets, asked.accuracies_um, weights))
 
 
 compare_point_sets = ask(BUDGET, budget_blocks)
