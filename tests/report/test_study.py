@@ -106,8 +106,8 @@ def pictures(tmp_path_factory):
     return [*empty_pictures(tmp_path_factory.mktemp("figures"), FIGURES), BIBLIOGRAPHY]
 
 
-def write_report(path, stated, pictures, figures=FIGURES):
-    shown = {name: [head, ["1.0 ± 0.1"] * len(head)] for name, head in HEAD.items()} | {"figures": figures}
+def write_report(path, stated, pictures):
+    shown = {name: [head, ["1.0 ± 0.1"] * len(head)] for name, head in HEAD.items()}
     compile_document(path, "study.typ", {"facts": json.loads(json.dumps(stated, allow_nan=False)), "tables": shown}, pictures)
 
 

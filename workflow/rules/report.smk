@@ -25,7 +25,6 @@ rule compile_paper:
     params:
         names=TITLES,
         stated={
-            "figures": PAPER_FIGURES,
             "classical": NAMES[CLASSICAL],
             **{key: str(config["tables"][key]) for key in ("noise_um", "length")},
             **{key: str(config[key]) for key in ("data_sets", "configurations", "test_configurations")},
@@ -92,7 +91,5 @@ rule compile_report:
         report=shown(
             "reports/study.pdf", "study", "Tables and figures of the paper", shows="The report of the study", kind="report"
         ),
-    params:
-        figures=FIGURES,
     script:
         "../scripts/compile_report.py"

@@ -243,7 +243,8 @@ def certificate(
     from elastocal.io.atomic_writes import check_places, write_together
     from elastocal.io.json_files import write_json
     from elastocal.loop.calibrated_files import certificate as certified
-    from elastocal.report.certificate import certificate_facts, write_certificate
+    from elastocal.report.certificate import certificate_facts
+    from elastocal.report.typesetting import compile_document
 
     console = Console(stderr=True)
     limit = length_m("--tolerance", tolerance)
@@ -258,7 +259,8 @@ def certificate(
         with tempfile.TemporaryDirectory() as scratch, write_together(place, (PAGES, DOCUMENT)) as partial:
             names = [row[0] for row in facts["budget"]]
             budget = budget_bars(document["budget"], names, limit, document["tracker_rms_m"])
-            write_certificate(partial / PAGES, facts, [*save_all({"budget": budget}, scratch).values()])
+            pictures = save_all({"budget": budget}, scratch).values()
+            compile_document(partial / PAGES, "certificate.typ", {"facts": facts}, pictures)
             write_json(partial / DOCUMENT, document)
     passed, (answer, *details) = facts["decision"] == "pass", _lines(document)
     print_answer(passed, answer, [*details, str(place / PAGES), str(place / DOCUMENT)], facts["now"], console)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,13 +15,11 @@ from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.effects.catalogue import effects
 from elastocal.effects.protocol import effect_of
 from elastocal.report import words as say
-from elastocal.report.typesetting import compile_document, sentences
+from elastocal.report.typesetting import sentences
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
     from typing import Any
-
-    from elastocal.io.origin import Origin
 
 TITLES = {
     "adequate": "the declared model is adequate",
@@ -131,16 +128,6 @@ def loop_facts(
         "untestable": untestable_rows(verdict["untestable"]),
         "found": [effect["name"] for effect in verdict["effects"]],
     }
-
-
-def write_loop_report(path: str | Path, facts: dict[str, Any], figures: Sequence[str], origin: Origin | None = None) -> None:
-    """Compile the report of a campaign; the file appears whole or not at all.
-
-    `path`: the PDF. `facts`: from `loop_facts`. `figures`: PDF files, named before_after, arrows and candidates.
-    `origin`: named in the foot of each page.
-    """
-    names = [Path(figure).stem for figure in figures]
-    compile_document(path, "loop.typ", {"facts": facts | {"figures": names}}, figures, origin)
 
 
 def cost_words(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> str:
