@@ -236,11 +236,16 @@ def span_words(joint_ranges: Sequence[Mapping[str, Any]]) -> str:
     return ", ".join(each)
 
 
+def unit_of(metres: float) -> tuple[float, str]:
+    """Unit in which a length is shown, with how many of them a metre has: µm below one millimetre."""
+    return (MICRO, "µm") if abs(metres) < 0.9995e-3 else (MILLI, "mm")
+
+
 def length(metres: float | None, digits: int = 3) -> str:
     """A length with its unit, µm below one millimetre; "unknown" where there is none."""
     if metres is None:
         return "unknown"
-    factor, unit = (MICRO, "µm") if abs(metres) < 0.9995e-3 else (MILLI, "mm")
+    factor, unit = unit_of(metres)
     return f"{plain(factor * metres, digits)}{_TIED}{unit}"
 
 

@@ -168,23 +168,6 @@ def configurations_needed(squares: np.ndarray, accuracy: float) -> np.ndarray:
     return np.where(~above.any(axis=-1), 1.0, np.where(reached, between, np.inf))
 
 
-def find_needed_by_set(
-    frame: pd.DataFrame, point_sets: PointSets, accuracy_um: float, weights: np.ndarray
-) -> dict[str, np.ndarray]:
-    """Configurations needed by each set of points in each bootstrap replicate, the first of which is no replicate.
-
-    `frame`: the budget table of one robot. `weights` (1 + replicates, sets): from `simulation.bootstrap_weights`.
-    """
-    found = {}
-    for points in point_sets:
-        mine = frame[frame.points == points]
-        if len(mine):
-            squares = mine.pivot(index="data_set", columns="length", values="mean_square").to_numpy()
-            mean = weights @ squares / weights.sum(axis=1, keepdims=True)
-            found[points] = configurations_needed(mean, accuracy_um / MICRO)
-    return found
-
-
 def break_even_table(
     found: Frames, point_sets: PointSets, accuracies_um: Sequence[float], weights: Mapping[str, np.ndarray]
 ) -> pd.DataFrame:
@@ -195,8 +178,14 @@ def break_even_table(
     rows = []
     against = next(iter(point_sets))
     for robot, frame in found.items():
+        squares = {
+            points: mine.pivot(index="data_set", columns="length", values="mean_square")
+            for points, mine in frame.groupby("points")
+        }
+        shares = weights[robot] / weights[robot].sum(axis=1, keepdims=True)
+        means = {points: shares @ squares[points].to_numpy() for points in point_sets if points in squares}
         for accuracy in accuracies_um:
-            needed = find_needed_by_set(frame, point_sets, accuracy, weights[robot])
+            needed = {points: configurations_needed(mean, accuracy / MICRO) for points, mean in means.items()}
             theirs, m = needed.pop(against, np.full(1, np.inf)), len(point_sets[against])
             for points, ours in needed.items():
                 if not (np.isfinite(ours[0]) and np.isfinite(theirs[0])):
