@@ -14,7 +14,7 @@ import numpy as np
 
 from elastocal import __version__
 from elastocal.application.accuracy import accuracy_sentence
-from elastocal.application.calibrated import forward, without
+from elastocal.application.calibrated import SPRINGS, forward, without
 from elastocal.effects.conditions import MASS_PARAMETERS
 from elastocal.mechanics.chain import Chain, MeasuringPoint, Transform
 
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from elastocal.application.calibrated import CalibratedRobot
     from elastocal.mechanics.robot import Robot
 
-_SPRINGS = "joint_compliance"
 _CONVENTIONS = {
     "base": "poses are in the robot's base frame: the frame of the chain before its first transform, as the fit placed it",
     "joint_angles": "q = matrix * reported + offset of the robot file, rad; reported angles are the controller's",
@@ -52,7 +51,7 @@ def sidecar(calibrated: CalibratedRobot, name: str, date: str, accuracy: Accurac
             {"name": label, "unit": unit, "value": float(value), "std_error": float(error) or None}
             for (label, unit), value, error in zip(described, values, mine, strict=True)
         ]
-        if effect.effect == _SPRINGS:
+        if effect.effect == SPRINGS:
             springs = listed
         elif number in kept:
             entries.append({"key": effect.key, "effect": effect.effect, "joints": list(effect.joints), "parameters": listed})

@@ -193,15 +193,10 @@ def break_even_table(
                 with np.errstate(divide="ignore", invalid="ignore"):
                     even = (ours * len(point_sets[points]) - theirs * m) / (theirs - ours)
                 even = np.where(ours < theirs, np.maximum(even, 0.0), np.inf)
-                rows.append((robot, accuracy, points, against, ours[0], theirs[0], *_interval(even)))
+                ends = np.quantile(even[1:], [0.025, 0.975], method="nearest")
+                rows.append((robot, accuracy, points, against, ours[0], theirs[0], even[0], *ends))
     columns = ("robot", "accuracy_um", "points", "against", "configurations", "configurations_against")
     return rows_as_frame(rows, (*columns, "break_even", "break_even_low", "break_even_high"))
-
-
-def _interval(values: np.ndarray) -> tuple[float, float, float]:
-    """A value, the first, with its 95 % interval over replicates."""
-    low, high = np.quantile(values[1:], [0.025, 0.975], method="nearest")
-    return values[0], low, high
 
 
 def tabulate_budget(job: Job) -> None:
