@@ -164,11 +164,8 @@ def inputs_of(model: Model, estimate: Estimate, observations: Observations) -> I
     and a regression that cannot give it back has the rest of the error and the effect to make up for.
     """
     inputs = geometric_inputs_of(model, estimate, observations)
-    found = [
-        (effect, shapes)
-        for effect, shapes in zip(model.effects, estimate.shapes, strict=True)
-        if effect.effect in effects() and is_commanded(effect)
-    ]
+    every = zip(model.effects, estimate.shapes, strict=True)
+    found = [(effect, shapes) for effect, shapes in every if effect.effect in effects() and is_commanded(effect)]
     if not found:
         return inputs
     sizes = np.array([parameter.plausible for effect, _ in found for parameter in effect.parameters])

@@ -224,7 +224,7 @@ def ideal_blocks(
         for point in robot.chain.points:
             deflections = true_deflections(robot, loaded, point, wrench_at)
             numbers = _index_columns(sets, deflections.shape[1])
-            yield {"point": point.name} | numbers | _component_columns(COMPONENT_NAMES, deflections)
+            yield {"point": point.name, **numbers, **_component_columns(COMPONENT_NAMES, deflections)}
 
 
 def measured_blocks(
