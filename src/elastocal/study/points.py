@@ -8,6 +8,7 @@ its break-even.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -60,18 +61,35 @@ def budget_blocks(study: StudyInMemory, point_sets: PointSets) -> Iterator[dict[
             yield {**prefix_index_columns(sets, len(squares)), "points": label, "mean_square": squares.T.ravel()}
 
 
-def root_mean(squares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Root of the mean over data sets, of squares (sets, ...), with its standard error by the delta method."""
-    root = np.sqrt(squares.mean(axis=0))
-    return root, squares.std(axis=0, ddof=1) / np.sqrt(len(squares)) / (2 * root)
+@dataclass(frozen=True)
+class Score:
+    """A score over data sets, with what its intervals need.
+
+    `relative` (N,): deviations of its logarithm, of data sets or replicates that all that is compared shares. `spread`: the
+    standard error over the standard deviation of `relative`: 1 over the root of N for data sets, 1 for replicates.
+    """
+
+    value: float
+    relative: np.ndarray
+    spread: float
+
+    def std_error(self) -> float:
+        """Standard error of the value."""
+        return float(abs(self.value) * self.spread * self.relative.std(ddof=1))
+
+    def ratio(self, other: Score) -> tuple[float, float, float]:
+        """Ratio to another score with its 95 % interval, paired."""
+        ratio = self.value / other.value
+        error = QUANTILE * self.spread * (self.relative - other.relative).std(ddof=1)
+        return ratio, ratio * np.exp(-error), ratio * np.exp(error)
 
 
-def ratio_of_roots(ours: np.ndarray, theirs: np.ndarray) -> tuple[float, float, float]:
-    """Ratio of two root mean squares over the same data sets (sets,) with its 95 % interval, by the delta method."""
-    ratio = float(np.sqrt(ours.mean() / theirs.mean()))
-    relative = (ours / ours.mean() - theirs / theirs.mean()) / 2
-    error = QUANTILE * relative.std(ddof=1) / np.sqrt(len(ours))
-    return ratio, ratio * np.exp(-error), ratio * np.exp(error)
+def mean_of(values: np.ndarray, root: bool = False, factor: float = 1.0) -> Score:
+    """Mean of values (N,) over data sets, or its root, times a factor; errors by the delta method."""
+    mean = values.mean()
+    # The logarithm of a root deviates half as much as that of the mean below it.
+    relative = (values / mean - 1) / (2 if root else 1)
+    return Score(factor * float(np.sqrt(mean) if root else mean), relative, 1 / np.sqrt(len(values)))
 
 
 def budget_table(found: Frames, point_sets: PointSets, length: int) -> pd.DataFrame:
@@ -86,8 +104,8 @@ def budget_table(found: Frames, point_sets: PointSets, length: int) -> pd.DataFr
             for configurations in sorted({length, 2 * length // len(names)}):
                 at = _at(frame, points, configurations)
                 if len(at):
-                    rms, error = root_mean(at.mean_square.to_numpy())
-                    rows.append((robot, points, len(names), configurations, MICRO * rms, MICRO * error))
+                    rms = mean_of(at.mean_square.to_numpy(), True, MICRO)
+                    rows.append((robot, points, len(names), configurations, rms.value, rms.std_error()))
     columns = ("robot", "points", "measurements_per_configuration", "configurations")
     return rows_as_frame(rows, (*columns, "rms_um", "std_error_um"))
 
@@ -108,7 +126,7 @@ def paired_table(found: Frames, point_sets: PointSets, length: int) -> pd.DataFr
             if points == against or not len(ours) or not len(theirs):
                 continue
             head = (robot, points, against, configurations * len(names), configurations, theirs_at)
-            rows.append((*head, *ratio_of_roots(ours, theirs)))
+            rows.append((*head, *mean_of(ours, True).ratio(mean_of(theirs, True))))
     columns = ("robot", "points", "against", "measurements", "configurations", "configurations_against")
     return rows_as_frame(rows, (*columns, "ratio", "ratio_low", "ratio_high"))
 
@@ -126,7 +144,8 @@ def lengths_table(found: Frames, point_sets: PointSets, accuracies_um: Sequence[
                 continue
             squares = mine.pivot(index="data_set", columns="length", values="mean_square")
             lengths = squares.columns.to_numpy()
-            rms, error = root_mean(squares.to_numpy())
+            rms = np.sqrt(squares.to_numpy().mean(axis=0))
+            error = squares.to_numpy().std(axis=0, ddof=1) / np.sqrt(len(squares)) / (2 * rms)
             curves = {
                 "configurations": rms,
                 "configurations_low": rms - QUANTILE * error,
