@@ -46,17 +46,14 @@ class Criterion:
         return np.concatenate([self._gains(part, matrix) for part in np.split(rows, range(_AT_ONCE, len(rows), _AT_ONCE))])
 
     def _gains(self, rows: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-        white = _whiten(rows, matrix)
+        inverse = np.linalg.inv(np.linalg.cholesky(matrix))
+        # Double precision, in which the matrix is I: single precision loses the 1 of I + Z Z' to an unknown base.
+        white = (rows.reshape(-1, rows.shape[2]) @ inverse.T).reshape(rows.shape)
         inner = add_prior(white @ white.transpose(0, 2, 1))
         if self.weight is None:
             return np.linalg.slogdet(inner)[1]
-        across = white @ self._whiten_weight(matrix) @ white.transpose(0, 2, 1)
+        across = white @ (inverse @ self.weight @ inverse.T) @ white.transpose(0, 2, 1)
         return np.trace(np.linalg.solve(inner, across), axis1=1, axis2=2)
-
-    def _whiten_weight(self, matrix: np.ndarray) -> np.ndarray:
-        assert self.weight is not None
-        inverse = np.linalg.inv(np.linalg.cholesky(matrix))
-        return inverse @ self.weight @ inverse.T
 
 
 def criterion(kind: str, accuracy_rows: np.ndarray) -> Criterion:
@@ -118,9 +115,3 @@ def exchange_candidates(rows: np.ndarray, chosen: list[int], criterion: Criterio
         if found == before:
             break
     return found
-
-
-def _whiten(rows: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """Rows in which the matrix is I, in double precision: single precision loses the 1 of I + Z Z' to an unknown base."""
-    inverse = np.linalg.inv(np.linalg.cholesky(matrix))
-    return (rows.reshape(-1, rows.shape[2]) @ inverse.T).reshape(rows.shape)
