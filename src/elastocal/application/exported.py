@@ -14,16 +14,15 @@ import numpy as np
 
 from elastocal import __version__
 from elastocal.application.accuracy import accuracy_sentence
-from elastocal.application.calibrated import forward, without
+from elastocal.application.calibrated import SPRINGS, forward, without
 from elastocal.effects.conditions import MASS_PARAMETERS
 from elastocal.mechanics.chain import Chain, MeasuringPoint, Transform
 
 if TYPE_CHECKING:
     from elastocal.application.accuracy import Accuracy
-    from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
+    from elastocal.application.calibrated import CalibratedRobot
     from elastocal.mechanics.robot import Robot
 
-_SPRINGS = "joint_compliance"
 _CONVENTIONS = {
     "base": "poses are in the robot's base frame: the frame of the chain before its first transform, as the fit placed it",
     "joint_angles": "q = matrix * reported + offset of the robot file, rad; reported angles are the controller's",
@@ -52,7 +51,7 @@ def sidecar(calibrated: CalibratedRobot, name: str, date: str, accuracy: Accurac
             {"name": label, "unit": unit, "value": float(value), "std_error": float(error) or None}
             for (label, unit), value, error in zip(described, values, mine, strict=True)
         ]
-        if effect.effect == _SPRINGS:
+        if effect.effect == SPRINGS:
             springs = listed
         elif number in kept:
             entries.append({"key": effect.key, "effect": effect.effect, "joints": list(effect.joints), "parameters": listed})
@@ -68,10 +67,10 @@ def sidecar(calibrated: CalibratedRobot, name: str, date: str, accuracy: Accurac
     }
 
 
-def find_left_out_m(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> np.ndarray:
+def find_left_out_m(calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray) -> np.ndarray:
     """How far the effects that a robot file cannot hold move the end effector, ndarray (N,), m; as in `forward`."""
     bare = without(calibrated, set(fold_effects(calibrated).left_out))
-    positions = [forward(each, reported_angles, operating)[0] for each in (calibrated, bare)]
+    positions = [forward(each, reported_angles, wrench)[0] for each in (calibrated, bare)]
     return np.linalg.norm(positions[0] - positions[1], axis=1)
 
 

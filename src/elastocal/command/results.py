@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer import Argument, Option
 
-from elastocal.command.terminal import PhysicsOnly, diagnosed_campaign, length_m, print_answer, print_lines, robots, workplace
+from elastocal.command.terminal import PhysicsOnly, diagnosed_campaign, length_m, print_answer, robots, workplace
 from elastocal.counting import counted, first_names, grouped
 from elastocal.errors import InputError
 
@@ -74,7 +74,7 @@ def correct(
         millimetres,
         predict_errors,
     )
-    from elastocal.application.calibrated import OperatingConditions, assumptions, beyond_fitted, regressed
+    from elastocal.application.calibrated import beyond_fitted, regressed
     from elastocal.application.compensation import find_joint_targets
     from elastocal.application.frames import root_mean_square
     from elastocal.diagnosis.misplaced import point_sentence
@@ -99,10 +99,9 @@ def correct(
     prismatic = calibrated.robot.chain.prismatic
     named = axes_of(controller, prismatic, axes) if controller else ()
     wanted = read_target_path_of(path, calibrated.robot)
-    operating = OperatingConditions(wanted.wrench, wanted.approach, wanted.time_s, wanted.temperature_c)
-    print_lines((f"assumed: {line}" for line in assumptions(calibrated, operating)), console)
+    wrench = np.zeros((len(wanted), 6)) if wanted.wrench is None else wanted.wrench
     with console.status("correcting"):
-        found = find_joint_targets(calibrated, wanted.position, wanted.rotation, operating, wanted.start)
+        found = find_joint_targets(calibrated, wanted.position, wanted.rotation, wrench, wanted.start)
     good = found.status == OK
     if not good.all() and not partial:
         rows = first_names([f"line {wanted.lines[row]} is {found.status[row]}" for row in (~good).nonzero()[0]], _NAMED)
@@ -114,14 +113,13 @@ def correct(
     if swings and not allow_large_steps:
         more = f" and {counted(len(swings) - 1, 'more large step')}" if len(swings) > 1 else ""
         raise InputError(path, "", swings[0] + more, "targets between, another posture, or --allow-large-steps")
-    wrench = np.zeros((len(wanted), 6)) if wanted.wrench is None else wanted.wrench
     outside, loaded = beyond_fitted(calibrated, found.joint_angles, wrench)
     beyond, heavy = outside | loaded, beyond_fitted(calibrated, found.joint_angles, wrench, _LOADS_BOUNDED)[1]
     bounded = good & ~outside & ~heavy
     status = found.status.astype(object)
     status[good & outside] = f"{NO_BOUND}joints outside the fitted range"
     status[good & heavy] = f"{NO_BOUND}loads beyond {_LOADS_BOUNDED:g} times the measured ones"
-    errors = predict_errors(calibrated, found.joint_angles, operating)
+    errors = predict_errors(calibrated, found.joint_angles, wrench)
     before = before_m(calibrated, wanted.position, wanted.rotation, found.error_before)
     with write_together(output.parent, [file.name for file in files]) as folder_of_all:
         write_csv(folder_of_all / output.name, _joint_targets(wanted, wrench, found, before, errors, beyond, status))
@@ -131,7 +129,7 @@ def correct(
     share = f"{grouped(good.sum())} of {counted(len(good), 'target')}"
     stated, lines = [], []
     if bounded.any():
-        known = errors if bounded.all() else predict_errors(calibrated, found.joint_angles[bounded], operating.part(bounded))
+        known = errors if bounded.all() else predict_errors(calibrated, found.joint_angles[bounded], wrench[bounded])
         accuracy = known.accuracy("the targets" if bounded[good].all() else "the targets with a bound")
         stated.append((accuracy, root_mean_square(before[bounded])))
         lines.append(accuracy_sentence(accuracy))
@@ -140,7 +138,7 @@ def correct(
     if good.any():
         lines += [accuracy_sentence(campaign_accuracy(calibrated)), point_sentence(campaign.case.campaign)]
     if calibrated.remainder is not None:
-        added = np.linalg.norm(regressed(calibrated, found.joint_angles[good], operating.part(good)), axis=1)
+        added = np.linalg.norm(regressed(calibrated, found.joint_angles[good], wrench[good]), axis=1)
         size = f"{millimetres(root_mean_square(added[added > 0.0]))} RMS" if added.any() else "nothing"
         acts = f"{grouped((added > 0.0).sum())} of {counted(len(added), 'target')}"
         words = campaign.verdict["remainder"]["words"]
@@ -245,7 +243,8 @@ def certificate(
     from elastocal.io.atomic_writes import check_places, write_together
     from elastocal.io.json_files import write_json
     from elastocal.loop.calibrated_files import certificate as certified
-    from elastocal.report.certificate import certificate_facts, write_certificate
+    from elastocal.report.certificate import certificate_facts
+    from elastocal.report.typesetting import compile_document
 
     console = Console(stderr=True)
     limit = length_m("--tolerance", tolerance)
@@ -260,7 +259,8 @@ def certificate(
         with tempfile.TemporaryDirectory() as scratch, write_together(place, (PAGES, DOCUMENT)) as partial:
             names = [row[0] for row in facts["budget"]]
             budget = budget_bars(document["budget"], names, limit, document["tracker_rms_m"])
-            write_certificate(partial / PAGES, facts, [*save_all({"budget": budget}, scratch).values()])
+            pictures = save_all({"budget": budget}, scratch).values()
+            compile_document(partial / PAGES, "certificate.typ", {"facts": facts}, pictures)
             write_json(partial / DOCUMENT, document)
     passed, (answer, *details) = facts["decision"] == "pass", _lines(document)
     print_answer(passed, answer, [*details, str(place / PAGES), str(place / DOCUMENT)], facts["now"], console)
@@ -304,7 +304,7 @@ def export(
     from rich.console import Console
 
     from elastocal.application.accuracy import accuracy_sentence, campaign_accuracy
-    from elastocal.application.calibrated import OperatingConditions, regressed
+    from elastocal.application.calibrated import regressed
     from elastocal.application.exported import find_left_out_m, fold_effects, sidecar
     from elastocal.exchange.urdf_writing import write_calibrated_origins
     from elastocal.io.atomic_writes import check_places, write_text, write_together
@@ -331,8 +331,7 @@ def export(
             (partial / URDF).write_bytes(drop_in.content)
             lines += _drop_in(drop_in, partial / URDF, nominal, robot, states.joint_angles)
         write_json(partial / SIDECAR, document)
-    at = nominal.reported_angles(states.joint_angles)
-    under = OperatingConditions(states.wrench, None, states.time_s, states.temperature_c)
+    at, under = nominal.reported_angles(states.joint_angles), states.wrench
     if document["effects"]:
         names = ", ".join(entry["key"] for entry in document["effects"])
         lines.insert(0, f"! only {SIDECAR} holds {names}: {_sizes(find_left_out_m(calibrated, at, under))}")
