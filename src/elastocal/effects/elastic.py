@@ -10,13 +10,11 @@ import numpy as np
 
 from elastocal.effects.gravity import compensated_joint, wave_parameters
 from elastocal.effects.protocol import (
-    LOADED_JOINTS,
     Candidate,
     Parameter,
     Shape,
     effect,
     every_joint,
-    load_behind,
     small_form,
     turning_joints,
     waves,
@@ -98,8 +96,8 @@ def link_elasticity(own: Effect, sites: Sites, links: tuple[int, ...], detail: s
     length, before = float(np.linalg.norm(sites.link_vectors_m[longest])), max(longest - 1, 0)
     names = ("bending_1_over_EI", "torsion_1_over_GJ")
     parameters = own.parameters("1/EI", names, "1/(N m^2)", sites, before, over=length)
-    joints, needs = tuple(k for k in links if k), load_behind(sites, max(links))
-    yield own.candidate(joints, parameters, law, needs, shapes=(_TAPER,), detail=detail, location_name=detail)
+    joints = tuple(k for k in links if k)
+    yield own.candidate(joints, parameters, law, {"load"}, shapes=(_TAPER,), detail=detail, location_name=detail)
 
 
 def _end_compliance(sites: Sites, link: int, taper: float) -> tuple[np.ndarray, np.ndarray]:
@@ -132,9 +130,7 @@ def joint_tilt(own: Effect, sites: Sites, joint: int) -> Candidates:
     across = [axis for axis in range(3) if sites.prismatic[joint] or axis != sites.joint_axes[joint]]
     tilts = own.parameters("tilt", [f"tilt_about_{'xyz'[axis]}" for axis in across], "rad/(N m)", sites, joint)
     coordinates = [sites.tilt[joint][axis] for axis in across]
-    yield own.candidate(
-        (joint + 1,), tilts, lambda around: [{c: around.total[:, c]} for c in coordinates], load_behind(sites, joint)
-    )
+    yield own.candidate((joint + 1,), tilts, lambda around: [{c: around.total[:, c]} for c in coordinates], {"load"})
 
 
 @_effect(
@@ -176,9 +172,7 @@ def cross_compliance(own: Effect, sites: Sites, one: int, other: int) -> Candida
     joints, seen at the end-effector alone, it is not distinguishable from bending of the link between them.
     """
     both, coupling = (one + 1, other + 1), own.parameters("coupling", ["compliance"], "rad/(N m)", sites, one, other)
-    yield own.candidate(
-        both, coupling, lambda around: [{one: around.total[:, other], other: around.total[:, one]}], LOADED_JOINTS
-    )
+    yield own.candidate(both, coupling, lambda around: [{one: around.total[:, other], other: around.total[:, one]}], {"load"})
 
 
 @_effect(
@@ -193,7 +187,7 @@ def joint_dependent_stiffness(own: Effect, sites: Sites, joint: int) -> Candidat
     """
 
     variation = own.parameters("variation", ["cos_q", "sin_q"], "rad/(N m)", sites, joint)
-    yield own.of_joint(joint, variation, lambda around: _softer(around, joint, 1), LOADED_JOINTS)
+    yield own.of_joint(joint, variation, lambda around: _softer(around, joint, 1), {"load"})
 
 
 def _softer(around: Conditions, joint: int, *orders: int) -> list[np.ndarray]:
@@ -217,7 +211,7 @@ def compensator_stiffness(own: Effect, sites: Sites, joint: int) -> Candidates:
     """
 
     variation = wave_parameters(own, "variation", "rad/(N m)", sites, joint)
-    yield own.of_joint(joint, variation, lambda around: _softer(around, joint, 1, 2), LOADED_JOINTS)
+    yield own.of_joint(joint, variation, lambda around: _softer(around, joint, 1, 2), {"load"})
 
 
 @_effect(
@@ -234,8 +228,6 @@ def flange_flexibility(own: Effect, sites: Sites) -> Candidates:
     """
     shifts = own.parameters("shift", [f"shift_{axis}" for axis in "xyz"], "m/N", sites)
     turns = own.parameters("turn", [f"turn_{axis}" for axis in "xyz"], "rad/(N m)", sites, sites.joints - 1)
-    every = own.candidate(
-        (), (*shifts, *turns), lambda around: [{c: around.load[:, c]} for c in sites.link_end[-1]], LOADED_JOINTS
-    )
+    every = own.candidate((), (*shifts, *turns), lambda around: [{c: around.load[:, c]} for c in sites.link_end[-1]], {"load"})
     # Turns alone are most of what a flange does.
     yield from (every, small_form(every, "turns", slice(3, None)))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.effects.conditions import MASS_PARAMETERS
-from elastocal.effects.protocol import LOADED_JOINTS, Candidate, Parameter, effect, small_form, turning_joints, waves
+from elastocal.effects.protocol import Candidate, Parameter, effect, small_form, turning_joints, waves
 from elastocal.effects.sizes import RATED, SAG, TORQUE, Size
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ def link_weight(own: Effect, sites: Sites) -> Candidates:
         parameters = [*masses, *(Parameter(*moment) for moment in moments)]
 
         def law(around: Conditions) -> Displacements:
-            torques = [*(around.weight[k] for k in links), *(around.weight_moment(k, axis) for k, axis in axes)]
+            torques = [*(around.weight(k) for k in links), *(around.weight(k, axis) for k, axis in axes)]
             if joint is None:
                 return [dict(enumerate((torque * around.compliance).T)) for torque in torques]
             return [{joint: torque[:, joint]} for torque in torques]
@@ -163,8 +163,7 @@ def payload(own: Effect, sites: Sites) -> Candidates:
         return found
 
     # Where neither a load nor what the links weigh is known, what hangs on the flange is not distinguishable from that.
-    known = LOADED_JOINTS - {"load"}
-    tool = own.candidate((), [Parameter("mass", "kg", mass, carried=True), *moments], law, known)
+    tool = own.candidate((), [Parameter("mass", "kg", mass, carried=True), *moments], law, {"load"})
     # A mass alone is most of what a tool does.
     yield from (tool, small_form(tool, "mass", slice(1)))
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects.protocol import LOADED_JOINTS, effect
+from elastocal.effects.protocol import effect
 from elastocal.effects.sizes import LOAD, REACH, Size
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def _wrong(own: Effect, parameters: tuple[Parameter, ...], frame: str, change: C
         wrong = [around.joint_deflections(np.concatenate(part, axis=1)) for part in changed]
         return [dict(enumerate(turns.T)) for turns in wrong]
 
-    return own.candidate((), parameters, law, LOADED_JOINTS, detail=frame)
+    return own.candidate((), parameters, law, {"load"}, detail=frame)
 
 
 def lever_of_pull(wrench: np.ndarray, rotation: np.ndarray) -> np.ndarray:
@@ -123,4 +123,4 @@ def force_scale(own: Effect, sites: Sites) -> Candidates:
     it.
     """
     scale = own.parameters("scale", ["scale"], "1", sites)
-    yield own.candidate((), scale, lambda around: [dict(enumerate(around.joint_deflections(around.wrench).T))], LOADED_JOINTS)
+    yield own.candidate((), scale, lambda around: [dict(enumerate(around.joint_deflections(around.wrench).T))], {"load"})

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.effects.protocol import (
-    LOADED_JOINTS,
     WAVES,
     Parameter,
     Shape,
@@ -225,7 +224,7 @@ def stiffening(own: Effect, sites: Sites, joint: int, detail: str) -> Candidates
         load = around.total[:, joint]
         return [load - _AS_AT_REST[detail](load, torque)]
 
-    yield own.of_joint(joint, beyond, turns, LOADED_JOINTS, shapes=(meeting,), detail=detail)
+    yield own.of_joint(joint, beyond, turns, {"load"}, shapes=(meeting,), detail=detail)
 
 
 @_gearbox("lost motion (backlash)", Size("play", 1e-4, "a third of an arc minute", sign=1), at=turning_joints)
@@ -238,7 +237,7 @@ def lost_motion(own: Effect, sites: Sites, joint: int) -> Candidates:
     +D_i.
     """
     play, shapes = own.parameters("play", ["half_play"], "rad", sites), (_torque(sites, joint, _PLAY),)
-    yield own.of_joint(joint, play, lambda around, at: [np.tanh(around.total[:, joint] / at)], LOADED_JOINTS, shapes=shapes)
+    yield own.of_joint(joint, play, lambda around, at: [np.tanh(around.total[:, joint] / at)], {"load"}, shapes=shapes)
 
 
 @_gearbox(
