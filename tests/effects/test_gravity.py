@@ -5,8 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.spatial.transform import Rotation
 from support import ODD_CHAINS, OTHER_CHAINS, PinocchioPoint, robot_of
 from synthetic import (
+    candidate_on,
+    conditions_on,
+    displacements,
     made_estimate,
     made_model,
     made_states,
@@ -15,12 +19,13 @@ from synthetic import (
 )
 
 from elastocal.effects.catalogue import candidates_on
-from elastocal.effects.gravity import declared_weight
+from elastocal.effects.gravity import declared_weight, lever_of_pull
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import conditions, displaced_coordinates, parameters
 from elastocal.mechanics.robot import Mass
 from elastocal.mechanics.sites import sites_of
 
+PLACE = np.array([0.1, -0.4, 0.25])
 TILTED = (3.0, -4.0, -8.0)
 
 
@@ -119,3 +124,25 @@ def test_plausible_payload_is_a_share_of_what_the_robot_carries_as_far_as_that_i
     tool, alone = (c for c in candidates_on(sites).values() if c.effect == "payload")
     assert [p.plausible for p in tool.parameters] == pytest.approx([expected, *[0.2 * expected] * 3])
     assert [p.plausible for p in alone.parameters] == pytest.approx([expected])
+
+
+@pytest.mark.parametrize("share", [0.0, 0.005, 0.05])
+def test_moments_that_are_a_hundredth_off_still_have_a_place_that_turns_with_the_flange_and_others_have_none(share):
+    """Forces anywhere with the flange anywhere."""
+    rng = np.random.default_rng(0)
+    force, rotation = 300.0 * rng.standard_normal((8, 3)), Rotation.random(8, rng=rng).as_matrix()
+    moment, noise = np.cross(rotation @ PLACE, force), rng.standard_normal((8, 3))
+    moment = moment + share * noise * np.linalg.norm(moment) / np.linalg.norm(noise)
+    lever = lever_of_pull(np.concatenate([force, moment], axis=1), rotation)
+    np.testing.assert_allclose(lever, 0 * force if share > 0.01 else rotation @ PLACE, atol=4 * share + 1e-9)
+
+
+def test_a_bias_is_there_wherever_something_is_recorded_be_it_a_moment_alone(fanuc):
+    states = made_states(6, 3, seed=4)
+    states.wrench[:] = [[300.0, 20.0, 10.0, 1.0, 2.0, 3.0], [0, 0, 0, 0, 5.0, 0], [0] * 6]
+    around = conditions_on(fanuc.chain, states)
+    made = displacements(candidate_on(fanuc.chain, "force_bias[base axes]"), around)[..., :6]
+    for axis, turned in enumerate(made):
+        force = np.eye(6)[[axis, axis]]
+        expected = around.load_by(np.concatenate([force, 0 * force[:1]]))[:, :6] * around.compliance
+        np.testing.assert_allclose(turned, expected, rtol=1e-12)

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.mechanics.elastostatics import generalized_forces
 from elastocal.mechanics.kinematics import Motion, motion
 from elastocal.mechanics.sites import Sites
 
@@ -37,7 +36,8 @@ class Conditions:
     `compliance` (n,): joint compliances, rad/(N m). `joint_angles` (S, n): as commanded, rad. `wrench` (S, 6): N, N m, at the
     last measuring point, base axes. `motion`: of `Sites.followed`. `mass_corrections` (4 m,): by how much each of the declared
     masses is off its robot file, kg, and then its first moments along the axes of its frame beyond what goes with the mass, kg
-    m. `approach` (S, n). `time_s` (S,): since the first measurement to which the model was fitted. `temperature_c` (S,).
+    m. `approach` (S, n). `time_s` (S,): since the first measurement to which the model was fitted. `temperature_c` (S,). These
+    three are NaN where they are not known; no law reads them that does not need them.
     `progress` (S,): how far the campaign had come, from 0 at its first row to 1 at its last: see `progress_of`. `of_angles`:
     laws that go with the joint angles alone, by the keys of their candidates; shared wherever the same states are under other
     loads: see `Candidate.fixed`.
@@ -49,10 +49,10 @@ class Conditions:
     wrench: np.ndarray
     motion: Motion
     mass_corrections: np.ndarray
-    approach: np.ndarray | None = None
-    time_s: np.ndarray | None = None
-    temperature_c: np.ndarray | None = None
-    progress: np.ndarray | None = None
+    approach: np.ndarray
+    time_s: np.ndarray
+    temperature_c: np.ndarray
+    progress: np.ndarray
     of_angles: dict[str, list[dict[int, np.ndarray]]] = field(default_factory=dict, repr=False, compare=False)
 
     @property
@@ -63,9 +63,13 @@ class Conditions:
     @cached_property
     def load(self) -> np.ndarray:
         """Generalized force (N, N m) of the external wrench on every coordinate of the sites (equation 7), ndarray (S, C)."""
-        acting = self.wrench.T.copy()
+        return self.load_by(self.wrench)
+
+    def load_by(self, wrench: np.ndarray, coordinates: slice = slice(None)) -> np.ndarray:
+        """The same by another wrench (S, 6) at the last measuring point, on some of the coordinates, ndarray (S, .)."""
+        acting = wrench.T.copy()
         acting[3:] += np.cross(self.motion.position[0], acting[:3], axis=0)
-        return self.motion.generalized_forces(self.sites.followed[0].after, acting).T
+        return self.motion.generalized_forces(self.sites.followed[0].after, acting, coordinates).T
 
     @cached_property
     def gravity(self) -> np.ndarray:
@@ -127,21 +131,6 @@ class Conditions:
         first = self.motion.position[end] if axis is None else self.motion.rotation[end, :, axis]
         return self._weighing(end, float(axis is None), first, slice(self.sites.joints)).T
 
-    @cached_property
-    def end_rotation(self) -> np.ndarray:
-        """Orientation of the last measuring point, ndarray (S, 3, 3)."""
-        return np.moveaxis(self.motion.rotation[0], -1, 0)
-
-    @cached_property
-    def end_jacobian(self) -> np.ndarray:
-        """Of the last measuring point, with respect to the joints, ndarray (S, 6, n)."""
-        end = self.sites.followed[0].after
-        return np.moveaxis(self.motion.jacobian(end, self.motion.position[0])[:, : self.sites.joints], -1, 0)
-
-    def joint_deflections(self, wrench: np.ndarray) -> np.ndarray:
-        """Turn of each joint under another wrench at the last measuring point: c J^T w, ndarray (S, n)."""
-        return generalized_forces(self.end_jacobian, wrench) * self.compliance
-
 
 def progress_of(states: States, row_span: tuple[int, int] | None = None) -> np.ndarray:
     """How far a campaign had come in each state, ndarray (S,): 0 at its first row, 1 at its last.
@@ -173,6 +162,7 @@ def conditions_of(
     """
     if coordinates is None:
         coordinates = sites.chain.at(states.joint_angles)
+    unknown = np.full(states.joint_angles.shape, np.nan)
     return Conditions(
         sites,
         np.asarray(compliance),
@@ -180,17 +170,11 @@ def conditions_of(
         states.wrench,
         motion(sites.chain, coordinates, sites.followed),
         np.zeros(MASS_PARAMETERS * len(sites.masses)) if mass_corrections is None else mass_corrections,
-        states.approach,
-        None if states.time_s is None else states.time_s - time_zero_s,
-        states.temperature_c,
+        unknown if states.approach is None else states.approach,
+        unknown[:, 0] if states.time_s is None else states.time_s - time_zero_s,
+        unknown[:, 0] if states.temperature_c is None else states.temperature_c,
         progress_of(states, row_span),
     )
-
-
-def at_coordinates(conditions: Conditions, coordinates: np.ndarray) -> Conditions:
-    """The same states where the robot has yielded to other coordinates, ndarray (S, C)."""
-    sites = conditions.sites
-    return replace(conditions, motion=motion(sites.chain, coordinates, sites.followed))
 
 
 def at_states(conditions: Conditions, chosen: slice | np.ndarray) -> Conditions:
@@ -198,7 +182,7 @@ def at_states(conditions: Conditions, chosen: slice | np.ndarray) -> Conditions:
     moved = conditions.motion
     some = replace(moved, **{name: getattr(moved, name)[..., chosen] for name in ("position", "rotation", "twist")})
     columns = ("joint_angles", "wrench", "approach", "time_s", "temperature_c", "progress")
-    kept = {name: values[chosen] for name in columns if (values := getattr(conditions, name)) is not None}
+    kept = {name: getattr(conditions, name)[chosen] for name in columns}
     return replace(conditions, motion=some, of_angles={}, **kept)
 
 
@@ -209,7 +193,7 @@ def with_springs(conditions: Conditions, compliance: np.ndarray, mass_correction
         return conditions
     changed = replace(conditions, compliance=compliance, mass_corrections=mass_corrections)
     # What is known of the loads stays so: they do not depend on the springs but by way of the motion.
-    for name in ("load", "gravity", "total", "mass_torques", "_falling", "end_jacobian"):
+    for name in ("load", "gravity", "total", "mass_torques", "_falling"):
         if name in vars(conditions) and (same or name not in ("gravity", "total")):
             vars(changed)[name] = vars(conditions)[name]
     return changed

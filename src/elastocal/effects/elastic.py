@@ -9,21 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.effects.gravity import compensated_joint, wave_parameters
-from elastocal.effects.protocol import (
-    Candidate,
-    Parameter,
-    Shape,
-    effect,
-    every_joint,
-    small_form,
-    turning_joints,
-    waves,
-)
+from elastocal.effects.protocol import Candidate, Parameter, Shape, effect, every_joint, small_form, turning_joints, waves
 from elastocal.effects.sizes import JOINT, PER_LENGTH, SHIFT, STIFFEST, Size
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from elastocal.effects.conditions import Conditions
-    from elastocal.effects.protocol import Candidates, Displacements, Effect
+    from elastocal.effects.protocol import Candidates, Displacements, Effect, Law
     from elastocal.mechanics.sites import Sites
 
 _effect = partial(effect, "elastic")
@@ -40,14 +33,17 @@ def joint_compliance(sites: Sites) -> Candidate:
 
     No effect, for nothing is missing: the declared model has it where the compliances are to be identified.
     """
-
-    def law(around: Conditions) -> Displacements:
-        return [{joint: around.total[:, joint]} for joint in range(sites.joints)]
-
     units = ["m/N" if prismatic else "rad/(N m)" for prismatic in sites.prismatic]
     sizes = [_OVER_USUAL * compliance for compliance in sites.compliance]
     parameters = tuple(Parameter(f"c{j}", unit, size) for j, (unit, size) in enumerate(zip(units, sizes, strict=True), 1))
+    law = _springs([joint] for joint in range(sites.joints))
     return Candidate("joint_compliance", "declared", (), "", parameters, law, frozenset({"load"}))
+
+
+def _springs(groups: Iterable[Iterable[int]]) -> Law:
+    """Law of coordinates that each yield to their own load, each group of them by one parameter."""
+    each = [tuple(group) for group in groups]
+    return lambda around: [{c: around.total[:, c] for c in group} for group in each]
 
 
 def _bending(sites: Sites) -> list[tuple[tuple[int, ...], str]]:
@@ -129,8 +125,8 @@ def joint_tilt(own: Effect, sites: Sites, joint: int) -> Candidates:
     # A carriage rolls about its own axis too, which is no joint's.
     across = [axis for axis in range(3) if sites.prismatic[joint] or axis != sites.joint_axes[joint]]
     tilts = own.parameters("tilt", [f"tilt_about_{'xyz'[axis]}" for axis in across], "rad/(N m)", sites, joint)
-    coordinates = [sites.tilt[joint][axis] for axis in across]
-    yield own.candidate((joint + 1,), tilts, lambda around: [{c: around.total[:, c]} for c in coordinates], {"load"})
+    law = _springs([sites.tilt[joint][axis]] for axis in across)
+    yield own.candidate((joint + 1,), tilts, law, {"load"})
 
 
 @_effect(
@@ -149,12 +145,7 @@ def base_compliance(own: Effect, sites: Sites) -> Candidates:
     tx, ty, tz, rx, ry, _ = sites.base
     shifts = own.parameters("shift", ["horizontal", "vertical"], "m/N", sites)
     tilt = own.parameters("tilt", ["tilt"], "rad/(N m)", sites)
-
-    def law(around: Conditions) -> Displacements:
-        load = around.total
-        return [{tx: load[:, tx], ty: load[:, ty]}, {tz: load[:, tz]}, {rx: load[:, rx], ry: load[:, ry]}]
-
-    every = own.candidate((), (*shifts, *tilt), law, {"load"})
+    every = own.candidate((), (*shifts, *tilt), _springs([(tx, ty), (tz,), (rx, ry)]), {"load"})
     # Rocking alone is what most foundations do.
     yield from (every, small_form(every, "rocking", slice(2, None)))
 
@@ -228,6 +219,6 @@ def flange_flexibility(own: Effect, sites: Sites) -> Candidates:
     """
     shifts = own.parameters("shift", [f"shift_{axis}" for axis in "xyz"], "m/N", sites)
     turns = own.parameters("turn", [f"turn_{axis}" for axis in "xyz"], "rad/(N m)", sites, sites.joints - 1)
-    every = own.candidate((), (*shifts, *turns), lambda around: [{c: around.load[:, c]} for c in sites.link_end[-1]], {"load"})
+    every = own.candidate((), (*shifts, *turns), _springs([c] for c in sites.link_end[-1]), {"load"})
     # Turns alone are most of what a flange does.
     yield from (every, small_form(every, "turns", slice(3, None)))

@@ -10,7 +10,7 @@ from collections import Counter
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from inspect import cleandoc
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -34,13 +34,6 @@ if TYPE_CHECKING:
 
 
 WAVES = {"cos": np.cos, "sin": np.sin}
-
-
-class Displacing(Protocol):
-    """Whatever displaces coordinates of the sites: a candidate, or a law that is none."""
-
-    @property
-    def displacement(self) -> Law: ...
 
 
 @dataclass(frozen=True)
@@ -247,13 +240,6 @@ def small_form(whole: Candidate, detail: str, kept: slice) -> Candidate:
         return whole.displacement(conditions, *shapes)[kept]
 
     return replace(whole, detail=detail, parameters=whole.parameters[kept], displacement=law)
-
-
-def needed(values: np.ndarray | None) -> np.ndarray:
-    """What states need not have, for a law whose candidate names it among its needs."""
-    if values is None:
-        raise TypeError("states without what the law of a candidate needs")
-    return values
 
 
 def effect_of(key: str) -> str:

@@ -176,13 +176,13 @@ class Motion:
         moved[:, self.place >= after] = 0.0
         return moved
 
-    def generalized_forces(self, after: int, wrench: np.ndarray) -> np.ndarray:
-        """Force or torque on each coordinate (C, S) by a wrench on what lies behind so many transforms of the chain.
+    def generalized_forces(self, after: int, wrench: np.ndarray, coordinates: slice = slice(None)) -> np.ndarray:
+        """Force or torque on each of the coordinates (., S) by a wrench on what lies behind so many transforms of the chain.
 
         `wrench` (6, S): force, and moment about the base's origin.
         """
-        on_each = np.einsum("ik...,i...->k...", self.twist, wrench)
-        on_each[self.place >= after] = 0.0
+        on_each = np.einsum("iks,is->ks", self.twist[:, coordinates], wrench)
+        on_each[self.place[coordinates] >= after] = 0.0
         return on_each
 
 

@@ -14,12 +14,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.mechanics.chain import SIX, Chain, MeasuringPoint, Transform, with_inserted
+from elastocal.mechanics.chain import SIX, Chain, MeasuringPoint, with_inserted
 from elastocal.mechanics.kinematics import motion, poses
 from elastocal.mechanics.robot import STANDING, Compensator, Mass, Robot, usual_compliance
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
     from typing import Any
 
 # Below this a link is a point.
@@ -73,8 +72,7 @@ class Sites:
     @property
     def shoulder(self) -> int | None:
         """Index of the first joint that the weight of its links can turn, or None."""
-        loaded = (j for j in range(self.joints) if self.carried_links(j))
-        return next(loaded, None)
+        return next((joint for joint in range(self.joints) if self.carried_links(joint)), None)
 
     def carried_links(self, joint: int) -> list[int]:
         """Links with a length behind a joint, from 0, whose weight can turn it, as numbers from 1."""
@@ -110,7 +108,7 @@ class Sites:
             for number, arm in enumerate((position, *rotation.swapaxes(0, 1))):
                 force = np.broadcast_to(0.0 * down if number else down, arm.shape)
                 wrench = np.concatenate([force, np.cross(arm, down, axis=0)])
-                found[link, number] = np.abs(moved.generalized_forces(end.after, wrench)[: self.joints]).max(axis=1)
+                found[link, number] = np.abs(moved.generalized_forces(end.after, wrench, slice(self.joints))).max(axis=1)
         return found
 
 
@@ -128,15 +126,18 @@ def _sites_of(chain: Chain, **known: Any) -> Sites:
     inserted: dict[int, list[tuple[str, int]]] = defaultdict(list)
     # A point at the end of a link is moved by the link's end; one inside a link is not.
     places = [index for index, transform in enumerate(chain.transforms) if transform.coordinate is not None]
-    joints, links = [chain.transforms[place] for place in places], []
+    joints, vectors, rotations = [chain.transforms[place] for place in places], [], []
     for start, end in zip([0, *(place + 1 for place in places)], [*places, len(chain.transforms)], strict=True):
         inserted[start] += SIX[3:] if start else SIX
         inserted[end] += SIX
-        links.append(_link(chain.transforms[start:end]))
+        # Along the fixed transforms of a link, and from the frame at their end to the one at their start.
+        fixed, far = chain.transforms[start:end], MeasuringPoint("far end", end - start)
+        position, rotation = poses(Chain(fixed, (far,), 1), np.zeros(1), far)
+        vectors.append(rotation.T @ position)
+        rotations.append(rotation)
     n = len(joints)
     # Along the chain: six of the foot, six of the end of a link, three of the joint behind it, and so on.
     ends = [range(n + 6 + 9 * link, n + 12 + 9 * link) for link in range(n + 1)]
-    vectors, rotations = (np.array(part) for part in zip(*links, strict=True))
     return Sites(
         with_inserted(chain, inserted),
         n,
@@ -144,16 +145,9 @@ def _sites_of(chain: Chain, **known: Any) -> Sites:
         tuple(tuple(range(end.stop, end.stop + 3)) for end in ends[:-1]),
         tuple(tuple(end) for end in ends),
         tuple(joint.axis for joint in joints),
-        vectors,
-        rotations,
+        np.array(vectors),
+        np.array(rotations),
         tuple(joint.sign for joint in joints),
         chain.prismatic,
         **known,
     )
-
-
-def _link(fixed: Sequence[Transform]) -> tuple[np.ndarray, np.ndarray]:
-    """Vector along fixed transforms in the frame at their end, and rotation from that frame to the one at their start."""
-    end = MeasuringPoint("end", len(fixed))
-    position, rotation = poses(Chain(tuple(fixed), (end,), 1), np.zeros((1, 1)), end)
-    return rotation[0].T @ position[0], rotation[0]
