@@ -110,12 +110,11 @@ class Campaign:
 def assemble_campaign(document: Mapping[str, Any], robot: Robot, measurements: Measurements, source: str) -> Campaign:
     """A campaign from its parts, checked before; `source`, the file of its document, is named in errors."""
     compliance = document.get("compliance", "nominal")
-    if compliance == "nominal" and not robot.compliance_known:
-        # What is left without known compliances: joints that do not yield, which no mass turns.
-        robot = replace(robot, compliance=np.zeros(robot.joints), masses=())
+    rigid = compliance == "nominal" and not robot.compliance_known
     return Campaign(
         name=document["campaign"],
-        robot=robot,
+        # What is left without known compliances: joints that do not yield, which no mass turns.
+        robot=replace(robot, compliance=np.zeros(robot.joints), masses=()) if rigid else robot,
         measured=document["measured"],
         frame=document["frame"],
         targets=targets_from(document["targets"], robot.chain, source),
