@@ -64,6 +64,16 @@ def test_sentences_say_what_a_row_reads(cases, diagnosis):
 SETTINGS, BAD = Settings(), 11
 
 
+def test_a_search_looks_at_the_same_poses_whatever_rows_are_left_out_or_come_back(cases):
+    case, settings = cases[0], replace(SETTINGS, searched_observations=12)
+    pose = case.campaign.measurements.pose
+    whole = fitted_to(case, pose >= 0, settings).searched
+    assert 2 < len(whole) < len(case.observations)
+    for out in (whole.states.pose[:1], whole.states.pose[-2:], np.setdiff1d(pose, whole.states.pose)):
+        some = fitted_to(case, ~np.isin(pose, out), settings).searched
+        np.testing.assert_array_equal(some.position, whole.position[~np.isin(whole.states.pose, out)[whole.state]])
+
+
 @pytest.fixture
 def case(cases):
     return cases[0]

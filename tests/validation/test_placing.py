@@ -13,6 +13,7 @@ from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import conditions
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import select_states
+from elastocal.validation import placing
 from elastocal.validation.held_out import position_errors
 from elastocal.validation.placing import beyond_campaign, beyond_loads, outside_poses, placed_estimate, predictive_variances
 
@@ -67,6 +68,16 @@ def test_variances_are_those_without_the_measurements_of_the_pose(fanuc):
     away = linearize(fitted.model, fitted.estimate, other, around).sensitivities[:, :3]
     variance = np.einsum("mrp,pq,mrq->m", away, covariance, away)
     np.testing.assert_allclose(there, [variance[other.state == state].max() for state in range(8)], rtol=1e-6)
+
+
+def test_a_sample_says_nearly_how_surely_very_many_poses_are_predicted(fanuc, monkeypatch):
+    fitted, own, other = fitted_part(fanuc, 1, 60, 9)
+    own_variance, variance = predictive_variances(fitted, own, fitted.model, fitted.estimate, other)
+    monkeypatch.setattr(placing, "_MOST_FITTED", len(own) // 2)
+    some, there = predictive_variances(fitted, own, fitted.model, fitted.estimate, other)
+    assert len(some) == 30 and there == pytest.approx(variance, rel=0.5)
+    assert np.median(there / variance) == pytest.approx(1.0, abs=0.2)
+    assert np.median(some) == pytest.approx(np.median(own_variance), rel=0.3)
 
 
 def outside(fitted, own, other, **changes):

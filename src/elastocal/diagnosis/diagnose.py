@@ -12,7 +12,16 @@ from elastocal.data_checks.faults import faults
 from elastocal.data_checks.protocol import Fault
 from elastocal.data_checks.warnings import fitted_compliance_warnings
 from elastocal.diagnosis import refit, verdict
-from elastocal.diagnosis.gross_errors import Deviations, Kept, entries_of, first_kept, fitted_to, gross_errors, warnings_of
+from elastocal.diagnosis.gross_errors import (
+    Deviations,
+    Kept,
+    entries_of,
+    first_kept,
+    fitted_to,
+    gross_errors,
+    searched_of,
+    warnings_of,
+)
 from elastocal.diagnosis.linearize import linearized, looked_at_closely, with_probable_centres
 from elastocal.diagnosis.search import alarm_of, initial_screening, posterior
 from elastocal.diagnosis.verdict import Evidence
@@ -20,7 +29,7 @@ from elastocal.effects.catalogue import effects
 from elastocal.fitting.least_squares import ON_THE_WAY, SETTLED, fit
 from elastocal.fitting.model import Case, joint_compliances, parameter_values
 from elastocal.fitting.noise import noise_facts
-from elastocal.fitting.observations import Observations, sample_of
+from elastocal.fitting.observations import Observations
 from elastocal.fitting.tolerances import effective_parameters
 from elastocal.random_streams import stream
 from elastocal.remainder.repeatable import Repeatable, repeatable_part
@@ -110,8 +119,7 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         if (remaining == part.kept).all() or number + 1 == settings.gross_error_rounds:
             break
         # The model found looks at all rows once more, without these, before another search is made.
-        like = None if (remaining & ~part.kept).any() else part.searched
-        some = sample_of(case.select(remaining).observations, settings.searched_observations, like)
+        some = searched_of(case, case.select(remaining), settings)
         about = fit(about.model, some, about.noise, about.estimate, True, ON_THE_WAY)
         errors = gross_errors(about, part.noise, measurements, remaining, settings)
         good |= ~remaining & ~errors.gross
@@ -133,7 +141,7 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         # Its statistics make room for those of the next search.
         found = None
     errors = replace(errors, gross=~part.kept)
-    case, noise, declared = part.case, part.noise, part.declared_to_all()
+    case, noise, declared = part.case, part.noise, part.to_all(part.declared)
     bare = fit(replace(case.model, effects=()), case.observations, noise, settled=ON_THE_WAY)
     steps = [Step("frames and targets", "frames", bare), Step("declared model", "declared", declared)]
     final, lost, contradicting, repeatable = declared, list[str](), list[str](), None
@@ -141,7 +149,7 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
     if found:
         final = about
         if about is not found.fitted or part.searched is not case.observations:
-            final = fit(about.model, case.observations, about.noise, about.estimate, reweighted=True)
+            final = part.to_all(about)
         named, word = found.conclusion.best.named, found.conclusion.verdict
         found = replace(found, conclusion=verdict.with_related(found.conclusion, verdict.oversized(final, named)))
         if not found.adopted:
@@ -153,7 +161,7 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         lost = _losses(bare, [steps[-1].fitted, *([final] if found.adopted else [])], case.observations, settings)
         found = replace(found, adopted=found.adopted and not lost)
         if found.adopted:
-            steps += _effect_steps(case, declared, final, found)
+            steps += _effect_steps(part, final, found)
         elif lost and lost[0]:
             kept = fit(bare.model, case.observations, steps[-1].fitted.noise, bare.estimate)
             steps.append(Step("frames and targets, kept", "kept", kept))
@@ -262,8 +270,11 @@ def _explained(
     return replace(evidence, fitted=about)
 
 
-def _effect_steps(case: Case, declared: Fit, final: Fit, found: Evidence) -> list[Step]:
-    """One step for each mechanism, that which explains most first, each with those before it; of many, the rest together."""
+def _effect_steps(part: Kept, final: Fit, found: Evidence) -> list[Step]:
+    """One step for each mechanism, that which explains most first, each with those before it; of many, the rest together.
+
+    All but the last come from what a search looks at: only their errors are shown.
+    """
     model = found.posterior.models[found.conclusion.best.model]
     chosen = [(effect, final.values_of(effect.key)[1]) for effect, _ in refit.selected(found.linearized, model)]
     explained = refit.squares_explained(found.linearized.problem, model)
@@ -273,8 +284,8 @@ def _effect_steps(case: Case, declared: Fit, final: Fit, found: Evidence) -> lis
     steps = [Step(f"with {rest[0] if len(rest) == 1 else f'{len(rest)} further effects'}", "effect", final)]
     for number in range(len(alone), 0, -1):
         some = tuple(entry for entry in chosen if entry[0].effect in alone[:number])
-        # Only its errors are shown, which a tenth of a standard error in a parameter hardly moves.
-        fitted = refit.fit_with_sizes(declared, case.observations, final.noise, some, steps[0].fitted, settled=ON_THE_WAY)
+        # Errors that a tenth of a standard error in a parameter hardly moves.
+        fitted = refit.fit_with_sizes(part.declared, part.searched, final.noise, some, steps[0].fitted, settled=ON_THE_WAY)
         steps.insert(0, Step(f"with {alone[number - 1]}", "effect", fitted))
     return steps
 

@@ -21,7 +21,7 @@ from elastocal.counting import counted
 from elastocal.diagnosis.evidence import Grid
 from elastocal.diagnosis.linearize import Linearized, linearized
 from elastocal.diagnosis.statistics import WhiteRows
-from elastocal.fitting.least_squares import evaluated, fit
+from elastocal.fitting.least_squares import ON_THE_WAY, evaluated, fit
 from elastocal.fitting.linearization import Linearization, linearize
 from elastocal.fitting.model import conditions, parameters, residuals
 from elastocal.fitting.noise import Noise, measurement_covariances
@@ -289,10 +289,16 @@ class Kept:
     declared: Fit
     searched: Observations
 
-    def declared_to_all(self) -> Fit:
-        """The declared model fitted to all that is kept."""
-        found, every = self.declared, self.case.observations
-        return found if self.searched is every else fit(found.model, every, self.noise, found.estimate, reweighted=True)
+    def to_all(self, found: Fit) -> Fit:
+        """A model that is fitted to what is searched, fitted to all that is kept.
+
+        From an estimate that some measurements lead to, a step or two by all of them are as good as the fit's end (one-step
+        M-estimators; Bickel, One-step Huber estimates in the linear model, JASA 1975).
+        """
+        every = self.case.observations
+        if self.searched is not every:
+            return fit(found.model, every, found.noise, found.estimate, reweighted=True, settled=ON_THE_WAY)
+        return found if found is self.declared else fit(found.model, every, found.noise, found.estimate, reweighted=True)
 
 
 def fitted_to(case: Case, kept: np.ndarray, settings: Settings, last: Kept | None = None) -> Kept:
@@ -301,10 +307,14 @@ def fitted_to(case: Case, kept: np.ndarray, settings: Settings, last: Kept | Non
         return last
     part = case.select(kept)
     noise, warnings = estimated_noise(part)
-    # Where rows only leave, the rest of the last sample.
-    like = last.searched if last is not None and not (kept & ~last.kept).any() else None
-    searched = sample_of(part.observations, settings.searched_observations, like)
+    searched = searched_of(case, part, settings)
     return Kept(part, kept, noise, warnings, fit_declared(part.model, searched, noise), searched)
+
+
+def searched_of(case: Case, part: Case, settings: Settings) -> Observations:
+    """What a search looks at of a part of a case: at the same poses whatever is kept, so that only gross errors move a fit."""
+    most = settings.searched_observations
+    return sample_of(part.observations, most, sample_of(case.observations, most))
 
 
 def first_kept(case: Case, settings: Settings) -> Kept:

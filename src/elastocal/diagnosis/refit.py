@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.diagnosis.evidence import Joint
-from elastocal.diagnosis.search import UNLIKELY, Model, Posterior, Problem
+from elastocal.diagnosis.search import UNLIKELY, Model, Posterior, Problem, solve_positive
 from elastocal.diagnosis.statistics import Statistics, normal_equations
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.model import parameter_values
@@ -217,7 +217,7 @@ def squares_beyond(problem: Problem, model: Model, mechanisms: Collection[str]) 
         made = gram[:, ours] @ coefficients[ours]
         whole = float(coefficients[ours] @ made[ours])
         inner = gram[np.ix_(rest, rest)] + np.diag(deviations[~inside] ** -2.0)
-        found.append((whole, whole - float(made[rest] @ np.linalg.solve(inner, made[rest]))))
+        found.append((whole, whole - float(made[rest] @ solve_positive(inner, made[rest]))))
     return found
 
 
@@ -239,12 +239,11 @@ def _moments(
     information = equations[np.ix_(chosen, chosen)].copy()
     places = np.arange(declared, len(chosen))
     information[places, places] += deviations**-2.0
-    inverse = np.linalg.inv(information)
-    covariance, mean = inverse * max(mean_square_left(problem, model), 1.0), inverse @ equations[chosen, -1]
     # Declared parameters from the orthonormal basis, less what the candidates' columns have in it.
     back = products.into_basis @ np.concatenate([np.eye(declared), -products.projected[:, columns]], axis=1)
-    variance = ((back @ covariance) * back).sum(axis=1)
-    found = dict(zip(owners, zip(back @ mean, variance, strict=True), strict=True))
+    solved = solve_positive(information, np.column_stack([back.T, equations[chosen, -1]]))
+    variance = max(mean_square_left(problem, model), 1.0) * (back * solved[:, :-1].T).sum(axis=1)
+    found = dict(zip(owners, zip(back @ solved[:, -1], variance, strict=True), strict=True))
     for number, (value, spread) in zip(model.units, joint.moments(), strict=True):
         unit = problem.units[number]
         if unit.candidate:

@@ -22,6 +22,7 @@ from heapq import nlargest
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg import lapack
 
 from elastocal.diagnosis.evidence import (
     Evaluated,
@@ -96,7 +97,7 @@ class Problem:
         place = self.statistics.nearest(model.pose_error_rad)
         inner = deviations[:, None] * self.statistics.gram[place][np.ix_(columns, columns)] * deviations + np.eye(len(columns))
         along = deviations * self.statistics.along[place, columns]
-        return columns, deviations * np.linalg.solve(inner, along), place
+        return columns, deviations * solve_positive(inner, along), place
 
 
 @dataclass(frozen=True)
@@ -123,6 +124,11 @@ class Posterior:
     def nothing(self) -> Model:
         """The declared model alone."""
         return next(model for model in self.models if not model.units)
+
+
+def solve_positive(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Solution of equations with a symmetric positive matrix, by Cholesky's factor; of none, at which LAPACK balks, nothing."""
+    return lapack.dposv(matrix, right)[1] if len(matrix) else right
 
 
 def initial_screening(problem: Problem) -> tuple[Model, np.ndarray]:

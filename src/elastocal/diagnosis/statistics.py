@@ -89,24 +89,26 @@ class Products:
         return replace(self, rows=self.rows.at(np.zeros(len(self.beside), bool)), beside=self.beside[:0])
 
     def by_pose(self) -> Iterator[tuple[np.ndarray, WhiteRows, np.ndarray, np.ndarray]]:
-        """B_p (G, n, P + K + 1) along the principal axes of C_p, and its eigenvalues (G, n), of some poses at a time.
+        """B_p (G, a, P + K + 1) along principal axes of C_p, and its eigenvalues (G, a), of some poses at a time.
 
-        With which of all rows are theirs, and these, their Jacobian along the same axes.
+        With which of all rows are theirs, and these, their Jacobian along the same axes: as many as joints, or as numbers that
+        are measured in any pose, if these are fewer.
         """
         rows, count = self.rows, self.declared
-        width, joints, poses = self.gram.shape[0], rows.jacobian.shape[2], int(rows.pose.max()) + 1
-        step = max(_AT_ONCE // (width * joints), 1)
+        width, poses = self.gram.shape[0], int(rows.pose.max()) + 1
+        axes = min(rows.jacobian.shape[2], int(np.bincount(rows.pose).max()) * rows.jacobian.shape[1])
+        step = max(_AT_ONCE // (width * axes), 1)
         for start in range(0, poses, step):
             seen = (rows.pose >= start) & (rows.pose < start + step)
             part, beside = rows.at(seen), self.beside if poses <= step else self.beside[seen]
-            groups, jacobian = groups_by_size(part.pose), np.empty(part.jacobian.shape)
-            found, values = np.empty((min(step, poses - start), joints, width)), np.empty((min(step, poses - start), joints))
+            groups, jacobian = groups_by_size(part.pose), np.empty((*part.jacobian.shape[:2], axes))
+            found, values = np.empty((min(step, poses - start), axes, width)), np.empty((min(step, poses - start), axes))
             for members in groups:
                 mine, flat = part.pose[members[:, 0]], (len(members), members.shape[1] * beside.shape[1], -1)
                 each = part.jacobian[members].reshape(flat)
-                values[mine], axes = np.linalg.eigh(each.transpose(0, 2, 1) @ each)
-                turned = each @ axes
-                jacobian[members] = turned.reshape(*members.shape, *part.jacobian.shape[1:])
+                squares, directions = np.linalg.eigh(each.transpose(0, 2, 1) @ each)
+                values[mine], turned = squares[:, -axes:], each @ directions[..., -axes:]
+                jacobian[members] = turned.reshape(*members.shape, *jacobian.shape[1:])
                 together = turned.transpose(0, 2, 1) @ beside[members].reshape(flat)
                 found[mine, :, :count], found[mine, :, -1] = together[..., :-1], together[..., -1]
             found[..., count:-1] = part.candidates.times_by_pose(jacobian, part.pose)
@@ -229,14 +231,15 @@ def null_draws(
     off = np.zeros((len(sizes), count))
     for chosen, part, each, values in products.by_pose():
         flat, values, drawn = each.reshape(-1, each.shape[2])[:, :-1], values.reshape(-1, 1), white[chosen]
-        by_pose = np.empty((len(each), joints, count))
+        by_pose, axes = np.empty((*each.shape[:2], count)), each.shape[1]
         for members in groups_by_size(part.pose):
-            turned = part.jacobian[members].reshape(len(members), -1, joints).transpose(0, 2, 1)
+            turned = part.jacobian[members].reshape(len(members), -1, axes).transpose(0, 2, 1)
             by_pose[part.pose[members[:, 0]]] = turned @ drawn[members].reshape(len(members), -1, count)
         seen = by_pose.reshape(-1, count)
         if tau:
             # Along the principal axes of a pose the errors of its joints are as independent as they are themselves.
-            common = tau * stream.standard_normal(seen.shape)
+            errors = stream.standard_normal((len(each), joints, count))
+            common = tau * errors[:, -axes:].reshape(seen.shape)
             squares += (common * (2 * seen + values * common)).sum(axis=0)
             along += flat.T @ common
             seen += values * common

@@ -265,11 +265,16 @@ def linearize(model: Model, estimate: Estimate, observations: Observations, cond
 
 
 def effect_columns(
-    effects: Iterable[tuple[Law, Iterable[float]]], around: Conditions, jacobian: np.ndarray, state: np.ndarray
+    effects: Iterable[tuple[Law, Iterable[float]]],
+    around: Conditions,
+    jacobian: np.ndarray,
+    state: np.ndarray,
+    sizes: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Sensitivities (M, rows, D) to the parameters of what displaces linearly, with its shapes, by a `coordinate_jacobian`."""
+    """Sensitivities (M, rows, D) to the parameters of what displaces linearly, with its shapes, by a `coordinate_jacobian`,
+    times some sizes (D,)."""
     laws = [law for displacement, shapes in effects for law in displacement(around, *shapes)]
-    return Factored.of(laws, jacobian, state, len(around.joint_angles)).dense()
+    return Factored.of(laws, jacobian, state, len(around.joint_angles), sizes).dense()
 
 
 def _shape_laws(

@@ -33,9 +33,8 @@ from elastocal.io.json_files import read_json
 from elastocal.io.origin import configuration_sha256
 from elastocal.io.records import check_sources, checksum, jobs_behind
 from elastocal.loop.diagnosis_tables import load_case, rows_left_out, step_model
-from elastocal.remainder.corrected import fitted_again, inputs_of
+from elastocal.remainder.corrected import predictor_of
 from elastocal.validation.conformity import PASS, UNDECIDED, joint_ranges, predicted_conformity, shortfalls
-from elastocal.validation.held_out import position_residuals
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -73,8 +72,7 @@ class Diagnosed:
         """By the final model, its errors as large as the verdict says after a look at held-out poses."""
         more, again, accuracy = None, self.verdict["remainder"], self.verdict["accuracy"]
         if again and again["regression"]:
-            known = self.model, self.estimate, self.case.observations
-            predictor = fitted_again(again, inputs_of(*known), position_residuals(*known))
+            predictor = predictor_of(again, self.model, self.estimate, self.case.observations)
             noise_m = self.verdict["noise"]["position_m"]
             more = regression_on(self.case, self.estimate, predictor, again["spread"]["typical"], noise_m)
         found = calibrate_on_case(self.case, self.model, self.estimate, self.covariance, self.noise, more)

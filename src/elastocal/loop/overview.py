@@ -69,7 +69,7 @@ def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
     part = first_kept(whole, settings)
     errors = gross_errors(part.declared, part.noise, whole.campaign.measurements, part.kept, settings)
     left_out = entries_of(replace(errors, gross=~part.kept), whole.campaign, held_out=False)
-    case, campaign, declared = part.case, part.case.campaign, part.declared_to_all()
+    case, campaign, declared = part.case, part.case.campaign, part.to_all(part.declared)
     candidates = list(case.candidates.values())
     untestable = linearized(part.declared, part.searched, candidates, settings).untestable
     found, negative = faults(campaign), _negative_springs(declared)

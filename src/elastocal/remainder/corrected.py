@@ -42,8 +42,9 @@ NORMAL_WIDTH = 1.959964
 # How often a regression is chosen where nothing is left. A few configurations leave the outer folds' fits so unlike the final
 # one that they must be surer; of fewer yet, a fold of a fold leaves nothing to regress.
 _LEVEL, _LEVEL_OF_FEW, _FEW, FEWEST_CONFIGURATIONS = 0.05, 0.01, 40, 10
-# A regression is chosen by so many observations at most; the quantile that scales its intervals they fix to two per cent.
-_FOLDS, _MOST_TO_CHOOSE, _REPLICATES = 5, 2_000, 1000
+# A regression is chosen by so many observations at most; the quantile that scales its intervals they fix to two per cent. It is
+# fitted to so many: of a million a process takes eight minutes, and its 2,000 values have been determined by far fewer.
+_FOLDS, _MOST_TO_CHOOSE, _MOST_TO_FIT, _REPLICATES = 5, 2_000, 10_000, 1000
 # Share of a joint's fitted range beside it within which a regression is added too: no pose has neighbours that near, and of
 # poses drawn like 200 fitted ones some 3 % would go without for standing a hundredth beyond.
 _BESIDE = 0.05
@@ -89,9 +90,7 @@ def corrected(
     outside = beyond_regressed(every.states, there.states.joint_angles, there.states.wrench)[there.state]
     mean, std, predictor = np.zeros((len(there), 3)), None, None
     if chosen["regression"]:
-        inputs = inputs if some is every else inputs_of(fitted.model, fitted.estimate, every)
-        predictor = fitted_again(chosen, inputs, fitted.residual[:, :3])
-        asked = inputs_of(model, estimate, there)
+        predictor, asked = predictor_of(chosen, fitted.model, fitted.estimate, every), inputs_of(model, estimate, there)
         mean, std = np.where(outside[:, None] & within_range, 0.0, predictor.mean(asked)), predictor.std(asked)
     if not same_campaign(case, held_out):
         session = np.searchsorted(estimate.sessions, there.states.session[there.state])
@@ -130,8 +129,14 @@ def _chosen(
     return tuned(names, inputs, configuration[each], fold[each], whole, without, seed)
 
 
+def predictor_of(chosen: Mapping[str, Any], model: Model, estimate: Estimate, observations: Observations) -> Predictor:
+    """`fitted_again`, to what a model leaves of its training poses."""
+    some = sample_of(observations, _MOST_TO_FIT)
+    return fitted_again(chosen, inputs_of(model, estimate, some), position_residuals(model, estimate, some))
+
+
 def fitted_again(chosen: Mapping[str, Any], inputs: Inputs, residual: np.ndarray) -> Predictor:
-    """The regression of facts of `tuned`, fitted to training poses, shrunk, with intervals as wide as poses left out say."""
+    """The regression of facts of `tuned`, fitted to residuals (M, 3), shrunk, with intervals as wide as poses left out say."""
     fitted, spread = REGRESSIONS[chosen["regression"]].fitted, chosen["spread"]
     found = next(fitted(inputs, residual, [chosen["setting"]], chosen["seed"]))
 
@@ -167,8 +172,8 @@ def inputs_of(model: Model, estimate: Estimate, observations: Observations) -> I
         return inputs
     sizes = np.array([parameter.plausible for effect, _ in found for parameter in effect.parameters])
     around, laws = conditions(model, estimate, observations.states), [(effect.displacement, shapes) for effect, shapes in found]
-    columns = effect_columns(laws, around, inputs.jacobian, observations.state)
-    return replace(inputs, jacobian=np.concatenate([inputs.jacobian, columns * sizes / _RAD_OF_A_SIZE], axis=2))
+    columns = effect_columns(laws, around, inputs.jacobian, observations.state, sizes / _RAD_OF_A_SIZE)
+    return replace(inputs, jacobian=np.concatenate([inputs.jacobian, columns], axis=2))
 
 
 def remainder_facts(

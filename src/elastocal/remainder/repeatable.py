@@ -86,15 +86,18 @@ def repeatable_part(fitted: Fit, observations: Observations, seed: int) -> Repea
     for seen, plain, white in fitted.sensitivities(some):
         mine, w, there = group[seen], weight[seen], inputs.select(seen)
         np.add.at(followed, mine, np.einsum("mrp,mr->mp", white, white_residual[seen]))
-        np.add.at(leverage, mine, ((white @ fitted.covariance) * white).sum(axis=2).mean(axis=1))
-        slopes, parts = w * plain[:, :3], [fold[mine] == k for k in range(_FOLDS)]
+        flat = white.reshape(len(white) * white.shape[1], parameters)
+        spread = ((flat @ fitted.covariance) * flat).sum(axis=1)
+        np.add.at(leverage, mine, spread.reshape(white.shape[:2]).mean(axis=1))
+        parts = [fold[mine] == k for k in range(_FOLDS)]
+        slopes = [(w[part] * plain[part, :3]).reshape(3 * part.sum(), parameters) for part in parts]
         for kind, (along, gram, across) in zip(kinds, sums, strict=True):
             functions = w * kind(there)
             np.add.at(along, mine, (functions * w * fitted.residual[seen, :3, None]).sum(axis=1))
             for k, part in enumerate(parts):
-                rows = functions[part].reshape(-1, functions.shape[2]).T
-                gram[k] += rows @ rows.T
-                across[k] += rows @ slopes[part].reshape(rows.shape[1], parameters)
+                rows = functions[part].reshape(-1, functions.shape[2])
+                gram[k] += rows.T @ rows
+                across[k] += rows.T @ slopes[k]
     # A configuration that the fit follows has errors larger than its residuals.
     free = np.maximum(1.0 - leverage / np.bincount(group), 1.0 / count)
     signs = draws.choice([-1.0, 1.0], (_DRAWS, count)) / np.sqrt(free)

@@ -10,10 +10,10 @@ from scipy.linalg import blas
 
 from elastocal.campaigns.holdout import beyond_range, find_repeated
 from elastocal.counting import counted
-from elastocal.fitting.least_squares import fit_frames
+from elastocal.fitting.least_squares import evaluated, fit_frames
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import conditions, of_placement
-from elastocal.fitting.observations import groups_by_size, parts_of, select_states, state_clusters
+from elastocal.fitting.observations import groups_by_size, parts_of, sample_of, select_states, state_clusters
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Measurements
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from elastocal.fitting.model import Case, Estimate, Model
     from elastocal.fitting.observations import Observations, States
 
+# Of more observations a sample says how surely those that were fitted are predicted.
+_MOST_FITTED = 10_000
 # A share of forces and moments, and N or N m: forces of one cell are stated to a few digits.
 _ROUNDING = 1e-3
 
@@ -128,7 +130,7 @@ def beyond_loads(fitted_states: States, wrench: np.ndarray, times: float = 1.0) 
 def predictive_variances(
     fitted: Fit, observations: Observations, model: Model, estimate: Estimate, unseen: Observations
 ) -> tuple[np.ndarray, np.ndarray]:
-    """How surely a fit predicts positions: its own poses (P,), each left out in turn, and other states (S,).
+    """How surely a fit predicts positions: its own poses (P,), of very many some, each left out in turn, and other states (S,).
 
     The variance of the least sure reading, m², comes from the parameters alone, each with its normal prior or else one of its
     plausible size: what the measurements do not identify is as uncertain as that, and a pose that alone identifies a parameter
@@ -143,19 +145,23 @@ def predictive_variances(
     plausible = np.array([parameter.prior_std or parameter.plausible for _, parameter in listed])
     if not listed:
         return _largest(own, observations.cluster), _largest(other, unseen.state)
-    gram = np.eye(len(listed))
-    for _, _, white in fitted.sensitivities(observations):
+    some, gram = sample_of(observations, _MOST_FITTED), np.zeros((len(listed),) * 2)
+    if len(some) < len(observations):
+        fitted, own = evaluated(fitted.model, some, fitted.noise, fitted.estimate), np.zeros(len(some))
+    for _, _, white in fitted.sensitivities(some):
         rows = (white * plausible).reshape(-1, len(listed))
         gram += rows.T @ rows
-    root, cluster = np.linalg.inv(np.linalg.cholesky(gram)), observations.cluster
-    for seen, plain, white in fitted.sensitivities(observations):
+    gram *= len(observations) / len(some)
+    root, cluster = np.linalg.inv(np.linalg.cholesky(gram + np.eye(len(listed)))), some.cluster
+    for seen, plain, white in fitted.sensitivities(some):
         projected, rows = _through(root, plain[:, :3] * (plausible * kept)), _through(root, white * plausible)
         own[seen] = _variances_left_out(projected, rows, cluster[seen])
     for _, seen, part in parts_of(unseen, len(listed)):
         there = linearize(model, estimate, part, conditions(model, estimate, part.states)).sensitivities[:, :3]
         # Effects come last in the order of the parameters, whatever frames and targets stand before them.
         there = there[..., there.shape[-1] - kept.sum() :] * plausible[kept]
-        other[seen] = ((there @ root[:, kept].T) ** 2).sum(axis=(1, 2))
+        flat = there.reshape(-1, there.shape[2]) @ root[:, kept].T
+        other[seen] = (flat**2).sum(axis=1).reshape(len(part), 3).sum(axis=1)
     return _largest(own, cluster), _largest(other, unseen.state)
 
 
