@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from elastocal.mechanics.robot import Robot
 
 DOCUMENT, PAGES = "certificate.json", "certificate.pdf"
-ROBOT, URDF, SIDECAR = _EXPORTED = "robot.yaml", "robot.urdf", "effects.json"
+ROBOT, URDF = _EXPORTED = "robot.yaml", "robot.urdf"
 _ROUNDING_MM = 1e-5
 # Lines that a message names.
 _NAMED = 5
@@ -66,18 +66,10 @@ def correct(
     import numpy as np
     from rich.console import Console
 
-    from elastocal.application.accuracy import (
-        accuracy_sentence,
-        before_m,
-        campaign_accuracy,
-        error_rows,
-        millimetres,
-        predict_errors,
-    )
+    from elastocal.application.accuracy import accuracy_sentence, before_m, millimetres, predict_errors
     from elastocal.application.calibrated import OperatingConditions, assumptions, beyond_fitted, regressed
     from elastocal.application.compensation import find_joint_targets
     from elastocal.application.frames import root_mean_square
-    from elastocal.diagnosis.misplaced import point_sentence
     from elastocal.exchange.controllers import axes_of, check_name, controller_of, targets_of
     from elastocal.exchange.target_path import NO_BOUND, OK, read_target_path_of
     from elastocal.io.atomic_writes import check_places, write_text, write_together
@@ -96,9 +88,9 @@ def correct(
         raise InputError(output, "", "no such folder", "a file in a folder that is there")
     campaign = diagnosed_campaign(folder, physics_only)
     calibrated = campaign.calibrated
-    prismatic = calibrated.robot.chain.prismatic
-    named = axes_of(controller, prismatic, axes) if controller else ()
-    wanted = read_target_path_of(path, calibrated.robot)
+    robot = calibrated.robot
+    named = axes_of(controller, robot.chain.prismatic, axes) if controller else ()
+    wanted = read_target_path_of(path, robot)
     operating = OperatingConditions(wanted.wrench, wanted.approach, wanted.time_s, wanted.temperature_c)
     print_lines((f"assumed: {line}" for line in assumptions(calibrated, operating)), console)
     with console.status("correcting"):
@@ -110,35 +102,29 @@ def correct(
         raise InputError(path, "", rows, reached)
     if controller and not good.any():
         raise InputError(path, "", "no pose that the robot reaches", "one at least, for a program")
-    swings = _swings(wanted, found, good, calibrated.robot)
+    swings = _swings(wanted, found, good, robot)
     if swings and not allow_large_steps:
-        more = f" and {counted(len(swings) - 1, 'more large step')}" if len(swings) > 1 else ""
-        raise InputError(path, "", swings[0] + more, "targets between, another posture, or --allow-large-steps")
+        raise InputError(path, "", first_names(swings, 1), "targets between, another posture, or --allow-large-steps")
     wrench = np.zeros((len(wanted), 6)) if wanted.wrench is None else wanted.wrench
     outside, loaded = beyond_fitted(calibrated, found.joint_angles, wrench)
-    beyond, heavy = outside | loaded, beyond_fitted(calibrated, found.joint_angles, wrench, _LOADS_BOUNDED)[1]
-    bounded = good & ~outside & ~heavy
+    heavy = beyond_fitted(calibrated, found.joint_angles, wrench, _LOADS_BOUNDED)[1]
     status = found.status.astype(object)
     status[good & outside] = f"{NO_BOUND}joints outside the fitted range"
     status[good & heavy] = f"{NO_BOUND}loads beyond {_LOADS_BOUNDED:g} times the measured ones"
-    errors = predict_errors(calibrated, found.joint_angles, operating)
+    bounded, beyond = good & ~outside & ~heavy, outside | loaded
+    errors = predict_errors(calibrated, found.joint_angles, operating, draws=0)
     before = before_m(calibrated, wanted.position, wanted.rotation, found.error_before)
     with write_together(output.parent, [file.name for file in files]) as folder_of_all:
         write_csv(folder_of_all / output.name, _joint_targets(wanted, wrench, found, before, errors, beyond, status))
         if controller:
-            targets = targets_of(found.joint_angles[good], prismatic, named)
+            targets = targets_of(found.joint_angles[good], robot.chain.prismatic, named)
             write_text(folder_of_all / files[1].name, controller.program(name, targets, _notes(campaign, wrench[good])))
-    share = f"{grouped(good.sum())} of {counted(len(good), 'target')}"
-    stated, lines = [], []
+    share, lines = f"{grouped(good.sum())} of {counted(len(good), 'target')}", []
     if bounded.any():
-        known = errors if bounded.all() else predict_errors(calibrated, found.joint_angles[bounded], operating.part(bounded))
+        known = predict_errors(calibrated, found.joint_angles[bounded], operating.part(bounded))
         accuracy = known.accuracy("the targets" if bounded[good].all() else "the targets with a bound")
-        stated.append((accuracy, root_mean_square(before[bounded])))
-        lines.append(accuracy_sentence(accuracy))
-    table = error_rows(campaign.verdict, *stated)
-    lines = [*(f"{where}: {off} uncorrected, {after} corrected" for where, off, after in table), *lines]
-    if good.any():
-        lines += [accuracy_sentence(campaign_accuracy(calibrated)), point_sentence(campaign.case.campaign)]
+        uncorrected = f"uncorrected they would be missed by {millimetres(root_mean_square(before[bounded]))} RMS"
+        lines += [accuracy_sentence(accuracy), uncorrected]
     if calibrated.remainder is not None:
         added = np.linalg.norm(regressed(calibrated, found.joint_angles[good], operating.part(good)), axis=1)
         size = f"{millimetres(root_mean_square(added[added > 0.0]))} RMS" if added.any() else "nothing"
@@ -148,7 +134,7 @@ def correct(
     if controller:
         called = ", ".join(f"q{number} as {axis}" for number, axis in enumerate(named, 1))
         lines.append(f"{files[1].name} goes to {share}: {controller.words}, {called}")
-    alarms = [*(each["sentence"] for each in campaign.verdict["misplaced"])]
+    alarms = [each["sentence"] for each in campaign.verdict["misplaced"]]
     if swings:
         alarms.append(first_names(swings, _NAMED))
     if unbounded := int((good & ~bounded).sum()):
@@ -208,10 +194,9 @@ def _joint_targets(
     from elastocal.exchange.target_path import NO_BOUND
     from elastocal.mechanics.components import WRENCH_NAMES
 
-    pose = np.column_stack([wanted.position, Rotation.from_matrix(wanted.rotation).as_rotvec()])
-    columns = dict(zip(("x", "y", "z", "rx", "ry", "rz"), pose.T, strict=True)) | dict(zip(WRENCH_NAMES, wrench.T, strict=True))
-    angles = {f"q{joint}": column for joint, column in enumerate(found.joint_angles.T, 1)}
-    nominal = {f"q{joint}_uncorrected": column for joint, column in enumerate(found.uncorrected.T, 1)}
+    pose = np.hstack([wanted.position, Rotation.from_matrix(wanted.rotation).as_rotvec(), wrench])
+    commands = pd.DataFrame(found.joint_angles).rename(columns=lambda joint: f"q{joint + 1}")
+    nominal = pd.DataFrame(found.uncorrected).rename(columns=lambda joint: f"q{joint + 1}_uncorrected")
     stated = {
         "predicted_error_before_m": before,
         "predicted_error_after_m": errors.error_m,
@@ -221,8 +206,10 @@ def _joint_targets(
         "predicted_rotation_std_rad": errors.std_rad,
         "repeatability_m": errors.repeated_m,
         "outside_range": beyond,
+        "status": status,
     }
-    return pd.DataFrame(angles | stated | {"status": status} | columns | nominal)
+    asked = pd.DataFrame(pose, columns=["x", "y", "z", "rx", "ry", "rz", *WRENCH_NAMES])
+    return pd.concat([commands, pd.DataFrame(stated), asked, nominal], axis=1)
 
 
 def certificate(
@@ -294,10 +281,10 @@ def export(
         Path | None, Option(help="The URDF that the robot was imported from. Its joint origins are changed, nothing else.")
     ] = None,
 ) -> None:
-    """Write the calibrated robot: robot file, URDF, effects.
+    """Write the calibrated robot: as a robot file, and as the URDF that it came from.
 
-    A URDF holds the geometry; effects.json holds springs and effects as well. None holds the regression on the
-    remainder: what is lost with it is said, and the accuracy stated is without.
+    A robot file holds geometry, springs and weights, a URDF the geometry alone. Neither holds other effects or the regression
+    on the remainder: what is lost with them is said, and the accuracy stated is without the regression.
     """
     import numpy as np
     import yaml
@@ -305,41 +292,36 @@ def export(
 
     from elastocal.application.accuracy import accuracy_sentence, campaign_accuracy
     from elastocal.application.calibrated import OperatingConditions, regressed
-    from elastocal.application.exported import find_left_out_m, fold_effects, sidecar
+    from elastocal.application.exported import find_left_out_m, fold_effects
     from elastocal.exchange.urdf_writing import write_calibrated_origins
     from elastocal.io.atomic_writes import check_places, write_text, write_together
-    from elastocal.io.json_files import write_json
     from elastocal.mechanics.robot_file import document_of
 
-    console = Console(stderr=True)
     check_places(*(output / name for name in _EXPORTED))
     if urdf is not None and (output / URDF).resolve() == urdf.resolve():
         raise InputError(urdf, "", "the file that would be replaced", "a URDF outside of --output")
     whole = diagnosed_campaign(folder)
     # No file has the regression: what stands in them is of a robot without.
     calibrated, states = whole.by_physics().calibrated, whole.case.observations.states
-    nominal, robot = calibrated.robot, fold_effects(calibrated).robot
-    drop_in = None if urdf is None else write_calibrated_origins(urdf, nominal, robot)
-    stated = f"Calibrated by elastocal from the campaign {whole.name}."
-    text = yaml.safe_dump(document_of(robot), sort_keys=False, default_flow_style=None, width=128)
-    accuracy = campaign_accuracy(calibrated)
-    document = sidecar(calibrated, whole.name, date.today().isoformat(), accuracy)
-    lines = [accuracy_sentence(accuracy), *(str(output / name) for name in (ROBOT, *([URDF] if urdf else []), SIDECAR))]
-    with write_together(output, _EXPORTED) as partial:
-        write_text(partial / ROBOT, f"# {stated}\n{text}")
-        if drop_in is not None:
-            (partial / URDF).write_bytes(drop_in.content)
-            lines += _drop_in(drop_in, partial / URDF, nominal, robot, states.joint_angles)
-        write_json(partial / SIDECAR, document)
+    nominal, folded = calibrated.robot, fold_effects(calibrated)
     at = nominal.reported_angles(states.joint_angles)
     under = OperatingConditions(states.wrench, None, states.time_s, states.temperature_c)
-    if document["effects"]:
-        names = ", ".join(entry["key"] for entry in document["effects"])
-        lines.insert(0, f"! only {SIDECAR} holds {names}: {_sizes(find_left_out_m(calibrated, at, under))}")
+    lines = []
     if whole.calibrated.remainder is not None:
         words, lost = whole.verdict["remainder"]["words"], np.linalg.norm(regressed(whole.calibrated, at, under), axis=1)
-        lines.insert(0, f"! no file holds the {words} on the remainder, which elastocal correct adds: {_sizes(lost)}")
-    print_answer(True, f"{whole.name}: calibrated robot in {output}", lines, "", console)
+        lines.append(f"! no file holds the {words} on the remainder, which elastocal correct adds: {_sizes(lost)}")
+    if folded.left_out:
+        names = ", ".join(calibrated.model.effects[number].key for number in folded.left_out)
+        lines.append(f"! no file holds {names}: {_sizes(find_left_out_m(calibrated, at, under))}")
+    lines += [accuracy_sentence(campaign_accuracy(calibrated)), str(output / ROBOT)]
+    drop_in = None if urdf is None else write_calibrated_origins(urdf, nominal, folded.robot)
+    text = yaml.safe_dump(document_of(folded.robot), sort_keys=False, default_flow_style=None, width=128)
+    with write_together(output, _EXPORTED) as partial:
+        write_text(partial / ROBOT, f"# Calibrated by elastocal from the campaign {whole.name}.\n{text}")
+        if drop_in is not None:
+            (partial / URDF).write_bytes(drop_in.content)
+            lines += [str(output / URDF), *_drop_in(drop_in, partial / URDF, nominal, folded.robot, at)]
+    print_answer(True, f"{whole.name}: calibrated robot in {output}", lines, "", Console(stderr=True))
 
 
 def _sizes(off: np.ndarray) -> str:
@@ -347,8 +329,8 @@ def _sizes(off: np.ndarray) -> str:
     return f"up to {1e3 * off.max():.3f} mm at the measured poses ({1e3 * float((off**2).mean()) ** 0.5:.3f} mm RMS)"
 
 
-def _drop_in(drop_in: CorrectedUrdf, path: Path, nominal: Robot, robot: Robot, angles: np.ndarray) -> list[str]:
-    """Lines to print: what became of the user's URDF, and how far its poses at measured angles are from the robot file's."""
+def _drop_in(drop_in: CorrectedUrdf, path: Path, nominal: Robot, robot: Robot, reported: np.ndarray) -> list[str]:
+    """What became of the user's URDF, and how far it is from the robot file at reported angles (N, n)."""
     import numpy as np
 
     from elastocal.exchange.urdf import read_urdf
@@ -356,8 +338,8 @@ def _drop_in(drop_in: CorrectedUrdf, path: Path, nominal: Robot, robot: Robot, a
     from elastocal.mechanics.kinematics import poses
 
     _, chain = nominal_chain(read_urdf(path), drop_in.base, drop_in.tip, path.as_posix())
-    theirs, _ = poses(chain, angles, chain.end_effector)
-    mine, _ = poses(robot.chain, robot.model_angles(nominal.reported_angles(angles)), robot.chain.end_effector)
+    theirs, _ = poses(chain, nominal.model_angles(reported), chain.end_effector)
+    mine, _ = poses(robot.chain, robot.model_angles(reported), robot.chain.end_effector)
     off = 1e3 * float(np.linalg.norm(theirs - mine, axis=1).max())
     changed = counted(drop_in.changed, "joint origin")
     lines = [f"{URDF}: {changed} changed, nothing else; put it where the old one is, beside its meshes"]
