@@ -5,7 +5,7 @@ import pandas as pd
 from made_remainders import smoothly_wrong_folder
 
 from elastocal.campaigns.campaign import columns_of
-from elastocal.loop.loading import load_whole_campaign
+from elastocal.loop.loading import described_campaign
 from elastocal_proof.league.methods import DataSet, dealt
 
 
@@ -13,7 +13,8 @@ def made_data_set(folder, robot, robots_folder, poses=24, **changes):
     """A data set of an unloaded robot that misses its poses by something smooth."""
     changes = {"frame": "tracker", "offset_m": "unknown", "declared": ["joint_offset"]} | changes
     smoothly_wrong_folder(folder, robot, poses=poses, **changes)
-    descriptions, seen = load_whole_campaign(folder, robots_folder)
+    descriptions, campaign = described_campaign(folder, robots_folder)
+    seen = campaign.measurements
     return DataSet(descriptions, columns_of(seen), dealt(seen, 4, np.random.default_rng(1)))
 
 

@@ -19,7 +19,7 @@ from elastocal.io.json_files import read_json, write_json
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_table, write_table
 from elastocal.loop.diagnosis_tables import diagnosis_facts, parameter_columns, step_fit
-from elastocal.loop.loading import load_whole_campaign
+from elastocal.loop.loading import described_campaign
 from elastocal.loop.schemas import measurements
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.random_streams import stream
@@ -173,7 +173,8 @@ def mechanism_columns(diagnosis: Diagnosis, fold: int) -> dict[str, np.ndarray |
 
 def deal_league_folds(job: Any) -> None:
     """A data set of the league, checked, with its poses dealt into folds."""
-    descriptions, seen = load_whole_campaign(job.params.folder, job.params.robots)
+    descriptions, campaign = described_campaign(job.params.folder, job.params.robots)
+    seen = campaign.measurements
     origin = provenance(job.params, **job.wildcards)
     draws = stream(job.params.seed, job.wildcards.data, "league folds", 0)
     write_table(job.output.measurements, measurements(seen.joint_angles.shape[1]), [columns_of(seen)], origin)
