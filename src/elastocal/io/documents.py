@@ -171,8 +171,8 @@ def check_document(document: Any, schema: str, source: str) -> None:
         line = _line_of(source, path)
         raise InputError(source, ", ".join(part for part in (line, key) if part), found, allowed)
     for place, text in _texts(document):
-        # White space between the transforms of a chain is free; headers of another table are nobody's names.
-        if fault := None if place[:1] == ("columns",) else text_fault(" ".join(text.split()) if place == ("chain",) else text):
+        # White space between the transforms of a chain is free.
+        if fault := text_fault(" ".join(text.split()) if place == ("chain",) else text):
             key, line = _key_of(place), _line_of(source, place)
             raise InputError(source, ", ".join(part for part in (line, key) if part), *fault)
 
