@@ -170,11 +170,12 @@ def _suspicious(case: Case, declared: Fit, training: Measurements, held_out: Mea
     if (judged := _poses(held_out)) < FEWEST_HELD_OUT:
         found.append(f"{judged} held-out poses say little of the error: {FEWEST_HELD_OUT} or more would")
     forces = states.wrench[states.wrench.any(axis=1), :3]
-    # A single force has a single singular value.
-    spread = np.linalg.svd(forces, compute_uv=False) if len(forces) > 1 else np.zeros(2)
-    if len(forces) and spread[1] < _ONE_DIRECTION * spread[0]:
-        found.append("all loads pull along one line: compliances across it are not shown")
-    elif not len(forces) and case.campaign.compliance == "identify":
+    if len(forces):
+        # A single force has a single singular value.
+        largest, second = [*np.linalg.svd(forces, compute_uv=False), 0.0][:2]
+        if second < _ONE_DIRECTION * largest:
+            found.append("all loads pull along one line: compliances across it are not shown")
+    elif case.campaign.compliance == "identify":
         found.append("no measurement is under a load: compliances are not identifiable")
     if len(np.unique(states.load)) == 2:
         found.append("one load beside none: what is not linear in the load cannot be distinguished")
