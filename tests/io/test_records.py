@@ -12,7 +12,6 @@ from elastocal.errors import InputError
 from elastocal.io.origin import Origin
 from elastocal.io.records import (
     JobRecord,
-    checksum,
     input_digests,
     jobs_behind,
     read_record,
