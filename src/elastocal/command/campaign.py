@@ -12,7 +12,7 @@ from typer import Argument, Option
 
 from elastocal.command.terminal import MOST_ROWS, pipeline, print_answer, print_lines, robots, workplace
 from elastocal.counting import counted
-from elastocal.errors import InputError, escaped, steering
+from elastocal.errors import InputError, steering
 
 _ROBOT = "robot.yaml"
 # Snakemake prints the second before its logger begins.
@@ -63,7 +63,6 @@ def check(folder: Annotated[Path, Argument(help="Folder of the campaign.")]) -> 
     The exit code is 1 where the data are at fault and cannot be diagnosed.
     """
     from rich.console import Console
-    from rich.table import Table
 
     from elastocal.loop.overview import overview
 
@@ -72,15 +71,9 @@ def check(folder: Annotated[Path, Argument(help="Folder of the campaign.")]) -> 
     if found.diagnosable:
         more = f"; {counted(len(found.attention), 'remark')} below" if found.attention else ""
         answer = f"{found.campaign} can be diagnosed: {counted(found.testable, 'candidate effect')} can be tested{more}"
-    print_answer(found.diagnosable, answer, [], "", console)
-    table = Table(show_header=False, box=None, pad_edge=False)
-    table.add_column(style="bold", no_wrap=True)
-    table.add_column(overflow="fold")
-    for name, words in found.rows:
-        table.add_row(f"  {name}", escaped(words))
-    console.print(table)
+    details = [*(f"{name:<16}{words}" for name, words in found.rows), *(f"! {sentence}" for sentence in found.attention)]
     following = f"elastocal diagnose {folder}" if found.diagnosable else "mend the data, then check again"
-    print_lines([*(f"! {sentence}" for sentence in found.attention), f"next: {following}"], console)
+    print_answer(found.diagnosable, answer, details, following, console)
     raise typer.Exit(0 if found.diagnosable else 1)
 
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 from typer import Argument, Option
 
-from elastocal.command.terminal import MOST_ROWS, example, robots
+from elastocal.command.terminal import MOST_ROWS, example, print_lines, robots
 from elastocal.counting import counted
-from elastocal.errors import InputError, printable
+from elastocal.errors import InputError
 
 if TYPE_CHECKING:
     from elastocal.exchange.measurement_table import ImportedMeasurements
@@ -111,6 +111,8 @@ def csv(
     ambiguous is asked for. Poses, loads and repeats are counted where no column numbers them. The end of the output states
     what was read, how, and what was left out.
     """
+    from rich.console import Console
+
     from elastocal.campaigns.campaign import DOCUMENT
     from elastocal.campaigns.measurements import CSV, PARQUET, write_measurements
     from elastocal.campaigns.reading import read_descriptions, read_robot
@@ -152,19 +154,17 @@ def csv(
     lines = [*_summary(found), f"written: {(folder / CSV).as_posix()}"]
     if known and (new := ", ".join(sorted({*found.table["target"].tolist()} - known))):
         lines.append(f"! campaign.yaml there has no target {new}: name it there, or in place of one of its own")
-    _tell(lines)
+    print_lines(lines, Console())
 
 
 def _write(result: Imported, output: Path) -> None:
     """Write the robot file, and print what was read."""
+    from rich.console import Console
+
     from elastocal.exchange.robot_text import summary, write_robot
 
     write_robot(result, output)
-    _tell([*summary(result), f"written: {output.as_posix()}"])
-
-
-def _tell(lines: list[str]) -> None:
-    typer.echo("\n".join(map(printable, lines)))
+    print_lines([*summary(result), f"written: {output.as_posix()}"], Console())
 
 
 def _pairs(option: str, texts: list[str] | None) -> dict[str, str]:

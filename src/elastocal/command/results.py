@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer import Argument, Option
 
-from elastocal.command.terminal import PhysicsOnly, diagnosed_campaign, length_m, print_answer, print_lines, robots, workplace
+from elastocal.command.terminal import diagnosed_campaign, length_m, print_answer, print_lines, robots, workplace
 from elastocal.counting import counted, first_names, grouped
 from elastocal.errors import InputError
 
@@ -51,8 +51,6 @@ def correct(
         bool,
         Option("--allow-large-steps", help="Accept joints that turn by more than 5 times what the path turns, and 10 degrees."),
     ] = False,
-    physics_only: PhysicsOnly = False,
-    partial: Annotated[bool, Option("--partial", help="Write the file even if some targets cannot be reached.")] = False,
 ) -> None:
     """Compute the joint targets that reach the wanted poses.
 
@@ -86,7 +84,7 @@ def correct(
     check_places(*files)
     if not output.parent.is_dir():
         raise InputError(output, "", "no such folder", "a file in a folder that is there")
-    campaign = diagnosed_campaign(folder, physics_only)
+    campaign = diagnosed_campaign(folder)
     calibrated = campaign.calibrated
     robot = calibrated.robot
     named = axes_of(controller, robot.chain.prismatic, axes) if controller else ()
@@ -95,69 +93,66 @@ def correct(
     print_lines((f"assumed: {line}" for line in assumptions(calibrated, operating)), console)
     with console.status("correcting"):
         found = find_joint_targets(calibrated, wanted.position, wanted.rotation, operating, wanted.start)
-    good = found.status == OK
-    if not good.all() and not partial:
-        rows = first_names([f"line {wanted.lines[row]} is {found.status[row]}" for row in (~good).nonzero()[0]], _NAMED)
-        reached = "poses that the robot reaches within its limits, in the posture that q1..qn state if any, or --partial"
+    if (failed := np.flatnonzero(found.status != OK)).size:
+        rows = first_names([f"line {wanted.lines[row]} is {found.status[row]}" for row in failed], _NAMED)
+        reached = "poses that the robot reaches within its limits, in the posture that q1..qn state if any"
         raise InputError(path, "", rows, reached)
-    if controller and not good.any():
-        raise InputError(path, "", "no pose that the robot reaches", "one at least, for a program")
-    swings = _swings(wanted, found, good, robot)
+    swings = _swings(wanted, found, robot)
     if swings and not allow_large_steps:
         raise InputError(path, "", first_names(swings, 1), "targets between, another posture, or --allow-large-steps")
     wrench = np.zeros((len(wanted), 6)) if wanted.wrench is None else wanted.wrench
     outside, loaded = beyond_fitted(calibrated, found.joint_angles, wrench)
     heavy = beyond_fitted(calibrated, found.joint_angles, wrench, _LOADS_BOUNDED)[1]
     status = found.status.astype(object)
-    status[good & outside] = f"{NO_BOUND}joints outside the fitted range"
-    status[good & heavy] = f"{NO_BOUND}loads beyond {_LOADS_BOUNDED:g} times the measured ones"
-    bounded, beyond = good & ~outside & ~heavy, outside | loaded
+    status[outside] = f"{NO_BOUND}joints outside the fitted range"
+    status[heavy] = f"{NO_BOUND}loads beyond {_LOADS_BOUNDED:g} times the measured ones"
+    bounded, beyond = status == OK, outside | loaded
     errors = predict_errors(calibrated, found.joint_angles, operating, draws=0)
     before = before_m(calibrated, wanted.position, wanted.rotation, found.error_before)
-    with write_together(output.parent, [file.name for file in files]) as folder_of_all:
-        write_csv(folder_of_all / output.name, _joint_targets(wanted, wrench, found, before, errors, beyond, status))
+    with write_together(output.parent, [file.name for file in files]) as partial:
+        write_csv(partial / output.name, _joint_targets(wanted, wrench, found, before, errors, beyond, status))
         if controller:
-            targets = targets_of(found.joint_angles[good], robot.chain.prismatic, named)
-            write_text(folder_of_all / files[1].name, controller.program(name, targets, _notes(campaign, wrench[good])))
-    share, lines = f"{grouped(good.sum())} of {counted(len(good), 'target')}", []
+            targets = targets_of(found.joint_angles, robot.chain.prismatic, named)
+            write_text(partial / files[1].name, controller.program(name, targets, _notes(campaign, wrench)))
+    lines = []
     if bounded.any():
         known = predict_errors(calibrated, found.joint_angles[bounded], operating.part(bounded))
-        accuracy = known.accuracy("the targets" if bounded[good].all() else "the targets with a bound")
+        accuracy = known.accuracy("the targets" if bounded.all() else "the targets with a bound")
         uncorrected = f"uncorrected they would be missed by {millimetres(root_mean_square(before[bounded]))} RMS"
         lines += [accuracy_sentence(accuracy), uncorrected]
+    count = counted(len(wanted), "target")
     if calibrated.remainder is not None:
-        added = np.linalg.norm(regressed(calibrated, found.joint_angles[good], operating.part(good)), axis=1)
+        added = np.linalg.norm(regressed(calibrated, found.joint_angles, operating), axis=1)
         size = f"{millimetres(root_mean_square(added[added > 0.0]))} RMS" if added.any() else "nothing"
-        acts = f"{grouped((added > 0.0).sum())} of {counted(len(added), 'target')}"
         words = campaign.verdict["remainder"]["words"]
-        lines.append(f"a {words} on what the model leaves corrects {acts} by {size}; --physics-only leaves it out")
+        lines.append(f"a {words} on what the model leaves corrects {grouped((added > 0.0).sum())} of {count} by {size}")
     if controller:
         called = ", ".join(f"q{number} as {axis}" for number, axis in enumerate(named, 1))
-        lines.append(f"{files[1].name} goes to {share}: {controller.words}, {called}")
+        lines.append(f"{files[1].name} goes to all of them: {controller.words}, {called}")
     alarms = [each["sentence"] for each in campaign.verdict["misplaced"]]
     if swings:
         alarms.append(first_names(swings, _NAMED))
-    if unbounded := int((good & ~bounded).sum()):
+    if not bounded.all():
         what = f"{_LOADS_BOUNDED:g} times the measured loads or outside the fitted range of joints"
-        alarms.append(f"no bound is stated for {grouped(unbounded)} of {counted(int(good.sum()), 'target')}: beyond {what}")
+        alarms.append(f"no bound is stated for {grouped((~bounded).sum())} of {count}: beyond {what}")
     if beyond.any():
-        some = f"{grouped(beyond.sum())} of {counted(len(beyond), 'target')}"
-        alarms.append(f"{some} lie beyond the poses or loads of the campaign: their predicted errors are extrapolated")
+        some = f"{grouped(beyond.sum())} of {count} lie beyond the poses or loads of the campaign"
+        alarms.append(f"{some}: their predicted errors are extrapolated")
     lines += [*(f"! {alarm}" for alarm in alarms), *map(str, files)]
-    print_answer(good.all(), f"{share} corrected", lines, f"elastocal certificate {folder} --tolerance 0.2mm", console)
+    print_answer(True, f"{count} corrected", lines, f"elastocal certificate {folder} --tolerance 0.2mm", console)
 
 
-def _swings(wanted: TargetPath, found: Correction, good: np.ndarray, robot: Robot) -> list[str]:
-    """A line for each joint that moves farther from one reached target to the next than `allowed_steps`."""
+def _swings(wanted: TargetPath, found: Correction, robot: Robot) -> list[str]:
+    """A line for each joint that moves farther from one target to the next than `allowed_steps`."""
     from elastocal.application.compensation import large_steps
 
-    lines = [wanted.lines[row] for row in good.nonzero()[0]]
-    return [
-        f"line {lines[row]}: joint {joint + 1} shifts by {1e3 * step:.0f} mm, {1e3 * most:.0f} allowed"
-        if robot.chain.prismatic[joint]
-        else f"line {lines[row]}: joint {joint + 1} turns by {math.degrees(step):.1f} degrees, {math.degrees(most):.1f} allowed"
-        for row, joint, step, most in large_steps(robot, wanted.position[good], wanted.rotation[good], found.joint_angles[good])
-    ]
+    def words(row: int, joint: int, step: float, most: float) -> str:
+        if robot.chain.prismatic[joint]:
+            return f"line {wanted.lines[row]}: joint {joint + 1} shifts by {1e3 * step:.0f} mm, {1e3 * most:.0f} allowed"
+        turns = f"turns by {math.degrees(step):.1f} degrees, {math.degrees(most):.1f} allowed"
+        return f"line {wanted.lines[row]}: joint {joint + 1} {turns}"
+
+    return [words(*step) for step in large_steps(robot, wanted.position, wanted.rotation, found.joint_angles)]
 
 
 def _notes(campaign: Diagnosed, wrench: np.ndarray) -> list[str]:
@@ -216,7 +211,6 @@ def certificate(
     folder: Annotated[Path, Argument(help="Folder of a diagnosed campaign.")],
     tolerance: Annotated[str, Option(help="Largest allowed RMS position error, such as 0.2mm.")],
     risk: Annotated[float, Option(min=0.001, max=0.5, help="Accepted risk of a wrong decision.")] = 0.05,
-    physics_only: PhysicsOnly = False,
 ) -> None:
     """Certify a robot against a tolerance: pass, fail or undecided.
 
@@ -236,7 +230,7 @@ def certificate(
 
     console = Console(stderr=True)
     limit = length_m("--tolerance", tolerance)
-    found = diagnosed_campaign(folder, physics_only)
+    found = diagnosed_campaign(folder)
     place = workplace() / "reports" / "loop" / found.name
     check_places(place / PAGES, place / DOCUMENT, top=workplace() / "reports")
     if data_at_fault(found.verdict):

@@ -7,9 +7,7 @@ import math
 import re
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-from typer import Option
+from typing import TYPE_CHECKING
 
 from elastocal.errors import InputError, escaped
 
@@ -35,9 +33,6 @@ LARGEST_SEED, MOST_POSES, MOST_ROWS = 2**32 - 1, 10_000, 10_000_000
 _SNAKEFILE = "Snakefile"
 # Where a wheel has the Snakefile, rules and configuration; see `data-files` in pyproject.toml.
 _INSTALLED = f"share/elastocal/{_SNAKEFILE}"
-PhysicsOnly = Annotated[
-    bool, Option("--physics-only", help="Leave out the regression on what the model leaves: correct by named effects alone.")
-]
 
 
 def length_m(option: str, text: str) -> float:
@@ -127,7 +122,7 @@ def _checkout() -> Path | None:
     return None
 
 
-def diagnosed_campaign(folder: Path, physics_only: bool = False) -> Diagnosed:
+def diagnosed_campaign(folder: Path) -> Diagnosed:
     """A campaign with what its diagnosis found, as `load_diagnosed`; results by other libraries or pins come with a warning."""
     from rich.console import Console
 
@@ -139,4 +134,4 @@ def diagnosed_campaign(folder: Path, physics_only: bool = False) -> Diagnosed:
     if other := [name for name in sorted(was | now) if was.get(name) != now.get(name)]:
         there, here = (", ".join(f"{name} {each.get(name, 'none')[:12]}" for name in other) for each in (was, now))
         print_lines([f"warning: {folder} was diagnosed with {there}; here are {here}"], Console(stderr=True))
-    return found.by_physics() if physics_only else found
+    return found
