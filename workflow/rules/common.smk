@@ -15,8 +15,7 @@ from elastocal.campaigns.importers import importer
 from elastocal.campaigns.reading import campaign_files
 from elastocal.campaigns.sources import campaign_sources, named_league, user_campaign
 from elastocal.errors import InputError
-from elastocal.io.origin import Origin, configuration_sha256, environment
-from elastocal.io.provenance import SOURCES_DIGEST
+from elastocal.io.origin import SOURCES_DIGEST, Origin, configuration_sha256, environment
 from elastocal.io.records import checksum
 from elastocal.report.outcome import outcome
 from elastocal.study.configuration import check_study, rows_read, override

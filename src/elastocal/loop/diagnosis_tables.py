@@ -17,7 +17,7 @@ from elastocal.fitting.least_squares import fit
 from elastocal.fitting.model import Estimate, case_from, parameters
 from elastocal.fitting.noise import noise_facts, noise_from
 from elastocal.io.json_files import read_json, write_json
-from elastocal.io.provenance import provenance
+from elastocal.io.origin import provenance
 from elastocal.io.storage import read_table, write_table
 from elastocal.loop.schemas import STEPS, measurements
 from elastocal.mechanics.robot_file import robot_from_document

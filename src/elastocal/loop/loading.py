@@ -10,7 +10,7 @@ from elastocal.campaigns.holdout import split
 from elastocal.effects.catalogue import effects
 from elastocal.io.documents import read_document
 from elastocal.io.json_files import write_json
-from elastocal.io.provenance import provenance
+from elastocal.io.origin import provenance
 from elastocal.io.storage import write_table
 from elastocal.loop.schemas import measurements
 

@@ -24,7 +24,7 @@ from elastocal.diagnosis.misplaced import misplaced
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.model import Case, case_from
 from elastocal.io.json_files import read_json, write_json
-from elastocal.io.provenance import provenance
+from elastocal.io.origin import provenance
 from elastocal.io.storage import write_table
 from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop.loading import load_campaign

@@ -31,7 +31,7 @@ from elastocal.fitting.model import declared_model
 from elastocal.fitting.observations import select_states
 from elastocal.fitting.tolerances import fit_declared
 from elastocal.io.data_frames import read_frame, write_csv
-from elastocal.io.provenance import provenance
+from elastocal.io.origin import provenance
 from elastocal.io.storage import write_table
 from elastocal.loop.whole import calibrated_by, cases_in
 from elastocal.mechanics.kinematics import jacobians, pose_differences

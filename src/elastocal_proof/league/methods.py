@@ -16,7 +16,7 @@ from elastocal.errors import InputError
 from elastocal.fitting.model import Case, case_from
 from elastocal.fitting.tolerances import estimated_noise, fit_declared
 from elastocal.io.json_files import read_json, write_json
-from elastocal.io.provenance import provenance
+from elastocal.io.origin import provenance
 from elastocal.io.storage import read_table, write_table
 from elastocal.loop.diagnosis_tables import diagnosis_facts, parameter_columns, step_fit
 from elastocal.loop.loading import described_campaign
