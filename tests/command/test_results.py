@@ -173,7 +173,7 @@ def test_a_certificate_states_the_campaign_and_correct_its_targets(elastocal, re
     # The answer in three lines: the decision, over which poses and of which point, what is missing.
     lines = result.output.splitlines()
     assert document["conformity"]["decision"] in lines[0] and "0.500 mm" in lines[0]
-    assert document["point"] in lines[1] and "Nobody has measured" in lines[2] and lines[3].endswith(".pdf")
+    assert "Nobody has measured" in lines[1] and document["point"] in lines[2] and lines[3].endswith(".pdf")
     rows = error_rows(json.loads(VERDICT.read_text()))
     assert document["errors"] == rows and len(rows) == 2
     assert document["budget"][0]["name"] == "uncorrected" and rows[1][1] == f"{1e3 * document['budget'][0]['rms_m']:.3f} mm"

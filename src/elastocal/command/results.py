@@ -6,7 +6,7 @@ import math
 import tempfile
 from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from typer import Argument, Option
@@ -16,8 +16,6 @@ from elastocal.counting import counted, first_names, grouped
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     import numpy as np
     import pandas as pd
 
@@ -243,29 +241,10 @@ def certificate(
             budget = budget_bars(document["budget"], names, limit, document["tracker_rms_m"])
             write_certificate(partial / PAGES, facts, [*save_all({"budget": budget}, scratch).values()])
             write_json(partial / DOCUMENT, document)
-    passed, (answer, *details) = facts["decision"] == "pass", _lines(document)
+    passed, answer = facts["decision"] == "pass", f"{facts['decision']}, as predicted: {facts['headline']}"
+    details = [facts["decision_sentences"], facts["point"], *(f"! {each['sentence']}" for each in document["misplaced"])]
     print_answer(passed, answer, [*details, str(place / PAGES), str(place / DOCUMENT)], facts["now"], console)
     raise typer.Exit(0 if passed else 1)
-
-
-def _lines(document: Mapping[str, Any]) -> list[str]:
-    """The answer in three lines: the decision by its criterion; over which poses and of which point; why, or what it lacks."""
-    from elastocal.application.accuracy import Accuracy, millimetres
-    from elastocal.application.frames import FRAMES
-
-    found, accuracy = document["conformity"], Accuracy(**document["accuracy"])
-    answer = f"{found['decision']}: no error is predicted of a robot of which nothing was fitted"
-    if accuracy.fitted or accuracy.form_m:
-        answer = (
-            f"{found['decision']}, as predicted: the RMS position error of the corrected robot is"
-            f" {millimetres(accuracy.rms_m)}, {1 - found['accepted_risk']:.0%} sure to be below"
-            f" {millimetres(found['limit_m'])}, the tolerance {millimetres(found['tolerance_m'])}"
-        )
-    poses = f"In {FRAMES[accuracy.frame].removeprefix('in ')}, over {accuracy.region} ({accuracy.poses})"
-    where = f"{poses}, {millimetres(accuracy.worst_m)} at the worst of them. {document['point']}"
-    rest = [f"Too little for a pass: {'; '.join(found['shortfalls'])}."] if found["shortfalls"] else []
-    rest.append("Nobody has measured the corrected robot: command corrected targets, measure them, and compare.")
-    return [answer, where, " ".join(rest), *(f"! {each['sentence']}" for each in document["misplaced"])]
 
 
 def export(
