@@ -22,7 +22,7 @@ def said(found, words):
 def test_what_was_read_and_can_be_tested_stands_in_the_table_and_what_is_little_below(found):
     rows = dict(found.rows)
     assert found.diagnosable and found.testable > 20 and rows["testable"].startswith(f"{found.testable} candidate")
-    assert "6 joints, position in the base frame" in rows["read"]
+    assert "6 joints" in rows["read"] and any("position of 3DoF, 6DoF in the base frame" in words for _, words in found.rows)
     assert any(" not testable: " in words for _, words in found.rows)
     assert 1.0 < float(rows["noise"].split(" ")[0]) < 1000.0
     assert rows["accuracy"].startswith("if the declared model is complete: Predicted position error")

@@ -3,16 +3,15 @@ contents of its certificate, how good the robot is, against what, and how sure t
 
 from __future__ import annotations
 
-import platform
 from dataclasses import asdict, dataclass, replace
 from datetime import date
 from functools import cached_property
-from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from elastocal import __version__
 from elastocal.application.accuracy import (
     REGION,
     calibrate_on_case,
@@ -42,8 +41,6 @@ if TYPE_CHECKING:
 
     from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
     from elastocal.fitting.model import Case
-
-_LIBRARIES = ("elastocal", "numpy", "scipy")
 
 
 @dataclass(frozen=True)
@@ -148,7 +145,7 @@ def certificate(
         "serial": document.get("serial_number", ""),
         "date": date.today().isoformat(),
         "stated": {"measured_on": document.get("measured_on", "")} | document.get("certificate", {}),
-        "versions": {name: metadata.version(name) for name in _LIBRARIES} | {"python": platform.python_version()},
+        "version": __version__,
         "origin": found.origin,
         "files": {Path(file).name: checksum(file) for file in campaign_files(folder, robots_folder)},
         "verdict": verdict["verdict"],

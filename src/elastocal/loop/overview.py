@@ -103,19 +103,16 @@ def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
 def _read(case: Case, training: Measurements, held_out: Measurements) -> list[tuple[str, str]]:
     """What was read."""
     campaign, states = case.campaign, case.observations.states
-    sessions, most = len(np.unique(states.session)), int(states.repeats.max())
+    sessions, most = counted(len(np.unique(states.session)), "session"), int(states.repeats.max())
+    force = np.linalg.norm(states.wrench[:, :3], axis=1).max()
     # Numbers of loads are labels; 0 is none.
-    loads = {int(load) for load in states.load}
-    loaded, force = len(loads - {0}), np.linalg.norm(states.wrench[:, :3], axis=1).max()
-    parts = ["unloaded"] * (0 in loads) + [f"{counted(loaded, 'load')} of up to {force:,.0f} N"] * (loaded > 0)
-    repeats = "each state measured once" if most == 1 else f"a state measured up to {most} times"
-    poses = f"{counted(_poses(training), 'pose')} to fit and {counted(_poses(held_out), 'validation pose')}"
-    targets = ", ".join(target.name for target in campaign.targets) + (f", {sessions} sessions" if sessions > 1 else "")
-    robot = f"{campaign.name}: {campaign.robot.name}, {counted(campaign.robot.joints, 'joint')}"
+    loaded = np.unique(states.load[states.load != 0]).size
+    loads = f"{counted(loaded, 'load')} of up to {force:,.0f} N" if loaded else "no load"
     return [
-        ("read", f"{robot}, {campaign.measured} in the {campaign.frame} frame"),
-        ("", f"{poses}; {counted(len(training), 'measurement')} of {targets}"),
-        ("", f"{' and '.join(parts)}; {repeats}"),
+        ("read", f"{campaign.name}: {campaign.robot.name}, {counted(campaign.robot.joints, 'joint')}"),
+        ("", f"{campaign.measured} of {', '.join(target.name for target in campaign.targets)} in the {campaign.frame} frame"),
+        ("", f"{counted(_poses(training), 'pose')} to fit and {counted(_poses(held_out), 'validation pose')} in {sessions}"),
+        ("", f"{counted(len(training), 'measurement')}, up to {most} of a state, {loads}"),
     ]
 
 
