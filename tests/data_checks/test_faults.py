@@ -6,8 +6,19 @@ import numpy as np
 import pytest
 from made_campaigns import POINTS, Plan, made, with_geometric_errors, with_measured, with_other_compliances
 from scipy.spatial.transform import Rotation
+from synthetic import NOISE
 
-from elastocal.data_checks.faults import constant_columns, faults, implausible_measurements, shuffled_rows
+from elastocal.data_checks.faults import (
+    compliance_warnings,
+    constant_columns,
+    controller_warnings,
+    faults,
+    implausible_measurements,
+    shuffled_rows,
+)
+from elastocal.fitting.least_squares import fit
+from elastocal.fitting.model import declared_model
+from elastocal.fitting.observations import averaged
 
 PLANS = {
     "base": Plan(poses=10, loads=2),
@@ -26,11 +37,11 @@ def test_no_fault_is_found_where_the_model_is_right(fanuc, plan, seed):
 
 
 @pytest.mark.parametrize(("seed", "plan"), list(enumerate(PLANS)))
-def test_nothing_decisive_is_found_where_the_model_lacks_something(kuka, plan, seed):
+def test_no_fault_is_found_where_the_model_lacks_something(kuka, plan, seed):
     """Springs, zeros, a sag and lengths off, which is most at once."""
     offsets = np.random.default_rng(seed).normal(0.0, 3e-3, kuka.joints)
     true_robot = with_geometric_errors(with_other_compliances(kuka, seed, 0.5), seed, 0.01)
-    assert not [fault for fault in faults(made(kuka, seed, PLANS[plan], true_robot, offsets, sag=3e-3)) if fault.decisive]
+    assert faults(made(kuka, seed, PLANS[plan], true_robot, offsets, sag=3e-3)) == ()
 
 
 def test_a_wrong_sign_is_not_called_shuffled_rows(fanuc):
@@ -49,7 +60,7 @@ def twelve_poses(request, fanuc):
 def test_positions_that_stand_still_are_named(twelve_poses, kept, words, value, same):
     still = np.where(kept, twelve_poses.measurements.position, value)
     (fault,) = constant_columns(with_measured(twelve_poses, position=still))
-    assert (fault.name, fault.decisive) == ("constant_columns", True)
+    assert fault.name == "constant_columns"
     assert fault.detail.startswith(words) and f" {same} in all 12 poses" in fault.detail
 
 
@@ -86,7 +97,7 @@ def test_measurements_in_the_rows_of_each_other_are_named_with_these_rows(campai
     source[some] = rng.permutation(some) if share else some[::-1]
     moved = some[source[some] != some]
     (fault,) = shuffled_rows(with_rows(campaign, source))
-    assert (fault.name, fault.joints, fault.decisive) == ("shuffled_rows", (), True)
+    assert (fault.name, fault.joints) == ("shuffled_rows", ())
     assert set(fault.rows) <= set((moved + 1).tolist()) and len(fault.rows) >= 0.9 * len(moved)
     assert fault.evidence[1] < fault.evidence[0] / 5
 
@@ -118,7 +129,47 @@ def test_a_robot_off_along_a_dense_path_is_not_shuffled(fanuc):
 def test_measurements_of_another_robot_are_named_and_those_of_one_off_by_centimetres_are_not(fanuc, kuka, tracker):
     campaign = made(fanuc, 1, Plan(poses=20, tracker=tracker))
     (fault,) = implausible_measurements(replace(campaign, robot=kuka))
-    assert (fault.name, fault.decisive) == ("implausible_measurements", True)
+    assert fault.name == "implausible_measurements"
     assert fault.parameters[0].value > 0.1 and "\n" not in fault.detail
     off = made(fanuc, 1, Plan(poses=20, tracker=tracker), with_geometric_errors(fanuc, 1, 0.01), 5e-3, sag=5e-3)
     assert implausible_measurements(off) == []
+
+
+def warned(robot, factors=1.0, turned=1.0, known=True):
+    """Warnings of a fit of the compliances of a robot that are so many times those that its file states, or are usual."""
+    file = replace(robot, compliance_known=known)
+    campaign = made(file, 1, Plan(poses=12), replace(robot, compliance=robot.compliance * factors))
+    campaign = with_measured(campaign, wrench=turned * campaign.measurements.wrench)
+    return compliance_warnings(fit(declared_model(campaign), averaged(campaign.measurements), NOISE))
+
+
+@pytest.mark.parametrize(
+    ("factor", "known", "words"),
+    [(0.3, True, ""), (3.0, True, ""), (9.8, True, "nominal"), (0.1, True, "nominal"), (9.8, False, "")],
+)
+def test_a_compliance_that_no_robot_has_is_named_with_its_standard_error(fanuc, factor, known, words):
+    found = warned(fanuc, [1, factor, 1, 1, 1, 1], known=known)
+    assert len(found) == bool(words)
+    for warning in found:
+        assert "joint 2 " in warning and "joint 3" not in warning and "±" in warning and words in warning
+
+
+def test_loads_turned_round_are_seen_by_compliances_below_zero_and_joints_without_any_are_rigid(fanuc):
+    (warning,) = warned(fanuc, turned=-1.0, known=False)
+    assert all(f"joint {joint} -" in warning for joint in range(1, 7)) and "usual for such a robot" in warning
+    rigid = replace(made(replace(fanuc, compliance_known=False), 1), compliance="nominal")
+    (warning,) = compliance_warnings(fit(declared_model(rigid), averaged(rigid.measurements), NOISE))
+    assert "taken as rigid" in warning
+
+
+@pytest.mark.parametrize("tracker", [True, False])
+@pytest.mark.parametrize(("decimals_deg", "decimals_mm"), [(12, 12), (4, 3), (3, 2)])
+def test_positions_of_the_files_own_kinematics_are_said_to_be_no_measurements(fanuc, tracker, decimals_deg, decimals_mm):
+    """Angles and positions rounded as a controller shows them."""
+    campaign = made(fanuc, 1, Plan(poses=14, loads=0, tracker=tracker, oriented=False, noise=0.0))
+    angles = np.radians(np.degrees(campaign.measurements.joint_angles).round(decimals_deg))
+    position = (1e3 * campaign.measurements.position).round(decimals_mm) / 1e3
+    (sentence,) = controller_warnings(with_measured(campaign, joint_angles=angles, position=position))
+    assert "no measurements" in sentence and "own kinematics" in sentence
+    measured = position + 6e-5 * np.random.default_rng(1).standard_normal(position.shape)
+    assert controller_warnings(with_measured(campaign, joint_angles=angles, position=measured)) == []

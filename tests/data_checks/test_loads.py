@@ -50,19 +50,18 @@ def selected(campaign, kept):
     return replace(campaign, measurements=campaign.measurements.select(kept))
 
 
-@pytest.mark.parametrize("loaded_only", [False, True])
-def test_joints_off_their_zeros_leave_no_trace_in_the_deflections(fanuc, loaded_only):
-    """As means of a pose, or by projection where each pose has one load."""
+def test_joints_off_their_zeros_leave_no_trace_in_the_deflections(fanuc):
     plan = Plan(poses=40, loads=1, noise=0.0)
     straight, off = (made(fanuc, 1, plan, true_offset=offset) for offset in (0.0, 2e-3 * np.array([1, -1, 1, -1, 1, -1])))
     assert np.linalg.norm(off.measurements.position - straight.measurements.position, axis=1).max() > 3e-3
-    one, other = (deflections(selected(each, each.measurements.load >= loaded_only)) for each in (straight, off))
+    one, other = map(deflections, (straight, off))
     # What is left is of second order: two milliradians of every deflection.
     assert np.abs(other.seen - one.seen).max() < 0.02 * np.abs(one.seen).max()
 
 
-def test_nothing_is_said_without_loads_or_known_compliances_or_with_too_few_poses(campaign):
+def test_nothing_is_said_without_differing_loads_or_known_compliances_or_with_too_few_poses(campaign):
     seen = campaign.measurements
+    assert deflections(selected(campaign, seen.load == 1)) is None
     assert deflections(with_measured(campaign, wrench=0.0 * seen.wrench)) is None
     assert deflections(replace(campaign, robot=replace(campaign.robot, compliance_known=False))) is None
     assert deflections(selected(campaign, seen.pose < 3)) is None
@@ -130,11 +129,11 @@ def test_of_two_units_within_reach_the_one_by_which_compliances_are_nearest_nomi
     # 1.4 times pounds-force are 0.63 times kilogram-force, and 1.55 times 0.70.
     (fault,) = wrong_loads(made_deflections(force=POUND, moment=POUND, ratios=1.4))
     assert fault.detail.startswith("the loads look like pounds-force")
-    assert "; less likely, the loads look like kilogram-force: measurements fit 9.81 times" in fault.detail
+    assert [each.startswith("the loads look like kilogram-force") for each in fault.alternatives] == [True]
     (fault,) = wrong_loads(made_deflections(force=POUND, moment=POUND, ratios=1.55))
-    assert fault.detail.startswith("the loads look like kilogram-force") and "; less likely" in fault.detail
+    assert fault.detail.startswith("the loads look like kilogram-force") and fault.alternatives
     (fault,) = wrong_loads(made_deflections(force=KILOGRAM, moment=KILOGRAM))
-    assert "less likely" not in fault.detail
+    assert not fault.alternatives
 
 
 @pytest.fixture(scope="module", params=["base", "tracker"])
@@ -146,7 +145,7 @@ def loaded(request, fanuc):
 def test_loads_in_another_unit_are_named_with_its_factor(loaded, factor):
     written = loaded.measurements.wrench / np.repeat(factor, 3)
     (fault,) = wrong_loads(deflections(with_measured(loaded, wrench=written)))
-    assert (fault.name, fault.joints, fault.decisive) == ("wrong_unit", (), True)
+    assert (fault.name, fault.joints) == ("wrong_unit", ())
     assert [value.value for value in fault.parameters[:2]] == pytest.approx(factor)
     assert fault.evidence[1] < 0.5 * fault.evidence[0]
 
@@ -155,11 +154,3 @@ def test_loads_turned_round_are_named(loaded):
     (fault,) = wrong_loads(deflections(with_measured(loaded, wrench=-loaded.measurements.wrench)))
     assert (fault.name, fault.joints) == ("wrong_sign", ()) and "loads" in fault.detail
     assert -2.0 < fault.parameters[0].value < -0.5
-
-
-@pytest.mark.parametrize("factor", [1 / KILOGRAM, -1.0, 1.0])
-def test_unit_and_sign_are_named_without_unloaded_measurements(fanuc, factor):
-    loaded = made(fanuc, 5, Plan(poses=40, loads=1, tracker=True, oriented=False))
-    loaded = selected(loaded, loaded.measurements.load > 0)
-    found = wrong_loads(deflections(with_measured(loaded, wrench=factor * loaded.measurements.wrench)))
-    assert told(found) == pytest.approx({1.0: (1, 1, 1), -1.0: (-1, 1, 1)}.get(factor, (1, KILOGRAM, KILOGRAM)))

@@ -1,6 +1,7 @@
 """Every fault of the data, sought before any physics: constant columns, other interpretations, loads, shuffled rows, nonsense.
 
-Where it is ambiguous none is found: a false alarm stops a trace that was right, a miss only leaves it to what comes after.
+Where it is ambiguous none is found: a false alarm stops a trace that was right, a miss only leaves it to what comes after. What
+stops nothing is a warning.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
-from elastocal.data_checks.alternatives import other_interpretations
+from elastocal.data_checks.hypotheses import other_interpretations
 from elastocal.data_checks.loads import deflections, wrong_loads
 from elastocal.data_checks.placement import (
     FAR_BETTER,
@@ -22,13 +23,14 @@ from elastocal.data_checks.placement import (
     robust_sigma,
     robustly_placed,
     spread,
-    trimmed_rms,
 )
 from elastocal.data_checks.protocol import Fault, Value
+from elastocal.fitting.model import joint_compliances
 from elastocal.fitting.observations import state_clusters
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign
+    from elastocal.fitting.least_squares import Fit
 
 # Below the last digit that any sensor writes (0.1 µm) and any controller reports (1e-6 rad or so).
 _SAME_M, _SAME_RAD, _FEWEST_POSES = 1e-6, 1e-6, 3
@@ -41,16 +43,23 @@ _NO_CHANCE, _MOST, _FEWEST_ROWS = 0.25, 0.8, 2
 _SAME_PLACE_M, _ARM_M = 1e-3, 0.5
 # Five times what no geometric error and no deflection makes.
 _FARTHEST_M, _FARTHEST_RAD = 5 * IMPLAUSIBLE_M, 5 * IMPLAUSIBLE_RAD
+# Compliances of a robot and those published for its make differ by up to two or so; five is a unit, a sign or another effect
+# that was taken for a joint's. What is usual for a robot's size is itself known to a factor of five.
+_MOST_OFF_NOMINAL, _MOST_OFF_USUAL = 5.0, 25.0
+_RIGID = (
+    "the robot file states no joint compliances: the joints are taken as rigid, and do not yield to the weights that it may"
+    " state; load the robot and set compliance to identify, or state them"
+)
+# No robot goes where its nominal kinematics are to less: a tenth of what good robots are off. Rounding to 0.001° is less.
+_NO_ROBOT_M = 3e-5
 
 
 def faults(campaign: Campaign) -> tuple[Fault, ...]:
     """Every fault that the measurements of a campaign show; none is looked for where another one makes that meaningless."""
-    found: list[Fault] = []
     for find in (constant_columns, other_interpretations):
-        found += find(campaign)
-        if any(fault.decisive for fault in found):
+        if found := find(campaign):
             return tuple(found)
-    return (*found, *wrong_loads(deflections(campaign)), *(shuffled_rows(campaign) or implausible_measurements(campaign)))
+    return (*wrong_loads(deflections(campaign)), *(shuffled_rows(campaign) or implausible_measurements(campaign)))
 
 
 def constant_columns(campaign: Campaign) -> list[Fault]:
@@ -77,7 +86,7 @@ def constant_columns(campaign: Campaign) -> list[Fault]:
             kinds["angles"] = f"{same}, though the measurements of {who} lie {moved:.2g} m apart", moved
         count = (Value("poses", float(poses), "–"),)
         for kind, (detail, size) in kinds.items():
-            found.setdefault(kind, Fault("constant_columns", (), detail, count, (float(size), 0.0), (), True))
+            found.setdefault(kind, Fault("constant_columns", (), detail, count, (float(size), 0.0)))
     return list(found.values())
 
 
@@ -106,8 +115,8 @@ def shuffled_rows(campaign: Campaign) -> list[Fault]:
     rows = np.flatnonzero(out)
     if len(rows) < _FEWEST_ROWS:
         return []
-    places = [_places(*pose)[rows] for pose in (beside.measured, beside.predicted)]
-    predicted, (left, number) = places[1], map(np.asarray, cKDTree(places[0]).query(places[1]))
+    measured, predicted = (_places(*pose)[rows] for pose in (beside.measured, beside.predicted))
+    left, number = map(np.asarray, cKDTree(measured).query(predicted))
     source = rows[number]
     back = (left < level) & (left < _NO_CHANCE * _spacing(predicted)) & (source != rows)
     # Each measurement has one place: one that stands for many is no permutation.
@@ -121,7 +130,7 @@ def shuffled_rows(campaign: Campaign) -> list[Fault]:
     detail = f"{back.sum()} of {len(measurements)} rows fit with the measured columns of another one of them"
     concerned = tuple(sorted(measurements.row[rows[back]].tolist()))
     share = Value("share of the measurements", float(back.mean() * len(rows) / len(measurements)), "–")
-    return [Fault("shuffled_rows", (), detail, (share,), (before, after), concerned, True)]
+    return [Fault("shuffled_rows", (), detail, (share,), (before, after), concerned)]
 
 
 def _places(position: np.ndarray, rotation: np.ndarray | None) -> np.ndarray:
@@ -142,12 +151,10 @@ def _spacing(points: np.ndarray) -> np.ndarray:
 
 def implausible_measurements(campaign: Campaign) -> list[Fault]:
     """Measurements absurdly far from the nominal robot, for a reason that no other fault names; one fault, or none."""
-    some = spread(campaign)
     # Nearly all campaigns are done with the first, which takes a sixth of the time.
     for place in (placed, robustly_placed):
-        placement = place(some)
-        away = trimmed_rms(placement.distance)
-        turned = 0.0 if placement.turn is None else trimmed_rms(placement.turn)
+        placement = place(spread(campaign))
+        away, turned = map(float, placement.misfit)
         if away < _FARTHEST_M and turned < _FARTHEST_RAD:
             return []
     what = f"positions lie {away:.2g} m" if away >= _FARTHEST_M else f"orientations lie {turned:.2g} rad"
@@ -156,4 +163,39 @@ def implausible_measurements(campaign: Campaign) -> list[Fault]:
         " tried mends it: chain, zeros of the joints, measuring points and columns need a look"
     )
     parameters = (Value("RMS distance of positions", away, "m"), Value("RMS turn of orientations", turned, "rad"))
-    return [Fault("implausible_measurements", (), detail, parameters, (rms(placement.distance),) * 2, (), True)]
+    return [Fault("implausible_measurements", (), detail, parameters, (rms(placement.distance),) * 2)]
+
+
+def compliance_warnings(fitted: Fit) -> list[str]:
+    """Name the identified joint compliances of a fit that are negative, or far off nominal either way, in one sentence.
+
+    None where measurements are wrong by centimetres: compliances mean nothing there. Where they are neither identified nor
+    known, that the joints are taken as rigid.
+    """
+    model = fitted.model
+    if not model.identifies_compliance:
+        return [] if model.compliance_known else [_RIGID]
+    if rms(np.linalg.norm(fitted.residual[:, :3], axis=1)) > IMPLAUSIBLE_M:
+        return []
+    std_error = np.sqrt(np.diag(fitted.covariance))[fitted.places_of("joint_compliance")]
+    found, nominal = joint_compliances(model, fitted.estimate), model.nominal_compliance
+    most, word = (_MOST_OFF_NOMINAL, "nominal") if model.compliance_known else (_MOST_OFF_USUAL, "usual for such a robot")
+    # What has no standard error was not identified.
+    off = (std_error > 0) & ((found < nominal / most) | (found > most * nominal))
+    named = [
+        f"joint {j + 1} {1e6 * found[j]:.3g} ± {1e6 * std_error[j]:.2g} ({word} {1e6 * nominal[j]:.3g})"
+        for j in np.flatnonzero(off)
+    ]
+    remedy = "check the sign and the unit of the loads, and whether something else yields too"
+    return [f"joint compliances beyond what robots have, in µrad/(N·m): {', '.join(named)}; {remedy}"] if named else []
+
+
+def controller_warnings(campaign: Campaign) -> list[str]:
+    """Say where positions are those of the robot file's own kinematics, as a controller works them out."""
+    off = rms(placed(campaign).distance)
+    if off > _NO_ROBOT_M:
+        return []
+    return [
+        f"positions are those of the robot file's own kinematics to {1e6 * off:.2g} µm, nearer than any robot goes: a"
+        " controller worked them out of the joint angles; they are no measurements, and show nothing of the robot"
+    ]

@@ -1,4 +1,4 @@
-"""Loads turned round, or in another unit than newtons and newton metres.
+"""Loads turned round, or in another unit than newtons and newton metres, where poses are measured under several.
 
 A load has no size that is absurd in itself: what the loads did to the robot stands beside what the written loads should have
 done by its nominal compliances. All joints give way by the same factor more, or less; one between a third and three is nobody's
@@ -14,12 +14,12 @@ import numpy as np
 from scipy.constants import g, pound_force
 
 from elastocal.campaigns.campaign import groups_of
-from elastocal.data_checks.placement import Placement, jacobians_at_targets, placed, rms, robust_sigma, robustly_placed, spread
+from elastocal.data_checks.placement import placed, rms, robust_sigma, robustly_placed, spread
 from elastocal.data_checks.protocol import Fault, Value
 from elastocal.fitting.normal_equations import solve_normal
 from elastocal.fitting.observations import state_clusters
 from elastocal.mechanics.elastostatics import generalized_forces, regressor
-from elastocal.mechanics.kinematics import jacobians
+from elastocal.mechanics.kinematics import jacobians, position_jacobians
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign
@@ -66,15 +66,10 @@ class Deflections:
 
 
 def deflections(campaign: Campaign) -> Deflections | None:
-    """Differences between the loads of each pose; where there is one load a pose, all of the deflection.
+    """Differences between the loads of each pose.
 
-    Frames, targets and geometry are taken off as means of each target in each pose (within transformation) or, where the loads
-    of a pose do not differ, by projection (Frisch-Waugh-Lovell theorem [1]).
-
-    Returns None without loads or known compliances, for no size of a deflection is to be expected then, or with too few poses.
-
-    [1] Lovell, M. C., Seasonal adjustment of economic time series and multiple regression analysis, Journal of the American
-        Statistical Association 58, 1963.
+    Frames, targets and geometry are taken off as means of each target in each pose (within transformation). Returns None where
+    loads do not differ within poses, compliances are not known or poses are too few: no deflection is to be expected then.
     """
     pose = state_clusters(campaign.measurements)
     loaded = campaign.robot.compliance_known and campaign.measurements.wrench.any()
@@ -84,20 +79,18 @@ def deflections(campaign: Campaign) -> Deflections | None:
     campaign, chain = replace(campaign, measurements=measurements), campaign.robot.chain
     # Frames and targets from the lowest loads: those of a wrong unit must not enter.
     whole = placed(campaign, robustly_placed(spread(campaign)).estimate)
-    residual, jacobian = whole.measured[0] - whole.predicted[0], jacobians_at_targets(campaign, whole.estimate)
+    residual, offsets = whole.measured[0] - whole.predicted[0], whole.estimate.target_offset
+    points = [replace(chain.point(t.point), offset_m=tuple(at)) for t, at in zip(campaign.targets, offsets, strict=True)]
+    jacobian = position_jacobians(chain, measurements.joint_angles, points, measurements.target)
     end = jacobians(chain, measurements.joint_angles, replace(chain.end_effector, offset_m=(0.0, 0.0, 0.0)))
     torques = [generalized_forces(end, measurements.wrench * (np.arange(6) // 3 == part)) for part in (0, 1)]
     parts = [residual[..., None], *(regressor(jacobian, each) * campaign.robot.compliance for each in torques)]
     pose = state_clusters(measurements)
-    rows = [part.reshape(len(measurements), -1) for part in parts]
     group = groups_of(np.column_stack([pose, measurements.target]))[1]
+    rows = [part.reshape(len(measurements), -1) for part in parts]
     centred = [_centred(part, group) for part in rows]
     if sum((part**2).sum() for part in centred[1:]) <= _DIFFERING * sum((part**2).sum() for part in rows[1:]):
-        # Less what frames, targets and joint offsets can explain of them.
-        free = np.concatenate([jacobian, *_of_frames_and_targets(campaign, whole)], axis=-1)
-        left, sizes, _ = np.linalg.svd(free.reshape(residual.size, -1), full_matrices=False)
-        basis, flat = left[:, sizes > 1e-9 * sizes[0]], [part.reshape(residual.size, -1) for part in parts]
-        centred = [values - basis @ (basis.T @ values) for values in flat]
+        return None
     seen, by_force, by_moment = (values.reshape(residual.size, -1) for values in centred)
     return Deflections(seen[:, 0], by_force, by_moment, int(pose.max()) + 1)
 
@@ -109,22 +102,10 @@ def _centred(values: np.ndarray, group: np.ndarray) -> np.ndarray:
     return values - (total / np.bincount(group)[:, None])[group]
 
 
-def _of_frames_and_targets(campaign: Campaign, beside: Placement) -> list[np.ndarray]:
-    """Sensitivities of positions to frames and targets that nobody knows, ndarrays (N, 3, .), base axes."""
-    measurements, columns = campaign.measurements, []
-    if campaign.frame == "tracker":
-        turns = np.stack([np.cross(axis, beside.predicted[0]) for axis in np.eye(3)], axis=-1)
-        rigid = np.concatenate([np.broadcast_to(np.eye(3), turns.shape), turns], axis=-1)
-        columns += [rigid * (measurements.session == session)[:, None, None] for session in np.unique(measurements.session)]
-    unknown = [index for index, target in enumerate(campaign.targets) if target.offset_m is None]
-    return columns + [beside.nominal[1] * (measurements.target == index)[:, None, None] for index in unknown]
-
-
 def wrong_loads(deflected: Deflections | None) -> list[Fault]:
     """The sign and the unit that explain deflections far better than the loads as written; none where nothing does.
 
-    Of units that explain them as well, the one that brings the compliances nearest to the nominal ones, and the next one as
-    less likely.
+    Of units that explain them as well, the one that brings the compliances nearest to the nominal ones, beside the next one.
     """
     if deflected is None:
         return []
@@ -155,14 +136,14 @@ def wrong_loads(deflected: Deflections | None) -> list[Fault]:
     faults = []
     if sign < 0:
         turned = "the loads fit turned round, as if they were written as what the robot does to its surroundings"
-        faults.append(Fault("wrong_sign", (), turned, (slope,), evidence, (), True))
+        faults.append(Fault("wrong_sign", (), turned, (slope,), evidence))
     if detail:
         units = (
             Value("newtons for each unit of force written", force, "N"),
             Value("newton metres for each unit of moment written", moment, "N m"),
         )
-        words = "; ".join([detail, *(f"less likely, {other[3][2]}" for other in others[:1])])
-        faults.append(Fault("wrong_unit", (), words, (*units, slope), evidence, (), True))
+        less_likely = tuple(other[3][2] for other in others[:1])
+        faults.append(Fault("wrong_unit", (), detail, (*units, slope), evidence, alternatives=less_likely))
     return faults
 
 

@@ -13,7 +13,7 @@ from elastocal.campaigns.campaign import groups_of
 from elastocal.fitting.least_squares import nominal_poses, registered_to
 from elastocal.fitting.model import declared_model, measured_in_base
 from elastocal.fitting.observations import select_states, single_observations
-from elastocal.mechanics.kinematics import position_jacobians, rotation_vectors
+from elastocal.mechanics.kinematics import rotation_vectors
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
@@ -29,7 +29,6 @@ FAR_BETTER = 5.0
 # Share of the measurements that frames and targets are first fitted to, and steps of fitting to those that fit best. Those
 # beyond so many robust standard deviations take no part in the last fit.
 _CORE, _CORE_STEPS, _APART = 0.6, 5, 5.0
-# Largest distances that an RMS leaves out: single measurements say nothing of all.
 _TRIMMED = 0.1
 
 
@@ -69,6 +68,16 @@ class Placement:
         if seen is None or predicted is None:
             return None
         return np.linalg.norm(rotation_vectors(seen @ predicted.transpose(0, 2, 1)), axis=1)
+
+    @cached_property
+    def misfit(self) -> np.ndarray:
+        """What is left of positions (m) and orientations (rad) of the target that fits worst, ndarray (2,).
+
+        RMS without the largest tenth: single measurements say nothing of all.
+        """
+        target, parts = self.observations.target, (self.distance, self.turn)
+        each = [target == number for number in np.unique(target)]
+        return np.array([0.0 if part is None else max(_trimmed_rms(part[mine]) for mine in each) for part in parts])
 
 
 def placed(campaign: Campaign, estimate: Estimate | None = None) -> Placement:
@@ -112,20 +121,12 @@ def spread(campaign: Campaign, poses: int = MANY_POSES) -> Campaign:
     return replace(campaign, measurements=seen.select(np.sort(np.concatenate(chosen))))
 
 
-def jacobians_at_targets(campaign: Campaign, estimate: Estimate) -> np.ndarray:
-    """How the target of each measurement moves with the joints, ndarray (N, 3, n)."""
-    chain, seen, offsets = campaign.robot.chain, campaign.measurements, estimate.target_offset
-    points = [replace(chain.point(t.point), offset_m=tuple(at)) for t, at in zip(campaign.targets, offsets, strict=True)]
-    return position_jacobians(chain, seen.joint_angles, points, seen.target)
-
-
 def rms(values: np.ndarray) -> float:
     """Root of the mean square, of an array of any shape."""
     return float(np.sqrt((values**2).mean()))
 
 
-def trimmed_rms(distance: np.ndarray) -> float:
-    """RMS of distances (N,) without the largest tenth."""
+def _trimmed_rms(distance: np.ndarray) -> float:
     return rms(np.sort(distance)[: max(int((1 - _TRIMMED) * len(distance)), 1)])
 
 

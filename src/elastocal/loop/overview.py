@@ -14,8 +14,7 @@ import numpy as np
 from elastocal.application.accuracy import accuracy_sentence, calibrate_on_case, campaign_accuracy
 from elastocal.campaigns.campaign import columns_of
 from elastocal.counting import counted, first_names
-from elastocal.data_checks.faults import faults
-from elastocal.data_checks.warnings import controller_warnings
+from elastocal.data_checks.faults import controller_warnings, faults
 from elastocal.diagnosis.gross_errors import entries_of, first_kept, gross_errors, warnings_of
 from elastocal.diagnosis.linearize import linearized
 from elastocal.diagnosis.misplaced import misplaced
@@ -73,7 +72,7 @@ def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
     candidates = list(case.candidates.values())
     untestable = linearized(part.declared, part.searched, candidates, settings).untestable
     found, negative = faults(campaign), _negative_springs(declared)
-    diagnosable, testable = not any(fault.decisive for fault in found), len(candidates) - len(untestable)
+    diagnosable, testable = not found, len(candidates) - len(untestable)
     attention = [fault.detail for fault in found]
     accuracy: list[tuple[str, str]] = []
     if diagnosable and not negative:
