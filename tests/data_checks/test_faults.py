@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_campaigns import POINTS, Plan, made, with_geometric_errors, with_measured, with_other_compliances
-from scipy.spatial.transform import Rotation
 from synthetic import NOISE
 
 from elastocal.data_checks.faults import (
@@ -14,7 +13,6 @@ from elastocal.data_checks.faults import (
     controller_warnings,
     faults,
     implausible_measurements,
-    shuffled_rows,
 )
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.model import declared_model
@@ -44,7 +42,7 @@ def test_no_fault_is_found_where_the_model_lacks_something(kuka, plan, seed):
     assert faults(made(kuka, seed, PLANS[plan], true_robot, offsets, sag=3e-3)) == ()
 
 
-def test_a_wrong_sign_is_not_called_shuffled_rows(fanuc):
+def test_a_wrong_sign_is_found_alone(fanuc):
     campaign = made(fanuc, 1, Plan(poses=20))
     turned = with_measured(campaign, joint_angles=campaign.measurements.joint_angles * [1, 1, -1, 1, 1, 1])
     assert [fault.name for fault in faults(turned)] == ["wrong_sign"]
@@ -89,40 +87,10 @@ def with_rows(campaign, source):
     return with_measured(campaign, position=seen.position[source], rotation_vector=seen.rotation_vector[source])
 
 
-@pytest.mark.parametrize("share", [0.0, 0.1, 0.4])
-def test_measurements_in_the_rows_of_each_other_are_named_with_these_rows(campaign, share):
-    """Two rows that change places, or a share of all."""
-    rng, source = np.random.default_rng(0), np.arange(len(campaign.measurements))
-    some = rng.choice(len(source), max(round(share * len(source)), 2), replace=False)
-    source[some] = rng.permutation(some) if share else some[::-1]
-    moved = some[source[some] != some]
-    (fault,) = shuffled_rows(with_rows(campaign, source))
-    assert (fault.name, fault.joints) == ("shuffled_rows", ())
-    assert set(fault.rows) <= set((moved + 1).tolist()) and len(fault.rows) >= 0.9 * len(moved)
-    assert fault.evidence[1] < fault.evidence[0] / 5
-
-
 @pytest.mark.parametrize(("steps", "words"), [(1, "row further up"), (-1, "row further down")])
 def test_measured_columns_moved_by_one_row_are_named(campaign, steps, words):
     (fault,) = faults(with_rows(campaign, np.roll(np.arange(len(campaign.measurements)), steps)))
     assert fault.name == "shuffled_rows" and words in fault.detail
-
-
-def test_measurements_that_belong_nowhere_are_not_shuffled(campaign):
-    rng, position = np.random.default_rng(3), campaign.measurements.position.copy()
-    position[rng.choice(len(position), 20, replace=False)] += rng.normal(0.0, 0.3, (20, 3))
-    assert shuffled_rows(with_measured(campaign, position=position)) == []
-
-
-def test_a_robot_off_along_a_dense_path_is_not_shuffled(fanuc):
-    """Each row then fits in the place of another by chance, as near as a half of the 2.5 mm between them."""
-    campaign = made(fanuc, 1, Plan(poses=300, loads=0, oriented=False), moving={joint: 0 for joint in range(1, 6)})
-    path = campaign.measurements.select(campaign.measurements.target == 3)
-    step = 0.0025 / np.linalg.norm(path.position[0, :2])
-    angles = np.outer(np.arange(300) * step, np.eye(6)[0])
-    turned = angles[:, 0] - path.joint_angles[:, 0] + 12.5 * step
-    position = Rotation.from_rotvec(np.outer(turned, [0.0, 0.0, 1.0])).apply(path.position)
-    assert shuffled_rows(replace(campaign, measurements=replace(path, joint_angles=angles, position=position))) == []
 
 
 @pytest.mark.parametrize("tracker", [True, False])

@@ -1,4 +1,4 @@
-"""Every fault of the data, sought before any physics: constant columns, other interpretations, loads, shuffled rows, nonsense.
+"""Every fault of the data, sought before any physics: constant columns, other interpretations, loads, nonsense.
 
 Where it is ambiguous none is found: a false alarm stops a trace that was right, a miss only leaves it to what comes after. What
 stops nothing is a warning.
@@ -9,24 +9,20 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from elastocal.data_checks.hypotheses import other_interpretations
 from elastocal.data_checks.loads import deflections, wrong_loads
 from elastocal.data_checks.placement import (
-    FAR_BETTER,
     IMPLAUSIBLE_M,
     IMPLAUSIBLE_RAD,
     of_each_target,
     placed,
     rms,
-    robust_sigma,
     robustly_placed,
     spread,
 )
 from elastocal.data_checks.protocol import Fault, Value
 from elastocal.fitting.model import joint_compliances
-from elastocal.fitting.observations import state_clusters
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign
@@ -34,13 +30,6 @@ if TYPE_CHECKING:
 
 # Below the last digit that any sensor writes (0.1 µm) and any controller reports (1e-6 rad or so).
 _SAME_M, _SAME_RAD, _FEWEST_POSES = 1e-6, 1e-6, 3
-# A row is out of place beyond so many robust standard deviations of the others, if so many are in place, which tell how well
-# rows in place fit; and back in place within so many.
-_OUT_OF_PLACE, _FEWEST_IN_PLACE, _IN_PLACE = 20.0, 10, 5.0
-# A place is no chance if it is so much nearer than other poses are to each other; so for this share of the rows.
-_NO_CHANCE, _MOST, _FEWEST_ROWS = 0.25, 0.8, 2
-# Places closer than this are one place; orientations distinguish them as points at this distance from the target would.
-_SAME_PLACE_M, _ARM_M = 1e-3, 0.5
 # Five times what no geometric error and no deflection makes.
 _FARTHEST_M, _FARTHEST_RAD = 5 * IMPLAUSIBLE_M, 5 * IMPLAUSIBLE_RAD
 # Compliances of a robot and those published for its make differ by up to two or so; five is a unit, a sign or another effect
@@ -59,7 +48,7 @@ def faults(campaign: Campaign) -> tuple[Fault, ...]:
     for find in (constant_columns, other_interpretations):
         if found := find(campaign):
             return tuple(found)
-    return (*wrong_loads(deflections(campaign)), *(shuffled_rows(campaign) or implausible_measurements(campaign)))
+    return (*wrong_loads(deflections(campaign)), *implausible_measurements(campaign))
 
 
 def constant_columns(campaign: Campaign) -> list[Fault]:
@@ -94,59 +83,6 @@ def _extents(points: np.ndarray) -> np.ndarray:
     """Standard deviations of points along their principal axes, rising, ndarray (3,), m."""
     off = points - points.mean(axis=0)
     return np.sqrt(np.maximum(np.linalg.eigvalsh(off.T @ off / len(points)), 0.0))
-
-
-def shuffled_rows(campaign: Campaign) -> list[Fault]:
-    """Rows that fit in the places of each other, as well as rows fit that are in place; one fault, or none.
-
-    A row is out of place where it is absurdly far from the nominal robot as it stands, and where another place is not only
-    better but clearly nearer than chance would have it: among many points some point is always near. Where frames are fitted,
-    most rows must be in place; elsewhere all may be out of it.
-    """
-    # One fit to some poses serves all: it only has to be good to a few centimetres.
-    beside, measurements = placed(campaign, robustly_placed(spread(campaign)).estimate), campaign.measurements
-    distance, level = beside.distance, IMPLAUSIBLE_M
-    out = distance > IMPLAUSIBLE_M
-    if (~out).sum() >= _FEWEST_IN_PLACE:
-        sigma = robust_sigma(distance[~out], 3)
-        out &= distance > _OUT_OF_PLACE * sigma
-        # Loads move some targets much more than others.
-        level = max(_IN_PLACE * sigma, 2.0 * np.quantile(distance[~out], 0.95), _SAME_PLACE_M)
-    rows = np.flatnonzero(out)
-    if len(rows) < _FEWEST_ROWS:
-        return []
-    measured, predicted = (_places(*pose)[rows] for pose in (beside.measured, beside.predicted))
-    left, number = map(np.asarray, cKDTree(measured).query(predicted))
-    source = rows[number]
-    back = (left < level) & (left < _NO_CHANCE * _spacing(predicted)) & (source != rows)
-    # Each measurement has one place: one that stands for many is no permutation.
-    pose = state_clusters(measurements)
-    taken = len(np.unique(pose[source[back]])), len(np.unique(pose[rows[back]]))
-    if back.sum() < max(_FEWEST_ROWS, _MOST * len(rows)) or taken[0] < _MOST * taken[1]:
-        return []
-    before, after = rms(distance[rows]), rms(left[back])
-    if after > before / FAR_BETTER:
-        return []
-    detail = f"{back.sum()} of {len(measurements)} rows fit with the measured columns of another one of them"
-    concerned = tuple(sorted(measurements.row[rows[back]].tolist()))
-    share = Value("share of the measurements", float(back.mean() * len(rows) / len(measurements)), "–")
-    return [Fault("shuffled_rows", (), detail, (share,), (before, after), concerned)]
-
-
-def _places(position: np.ndarray, rotation: np.ndarray | None) -> np.ndarray:
-    """Positions and, where they are measured, orientations as points whose distances are in m."""
-    # A small angle changes the nine entries, taken together, by the square root of two times itself.
-    turned = [] if rotation is None else [_ARM_M / np.sqrt(2) * rotation.reshape(-1, 9)]
-    return np.column_stack([position, *turned])
-
-
-def _spacing(points: np.ndarray) -> np.ndarray:
-    """How far from each of some points (N, .) the next place is, 0 where there is none, ndarray (N,), m."""
-    # One of each place.
-    places = points[np.unique(np.round(points / _SAME_PLACE_M), axis=0, return_index=True)[1]]
-    near = np.reshape(cKDTree(places).query(points, k=min(4, len(places)))[0], (len(points), -1))
-    other = np.where(near > 2 * _SAME_PLACE_M, near, np.inf).min(axis=1)
-    return np.where(np.isfinite(other), other, 0.0)
 
 
 def implausible_measurements(campaign: Campaign) -> list[Fault]:

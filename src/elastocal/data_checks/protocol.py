@@ -26,8 +26,8 @@ class Fault:
     """A fault that the measurements show, and that must be mended before anything is traced.
 
     `joints`: joints concerned, counted from 1; empty where there are none. `detail`: one sentence in plain words. `evidence`:
-    RMS residual as written and with the correction, m. Where only orientations show the fault: of a point 1 m away. `rows`:
-    rows of the file concerned; empty where all are. `alternatives`: what explains the measurements as well, in plain words.
+    RMS residual as written and with the correction, m. Where only orientations show the fault: of a point 1 m away.
+    `alternatives`: what would explain the measurements as well, in plain words.
     """
 
     name: str
@@ -35,7 +35,6 @@ class Fault:
     detail: str
     parameters: tuple[Value, ...]
     evidence: tuple[float, float]
-    rows: tuple[int, ...] = ()
     alternatives: tuple[str, ...] = ()
 
 
