@@ -11,9 +11,8 @@ from pathlib import Path
 import elastocal
 from snakemake.iocontainers import Wildcards
 
-from elastocal.campaigns.importers import importer
+from elastocal.campaigns.importers import campaign_sources, importer, named_league, user_campaign
 from elastocal.campaigns.reading import campaign_files
-from elastocal.campaigns.sources import campaign_sources, named_league, user_campaign
 from elastocal.errors import InputError
 from elastocal.io.origin import Origin, configuration_sha256, environment
 from elastocal.io.provenance import SOURCES_DIGEST
