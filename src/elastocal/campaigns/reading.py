@@ -25,7 +25,6 @@ from elastocal.campaigns.holdout import (
     FEWEST_HELD_OUT_POSES,
     SAME_POSE_RAD,
     held_out_mask,
-    holdout_from,
     measured_poses,
     other_folder,
 )
@@ -50,7 +49,9 @@ def read_campaign(folder: str | Path, robots_folder: str | Path, effects: Collec
     document, robot_path = read_descriptions(folder, robots_folder)
     robot = read_robot(robot_path)
     targets = targets_from(document["targets"], robot.chain, source)
-    holdout = holdout_from(document.get("holdout", DEFAULT_HOLDOUT), folder, source)
+    holdout = document.get("holdout", DEFAULT_HOLDOUT)
+    if "campaign" in holdout:
+        other_folder(holdout["campaign"], folder, source)
     for index, name in enumerate(document.get("declared", ())):
         if effects is not None and name not in set(effects):
             raise InputError(source, f"declared[{index}]", repr(name), closest_first(name, sorted(effects)))
@@ -60,7 +61,7 @@ def read_campaign(folder: str | Path, robots_folder: str | Path, effects: Collec
     _check_stated(document, measurements, robot, robot_path.name, source)
     held_out_mask(holdout, measurements, robot.reported_offset, source)
     place = {"table": Path(table.path).name, "header_line": table.header_line}
-    return assemble_campaign(document | {"holdout": holdout} | place, robot, measurements, source)
+    return assemble_campaign(document | place, robot, measurements, source)
 
 
 def read_descriptions(folder: str | Path, robots_folder: str | Path) -> tuple[dict[str, Any], Path]:
