@@ -48,7 +48,8 @@ def faults(campaign: Campaign) -> tuple[Fault, ...]:
     for find in (constant_columns, other_interpretations):
         if found := find(campaign):
             return tuple(found)
-    return (*wrong_loads(deflections(campaign)), *implausible_measurements(campaign))
+    differences = deflections(campaign)
+    return (*(wrong_loads(*differences) if differences else ()), *implausible_measurements(campaign))
 
 
 def constant_columns(campaign: Campaign) -> list[Fault]:
