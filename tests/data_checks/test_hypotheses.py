@@ -91,12 +91,6 @@ def test_positions_in_another_unit_are_named(campaign, factor, unit):
     assert f"fit {1 / factor:g} times" in fault.detail
 
 
-@pytest.mark.parametrize(("factor", "words"), [(0.5, "halves"), (2.0, "doubles"), (180 / np.pi, "degrees")])
-def test_scaled_rotation_vectors_are_named(campaign, factor, words):
-    (fault,) = other_interpretations(with_measured(campaign, rotation_vector=factor * campaign.measurements.rotation_vector))
-    assert fault.name == "wrong_unit" and "rotation vectors" in fault.detail and words in fault.detail
-
-
 @pytest.mark.parametrize(("letters", "words"), [("XYZ", "moved x, y, z"), ("xyz", "roll, pitch, yaw")])
 def test_angles_in_the_columns_of_the_rotation_vector_are_named(campaign, letters, words):
     angles = Rotation.from_rotvec(campaign.measurements.rotation_vector).as_euler(letters)

@@ -134,7 +134,12 @@ def _check_stated(document: Mapping[str, Any], measurements: Measurements, robot
 
 def _measurements(table: Cells, robot: Robot, targets: Sequence[Target], measured: str) -> Measurements:
     reported = table.matrix(f"q{j}" for j in range(1, robot.joints + 1))
-    _check_angles(reported, table, robot)
+    degrees = find_degrees(reported, robot)
+    if degrees.any(axis=1).mean() > _SINGLE_ROWS:
+        index, joint = np.argwhere(degrees)[0]
+        limits = "from {:.2f} to {:.2f} rad".format(*robot.joint_limits[joint])
+        allowed = f"rad, not degrees, of a joint that goes {limits} (counted otherwise: reported_joints of the robot file)"
+        raise table.fault(index, f"q{joint + 1}", allowed)
     names = {target.name: index for index, target in enumerate(targets)}
     labels = table.texts("target")
     unknown = next((index for index, label in enumerate(labels) if label not in names), None)
@@ -187,16 +192,6 @@ def find_degrees(reported: np.ndarray, robot: Robot) -> np.ndarray:
     # An angle that its opposite would bring inside the limits has rather a wrong sign, which is for the diagnosis to trace.
     beyond = np.minimum(off(reported), off(-reported)) > _BEYOND_LIMITS_RAD
     return np.asarray((np.abs(reported) > farthest) | (beyond & (off(np.radians(reported)) <= 0)))
-
-
-def _check_angles(reported: np.ndarray, table: Cells, robot: Robot) -> None:
-    """Refuse degrees in more than single rows of angles (N, n) as the controller reports them."""
-    wrong = find_degrees(reported, robot)
-    if wrong.any(axis=1).mean() > _SINGLE_ROWS:
-        index, joint = np.argwhere(wrong)[0]
-        limits = "from {:.2f} to {:.2f} rad".format(*robot.joint_limits[joint])
-        allowed = f"rad, not degrees, of a joint that goes {limits} (counted otherwise: reported_joints of the robot file)"
-        raise table.fault(index, f"q{joint + 1}", allowed)
 
 
 def _check_measurements(measurements: Measurements, table: Cells, robot: Robot, targets: Sequence[Target], source: str) -> None:

@@ -32,18 +32,12 @@ A_HEADER_ALONE = "a header alone"
 LARGEST_BYTES, MOST_LINES = 100_000_000, 500_000
 # Lines of a file with their numbers, from 1.
 _Lines = Sequence[tuple[int, str]]
-
-
 # Least and largest value of a column, in its unit, and why. Generous: whatever lies beyond is in another unit, or no reading of
 # an instrument beside a robot.
-_Bound = tuple[float, float, str]
-_FORCE: _Bound = (-1e6, 1e6, "N, the weight of a hundred tonnes")
-_MOMENT: _Bound = (-1e7, 1e7, "N m, a hundred tonnes on a lever of ten metres")
-_PLACE: _Bound = (-2e7, 2e7, "m, half the circumference of the Earth")
-BOUNDS: Mapping[str, _Bound] = {
-    **dict.fromkeys(("fx", "fy", "fz"), _FORCE),
-    **dict.fromkeys(("mx", "my", "mz"), _MOMENT),
-    **dict.fromkeys("xyz", _PLACE),
+BOUNDS: Mapping[str, tuple[float, float, str]] = {
+    **dict.fromkeys(("fx", "fy", "fz"), (-1e6, 1e6, "N, the weight of a hundred tonnes")),
+    **dict.fromkeys(("mx", "my", "mz"), (-1e7, 1e7, "N m, a hundred tonnes on a lever of ten metres")),
+    **dict.fromkeys("xyz", (-2e7, 2e7, "m, half the circumference of the Earth")),
     "time_s": (-1e11, 1e11, "s, three thousand years either way: not milliseconds of a calendar"),
     "temperature_c": (-200.0, 200.0, "°C, in which arms work, not kelvin"),
     "u95_m": (1e-8, 0.1, "m, more than 0: a sixtieth of a laser's wavelength at least, at most what a robot is off by"),

@@ -47,13 +47,6 @@ _LENGTHS = {
     "hundredths of what they should be": 100.0,
     "thousandths of what they should be": 1e3,
 }
-# What rotation vectors were multiplied by before they were written.
-_TURNS = {
-    0.5: "halves of what they should be",
-    2.0: "doubles of what they should be",
-    180 / np.pi: "degrees",
-    np.pi / 180: "radians converted twice",
-}
 # Angles that people write for a rotation vector, as letters of scipy: capital ones turn about the moved axes.
 _EULER = {"XYZ": "Euler angles about the moved x, y, z", "xyz": "angles about the fixed x, y, z (roll, pitch, yaw)"}
 
@@ -228,9 +221,6 @@ def _lengths(campaign: Campaign) -> Iterator[Hypothesis]:
 def _rotations() -> Iterator[Hypothesis]:
     detail = "the rotation vectors fit turned round, as if they took base axes into the target's"
     yield Hypothesis("wrong_sign", detail, columns(rotation_vector=np.negative))
-    for factor, words in _TURNS.items():
-        detail = f"the rotation vectors look like {words}: measurements fit {1 / factor:.4g} times the written rotation vectors"
-        yield Hypothesis("wrong_unit", detail, columns(rotation_vector=partial(np.multiply, 1 / factor)))
     for letters, words in _EULER.items():
         detail = f"the columns of the rotation vector look like {words}, in rad"
         yield Hypothesis("wrong_unit", detail, columns(rotation_vector=partial(_from_angles, letters)))

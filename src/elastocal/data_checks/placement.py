@@ -27,7 +27,7 @@ IMPLAUSIBLE_M, IMPLAUSIBLE_RAD = 0.02, 0.1
 # A correction must lower the residual by this factor.
 FAR_BETTER = 5.0
 # Share of the measurements that frames and targets are first fitted to, and steps of fitting to those that fit best. Those
-# beyond so many robust standard deviations take no part in the last fit.
+# beyond so many robust standard deviations, by the median of their distances, take no part in the last fit.
 _CORE, _CORE_STEPS, _APART = 0.6, 5, 5.0
 _TRIMMED = 0.1
 
@@ -104,7 +104,7 @@ def robustly_placed(campaign: Campaign) -> Placement:
         for members in of_each_target(campaign.measurements):
             limit = np.quantile(distance[members], _CORE)
             if step == _CORE_STEPS:
-                limit = max(limit, _APART * robust_sigma(distance[members], 3))
+                limit = max(limit, _APART * np.median(distance[members]) / np.sqrt(chdtri(3, 0.5)))
             kept[members] = distance[members] <= limit
         some, nominal = select_states(found.observations, kept), (part[kept] for part in found.nominal)
         found = replace(found, estimate=registered_to(found.model, some, *nominal))
@@ -128,17 +128,6 @@ def rms(values: np.ndarray) -> float:
 
 def _trimmed_rms(distance: np.ndarray) -> float:
     return rms(np.sort(distance)[: max(int((1 - _TRIMMED) * len(distance)), 1)])
-
-
-def robust_sigma(distance: np.ndarray, components: int) -> float:
-    """Standard deviation of each component of vectors, from the median of their lengths (N,).
-
-    The median absolute deviation [1] for vectors: divided by the median of the chi distribution.
-
-    [1] Hampel, F. R., The influence curve and its role in robust estimation, Journal of the American Statistical Association
-        69, 1974.
-    """
-    return float(np.median(distance) / np.sqrt(chdtri(components, 0.5)))
 
 
 def of_each_target(measurements: Measurements) -> list[np.ndarray]:
