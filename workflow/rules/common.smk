@@ -266,7 +266,7 @@ def files_of_campaign(campaign):
 def robots_of_import(wildcards):
     """Files of the robots that an importer reads or names."""
     source = importer(SOURCES[wildcards.campaign]["importer"], CONFIG, f"campaign {wildcards.campaign}")
-    return expand(f"{CONFIG}/robots/{{robot}}.yaml", robot=source.all_robots)
+    return expand(f"{CONFIG}/robots/{{robot}}.yaml", robot=source.robots)
 
 
 def loop_reports(campaigns):

@@ -155,7 +155,7 @@ class Importer:
     """What makes campaigns of a public source: an entry of ``public_data.yaml``, whose schema says what its keys mean.
 
     `files`: by the names that campaigns have for them, those of its parts too. `read`: makes measurements of a file; of an
-    importer with parts each has its own.
+    importer with parts each has its own. `robots`: that its campaigns name, and those of its parts, which it reads.
     """
 
     files: Mapping[str, PublicFile]
@@ -164,11 +164,6 @@ class Importer:
     noise: Mapping[str, float] | None = None
     same_pose_rad: float = 0.0
     parts: tuple[Importer, ...] = ()
-
-    @property
-    def all_robots(self) -> tuple[str, ...]:
-        """Robots that its campaigns name or that it reads."""
-        return (*self.robots, *(robot for part in self.parts for robot in part.robots))
 
     def write_campaign(
         self, paths: Sequence[str | Path], folder: str | Path, robots_folder: str | Path, name: str, **test: Mapping[str, Any]
@@ -231,7 +226,8 @@ def read_importers(path: Path) -> dict[str, Importer]:
             raise InputError(path, name, "no format", "a table, or parts that have one")
         files |= {each: file for part in parts for each, file in part.files.items()}
         stated = {key: entry[key] for key in ("noise", "same_pose_rad") if key in entry}
-        found[name] = Importer(files, read, tuple(entry["robots"]), **stated, parts=parts)
+        robots = (*entry["robots"], *(robot for part in parts for robot in part.robots))
+        found[name] = Importer(files, read, robots, **stated, parts=parts)
     return found
 
 

@@ -125,8 +125,8 @@ def _evidence(written: Placement, found: Placement) -> tuple[float, float] | Non
 def discrete(campaign: Campaign) -> list[Hypothesis]:
     """Everything that is no fit, the simplest first."""
     oriented = campaign.measured == "pose"
-    lists = [_senses(campaign.robot.joints), _lengths(campaign), _rotations() if oriented else ()]
-    return [each for some in (*lists, _axes(campaign.frame == "tracker" and not oriented, oriented)) for each in some]
+    axes = _axes(campaign.frame == "tracker" and not oriented, oriented)
+    return [*_senses(campaign.robot.joints), *_lengths(campaign), *(_rotations() if oriented else ()), *axes]
 
 
 def fitted(campaign: Campaign) -> list[Hypothesis]:
