@@ -30,6 +30,12 @@ def test_a_joint_counted_the_other_way_round_is_named(fanuc, joint, tracker):
     assert before > 0.02 and after < 1e-3
 
 
+def test_loads_that_are_numbered_throughout_have_no_row_beside_them(campaign):
+    seen = campaign.measurements
+    turned = with_measured(campaign, joint_angles=-seen.joint_angles, load=np.arange(len(seen)) + 1)
+    assert not [fault for fault in other_interpretations(turned) if fault.name == "shuffled_rows"]
+
+
 @pytest.mark.parametrize(("sign", "words"), [(1.0, "taken from"), (-1.0, "added to")])
 def test_a_joint_counted_from_its_neighbour_is_named_with_it(campaign, sign, words):
     angles = campaign.measurements.joint_angles.copy()

@@ -90,7 +90,7 @@ def _mended(campaign: Campaign, *tried: Sequence[Hypothesis]) -> list[Fault]:
 def _best(campaign: Campaign, written: Placement, tried: Sequence[Hypothesis]) -> tuple[float, Fault | None] | None:
     """What the first of those that fit best leaves, m, and its fault, if it is one; None where it does not convince."""
     left = np.array([_length(placed(each.read(campaign)).misfit) for each in tried])
-    alike = [tried[n] for n in np.flatnonzero(left <= max(_ALIKE * left.min(), left.min() + _ALIKE_M))]
+    alike = [each for each, lies in zip(tried, left, strict=True) if lies <= max(_ALIKE * left.min(), left.min() + _ALIKE_M)]
     best, others = alike[0], tuple(each.detail for each in alike[1 : 1 + _MOST_ALIKE])
     found = robustly_placed(best.read(campaign))
     evidence = _evidence(written, found)
@@ -185,11 +185,10 @@ def shifts(campaign: Campaign) -> list[Hypothesis]:
         group = groups_of(np.column_stack(keys))[1]
         order = np.lexsort((measurements.row, group))
         rows = np.array([order[:-1], order[1:]])[:, group[order[1:]] == group[order[:-1]]]
-        for way, (source, at) in (("down", rows), ("up", rows[::-1])):
-            read = measurements.select(source)
-            moved = replace(measurements.select(at), position=read.position, rotation_vector=read.rotation_vector)
+        # No row has another beside it where each load has a number of its own.
+        for way, (source, at) in (("down", rows), ("up", rows[::-1])) if rows.size else ():
             detail = f"the measured columns fit one {kind} further {way}"
-            found.append(Hypothesis("shuffled_rows", detail, partial(_with_spread, moved)))
+            found.append(Hypothesis("shuffled_rows", detail, partial(_moved, measurements, source, at)))
     return found
 
 
@@ -269,8 +268,10 @@ def columns(**functions: Callable[[np.ndarray], np.ndarray]) -> Callable[[Campai
     return read
 
 
-def _with_spread(measurements: Measurements, campaign: Campaign) -> Campaign:
-    return spread(replace(campaign, measurements=measurements), _POSES)
+def _moved(measurements: Measurements, source: np.ndarray, at: np.ndarray, campaign: Campaign) -> Campaign:
+    read = measurements.select(source)
+    moved = replace(measurements.select(at), position=read.position, rotation_vector=read.rotation_vector)
+    return spread(replace(campaign, measurements=moved), _POSES)
 
 
 def _with_angles(matrix: np.ndarray, campaign: Campaign) -> Campaign:
