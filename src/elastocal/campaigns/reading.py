@@ -21,13 +21,7 @@ from elastocal.campaigns.campaign import (
     groups_of,
     targets_from,
 )
-from elastocal.campaigns.holdout import (
-    FEWEST_HELD_OUT_POSES,
-    SAME_POSE_RAD,
-    held_out_mask,
-    measured_poses,
-    other_folder,
-)
+from elastocal.campaigns.holdout import FEWEST_HELD_OUT_POSES, SAME_POSE_RAD, held_out_mask, measured_poses, other_folder
 from elastocal.campaigns.measurements import CSV, FARTHEST_RAD, PARQUET, ROTATION, files_there, is_file_in, read_measurements
 from elastocal.campaigns.tables import Cells
 from elastocal.counting import counted

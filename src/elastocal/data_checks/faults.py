@@ -14,15 +14,7 @@ from scipy.constants import g, pound_force
 
 from elastocal.campaigns.campaign import groups_of
 from elastocal.data_checks.hypotheses import other_interpretations
-from elastocal.data_checks.placement import (
-    IMPLAUSIBLE_M,
-    IMPLAUSIBLE_RAD,
-    of_each_target,
-    placed,
-    rms,
-    robustly_placed,
-    spread,
-)
+from elastocal.data_checks.placement import IMPLAUSIBLE_M, IMPLAUSIBLE_RAD, of_each_target, placed, rms, robustly_placed, spread
 from elastocal.data_checks.protocol import Fault, Value
 from elastocal.fitting.model import joint_compliances
 from elastocal.fitting.observations import state_clusters
@@ -87,7 +79,7 @@ def constant_columns(campaign: Campaign) -> list[Fault]:
 
     Returns one for each kind, of the first target that shows it.
     """
-    some, predicted = spread(campaign).measurements, placed(spread(campaign)).predicted[0]
+    some, predicted = spread(campaign).measurements, placed(spread(campaign)).predicted
     found: dict[str, Fault] = {}
     for members in of_each_target(some):
         if (poses := len(np.unique(some.pose[members]))) < _FEWEST_POSES:
@@ -137,7 +129,7 @@ def deflections(campaign: Campaign) -> tuple[np.ndarray, np.ndarray] | None:
     torques = [generalized_forces(end, measurements.wrench * (np.arange(6) // 3 == part)) for part in (0, 1)]
     expected = [regressor(jacobian, each) @ campaign.robot.compliance for each in torques]
     group = groups_of(np.column_stack([state_clusters(measurements), measurements.target]))[1]
-    rows = np.stack([whole.measured[0] - whole.predicted[0], *expected], axis=-1)
+    rows = np.stack([whole.measured[0] - whole.predicted, *expected], axis=-1)
     mean = np.zeros((group.max() + 1, *rows.shape[1:]))
     np.add.at(mean, group, rows)
     off = rows - (mean / np.bincount(group)[:, None, None])[group]

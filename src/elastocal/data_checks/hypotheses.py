@@ -110,7 +110,7 @@ def _length(misfit: np.ndarray) -> float:
 def _evidence(written: Placement, found: Placement) -> tuple[float, float] | None:
     """RMS before and after, of positions or else of orientations; None where a correction does not convince."""
     before, after, target = written.misfit, found.misfit, found.observations.target
-    predicted = [found.predicted[0][target == number] for number in np.unique(target)]
+    predicted = [found.predicted[target == number] for number in np.unique(target)]
     extent = max(rms(np.linalg.norm(points - points.mean(axis=0), axis=1)) for points in predicted)
     # Where the robot hardly moves, anything that gathers the measurements in one place would fit.
     limit = np.minimum(before / FAR_BETTER, np.minimum(_IMPLAUSIBLE, [extent / FAR_BETTER, np.inf]))

@@ -45,28 +45,27 @@ class Placement:
     estimate: Estimate
 
     @cached_property
-    def predicted(self) -> tuple[np.ndarray, np.ndarray | None]:
-        """Positions that the robot gives the targets, ndarray (N, 3), m, and orientations (N, 3, 3), as `measured`."""
-        (position, rotation), target = self.nominal, self.observations.target
-        turned = None if self.observations.rotation is None else rotation @ self.estimate.target_rotation[target]
-        return position + (rotation @ self.estimate.target_offset[target][..., None])[..., 0], turned
+    def predicted(self) -> np.ndarray:
+        """Positions that the robot gives the targets, ndarray (N, 3), m."""
+        position, rotation = self.nominal
+        return position + (rotation @ self.estimate.target_offset[self.observations.target][..., None])[..., 0]
 
     @cached_property
     def measured(self) -> tuple[np.ndarray, np.ndarray | None]:
-        """Positions and orientations; these None where positions alone are measured."""
+        """Positions (N, 3), m, and orientations (N, 3, 3); these None where positions alone are measured."""
         return measured_in_base(self.estimate, self.observations)
 
     @cached_property
     def distance(self) -> np.ndarray:
         """From the predicted to the measured position, ndarray (N,), m."""
-        return np.linalg.norm(self.measured[0] - self.predicted[0], axis=1)
+        return np.linalg.norm(self.measured[0] - self.predicted, axis=1)
 
     @cached_property
     def turn(self) -> np.ndarray | None:
         """Angle between predicted and measured orientation, ndarray (N,), rad; None where positions are measured."""
-        seen, predicted = self.measured[1], self.predicted[1]
-        if seen is None or predicted is None:
+        if (seen := self.measured[1]) is None:
             return None
+        predicted = self.nominal[1] @ self.estimate.target_rotation[self.observations.target]
         return np.linalg.norm(rotation_vectors(seen @ predicted.transpose(0, 2, 1)), axis=1)
 
     @cached_property
