@@ -11,9 +11,8 @@ from pathlib import Path
 import elastocal
 from snakemake.iocontainers import Wildcards
 
-from elastocal.campaigns.importers import importer
+from elastocal.campaigns.importers import campaign_sources, importer, named_league, user_campaign
 from elastocal.campaigns.reading import campaign_files
-from elastocal.campaigns.sources import campaign_sources, named_league, user_campaign
 from elastocal.errors import InputError
 from elastocal.io.origin import SOURCES_DIGEST, Origin, configuration_sha256, environment
 from elastocal.io.records import checksum
@@ -266,7 +265,7 @@ def files_of_campaign(campaign):
 def robots_of_import(wildcards):
     """Files of the robots that an importer reads or names."""
     source = importer(SOURCES[wildcards.campaign]["importer"], CONFIG, f"campaign {wildcards.campaign}")
-    return expand(f"{CONFIG}/robots/{{robot}}.yaml", robot=source.all_robots)
+    return expand(f"{CONFIG}/robots/{{robot}}.yaml", robot=source.robots)
 
 
 def loop_reports(campaigns):

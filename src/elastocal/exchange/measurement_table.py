@@ -122,7 +122,7 @@ class ImportedMeasurements:
 
     `table` (N,): columns of measurements.csv. `options`: those given, and what was found out.
     `ignored`: headers of columns that are not used. `skipped`: rows without a position that were left out. `notes`: how columns
-    were understood that may surprise, and what else was left out.
+    were understood that may surprise, and which were not read.
     """
 
     table: dict[str, np.ndarray]
@@ -212,7 +212,7 @@ def read_measurement_table(path: str | Path, options: ImportOptions, robot: Robo
     )
     ignored = (*(header for header in text.columns if header not in used.values()), *options.ignore)
     skipped = len(text.lines) - len(kept)
-    return ImportedMeasurements(table, len(angles), resolved, ignored, skipped, (*text.left_out, *notes))
+    return ImportedMeasurements(table, len(angles), resolved, ignored, skipped, tuple(notes))
 
 
 def _check_complete(

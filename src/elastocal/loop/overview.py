@@ -15,8 +15,7 @@ from elastocal.application.accuracy import accuracy_sentence, calibrate_on_case,
 from elastocal.campaigns.campaign import columns_of
 from elastocal.campaigns.holdout import measured_poses
 from elastocal.counting import counted, first_names
-from elastocal.data_checks.faults import faults
-from elastocal.data_checks.warnings import controller_warnings
+from elastocal.data_checks.faults import controller_warnings, faults
 from elastocal.diagnosis.gross_errors import entries_of, first_kept, gross_errors, warnings_of
 from elastocal.diagnosis.linearize import linearized
 from elastocal.diagnosis.misplaced import misplaced
@@ -74,7 +73,7 @@ def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
     untestable = linearized(part.declared, part.searched, [*case.candidates.values()], settings).untestable
     testable = len(case.candidates) - len(untestable)
     found, negative = faults(campaign), _negative_springs(declared)
-    diagnosable = not any(fault.decisive for fault in found)
+    diagnosable = not found
     rows = _read(case, training, held_out)
     rows.append(("noise", f"{1e6 * part.noise.position_m:.0f} µm a coordinate, from {_SOURCES[part.noise.source]}"))
     rows += _identified(declared)
