@@ -64,9 +64,9 @@ rule study:
         rules.compile_report.output.report,
         expand(
             "reports/tables/{table}.csv",
-            table=["comparison", "joint_test", "extended", "strategies_over_studies", "costs", "break_even"],
+            table=["comparison", "joint_test", "extended", "strategies_over_studies", "break_even"],
         ),
-        expand("reports/tables/{table}.csv", table=["ladder", "designs", "simulated_designs"]),
+        expand("reports/tables/{table}.csv", table=["ladder", "simulated_designs"]),
         rules.tabulate_budget.output,
         # Scores of every strategy at every noise level.
         cells("metrics", config["robots"], NOISE),

@@ -13,7 +13,7 @@ import time
 import numpy as np
 from remainder_rates import HELD_OUT, JOINT_RAD, NOISE_M, OFFSET_RAD, ROBOTS, measured_cases
 
-from elastocal.application.calibrated import NEUTRAL, CalibratedRobot, nominal_forward
+from elastocal.application.calibrated import CalibratedRobot, nominal_forward
 from elastocal.application.compensation import find_joint_targets
 from elastocal.application.frames import root_mean_square, subtract_placement
 from elastocal.campaigns.reading import read_robot
@@ -64,7 +64,8 @@ def closed(poses: int, size: float, seed: int) -> dict[str, float]:
         name: calibrated_by(found, verdict.held_out, verdict.delivered, physics_only=name == "physics")
         for name in ("physics", "delivered")
     }
-    targets = {name: find_joint_targets(each, position, rotation, NEUTRAL, wanted) for name, each in corrected.items()}
+    unloaded = np.zeros((len(wanted), 6))
+    targets = {name: find_joint_targets(each, position, rotation, unloaded, wanted) for name, each in corrected.items()}
     good = np.all([each.status == OK for each in targets.values()], axis=0)
     position, rotation, wanted = position[good], rotation[good], wanted[good]
     known = robot.model_angles(wanted)

@@ -16,20 +16,20 @@ from elastocal.application.accuracy import (
     before_m,
     calibrate_on_case,
     campaign_accuracy,
-    conditions_in,
     judge_by_held_out,
     predict_errors,
     quantile_of_length,
     scope_of,
 )
-from elastocal.application.calibrated import NEUTRAL, forward
+from elastocal.application.calibrated import forward
 from elastocal.application.frames import BASE, ROBOT, Scope, subtract_placement
-from elastocal.effects.catalogue import candidates_on, moves_robot
+from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.model import stepped
 from elastocal.fitting.noise import Noise
 from elastocal.loop.whole import cases_in
 from elastocal.mechanics.sites import sites_of
+from elastocal.remainder.corrected import is_commanded
 from elastocal.validation.held_out import position_residuals
 from elastocal.validation.placing import placed
 
@@ -48,7 +48,7 @@ def test_bounds_hold_95_percent_of_robots_drawn_from_the_covariance(fanuc, unkno
     """Of 150 robots; 90 to 100 % are within nearly three standard errors."""
     calibrated = set_scope(made_calibrated(fanuc, *USUAL), unknown_base)
     angles = calibrated.robot.reported_angles(STATES.joint_angles)
-    stated = predict_errors(calibrated, angles, NEUTRAL).accuracy("")
+    stated = predict_errors(calibrated, angles, STATES.wrench).accuracy("")
     assert stated.frame == (ROBOT if unknown_base else BASE)
     position, _ = forward(calibrated, angles)
     draws, root = np.random.default_rng(3), np.linalg.cholesky(calibrated.covariance)
@@ -100,32 +100,20 @@ def scope_with(robot, candidate, values, shapes, std=0.0):
 
 
 def test_every_effect_that_no_command_contains_counts_as_error(fanuc):
-    found = {key: candidate for key, candidate in candidates_on(sites_of(fanuc)).items() if not moves_robot(candidate)}
-    assert {candidate.effect for candidate in found.values()} >= {"setup_step", "frame_drift", "tracker_scale", "force_bias"}
-    # The last one of each effect.
-    for key, candidate in {candidate.effect: (key, candidate) for key, candidate in found.items()}.values():
+    found = {key: candidate for key, candidate in candidates_on(sites_of(fanuc)).items() if not is_commanded(candidate)}
+    instruments, unstated = (
+        {"frame_drift", "tracker_scale", "force_bias"},
+        {"hysteresis", "thermal_growth", "temperature_gradient"},
+    )
+    assert {candidate.effect for candidate in found.values()} >= {"setup_step", *instruments, *unstated}
+    # The first one of each effect.
+    for key, candidate in {candidate.effect: (key, candidate) for key, candidate in reversed(found.items())}.values():
         values, shapes = [p.plausible for p in candidate.parameters], [0.5 * (s.lowest + s.highest) for s in candidate.shapes]
         scope = scope_with(fanuc, candidate, values, shapes)
         assert scope.left_out == (key,) and scope.left_out_worst_m >= scope.left_out_m > 1e-7, key
         # One that is fitted to nothing is as uncertain as it is.
         unsure = scope_with(fanuc, candidate, np.zeros(len(values)), shapes, std=1.0)
         assert unsure.left_out_m > 0.1 * scope.left_out_m, key
-
-
-def test_what_goes_with_a_condition_counts_as_error_where_a_command_does_not_state_it(fanuc):
-    calibrated = made_calibrated(fanuc, "joint_offset@2", "temperature_gradient@2[temperature]")
-    scope = scope_of(calibrated, calibrated.model, calibrated.estimate, calibrated.covariance, LOADED)
-    known, angles = replace(calibrated, scope=scope), calibrated.robot.reported_angles(LOADED.joint_angles)
-    names, there = [name for name, _, _ in scope.unstated], conditions_in(known, LOADED)
-    assert names and set(names) <= {"time", "temperature"} and scope.left_out_m == 0.0
-    stated, unstated = (predict_errors(known, angles, each) for each in (there, replace(there, temperature_c=None)))
-    assert not stated.accuracy("").left_out and "not given" in unstated.accuracy("").left_out[0]
-    assert unstated.accuracy("").left_out_m == pytest.approx(np.linalg.norm([rms for _, rms, _ in scope.unstated]))
-    assert unstated.accuracy("").rms_m > stated.accuracy("").rms_m
-    missing = unstated.accuracy("").left_out_m ** 2
-    for name in ("rms_m", "bound_m", "error_m"):
-        added = np.mean(getattr(unstated, name) ** 2 - getattr(stated, name) ** 2)
-        assert added == pytest.approx(missing, rel=0.1)
 
 
 def test_an_unknown_offset_of_the_target_at_the_end_effector_is_no_error(fanuc):
@@ -177,12 +165,12 @@ def test_repeats_tell_how_well_joints_repeat_though_the_sensor_hides_each(campai
 
 def test_of_a_robot_of_which_nothing_was_fitted_no_error_of_zero_is_predicted(fanuc):
     calibrated = made_calibrated(fanuc, relative_std=0.0)
-    found = predict_errors(calibrated, np.zeros((3, 6)), NEUTRAL).accuracy("some poses")
+    found = predict_errors(calibrated, *np.zeros((2, 3, 6))).accuracy("some poses")
     assert found.rms_m == 0.0 and not found.fitted
     assert "nothing of the robot was fitted" in accuracy_sentence(found) and "0.000" not in accuracy_sentence(found)
     # What the form of the model leaves open is in every figure.
     contradicted = replace(calibrated, scope=replace(calibrated.scope, form_m=1e-3, contradicted=True))
-    open_form = predict_errors(contradicted, np.zeros((3, 6)), NEUTRAL)
+    open_form = predict_errors(contradicted, *np.zeros((2, 3, 6)))
     stated = open_form.accuracy("some poses")
     assert stated.rms_m == pytest.approx(1e-3, rel=0.01) and min(stated.rms_bound_m, stated.worst_m) > 1e-3
     assert (open_form.bound_m > 1e-3).all() and "1.000 mm" in accuracy_sentence(stated)

@@ -3,19 +3,12 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from made_calibrated import USUAL, made_calibrated, plain_estimate, plain_model
 from scipy.spatial.transform import Rotation
-from support import random_angles, robot_of
+from support import robot_of
 from synthetic import NOISE, made_states
 
-from elastocal.application.calibrated import (
-    OperatingConditions,
-    assumptions,
-    calibrate_by_model,
-    forward,
-    pose_sensitivities,
-)
+from elastocal.application.calibrated import calibrate_by_model, forward, pose_sensitivities
 from elastocal.fitting.model import stepped
 from elastocal.mechanics.kinematics import pose_differences
 from elastocal.mechanics.robot import Mass
@@ -23,8 +16,8 @@ from elastocal.mechanics.robot import Mass
 ONE_JOINT = "Tz(0.5) Ry(q1) Tx(0.8) [hand]"
 
 
-def test_what_belongs_to_the_instruments_and_the_set_up_is_left_out_with_its_covariance(fanuc):
-    keys = ("force_bias[base axes]", "joint_offset@2", "tracker_scale", "frame_drift", "lost_motion@3", "nest_eccentricity")
+def test_what_belongs_to_the_set_up_or_goes_with_what_no_command_states_is_left_out_with_its_covariance(fanuc):
+    keys = ("force_bias[base axes]", "joint_offset@2", "hysteresis@2", "frame_drift", "lost_motion@3", "nest_eccentricity")
     model = plain_model(fanuc, *keys)
     rng = np.random.default_rng(1)
     counts = [len(effect.parameters) + len(effect.shapes) for effect in model.effects]
@@ -44,7 +37,7 @@ def test_spring_and_weight_of_one_joint_are_in_equilibrium():
     robot = replace(robot_of(ONE_JOINT, [2e-5]), masses=(Mass(1, 20.0, (0.4, 0.0, 0.1), 0.1),))
     found = made_calibrated(robot, identified=False, size=0.0)
     for q, force in ((0.3, 0.0), (-0.7, 300.0)):
-        position, rotation = forward(found, np.array([[q]]), OperatingConditions(np.array([[0, 0, force, 0, 0, 0.0]])))
+        position, rotation = forward(found, np.array([[q]]), np.array([[0, 0, force, 0, 0, 0.0]]))
         at = q
         for _ in range(100):
             weight = -20.0 * 9.80665
@@ -59,32 +52,11 @@ def test_spring_and_weight_of_one_joint_are_in_equilibrium():
 def test_sensitivities_are_the_derivatives_of_the_poses_by_every_parameter(fanuc):
     found = made_calibrated(fanuc, *USUAL, "transmission_harmonic@2[orders 1-2]", relative_std=0.01)
     states = made_states(6, 2, seed=4)
-    operating, middle = (
-        OperatingConditions(states.wrench),
-        forward(found, states.joint_angles, OperatingConditions(states.wrench)),
-    )
-    sensitivities = pose_sensitivities(found, states.joint_angles, operating)
+    middle = forward(found, states.joint_angles, states.wrench)
+    sensitivities = pose_sensitivities(found, states.joint_angles, states.wrench)
     for place, size in enumerate(np.sqrt(np.diag(found.covariance))):
         step = np.zeros(len(found.covariance))
         step[place] = 1e-2 * size
         moved = replace(found, estimate=stepped(found.model, found.estimate, step))
-        off = pose_differences(*forward(moved, states.joint_angles, operating), *middle)
+        off = pose_differences(*forward(moved, states.joint_angles, states.wrench), *middle)
         np.testing.assert_allclose(off, sensitivities @ step, rtol=1e-2, atol=1e-2 * np.abs(sensitivities @ step).max())
-
-
-@pytest.mark.parametrize(
-    ("key", "name", "given"),
-    [
-        ("hysteresis@2", "approach", OperatingConditions(approach=np.ones((1, 6)))),
-        ("thermal_growth[time]", "time", OperatingConditions(time_s=np.array([3600.0]))),
-        ("thermal_growth[temperature]", "temperature", OperatingConditions(temperature_c=np.array([30.0]))),
-    ],
-)
-def test_what_an_effect_needs_and_is_not_given_is_neutral_and_said(fanuc, key, name, given):
-    found, without = made_calibrated(fanuc, key), made_calibrated(fanuc)
-    angles = random_angles(np.random.default_rng(5), fanuc.chain, 1)
-    np.testing.assert_array_equal(forward(found, angles)[0], forward(without, angles)[0])
-    assert np.linalg.norm(forward(found, angles, given)[0] - forward(without, angles)[0]) > 1e-6
-    (line,) = assumptions(found, OperatingConditions())
-    assert line.startswith(f"{key} needs the {name}")
-    assert assumptions(found, given) == [] == assumptions(without, OperatingConditions())

@@ -8,7 +8,7 @@ from analysed_robots import analysed
 from made_calibrated import USUAL, made_calibrated
 
 from elastocal.application.accuracy import predict_errors
-from elastocal.application.calibrated import NEUTRAL, OperatingConditions, come_to_rest, nominal_forward
+from elastocal.application.calibrated import come_to_rest, nominal_forward
 from elastocal.application.compensation import (
     OK,
     OTHER_POSTURE,
@@ -36,32 +36,32 @@ def draw_states(calibrated, count, force=100.0):
     low, high = robot.joint_limits.T
     angles = low + (high - low) * (0.5 + 0.8 * (draws.random((count, robot.joints)) - 0.5))
     wrench = draws.standard_normal((count, 6)) * ([force] * 3 + [0.3 * force] * 3)
-    return robot.reported_angles(angles), OperatingConditions(wrench)
+    return robot.reported_angles(angles), wrench
 
 
-def settle(robot, angles, operating):
+def settle(robot, angles, wrench):
     """As `forward`, with the loads found again until the arm has come to rest."""
-    found = come_to_rest(robot, angles, operating)
+    found = come_to_rest(robot, angles, wrench)
     for _ in range(6):
-        found = come_to_rest(robot, angles, operating, found[0])
+        found = come_to_rest(robot, angles, wrench, found[0])
     return found[1:]
 
 
 @pytest.mark.parametrize("name", ["gp180", "iiwa14"])
 def test_corrected_targets_bring_the_robot_to_the_wanted_poses(name):
     robot = make_robot(name, *EFFECTS)
-    angles, operating = draw_states(robot, 150)
+    angles, wrench = draw_states(robot, 150)
     position, rotation = nominal_forward(robot.robot, angles)
-    found = find_joint_targets(robot, position, rotation, operating, angles)
+    found = find_joint_targets(robot, position, rotation, wrench, angles)
     good = found.status == OK
     assert good.mean() > 0.9
-    off = pose_differences(position, rotation, *settle(robot, found.joint_angles, operating))[good]
+    off = pose_differences(position, rotation, *settle(robot, found.joint_angles, wrench))[good]
     assert np.abs(off).max() < 2e-9
     np.testing.assert_allclose(found.error_after[good], off, atol=2e-9)
     assert np.sqrt((found.error_before[good, :3] ** 2).sum(axis=1).mean()) > 1e-4
     # Each joint repeats to 10 µrad: seen through the Jacobian of where it stands.
     jacobian = jacobians(robot.robot.chain, robot.robot.model_angles(found.joint_angles), robot.robot.chain.end_effector)
-    stated = predict_errors(robot, found.joint_angles, operating, draws=0).repeated_m
+    stated = predict_errors(robot, found.joint_angles, wrench, draws=0).repeated_m
     np.testing.assert_allclose(stated, 1e-5 * np.sqrt((jacobian[:, :3] ** 2).sum(axis=(1, 2))), rtol=1e-9)
 
 
@@ -75,7 +75,7 @@ def test_what_cannot_be_corrected_is_named():
     reported = robot.robot.reported_angles(angles)
     position, rotation = nominal_forward(robot.robot, reported)
     position[3] *= 5.0
-    found = find_joint_targets(robot, position, rotation, NEUTRAL, reported)
+    found = find_joint_targets(robot, position, rotation, np.zeros((len(position), 6)), reported)
     assert found.status.tolist() == [OK, OUTSIDE_LIMITS, SINGULAR, UNREACHABLE]
     assert np.isfinite(found.joint_angles).all()
 
@@ -90,15 +90,15 @@ def test_a_stated_posture_and_its_turn_are_kept_or_refused(name):
     angles[:, 0] = np.radians(np.linspace(-180.6, -168.6, 7))
     angles = robot.robot.reported_angles(angles)
     position, rotation = nominal_forward(robot.robot, angles)
-    found = find_joint_targets(robot, position, rotation, NEUTRAL, np.repeat(angles[:1], 7, axis=0))
+    found = find_joint_targets(robot, position, rotation, np.zeros((len(position), 6)), np.repeat(angles[:1], 7, axis=0))
     assert (found.status == OK).all() and np.abs(found.joint_angles - angles).max() < 0.02
     turned, straight = angles.copy(), np.zeros_like(angles)
     turned[:, 0] += 2 * np.pi
-    found = find_joint_targets(robot, position, rotation, NEUTRAL, turned)
+    found = find_joint_targets(robot, position, rotation, np.zeros((len(position), 6)), turned)
     kept = found.status == OK
     assert kept.any() and np.abs(found.joint_angles - turned)[kept].max() < 0.02
     assert set(found.status[~kept]) <= {OUTSIDE_LIMITS}
-    found = find_joint_targets(robot, position, rotation, NEUTRAL, straight)
+    found = find_joint_targets(robot, position, rotation, np.zeros((len(position), 6)), straight)
     assert set(found.status) <= {OTHER_POSTURE, UNREACHABLE, OUTSIDE_LIMITS} and OTHER_POSTURE in found.status
 
 
@@ -110,7 +110,9 @@ def test_a_posture_behind_a_singular_one_is_another_however_near():
     reported = robot.robot.reported_angles(angles)
     stated = angles.copy()
     stated[:, 4] = np.radians([15.0, -1.0])
-    found = find_joint_targets(robot, *nominal_forward(robot.robot, reported), NEUTRAL, robot.robot.reported_angles(stated))
+    found = find_joint_targets(
+        robot, *nominal_forward(robot.robot, reported), np.zeros((len(reported), 6)), robot.robot.reported_angles(stated)
+    )
     assert found.status.tolist() == [OK, OTHER_POSTURE]
 
 
@@ -124,7 +126,7 @@ def test_random_paths_never_swing(name):
         robot = replace(robot, robot=replace(robot.robot, joint_limits=np.stack([-half, half], axis=1)))
         walk = draws.uniform(-half, half) + np.cumsum(draws.normal(0.0, 0.06, (10, len(half))), axis=0)
         position, rotation = nominal_forward(robot.robot, robot.robot.reported_angles(walk.clip(-half, half)))
-        found = find_joint_targets(robot, position, rotation, NEUTRAL)
+        found = find_joint_targets(robot, position, rotation, np.zeros((len(position), 6)))
         good = found.status == OK
         whole += good.all()
         assert not large_steps(robot.robot, position[good], rotation[good], found.joint_angles[good])

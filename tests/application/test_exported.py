@@ -6,7 +6,6 @@ from analysed_robots import analysed
 from made_calibrated import made_calibrated, plain_estimate, plain_model
 
 from elastocal.application.calibrated import (
-    OperatingConditions,
     calibrate_by_model,
     forward,
     without,
@@ -24,7 +23,7 @@ def draw_states(robot, count=20):
     low, high = robot.joint_limits.T
     angles = low + (high - low) * draws.random((count, robot.joints))
     wrench = draws.standard_normal((count, 6)) * 50.0
-    return robot.reported_angles(angles), OperatingConditions(wrench, None, np.full(count, 3600.0))
+    return robot.reported_angles(angles), wrench
 
 
 def read_file_model(robot):
@@ -49,10 +48,10 @@ def test_poses_of_a_robot_file_under_load_are_those_of_the_calibrated_robot(name
     calibrated = made_calibrated(robot, *(key for key in (*GEOMETRY, "link_geometry@6", *more) if key in known), size=1.0)
     found = fold_effects(calibrated)
     assert found.left_out == ()
-    angles, operating = draw_states(robot)
+    angles, wrench = draw_states(robot)
     through_file = robot_from_document(document_of(found.robot))
     for mine, theirs in zip(
-        forward(read_file_model(through_file), angles, operating), forward(calibrated, angles, operating), strict=True
+        forward(read_file_model(through_file), angles, wrench), forward(calibrated, angles, wrench), strict=True
     ):
         np.testing.assert_allclose(mine, theirs, atol=1e-9)
 
@@ -62,10 +61,10 @@ def test_what_a_robot_file_cannot_say_is_left_out_and_changes_nothing_else():
     calibrated = made_calibrated(analysed("gp180"), *GEOMETRY, *keys)
     found = fold_effects(calibrated)
     assert [calibrated.model.effects[number].key for number in found.left_out] == keys
-    angles, operating = draw_states(calibrated.robot)
+    angles, wrench = draw_states(calibrated.robot)
     bare = without(calibrated, set(found.left_out))
-    ends = [forward(each, angles, operating)[0] for each in (read_file_model(found.robot), bare, calibrated)]
+    ends = [forward(each, angles, wrench)[0] for each in (read_file_model(found.robot), bare, calibrated)]
     np.testing.assert_allclose(ends[0], ends[1], atol=1e-9)
-    off = find_left_out_m(calibrated, angles, operating)
+    off = find_left_out_m(calibrated, angles, wrench)
     np.testing.assert_allclose(off, np.linalg.norm(ends[2] - ends[1], axis=1))
     assert off.max() > 1e-6

@@ -18,18 +18,17 @@ def write_path(folder, header=HEADER, rows=ROWS):
     return path
 
 
-def test_poses_are_read_loads_and_covariates_where_they_are(tmp_path):
+def test_poses_are_read_loads_and_postures_where_they_are(tmp_path):
     found = read_target_path(write_path(tmp_path), 6)
     np.testing.assert_array_equal(found.position, [[1.0, 0.2, 0.5], [1.1, 0.2, 0.5]])
     np.testing.assert_allclose(Rotation.from_matrix(found.rotation[0]).as_rotvec(), [0.1, 0.2, 0.3])
-    assert found.start is None and found.wrench is None and found.time_s is None and len(found) == 2
-    header = HEADER + ",fx,fy,fz,mx,my,mz,q1,q2,temperature_c"
-    found = read_target_path(write_path(tmp_path, header, [row + ",1,2,3,4,5,6,0.1,0.2,21" for row in ROWS]), 2)
+    assert found.start is None and found.wrench is None and len(found) == 2
+    header = HEADER + ",fx,fy,fz,mx,my,mz,q1,q2"
+    found = read_target_path(write_path(tmp_path, header, [row + ",1,2,3,4,5,6,0.1,0.2" for row in ROWS]), 2)
     np.testing.assert_array_equal(found.wrench[1], [1, 2, 3, 4, 5, 6])
     forces = read_target_path(write_path(tmp_path, HEADER + ",fx,fy,fz", [row + ",1,2,3" for row in ROWS]), 2)
     np.testing.assert_array_equal(forces.wrench, [[1, 2, 3, 0, 0, 0]] * 2)
     np.testing.assert_array_equal(found.start[0], [0.1, 0.2])
-    np.testing.assert_array_equal(found.temperature_c, [21, 21])
 
 
 @pytest.mark.parametrize(
@@ -44,7 +43,7 @@ def test_poses_are_read_loads_and_covariates_where_they_are(tmp_path):
         (HEADER, "1100,0,0,0,0,0", "line 2", ["1100", "metres"]),
         (HEADER, "1,0,0,0,0,90", "line 2", ["a turn of 90", "rad, not degrees, 9.42 at most"]),
         (HEADER, "1,0,0,0,0,\x1b[2J", "line 2", [r"the character '\x1b'"]),
-        (HEADER + ",temperature_c", "1,0,0,0,0,0,-500", "line 2, column temperature_c", ["'-500'", "-200 to 200"]),
+        (HEADER + ",temperature_c", "1,0,0,0,0,0,20", "line 1", ["unknown column 'temperature_c'"]),
         (HEADER + ",fx,fy,fz,mx,my,mz", "1,0,0,0,0,0,0,0,-1e9,0,0,0", "line 2, column fz", ["'-1e9'", "1e+06 N"]),
     ],
 )

@@ -19,7 +19,7 @@ from made_remainders import NOISE_M
 from support import refused
 
 from elastocal.application.accuracy import campaign_accuracy
-from elastocal.application.calibrated import OperatingConditions, calibrate_by_fit, forward, nominal_forward
+from elastocal.application.calibrated import calibrate_by_fit, forward, nominal_forward
 from elastocal.io.json_files import read_json
 from elastocal.io.origin import environment
 from elastocal.io.records import checksum
@@ -132,7 +132,7 @@ def states(fanuc):
     rng = np.random.default_rng(0)
     low, high = fanuc.joint_limits.T
     wrench = np.hstack([300.0 * rng.standard_normal((60, 3)), np.zeros((60, 3))])
-    return fanuc.reported_angles(rng.uniform(0.6 * low, 0.6 * high, (60, 6))), OperatingConditions(wrench)
+    return fanuc.reported_angles(rng.uniform(0.6 * low, 0.6 * high, (60, 6))), wrench
 
 
 def test_each_line_of_the_budget_is_what_the_robot_misses_without_that_effect(fanuc, states):

@@ -37,7 +37,7 @@ def imported(paths):
 
 
 def test_what_every_user_installs_is_imported_by_what_every_user_runs():
-    """A package that a test alone needs is of the extra test; cvxpy was not, with 10 packages and 234 MB."""
+    """A package that a test alone needs is of the extra test: cvxpy once was not, with 10 packages and 234 MB."""
     assert names(PROJECT["dependencies"]) - set().union(*imported(RUN)) == IMPORTED_BY_OTHERS
 
 

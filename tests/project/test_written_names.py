@@ -22,7 +22,7 @@ from elastocal.command.main import app
 from elastocal.errors import InputError
 from elastocal.figures import style
 from elastocal.io import json_files
-from elastocal.report import certificate
+from elastocal.report import typesetting
 
 pytestmark = pytest.mark.slow
 
@@ -169,7 +169,7 @@ def test_a_command_that_is_killed_leaves_the_old_files_or_none(checkout, names_w
     child = os.fork()
     if not child:
         monkeypatch.setattr(style, "save", lambda *_: os._exit(9))
-        monkeypatch.setattr(certificate, "write_certificate", lambda *_: os._exit(9))
+        monkeypatch.setattr(typesetting, "compile_document", lambda *_: os._exit(9))
         monkeypatch.setattr(json_files, "write_json", lambda *_: os._exit(9))
         run(*words)
         os._exit(0)

@@ -11,9 +11,9 @@ import pytest
 from drawn_figures import empty_pictures
 from made_loop_tables import CAMPAIGNS, facts_of, plainly, residual_table
 
-from elastocal.report.loop_facts import write_loop_report
 from elastocal.report.loop_page import loop_page, write_loop_page
 from elastocal.report.outcome import outcome
+from elastocal.report.typesetting import compile_document
 
 PICTURES = ["arrows", "before_after", "candidates"]
 
@@ -35,7 +35,7 @@ def test_artefacts_of_every_verdict_agree(campaign, kuka, pictures, tmp_path, mo
     folder.mkdir(parents=True)
     facts = facts_of(verdict)
     (folder / "verdict.json").write_text(json.dumps(verdict), encoding="utf-8")
-    write_loop_report(folder / "report.pdf", facts, pictures)
+    compile_document(folder / "report.pdf", "loop.typ", {"facts": facts}, pictures)
     write_loop_page(folder / "report.html", *loop_page(facts, residual_table(), kuka))
     page = (folder / "report.html").read_text(encoding="utf-8").partition('<script type="application/json"')[0]
     texts = {"page": bare(html.unescape(re.sub(r"<style>.*?</style>|<[^>]+>", " ", page, flags=re.DOTALL)))}

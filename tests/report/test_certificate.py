@@ -6,7 +6,8 @@ import pytest
 from drawn_figures import empty_pictures
 from made_certificates import made_document
 
-from elastocal.report.certificate import certificate_facts, share_name, write_certificate
+from elastocal.report.certificate import certificate_facts, share_name
+from elastocal.report.typesetting import compile_document
 
 
 @pytest.mark.parametrize(
@@ -43,5 +44,5 @@ def test_every_kind_of_certificate_is_typeset(tmp_path, decision):
     assert small["budget"] == [["weight of an undeclared payload", "below 0.1\u00a0µm"]]
     assert facts["budget"][-1][1] == "hidden by the tracker's noise" and share_name("link_weight") == "gravity sag"
     path = tmp_path / "certificate.pdf"
-    write_certificate(path, facts, empty_pictures(tmp_path, ["budget"]))
+    compile_document(path, "certificate.typ", {"facts": facts}, empty_pictures(tmp_path, ["budget"]))
     assert path.read_bytes().startswith(b"%PDF")

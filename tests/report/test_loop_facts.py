@@ -78,7 +78,7 @@ def test_what_to_do_follows_from_the_verdict_and_from_the_gain():
         ({"cost_m": 1.5e-5, "probability": 0.996}, "0.015 mm: real, negligible"),
         ({"cost_m": 1.5e-5, "probability": 0.7}, "0.015 mm: negligible"),
         ({"cost_m": 4.4e-10, "probability": 0.996}, "below 0.001 mm: real, negligible"),
-        ({"cost_m": None}, "not in the final model"),
+        ({"cost_m": None}, "in no command"),
         ({"cost_m": None, "name": "setup_step"}, "an error of the measurement, not of the robot"),
     ],
 )

@@ -8,7 +8,8 @@ from made_surveys import made_candidates, made_survey
 
 from elastocal.application.planning.plan import choose_plan, sheet
 from elastocal.campaigns.campaign import Target
-from elastocal.report.plan_pages import plan_facts, write_plan_sheet
+from elastocal.report.plan_pages import plan_facts
+from elastocal.report.typesetting import compile_document
 
 
 def made():
@@ -35,6 +36,6 @@ def test_a_row_has_the_angles_in_degrees_and_as_many_boxes_as_measurements():
 
 
 def test_the_sheet_is_typeset(tmp_path):
-    pictures = dict(zip(("overview", "poses0"), map(str, empty_pictures(tmp_path, ["overview", "poses0"])), strict=True))
-    write_plan_sheet(tmp_path / "plan.pdf", plan_facts(*made(), ["It is worth the effort."]), pictures)
+    facts, pictures = plan_facts(*made(), ["It is worth the effort."]), empty_pictures(tmp_path, ["overview", "poses0"])
+    compile_document(tmp_path / "plan.pdf", "plan.typ", {"facts": facts}, pictures)
     assert (tmp_path / "plan.pdf").read_bytes().startswith(b"%PDF")

@@ -41,7 +41,7 @@ def facts(**changed):
 
 
 EVERY = facts()
-FIGURES = ["figure2", "figure3", "figure4", "figure5a", "figure5c", "scores_against_paper", "ladder", "designs", "costs"]
+FIGURES = ["figure2", "figure3", "figure4", "figure5a", "figure5c", "scores_against_paper", "ladder", "designs"]
 BIBLIOGRAPHY = Path(__file__).resolve().parents[2] / "paper" / "paper.bib"
 HEAD = {
     "table1": ["robot", "c1"],
@@ -106,8 +106,8 @@ def pictures(tmp_path_factory):
     return [*empty_pictures(tmp_path_factory.mktemp("figures"), FIGURES), BIBLIOGRAPHY]
 
 
-def write_report(path, stated, pictures, figures=FIGURES):
-    shown = {name: [head, ["1.0 ± 0.1"] * len(head)] for name, head in HEAD.items()} | {"figures": figures}
+def write_report(path, stated, pictures):
+    shown = {name: [head, ["1.0 ± 0.1"] * len(head)] for name, head in HEAD.items()}
     compile_document(path, "study.typ", {"facts": json.loads(json.dumps(stated, allow_nan=False)), "tables": shown}, pictures)
 
 

@@ -11,8 +11,8 @@ from elastocal.study.points import (
     budget_blocks,
     configurations_needed,
     lengths_table,
+    mean_of,
     paired_table,
-    ratio_of_roots,
 )
 
 POINT_SETS = {"E": ["E"], "E twice": ["E", "E"], "three": ["A", "B", "E"]}
@@ -45,7 +45,7 @@ def test_the_interval_of_a_ratio_is_that_of_the_bootstrap_over_data_sets():
     ours, theirs = rng.chisquare(5, (2, 200))
     drawn = rng.integers(0, 200, (2000, 200))
     expected = np.quantile(np.sqrt(ours[drawn].mean(axis=1) / theirs[drawn].mean(axis=1)), [0.025, 0.975])
-    assert ratio_of_roots(ours, theirs)[1:] == pytest.approx(expected, rel=0.02)
+    assert mean_of(ours, True).ratio(mean_of(theirs, True))[1:] == pytest.approx(expected, rel=0.02)
 
 
 def test_lengths_are_exact_with_an_interval():

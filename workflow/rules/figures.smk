@@ -14,7 +14,6 @@ DEVIATION_PANELS = dict(zip("cd", REDUCED, strict=False))
 PAPER_FIGURES = [*SCHEME_ROBOTS, "figure4", *(f"figure5{panel}" for panel in (STIFFNESS_PANELS | DEVIATION_PANELS))]
 FIGURES = [
     *PAPER_FIGURES,
-    "costs",
     "scores_against_paper",
     "ladder",
     "designs",
@@ -39,16 +38,7 @@ DRAWN = {
     ),
     "draw_designs": (
         ("designs", "designs", "designs", ABOUT, "Which configurations (RQ3)"),
-        {"table": rules.tabulate_designs.output.table},
-        {
-            "titles": REDUCED_TITLES,
-            "accuracy_um": QUESTIONS["accuracies_um"][0],
-            "joint_range": INTERPRETATIONS["joint_range"],
-        },
-    ),
-    "draw_costs": (
-        ("costs", "costs", "costs", ABOUT, "Cost of an accuracy (RQ2)"),
-        {"table": rules.tabulate_costs.output.costs, "break_even": rules.tabulate_costs.output.break_even},
+        {"table": rules.tabulate_simulated_designs.output.table},
         {"titles": REDUCED_TITLES, "accuracy_um": QUESTIONS["accuracies_um"][0]},
     ),
 }

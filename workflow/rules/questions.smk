@@ -2,7 +2,7 @@
 metric (RQ4).
 
 Needs the configuration alone, as the data sets are those of the study, drawn again in memory; tabulate_uses needs results/metrics/
-and results/replicates/. Writes results/budget/{robot}.parquet, results/ladder/, designs/, simulated_designs/ and uses/ alike, and
+and results/replicates/. Writes results/budget/{robot}.parquet, results/ladder/, simulated_designs/ and uses/ alike, and
 from each tables of their names in reports/tables/.
 """
 
@@ -19,11 +19,6 @@ ASKED = {
             "lengths": QUESTIONS["ladder_lengths"],
             "noises": [1e-6 * noise for noise in QUESTIONS["ladder_noise_um"]],
         },
-    ),
-    "choose_designs": (
-        "designs",
-        ["designs"],
-        {"study": study_in_memory(), "candidates": QUESTIONS["candidates"], "sizes": QUESTIONS["design_sizes"]},
     ),
     "judge_in_use": (
         "uses",
@@ -58,11 +53,10 @@ TABULATED = {
     "tabulate_costs": (
         "points",
         {"budgets": "budget"},
-        {"costs": ("costs", "costs", "Cost of an accuracy (RQ2)"), "break_even": ("break_even",)},
+        {"table": ("break_even",)},
         SETS_OF_POINTS | {"weights": {"seed": config["seed"], "replicates": config["evaluation"]["bootstrap_replicates"]}},
     ),
     "tabulate_ladder": ("ladder", {"ladders": "ladder"}, {"table": ("ladder", "ladder", "Link springs (RQ1)")}, {}),
-    "tabulate_designs": ("designs", {"designs": "designs"}, {"table": ("designs", "designs", "Optimal designs (RQ3)")}, {}),
     "tabulate_simulated_designs": (
         "designs",
         {"designs": "simulated_designs"},

@@ -25,7 +25,6 @@ rule compile_paper:
     params:
         names=TITLES,
         stated={
-            "figures": PAPER_FIGURES,
             "classical": NAMES[CLASSICAL],
             **{key: str(config["tables"][key]) for key in ("noise_um", "length")},
             **{key: str(config[key]) for key in ("data_sets", "configurations", "test_configurations")},
@@ -47,7 +46,7 @@ rule state_answers:
         extended=rules.tabulate_extended.output.table,
         studies=rules.tabulate_studies.output.table,
         joint=rules.compare_with_studies.output.joint,
-        break_even=rules.tabulate_costs.output.break_even,
+        break_even=rules.tabulate_costs.output.table,
         simulated=rules.tabulate_simulated_designs.output.table,
         citation=placed(ROOT / "CITATION.cff"),
         template=placed(PACKAGES / "elastocal" / "report" / "study.txt"),
@@ -92,7 +91,5 @@ rule compile_report:
         report=shown(
             "reports/study.pdf", "study", "Tables and figures of the paper", shows="The report of the study", kind="report"
         ),
-    params:
-        figures=FIGURES,
     script:
         "../scripts/compile_report.py"

@@ -9,8 +9,9 @@ from elastocal.io.storage import read_table
 from elastocal.loop.diagnosis_tables import final_parameters
 from elastocal.loop.schemas import STEPS, read_residuals
 from elastocal.mechanics.robot_file import robot_from_document
-from elastocal.report.loop_facts import loop_facts, write_loop_report
+from elastocal.report.loop_facts import loop_facts
 from elastocal.report.loop_page import loop_page, write_loop_page
+from elastocal.report.typesetting import compile_document
 
 
 def compile_loop_report(job: Job) -> None:
@@ -20,7 +21,7 @@ def compile_loop_report(job: Job) -> None:
     table = read_residuals(job.input.residuals, robot.joints)
     parameters = final_parameters(read_json(job.input.diagnosis), read_table(job.input.steps, STEPS))
     facts = loop_facts(verdict, *rows, table, descriptions, parameters)
-    write_loop_report(job.output.report, facts, job.input.figures, origin_of(job))
+    compile_document(job.output.report, "loop.typ", {"facts": facts}, job.input.figures, origin_of(job))
     write_loop_page(job.output.page, *loop_page(facts, table, robot), origin_of(job))
 
 

@@ -14,7 +14,7 @@ TABLES = ("table1", "table2", "table3", "table4", "interpretations")
 def compile_report(job: Job) -> None:
     facts = read_json(job.input.answers)
     frames = {name: pd.read_csv(job.input[name]) for name in TABLES}
-    tables = paper_tables(frames, facts["names"], int(facts["size"]["configurations"])) | {"figures": job.params.figures}
+    tables = paper_tables(frames, facts["names"], int(facts["size"]["configurations"]))
     beside = [*job.input.figures, job.input.bibliography]
     compile_document(job.output.report, "study.typ", {"facts": facts, "tables": tables}, beside, origin_of(job))
 

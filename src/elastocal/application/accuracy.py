@@ -3,9 +3,9 @@
 The error at a pose is the real robot less the commanded model, in a frame (`frames`). Predicted, it has four parts: what the
 uncertainty of the parameters leaves; the repeatability of the joints and the error that each new pose has of its own; what the
 form of the model leaves open, by what other models of the diagnosis predict, or held-out poses where these show more; and all
-of what the fit ascribes to effects that no command contains, such as a step of the set-up, for nothing shows that they leave
-the robot alone. Where a regression on the remainder acts, the first two are no smaller than poses left out of it say, and what
-is open of the form is in them unless held-out poses show more. Nothing of the tracker's noise is in it.
+of what the fit ascribes to effects that no command contains, such as hysteresis or a step of the set-up, for nothing shows that
+they leave the robot alone. Where a regression on the remainder acts, the first two are no smaller than poses left out of it
+say, and what is open of the form is in them unless held-out poses show more. Nothing of the tracker's noise is in it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ import numpy as np
 from scipy.special import gammaincinv
 
 from elastocal.application.calibrated import (
-    OperatingConditions,
     Remainder,
     calibrate_by_model,
     forward,
@@ -29,11 +28,11 @@ from elastocal.application.calibrated import (
     square_root,
 )
 from elastocal.application.frames import BASE, FRAMES, ROBOT, Scope, find_absorbed, free_parts, placement, root_mean_square
-from elastocal.effects.catalogue import moves_robot
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import conditions, displaced_coordinates, parameters
 from elastocal.fitting.noise import hidden_repeatability
 from elastocal.mechanics.kinematics import jacobians, pose_differences, poses
+from elastocal.remainder.corrected import is_commanded
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -132,24 +131,24 @@ class Prediction:
 
 
 def predict_errors(
-    calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions, draws: int = _DRAWS
+    calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray, draws: int = _DRAWS
 ) -> Prediction:
-    """Predicted errors of the corrected robot where it is commanded to joint angles (N, n).
+    """Predicted errors of the corrected robot where it is commanded to joint angles (N, n) under loads (N, 6).
 
     Drawn robots, most of the work, are for errors over all poses; where those of each pose are enough, none (0) need be.
     """
-    scope, robot = _under(calibrated.scope, operating), calibrated.robot
+    scope, robot = calibrated.scope, calibrated.robot
     root, repeated = square_root(calibrated.covariance), np.hypot(calibrated.noise.joint_rad, calibrated.noise.pose_rad)
     stream = np.random.default_rng(_SEED)
     drawn = stream.standard_normal((root.shape[1], draws))
     freedom = scope.repeated_freedom
     size = np.sqrt(stream.gamma(0.5 * freedom, 2.0 / freedom, draws)) if freedom else np.ones(draws)
     total, worst = np.zeros(draws), np.zeros(draws)
-    acts, stated = _by_regression(calibrated, reported_angles, operating)
+    acts, stated = _by_regression(calibrated, reported_angles, wrench)
     parts, more = [], np.zeros_like(stated)
     for start in range(0, len(reported_angles), _AT_ONCE):
         part = slice(start, start + _AT_ONCE)
-        angles, under = reported_angles[part], operating.part(part)
+        angles, under = reported_angles[part], wrench[part]
         columns = placement(scope, *forward(calibrated, angles, under))
         moved = (pose_sensitivities(calibrated, angles, under) - columns @ scope.absorbed) @ root
         apart = jacobians(robot.chain, robot.model_angles(angles), robot.chain.end_effector) * repeated
@@ -185,29 +184,17 @@ def predict_errors(
 
 
 def _by_regression(
-    calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions
+    calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Where a regression acts, (N,), and the squared error that it leaves there without the tracker's noise, (2, N), m²: on the
     average, and for intervals."""
-    acts, asked = regression_at(calibrated, reported_angles, operating)
+    acts, asked = regression_at(calibrated, reported_angles, wrench)
     found, more = np.zeros((2, len(acts))), calibrated.remainder
     if more is not None and asked is not None:
         std = more.predictor.std(asked)
         for number, times in enumerate((more.typical, 1.0)):
             found[number, acts] = np.maximum((times**2 * std**2 - more.sensor_m**2).sum(axis=1), 0.0)
     return acts, found
-
-
-def _under(scope: Scope, operating: OperatingConditions) -> Scope:
-    """A scope with what goes with conditions that are not given among what is left out."""
-    given = {"time": operating.time_s, "temperature": operating.temperature_c, "approach": operating.approach}
-    missing = [entry for entry in scope.unstated if given[entry[0]] is None]
-    return replace(
-        scope,
-        left_out=(*scope.left_out, *(f"what goes with the {name} (not given)" for name, _, _ in missing)),
-        left_out_m=float(np.linalg.norm([scope.left_out_m, *(rms for _, rms, _ in missing)])),
-        left_out_worst_m=float(np.linalg.norm([scope.left_out_worst_m, *(worst for _, _, worst in missing)])),
-    )
 
 
 def quantile_of_length(covariance: np.ndarray) -> np.ndarray:
@@ -233,9 +220,9 @@ def before_m(calibrated: CalibratedRobot, position: np.ndarray, rotation: np.nda
     return np.linalg.norm((off - placement(scope, position, rotation) @ scope.absorbed_before)[:, :3], axis=1)
 
 
-def uncorrected_m(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> float:
-    """RMS error of the uncorrected robot at commands (N, n), m, in the frame of the corrected one."""
-    pose = forward(calibrated, reported_angles, operating)
+def uncorrected_m(calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray) -> float:
+    """RMS error of the uncorrected robot at commands (N, n) under loads (N, 6), m, in the frame of the corrected one."""
+    pose = forward(calibrated, reported_angles, wrench)
     off = pose_differences(*nominal_forward(calibrated.robot, reported_angles), *pose)
     return root_mean_square(before_m(calibrated, *pose, off))
 
@@ -278,8 +265,8 @@ def scope_of(calibrated: CalibratedRobot, model: Model, estimate: Estimate, cova
     offset = bool(there) and all(target.offset_m is None for target in there)
     turn = bool(there) and all(target.rotation is None for target in there)
     free = free_parts(base, offset, turn and model.rows == 6)
-    reported, operating = robot.reported_angles(states.joint_angles), conditions_in(calibrated, states)
-    position, rotation = forward(calibrated, reported, operating)
+    reported = robot.reported_angles(states.joint_angles)
+    position, rotation = forward(calibrated, reported, states.wrench)
     scope = Scope(ROBOT if base else BASE, position.mean(axis=0), offset_removed=offset)
     columns = placement(scope, position, rotation)
     before = pose_differences(*nominal_forward(robot, reported), position, rotation)[..., None]
@@ -288,18 +275,10 @@ def scope_of(calibrated: CalibratedRobot, model: Model, estimate: Estimate, cova
         squares = ((fields - columns @ find_absorbed(columns, fields, free))[:, :3] ** 2).sum(axis=(1, 2))
         return float(np.sqrt(squares.mean())), float(np.sqrt(squares.max()))
 
-    unstated = []
-    for name, blank in (("time", "time_s"), ("temperature", "temperature_c"), ("approach", "approach")):
-        if any(name in effect.needs for effect in calibrated.model.effects):
-            other = forward(calibrated, reported, replace(operating, **{blank: None}))
-            unstated.append((name, *size(pose_differences(position, rotation, *other)[..., None])))
-    scope = replace(
-        scope,
-        unstated=tuple(unstated),
-        absorbed=find_absorbed(columns, pose_sensitivities(calibrated, reported, operating), free),
-        absorbed_before=find_absorbed(columns, before, free)[:, 0],
-    )
-    dropped = tuple(effect.key for effect in model.effects if not moves_robot(effect))
+    sensitivities = pose_sensitivities(calibrated, reported, states.wrench)
+    absorbed, absorbed_before = (find_absorbed(columns, fields, free) for fields in (sensitivities, before))
+    scope = replace(scope, absorbed=absorbed, absorbed_before=absorbed_before[:, 0])
+    dropped = tuple(effect.key for effect in model.effects if not is_commanded(effect))
     if not dropped:
         return scope
     if model.row_span is None and states.row is not None:
@@ -315,18 +294,11 @@ def scope_of(calibrated: CalibratedRobot, model: Model, estimate: Estimate, cova
     return replace(scope, left_out=dropped, left_out_m=rms, left_out_worst_m=worst)
 
 
-def conditions_in(calibrated: CalibratedRobot, states: States) -> OperatingConditions:
-    """Those of states; senses of approach as the controller counts them."""
-    back = np.linalg.inv(calibrated.robot.reported_matrix)
-    approach = None if states.approach is None else np.sign(states.approach @ back.T)
-    return OperatingConditions(states.wrench, approach, states.time_s, states.temperature_c)
-
-
-def campaign_poses(calibrated: CalibratedRobot) -> tuple[np.ndarray, OperatingConditions]:
-    """Commands (N, n) and conditions of a campaign over which its accuracy is stated: all, or evenly some of very many."""
+def campaign_poses(calibrated: CalibratedRobot) -> tuple[np.ndarray, np.ndarray]:
+    """Commands (N, n) and loads (N, 6) of a campaign over which its accuracy is stated: all, or evenly some of very many."""
     states = calibrated.states
     chosen = np.unique(np.linspace(0, len(states) - 1, min(len(states), _MOST_STATES)).astype(int))
-    return calibrated.robot.reported_angles(states.joint_angles[chosen]), conditions_in(calibrated, states).part(chosen)
+    return calibrated.robot.reported_angles(states.joint_angles[chosen]), states.wrench[chosen]
 
 
 def campaign_accuracy(calibrated: CalibratedRobot) -> Accuracy:
@@ -353,7 +325,7 @@ def judge_by_held_out(calibrated: CalibratedRobot, held_out: Case, residual: np.
     if calibrated.noise.source == "residual" or not mine.any():
         return calibrated
     state = seen.state[mine]
-    found = predict_errors(calibrated, calibrated.robot.reported_angles(states.joint_angles), conditions_in(calibrated, states))
+    found = predict_errors(calibrated, calibrated.robot.reported_angles(states.joint_angles), states.wrench)
     sensor = noise_m**2 / states.repeats[state]
     drawn = sensor @ np.random.default_rng(_SEED).chisquare(3, (len(state), len(found.rms_m))) / len(state)
     square = float((residual[mine] ** 2).sum(axis=1).mean())
@@ -367,7 +339,7 @@ def _find_left_out(model: Model, estimate: Estimate, covariance: np.ndarray, sta
     """What effects that are not commanded do to the end effector, (S, 6, 1 + D): all of it, and a factor of its covariance."""
     moved, values = move_to_end_effector(model, estimate)
     states = replace(states, session=np.zeros_like(states.session))
-    kept = [moves_robot(effect) for effect in model.effects]
+    kept = [is_commanded(effect) for effect in model.effects]
     commanded = tuple(value if moves else 0.0 * value for moves, value in zip(kept, estimate.coefficients, strict=True))
     chain, ends = model.sites.chain, []
     for each in (values, replace(values, coefficients=commanded)):
@@ -409,23 +381,20 @@ def accuracy_sentence(accuracy: Accuracy) -> str:
     return text
 
 
-def error_rows(verdict: Mapping[str, Any], *others: tuple[Accuracy, float]) -> list[list[str]]:
-    """How far the robot is off before and after its correction: one table, the same in report, certificate and on the terminal.
+def error_rows(verdict: Mapping[str, Any]) -> list[list[str]]:
+    """How far the robot is off before and after its correction: one table, the same in report and certificate.
 
     What is measured and what is predicted, over which poses and in which frame, are different errors; each row says which.
     Columns: which RMS error, of the uncorrected robot, of the corrected one; no row where the data are at fault. `verdict`:
-    contents of verdict.json. `others`: accuracies over other poses, each with that of the uncorrected robot, m.
+    contents of verdict.json.
     """
     if not verdict.get("accuracy"):
         return []
     heldout, measured = verdict["heldout"], "measured at validation poses, noise included, after the best placement of the base"
-    stated = [(Accuracy(**verdict["accuracy"]), verdict["uncorrected_m"]), *others]
+    stated, before = Accuracy(**verdict["accuracy"]), millimetres(verdict["uncorrected_m"])
     return [
         [measured, millimetres(heldout["uncalibrated"]["rms_m"]), millimetres(heldout["delivered"]["rms_m"])],
-        *(
-            [f"predicted over {each.region}, {FRAMES[each.frame]}", millimetres(before), millimetres(each.rms_m)]
-            for each, before in stated
-        ),
+        [f"predicted over {stated.region}, {FRAMES[stated.frame]}", before, millimetres(stated.rms_m)],
     ]
 
 

@@ -1,5 +1,8 @@
 """The robot as corrected: the final model of a diagnosis without what belongs to one campaign's set-up and its instruments.
 
+A command states joint angles and a load. What goes with the sense in which a joint is approached, with time or temperature is
+in no command either, and counts as an error that is left (`accuracy`).
+
 All that uses it (`accuracy`, `compensation`, `exported`) asks the same of it: where it comes to rest
 (`come_to_rest` and `regressed`, `forward`), how surely (`pose_sensitivities` with its covariance, noise and scope), and where
 it was fitted (`beyond_fitted`). Poses are those of the end effector's measuring point in the robot's base frame: that of the
@@ -15,16 +18,14 @@ import numpy as np
 
 from elastocal.application.frames import BASE, Scope, root_mean_square, subtract_placement
 from elastocal.campaigns.campaign import Target
-from elastocal.effects.catalogue import moves_robot
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import conditions, displaced_coordinates, parameters
-from elastocal.fitting.observations import Observations, States
+from elastocal.fitting.observations import Observations, States, select_states
 from elastocal.mechanics.kinematics import pose_differences, poses
-from elastocal.remainder.corrected import beyond_regressed, inputs_of
+from elastocal.remainder.corrected import beyond_regressed, inputs_of, is_commanded
 from elastocal.validation.placing import beyond_campaign, beyond_loads
 
 if TYPE_CHECKING:
-    from elastocal.application.frames import Scope
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.noise import Noise
@@ -35,8 +36,6 @@ if TYPE_CHECKING:
 _AT_ONCE = 1024
 # Names of what costs something and is no effect of the catalogue.
 SPRINGS, REGRESSION = "joint_compliance", "regression"
-# °C, at which dimensions are stated (ISO 1).
-_REFERENCE_C = 20.0
 
 
 @dataclass(frozen=True)
@@ -81,30 +80,6 @@ class CalibratedRobot:
         return self.fitted
 
 
-@dataclass(frozen=True)
-class OperatingConditions:
-    """Under what the robot works, row for row as the joint angles, or one row for all of them.
-
-    `wrench` (N, 6): N, N m, at the last measuring point's origin, base axes, beside the weights that the robot file declares;
-    None for none. `approach` (N, n): sense in which each joint comes to rest as the controller reports it, -1, 0 or +1; None
-    for unknown, 0. `time_s` (N,): on the clock of the campaign; None for its start. `temperature_c` (N,): None for the 20 °C at
-    which dimensions are stated.
-    """
-
-    wrench: np.ndarray | None = None
-    approach: np.ndarray | None = None
-    time_s: np.ndarray | None = None
-    temperature_c: np.ndarray | None = None
-
-    def part(self, chosen: slice | np.ndarray) -> OperatingConditions:
-        """Those of some rows."""
-        found = [each if each is None or len(each) == 1 else each[chosen] for each in vars(self).values()]
-        return OperatingConditions(*found)
-
-
-NEUTRAL = OperatingConditions()
-
-
 def calibrate_by_fit(fit: Fit, robot: Robot) -> CalibratedRobot:
     """A calibrated robot from the final fit of a diagnosis of that robot's campaign."""
     return calibrate_by_model(robot, fit.model, fit.estimate, fit.covariance, fit.noise)
@@ -112,7 +87,7 @@ def calibrate_by_fit(fit: Fit, robot: Robot) -> CalibratedRobot:
 
 def calibrate_by_model(robot: Robot, model: Model, estimate: Estimate, covariance: np.ndarray, noise: Noise) -> CalibratedRobot:
     """A calibrated robot from a fitted model; `covariance` (P, P): of all its `parameters`."""
-    kept = [number for number, effect in enumerate(model.effects) if moves_robot(effect)]
+    kept = [number for number, effect in enumerate(model.effects) if is_commanded(effect)]
     keys = {model.effects[number].key for number in kept}
     rows = np.flatnonzero([owner in keys for owner, _ in parameters(model, estimate)])
     bare, values = move_to_end_effector(model, estimate)
@@ -147,12 +122,13 @@ def without(calibrated: CalibratedRobot, numbers: set[int]) -> CalibratedRobot:
     return replace(calibrated, estimate=replace(calibrated.estimate, coefficients=values))
 
 
-def effect_costs(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> dict[str, float]:
-    """RMS error in m over commands (N, n) if one effect alone were left out of the correction, by effect; compliances come
-    after effects, and a regression on the remainder last. In the frame of the robot's scope: what a new placement of its base
-    takes up is no error there.
+def effect_costs(calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray) -> dict[str, float]:
+    """RMS error in m over commands (N, n) under loads (N, 6) if one effect alone were left out of the correction, by effect.
+
+    Compliances come after effects, and a regression on the remainder last. In the frame of the robot's scope: what a new
+    placement of its base takes up is no error there.
     """
-    pose, costs = forward(calibrated, reported_angles, operating), {}
+    pose, costs = forward(calibrated, reported_angles, wrench), {}
     names = [effect.effect for effect in calibrated.model.effects]
     for name in dict.fromkeys([*names, SPRINGS, *([REGRESSION] if calibrated.remainder else [])]):
         other = without(calibrated, {number for number, each in enumerate(names) if each == name})
@@ -161,73 +137,59 @@ def effect_costs(calibrated: CalibratedRobot, reported_angles: np.ndarray, opera
         elif name not in names:
             # Compliances as declared are no effect of the model.
             other = replace(other, model=replace(other.model, nominal_compliance=0.0 * other.model.nominal_compliance))
-        apart = pose_differences(*pose, *forward(other, reported_angles, operating))[..., None]
+        apart = pose_differences(*pose, *forward(other, reported_angles, wrench))[..., None]
         costs[name] = root_mean_square(subtract_placement(calibrated.scope, *pose, apart)[:, :3, 0])
     return costs
 
 
-def assumptions(calibrated: CalibratedRobot, conditions: OperatingConditions) -> list[str]:
-    """What effects of the model need and the conditions do not have, one line for each with what is taken instead."""
-    taken = {
-        "approach": (conditions.approach, "no joint's sense of approach is known, and hysteresis is left out"),
-        "time": (conditions.time_s, "the time is that of the campaign's first measurement, when nothing had warmed up"),
-        "temperature": (conditions.temperature_c, f"the temperature is {_REFERENCE_C:g} °C"),
-    }
-    named = {name: ", ".join(e.key for e in calibrated.model.effects if name in e.needs) for name in taken}
-    return [
-        f"{named[name]} needs the {name}, which is not given: {words}"
-        for name, (values, words) in taken.items()
-        if named[name] and values is None
-    ]
-
-
 def forward(
-    calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions = NEUTRAL
+    calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Where the robot really is: exact poses of the end effector's measuring point.
 
-    `reported_angles` (N, n): as the controller reports them, rad (m for prismatic joints). Returns position (N, 3), m, and
-    rotation (N, 3, 3), base axes.
+    `reported_angles` (N, n): as the controller reports them, rad (m for prismatic joints). `wrench` (N, 6): N, N m, at the last
+    measuring point's origin, base axes, beside the weights that the robot file declares; None for none. Returns position
+    (N, 3), m, and rotation (N, 3, 3), base axes.
     """
+    wrench = np.zeros((len(reported_angles), 6)) if wrench is None else wrench
     position, rotation = np.empty((len(reported_angles), 3)), np.empty((len(reported_angles), 3, 3))
     for part in parts(len(reported_angles)):
-        _, position[part], rotation[part] = come_to_rest(calibrated, reported_angles[part], operating.part(part))
-    return position + regressed(calibrated, reported_angles, operating), rotation
+        _, position[part], rotation[part] = come_to_rest(calibrated, reported_angles[part], wrench[part])
+    return position + regressed(calibrated, reported_angles, wrench), rotation
 
 
-def regressed(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> np.ndarray:
+def regressed(calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray) -> np.ndarray:
     """Displacement of the end effector by the regression on the remainder, ndarray (N, 3), m, base axes; 0 where none acts."""
     found = np.zeros((len(reported_angles), 3))
-    acts, asked = regression_at(calibrated, reported_angles, operating)
+    acts, asked = regression_at(calibrated, reported_angles, wrench)
     if calibrated.remainder is not None and asked is not None:
         found[acts] = calibrated.remainder.predictor.mean(asked)
     return found
 
 
 def regression_at(
-    calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions
+    calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray
 ) -> tuple[np.ndarray, Inputs | None]:
     """At which commands (N, n) a regression on the remainder is added, ndarray of bool (N,), and what it is shown there."""
     more = calibrated.remainder
     if more is None:
         return np.zeros(len(reported_angles), bool), None
-    states = states_of(calibrated, reported_angles, operating)
-    acts = ~beyond_regressed(calibrated.states, states.joint_angles, states.wrench)
-    seen = observations_of(states_of(calibrated, reported_angles[acts], operating.part(acts)))
-    asked = inputs_of(calibrated.model, calibrated.estimate, seen)
+    every = observations_of(states_of(calibrated, reported_angles, wrench))
+    acts = ~beyond_regressed(calibrated.states, every.states.joint_angles, wrench)
+    asked = inputs_of(calibrated.model, calibrated.estimate, select_states(every, acts))
     place = np.broadcast_to(more.place, (len(asked), 3))
     return acts, replace(asked, others=np.hstack([asked.others[:, :-3], place]))
 
 
 def come_to_rest(
-    calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions, near: np.ndarray | None = None
+    calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray, near: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Where the robot yields to by its model: coordinates (N, C) of its sites, and position and rotation as by `forward`.
 
     `near` (N, C): coordinates at which the loads are taken, of states that differ little. Without, loads act where the robot
     has yielded to them, by the fixed-point iteration of `model.conditions`.
     """
-    fitted, states = (calibrated.model, calibrated.estimate), states_of(calibrated, reported_angles, operating)
+    fitted, states = (calibrated.model, calibrated.estimate), states_of(calibrated, reported_angles, wrench)
     coordinates, chain = displaced_coordinates(*fitted, conditions(*fitted, states, near)), calibrated.model.sites.chain
     return coordinates, *poses(chain, coordinates, chain.end_effector)
 
@@ -237,44 +199,29 @@ def nominal_forward(robot: Robot, reported_angles: np.ndarray) -> tuple[np.ndarr
     return poses(robot.chain, robot.model_angles(reported_angles), robot.chain.end_effector)
 
 
-def pose_sensitivities(
-    calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions = NEUTRAL
-) -> np.ndarray:
+def pose_sensitivities(calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray) -> np.ndarray:
     """Displacement and rotation of the poses of `forward` by the parameters, ndarray (N, 6, P), m and rad, base axes."""
     model, estimate = calibrated.model, calibrated.estimate
     found = np.zeros((len(reported_angles), 6, len(calibrated.covariance)))
     for part in parts(len(reported_angles)):
-        seen = observations_of(states_of(calibrated, reported_angles[part], operating.part(part)))
+        seen = observations_of(states_of(calibrated, reported_angles[part], wrench[part]))
         found[part] = linearize(model, estimate, seen, conditions(model, estimate, seen.states)).sensitivities
     return found
 
 
 def beyond_fitted(
-    calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray | None = None, times: float = 1.0
+    calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray, times: float = 1.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Which commands (N, n) stand beyond the joint angles that were fitted, and which are loaded so many times more: (N,)."""
     joints = beyond_campaign(calibrated.states, calibrated.robot.model_angles(reported_angles), None)
-    return joints, np.zeros_like(joints) if wrench is None else beyond_loads(calibrated.states, wrench, times)
+    return joints, beyond_loads(calibrated.states, wrench, times)
 
 
-def states_of(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> States:
-    """Reported joint angles and operating conditions as states of the model, with the neutral ones for what is not given."""
-    robot, count = calibrated.robot, len(reported_angles)
-
-    def rows(values: np.ndarray | None, neutral: float, *shape: int) -> np.ndarray:
-        return np.broadcast_to(neutral if values is None else values, (count, *shape))
-
-    return States(
-        session=np.zeros(count, int),
-        pose=np.arange(count),
-        load=np.zeros(count, int),
-        joint_angles=robot.model_angles(np.asarray(reported_angles, float)),
-        wrench=rows(operating.wrench, 0.0, 6),
-        repeats=np.ones(count, int),
-        approach=np.sign(rows(operating.approach, 0.0, robot.joints) @ robot.reported_matrix.T),
-        time_s=rows(operating.time_s, calibrated.model.time_zero_s),
-        temperature_c=rows(operating.temperature_c, _REFERENCE_C),
-    )
+def states_of(calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray) -> States:
+    """Commands, reported joint angles (N, n) and loads (N, 6), as states of the model."""
+    nothing = np.zeros(len(reported_angles), int)
+    angles = calibrated.robot.model_angles(np.asarray(reported_angles, float))
+    return States(nothing, np.arange(len(nothing)), nothing, angles, wrench, nothing + 1)
 
 
 def observations_of(states: States) -> Observations:

@@ -22,7 +22,7 @@ from elastocal.exchange.target_path import OK
 from elastocal.mechanics.kinematics import jacobians, pose_differences
 
 if TYPE_CHECKING:
-    from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
+    from elastocal.application.calibrated import CalibratedRobot
     from elastocal.mechanics.robot import Robot
 
 OUTSIDE_LIMITS, UNREACHABLE, SINGULAR = "outside limits", "unreachable", "singular"
@@ -63,14 +63,14 @@ def find_joint_targets(
     calibrated: CalibratedRobot,
     position: np.ndarray,
     rotation: np.ndarray,
-    operating: OperatingConditions,
+    wrench: np.ndarray,
     start: np.ndarray | None = None,
 ) -> Correction:
     """Joint targets that bring the end effector to wanted poses.
 
     `calibrated`: of six joints or more; of more, joints move as little as possible from where the rigid robot would have them.
-    `position`, `rotation` (N, 3), (N, 3, 3): wanted pose of the last measuring point, m, base axes. `operating`: under which
-    each target is reached. `start` (N, n): joint angles near which each target lies, as the controller reports them, rad:
+    `position`, `rotation` (N, 3), (N, 3, 3): wanted pose of the last measuring point, m, base axes. `wrench` (N, 6): N,
+    N m, there, base axes. `start` (N, n): joint angles near which each target lies, as the controller reports them, rad:
     posture and turns are kept, or the target refused. Without, both are chosen for the path as a whole, see `along_path`.
     """
     robot = calibrated.robot
@@ -84,7 +84,7 @@ def find_joint_targets(
         other = _find_other_postures(robot, near, nominal)
 
     def of(part: slice) -> Correction:
-        return _find_chunk_targets(calibrated, position[part], rotation[part], operating.part(part), nominal[part], left[part])
+        return _find_chunk_targets(calibrated, position[part], rotation[part], wrench[part], nominal[part], left[part])
 
     with ThreadPoolExecutor(2) as pool:
         done = [*pool.map(of, parts(len(position)))]
@@ -120,7 +120,7 @@ def _find_chunk_targets(
     calibrated: CalibratedRobot,
     position: np.ndarray,
     rotation: np.ndarray,
-    operating: OperatingConditions,
+    wrench: np.ndarray,
     nominal: np.ndarray,
     left: np.ndarray,
 ) -> Correction:
@@ -128,8 +128,8 @@ def _find_chunk_targets(
     reached = left <= SOLVED_M
     scale = np.repeat([1.0, reach_m(robot)], 3)
     uncorrected = robot.reported_angles(nominal)
-    coordinates, at, turned = come_to_rest(calibrated, uncorrected, operating)
-    added = regressed(calibrated, uncorrected, operating)
+    coordinates, at, turned = come_to_rest(calibrated, uncorrected, wrench)
+    added = regressed(calibrated, uncorrected, wrench)
     before = pose_differences(position, rotation, at + added, turned)
     inverse = np.linalg.pinv(jacobians(robot.chain, nominal, robot.chain.end_effector))
     angles, off = nominal.copy(), before.copy()
@@ -143,8 +143,7 @@ def _find_chunk_targets(
         moving, step = moving[~far], step[~far]
         angles[moving] += step
         coordinates[moving, :joints] += step
-        commands = robot.reported_angles(angles[moving])
-        under = operating.part(moving)
+        commands, under = robot.reported_angles(angles[moving]), wrench[moving]
         coordinates[moving], at, turned = come_to_rest(calibrated, commands, under, coordinates[moving])
         if number < _REGRESSED:
             added[moving] = regressed(calibrated, commands, under)

@@ -17,14 +17,14 @@ from elastocal.effects.conditions import MASS_PARAMETERS
 from elastocal.mechanics.chain import Chain, MeasuringPoint, Transform
 
 if TYPE_CHECKING:
-    from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
+    from elastocal.application.calibrated import CalibratedRobot
     from elastocal.mechanics.robot import Robot
 
 
-def find_left_out_m(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> np.ndarray:
+def find_left_out_m(calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray) -> np.ndarray:
     """How far the effects that a robot file cannot hold move the end effector, ndarray (N,), m; as in `forward`."""
     bare = without(calibrated, set(fold_effects(calibrated).left_out))
-    positions = [forward(each, reported_angles, operating)[0] for each in (calibrated, bare)]
+    positions = [forward(each, reported_angles, wrench)[0] for each in (calibrated, bare)]
     return np.linalg.norm(positions[0] - positions[1], axis=1)
 
 

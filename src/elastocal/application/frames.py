@@ -25,10 +25,9 @@ class Scope:
     `frame`: "robot" or "base". `origin` (3,): about which the placement turns, m. `absorbed` (12, P): motion of the base (m,
     rad), constant offset and turn of the end effector that take up each parameter. `absorbed_before` (12,): the same of the
     nominal robot less the calibrated one. `left_out`: effects of the fit that no command contains, with what they contribute at
-    the campaign's poses, RMS and at the worst. `unstated`: the same of what goes with "time", "temperature" or "approach" where
-    a command does not state it. `form_m`: what the form of the model leaves open there, RMS. `contradicted`: whether held-out
-    poses showed that to be more than other models say. `repeated_freedom`: degrees of freedom of the square of the joints'
-    repeatability; 0 where it is taken as known.
+    the campaign's poses, RMS and at the worst. `form_m`: what the form of the model leaves open there, RMS. `contradicted`:
+    whether held-out poses showed that to be more than other models say. `repeated_freedom`: degrees of freedom of the square of
+    the joints' repeatability; 0 where it is taken as known.
     """
 
     frame: str
@@ -39,7 +38,6 @@ class Scope:
     left_out: tuple[str, ...] = ()
     left_out_m: float = 0.0
     left_out_worst_m: float = 0.0
-    unstated: tuple[tuple[str, float, float], ...] = ()
     form_m: float = 0.0
     contradicted: bool = False
     repeated_freedom: float = 0.0

@@ -161,7 +161,6 @@ def _worth(survey: Survey, found: Plan, stated: bool) -> list[str]:
         f"Assumed noise: {1e6 * survey.position_m:.3g} µm"
         + (f", {1e6 * survey.orientation_rad:.3g} µrad" if survey.measured == "pose" else "")
         + ("." if stated else f"; {SENSORS[survey.measured][0]}."),
-        f"D-efficiency: at least {100 * found.efficiency:.0f} % of the best design with as many poses.",
     ]
 
 
@@ -178,7 +177,8 @@ def _write(folder: Path, robot: Path, survey: Survey, cell: Cell, found: Plan, w
     from elastocal.io.data_frames import write_csv
     from elastocal.io.documents import LARGEST_BYTES
     from elastocal.io.texts import read_text
-    from elastocal.report.plan_pages import plan_facts, write_plan_sheet
+    from elastocal.report.plan_pages import plan_facts
+    from elastocal.report.typesetting import compile_document
 
     table, names = sheet(survey, found), (ROBOT, CSV, SHEET, PICTURE, DOCUMENT)
     with write_together(folder, names) as partial, tempfile.TemporaryDirectory() as scratch:
@@ -186,7 +186,8 @@ def _write(folder: Path, robot: Path, survey: Survey, cell: Cell, found: Plan, w
         write_csv(partial / CSV, table)
         pages = {f"poses{page}": figure for page, figure in enumerate(pose_pictures(survey.robot, found))}
         pictures = save_all({"overview": plan_picture(survey.robot, cell, found), **pages}, scratch)
-        write_plan_sheet(partial / SHEET, plan_facts(survey, found, table, worth), pictures)
+        facts = plan_facts(survey, found, table, worth)
+        compile_document(partial / SHEET, "plan.typ", {"facts": facts}, pictures.values())
         shutil.copyfile(f"{scratch}/overview.png", partial / PICTURE)
         document = campaign_document(folder.name, ROBOT, survey, found)
         write_text(partial / DOCUMENT, yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=120))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from typer import Argument, Option
 
-from elastocal.command.terminal import diagnosed_campaign, length_m, print_answer, print_lines, robots, workplace
+from elastocal.command.terminal import diagnosed_campaign, length_m, print_answer, robots, workplace
 from elastocal.counting import counted, first_names, grouped
 from elastocal.errors import InputError
 
@@ -63,7 +63,7 @@ def correct(
     from rich.console import Console
 
     from elastocal.application.accuracy import accuracy_sentence, before_m, millimetres, predict_errors
-    from elastocal.application.calibrated import OperatingConditions, assumptions, beyond_fitted, regressed
+    from elastocal.application.calibrated import beyond_fitted, regressed
     from elastocal.application.compensation import find_joint_targets
     from elastocal.application.frames import root_mean_square
     from elastocal.exchange.controllers import axes_of, check_name, controller_of, targets_of
@@ -87,10 +87,9 @@ def correct(
     robot = calibrated.robot
     named = axes_of(controller, robot.chain.prismatic, axes) if controller else ()
     wanted = read_target_path_of(path, robot)
-    operating = OperatingConditions(wanted.wrench, wanted.approach, wanted.time_s, wanted.temperature_c)
-    print_lines((f"assumed: {line}" for line in assumptions(calibrated, operating)), console)
+    wrench = np.zeros((len(wanted), 6)) if wanted.wrench is None else wanted.wrench
     with console.status("correcting"):
-        found = find_joint_targets(calibrated, wanted.position, wanted.rotation, operating, wanted.start)
+        found = find_joint_targets(calibrated, wanted.position, wanted.rotation, wrench, wanted.start)
     if (failed := np.flatnonzero(found.status != OK)).size:
         rows = first_names([f"line {wanted.lines[row]} is {found.status[row]}" for row in failed], _NAMED)
         reached = "poses that the robot reaches within its limits, in the posture that q1..qn state if any"
@@ -98,14 +97,13 @@ def correct(
     swings = _swings(wanted, found, robot)
     if swings and not allow_large_steps:
         raise InputError(path, "", first_names(swings, 1), "targets between, another posture, or --allow-large-steps")
-    wrench = np.zeros((len(wanted), 6)) if wanted.wrench is None else wanted.wrench
     outside, loaded = beyond_fitted(calibrated, found.joint_angles, wrench)
     heavy = beyond_fitted(calibrated, found.joint_angles, wrench, _LOADS_BOUNDED)[1]
     status = found.status.astype(object)
     status[outside] = f"{NO_BOUND}joints outside the fitted range"
     status[heavy] = f"{NO_BOUND}loads beyond {_LOADS_BOUNDED:g} times the measured ones"
     bounded, beyond = status == OK, outside | loaded
-    errors = predict_errors(calibrated, found.joint_angles, operating, draws=0)
+    errors = predict_errors(calibrated, found.joint_angles, wrench, draws=0)
     before = before_m(calibrated, wanted.position, wanted.rotation, found.error_before)
     with write_together(output.parent, [file.name for file in files]) as partial:
         write_csv(partial / output.name, _joint_targets(wanted, wrench, found, before, errors, beyond, status))
@@ -114,13 +112,13 @@ def correct(
             write_text(partial / files[1].name, controller.program(name, targets, _notes(campaign, wrench)))
     lines = []
     if bounded.any():
-        known = predict_errors(calibrated, found.joint_angles[bounded], operating.part(bounded))
+        known = predict_errors(calibrated, found.joint_angles[bounded], wrench[bounded])
         accuracy = known.accuracy("the targets" if bounded.all() else "the targets with a bound")
         uncorrected = f"uncorrected they would be missed by {millimetres(root_mean_square(before[bounded]))} RMS"
         lines += [accuracy_sentence(accuracy), uncorrected]
     count = counted(len(wanted), "target")
     if calibrated.remainder is not None:
-        added = np.linalg.norm(regressed(calibrated, found.joint_angles, operating), axis=1)
+        added = np.linalg.norm(regressed(calibrated, found.joint_angles, wrench), axis=1)
         size = f"{millimetres(root_mean_square(added[added > 0.0]))} RMS" if added.any() else "nothing"
         words = campaign.verdict["remainder"]["words"]
         lines.append(f"a {words} on what the model leaves corrects {grouped((added > 0.0).sum())} of {count} by {size}")
@@ -224,7 +222,8 @@ def certificate(
     from elastocal.io.atomic_writes import check_places, write_together
     from elastocal.io.json_files import write_json
     from elastocal.loop.calibrated_files import certificate as certified
-    from elastocal.report.certificate import certificate_facts, write_certificate
+    from elastocal.report.certificate import certificate_facts
+    from elastocal.report.typesetting import compile_document
 
     console = Console(stderr=True)
     limit = length_m("--tolerance", tolerance)
@@ -239,7 +238,8 @@ def certificate(
         with tempfile.TemporaryDirectory() as scratch, write_together(place, (PAGES, DOCUMENT)) as partial:
             names = [row[0] for row in facts["budget"]]
             budget = budget_bars(document["budget"], names, limit, document["tracker_rms_m"])
-            write_certificate(partial / PAGES, facts, [*save_all({"budget": budget}, scratch).values()])
+            pictures = save_all({"budget": budget}, scratch).values()
+            compile_document(partial / PAGES, "certificate.typ", {"facts": facts}, pictures)
             write_json(partial / DOCUMENT, document)
     passed, answer = facts["decision"] == "pass", f"{facts['decision']}, as predicted: {facts['headline']}"
     details = [facts["decision_sentences"], facts["point"], *(f"! {each['sentence']}" for each in document["misplaced"])]
@@ -264,7 +264,7 @@ def export(
     from rich.console import Console
 
     from elastocal.application.accuracy import accuracy_sentence, campaign_accuracy
-    from elastocal.application.calibrated import OperatingConditions, regressed
+    from elastocal.application.calibrated import regressed
     from elastocal.application.exported import find_left_out_m, fold_effects
     from elastocal.exchange.urdf_writing import write_calibrated_origins
     from elastocal.io.atomic_writes import check_places, write_text, write_together
@@ -277,8 +277,7 @@ def export(
     # No file has the regression: what stands in them is of a robot without.
     calibrated, states = whole.by_physics().calibrated, whole.case.observations.states
     nominal, folded = calibrated.robot, fold_effects(calibrated)
-    at = nominal.reported_angles(states.joint_angles)
-    under = OperatingConditions(states.wrench, None, states.time_s, states.temperature_c)
+    at, under = nominal.reported_angles(states.joint_angles), states.wrench
     lines = []
     if whole.calibrated.remainder is not None:
         words, lost = whole.verdict["remainder"]["words"], np.linalg.norm(regressed(whole.calibrated, at, under), axis=1)

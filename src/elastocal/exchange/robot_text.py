@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from elastocal.counting import counted
 from elastocal.errors import InputError, reason_of
@@ -143,7 +144,7 @@ def express_axis(axis: np.ndarray) -> tuple[list[str], str, str, list[str], np.n
     before = [text for name, angle in turns if (text := word(name, angle))]
     after = [text for name, angle in reversed(turns) if (text := word(name, -angle))]
     angles = [math.radians(round(math.degrees(angle), _DECIMALS)) for _, angle in turns]
-    return before, "z", "", after, rotation_about("z", angles[0]) @ rotation_about("y", angles[1])
+    return before, "z", "", after, Rotation.from_euler("ZY", angles).as_matrix()
 
 
 def yaw_pitch_roll(rotation: np.ndarray) -> tuple[float, float, float]:
@@ -153,25 +154,14 @@ def yaw_pitch_roll(rotation: np.ndarray) -> tuple[float, float, float]:
     """
     level = math.hypot(rotation[0, 0], rotation[1, 0])
     yaw = math.atan2(rotation[1, 0], rotation[0, 0]) if level > 10.0**-_DECIMALS else 0.0
-    rest = rotation_about("z", -yaw) @ rotation
+    rest = Rotation.from_euler("z", -yaw).as_matrix() @ rotation
     return yaw, math.atan2(-rotation[2, 0], level), math.atan2(-rest[1, 2], rest[1, 1])
-
-
-def rotation_about(letter: str, angle_rad: float) -> np.ndarray:
-    """Rotation matrix about x, y or z, ndarray (3, 3)."""
-    c, s = math.cos(angle_rad), math.sin(angle_rad)
-    first, second = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[letter]
-    turn = np.eye(3)
-    turn[first, first] = turn[second, second] = c
-    turn[first, second], turn[second, first] = -s, s
-    return turn
 
 
 def elementary(kind: str, axis: int, amount: float) -> np.ndarray:
     """Shift (``T``, m) along or turn (``R``, rad) about an axis, 0 to 2, ndarray (4, 4)."""
-    if kind == "R":
-        return homogeneous(rotation_about("xyz"[axis], amount))
-    return homogeneous(np.eye(3), amount * np.eye(3)[axis])
+    along = amount * np.eye(3)[axis]
+    return homogeneous(Rotation.from_rotvec(along).as_matrix()) if kind == "R" else homogeneous(np.eye(3), along)
 
 
 def homogeneous(rotation: np.ndarray, shift: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0)) -> np.ndarray:
@@ -183,5 +173,4 @@ def homogeneous(rotation: np.ndarray, shift: Sequence[float] | np.ndarray = (0.0
 
 def origin_transform(xyz: Sequence[float], rpy: Sequence[float]) -> np.ndarray:
     """Shift (m), then turn by roll, pitch and yaw (rad) as the origin of a URDF has them, ndarray (4, 4)."""
-    roll, pitch, yaw = rpy
-    return homogeneous(rotation_about("z", yaw) @ rotation_about("y", pitch) @ rotation_about("x", roll), xyz)
+    return homogeneous(Rotation.from_euler("xyz", rpy).as_matrix(), xyz)

@@ -1,8 +1,7 @@
 """A file of wanted poses of the end effector: position and rotation vector in base axes, and what the robot works under.
 
 Columns ``x, y, z`` (m) and ``rx, ry, rz`` (rotation vector, rad) of the last measuring point; ``fx .. mz`` (N, N m) where it is
-loaded, forces alone with moments of zero; ``q1 .. qn`` (rad, as the controller reports them) near which the robot shall stand;
-``approach1 .. approachn``, ``time_s`` and ``temperature_c`` as in a campaign.
+loaded, forces alone with moments of zero; ``q1 .. qn`` (rad, as the controller reports them) near which the robot shall stand.
 """
 
 from dataclasses import dataclass
@@ -31,17 +30,14 @@ _FARTHEST_M = 10.0
 class TargetPath:
     """N wanted poses; None where the file has no such columns.
 
-    `position` (N, 3): m, base axes. `rotation` (N, 3, 3). `start` (N, n): rad. `wrench` (N, 6): N, N m. `approach` (N, n),
-    `time_s`, `temperature_c` (N,). `lines` (N,) of int: line of the file of each pose.
+    `position` (N, 3): m, base axes. `rotation` (N, 3, 3). `start` (N, n): rad. `wrench` (N, 6): N, N m. `lines` (N,) of
+    int: line of the file of each pose.
     """
 
     position: np.ndarray
     rotation: np.ndarray
     start: np.ndarray | None
     wrench: np.ndarray | None
-    approach: np.ndarray | None
-    time_s: np.ndarray | None
-    temperature_c: np.ndarray | None
     lines: tuple[int, ...]
 
     def __len__(self) -> int:
@@ -54,8 +50,7 @@ def read_target_path(path: str | Path, joints: int) -> TargetPath:
     An InputError refuses a column that is missing, unknown or there in part, what is no number, and what no arm reaches.
     """
     angles = tuple(f"q{j}" for j in range(1, joints + 1))
-    approach = tuple(f"approach{j}" for j in range(1, joints + 1))
-    known = (*_POSE, *WRENCH_NAMES, *angles, *approach, "time_s", "temperature_c")
+    known = (*_POSE, *WRENCH_NAMES, *angles)
     text = read_text_table(path, lambda _: True, Dialect("comma", "point"))
     cells, header = text.columns, f"line {text.dialect.header}"
     read = text.cells({name: name for name in cells}, {})
@@ -75,8 +70,6 @@ def read_target_path(path: str | Path, joints: int) -> TargetPath:
             raise InputError(path, header, f"{', '.join(there)} without {', '.join(missing)}", "all of them or none")
         return read.matrix(names)
 
-    single = [group((name,)) for name in ("time_s", "temperature_c")]
-    time, temperature = (None if column is None else column[:, 0] for column in single)
     pose = read.matrix(_POSE)
     for size, what, largest, allowed in (
         (np.abs(pose[:, :3]).max(axis=1), "position", _FARTHEST_M, "metres"),
@@ -90,7 +83,7 @@ def read_target_path(path: str | Path, joints: int) -> TargetPath:
     if wrench is not None:
         wrench = np.pad(wrench, ((0, 0), (0, 6 - wrench.shape[1])))
     rotation = Rotation.from_rotvec(pose[:, 3:]).as_matrix()
-    return TargetPath(pose[:, :3], rotation, group(angles), wrench, group(approach), time, temperature, text.lines)
+    return TargetPath(pose[:, :3], rotation, group(angles), wrench, text.lines)
 
 
 def read_target_path_of(path: str | Path, robot: Robot) -> TargetPath:

@@ -13,8 +13,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from elastocal.counting import first_names
-from elastocal.figures.style import MICRO, MILLI, PALETTE, STAGES, note, panels, styled
-from elastocal.report.words import candidate_words, capital, hypotheses_words, in_words, probability_words
+from elastocal.figures.style import MILLI, PALETTE, STAGES, note, panels, styled
+from elastocal.report.words import candidate_words, capital, hypotheses_words, in_words, probability_words, unit_of
 
 # Of more states than this only one is drawn in each cell of a grid of so many columns.
 _MOST_ARROWS = 320
@@ -124,7 +124,7 @@ def _scale_arrow(axis: Axes, largest: float, length: float) -> None:
     """An arrow of a round length beside the title."""
     digit = 10.0 ** np.floor(np.log10(largest))
     shown = max(step for step in (1, 2, 5) if step * digit <= largest * (1 + 1e-9)) * digit
-    scale, unit = (MILLI, "mm") if shown > 0.9995e-3 else (MICRO, "µm")
+    scale, unit = unit_of(shown)
     key = axis.quiver([0], [0], [0], [0], angles="xy", scale_units="xy", scale=1, color="black", width=0.006, minlength=0)
     place = {"labelpos": "W", "coordinates": "axes", "fontproperties": {"size": 8}}
     axis.quiverkey(key, 0.88, 1.035, shown * length / largest, f"{scale * shown:g} {unit}", **place)
@@ -145,7 +145,7 @@ def before_after(steps: Sequence[Mapping[str, Any]], noise_floor_m: float | None
     heights = np.array([0.55 + 0.45 * count for count in lines])
     rows = np.cumsum(heights) - heights / 2
     values = np.array([[step[f"heldout_{metric}_m"] for metric in METRICS] for step in steps])
-    scale, unit = (MILLI, "mm") if values.max() >= 1e-3 else (MICRO, "µm")
+    scale, unit = unit_of(values.max())
     trained = np.array([[step[f"train_{metric}_m"] for metric in METRICS] for step in steps])
     known = [*values[values > 0], *([noise_floor_m] if noise_floor_m else [])]
     logarithmic = max(known) > _LARGEST_RATIO * min(known)

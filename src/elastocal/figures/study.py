@@ -23,7 +23,7 @@ _HEADS = {
     "dev_20": "dev at 20 (µm)",
     "n_dev_2_um": "length until 2 µm",
 }
-_DESIGNS = {"random": "random", "A": "A-optimal", "D": "D-optimal", "I": "I-optimal", "bound": "bound of all designs"}
+_DESIGNS = {"random": "random", "A": "A-optimal", "D": "D-optimal", "I": "I-optimal"}
 
 
 @styled
@@ -194,55 +194,23 @@ def ladder(table: pd.DataFrame) -> Figure:
 
 
 @styled
-def costs(table: pd.DataFrame, break_even: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float) -> Figure:
-    """Cost of an accuracy by each set of points over the first one, by the cost of a configuration.
+def designs(table: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float) -> Figure:
+    """Error that simulated data sets of random and optimal configurations leave, by their number.
 
-    `table`, `break_even`: from `costs.cost_table` and `costs.break_even_table`; discs are at break-even. `titles`: name of each
-    robot to draw, by its key.
+    `table`: from `designs.simulated_designs_table`, of which loads in random directions are drawn. `titles`: name of each robot
+    to draw, by its key. `accuracy_um`: marked by a line.
     """
-    if not table.ratio.gt(0).any():
-        return note(f"no set of points reaches {accuracy_um:g} µm with the configurations of this study")
-    labels, break_even = list(dict.fromkeys(table.points)), break_even[break_even.accuracy_um == accuracy_um]
-    figure, axes = panels(1, len(titles), 78, sharey=True)
-    for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):
-        for index, points in enumerate(labels):
-            cell = table[(table.robot == robot) & (table.points == points) & (table.configuration_cost > 0)]
-            cost, band = cell.configuration_cost, {"color": PALETTE[index], "alpha": 0.12, "linewidth": 0}
-            axis.plot(cost, cell.ratio, **line_style(index), label=points)
-            axis.fill_between(cost, cell.ratio_low, cell.ratio_high, **band)
-            for even in break_even[(break_even.robot == robot) & (break_even.points == points)].break_even:
-                axis.plot(even, 1.0, "o", color=PALETTE[index], markeredgecolor="black", markersize=4.5, zorder=4, gid="even")
-        axis.set(title=title, xlabel="cost of a configuration (measurements)", xscale="log", yscale="log")
-        axis.set_xticks([0.01, 0.1, 1, 10])
-        axis.xaxis.set_major_formatter("{x:g}")
-        label_decades(axis.yaxis)
-    axes[0, 0].set_ylabel(f"cost of {accuracy_um:g} µm over that of {labels[0] if labels else ''}")
-    title = "points measured in each configuration; bands: 95 % intervals by bootstrap over data sets; discs: break-even"
-    legend_below(figure, 4, title)
-    return figure
-
-
-@styled
-def designs(table: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float, joint_range: str) -> Figure:
-    """Error that random and optimal configurations leave, by their number.
-
-    `table`: from `designs.designs_table`. `titles`: name of each robot to draw, by its key. `accuracy_um`: marked by a
-    line. `joint_range`: whose rows are drawn.
-    """
-    table = table[table.joint_range == joint_range]
+    table = table[table.load == "random"]
     figure, axes = panels(1, len(titles), 80, sharey=True)
     for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):
         for index, (kind, name) in enumerate(_DESIGNS.items()):
             cell = table[(table.robot == robot) & (table.design == kind)]
-            axis.plot(cell.configurations, cell.rms_um, **line_style(index), label=name)
-            if kind == "random":
-                axis.fill_between(cell.configurations, cell.low_um, cell.high_um, color=PALETTE[index], alpha=0.15, linewidth=0)
+            axis.errorbar(cell.configurations, cell.rms_um, cell.rms_um_std_error, **line_style(index), label=name)
         axis.axhline(accuracy_um, color="black", linewidth=0.7)
         axis.set(title=title, xlabel="configurations", xscale="log", yscale="log")
         axis.set_xticks(sorted(set(table.configurations)), labels=[f"{size}" for size in sorted(set(table.configurations))])
         axis.xaxis.set_minor_locator(NullLocator())
         label_decades(axis.yaxis)
-    axes[0, 0].set_ylabel("bound of the RMS error (µm)")
-    title = f"band: 5 to 95 % of random designs; line: {accuracy_um:g} µm"
-    legend_below(figure, 5, title)
+    axes[0, 0].set_ylabel("RMS error of one data set (µm)")
+    legend_below(figure, 4, f"bars: ± one Monte Carlo standard error; line: {accuracy_um:g} µm")
     return figure

@@ -39,7 +39,7 @@ from elastocal.validation.held_out import position_residuals
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
+    from elastocal.application.calibrated import CalibratedRobot
     from elastocal.fitting.model import Case
 
 
@@ -167,22 +167,22 @@ def certificate(
     }
 
 
-def error_budget(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> dict[str, float]:
-    """Error budget of a robot over commands (N, n), m, RMS.
+def error_budget(calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray) -> dict[str, float]:
+    """Error budget of a robot over commands (N, n) under loads (N, 6), m, RMS.
 
     What is missed without any correction; each effect by its name in the catalogue, or ``joint_compliance``, if it alone were
     left out, largest first; what a correction leaves, by `accuracy.predict_errors`. Only the last add up: effects may work
     against each other, and loads meet springs.
     """
-    costs = effect_costs(calibrated, reported_angles, operating)
-    rest = predict_errors(calibrated, reported_angles, operating, draws=0)
+    costs = effect_costs(calibrated, reported_angles, wrench)
+    rest = predict_errors(calibrated, reported_angles, wrench, draws=0)
     ends = {
         "left by the regression": root_mean_square(rest.regression_m),
         "form of the model": root_mean_square(rest.form_m),
         "not commanded": rest.scope.left_out_m,
     }
     return {
-        "uncorrected": uncorrected_m(calibrated, reported_angles, operating),
+        "uncorrected": uncorrected_m(calibrated, reported_angles, wrench),
         **{name: costs[name] for name in sorted(costs, key=costs.__getitem__, reverse=True) if costs[name] > 0.0},
         "uncertainty of the parameters": root_mean_square(rest.parameters_m),
         "repeatability": root_mean_square(rest.repeated_m),

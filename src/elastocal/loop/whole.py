@@ -105,7 +105,7 @@ def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
 
     ``accuracy`` and ``uncorrected_m``, the RMS error without a correction at the same poses, are predicted; ``cost_m`` of an
     effect is the RMS error over the campaign's poses and loads if it alone were left out of the correction. All are None where
-    the data are at fault, the cost also of an effect that is not in the final model or moves no robot. ``misplaced``: what was
+    the data are at fault, the cost also of an effect that is in no command. ``misplaced``: what was
     declared wrongly, see there. ``physics``: accuracy and ``uncorrected_m`` of a robot that is corrected without the regression
     on the remainder; None where there is none.
     """

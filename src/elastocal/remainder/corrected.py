@@ -32,6 +32,7 @@ from elastocal.validation.placing import beyond_campaign, placed, same_campaign
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from elastocal.effects.protocol import Candidate
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Case, Estimate, Model
     from elastocal.fitting.observations import Observations, States
@@ -49,8 +50,8 @@ _FOLDS, _MOST_TO_CHOOSE, _REPLICATES = 5, 2_000, 1000
 _BESIDE = 0.05
 # A usual size of an effect is as easily taken back as so much of a joint is added.
 _RAD_OF_A_SIZE = 1e-3
-# A correction knows of no time or temperature, so that it takes back nothing of what goes by them.
-_UNKNOWN_OF_TASKS = {"time", "temperature"}
+# What no command states, as `effects.conditions.offered` names it.
+_NOT_STATED = {"approach", "time", "temperature"}
 
 
 @dataclass(frozen=True)
@@ -99,6 +100,11 @@ def corrected(
         known = replace(fitted, model=model, estimate=estimate)
         estimate = fit_frames(known, model, replace(there, position=moved))
     return Corrected(position_residuals(model, estimate, there) - mean, std, outside, chosen, predictor)
+
+
+def is_commanded(effect: Candidate) -> bool:
+    """Whether a correction contains an effect: one that moves the robot, by what a command states."""
+    return moves_robot(effect) and effect.needs.isdisjoint(_NOT_STATED)
 
 
 def beyond_regressed(fitted: States, joint_angles: np.ndarray, wrench: np.ndarray | None) -> np.ndarray:
@@ -158,11 +164,8 @@ def inputs_of(model: Model, estimate: Estimate, observations: Observations) -> I
     and a regression that cannot give it back has the rest of the error and the effect to make up for.
     """
     inputs = geometric_inputs_of(model, estimate, observations)
-    found = [
-        (effect, shapes)
-        for effect, shapes in zip(model.effects, estimate.shapes, strict=True)
-        if effect.effect in effects() and moves_robot(effect) and _UNKNOWN_OF_TASKS.isdisjoint(effect.needs)
-    ]
+    every = zip(model.effects, estimate.shapes, strict=True)
+    found = [(effect, shapes) for effect, shapes in every if effect.effect in effects() and is_commanded(effect)]
     if not found:
         return inputs
     sizes = np.array([parameter.plausible for effect, _ in found for parameter in effect.parameters])

@@ -8,11 +8,10 @@ from elastocal.application.accuracy import Accuracy, accuracy_sentence
 from elastocal.counting import counted
 from elastocal.report import words as say
 from elastocal.report.loop_facts import title_of
-from elastocal.report.typesetting import compile_document, sentences
+from elastocal.report.typesetting import sentences
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-    from pathlib import Path
+    from collections.abc import Mapping
     from typing import Any
 
 _SHARES = {
@@ -29,14 +28,6 @@ _SHARES = {
 # Below the digits of any tracker.
 _NOTHING_M = 1e-7
 _LISTS = ("misplaced", "identity", "data")
-
-
-def write_certificate(path: str | Path, facts: Mapping[str, Any], figures: Iterable[str]) -> None:
-    """Compile a certificate; the file appears whole or not at all.
-
-    `path`: the PDF. `facts`: from `certificate_facts`. `figures`: PDF files, named budget.
-    """
-    compile_document(path, "certificate.typ", {"facts": facts}, figures)
 
 
 def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:

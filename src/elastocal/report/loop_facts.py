@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,13 +15,11 @@ from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.effects.catalogue import effects
 from elastocal.effects.protocol import effect_of
 from elastocal.report import words as say
-from elastocal.report.typesetting import compile_document, sentences
+from elastocal.report.typesetting import sentences
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
     from typing import Any
-
-    from elastocal.io.origin import Origin
 
 TITLES = {
     "adequate": "the declared model is adequate",
@@ -133,23 +130,13 @@ def loop_facts(
     }
 
 
-def write_loop_report(path: str | Path, facts: dict[str, Any], figures: Sequence[str], origin: Origin | None = None) -> None:
-    """Compile the report of a campaign; the file appears whole or not at all.
-
-    `path`: the PDF. `facts`: from `loop_facts`. `figures`: PDF files, named before_after, arrows and candidates.
-    `origin`: named in the foot of each page.
-    """
-    names = [Path(figure).stem for figure in figures]
-    compile_document(path, "loop.typ", {"facts": facts | {"figures": names}}, figures, origin)
-
-
 def cost_words(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> str:
     """What an effect costs at the campaign's poses and loads: the RMS error if it alone were left out of the correction."""
     cost = effect["cost_m"]
     if cost is None:
         known = effects().get(effect["name"])
         moves = known is None or known.moves_robot
-        return "not in the final model" if moves else "an error of the measurement, not of the robot"
+        return "in no command" if moves else "an error of the measurement, not of the robot"
     if cost > NEGLIGIBLE * heldout["after"]["rms_m"]:
         return f"{say.millimetres(cost)} mm"
     # No finer than a micrometre, and what was found is not nothing.
@@ -228,10 +215,10 @@ def effect_facts(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> dict[
 
 def _with_interval(step: Mapping[str, Any]) -> str:
     """RMS error of a step on validation poses with its 95 % interval, in one unit."""
-    number, unit = say.length(step["heldout_rms_m"]).split("\u00a0")
-    ends = [(say.MICRO if unit == "µm" else say.MILLI) * step[f"heldout_rms_m_{end}"] for end in ("low", "high")]
-    interval = f" [{say.plain(ends[0])}, {say.plain(ends[1])}]" if np.isfinite(ends).all() else ""
-    return f"{number}{interval}\u00a0{unit}"
+    factor, unit = say.unit_of(step["heldout_rms_m"])
+    value, low, high = (factor * step[f"heldout_rms_m{end}"] for end in ("", "_low", "_high"))
+    interval = f" [{say.plain(low)}, {say.plain(high)}]" if np.isfinite([low, high]).all() else ""
+    return f"{say.plain(value)}{interval}\u00a0{unit}"
 
 
 def description(effect: str) -> str:
@@ -254,10 +241,6 @@ def _parameter_row(entry: Mapping[str, Any], members: Sequence[str]) -> list[str
     return [*row, "measurements" if entry["std_error"] else "the best of those tried" if entry.get("shape") else ""]
 
 
-def _error_unit(lengths_m: Sequence[float]) -> tuple[float, str]:
-    return (say.MILLI, "mm") if max(lengths_m) >= 1e-3 else (say.MICRO, "µm")
-
-
 def _cell(row: Mapping[str, Any], name: str, factor: float, unit: str) -> list[str]:
     """A value and its interval, in lines."""
     value, low, high = (factor * row[name + end] for end in ("", "_low", "_high"))
@@ -271,7 +254,7 @@ def _cell(row: Mapping[str, Any], name: str, factor: float, unit: str) -> list[s
 
 def step_rows(steps: Sequence[Mapping[str, Any]], floor_m: float | None) -> dict[str, Any]:
     """Rows of the table before and after; each error as a list of lines: value, interval, multiple of the noise floor."""
-    factor, unit = _error_unit([step["heldout_max_m"] for step in steps])
+    factor, unit = say.unit_of(max(step["heldout_max_m"] for step in steps))
     rows = []
     for step in steps:
         multiples = {name: [f"{step[f'heldout_{name}_over_floor']:.2f} × floor"] if floor_m else [] for name in METRICS}

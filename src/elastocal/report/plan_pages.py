@@ -6,11 +6,9 @@ from typing import TYPE_CHECKING
 
 from elastocal.campaigns.measurements import SHOWN
 from elastocal.counting import counted
-from elastocal.report.typesetting import compile_document
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from pathlib import Path
+    from collections.abc import Sequence
     from typing import Any
 
     import pandas as pd
@@ -20,15 +18,6 @@ if TYPE_CHECKING:
 
 _UNITS = {"deg": "°", "mm": "mm"}
 _LOADS = {0.0: "0", 1.0: "+F", -1.0: "−F"}
-
-
-def write_plan_sheet(path: str | Path, facts: Mapping[str, Any], figures: Mapping[str, str]) -> None:
-    """Typeset the sheet; the file appears whole or not at all.
-
-    `path`: the PDF. `facts`: from `plan_facts`. `figures`: PDF files by their names, "overview" and pages of poses.
-    """
-    pictures = [name for name in figures if name != "overview"]
-    compile_document(path, "plan.typ", {"facts": {**facts, "pictures": pictures}}, figures.values())
 
 
 def plan_facts(survey: Survey, plan: Plan, rows: pd.DataFrame, worth: Sequence[str]) -> dict[str, Any]:

@@ -64,10 +64,11 @@ def compile_document(
     """Compile a Typst document; the PDF appears whole or not at all.
 
     `path`: the PDF. `document`: file name of the document. `data`: JSON-serialisable contents of the files
-    ``<name>.json`` that the document reads. `figures`: PDF files; the document finds them by their names. `origin`: what the
-    document shows in its foot and has in its metadata: the contents of ``origin.json``, empty without. `package`: has the
-    document.
+    ``<name>.json`` that the document reads. `figures`: PDF files; the document finds them by their names, which
+    ``figures.json`` lists. `origin`: what the document shows in its foot and has in its metadata: the contents of
+    ``origin.json``, empty without. `package`: has the document.
     """
+    figures, words = [*figures], "" if origin is None else origin.words
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder) / document
         # A document imports what it shares with the others, which stands here.
@@ -77,7 +78,7 @@ def compile_document(
                 Path(folder, each.name).write_text(each.read_text(encoding="utf-8"), encoding="utf-8")
         if not source.is_file():
             raise FileNotFoundError(document)
-        for name, contents in {**data, "origin": "" if origin is None else origin.words}.items():
+        for name, contents in {**data, "figures": [Path(each).stem for each in figures], "origin": words}.items():
             (Path(folder) / f"{name}.json").write_text(json.dumps(contents, allow_nan=False), encoding="utf-8")
         for figure in figures:
             shutil.copy(figure, folder)

@@ -75,12 +75,12 @@ def parameter_words(effect: str, name: str) -> str:
 
 def effect_words(effect: str, locations: Iterable[str] = ()) -> str:
     """An effect and where it acts, by locations as verdict.json has them: gravity sag of joints 2 and 3."""
-    return physical_name(effect) + _where(effect, _gathered(_LOCATION.match(location) for location in locations))
+    return physical_name(effect) + _where(effect, map(_LOCATION.match, locations))
 
 
 def found_words(effect: str, keys: Iterable[str]) -> str:
     """The same by the keys of its candidates."""
-    return physical_name(effect) + _where(effect, _gathered(map(_ANY_KEY.match, keys)))
+    return physical_name(effect) + _where(effect, map(_ANY_KEY.match, keys))
 
 
 def candidate_words(key: str) -> str:
@@ -91,17 +91,12 @@ def candidate_words(key: str) -> str:
 
 def location_words(effect: str, location: str) -> str:
     """A location without its effect: links 1, 2 and 3 (one section)."""
-    return _without_name(effect, effect_words(effect, [location])) or "the whole robot"
+    return _where(effect, [_LOCATION.match(location)]).strip().removeprefix("of ") or "the whole robot"
 
 
 def place_words(keys: Sequence[str]) -> str:
     """Where candidates of one effect act, without its name: joints 2 and 3, or nothing."""
-    effect = effect_of(keys[0])
-    return _without_name(effect, found_words(effect, keys))
-
-
-def _without_name(effect: str, text: str) -> str:
-    return text.removeprefix(physical_name(effect)).strip().removeprefix("of ")
+    return _where(effect_of(keys[0]), map(_ANY_KEY.match, keys)).strip().removeprefix("of ")
 
 
 def at_joints(effect: str, joints: Collection[int]) -> str:
@@ -110,17 +105,12 @@ def at_joints(effect: str, joints: Collection[int]) -> str:
     return f" of {plural(part, len(joints))} {listed(map(str, joints))}" if joints else ""
 
 
-def _gathered(found: Iterable[re.Match[str] | None]) -> dict[tuple[int, ...], list[str]]:
-    """Details by the joints of keys or locations."""
+def _where(effect: str, found: Iterable[re.Match[str] | None]) -> str:
+    """Where an effect acts, by joints or links and details of keys or locations: " of joint 4 (orders 1-2)"."""
     details: dict[tuple[int, ...], list[str]] = {}
     for match in found:
         assert match is not None
         details.setdefault(tuple(map(int, re.findall(r"\d+", match["joints"] or ""))), []).append(match["detail"] or "")
-    return details
-
-
-def _where(effect: str, details: Mapping[tuple[int, ...], Sequence[str]]) -> str:
-    """Where an effect acts, by joints or links and details: " of joint 4 (orders 1-2)"."""
     singles = len(details) > 1 and all(len(numbers) == 1 for numbers in details)
     if singles and (len(details) > _MOST_DETAILED or not any(map(any, details.values()))):
         return at_joints(effect, sorted(numbers[0] for numbers in details))
@@ -236,11 +226,16 @@ def span_words(joint_ranges: Sequence[Mapping[str, Any]]) -> str:
     return ", ".join(each)
 
 
+def unit_of(metres: float) -> tuple[float, str]:
+    """Unit in which a length is shown, with how many of them a metre has: µm below one millimetre."""
+    return (MICRO, "µm") if abs(metres) < 0.9995e-3 else (MILLI, "mm")
+
+
 def length(metres: float | None, digits: int = 3) -> str:
     """A length with its unit, µm below one millimetre; "unknown" where there is none."""
     if metres is None:
         return "unknown"
-    factor, unit = (MICRO, "µm") if abs(metres) < 0.9995e-3 else (MILLI, "mm")
+    factor, unit = unit_of(metres)
     return f"{plain(factor * metres, digits)}{_TIED}{unit}"
 
 

@@ -1,7 +1,7 @@
-"""Which configurations (RQ3): random against chosen ones, by their bound and simulated.
+"""Which configurations (RQ3): random against chosen ones.
 
-Candidates are random configurations with their loads; a design is some of them. Its worth is the Cramér-Rao bound of the RMS
-end-effector error, or the error that simulated data sets of it leave.
+Candidates are random configurations with their loads; a design is some of them. Its worth is the error that simulated data sets
+of it leave.
 """
 
 from __future__ import annotations
@@ -14,12 +14,9 @@ import numpy as np
 from elastocal.application.planning.designs import (
     CRITERIA,
     Criterion,
-    best_value,
     choose_greedily,
     criterion,
     exchange_candidates,
-    matrix_of,
-    mean_squares,
 )
 from elastocal.io.storage import Column
 from elastocal.random_streams import stream
@@ -34,16 +31,7 @@ if TYPE_CHECKING:
 
     from elastocal.study.in_memory import StudyInMemory
 
-RANDOM, CONTINUOUS = "random", "bound"
-DESIGNS = table(
-    "designs",
-    Column("joint_range", "text", "", "of candidates and validation configurations: full_turn or limits"),
-    Column("design", "text", "", "criterion by which the configurations are chosen, random, or the bound of all designs"),
-    whole("configurations", "configurations of the design", 1),
-    real("rms", "m", "Cramér-Rao bound of the RMS end-effector error"),
-    real("low", "m", "5 % of random designs"),
-    real("high", "m", "95 % of random designs"),
-)
+RANDOM = "random"
 SIMULATED_DESIGNS = table(
     "simulated_designs",
     Column("load", "text", "", "kind of load: random directions, or one direction in every configuration"),
@@ -53,55 +41,10 @@ SIMULATED_DESIGNS = table(
     real("rms", "m", "RMS end-effector error over simulated data sets on test configurations"),
     real("std_error", "m", "Monte Carlo standard error of the same"),
 )
-# Interpretation R3 both ways: a robot on the floor cannot turn its joints fully.
-_JOINT_RANGES = ("full_turn", "limits")
-# Random designs of each size: rated by their bound, and simulated; of these each has as many noisy data sets as all have
-# together over this.
-_RATED, _SIMULATED = 400, 200
+# Random designs of each size; each has as many noisy data sets as all have together over this.
+_SIMULATED = 200
 # A joint whose columns are smaller than this share of the largest is not moved by the loads.
 _MOVED = 1e-9
-
-
-def rate_designs(
-    rows: np.ndarray, accuracy_rows: np.ndarray, sizes: Sequence[int], draws: np.random.Generator
-) -> list[tuple[str, int, float, float, float]]:
-    """Random, chosen and best possible designs.
-
-    `rows` (N, rows, n): regressors of the candidates over the noise, in plausible sizes of the compliances. `accuracy_rows`
-    (tests, 3, n): of the end-effector position where the robot shall be accurate, m per plausible size. Returns kind (of
-    `CRITERIA`, `RANDOM` or `CONTINUOUS`), configurations and three RMS errors (m): of random designs the root of the mean
-    square, and 5 and 95 %; else three times the same.
-    """
-    exact, found = Criterion(mean_squares(accuracy_rows)), []
-
-    def error(chosen: np.ndarray | list[int]) -> float:
-        return float(np.sqrt(-exact.value(matrix_of(rows, chosen))))
-
-    for size in sizes:
-        random = np.array([error(draws.choice(len(rows), size, replace=False)) for _ in range(_RATED)])
-        low, high = np.quantile(random, [0.05, 0.95])
-        found.append((RANDOM, size, float(np.sqrt((random**2).mean())), float(low), float(high)))
-        for kind in CRITERIA:
-            rule = criterion(kind, accuracy_rows)
-            chosen = exchange_candidates(rows, choose_greedily(rows, size, rule), rule)
-            found.append((kind, size, *3 * (error(chosen),)))
-        found.append((CONTINUOUS, size, *3 * (float(np.sqrt(-best_value(rows, size, exact, chosen))),)))
-    return found
-
-
-def design_columns(study: StudyInMemory, candidates: int, sizes: Sequence[int]) -> dict[str, np.ndarray]:
-    """Random against optimal ones of `candidates` random configurations, measured at the end-effector."""
-    found = []
-    for joint_range in _JOINT_RANGES:
-        within = study.under(joint_range=joint_range)
-        drawn = within.experiments([0], candidates, "candidates of designs")
-        rows = study.robot.compliance / study.size.noise * within.regressor(drawn)[0, :, : study.interpretation.rows]
-        accuracy = study.robot.compliance * within.regressor(within.tests())[0, :, :3]
-        rated = rate_designs(rows, accuracy, sizes, stream(study.seed, study.key, "random designs", 0))
-        found += [(joint_range, *one) for one in rated]
-    kinds = dict.fromkeys(("joint_range", "design"), object)
-    names = [column.name for column in DESIGNS.columns]
-    return {name: np.array(values, kinds.get(name)) for name, values in zip(names, zip(*found, strict=True), strict=True)}
 
 
 @dataclass(frozen=True)
@@ -185,13 +128,6 @@ def _simulate(study: StudyInMemory, candidates: Candidates, designs: np.ndarray)
     return float(rms), float(groups.std(ddof=1) / np.sqrt(len(groups)) / (2 * rms))
 
 
-def designs_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
-    """Random against optimal configurations; low_um and high_um: 5 and 95 % of random designs."""
-    frame = below(found)
-    errors = (MICRO * frame[["rms", "low", "high"]]).add_suffix("_um")
-    return frame[["robot", "joint_range", "design", "configurations"]].join(errors)
-
-
 def simulated_designs_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """Simulated errors of random and chosen configurations by the kind of load.
 
@@ -206,6 +142,5 @@ def simulated_designs_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     return part.assign(gain=part.join(random, on=size).random / part.rms_um)
 
 
-choose_designs, tabulate_designs = ask(DESIGNS, design_columns), tabulate(DESIGNS, designs_table)
 simulate_designs = ask(SIMULATED_DESIGNS, simulated_design_blocks)
 tabulate_simulated_designs = tabulate(SIMULATED_DESIGNS, simulated_designs_table)

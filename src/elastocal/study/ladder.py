@@ -22,7 +22,7 @@ from elastocal.mechanics.elastostatics import beam_axes, extended_chain, general
 from elastocal.mechanics.kinematics import jacobians
 from elastocal.study.in_memory import ask
 from elastocal.study.jobs import LENGTH, MICRO, ON_TESTS, SET, real, rows_as_frame, table, tabulate, whole
-from elastocal.study.points import root_mean
+from elastocal.study.points import mean_of
 from elastocal.study.simulation import measurement_noise
 
 if TYPE_CHECKING:
@@ -201,10 +201,10 @@ def ladder_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
         for (noise, length), cell in frame.groupby(["noise", "length"]):
             steps = [(str(number), some) for number, some in cell.groupby("link_springs")]
             for name, some in [*steps, (CHOSEN, cell[cell.chosen])]:
-                rms, error = root_mean(some.mean_square.to_numpy())
+                rms = mean_of(some.mean_square.to_numpy(), True, MICRO)
                 chosen = 100 * some.chosen.mean() if name != CHOSEN else np.nan
                 noise_um = round(MICRO * float(str(noise)), 6)
-                rows.append((robot, noise_um, length, name, MICRO * rms, MICRO * error, chosen))
+                rows.append((robot, noise_um, length, name, rms.value, rms.std_error(), chosen))
     head = ("robot", "noise_um", "length", "link_springs")
     return rows_as_frame(rows, (*head, "rms_um", "rms_um_std_error", "chosen_percent"))
 

@@ -8,7 +8,8 @@ its break-even.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -38,8 +39,6 @@ BUDGET = table(
 _AGAIN = "/again"
 # Of a normal distribution: 95 % within.
 QUANTILE = 1.96
-# Costs of a configuration, in measurements, at which curves are given: from none to a robot that is loaded by hand.
-_CONFIGURATION_COSTS = (0.0, *np.logspace(-2, 1.5, 43).round(4).tolist())
 
 
 def budget_blocks(study: StudyInMemory, point_sets: PointSets) -> Iterator[dict[str, np.ndarray | str]]:
@@ -62,18 +61,35 @@ def budget_blocks(study: StudyInMemory, point_sets: PointSets) -> Iterator[dict[
             yield {**prefix_index_columns(sets, len(squares)), "points": label, "mean_square": squares.T.ravel()}
 
 
-def root_mean(squares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Root of the mean over data sets, of squares (sets, ...), with its standard error by the delta method."""
-    root = np.sqrt(squares.mean(axis=0))
-    return root, squares.std(axis=0, ddof=1) / np.sqrt(len(squares)) / (2 * root)
+@dataclass(frozen=True)
+class Score:
+    """A score over data sets, with what its intervals need.
+
+    `relative` (N,): deviations of its logarithm, of data sets or replicates that all that is compared shares. `spread`: the
+    standard error over the standard deviation of `relative`: 1 over the root of N for data sets, 1 for replicates.
+    """
+
+    value: float
+    relative: np.ndarray
+    spread: float
+
+    def std_error(self) -> float:
+        """Standard error of the value."""
+        return float(abs(self.value) * self.spread * self.relative.std(ddof=1))
+
+    def ratio(self, other: Score) -> tuple[float, float, float]:
+        """Ratio to another score with its 95 % interval, paired."""
+        ratio = self.value / other.value
+        error = QUANTILE * self.spread * (self.relative - other.relative).std(ddof=1)
+        return ratio, ratio * np.exp(-error), ratio * np.exp(error)
 
 
-def ratio_of_roots(ours: np.ndarray, theirs: np.ndarray) -> tuple[float, float, float]:
-    """Ratio of two root mean squares over the same data sets (sets,) with its 95 % interval, by the delta method."""
-    ratio = float(np.sqrt(ours.mean() / theirs.mean()))
-    relative = (ours / ours.mean() - theirs / theirs.mean()) / 2
-    error = QUANTILE * relative.std(ddof=1) / np.sqrt(len(ours))
-    return ratio, ratio * np.exp(-error), ratio * np.exp(error)
+def mean_of(values: np.ndarray, root: bool = False, factor: float = 1.0) -> Score:
+    """Mean of values (N,) over data sets, or its root, times a factor; errors by the delta method."""
+    mean = values.mean()
+    # The logarithm of a root deviates half as much as that of the mean below it.
+    relative = (values / mean - 1) / (2 if root else 1)
+    return Score(factor * float(np.sqrt(mean) if root else mean), relative, 1 / np.sqrt(len(values)))
 
 
 def budget_table(found: Frames, point_sets: PointSets, length: int) -> pd.DataFrame:
@@ -88,8 +104,8 @@ def budget_table(found: Frames, point_sets: PointSets, length: int) -> pd.DataFr
             for configurations in sorted({length, 2 * length // len(names)}):
                 at = _at(frame, points, configurations)
                 if len(at):
-                    rms, error = root_mean(at.mean_square.to_numpy())
-                    rows.append((robot, points, len(names), configurations, MICRO * rms, MICRO * error))
+                    rms = mean_of(at.mean_square.to_numpy(), True, MICRO)
+                    rows.append((robot, points, len(names), configurations, rms.value, rms.std_error()))
     columns = ("robot", "points", "measurements_per_configuration", "configurations")
     return rows_as_frame(rows, (*columns, "rms_um", "std_error_um"))
 
@@ -110,7 +126,7 @@ def paired_table(found: Frames, point_sets: PointSets, length: int) -> pd.DataFr
             if points == against or not len(ours) or not len(theirs):
                 continue
             head = (robot, points, against, configurations * len(names), configurations, theirs_at)
-            rows.append((*head, *ratio_of_roots(ours, theirs)))
+            rows.append((*head, *mean_of(ours, True).ratio(mean_of(theirs, True))))
     columns = ("robot", "points", "against", "measurements", "configurations", "configurations_against")
     return rows_as_frame(rows, (*columns, "ratio", "ratio_low", "ratio_high"))
 
@@ -128,7 +144,8 @@ def lengths_table(found: Frames, point_sets: PointSets, accuracies_um: Sequence[
                 continue
             squares = mine.pivot(index="data_set", columns="length", values="mean_square")
             lengths = squares.columns.to_numpy()
-            rms, error = root_mean(squares.to_numpy())
+            rms = np.sqrt(squares.to_numpy().mean(axis=0))
+            error = squares.to_numpy().std(axis=0, ddof=1) / np.sqrt(len(squares)) / (2 * rms)
             curves = {
                 "configurations": rms,
                 "configurations_low": rms - QUANTILE * error,
@@ -170,23 +187,6 @@ def configurations_needed(squares: np.ndarray, accuracy: float) -> np.ndarray:
     return np.where(~above.any(axis=-1), 1.0, np.where(reached, between, np.inf))
 
 
-def find_needed_by_set(
-    frame: pd.DataFrame, point_sets: PointSets, accuracy_um: float, weights: np.ndarray
-) -> dict[str, np.ndarray]:
-    """Configurations needed by each set of points in each bootstrap replicate, the first of which is no replicate.
-
-    `frame`: the budget table of one robot. `weights` (1 + replicates, sets): from `simulation.bootstrap_weights`.
-    """
-    found = {}
-    for points in point_sets:
-        mine = frame[frame.points == points]
-        if len(mine):
-            squares = mine.pivot(index="data_set", columns="length", values="mean_square").to_numpy()
-            mean = weights @ squares / weights.sum(axis=1, keepdims=True)
-            found[points] = configurations_needed(mean, accuracy_um / MICRO)
-    return found
-
-
 def break_even_table(
     found: Frames, point_sets: PointSets, accuracies_um: Sequence[float], weights: Mapping[str, np.ndarray]
 ) -> pd.DataFrame:
@@ -197,8 +197,14 @@ def break_even_table(
     rows = []
     against = next(iter(point_sets))
     for robot, frame in found.items():
+        squares = {
+            points: mine.pivot(index="data_set", columns="length", values="mean_square")
+            for points, mine in frame.groupby("points")
+        }
+        shares = weights[robot] / weights[robot].sum(axis=1, keepdims=True)
+        means = {points: shares @ squares[points].to_numpy() for points in point_sets if points in squares}
         for accuracy in accuracies_um:
-            needed = find_needed_by_set(frame, point_sets, accuracy, weights[robot])
+            needed = {points: configurations_needed(mean, accuracy / MICRO) for points, mean in means.items()}
             theirs, m = needed.pop(against, np.full(1, np.inf)), len(point_sets[against])
             for points, ours in needed.items():
                 if not (np.isfinite(ours[0]) and np.isfinite(theirs[0])):
@@ -206,32 +212,10 @@ def break_even_table(
                 with np.errstate(divide="ignore", invalid="ignore"):
                     even = (ours * len(point_sets[points]) - theirs * m) / (theirs - ours)
                 even = np.where(ours < theirs, np.maximum(even, 0.0), np.inf)
-                rows.append((robot, accuracy, points, against, ours[0], theirs[0], *_interval(even)))
+                ends = np.quantile(even[1:], [0.025, 0.975], method="nearest")
+                rows.append((robot, accuracy, points, against, ours[0], theirs[0], even[0], *ends))
     columns = ("robot", "accuracy_um", "points", "against", "configurations", "configurations_against")
     return rows_as_frame(rows, (*columns, "break_even", "break_even_low", "break_even_high"))
-
-
-def cost_table(found: Frames, point_sets: PointSets, accuracy_um: float, weights: Mapping[str, np.ndarray]) -> pd.DataFrame:
-    """What an accuracy costs by each set of points over the first one, by the cost of a configuration.
-
-    `weights`: as in `break_even_table`. Costs are in measurements, the ratio to the first set has its 95 % interval.
-    """
-    rows: list[tuple[Any, ...]] = []
-    against = next(iter(point_sets))
-    for robot, frame in found.items():
-        needed = find_needed_by_set(frame, point_sets, accuracy_um, weights[robot])
-        for each in _CONFIGURATION_COSTS:
-            costs = {points: n * (each + len(point_sets[points])) for points, n in needed.items() if np.isfinite(n[0])}
-            for points, cost in costs.items():
-                ratio = cost / costs[against] if against in costs else np.full_like(cost, np.nan)
-                rows.append((robot, points, each, *_interval(ratio)))
-    return rows_as_frame(rows, ("robot", "points", "configuration_cost", "ratio", "ratio_low", "ratio_high"))
-
-
-def _interval(values: np.ndarray) -> tuple[float, float, float]:
-    """A value, the first, with its 95 % interval over replicates."""
-    low, high = np.quantile(values[1:], [0.025, 0.975], method="nearest")
-    return values[0], low, high
 
 
 def tabulate_budget(job: Job) -> None:
@@ -252,11 +236,7 @@ def tabulate_costs(job: Job) -> None:
         robot: bootstrap_weights(asked.weights["seed"], robot, sorted(set(frame.data_set)), asked.weights["replicates"])
         for robot, frame in found.items()
     }
-    write_csvs(
-        job,
-        costs=cost_table(found, asked.point_sets, asked.accuracies_um[0], weights),
-        break_even=break_even_table(found, asked.point_sets, asked.accuracies_um, weights),
-    )
+    write_csvs(job, table=break_even_table(found, asked.point_sets, asked.accuracies_um, weights))
 
 
 compare_point_sets = ask(BUDGET, budget_blocks)

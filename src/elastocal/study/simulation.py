@@ -188,14 +188,6 @@ def experiment_columns(sets: Sequence[int] | np.ndarray, experiments: Experiment
     return columns | _component_columns(WRENCH_NAMES, experiments.wrench)
 
 
-def deflection_columns(
-    point_name: str, sets: Sequence[int] | np.ndarray, deflections: np.ndarray
-) -> dict[str, np.ndarray | str]:
-    """Block of the deflections table for one measuring point, from deflections (sets, configurations, 6)."""
-    columns = _index_columns(sets, deflections.shape[1]) | _component_columns(COMPONENT_NAMES, deflections)
-    return {"point": point_name} | columns
-
-
 def to_experiments(columns: Mapping[str, np.ndarray]) -> Experiments:
     """Experiments of a block."""
     angles = [f"q{j + 1}" for j in range(sum(name[0] == "q" for name in columns))]
@@ -230,7 +222,9 @@ def ideal_blocks(
     for block in experiments:
         loaded, sets = to_experiments(block), data_sets(block)
         for point in robot.chain.points:
-            yield deflection_columns(point.name, sets, true_deflections(robot, loaded, point, wrench_at))
+            deflections = true_deflections(robot, loaded, point, wrench_at)
+            numbers = _index_columns(sets, deflections.shape[1])
+            yield {"point": point.name, **numbers, **_component_columns(COMPONENT_NAMES, deflections)}
 
 
 def measured_blocks(

@@ -15,7 +15,6 @@ have the bootstrap replicates, whose weights all strategies share.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +25,7 @@ from elastocal.study.evaluation import REPLICATES, metrics
 from elastocal.study.in_memory import ask
 from elastocal.study.jobs import MICRO, SET, STRATEGY, Job, frames, real, rows_as_frame, table, write_csvs
 from elastocal.study.metrics import make_judge, position_errors
-from elastocal.study.points import QUANTILE
+from elastocal.study.points import Score, mean_of
 from elastocal.study.simulation import Experiments
 
 if TYPE_CHECKING:
@@ -156,29 +155,6 @@ def use_blocks(
         }
 
 
-@dataclass(frozen=True)
-class Score:
-    """A score of one strategy.
-
-    `relative` (N,): deviations of its logarithm, of data sets or replicates that all strategies share. `spread`: the standard
-    error over the standard deviation of `relative`: 1 over the root of N for data sets, 1 for replicates.
-    """
-
-    value: float
-    relative: np.ndarray
-    spread: float
-
-    def std_error(self) -> float:
-        """Standard error of the value."""
-        return float(abs(self.value) * self.spread * self.relative.std(ddof=1))
-
-    def ratio(self, other: Score) -> tuple[float, float, float]:
-        """Ratio to another strategy's score with its 95 % interval, paired."""
-        ratio = self.value / other.value
-        error = QUANTILE * self.spread * (self.relative - other.relative).std(ddof=1)
-        return ratio, ratio * np.exp(-error), ratio * np.exp(error)
-
-
 def scores(uses: pd.DataFrame, metrics: pd.DataFrame, replicates: pd.DataFrame, length: int) -> dict[str, dict[str, Score]]:
     """Scores of one robot's strategies by every metric.
 
@@ -241,17 +217,14 @@ def pairs_table(found: Scores) -> pd.DataFrame:
 
 
 def _of_single_sets(mine: pd.DataFrame) -> dict[str, Score]:
-    spread, found = 1 / np.sqrt(len(mine)), {}
+    found = {}
     for name, (column, root) in _SINGLE.items():
         values = mine[column].to_numpy()
-        if np.isnan(values).any():
-            continue
-        mean = values.mean()
-        # The logarithm of a root deviates half as much as that of the mean below it.
-        relative = (values / mean - 1) / (2 if root else 1)
-        found[name] = Score(MICRO * float(np.sqrt(mean) if root else mean), relative, spread)
+        if not np.isnan(values).any():
+            found[name] = mean_of(values, root, MICRO)
     pooled = float(mine.pooled_p95.iloc[0])
-    found["pooled_p95_um"] = Score(MICRO * pooled, mine.pooled_p95_influence.to_numpy() / pooled, spread)
+    influence = mine.pooled_p95_influence.to_numpy() / pooled
+    found["pooled_p95_um"] = Score(MICRO * pooled, influence, 1 / np.sqrt(len(mine)))
     return found
 
 

@@ -17,7 +17,7 @@ import pandas as pd
 from statsmodels.stats.proportion import proportion_confint
 
 from elastocal.application.accuracy import predict_errors
-from elastocal.application.calibrated import OperatingConditions, calibrate_by_fit, nominal_forward
+from elastocal.application.calibrated import calibrate_by_fit, nominal_forward
 from elastocal.application.compensation import find_joint_targets
 from elastocal.application.frames import ROBOT, Scope, find_absorbed, placement
 from elastocal.campaigns.reading import read_robot
@@ -180,7 +180,6 @@ def closed_loop(robot_file: Path, effect: str, seed: int, slips: bool = False) -
     """
     made = measure(robot_file, effect, seed, slips=slips)
     robot, wanted, count = made.declared, made.wanted, len(made.wanted.part)
-    operating = OperatingConditions(wanted.wrench)
     models = {
         GEOMETRY: calibrate_by_fit(_geometry(made.training, made.found), replace(robot, masses=())),
         DECLARED: calibrate_by_fit(made.found.declared, robot),
@@ -189,8 +188,8 @@ def closed_loop(robot_file: Path, effect: str, seed: int, slips: bool = False) -
     # Commands, the errors that a model states, and whether a pose could be corrected.
     commanded = {UNCORRECTED: (wanted.start, np.zeros(count), np.ones(count, bool))}
     for name, model in models.items():
-        targets = find_joint_targets(model, wanted.position, wanted.rotation, operating, wanted.start)
-        stated = predict_errors(model, targets.joint_angles, operating, draws=0).error_m
+        targets = find_joint_targets(model, wanted.position, wanted.rotation, wanted.wrench, wanted.start)
+        stated = predict_errors(model, targets.joint_angles, wanted.wrench, draws=0).error_m
         commanded[name] = targets.joint_angles, stated, targets.status == OK
     commanded[TRUE] = _by_plant(made, seed)
     rows = [
@@ -252,9 +251,9 @@ def stated_accuracy(robot_file: Path, effect: str, seed: int, frame: str) -> lis
     In the base's frame where the campaign knew it, else after the best rigid placement over the random poses.
     """
     made = measure(robot_file, effect, seed, frame)
-    plant, wanted, operating = made.plant, made.wanted, OperatingConditions(made.wanted.wrench)
+    plant, wanted = made.plant, made.wanted
     calibrated = _corrected(made, seed)
-    targets = find_joint_targets(calibrated, wanted.position, wanted.rotation, operating, wanted.start)
+    targets = find_joint_targets(calibrated, wanted.position, wanted.rotation, wanted.wrench, wanted.start)
     good = targets.status == OK
     off = reached(plant, targets.joint_angles, wanted.wrench, seed + 1)[0] - wanted.position
     if frame != "base":
@@ -266,7 +265,7 @@ def stated_accuracy(robot_file: Path, effect: str, seed: int, frame: str) -> lis
     rows = []
     for part, members in STATED_OF.items():
         mine = good & np.isin(wanted.part, members)
-        prediction = predict_errors(calibrated, targets.joint_angles[mine], operating.part(mine))
+        prediction = predict_errors(calibrated, targets.joint_angles[mine], wanted.wrench[mine])
         stated, distance = prediction.accuracy(part), np.linalg.norm(off[mine], axis=1)
         decided = predicted_conformity(prediction.rms_m, stated.poses, tolerance, _RISK)
         rows.append(

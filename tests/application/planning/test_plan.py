@@ -39,7 +39,7 @@ def some(survey):
 def test_a_plan_is_better_than_random_designs_and_its_first_poses_are_repeated(survey, some):
     plan = choose_plan(survey, some, 16, 5, 1)
     assert plan.accuracy_m[-1] < np.quantile(plan.random_m[:, -1], 0.5)
-    assert 0.2 < plan.efficiency <= 1.0 and (np.diff(plan.accuracy_m) <= 1e-12).all()
+    assert (np.diff(plan.accuracy_m) <= 1e-12).all()
     table = sheet(survey, plan)
     assert len(table) == 3 * 21 + 2 * (REPEATS - 1) * REPEATED_POSES
     assert table[["x", "y", "z"]].isna().all().all() and "rx" not in table

@@ -1,4 +1,4 @@
-"""Optimal designs: the best few of many candidates by a criterion, and how far they are from the best that any could be.
+"""Optimal designs: the best few of many candidates by a criterion.
 
 With M the information matrix in units of the plausible sizes, which a prior of one plausible size each makes I without any
 measurement (Bayesian designs [1], for which no parameter need be identifiable), a candidate with rows Z makes it M + Z' Z, and
@@ -7,14 +7,10 @@ measurement (Bayesian designs [1], for which no parameter need be identifiable),
 - A and I: tr C M^-1 falls by tr (I + Z M^-1 Z')^-1 Z M^-1 C M^-1 Z', by Woodbury's identity; C is the identity over the number
   of parameters for A, and for I the mean of G' G over where the robot shall be accurate, G the sensitivities there.
 
-Chosen is greedily, then by Fedorov's exchange [2]. For a concave criterion f of M(w) = I + n sum w_i Z_i' Z_i no weights have
-more than f(M) + n max_i s_i - n sum w_i s_i, with s_i the slope of f along candidate i: Kiefer and Wolfowitz's general
-equivalence theorem [3] as a bound that holds for any w. The weights come from the multiplicative algorithm [4].
+Chosen is greedily, then by Fedorov's exchange [2].
 
 [1] Chaloner, K. and Verdinelli, I., Bayesian experimental design: a review, Statistical Science 10, 1995.
 [2] Fedorov, V. V., Theory of Optimal Experiments, Academic Press, 1972.
-[3] Kiefer, J. and Wolfowitz, J., The equivalence of two extremum problems, Canadian Journal of Mathematics 12, 1960.
-[4] Silvey, S. D. et al., An algorithm for optimal designs on a finite design space, Comm. in Statistics 7, 1978.
 """
 
 from __future__ import annotations
@@ -29,8 +25,6 @@ _AT_ONCE = 1000
 # Candidates for which the exchange looks: those that add most at the end of the greedy choice; and its rounds: most designs
 # settle in two or three. An exchange that gains less than a share is rounding.
 _SHORT_LIST, _ROUNDS, _LEAST_GAIN = 400, 4, 1e-6
-# Steps of the multiplicative algorithm; candidates on which it puts weights, and how often those that break the bound join.
-_STEPS, _SUPPORT, _JOINED = 120, 300, 2
 # What a sum of thousands of products in double precision is known to, over the sum.
 _ROUNDING = 1e-12
 
@@ -52,23 +46,14 @@ class Criterion:
         return np.concatenate([self._gains(part, matrix) for part in np.split(rows, range(_AT_ONCE, len(rows), _AT_ONCE))])
 
     def _gains(self, rows: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-        white = _whiten(rows, matrix)
+        inverse = np.linalg.inv(np.linalg.cholesky(matrix))
+        # Double precision, in which the matrix is I: single precision loses the 1 of I + Z Z' to an unknown base.
+        white = (rows.reshape(-1, rows.shape[2]) @ inverse.T).reshape(rows.shape)
         inner = add_prior(white @ white.transpose(0, 2, 1))
         if self.weight is None:
             return np.linalg.slogdet(inner)[1]
-        across = white @ self._whiten_weight(matrix) @ white.transpose(0, 2, 1)
+        across = white @ (inverse @ self.weight @ inverse.T) @ white.transpose(0, 2, 1)
         return np.trace(np.linalg.solve(inner, across), axis1=1, axis2=2)
-
-    def slopes(self, rows: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-        """Derivatives of the value by the weight of each candidate: tr M^-1 Z' Z, or tr M^-1 C M^-1 Z' Z; ndarray (N,)."""
-        white = _whiten(rows, matrix)
-        across = white if self.weight is None else white @ self._whiten_weight(matrix)
-        return (across * white).sum(axis=(1, 2))
-
-    def _whiten_weight(self, matrix: np.ndarray) -> np.ndarray:
-        assert self.weight is not None
-        inverse = np.linalg.inv(np.linalg.cholesky(matrix))
-        return inverse @ self.weight @ inverse.T
 
 
 def criterion(kind: str, accuracy_rows: np.ndarray) -> Criterion:
@@ -94,10 +79,9 @@ def add_prior(sums: np.ndarray) -> np.ndarray:
     return sums
 
 
-def matrix_of(rows: np.ndarray, chosen: np.ndarray | list[int], weights: np.ndarray | float = 1.0) -> np.ndarray:
-    """Information matrix of some candidates with the prior, ndarray (P, P), in double precision; each counts by its weight."""
-    some = np.sqrt(np.broadcast_to(weights, len(chosen)))[:, None, None] * rows[chosen]
-    flat = some.reshape(-1, rows.shape[2]).astype(float)
+def matrix_of(rows: np.ndarray, chosen: np.ndarray | list[int]) -> np.ndarray:
+    """Information matrix of some candidates with the prior, ndarray (P, P), in double precision."""
+    flat = rows[chosen].reshape(-1, rows.shape[2]).astype(float)
     return add_prior(flat.T @ flat)
 
 
@@ -131,46 +115,3 @@ def exchange_candidates(rows: np.ndarray, chosen: list[int], criterion: Criterio
         if found == before:
             break
     return found
-
-
-def best_value(rows: np.ndarray, count: int, criterion: Criterion, chosen: list[int]) -> float:
-    """A value of the criterion that no design of so many configurations exceeds, each as often as it likes.
-
-    `rows` (N, k, P). `chosen`: a good design, on which the weights start.
-    """
-    slopes = criterion.slopes(rows, matrix_of(rows, chosen))
-    support = np.union1d(np.argsort(-slopes)[:_SUPPORT], chosen)
-    bound = np.inf
-    for _ in range(_JOINED):
-        weights = _weights(rows[support], count, criterion)
-        matrix = matrix_of(rows, support, count * weights)
-        slopes = criterion.slopes(rows, matrix)
-        gap = count * (slopes.max() - weights @ slopes[support])
-        bound = min(bound, criterion.value(matrix) + float(gap))
-        support = np.union1d(support[weights > 1e-6], np.argsort(-slopes)[:_SUPPORT])
-    return bound
-
-
-def d_efficiency(matrix: np.ndarray, bound: float) -> float:
-    """Share of the best design's worth that one with a matrix (P, P) is sure to have, by a bound of `best_value`.
-
-    By determinants, per parameter that the measurements tell more of than the prior.
-    """
-    learned = float(np.trace(np.eye(len(matrix)) - np.linalg.inv(matrix)))
-    return float(np.exp((Criterion(None).value(matrix) - bound) / learned))
-
-
-def _weights(rows: np.ndarray, count: int, criterion: Criterion) -> np.ndarray:
-    every, weights = np.arange(len(rows)), np.full(len(rows), 1.0 / len(rows))
-    for _ in range(_STEPS):
-        slopes = criterion.slopes(rows, matrix_of(rows, every, count * weights)).astype(float)
-        # The exponent with which the algorithm rises monotonically: 1 for determinants, 1/2 for traces.
-        weights = weights * (slopes if criterion.weight is None else np.sqrt(slopes))
-        weights /= weights.sum()
-    return weights
-
-
-def _whiten(rows: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """Rows in which the matrix is I, in double precision: single precision loses the 1 of I + Z Z' to an unknown base."""
-    inverse = np.linalg.inv(np.linalg.cholesky(matrix))
-    return (rows.reshape(-1, rows.shape[2]) @ inverse.T).reshape(rows.shape)

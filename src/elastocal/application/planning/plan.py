@@ -21,17 +21,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from elastocal.application.calibrated import OperatingConditions, calibrate_by_model, nominal_forward, pose_sensitivities
+from elastocal.application.calibrated import calibrate_by_model, nominal_forward, pose_sensitivities
 from elastocal.application.frames import BASE, ROBOT, Scope, subtract_placement
 from elastocal.application.planning.cell import find_allowed
 from elastocal.application.planning.designs import (
     Criterion,
     add_prior,
-    best_value,
     choose_greedily,
-    d_efficiency,
     exchange_candidates,
-    matrix_of,
     mean_squares,
 )
 from elastocal.campaigns.campaign import Target
@@ -182,7 +179,7 @@ def accuracy_rows(survey: Survey, reported_angles: np.ndarray, force: np.ndarray
     count = len(parameters(model, estimate))
     noise = Noise("declared", survey.position_m, survey.orientation_rad, np.zeros(survey.robot.joints))
     robot = calibrate_by_model(survey.robot, model, estimate, np.zeros((count, count)), noise)
-    moved = pose_sensitivities(robot, reported_angles, OperatingConditions(np.hstack([force, np.zeros_like(force)])))
+    moved = pose_sensitivities(robot, reported_angles, np.hstack([force, np.zeros_like(force)]))
     position, rotation = nominal_forward(survey.robot, reported_angles)
     there = [target for target in survey.targets if target.point == survey.robot.chain.end_effector.name]
     offset = bool(there) and all(target.offset_m is None for target in there)
@@ -224,14 +221,13 @@ class Candidates:
 class Plan:
     """What to measure: configurations that choose the parameters, in the order of a short tour; random ones that judge them.
 
-    `efficiency`: as in `designs.d_efficiency`. `accuracy_m` (poses,): RMS error of the end effector over the workspace that the
+    `accuracy_m` (poses,): RMS error of the end effector over the workspace that the
     parameters' uncertainty leaves, as `accuracy` counts it, with the first 1, 2, .. of the fitted ones, best first. `random_m`
     (designs, poses): the same with random configurations.
     """
 
     fitted: Candidates
     held_out: Candidates
-    efficiency: float
     accuracy_m: np.ndarray
     random_m: np.ndarray
 
@@ -279,7 +275,6 @@ def choose_plan(survey: Survey, some: Candidates, poses: int, held_out: int, see
     accuracy = accuracy_rows(survey, places.joint_angles, places.force)
     rule, weight = Criterion(None), mean_squares(accuracy)
     chosen = exchange_candidates(rows, choose_greedily(rows, poses, rule), rule)
-    worth = d_efficiency(matrix_of(rows, chosen), best_value(rows, poses, rule, chosen))
     rest = np.setdiff1d(np.arange(count), chosen)
     judged = draws.choice(rest, held_out, replace=False)
     # The chosen, each that which lowers the error most.
@@ -288,7 +283,6 @@ def choose_plan(survey: Survey, some: Candidates, poses: int, held_out: int, see
     return Plan(
         some.at(tour(some.joint_angles, chosen)),
         some.at(tour(some.joint_angles, judged.tolist())),
-        worth,
         accuracy_curve(rows, order, weight),
         random,
     )
