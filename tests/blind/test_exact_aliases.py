@@ -25,7 +25,7 @@ def directions(declared, observations, candidates):
     basis = np.linalg.qr(left / np.linalg.norm(left, axis=0))[0]
     found = []
     for candidate in candidates:
-        made = effect_columns([(candidate, ())], line.conditions, line.coordinate_jacobian, observations.state)
+        made = effect_columns([(candidate.displacement, ())], line.conditions, line.coordinate_jacobian, observations.state)
         columns = declared.whitened(made).reshape(line.residual.size, -1)
         columns = columns / np.linalg.norm(columns, axis=0)
         for _ in range(2):

@@ -17,13 +17,13 @@ from elastocal_proof.blind.cases import Case, cases_of, make_case
 from elastocal_proof.blind.oracle import limit, log_bayes_factors, members_of, oracle
 
 
-def keys(effect, joints, chain):
-    return [[c.key for c in members] for members in members_of(effect, joints, candidates_on(sites_of(chain)).values())]
+def keys(effect, joints, robot):
+    return [[c.key for c in members] for members in members_of(effect, joints, candidates_on(sites_of(robot)).values())]
 
 
 def test_members_are_the_candidates_at_the_true_joints(kuka):
-    assert keys("joint_offset", (3,), kuka.chain) == [["joint_offset@3"]]
-    (weights,) = keys("link_weight", (2, 3), kuka.chain)
+    assert keys("joint_offset", (3,), kuka) == [["joint_offset@3"]]
+    (weights,) = keys("link_weight", (2, 3), kuka)
     assert {key.partition("[")[0] for key in weights} == {"link_weight@2", "link_weight@3"}
 
 

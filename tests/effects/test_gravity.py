@@ -5,8 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.spatial.transform import Rotation
 from support import ODD_CHAINS, OTHER_CHAINS, PinocchioPoint, robot_of
 from synthetic import (
+    candidate_on,
+    conditions_on,
+    displacements,
     made_estimate,
     made_model,
     made_states,
@@ -15,14 +19,13 @@ from synthetic import (
 )
 
 from elastocal.effects.catalogue import candidates_on
-from elastocal.effects.conditions import conditions_of, offered
-from elastocal.effects.gravity import declared_weight
+from elastocal.effects.gravity import declared_weight, lever_of_pull
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import conditions, displaced_coordinates, parameters
-from elastocal.mechanics.kinematics import motion
 from elastocal.mechanics.robot import Mass
 from elastocal.mechanics.sites import sites_of
 
+PLACE = np.array([0.1, -0.4, 0.25])
 TILTED = (3.0, -4.0, -8.0)
 
 
@@ -62,7 +65,9 @@ def test_gravity_on_every_coordinate_where_the_robot_has_yielded_is_that_of_pino
     for mass, correction in zip(robot.masses, corrections, strict=True):
         total = mass.mass_kg + correction[0]
         centre = np.array(mass.centre_m) + correction[1:] / total
-        after = sites.body(mass.link).after
+        # Whatever tilts its joint, or the foot, carries it.
+        carrying = sites.tilt[mass.link - 1] if mass.link else sites.base
+        after = 1 + max(place for place, t in enumerate(sites.chain.transforms) if t.coordinate in carrying)
         expected = expected + gravity_by_pinocchio(sites.chain, after, total, centre, TILTED, at)
     np.testing.assert_allclose(around.gravity, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
     np.testing.assert_array_equal(around.total, around.load + around.gravity)
@@ -105,29 +110,6 @@ def test_priors_are_those_of_the_robot_file(fanuc):
     assert [p.plausible for p in found] == pytest.approx([20.0, *[20.0 * 0.5] * 3, 10.0, *[10.0 * 0.1] * 3])
 
 
-def test_structure_bears_the_usual_weight_where_neither_masses_nor_loads_are_known(fanuc):
-    """Half of each link at either end, six times the rated load in all: slopes of its potential energy."""
-    states = made_states(6, 4, seed=7)
-    states.wrench[:] = 0.0
-    sites = replace(sites_of(replace(fanuc, payload_kg=100.0)), usual_weight=True)
-    around = conditions_of(sites, fanuc.compliance, states)
-    assert sites.usual_masses.sum() == pytest.approx(600.0)
-    assert offered(sites, states) & {"load", "load on the joints"} == {"load"}
-
-    def energy(coordinates):
-        ends = motion(sites.chain, coordinates, sites.followed).position[1 : sites.joints + 2]
-        return -np.einsum("k,kis,i->s", sites.usual_masses, ends, np.array(sites.gravity_m_s2))
-
-    commanded = np.zeros((4, sites.chain.coordinates))
-    commanded[:, :6] = states.joint_angles
-    for coordinate in (*sites.base, *sites.tilt[1], *sites.link_end[2]):
-        step = np.zeros(sites.chain.coordinates)
-        step[coordinate] = 1e-4
-        slope = (energy(commanded + step) - energy(commanded - step)) / 2e-4
-        np.testing.assert_allclose(around.total[:, coordinate], -slope, atol=1e-3)
-    assert not around.total[:, :6].any()
-
-
 @pytest.mark.parametrize(
     ("known", "expected"),
     [
@@ -141,7 +123,29 @@ def test_structure_bears_the_usual_weight_where_neither_masses_nor_loads_are_kno
 )
 def test_plausible_payload_is_a_share_of_what_the_robot_carries_as_far_as_that_is_known(fanuc, known, expected):
     masses = tuple(Mass(2 + link, mass, (0.0, 0.0, 0.0), 0.1) for link, mass in enumerate(known.get("masses", ())))
-    sites = replace(sites_of(fanuc.chain), masses=masses, payload_kg=known.get("payload_kg"))
+    sites = replace(sites_of(replace(fanuc, payload_kg=None)), masses=masses, payload_kg=known.get("payload_kg"))
     tool, alone = (c for c in candidates_on(sites).values() if c.effect == "payload")
     assert [p.plausible for p in tool.parameters] == pytest.approx([expected, *[0.2 * expected] * 3])
     assert [p.plausible for p in alone.parameters] == pytest.approx([expected])
+
+
+@pytest.mark.parametrize("share", [0.0, 0.005, 0.05])
+def test_moments_that_are_a_hundredth_off_still_have_a_place_that_turns_with_the_flange_and_others_have_none(share):
+    """Forces anywhere with the flange anywhere."""
+    rng = np.random.default_rng(0)
+    force, rotation = 300.0 * rng.standard_normal((8, 3)), Rotation.random(8, rng=rng).as_matrix()
+    moment, noise = np.cross(rotation @ PLACE, force), rng.standard_normal((8, 3))
+    moment = moment + share * noise * np.linalg.norm(moment) / np.linalg.norm(noise)
+    lever = lever_of_pull(np.concatenate([force, moment], axis=1), rotation)
+    np.testing.assert_allclose(lever, 0 * force if share > 0.01 else rotation @ PLACE, atol=4 * share + 1e-9)
+
+
+def test_a_bias_is_there_wherever_something_is_recorded_be_it_a_moment_alone(fanuc):
+    states = made_states(6, 3, seed=4)
+    states.wrench[:] = [[300.0, 20.0, 10.0, 1.0, 2.0, 3.0], [0, 0, 0, 0, 5.0, 0], [0] * 6]
+    around = conditions_on(fanuc.chain, states)
+    made = displacements(candidate_on(fanuc.chain, "force_bias[base axes]"), around)[..., :6]
+    for axis, turned in enumerate(made):
+        force = np.eye(6)[[axis, axis]]
+        expected = around.load_by(np.concatenate([force, 0 * force[:1]]))[:, :6] * around.compliance
+        np.testing.assert_allclose(turned, expected, rtol=1e-12)

@@ -7,7 +7,7 @@ import pytest
 from fitted_models import model_of
 from made_campaigns import POINTS, Plan, made
 from scipy.optimize import root
-from support import OTHER_CHAINS, chain_of, robot_of
+from support import OTHER_CHAINS, chain_of
 from synthetic import made_estimate, made_measurements, made_model, made_states, seen_exactly
 
 from elastocal.campaigns.campaign import Campaign, Target, columns_of
@@ -26,7 +26,6 @@ from elastocal.fitting.model import (
 from elastocal.io.documents import read_document
 from elastocal.mechanics.elastostatics import exact_deflections, joint_torques
 from elastocal.mechanics.kinematics import poses
-from elastocal.mechanics.robot import Mass
 
 TWO = Target("A", "6DoF", None), Target("B", "3DoF", (0.1, 0.0, -0.2))
 
@@ -93,24 +92,6 @@ def test_declared_model_is_that_of_the_campaign(fanuc, measured, rows, frame, fi
     assert [effect.key for effect in model.effects][-1] == "joint_offset@2"
     np.testing.assert_array_equal(model.nominal_compliance, fanuc.compliance)
     assert model.time_zero_s == 5.0 and model.row_span == (4, 9)
-
-
-@pytest.mark.parametrize(
-    ("chain", "slides"), [("Tz(q1) Tz(0.5) Ry(q2) Tx(1) [end]", True), ("Rz(q1) Tz(0.5) Ry(q2) Tx(1) [end]", False)]
-)
-def test_a_usual_weight_loads_an_arm_that_slides_and_of_which_neither_masses_nor_loads_are_known(chain, slides):
-    robot, target = robot_of(chain), (Target("A", "end", (0, 0, 0)),)
-    measurements = made_measurements(made_model(robot.chain, target), np.random.default_rng(0), 2, 1, 0.0, 0.0)
-
-    def usual(robot, measurements):
-        campaign = Campaign("c", robot, "position", "base", target, "nominal", (), None, {}, measurements)
-        return declared_model(campaign).sites.usual_weight
-
-    unloaded = replace(measurements, wrench=np.zeros_like(measurements.wrench))
-    loaded = replace(measurements, wrench=np.ones_like(measurements.wrench))
-    assert usual(robot, unloaded) == slides
-    assert not usual(robot, loaded)
-    assert not usual(replace(robot, masses=(Mass(1, 10.0, (0.1, 0.0, 0.0), 0.1),)), unloaded)
 
 
 def test_parameters_are_named_in_the_order_of_the_sensitivities(full_case):

@@ -31,8 +31,12 @@ def chain_of(text, **lengths_m):
 
 
 def robot_of(text, compliance=None, links=()):
-    """Robot from one line, with joint limits that no test needs."""
-    chain = chain_of(text)
+    """Robot from one line."""
+    return robot_on(chain_of(text), compliance, links)
+
+
+def robot_on(chain, compliance=None, links=()):
+    """Robot of a chain, with joint limits that no test needs."""
     n = chain.coordinates
     compliance = 1e-6 * np.arange(1, n + 1) if compliance is None else np.asarray(compliance)
     return Robot("test", chain, compliance, np.tile([-1.0, 1.0], (n, 1)), links, np.eye(n), np.zeros(n))

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
+from support import robot_on
 
 from elastocal.campaigns.campaign import Measurements, Target
 from elastocal.effects.catalogue import candidates_on
@@ -14,7 +15,7 @@ from elastocal.fitting.model import Estimate, Model, conditions, parameters, pre
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import Observations, States
 from elastocal.mechanics.kinematics import poses
-from elastocal.mechanics.robot import Compensator
+from elastocal.mechanics.robot import Compensator, Robot
 from elastocal.mechanics.sites import sites_of
 
 NOISE = Noise("declared", 60e-6, 60e-6, np.zeros(6))
@@ -40,7 +41,8 @@ def made_states(joints, count, seed=0, force=500.0, span=1.2, sessions=1, repeat
 
 def equipped(holder):
     """Sites of a robot or a chain with a compensator beside its shoulder and a known gear: no effect is out of place there."""
-    sites = sites_of(holder)
+    robot = holder if isinstance(holder, Robot) else robot_on(holder, np.zeros(holder.coordinates))
+    sites = sites_of(robot)
     if sites.compensator is None and sites.shoulder is not None:
         sites = replace(sites, compensator=Compensator(sites.shoulder + 1, "spring"))
     return sites if sites.gear_ratio else replace(sites, gear_ratio=(101.0, *[None] * (sites.joints - 1)))

@@ -107,7 +107,8 @@ def test_motion_gives_the_jacobian_of_every_point_and_the_forces_of_every_wrench
         some = moved.jacobian(point.after, moved.position[number][:, [4, 1, 1]], 3, np.array([4, 1, 1]))
         np.testing.assert_allclose(np.moveaxis(some, -1, 0), jacobian[[4, 1, 1], :3], rtol=0, atol=ROUNDING)
         moment = wrench[:, 3:] + np.cross(position, wrench[:, :3])
-        forces = moved.generalized_forces(point.after, wrench[:, :3].T, moment.T)
+        acting = np.concatenate([wrench[:, :3], moment], axis=1).T
+        forces = moved.generalized_forces(point.after, acting)
         np.testing.assert_allclose(forces.T, np.einsum("sij,si->sj", jacobian, wrench), rtol=0, atol=10 * ROUNDING)
 
 

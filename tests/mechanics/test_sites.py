@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support import ODD_CHAINS, OTHER_CHAINS, TRACK, chain_of, random_angles
+from support import ODD_CHAINS, OTHER_CHAINS, TRACK, random_angles, robot_of, robot_on
 
 from elastocal.mechanics.kinematics import poses, poses_and_jacobians
 from elastocal.mechanics.sites import sites_of
@@ -24,7 +24,7 @@ def extended(sites, angles):
 @pytest.mark.parametrize("name", [*NAMES, *ODD_CHAINS])
 def test_sites_at_zero_leave_the_poses_and_jacobians_of_the_robot(name, chain_called):
     chain = chain_called(name)
-    sites, angles = sites_of(chain), random_angles(np.random.default_rng(0), chain, 2, 3)
+    sites, angles = sites_of(robot_on(chain)), random_angles(np.random.default_rng(0), chain, 2, 3)
     assert [p.name for p in sites.chain.points] == [p.name for p in chain.points]
     for ours, point in zip(sites.chain.points, chain.points, strict=True):
         expected = poses_and_jacobians(chain, angles, point)
@@ -39,7 +39,7 @@ def columns_at(sites, angles, point, coordinates):
 
 
 def test_tilt_about_the_axis_of_a_joint_is_the_joint_itself(chain):
-    sites, angles = sites_of(chain), random_angles(np.random.default_rng(4), chain)
+    sites, angles = sites_of(robot_on(chain)), random_angles(np.random.default_rng(4), chain)
     turning = [t for t in chain.transforms if t.coordinate is not None]
     for joint, transform in enumerate(turning):
         assert sites.joint_axes[joint] == transform.axis
@@ -51,7 +51,7 @@ def test_tilt_about_the_axis_of_a_joint_is_the_joint_itself(chain):
 
 @pytest.mark.parametrize(("point", "link"), [("2DoF", 2), ("3DoF", 3), ("4DoF", 4), ("6DoF", 6)])
 def test_point_at_the_end_of_a_link_moves_with_it(fanuc, point, link):
-    sites, angles = sites_of(fanuc.chain), random_angles(np.random.default_rng(5), fanuc.chain)
+    sites, angles = sites_of(fanuc), random_angles(np.random.default_rng(5), fanuc.chain)
     rotation = poses(fanuc.chain, angles, fanuc.chain.point(point))[1]
     # At its own origin a site shifts and turns a point along the axes that they share, and nothing else.
     expected = np.kron(np.eye(2), rotation)
@@ -71,7 +71,7 @@ CARRIED = {
 
 @pytest.mark.parametrize("name", CARRIED)
 def test_carried_links_are_those_whose_weight_can_turn_the_joint(name, chain_called):
-    sites = sites_of(chain_called(name))
+    sites = sites_of(robot_on(chain_called(name)))
     lengths = np.linalg.norm(sites.link_vectors_m, axis=1)
     expected = [[link for link in links if lengths[link] > 0] for links in CARRIED[name]]
     assert [sites.carried_links(joint) for joint in range(sites.joints)] == expected
@@ -80,6 +80,6 @@ def test_carried_links_are_those_whose_weight_can_turn_the_joint(name, chain_cal
 
 
 def test_sites_of_a_robot_on_a_track():
-    sites = sites_of(chain_of(TRACK))
+    sites = sites_of(robot_of(TRACK))
     assert sites.prismatic == (True, False, False, False) and sites.joint_signs == (-1.0, 1.0, 1.0, 1.0)
     np.testing.assert_allclose(sites.link_vectors_m[:3], [(0, 0, 0.3), (0, 0, 0.5), (0.3, 0, 0)], atol=1e-16)

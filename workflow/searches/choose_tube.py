@@ -10,7 +10,6 @@ import numpy as np
 from scipy.optimize import brentq
 
 from elastocal.io.documents import read_document
-from elastocal.mechanics.elastostatics import with_tube
 from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.simulation import Experiments, Loading, random_experiments, true_deflections
@@ -26,7 +25,8 @@ def diameter_for_mean_deflection(robot: Robot, experiments: Experiments, target_
     """
 
     def excess(diameter: float) -> float:
-        candidate = with_tube(robot, replace(robot.links[0].tube, outer_diameter_m=diameter))
+        tube = replace(robot.links[0].tube, outer_diameter_m=diameter)
+        candidate = replace(robot, links=tuple(replace(link, tube=tube) for link in robot.links))
         deflections = true_deflections(candidate, experiments, robot.chain.end_effector, "end_effector")
         return np.linalg.norm(deflections[..., :3], axis=-1).mean() - target_m
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from elastocal.errors import InputError, closest_first
 from elastocal.mechanics.chain import Chain
 from elastocal.mechanics.components import COMPONENT_NAMES, WRENCH_NAMES
-from elastocal.mechanics.robot import Robot, with_rigid_joints
+from elastocal.mechanics.robot import Robot
 
 DOCUMENT = "campaign.yaml"
 DEFAULT_HOLDOUT = {"fraction": 0.3, "seed": 1}
@@ -113,7 +113,8 @@ def assemble_campaign(document: Mapping[str, Any], robot: Robot, measurements: M
     rigid = compliance == "nominal" and not robot.compliance_known
     return Campaign(
         name=document["campaign"],
-        robot=with_rigid_joints(robot) if rigid else robot,
+        # What is left without known compliances: joints that do not yield, which no mass turns.
+        robot=replace(robot, compliance=np.zeros(robot.joints), masses=()) if rigid else robot,
         measured=document["measured"],
         frame=document["frame"],
         targets=targets_from(document["targets"], robot.chain, source),

@@ -98,7 +98,7 @@ class Instrument:
         around = replace(conditions(model, estimate, observations.states), progress=np.ones(len(observations.states)))
         line, products = linearize(model, estimate, observations, around), self.linearized.products
         jacobian, columns = line.coordinate_jacobian, np.concatenate([unit.columns for unit in self.units])
-        laws = [(law, unit.shapes) for unit in self.units if (law := unit.candidate or unit.law)]
+        laws = [(law.displacement, unit.shapes) for unit in self.units if (law := unit.candidate or unit.law)]
         made = effect_columns(laws, line.conditions, jacobian, observations.state)
         declared = [owner not in self.linearized.candidates for owner, _ in self.fitted.parameters]
         white = whitening(observations, jacobian[..., : model.sites.joints], self.noise)

@@ -374,7 +374,8 @@ def sag_entries(name: str, members: Sequence[Candidate], final: Fit, observation
     if members[0].family != "gravity" or final.model.identifies_compliance or final.joint_jacobian is None:
         return []
     jacobian = final.joint_jacobian[:, :3]
-    columns = effect_columns([(m, ()) for m in members], final.conditions_of(observations.states), jacobian, observations.state)
+    laws, around = [(member.displacement, ()) for member in members], final.conditions_of(observations.states)
+    columns = effect_columns(laws, around, jacobian, observations.state)
     mine = np.concatenate([final.places_of(member.key) for member in members])
     sag = columns @ np.concatenate([final.values_of(member.key)[0] for member in members])
     most = int(np.argmax((sag**2).sum(axis=1)))

@@ -9,23 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.effects.gravity import compensated_joint, wave_parameters
-from elastocal.effects.protocol import (
-    LOADED_JOINTS,
-    Candidate,
-    Parameter,
-    Shape,
-    effect,
-    every_joint,
-    load_behind,
-    small_form,
-    turning_joints,
-    waves,
-)
+from elastocal.effects.protocol import Candidate, Parameter, Shape, effect, every_joint, small_form, turning_joints, waves
 from elastocal.effects.sizes import JOINT, PER_LENGTH, SHIFT, STIFFEST, Size
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from elastocal.effects.conditions import Conditions
-    from elastocal.effects.protocol import Candidates, Displacements, Effect
+    from elastocal.effects.protocol import Candidates, Displacements, Effect, Law
     from elastocal.mechanics.sites import Sites
 
 _effect = partial(effect, "elastic")
@@ -42,14 +33,17 @@ def joint_compliance(sites: Sites) -> Candidate:
 
     No effect, for nothing is missing: the declared model has it where the compliances are to be identified.
     """
-
-    def law(around: Conditions) -> Displacements:
-        return [{joint: around.total[:, joint]} for joint in range(sites.joints)]
-
     units = ["m/N" if prismatic else "rad/(N m)" for prismatic in sites.prismatic]
     sizes = [_OVER_USUAL * compliance for compliance in sites.compliance]
     parameters = tuple(Parameter(f"c{j}", unit, size) for j, (unit, size) in enumerate(zip(units, sizes, strict=True), 1))
+    law = _springs([joint] for joint in range(sites.joints))
     return Candidate("joint_compliance", "declared", (), "", parameters, law, frozenset({"load"}))
+
+
+def _springs(groups: Iterable[Iterable[int]]) -> Law:
+    """Law of coordinates that each yield to their own load, each group of them by one parameter."""
+    each = [tuple(group) for group in groups]
+    return lambda around: [{c: around.total[:, c] for c in group} for group in each]
 
 
 def _bending(sites: Sites) -> list[tuple[tuple[int, ...], str]]:
@@ -98,8 +92,8 @@ def link_elasticity(own: Effect, sites: Sites, links: tuple[int, ...], detail: s
     length, before = float(np.linalg.norm(sites.link_vectors_m[longest])), max(longest - 1, 0)
     names = ("bending_1_over_EI", "torsion_1_over_GJ")
     parameters = own.parameters("1/EI", names, "1/(N m^2)", sites, before, over=length)
-    joints, needs = tuple(k for k in links if k), load_behind(sites, max(links))
-    yield own.candidate(joints, parameters, law, needs, shapes=(_TAPER,), detail=detail, location_name=detail)
+    joints = tuple(k for k in links if k)
+    yield own.candidate(joints, parameters, law, {"load"}, shapes=(_TAPER,), detail=detail, location_name=detail)
 
 
 def _end_compliance(sites: Sites, link: int, taper: float) -> tuple[np.ndarray, np.ndarray]:
@@ -131,10 +125,8 @@ def joint_tilt(own: Effect, sites: Sites, joint: int) -> Candidates:
     # A carriage rolls about its own axis too, which is no joint's.
     across = [axis for axis in range(3) if sites.prismatic[joint] or axis != sites.joint_axes[joint]]
     tilts = own.parameters("tilt", [f"tilt_about_{'xyz'[axis]}" for axis in across], "rad/(N m)", sites, joint)
-    coordinates = [sites.tilt[joint][axis] for axis in across]
-    yield own.candidate(
-        (joint + 1,), tilts, lambda around: [{c: around.total[:, c]} for c in coordinates], load_behind(sites, joint)
-    )
+    law = _springs([sites.tilt[joint][axis]] for axis in across)
+    yield own.candidate((joint + 1,), tilts, law, {"load"})
 
 
 @_effect(
@@ -153,12 +145,7 @@ def base_compliance(own: Effect, sites: Sites) -> Candidates:
     tx, ty, tz, rx, ry, _ = sites.base
     shifts = own.parameters("shift", ["horizontal", "vertical"], "m/N", sites)
     tilt = own.parameters("tilt", ["tilt"], "rad/(N m)", sites)
-
-    def law(around: Conditions) -> Displacements:
-        load = around.total
-        return [{tx: load[:, tx], ty: load[:, ty]}, {tz: load[:, tz]}, {rx: load[:, rx], ry: load[:, ry]}]
-
-    every = own.candidate((), (*shifts, *tilt), law, {"load"})
+    every = own.candidate((), (*shifts, *tilt), _springs([(tx, ty), (tz,), (rx, ry)]), {"load"})
     # Rocking alone is what most foundations do.
     yield from (every, small_form(every, "rocking", slice(2, None)))
 
@@ -176,9 +163,7 @@ def cross_compliance(own: Effect, sites: Sites, one: int, other: int) -> Candida
     joints, seen at the end-effector alone, it is not distinguishable from bending of the link between them.
     """
     both, coupling = (one + 1, other + 1), own.parameters("coupling", ["compliance"], "rad/(N m)", sites, one, other)
-    yield own.candidate(
-        both, coupling, lambda around: [{one: around.total[:, other], other: around.total[:, one]}], LOADED_JOINTS
-    )
+    yield own.candidate(both, coupling, lambda around: [{one: around.total[:, other], other: around.total[:, one]}], {"load"})
 
 
 @_effect(
@@ -193,7 +178,7 @@ def joint_dependent_stiffness(own: Effect, sites: Sites, joint: int) -> Candidat
     """
 
     variation = own.parameters("variation", ["cos_q", "sin_q"], "rad/(N m)", sites, joint)
-    yield own.of_joint(joint, variation, lambda around: _softer(around, joint, 1), LOADED_JOINTS)
+    yield own.of_joint(joint, variation, lambda around: _softer(around, joint, 1), {"load"})
 
 
 def _softer(around: Conditions, joint: int, *orders: int) -> list[np.ndarray]:
@@ -217,7 +202,7 @@ def compensator_stiffness(own: Effect, sites: Sites, joint: int) -> Candidates:
     """
 
     variation = wave_parameters(own, "variation", "rad/(N m)", sites, joint)
-    yield own.of_joint(joint, variation, lambda around: _softer(around, joint, 1, 2), LOADED_JOINTS)
+    yield own.of_joint(joint, variation, lambda around: _softer(around, joint, 1, 2), {"load"})
 
 
 @_effect(
@@ -234,8 +219,6 @@ def flange_flexibility(own: Effect, sites: Sites) -> Candidates:
     """
     shifts = own.parameters("shift", [f"shift_{axis}" for axis in "xyz"], "m/N", sites)
     turns = own.parameters("turn", [f"turn_{axis}" for axis in "xyz"], "rad/(N m)", sites, sites.joints - 1)
-    every = own.candidate(
-        (), (*shifts, *turns), lambda around: [{c: around.load[:, c]} for c in sites.link_end[-1]], LOADED_JOINTS
-    )
+    every = own.candidate((), (*shifts, *turns), _springs([c] for c in sites.link_end[-1]), {"load"})
     # Turns alone are most of what a flange does.
     yield from (every, small_form(every, "turns", slice(3, None)))

@@ -1,4 +1,4 @@
-"""Geometry: effects that are there without a load and fixed in time."""
+"""Geometry that is not as declared: fixed in time, drifting with tracker, nests and foot, or growing with warmth."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects.protocol import WAVES, Parameter, effect, every_joint, moved_and_turned, waves
+from elastocal.effects.protocol import WAVES, Parameter, Shape, effect, every_joint, moved_and_turned, waves
 from elastocal.effects.sizes import REACH, Size
 
 if TYPE_CHECKING:
@@ -15,8 +15,17 @@ if TYPE_CHECKING:
     from elastocal.effects.protocol import Candidates, Displacements, Effect
     from elastocal.mechanics.sites import Sites
 
-_effect = partial(effect, "geometry")
+_effect, _drift = partial(effect, "geometry"), partial(effect, "drift")
 _NEST_ORDER, _SAMPLES_PER_PERIOD = 2, 4
+_HOUR_S = 3600.0
+# The nearest of these has all but a 24th of the measurements on the right side of the step. Nearer to an end than the outermost
+# a step would be a shift of nearly all measurements.
+_WHEN = Shape("when", "1", 0.5, 1 / 12, 11 / 12, tried=11)
+_REFERENCE_C, _SHORTEST_M = 20.0, 0.05
+# By which of them the shapes of a law go. Castings of a robot follow their motors and the air in a quarter of an hour to some
+# hours.
+_WARMED_WORDS = {"along ": "along the arm", "": "across it", "column ": "across the column"}
+CAUSES = {"temperature": (), "time": (Shape("lag", "s", 3600.0, 900.0, 36000.0),)}
 
 
 @_effect(
@@ -106,16 +115,135 @@ def tracker_scale(own: Effect, sites: Sites) -> Candidates:
 
     def law(around: Conditions) -> Displacements:
         travels = {joint: around.joint_angles[:, joint] for joint, slides in enumerate(sites.prismatic) if slides}
-        return [longer(sites, around.always) | travels]
+        return [times(around.always, every) | travels]
 
+    every = longer(sites, np.ones(sites.joints + 1))
     yield own.candidate((), own.parameters("scale", ["scale"], "m/m", sites), law)
 
 
-def longer(sites: Sites, share: np.ndarray) -> dict[int, np.ndarray]:
-    """Displacement by which the column and every link are longer by a share (S,), as a dict by coordinate."""
-    return {
-        coordinate: share * along
-        for ends, vector in zip(sites.link_end, sites.link_vectors_m, strict=True)
-        for coordinate, along in zip(ends[:3], vector, strict=True)
-        if along
-    }
+def longer(sites: Sites, shares: np.ndarray) -> dict[int, float]:
+    """How the far ends move, by coordinate, where the column and each link are longer by their shares (n + 1,)."""
+    ends = zip(sites.link_end, sites.link_vectors_m * shares[:, None], strict=True)
+    return {coordinate: along for end, vector in ends for coordinate, along in zip(end[:3], vector.tolist(), strict=True)}
+
+
+def times(amount: np.ndarray, moved: dict[int, float]) -> dict[int, np.ndarray]:
+    """A displacement of some coordinates, of which each goes with an amount (S,)."""
+    return {coordinate: amount * part for coordinate, part in moved.items() if part}
+
+
+# Tracker and foot drift alike in the measurements, and a task counts from where the foot stands.
+@_drift(
+    "drift of the tracker or of the robot's foot",
+    Size("shift an hour", 2e-4, "a tripod on a warming floor"),
+    Size("turn an hour", 1e-4, "the same over its height"),
+    moves_robot=False,
+)
+def frame_drift(own: Effect, sites: Sites) -> Candidates:
+    """A tracker or a robot's foot that drifts: stand, floor or bolts settle, and all measurements move as one rigid body.
+
+    u = t (d, r) at the foot in base axes, with t the time since the first measurement (h), d in m/h and r in rad/h; a point p
+    (m) moves by t (d + r x p).
+    """
+    six = moved_and_turned(own.size("shift an hour", sites), own.size("turn an hour", sites), "/h")
+    yield own.candidate((), six, lambda around: [{c: around.time_s / _HOUR_S} for c in sites.base], {"time"}, of_setup=True)
+
+
+# As a drift.
+@_drift(
+    "shift of the set-up between rows",
+    Size("shift", 5e-4, "a stand that is knocked"),
+    Size("turn", 2e-4, "the same over its height"),
+    moves_robot=False,
+    parameter_words={"when": "share of the measurements before it"},
+)
+def setup_step(own: Effect, sites: Sites) -> Candidates:
+    """A tracker, a nest or a foot that was moved between two rows: a rigid motion of all measurements from there on.
+
+    u = (d, r) at the foot in base axes from the share w of the campaign on, zero before; d in m, r in rad, and a point p (m)
+    moves by d + r x p. Where it happens is a shape: w = 0 is the first row of the campaign, 1 its last. A step needs no clock;
+    where the rows are not known the poses count by their numbers.
+    """
+    six = moved_and_turned(own.size("shift", sites), own.size("turn", sites))
+
+    def law(around: Conditions, when: float) -> Displacements:
+        return [{coordinate: (around.progress >= when).astype(float)} for coordinate in sites.base]
+
+    yield own.candidate((), six, law, shapes=(_WHEN,), of_setup=True)
+
+
+def warmer(around: Conditions, *lag: float) -> np.ndarray:
+    """By how much the robot is warmer, ndarray (S,): by the time where a lag (s) is given, by the temperature without."""
+    if lag:
+        return -np.expm1(-around.time_s / lag[0])
+    return around.temperature_c - _REFERENCE_C
+
+
+@_drift(
+    "thermal growth of the links",
+    Size("expansion", 3e-5, "aluminium, and a little more for the gears", sign=1),
+    Size("final growth", 3e-4, "10 K of it"),
+    at=lambda sites: [("temperature", "expansion", "1/K"), ("time", "final growth", "m/m")],
+)
+def thermal_growth(own: Effect, sites: Sites, cause: str, quantity: str, unit: str) -> Candidates:
+    """Column and links that grow as they warm up: motors, gears and the air warm the castings, which expand.
+
+    dl = alpha dT l for each length l (m). With a measured temperature alpha is the expansion (1/K) and dT the temperature above
+    20 °C, at which dimensions are stated (ISO 1); with the time t (s) alone dl = g (1 - exp(-t / t_0)) l, with g the final
+    growth (m/m) and t_0 (s) the lag of a body that has one temperature throughout (Incropera and DeWitt 2002).
+    """
+    growth = own.parameters(quantity, [quantity.replace(" ", "_")], unit, sites)
+    every = longer(sites, np.ones(sites.joints + 1))
+
+    def law(around: Conditions, *lag: float) -> Displacements:
+        return [times(warmer(around, *lag), every)]
+
+    yield own.candidate((), growth, law, {cause}, shapes=CAUSES[cause], detail=cause)
+
+
+def _warmed(sites: Sites) -> list[tuple[int | None, str]]:
+    """Each link with a length, named by the joint before it, 0 the column, and None along the arm; by each cause."""
+    long = [k for k in range(sites.joints + 1) if np.linalg.norm(sites.link_vectors_m[k]) > _SHORTEST_M]
+    return [(link, cause) for link in (*long, None) for cause in CAUSES]
+
+
+@_drift(
+    "temperature gradient",
+    Size("curvature a kelvin", 2e-5, "steel, half of the warmth across 0.3 m"),
+    Size("curvature", 1.5e-4, "8 K of it"),
+    at=_warmed,
+    part="link",
+    detail_words={"along": "along the arm"}
+    | {f"{where}{cause}": f"{words}, by {cause}" for where, words in _WARMED_WORDS.items() for cause in CAUSES},
+)
+def temperature_gradient(own: Effect, sites: Sites, link: int | None, cause: str) -> Candidates:
+    """An arm that is warmer on one side or at one end than at the other: motors, sun or a draught warm it unevenly.
+
+    A gradient g (K/m) across a link bends it to the curvature alpha g (1/m) (Boley and Weiner 1960), with alpha the expansion
+    (1/K), so that a link of length l (m) ends by l^2 / 2 times that to the side (m) and turned by l times that (rad). Along the
+    arm motors and gears at its foot are warmer than the wrist: a link whose middle is x (m) from the foot grows by the share b
+    (x - x_0), x_0 the mean over the arm, which keeps its length. Both in proportion to the temperature above 20 °C where it is
+    measured, parameters in 1/(K m), or to a first-order lag since the campaign began, in 1/m.
+    """
+    quantity, unit = {"temperature": ("curvature a kelvin", "1/(K m)"), "time": ("curvature", "1/m")}[cause]
+    if link is None:
+        lengths = np.linalg.norm(sites.link_vectors_m, axis=1)
+        middle = np.cumsum(lengths) - lengths / 2
+        moved = {"growth_along": longer(sites, middle - middle @ lengths / lengths.sum())}
+    else:
+        moved, vector, length = {}, sites.link_vectors_m[link], np.linalg.norm(sites.link_vectors_m[link])
+        for axis in sites.transverse_axes(link):
+            # About an axis of those least along the link, made square to it. A turn about e by s / l carries the end of a beam
+            # along x by e cross x over half its length.
+            about = np.eye(3)[axis] - vector[axis] * vector / length**2
+            end = np.concatenate([np.cross(about, vector) * length / 2, length * about])
+            moved[f"curvature_about_{'xyz'[axis]}"] = dict(zip(sites.link_end[link], end.tolist(), strict=True))
+
+    def law(around: Conditions, *lag: float) -> Displacements:
+        rise = warmer(around, *lag)
+        return [times(rise, each) for each in moved.values()]
+
+    parameters = [Parameter(name, unit, own.size(quantity, sites)) for name in moved]
+    where = {None: "along", 0: "column"}.get(link, "")
+    detail, joints = f"{where} {cause}".strip(), (link,) if link else ()
+    yield own.candidate(joints, parameters, law, {cause}, shapes=CAUSES[cause], detail=detail, location_name=where)

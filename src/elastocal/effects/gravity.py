@@ -1,4 +1,8 @@
-"""Gravity: effects that are there without a load, by weights and the compliances of the joints."""
+"""Loads that a model does not have: weights, the torque of a compensator, and what a force sensor shows that does not act.
+
+Gravity is there without an external load and moves the robot; a wrench that is declared for a task is right, so that no error
+of the sensor does.
+"""
 
 from __future__ import annotations
 
@@ -8,27 +12,36 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.effects.conditions import MASS_PARAMETERS
-from elastocal.effects.protocol import LOADED_JOINTS, Candidate, Parameter, effect, small_form, turning_joints, waves
-from elastocal.effects.sizes import RATED, SAG, TORQUE, Size
+from elastocal.effects.protocol import Candidate, Parameter, effect, small_form, turning_joints, waves
+from elastocal.effects.sizes import LOAD, RATED, REACH, SAG, TORQUE, Size
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from typing import Any
+    from collections.abc import Callable, Iterable, Sequence
 
     from elastocal.effects.conditions import Conditions
     from elastocal.effects.protocol import Candidates, Displacements, Effect
     from elastocal.mechanics.sites import Sites
 
-_effect = partial(effect, "gravity")
+    # Change of force and moment (S, 3) by a unit of an error along or about a direction (S, 3), of the wrench (S, 6).
+    Change = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+_gravity, _sensor = partial(effect, "gravity"), partial(effect, "load", moves_robot=False)
+DECLARED_WEIGHT = "declared_weight"
 _LINKS, _OFF_THE_LINE = 2, "off the line"
 # Of a centre of mass off the line of its link; and of a gripper, from the flange.
 _OFF_M, _LEVER_M = 0.2, 0.2
-DECLARED_WEIGHT = "declared_weight"
 # Links are as wide as a tenth of the arm is long (KUKA KR 270: 0.3 m of 2.7 m); motors and gears put the centre of a slender
 # one so far off the line as well.
 _WIDTH_OF_LENGTH, _LEAST_OFF_M = 0.1, 0.04
 # A centre on its joint's axis is stated no better than as so far from it.
 _LEAST_LEVER_M = 0.1
+# Share of the moments that may be left unexplained where a pull acts at one place.
+_OF_ONE_PLACE = 0.01
+# Axes in which an error can be fixed, with the moments right, or with those that the wrong force makes at its lever: between
+# flange and tool a sensor measures forces and moments; in the line of a pull, the force alone.
+_PULL = " in the pull"
+_FRAMES = [("base axes",), ("flange axes",)]
+_AND_IN_PULL = [*_FRAMES, *((frame + _PULL,) for (frame,) in _FRAMES)]
 
 
 def declared_weight(sites: Sites) -> Candidate:
@@ -60,7 +73,12 @@ def _by_joint(turns: np.ndarray) -> Displacements:
     return [{joint: turn for joint, turn in enumerate(each.T) if turn.any()} for each in turns]
 
 
-@_effect(
+def _sagging(around: Conditions, places: Iterable[tuple[int, int | None]]) -> Displacements:
+    """Turns of the joints by a kilogram, or a kilogram metre, at each of some places as of `Conditions.weight`."""
+    return [dict(enumerate((around.weight(*place) * around.compliance).T)) for place in places]
+
+
+@_gravity(
     "gravity sag",
     Size("mass", 1.5, "an arm weighs six times what it carries, a quarter of it at the end of a link", RATED),
     Size("mass of one joint", 1.5, "the same, by the joint's turn", SAG),
@@ -87,20 +105,15 @@ def link_weight(own: Effect, sites: Sites) -> Candidates:
     def form(joint: int | None, links: Sequence[int], axes: Sequence[tuple[int, int]], detail: str) -> Candidate:
         of, unit = ("", "{}") if joint is None else ("compliance_times_", "rad {}/(N m)")
         size = own.size("mass", sites) if joint is None else own.size("mass of one joint", sites, joint)
-        masses = [Parameter(f"{of}mass_at_end_of_link_{k}", unit.format("kg"), size) for k in links]
-        moments = [(f"{of}moment_{'xyz'[axis]}_of_link_{k}", unit.format("kg m"), _OFF_M * size) for k, axis in axes]
-        parameters = [*masses, *(Parameter(*moment) for moment in moments)]
-
-        def law(around: Conditions) -> Displacements:
-            torques = [*(around.weight[k] for k in links), *(around.weight_moment(k, axis) for k, axis in axes)]
-            if joint is None:
-                return [dict(enumerate((torque * around.compliance).T)) for torque in torques]
-            return [{joint: torque[:, joint]} for torque in torques]
-
+        parameters = [Parameter(f"{of}mass_at_end_of_link_{k}", unit.format("kg"), size) for k in links]
+        for k, axis in axes:
+            parameters.append(Parameter(f"{of}moment_{'xyz'[axis]}_of_link_{k}", unit.format("kg m"), _OFF_M * size))
+        places = [*((k, None) for k in links), *axes]
         if joint is None:
             # Without a load the compliances are not identifiable, and nominal ones are far off.
-            return own.candidate((), parameters, law, {"external load"}, detail=detail, location_name="arm")
-        return own.candidate((joint + 1,), parameters, law, detail=detail)
+            law, needs = partial(_sagging, places=places), {"external load"}
+            return own.candidate((), parameters, law, needs, detail=detail, location_name="arm")
+        return own.of_joint(joint, parameters, lambda at: [at.weight(*place)[:, joint] for place in places], detail=detail)
 
     # The links behind the first joint that weight can turn turn all others too.
     for first in joints[:1]:
@@ -114,7 +127,7 @@ def link_weight(own: Effect, sites: Sites) -> Candidates:
     yield from [form(joint, links, off, _OFF_THE_LINE) for joint, links in near.items() if (off := across(links, [joint]))]
 
 
-@_effect(
+@_gravity(
     "weight of the arm beyond its declared masses",
     Size("share", 0.3, "files made of drawings lack motors, cables and dress, a third of an arm's weight"),
 )
@@ -132,17 +145,17 @@ def declared_masses(own: Effect, sites: Sites) -> Candidates:
     names = [f"share_of_link_{mass.link}_from_mass_{number}" for number, mass in bodies]
     places, kilograms = [MASS_PARAMETERS * number for number, _ in bodies], np.array([mass.mass_kg for _, mass in bodies])
 
-    def turns(around: Conditions) -> np.ndarray:
-        return kilograms[:, None, None] * around.mass_torques[places] * around.compliance
+    def law(around: Conditions, shares: np.ndarray) -> Displacements:
+        return _by_joint(np.tensordot(shares * kilograms, around.mass_torques[places], 1) * around.compliance)
 
-    options: Mapping[str, Any] = {"needs": {"external load"}, "location_name": "arm"}
-    share, shares = (own.parameters("share", each, "1", sites) for each in (["share"], names))
-    yield own.candidate((), share, lambda at: _by_joint(turns(at).sum(axis=0, keepdims=True)), detail="all alike", **options)
-    yield own.candidate((), shares, lambda at: _by_joint(turns(at)), detail="each", **options)
+    ways = (("all alike", ["share"], np.ones((1, len(bodies)))), ("each", names, np.eye(len(bodies))))
+    for detail, named, shares in ways:
+        parameters, turns = own.parameters("share", named, "1", sites), partial(law, shares=shares)
+        yield own.candidate((), parameters, turns, {"external load"}, detail=detail, location_name="arm")
 
 
 # It hangs on the flange in tasks as in the campaign, until someone takes it off: that moves the robot.
-@_effect("weight of an undeclared payload", Size("mass", 0.15, "a cable package or a forgotten gripper", RATED))
+@_gravity("weight of an undeclared payload", Size("mass", 0.15, "a cable package or a forgotten gripper", RATED))
 def payload(own: Effect, sites: Sites) -> Candidates:
     """Weight at the flange that the model does not know: a tool, a cable package or an adapter that nobody declared.
 
@@ -150,21 +163,10 @@ def payload(own: Effect, sites: Sites) -> Candidates:
     Jacobian of the end-effector, g gravity (m/s^2), m the mass (kg) and r its centre from there (m). Given the compliances it
     is linear in m and in the first moments m r along the axes of the end-effector (kg m) (Atkeson et al. 1986).
     """
-    mass = own.size("mass", sites)
+    mass, law = own.size("mass", sites), partial(_sagging, places=[(sites.joints, axis) for axis in (None, 0, 1, 2)])
     moments = [Parameter(f"moment_{axis}", "kg m", _LEVER_M * mass) for axis in "xyz"]
-
-    def law(around: Conditions) -> Displacements:
-        gravity, found = np.array(sites.gravity_m_s2), []
-        levers = [np.zeros_like(around.wrench[:, :3]), *np.moveaxis(around.end_rotation, -1, 0)]
-        for lever, kilograms in zip(levers, (1.0, 0.0, 0.0, 0.0), strict=True):
-            force = np.broadcast_to(kilograms * gravity, lever.shape)
-            turned = around.joint_deflections(np.concatenate([force, np.cross(lever, gravity)], axis=-1))
-            found.append(dict(enumerate(turned.T)))
-        return found
-
     # Where neither a load nor what the links weigh is known, what hangs on the flange is not distinguishable from that.
-    known = LOADED_JOINTS - {"load"}
-    tool = own.candidate((), [Parameter("mass", "kg", mass, carried=True), *moments], law, known)
+    tool = own.candidate((), [Parameter("mass", "kg", mass, carried=True), *moments], law, {"load"})
     # A mass alone is most of what a tool does.
     yield from (tool, small_form(tool, "mass", slice(1)))
 
@@ -181,7 +183,7 @@ def wave_parameters(own: Effect, quantity: str, unit: str, sites: Sites, joint: 
     return [parameter for order in each for parameter in order]
 
 
-@_effect(
+@_gravity(
     "torque of the gravity compensator",
     Size("turn", 0.3, "a compensator bears a third of the weight", TORQUE),
     at=compensated_joint,
@@ -199,3 +201,105 @@ def compensator_torque(own: Effect, sites: Sites, joint: int) -> Candidates:
     parameters = wave_parameters(own, "turn", "rad", sites, joint)
     whole = own.of_joint(joint, parameters, lambda around: waves(around.joint_angles[:, joint], 1, 2))
     yield from (whole, small_form(whole, "first order", slice(2)))
+
+
+def _turned(around: Conditions, changes: Iterable[Sequence[np.ndarray]]) -> Displacements:
+    """Turns of the joints by each of some changes of force and moment (S, 3) at the last measuring point."""
+    joints = slice(len(around.compliance))
+    torques = [around.load_by(np.concatenate(change, axis=1), joints) for change in changes]
+    return [dict(enumerate((each * around.compliance).T)) for each in torques]
+
+
+def _wrong(own: Effect, parameters: tuple[Parameter, ...], frame: str, change: Change) -> Candidate:
+    """Candidate of a wrench that is wrong by ``change(direction, wrench)`` for each of the axes of a frame."""
+
+    def law(around: Conditions) -> Displacements:
+        wrench, rotation = around.wrench, np.moveaxis(around.motion.rotation[0], -1, 0)
+        fixed = np.broadcast_to(np.eye(3), rotation.shape)
+        changed = [change(axis, wrench) for axis in np.moveaxis(rotation if frame.startswith("flange") else fixed, -1, 0)]
+        if frame.endswith(_PULL):
+            lever = lever_of_pull(wrench, rotation)
+            changed = [(force, np.cross(lever, force)) for force, _ in changed]
+        return _turned(around, changed)
+
+    return own.candidate((), parameters, law, {"load"}, detail=frame)
+
+
+def lever_of_pull(wrench: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+    """Where a pull acts: the one place, in the flange or in base axes, about which forces make the moments (least squares).
+
+    `wrench` (S, 6): at a point of the flange, base axes. `rotation` (S, 3, 3): of the flange. Returns (S, 3): from the point of
+    the wrench, m, base axes; zero where no place explains the moments.
+    """
+    for axes in (rotation, np.broadcast_to(np.eye(3), rotation.shape)):
+        force, moment = (np.einsum("sji,sj->si", axes, part) for part in (wrench[:, :3], wrench[:, 3:]))
+        # r x F = -[F] r.
+        rows = -np.cross(force[:, :, None], np.eye(3)[None], axis=1).reshape(-1, 3)
+        place = np.linalg.lstsq(rows, moment.ravel(), rcond=None)[0]
+        if np.linalg.norm(rows @ place - moment.ravel()) <= _OF_ONE_PLACE * np.linalg.norm(moment):
+            return axes @ place
+    return np.zeros((len(wrench), 3))
+
+
+@_sensor(
+    "misalignment of the force sensor", Size("turn", 0.02, "a sensor mounted by eye: a degree"), at=lambda sites: _AND_IN_PULL
+)
+def force_misalignment(own: Effect, sites: Sites, frame: str) -> Candidates:
+    """A force sensor that is mounted askew: it shows the right force in a wrong direction.
+
+    theta = diag(c) J^T (phi x F, 0), or diag(c) J^T (phi x F, r x (phi x F)) in a pull,
+
+    with theta the turns of the joints (rad), c their compliances (rad/(N m)), J the Jacobian of the loaded point, F the
+    recorded force (N) and phi the small angle from it to the one that acts (rad), fixed in base axes, or in the flange where
+    the sensor turns with the tool. A sensor in the line of a pull measures the force alone, so that the moment about its lever
+    r (m) is wrong, too; elsewhere the moments are as recorded. Derived here: a small turn adds phi x F, and an error dw of the
+    wrench loads by J^T dw.
+    """
+    parameters = own.parameters("turn", [f"about_{axis}" for axis in "xyz"], "rad", sites)
+    yield _wrong(own, parameters, frame, lambda axis, wrench: (np.cross(axis, wrench[:, :3]), np.zeros_like(axis)))
+
+
+@_sensor(
+    "zero error of the force sensor",
+    Size("force", 0.01, "accuracy class of load cells that suit the arm", LOAD),
+    at=lambda sites: _AND_IN_PULL,
+)
+def force_bias(own: Effect, sites: Sites, frame: str) -> Candidates:
+    """A force sensor that shows a force where there is none: its zero was not set before the pull, or has moved since.
+
+    theta = diag(c) J^T (b, 0) wherever a load is recorded, or (b, r x b) in a pull with the lever r (m); theta are the turns of
+    the joints (rad), c their compliances (rad/(N m)), J the Jacobian of the loaded point, and b the force that acts beyond the
+    recorded one (N), which is minus what the sensor shows at zero. It is fixed in base axes, or in the flange where the sensor
+    turns with the tool.
+    """
+    parameters = own.parameters("force", [f"along_{axis}" for axis in "xyz"], "N", sites)
+    yield _wrong(own, parameters, frame, lambda axis, wrench: (axis * wrench.any(axis=1, keepdims=True), np.zeros_like(axis)))
+
+
+@_sensor(
+    "wrong load application point",
+    Size("shift", 0.01, "a hook or a screw beside the point that was meant", REACH),
+    at=lambda sites: _FRAMES,
+)
+def application_point(own: Effect, sites: Sites, frame: str) -> Candidates:
+    """A force that acts elsewhere than was recorded: the pull or the weight is fixed to the tool at another place.
+
+    theta = diag(c) J^T (0, dr x F), with theta the turns of the joints (rad), c their compliances (rad/(N m)), J the Jacobian
+    of the loaded point, F the force (N) and dr the shift of its point of application (m), fixed in base axes, or in the flange
+    where the load hangs on the tool. Derived here: a force that is moved by dr has the further moment dr x F.
+    """
+    parameters = own.parameters("shift", [f"shift_{axis}" for axis in "xyz"], "m", sites)
+    yield _wrong(own, parameters, frame, lambda axis, wrench: (np.zeros_like(axis), np.cross(axis, wrench[:, :3])))
+
+
+@_sensor("scale error of the force sensor", Size("scale", 0.02, "a load cell that was calibrated long ago"))
+def force_scale(own: Effect, sites: Sites) -> Candidates:
+    """A force sensor that shows too much or too little: its sensitivity differs from the one of its calibration.
+
+    theta = diag(c) J^T (s w), with theta the turns of the joints (rad), c their compliances (rad/(N m)), J the Jacobian of the
+    loaded point, w the recorded wrench (N, N m) and s the share by which the one that acts is larger. Where all compliances are
+    identified and no declared masses load the joints it is exactly an alias of them, so that only a reference weight can find
+    it.
+    """
+    scale = own.parameters("scale", ["scale"], "1", sites)
+    yield own.candidate((), scale, lambda around: _turned(around, [np.split(around.wrench, 2, axis=1)]), {"load"})

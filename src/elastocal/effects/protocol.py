@@ -10,7 +10,7 @@ from collections import Counter
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from inspect import cleandoc
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -33,24 +33,7 @@ if TYPE_CHECKING:
     Turns = Callable[..., Iterable[np.ndarray]]
 
 
-# Needs of laws that go with the load on the joints.
-LOADED_JOINTS = frozenset({"load", "load on the joints"})
 WAVES = {"cos": np.cos, "sin": np.sin}
-
-
-def load_behind(sites: Sites, joints: int) -> frozenset[str]:
-    """Needs of the law of what yields to the load, behind so many joints.
-
-    A weight that is only usual, not declared, loads columns and rails: behind a joint that turns `link_weight` has it.
-    """
-    return frozenset({"load"}) if all(sites.prismatic[:joints]) else LOADED_JOINTS
-
-
-class Displacing(Protocol):
-    """Whatever displaces coordinates of the sites: a candidate, or a law that is none."""
-
-    @property
-    def displacement(self) -> Law: ...
 
 
 @dataclass(frozen=True)
@@ -257,13 +240,6 @@ def small_form(whole: Candidate, detail: str, kept: slice) -> Candidate:
         return whole.displacement(conditions, *shapes)[kept]
 
     return replace(whole, detail=detail, parameters=whole.parameters[kept], displacement=law)
-
-
-def needed(values: np.ndarray | None) -> np.ndarray:
-    """What states need not have, for a law whose candidate names it among its needs."""
-    if values is None:
-        raise TypeError("states without what the law of a candidate needs")
-    return values
 
 
 def effect_of(key: str) -> str:

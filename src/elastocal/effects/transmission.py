@@ -11,17 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects.protocol import (
-    LOADED_JOINTS,
-    WAVES,
-    Parameter,
-    Shape,
-    effect,
-    every_joint,
-    needed,
-    turning_joints,
-    waves,
-)
+from elastocal.effects.protocol import WAVES, Parameter, Shape, effect, every_joint, turning_joints, waves
 from elastocal.effects.sizes import JOINT, Size, full_torque_Nm
 
 if TYPE_CHECKING:
@@ -179,14 +169,11 @@ def bearing_runout(own: Effect, sites: Sites, joint: int, motion: str) -> Candid
 
 def _seen_behind(sites: Sites, joint: int, axis: int, angle: np.ndarray) -> np.ndarray:
     """Unit vector along an axis of the frame before a joint, in the frame that turns with it, ndarray (3, S)."""
-    own, turned, seen = sites.joint_axes[joint], sites.joint_signs[joint] * angle, np.zeros((3, len(angle)))
-    if axis == own:
-        seen[axis] = 1.0
-        return seen
-    # R(-turned) e_axis: the other axis across follows or goes before it.
-    ahead = 1.0 if (own + 1) % 3 == axis else -1.0
-    seen[axis], seen[3 - own - axis] = np.cos(turned), -ahead * np.sin(turned)
-    return seen
+    about, along = np.eye(3)[[sites.joint_axes[joint], axis]]
+    turned, lengthwise = -sites.joint_signs[joint] * angle, about * (about @ along)
+    # Rodrigues.
+    across = np.outer(along - lengthwise, np.cos(turned)) + np.outer(np.cross(about, along), np.sin(turned))
+    return lengthwise[:, None] + across
 
 
 # Start, least and most of the torque of a law, of the full torque. Slopes that meet at less are those of play; where both laws
@@ -196,11 +183,6 @@ _AS_AT_REST: dict[str, Callable[[np.ndarray, float], np.ndarray]] = {
     "": lambda load, torque: torque * np.tanh(load / torque),
     "two slopes": lambda load, torque: np.clip(load, -torque, torque),
 }
-
-
-def _torque(sites: Sites, joint: int, shares: np.ndarray) -> Shape:
-    start, lowest, highest = (shares * full_torque_Nm(sites, joint)).tolist()
-    return Shape("torque", "N m", start, lowest, highest)
 
 
 # Small gears carry less torque and may bend more by it.
@@ -219,13 +201,14 @@ def stiffening(own: Effect, sites: Sites, joint: int, detail: str) -> Candidates
     together, and which below tau_1 is the cubic law tau^3 / (3 tau_1^2). Neither is linear in tau_1. A stiffness that depends
     on the torque was measured on strain wave gears (Tuttle 1992).
     """
-    beyond, meeting = own.parameters("lost beyond", ["beyond"], "rad/(N m)", sites, joint), _torque(sites, joint, _MEETING)
+    beyond = own.parameters("lost beyond", ["beyond"], "rad/(N m)", sites, joint)
+    meeting = Shape("torque", "N m", *(_MEETING * full_torque_Nm(sites, joint)).tolist())
 
     def turns(around: Conditions, torque: float) -> list[np.ndarray]:
         load = around.total[:, joint]
         return [load - _AS_AT_REST[detail](load, torque)]
 
-    yield own.of_joint(joint, beyond, turns, LOADED_JOINTS, shapes=(meeting,), detail=detail)
+    yield own.of_joint(joint, beyond, turns, {"load"}, shapes=(meeting,), detail=detail)
 
 
 @_gearbox("lost motion (backlash)", Size("play", 1e-4, "a third of an arc minute", sign=1), at=turning_joints)
@@ -237,8 +220,9 @@ def lost_motion(own: Effect, sites: Sites, joint: int) -> Candidates:
     (Nabtesco, Precision Reduction Gear RV, glossary). Derived here: tanh is a smooth step from one flank, -D_i, to the other,
     +D_i.
     """
-    play, shapes = own.parameters("play", ["half_play"], "rad", sites), (_torque(sites, joint, _PLAY),)
-    yield own.of_joint(joint, play, lambda around, at: [np.tanh(around.total[:, joint] / at)], LOADED_JOINTS, shapes=shapes)
+    play = own.parameters("play", ["half_play"], "rad", sites)
+    taken_up = Shape("torque", "N m", *(_PLAY * full_torque_Nm(sites, joint)).tolist())
+    yield own.of_joint(joint, play, lambda around, at: [np.tanh(around.total[:, joint] / at)], {"load"}, shapes=(taken_up,))
 
 
 @_gearbox(
@@ -254,4 +238,4 @@ def hysteresis(own: Effect, sites: Sites, joint: int) -> Candidates:
     """
     quantity, unit = ("shift", "m") if sites.prismatic[joint] else ("turn", "rad")
     width = own.parameters(quantity, ["half_width"], unit, sites)
-    yield own.of_joint(joint, width, lambda around: [needed(around.approach)[:, joint]], {"approach"})
+    yield own.of_joint(joint, width, lambda around: [around.approach[:, joint]], {"approach"})

@@ -34,7 +34,7 @@ from elastocal.mechanics.kinematics import motion
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from elastocal.effects.protocol import Candidate, Displacing
+    from elastocal.effects.protocol import Candidate, Law
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.observations import Observations
 
@@ -265,10 +265,10 @@ def linearize(model: Model, estimate: Estimate, observations: Observations, cond
 
 
 def effect_columns(
-    effects: Iterable[tuple[Displacing, Iterable[float]]], around: Conditions, jacobian: np.ndarray, state: np.ndarray
+    effects: Iterable[tuple[Law, Iterable[float]]], around: Conditions, jacobian: np.ndarray, state: np.ndarray
 ) -> np.ndarray:
-    """Sensitivities (M, rows, D) to the linear parameters of effects, with their shapes, by a `coordinate_jacobian`."""
-    laws = [law for effect, shapes in effects for law in effect.displacement(around, *shapes)]
+    """Sensitivities (M, rows, D) to the parameters of what displaces linearly, with its shapes, by a `coordinate_jacobian`."""
+    laws = [law for displacement, shapes in effects for law in displacement(around, *shapes)]
     return Factored.of(laws, jacobian, state, len(around.joint_angles)).dense()
 
 

@@ -10,12 +10,12 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.campaign import Campaign, assemble_campaign, measurements_from
 from elastocal.effects.catalogue import candidates_on, declared_candidates
-from elastocal.effects.conditions import MASS_PARAMETERS, at_coordinates, conditions_of, offered, with_springs
+from elastocal.effects.conditions import MASS_PARAMETERS, conditions_of, offered, with_springs
 from elastocal.effects.elastic import joint_compliance
 from elastocal.effects.gravity import DECLARED_WEIGHT, declared_weight
 from elastocal.effects.protocol import Candidate, Parameter, moved_and_turned
 from elastocal.fitting.observations import Observations, averaged, without_outlying_repeats
-from elastocal.mechanics.kinematics import pose_differences, poses_of_points
+from elastocal.mechanics.kinematics import motion, pose_differences, poses_of_points
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.mechanics.sites import Sites, sites_of
 
@@ -113,9 +113,6 @@ class Estimate:
 def declared_model(campaign: Campaign, effects: Iterable[Candidate] = ()) -> Model:
     """The model that a campaign declares, with its declared effects."""
     sites, measurements = sites_of(campaign.robot), campaign.measurements
-    # Under an arm whose first joint turns, a base that yields and the sag of that arm are one thing until weights are known.
-    unknown = not sites.masses and not measurements.wrench.any()
-    sites = replace(sites, usual_weight=sites.prismatic[0] and unknown)
     springs = (joint_compliance(sites),) if campaign.compliance == "identify" else ()
     weight = (declared_weight(sites),) if sites.masses else ()
     return Model(
@@ -207,7 +204,8 @@ def conditions(model: Model, estimate: Estimate, states: States, coordinates: np
     springs = joint_compliances(model, estimate), mass_corrections(model, estimate)
     around = conditions_of(model.sites, springs[0], states, model.time_zero_s, springs[1], model.row_span, coordinates)
     for _ in range(_PASSES if coordinates is None else 0):
-        around = at_coordinates(around, displaced_coordinates(model, estimate, around))
+        displaced = displaced_coordinates(model, estimate, around)
+        around = replace(around, motion=motion(model.sites.chain, displaced, model.sites.followed))
     return around
 
 

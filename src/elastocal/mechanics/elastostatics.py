@@ -128,8 +128,3 @@ def spring_compliance(robot: Robot) -> np.ndarray:
         turn = beam_axes(link)
         compliance[block, block] = turn @ tube_compliance(link.tube, float(np.linalg.norm(link.vector_m))) @ turn.T
     return compliance
-
-
-def with_tube(robot: Robot, tube: Tube) -> Robot:
-    """The same robot with every link made of `tube`."""
-    return replace(robot, links=tuple(replace(link, tube=tube) for link in robot.links))

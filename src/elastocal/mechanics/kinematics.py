@@ -16,7 +16,7 @@ import numpy as np
 from elastocal.mechanics.chain import MeasuringPoint
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from elastocal.mechanics.chain import Chain, Transform
 
@@ -55,15 +55,6 @@ def _walk(chain: Chain, coordinates: np.ndarray, until: int) -> list[Frame]:
     return frames
 
 
-def _place_point(frames: Sequence[Frame], point: MeasuringPoint) -> Frame:
-    """The frame of a measuring point, by the frames of `_walk` up to it at least."""
-    axes, origin = frames[point.after]
-    for axis, length in zip(axes, point.offset_m, strict=True):
-        if length:
-            origin = origin + length * axis
-    return axes, origin
-
-
 def _turn(axes: list[np.ndarray], about: int, angle: float | np.ndarray) -> list[np.ndarray]:
     """Axes of a frame after it has turned about one of them."""
     cosine, sine = (math.cos(angle), math.sin(angle)) if isinstance(angle, float) else _cosine_and_sine(angle)
@@ -96,14 +87,10 @@ def poses(chain: Chain, coordinates: np.ndarray, point: MeasuringPoint) -> tuple
 
 def poses_of_points(chain: Chain, coordinates: np.ndarray, points: Sequence[MeasuringPoint]) -> tuple[np.ndarray, np.ndarray]:
     """Poses of several measuring points in one walk along the chain: `position` (T, ..., 3), `rotation` (T, ..., 3, 3)."""
-    components, batch = _component_first(coordinates)
-    size = components.shape[1]
-    position, rotation = np.empty((len(points), 3, size)), np.empty((len(points), 3, 3, size))
-    for part in _blocks(size):
-        frames = _walk(chain, components[:, part], max(point.after for point in points))
-        for number, point in enumerate(points):
-            _store_pose(_place_point(frames, point), position[number, :, part], rotation[number, :, :, part])
-    return _batch_first(position, batch, 1), _batch_first(rotation, batch, 1)
+    position, rotation = _room(coordinates, (len(points), 3), (len(points), 3, 3))
+    for part, frames in _blocks(chain, coordinates, max(point.after for point in points)):
+        _store_poses(frames, points, position[..., part], rotation[..., part])
+    return _batch_first(position, coordinates, 1), _batch_first(rotation, coordinates, 1)
 
 
 def corners(chain: Chain, coordinates: np.ndarray) -> np.ndarray:
@@ -135,25 +122,20 @@ def poses_and_jacobians(
     [1] Siciliano, B., Sciavicco, L., Villani, L. and Oriolo, G., Robotics: Modelling, Planning and Control, Springer, 2009.
     [2] Murray, R. M., Li, Z. and Sastry, S. S., A Mathematical Introduction to Robotic Manipulation, CRC Press, 1994.
     """
-    components, batch = _component_first(coordinates)
-    size = components.shape[1]
-    position, rotation, jacobian = (np.empty((*shape, size)) for shape in ((3,), (3, 3), (6, chain.coordinates)))
-    for part in _blocks(size):
-        frames = _walk(chain, components[:, part], point.after)
-        placed = _place_point(frames, point)
-        _store_pose(placed, position[:, part], rotation[:, :, part])
-        _store_twists(chain, frames, point, placed[1], jacobian[:, :, part])
-    return _batch_first(position, batch), _batch_first(rotation, batch), _batch_first(jacobian, batch)
+    position, rotation, jacobian = _room(coordinates, (1, 3), (1, 3, 3), (6, chain.coordinates))
+    for part, frames in _blocks(chain, coordinates, point.after):
+        _store_poses(frames, [point], position[..., part], rotation[..., part])
+        for number, transform in enumerate(chain.transforms[: point.after]):
+            if transform.coordinate is not None:
+                target = None if _passes(chain.transforms[number : point.after], point) else position[0, :, part]
+                _store_twist(transform, frames[number], target, jacobian[:, transform.coordinate, part])
+    pose = _batch_first(position[0], coordinates), _batch_first(rotation[0], coordinates)
+    return *pose, _batch_first(jacobian, coordinates)
 
 
 def jacobians(chain: Chain, coordinates: np.ndarray, point: MeasuringPoint) -> np.ndarray:
     """Geometric Jacobian of a measuring point, (..., 6, n), as by `poses_and_jacobians`, where its pose is not needed."""
-    components, batch = _component_first(coordinates)
-    jacobian = np.empty((6, chain.coordinates, components.shape[1]))
-    for part in _blocks(components.shape[1]):
-        frames = _walk(chain, components[:, part], point.after)
-        _store_twists(chain, frames, point, _place_point(frames, point)[1], jacobian[:, :, part])
-    return _batch_first(jacobian, batch)
+    return poses_and_jacobians(chain, coordinates, point)[2]
 
 
 def position_jacobians(
@@ -191,20 +173,17 @@ class Motion:
         cross(angular, position, moved[:3])
         moved[:3] += twist[:3]
         moved[3:] = angular[: rows - 3]
-        return self._behind_none(moved, after)
+        moved[:, self.place >= after] = 0.0
+        return moved
 
-    def generalized_forces(self, after: int, force: np.ndarray, moment: np.ndarray) -> np.ndarray:
-        """Force or torque on each coordinate (C, S) by a wrench on what lies behind so many transforms of the chain.
+    def generalized_forces(self, after: int, wrench: np.ndarray, coordinates: slice = slice(None)) -> np.ndarray:
+        """Force or torque on each of the coordinates (., S) by a wrench on what lies behind so many transforms of the chain.
 
-        `force`, `moment` (3, S): the moment about the base's origin.
+        `wrench` (6, S): force, and moment about the base's origin.
         """
-        on_each = np.einsum("ik...,i...->k...", self.twist, np.concatenate([force, moment]))
-        return self._behind_none(on_each, after)
-
-    def _behind_none(self, values: np.ndarray, after: int) -> np.ndarray:
-        """Values (..., C, S) without coordinates behind a place of the chain."""
-        values[..., self.place >= after, :] = 0.0
-        return values
+        on_each = np.einsum("iks,is->ks", self.twist[:, coordinates], wrench)
+        on_each[self.place[coordinates] >= after] = 0.0
+        return on_each
 
 
 def motion(chain: Chain, coordinates: np.ndarray, points: Sequence[MeasuringPoint]) -> Motion:
@@ -212,15 +191,10 @@ def motion(chain: Chain, coordinates: np.ndarray, points: Sequence[MeasuringPoin
 
     `coordinates` (S, C): rad and m.
     """
-    components, _ = _component_first(coordinates)
-    size = components.shape[1]
     moving = sorted((t.coordinate, place) for place, t in enumerate(chain.transforms) if t.coordinate is not None)
-    shapes = (len(points), 3), (len(points), 3, 3), (6, len(moving))
-    position, rotation, twist = (np.empty((*shape, size)) for shape in shapes)
-    for part in _blocks(size):
-        frames = _walk(chain, components[:, part], len(chain.transforms))
-        for number, point in enumerate(points):
-            _store_pose(_place_point(frames, point), position[number, :, part], rotation[number, :, :, part])
+    position, rotation, twist = _room(coordinates, (len(points), 3), (len(points), 3, 3), (6, len(moving)))
+    for part, frames in _blocks(chain, coordinates, len(chain.transforms)):
+        _store_poses(frames, points, position[..., part], rotation[..., part])
         for coordinate, place in moving:
             _store_twist(chain.transforms[place], frames[place], _BASE, twist[:, coordinate, part])
     return Motion(position, rotation, twist, np.array([place for _, place in moving], int))
@@ -255,43 +229,36 @@ def rotation_vectors(rotation: np.ndarray) -> np.ndarray:
     return np.moveaxis(skew * scale, 0, -1)
 
 
-def _blocks(size: int) -> list[slice]:
-    """Cut so many configurations into blocks of `BLOCK`."""
-    return [slice(start, min(start + BLOCK, size)) for start in range(0, size, BLOCK)]
+def _blocks(chain: Chain, coordinates: np.ndarray, until: int) -> Iterator[tuple[slice, list[Frame]]]:
+    """Frames of `_walk` for coordinates (..., C), a block of configurations after the other."""
+    components = np.moveaxis(np.asarray(coordinates, float), -1, 0).reshape(np.shape(coordinates)[-1], -1)
+    for start in range(0, components.shape[1], BLOCK):
+        part = slice(start, start + BLOCK)
+        yield part, _walk(chain, components[:, part], until)
 
 
-def _component_first(coordinates: np.ndarray) -> tuple[np.ndarray, tuple[int, ...]]:
-    coordinates = np.asarray(coordinates, float)
-    batch = coordinates.shape[:-1]
-    return np.moveaxis(coordinates, -1, 0).reshape(coordinates.shape[-1], -1), batch
+def _room(coordinates: np.ndarray, *shapes: tuple[int, ...]) -> list[np.ndarray]:
+    """Arrays of such shapes for each of the configurations (..., C), component first; zero, as what does not move stays."""
+    return [np.zeros((*shape, math.prod(np.shape(coordinates)[:-1]))) for shape in shapes]
 
 
-def _batch_first(components: np.ndarray, batch: tuple[int, ...], before: int = 0) -> np.ndarray:
+def _batch_first(components: np.ndarray, coordinates: np.ndarray, before: int = 0) -> np.ndarray:
     """Memory that is component first as it is handed out; `before`: axes that stay in front, such as one of points."""
     shape = components.shape[:-1]
-    components = components.reshape(*shape, *batch)
+    components = components.reshape(*shape, *np.shape(coordinates)[:-1])
     return np.moveaxis(components, range(before, len(shape)), range(before - len(shape), 0))
 
 
-def _store_pose(frame: Frame, position: np.ndarray, rotation: np.ndarray) -> None:
-    """Write a frame to arrays: `position` (3, S), and `rotation` (3, 3, S), whose columns are the axes."""
-    axes, position[:] = frame
-    for column, axis in enumerate(axes):
-        rotation[:, column] = axis
-
-
-def _store_twists(
-    chain: Chain, frames: Sequence[Frame], point: MeasuringPoint, target: np.ndarray, jacobian: np.ndarray
-) -> None:
-    """Columns of the Jacobian of a point, which is at `target`."""
-    behind, transforms = set(range(jacobian.shape[1])), chain.transforms[: point.after]
-    for number, (transform, frame) in enumerate(zip(transforms, frames, strict=False)):
-        if transform.coordinate is not None:
-            passed = _passes(transforms[number:], point)
-            _store_twist(transform, frame, None if passed else target, jacobian[:, transform.coordinate])
-            behind.discard(transform.coordinate)
-    for coordinate in behind:
-        jacobian[:, coordinate] = 0.0
+def _store_poses(frames: Sequence[Frame], points: Sequence[MeasuringPoint], position: np.ndarray, rotation: np.ndarray) -> None:
+    """Write the frames of measuring points to arrays: (T, 3, S), and (T, 3, 3, S), whose columns are the axes."""
+    for number, point in enumerate(points):
+        axes, origin = frames[point.after]
+        for axis, length in zip(axes, point.offset_m, strict=True):
+            if length:
+                origin = origin + length * axis
+        position[number] = origin
+        for column, axis in enumerate(axes):
+            rotation[number, :, column] = axis
 
 
 def _passes(transforms: Sequence[Transform], point: MeasuringPoint) -> bool:

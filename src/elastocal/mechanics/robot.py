@@ -116,11 +116,6 @@ class Robot:
         return np.linalg.solve(self.reported_matrix, (angles - self.reported_offset).T).T
 
 
-def with_rigid_joints(robot: Robot) -> Robot:
-    """A robot whose joints do not yield, without masses, which turn nothing: what is left without known compliances."""
-    return replace(robot, compliance=np.zeros(robot.joints), masses=(), compliance_known=False)
-
-
 def with_target_offset(robot: Robot, offset_m: Sequence[float]) -> Robot:
     """A robot with the same target offset on every measuring point (T_tool, interpretation R5)."""
     points = tuple(replace(point, offset_m=tuple(offset_m)) for point in robot.chain.points)

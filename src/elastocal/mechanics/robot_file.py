@@ -143,8 +143,8 @@ def _masses(described: Sequence[dict[str, Any]], joints: int, source: str) -> tu
         if entry["link"] > joints:
             allowed = f"0 for the column, or a joint up to {joints}"
             raise InputError(source, f"masses[{index}].link", str(entry["link"]), allowed)
-    masses = [Mass(**entry | {"centre_m": tuple(map(float, entry["centre_m"]))}) for entry in described]
-    masses.sort(key=attrgetter("link"))
+    found = (Mass(**entry | {"centre_m": tuple(map(float, entry["centre_m"]))}) for entry in described)
+    masses = sorted(found, key=attrgetter("link"))
     twice = next((one.link for one, other in pairwise(masses) if one.link == other.link), None)
     if twice is not None:
         raise InputError(source, "masses", f"link {twice} twice", "each link once, with all that it carries")

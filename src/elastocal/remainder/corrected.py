@@ -169,8 +169,8 @@ def inputs_of(model: Model, estimate: Estimate, observations: Observations) -> I
     if not found:
         return inputs
     sizes = np.array([parameter.plausible for effect, _ in found for parameter in effect.parameters])
-    around = conditions(model, estimate, observations.states)
-    columns = effect_columns(found, around, inputs.jacobian, observations.state)
+    around, laws = conditions(model, estimate, observations.states), [(effect.displacement, shapes) for effect, shapes in found]
+    columns = effect_columns(laws, around, inputs.jacobian, observations.state)
     return replace(inputs, jacobian=np.concatenate([inputs.jacobian, columns * sizes / _RAD_OF_A_SIZE], axis=2))
 
 
