@@ -90,7 +90,6 @@ def test_each_setting_makes_a_campaign_that_can_be_read(tmp_path, setting):
     assert truth["case"]["setting"] == setting and truth["case"]["changes"] == SETTINGS[setting] and not truth["defects"]
     for covariate, column in (("approach", "approach"), ("time", "time_s"), ("temperature", "temperature_c")):
         assert (getattr(campaign.measurements, column) is not None) == (covariate in case.design.covariates)
-    assert bool(truth["outliers"]) == setting.startswith("outliers")
     if setting.startswith("declared"):
         assert campaign.noise["position_m"] == pytest.approx(SETTINGS[setting]["declared_ratio"] * 60e-6)
         assert campaign.measurements.repeat.max() == 0

@@ -18,8 +18,7 @@ import numpy as np
 
 from elastocal_proof.blind.folders import write_blind_campaign, write_truth
 from elastocal_proof.plant.arm import Arm, LinkMass, arm_from_file
-from elastocal_proof.plant.bad_rows import possible_kinds, with_bad_rows
-from elastocal_proof.plant.campaigns import Design, schedule_of
+from elastocal_proof.plant.campaigns import Design, Slip, Table, possible_kinds, schedule_of, with_bad_rows
 from elastocal_proof.plant.kinds import KINDS, OUTSIDE, Defect, drawn_defect, truth_of, with_defects
 from elastocal_proof.plant.machine import on_stretches, usual_gravity_torque
 from elastocal_proof.plant.physical_robot import PhysicalRobot, Tracker, misplaced_base, specimen, stream
@@ -27,9 +26,6 @@ from elastocal_proof.plant.sizing import Yardstick, size_for
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
-
-    from elastocal_proof.plant.bad_rows import Slip
-    from elastocal_proof.plant.campaigns import Table
 
     Plan = Mapping[str, Any]
     Sized = tuple[Defect, dict[str, Any]]
@@ -230,10 +226,8 @@ def _drawn(case: Case, robot: PhysicalRobot, effect: str, seed: int) -> list[Def
 
 def yardstick_of(case: Case, robot: PhysicalRobot) -> Yardstick:
     """To which the defective robots of a case are compared; `robot`: faultless."""
-    arm, design = robot.arm, case.design
-    targets = [arm.points.index(point) for point in design.targets_on(arm)]
-    free, done = design.frame == "tracker", schedule_of(arm, design, case.seed)
-    return Yardstick(robot, done, targets, free_frame=free, declared=case.declared(arm))
+    free, done = case.design.frame == "tracker", schedule_of(robot.arm, case.design, case.seed)
+    return Yardstick(robot, done, free_frame=free, declared=case.declared(robot.arm))
 
 
 def _first_plausible(
@@ -263,7 +257,7 @@ def _stated(
     """Defects with their sizes as in the ground truth, each with its own signal."""
     found: list[Sized] = []
     for defect in defects:
-        signal, share = asdict(yardstick.signal(with_defects(robot, [defect]))), _share_of_plausible(robot, defect)
+        signal, share = yardstick.signal(with_defects(robot, [defect])), _share_of_plausible(robot, defect)
         sizing = {"non_centrality": level, "of": quantity, "draw": draw, "signal": signal, "share_of_plausible": share}
         found.append((defect, sizing))
     return found

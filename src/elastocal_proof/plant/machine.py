@@ -13,21 +13,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.constants import g as standard_gravity
 from scipy.spatial.transform import Rotation
 
 from elastocal.errors import InputError
 from elastocal_proof.plant.arm import Arm, LinkMass, Stretch, turned
 
-# Start of the names of some structural springs, and what they deflect by, beyond their compliance, under a force (S,).
-StructureLaw = tuple[str, Callable[[np.ndarray], np.ndarray]]
 # MuJoCo wants mass in each moving body; this weighs nothing beside a load of newtons.
 _NOTHING = {"ipos": (0.0, 0.0, 0.0), "mass": 1e-12, "inertia": [1e-12] * 3, "explicitinertial": True}
 _SWEEPS, _POSES = 60, 64
+# Share of the largest torque below which a weight does not turn a joint.
+_NO_TORQUE, _SHORTEST_LINK_M = 0.003, 0.1
+# Of an elastic link.
+SEGMENTS = 6
 # Of the largest deflection: a hundredth of a picometre of millimetres.
 _TOLERANCE = 1e-11
 _NOWHERE = (0.0, 0.0, 0.0)
@@ -79,24 +81,20 @@ class Structure:
     """Everything of an arm that its robot file does not declare. The default is an arm of drives alone.
 
     `base`: compliances of the foot along x, y, z (m/N) and about x, y, z (rad/(N m)). `flange`: the same between the last
-    stretch and the flange, in the flange's frame. `tilt`: of a joint, from 1: compliances across its axis, rad/(N m), in the
-    order of the remaining axes. `loose`: joints, from 1, whose bearings let the arm shift across the axis as a law says.
-    `tubes`: elastic stretches, each cut into so many `segments`. `payload`: ``aside_m`` counts from the flange, in its frame.
-    `wrong_vectors_m`, `wrong_turns`: by how much a stretch's vector and its far end's rotation vector (rad) differ from the
-    robot file. `gravity_m_s2`: in the axes of the base.
+    stretch and the flange, in the flange's frame. `bearings`: of a joint, from 1: compliances of its tilts across its axis,
+    rad/(N m), in the order of the remaining axes, along which only a law lets it shift. `tubes`: elastic stretches. `payload`:
+    ``aside_m`` counts from the flange, in its frame. `wrong`: by how much a stretch's vector (m) and its far end's rotation
+    vector (rad) differ from the robot file. `gravity_m_s2`: in the axes of the base.
     """
 
     base: tuple[float, ...] = ()
     flange: tuple[float, ...] = ()
-    tilt: dict[int, tuple[float, float]] = field(default_factory=dict)
-    loose: tuple[int, ...] = ()
+    bearings: dict[int, tuple[float, ...]] = field(default_factory=dict)
     tubes: dict[int, TaperedTube] = field(default_factory=dict)
-    segments: int = 6
     masses: tuple[Mass, ...] = ()
     payload: Mass | None = None
     compensator: Compensator | None = None
-    wrong_vectors_m: dict[int, tuple[float, ...]] = field(default_factory=dict)
-    wrong_turns: dict[int, tuple[float, ...]] = field(default_factory=dict)
+    wrong: dict[int, tuple[ArrayLike, ArrayLike]] = field(default_factory=dict)
     gravity_m_s2: tuple[float, ...] = (0.0, 0.0, -standard_gravity)
 
 
@@ -105,7 +103,7 @@ class Machine:
     """A compiled model and where in it what is.
 
     `drive`, `gear` (n,) of int: coordinates that are commanded, and those that spring behind them. `springs`: structural
-    coordinates by name, such as ``base_x``, ``tilt2_0``, ``link3_4_bend0``. `compliance` (coordinates,): of structural springs,
+    coordinates by name, such as ``base_x``, ``tilt2_0``, ``link3_bend0_4``. `compliance` (coordinates,): of structural springs,
     m/N or rad/(N m); zero elsewhere. `sites` (points,) of int: measuring points, the flange last. `body_stretch`,
     `site_stretch` (bodies,), (all sites,) of int: of whose vector the place of each body and site is a part.
     """
@@ -198,8 +196,8 @@ class _Tree:
 
     def walk(self, number: int, stretch: Stretch, structure: Structure, elsewhere: str) -> None:
         """From the near to the far end of a stretch; one measuring point may be put elsewhere."""
-        vector = stretch.vector_m + np.array(structure.wrong_vectors_m.get(number, _NOWHERE))
-        turn, tube = turned(structure.wrong_turns.get(number, _NOWHERE)), structure.tubes.get(number)
+        shift, turn = structure.wrong.get(number, (_NOWHERE, _NOWHERE))
+        vector, turn, tube = stretch.vector_m + np.array(shift), turned(turn), structure.tubes.get(number)
         masses = [mass for mass in structure.masses if mass.stretch == number]
         start, facing = self.position, self.rotation
         if tube is None:
@@ -207,38 +205,38 @@ class _Tree:
                 self.weigh(mass.mass_kg, start + facing @ (mass.along * vector + np.array(mass.aside_m)))
             self.position = start + facing @ vector
         else:
-            self.bend(f"link{number}_", vector, tube, structure.segments, masses)
+            self.bend(f"link{number}_", vector, tube, masses)
             facing = np.eye(3)
-        for point in stretch.points:
+        for name, (place, turns) in stretch.points.items():
             # What is wrong about a stretch is wrong at its far end.
-            if np.allclose(point.position_m, stretch.vector_m, atol=1e-12):
-                where, turns = self.position, facing @ point.rotation @ turn
+            if np.allclose(place, stretch.vector_m, atol=1e-12):
+                where, turns = self.position, facing @ turns @ turn
             elif tube is None:
-                where, turns = start + facing @ point.position_m, facing @ point.rotation
+                where, turns = start + facing @ place, facing @ turns
             else:
-                raise InputError("structure", f"tubes[{number}]", f"[{point.name}] inside it", "points at the end of a link")
-            if point.name != elsewhere:
-                self.mark(point.name, where, turns)
+                raise InputError("structure", f"tubes[{number}]", f"[{name}] inside it", "points at the end of a link")
+            if name != elsewhere:
+                self.mark(name, where, turns)
         self.rotation = facing @ stretch.rotation @ turn
 
-    def bend(self, name: str, vector: np.ndarray, tube: TaperedTube, count: int, masses: Iterable[Mass]) -> None:
+    def bend(self, name: str, vector: np.ndarray, tube: TaperedTube, masses: Iterable[Mass]) -> None:
         """Rigid pieces with springs at the middle of each: the midpoint rule for the integral of M / EI along the link."""
         along = vector / np.linalg.norm(vector)
         first = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
         first /= np.linalg.norm(first)
         across = (first, np.cross(along, first))
-        piece, step = float(np.linalg.norm(vector)) / count, vector / count
+        count, piece, step = SEGMENTS, float(np.linalg.norm(vector)) / SEGMENTS, vector / SEGMENTS
         self.position = self.position + self.rotation @ (0.5 * step)
         for segment in range(count):
-            start, width = f"{name}{segment}_", 1.0 - tube.taper * (segment + 0.5) / count
+            width = 1.0 - tube.taper * (segment + 0.5) / count
             self.descend(f"{name}{segment}")
             for which, axis in enumerate(across if np.isfinite(tube.shear_N) else ()):
-                self.joint(f"{start}shear{which}", axis, piece / (tube.shear_N * width), slides=True)
+                self.joint(f"{name}shear{which}_{segment}", axis, piece / (tube.shear_N * width), slides=True)
             if np.isfinite(tube.axial_N):
-                self.joint(f"{start}axial", along, piece / (tube.axial_N * width), slides=True)
+                self.joint(f"{name}axial_{segment}", along, piece / (tube.axial_N * width), slides=True)
             for which, axis in enumerate(across):
-                self.joint(f"{start}bend{which}", axis, piece / (tube.bending_Nm2 * width**3))
-            self.joint(f"{start}twist", along, piece / (tube.torsion_Nm2 * width**3))
+                self.joint(f"{name}bend{which}_{segment}", axis, piece / (tube.bending_Nm2 * width**3))
+            self.joint(f"{name}twist_{segment}", along, piece / (tube.torsion_Nm2 * width**3))
             for mass in masses:
                 # On the segment that holds its place; the body's origin is the middle of the segment.
                 if min(int(mass.along * count), count - 1) == segment:
@@ -260,9 +258,10 @@ def machine_of(arm: Arm, structure: Structure) -> Machine:
             tree.joint(f"drive{number + 1}", axis)
             tree.joint(f"gear{number + 1}", axis)
             across = [e for e in np.eye(3) if abs(e @ axis) < 0.5]
-            for which in range(2 if number + 1 in structure.loose else 0):
+            tilts = structure.bearings.get(number + 1, ())
+            for which in range(len(tilts)):
                 tree.joint(f"shift{number + 1}_{which}", across[which], 0.0, slides=True)
-            for which, compliance in enumerate(structure.tilt.get(number + 1, ())):
+            for which, compliance in enumerate(tilts):
                 tree.joint(f"tilt{number + 1}_{which}", across[which], compliance)
     if structure.flange:
         tree.descend("flange")
@@ -290,34 +289,25 @@ def machine_of(arm: Arm, structure: Structure) -> Machine:
     return Machine(model, drive, gear, springs, yields, sites, within - behind_drive, within[model.site_bodyid])
 
 
-class Equilibrium(NamedTuple):
-    """Where an arm came to rest, in S states.
-
-    `coordinates` (S, coordinates): rad, m. `force` (S, coordinates): generalized force that each coordinate's spring transmits,
-    N m, N. `position`, `rotation` (S, points, 3), (S, points, 3, 3): of the measuring points, base frame, m.
-    """
-
-    coordinates: np.ndarray
-    force: np.ndarray
-    position: np.ndarray
-    rotation: np.ndarray
-
-
 def equilibrium(
     machine: Machine,
     drive: np.ndarray,
     wrench: np.ndarray,
     growth: np.ndarray,
     gear_deflection: Callable[[np.ndarray, np.ndarray], np.ndarray],
-    laws: Iterable[StructureLaw] = (),
+    laws: Iterable[tuple[str, Callable[[np.ndarray], np.ndarray]]] = (),
     start: np.ndarray | None = None,
-) -> Equilibrium:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Where the arm comes to rest in S states, by fixed-point iteration.
+
+    Returns coordinates (S, coordinates), rad, m; generalized forces that their springs transmit, the same, N m, N; positions
+    (S, points, 3), m, and rotations (S, points, 3, 3) of the measuring points, base frame.
 
     `drive` (S, n): angles at which the drives really stand, rad. `wrench` (S, 6): that the flange really feels, at its
     deflected origin, base axes; N, N m. `growth` (S, n + 1): relative growth of all lengths of each stretch. `gear_deflection`:
-    of the torques on the gears now and before the wrench came on, (S, n), N m: their deflections (S, n), rad. `start` (S, n):
-    deflections of the gears to begin with, such as those of a robot that differs little.
+    of the torques on the gears now and before the wrench came on, (S, n), N m: their deflections (S, n), rad. `laws`: starts of
+    the names of structural springs, and what they yield beyond their compliance under a force (S,). `start` (S, n): deflections
+    of the gears to begin with, such as those of a robot that differs little.
 
     The forces depend on the deflections only through the geometry, by the share (force times arm) / stiffness, a thousandth or
     so, so that each sweep gains about three digits. With linear springs it is the modified Newton method with their stiffness
@@ -341,7 +331,7 @@ def equilibrium(
         change[:, machine.drive] = size[:, machine.drive] = 0.0
         # The poses are those of `coordinates`; once the next would be the same they need no further sweep.
         if change.max(initial=0.0) <= _TOLERANCE * max(size.max(initial=0.0), 1e-9):
-            return Equilibrium(coordinates, force, position, rotation)
+            return coordinates, force, position, rotation
         coordinates = following
     raise RuntimeError(f"no equilibrium after {_SWEEPS} sweeps: the last moved by {change.max():.3g}")
 
@@ -365,3 +355,25 @@ def usual_gravity_torque(arm: Arm, masses: Iterable[Mass], gravity_m_s2: tuple[f
     coordinates[:, machine.drive] = low + (high - low) * np.random.default_rng(0).random((_POSES, arm.joints))
     torque = machine.forces(coordinates, np.zeros((_POSES, arm.joints + 1)))[0][:, machine.gear]
     return np.sqrt((torque**2).mean(axis=0))
+
+
+def turned_by(arm: Arm, masses: Iterable[Mass]) -> tuple[int, ...]:
+    """Joints, from 1, that weights turn where the arm stands upright."""
+    torque = usual_gravity_torque(arm, masses, (0.0, 0.0, -standard_gravity))
+    return tuple(int(joint) + 1 for joint in np.flatnonzero(torque > _NO_TORQUE * torque.max()))
+
+
+def long_links(arm: Arm) -> list[int]:
+    """Links that are long enough to bend."""
+    return [link for link in range(1, arm.joints + 1) if arm.lengths_m[link] > _SHORTEST_LINK_M]
+
+
+def weighing_links(arm: Arm) -> dict[tuple[int, ...], int]:
+    """The upper arm and the forearm by the joints that their weight turns."""
+    found: dict[tuple[int, ...], int] = {}
+    for link in long_links(arm):
+        turned = turned_by(arm, [Mass(link, 1.0)])
+        # Of links that turn the same joints the first counts, and of all links two: the hand's weight is like a tool's.
+        if turned and turned[-1] == link and len(found) < 2:
+            found[turned] = link
+    return found

@@ -9,8 +9,8 @@ from functools import partial
 
 import numpy as np
 
-from elastocal_proof.plant.arm import Arm, off_the_line, true_masses, turned
-from elastocal_proof.plant.machine import Equilibrium, Machine, Structure, equilibrium, machine_of, on_stretches
+from elastocal_proof.plant.arm import Arm, true_masses, turned
+from elastocal_proof.plant.machine import Machine, Structure, equilibrium, machine_of, on_stretches
 
 _REFERENCE_C = 20.0
 # A thermometer on a motor shows a rise by RISE (1 - exp(-t / MOTOR)); the castings follow it by a first-order lag.
@@ -97,18 +97,14 @@ class Tracker:
                 rotation = turn[:, None] @ rotation
         return position, rotation
 
-    def read(
-        self, position: np.ndarray, rotation: np.ndarray, draws: np.random.Generator
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Poses as seen with noise and outliers, and (S, targets) of bool which are outliers."""
+    def read(self, position: np.ndarray, rotation: np.ndarray, draws: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+        """Poses as seen, with noise and outliers."""
         # A generator each, so that measurements that come later change none that are there.
         chance, metres, radians = draws.spawn(3)
         sigma = self.sigma_at(position)[..., None]
-        outlier = chance.random(position.shape[:2]) < self.outliers
-        large = np.where(outlier, self.outlier_sigmas, 1.0)[..., None]
+        large = np.where(chance.random(position.shape[:2]) < self.outliers, self.outlier_sigmas, 1.0)[..., None]
         position = position + large * sigma * metres.standard_normal(position.shape)
-        turn = turned(large * self.sigma_rad * radians.standard_normal(position.shape))
-        return position, turn @ rotation, outlier
+        return position, turned(large * self.sigma_rad * radians.standard_normal(position.shape)) @ rotation
 
     def sigma_at(self, position: np.ndarray) -> np.ndarray:
         """Standard deviation (...) of a coordinate at positions (..., 3), m."""
@@ -125,7 +121,7 @@ class LoadCell:
     """A cell between the pull and the flange, and where it pulls. The default is perfect.
 
     The experimenter pulls until the display shows what the plan says; a cell that errs makes the flange feel something else. So
-    the campaign holds what was shown, and the arm deflects by what was felt. `scale`: shown = (1 + scale) felt. `turn_rad`:
+    the campaign holds what was shown, and the arm deflects by what was felt. `scale`: felt = (1 + scale) shown. `turn_rad`:
     rotation vector by which the cell is mounted askew: it shows R(turn)^T felt. `bias_N`: shown without a force. `shift_m`:
     where the force really acts, from where the plan says. `crosstalk_per_N`: quadratic: shown x gets k F_y F_z, and so on round
     the axes. `in_flange`: which of "turn", "bias" and "shift" are fixed in the flange's axes rather than in the base's.
@@ -146,7 +142,7 @@ class LoadCell:
         turn, bias = (self._in_base(name, flange_rotation) for name in ("turn", "bias"))
         askew = np.einsum("sji,sj->si", turned(turn), felt)
         crossed = self.crosstalk_per_N * np.roll(felt, -1, axis=1) * np.roll(felt, -2, axis=1)
-        return (1.0 + self.scale) * askew + bias + crossed
+        return askew / (1.0 + self.scale) + bias + crossed
 
     def felt(self, force: np.ndarray, lever: np.ndarray, flange_rotation: np.ndarray) -> np.ndarray:
         """Wrench on the flange (S, 6), which solves shown = cell(felt) by fixed-point iteration: what lacks is pulled more.
@@ -224,9 +220,9 @@ class PhysicalRobot:
     """All that is true of a robot and its instruments; the default is faultless.
 
     `compliance` (n,): the gears' own, rad/(N m). `drives`, `gears`: laws, each of a joint from 0; `springs`: of structural
-    springs, by the start of their names. `gradient_per_K` (float, float): further expansion of the column and of the flange; in
-    between it changes evenly from stretch to stretch. No defects, as every arm has them: `repeatability_rad` (n,): each
-    approach ends a little elsewhere; `pose_rad` (n,): an error of the angles common to all measurements of a pose.
+    springs, by the start of their names. `expansion_per_K`: of the column and of the flange; in between it changes evenly from
+    stretch to stretch. No defects, as every arm has them: `repeatability_rad` (n,): each approach ends a little elsewhere;
+    `pose_rad` (n,): an error of the angles common to all measurements of a pose.
     """
 
     arm: Arm
@@ -235,8 +231,7 @@ class PhysicalRobot:
     gears: tuple[tuple[int, GearLaw], ...] = ()
     drives: tuple[tuple[int, DriveLaw], ...] = ()
     springs: tuple[tuple[str, SpringLaw], ...] = ()
-    expansion_per_K: float = 0.0
-    gradient_per_K: tuple[float, float] = (0.0, 0.0)
+    expansion_per_K: tuple[float, float] = (0.0, 0.0)
     cell: LoadCell = field(default_factory=LoadCell)
     tracker: Tracker = field(default_factory=Tracker)
     repeatability_rad: tuple[float, ...] = ()
@@ -249,9 +244,8 @@ def specimen(arm: Arm, seed: int, weighs: bool = True, off_line_m: float = 0.0) 
     `off_line_m`: by how much centres of mass lie off the lines of their links at most, across each, beyond what is declared.
     """
     compliance = arm.compliance * stream(seed, "specimen").uniform(1.0 - _SPREAD, 1.0 + _SPREAD, arm.joints)
-    masses = true_masses(arm.masses, stream(seed, "weights")) if weighs else ()
-    if off_line_m:
-        masses = off_the_line(masses, arm, off_line_m, stream(seed, "centres off the line"))
+    draws = stream(seed, "weights"), stream(seed, "centres off the line")
+    masses = true_masses(arm, draws[0], off_line_m, draws[1]) if weighs else []
     return PhysicalRobot(arm, compliance, Structure(masses=on_stretches(masses, arm), gravity_m_s2=arm.gravity_m_s2))
 
 
@@ -260,22 +254,21 @@ def seen_poses(robot: PhysicalRobot, schedule: Schedule, start: np.ndarray | Non
 
     `start` (S, n): deflections of the gears of a robot that differs little; saves time.
     """
-    rest = at_rest(robot, schedule, start)[1]
-    return robot.tracker.seen(rest.position, rest.rotation, schedule.time_s, schedule.angle[:, -1])
+    _, _, position, rotation = at_rest(robot, schedule, start)[1]
+    return robot.tracker.seen(position, rotation, schedule.time_s, schedule.angle[:, -1])
 
 
-def read_poses(
-    robot: PhysicalRobot, schedule: Schedule, start: np.ndarray | None = None
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Poses of all targets with the noise of the robot's tracker, the same whenever they are asked for; as `Tracker.read`."""
+def read_poses(robot: PhysicalRobot, schedule: Schedule, start: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """The same with the noise of the robot's tracker, alike whenever they are asked for."""
     return robot.tracker.read(*seen_poses(robot, schedule, start), stream(schedule.seed, "readings"))
 
 
-def at_rest(robot: PhysicalRobot, schedule: Schedule, start: np.ndarray | None = None) -> tuple[Machine, Equilibrium]:
-    """The arm in equilibrium; arguments as of `seen_poses`."""
+def at_rest(
+    robot: PhysicalRobot, schedule: Schedule, start: np.ndarray | None = None
+) -> tuple[Machine, tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
+    """The arm, and its equilibrium as of `machine.equilibrium`; arguments as of `seen_poses`."""
     machine, drive = machine_of(robot.arm, robot.structure), driven(robot, schedule)
-    per_kelvin = robot.expansion_per_K + np.linspace(*robot.gradient_per_K, robot.arm.joints + 1)
-    growth = warmth_of_castings(schedule.time_s)[:, None] * per_kelvin
+    growth = warmth_of_castings(schedule.time_s)[:, None] * np.linspace(*robot.expansion_per_K, robot.arm.joints + 1)
     facing = np.broadcast_to(np.eye(3), (len(drive), 3, 3))
     if robot.cell.in_flange:
         coordinates = np.zeros((len(drive), machine.model.nq))
