@@ -12,9 +12,8 @@ from support import OTHER_CHAINS, robot_of
 from elastocal.errors import InputError
 from elastocal.mechanics.elastostatics import generalized_forces as joint_torques
 from elastocal.mechanics.kinematics import pose_differences, poses_and_jacobians
+from elastocal_proof.plant.arm import LinkMass
 from elastocal_proof.plant.machine import (
-    Compensator,
-    Mass,
     Structure,
     TaperedTube,
     equilibrium,
@@ -31,9 +30,9 @@ def everything(arm):
         flange=(1e-8, 2e-8, 1e-8, 2e-7, 1e-7, 3e-7),
         bearings={1: (1e-7, 1e-7), arm.joints - 1: (2e-7, 2e-7)},
         tubes={k: TaperedTube(2e7, 1.5e7, 2e9, 4e8, 0.2) for k in (2, 3) if k < arm.joints},
-        masses=(Mass(2, 300.0), Mass(min(3, arm.joints), 200.0, 0.4, (0.0, 0.0, 0.1))),
-        payload=Mass(arm.joints, 100.0, 1.0, (0.1, 0.0, 0.1)),
-        compensator=Compensator((-0.3, 0.0, -0.25), (0.2, 0.0, 0.05), 1.5e5, 0.3),
+        masses=(LinkMass(2, 300.0, (0.1, 0.0, 0.4)), LinkMass(min(3, arm.joints), 200.0, (0.2, 0.0, 0.1), along=0.4)),
+        payload=LinkMass(arm.joints, 100.0, (0.1, 0.0, 0.1)),
+        compensator=((-0.3, 0.0, -0.25), (0.2, 0.0, 0.05), 1.5e5, 0.3),
     )
 
 
@@ -54,13 +53,13 @@ def test_chains_of_three_to_seven_joints_that_turn_backwards_are_read_and_bend_a
 
 
 def test_weight_turns_the_joints_as_pinocchio_says(arm):
-    masses = (
-        Mass(1, 300.0, 0.4),
-        Mass(2, 250.0, 0.3, (0.05, 0.02, -0.04)),
-        Mass(2, 90.0, 0.9),
-        Mass(3, 150.0, 0.6, (0.0, 0.0, 0.1)),
-    )
-    load = Mass(arm.joints, 120.0, 1.0, (0.1, -0.05, 0.15))
+    places = [
+        (1, 300.0, (0.1, 0.0, 0.3)),
+        (2, 250.0, (0.4, 0.02, -0.04)),
+        (2, 90.0, (0.0, 0.1, 0.9)),
+        (3, 150.0, (0.3, 0, 0.1)),
+    ]
+    masses, load = tuple(LinkMass(*each) for each in places), LinkMass(arm.joints, 120.0, (0.1, -0.05, 0.15))
     gravity = (3.0, -2.0, -9.0)
     angles, _ = angles_and_wrenches(arm)
     found = forces_at(machine_of(arm, Structure(masses=masses, payload=load, gravity_m_s2=gravity)), angles)[0]
@@ -69,9 +68,9 @@ def test_weight_turns_the_joints_as_pinocchio_says(arm):
         place = pin.SE3(arm.stretches[number].rotation, arm.stretches[number].vector_m)
         parent = model.addJoint(parent, pin.JointModelRevoluteUnaligned(axis), place, f"q{number}")
         stretch = arm.stretches[number + 1]
-        weights = [(m.mass_kg, m.along * stretch.vector_m + m.aside_m) for m in masses if m.stretch == number + 1]
+        weights = [(m.mass_kg, np.array(m.centre_m)) for m in masses if m.link == number + 1]
         if number == arm.joints - 1:
-            weights.append((load.mass_kg, stretch.vector_m + stretch.rotation @ np.array(load.aside_m)))
+            weights.append((load.mass_kg, stretch.vector_m + stretch.rotation @ np.array(load.centre_m)))
         for kilograms, centre in weights:
             model.appendBodyToJoint(parent, pin.Inertia(kilograms, centre, np.eye(3)), pin.SE3.Identity())
     model.gravity.linear = np.array(gravity)

@@ -69,7 +69,7 @@ def test_noise_has_the_stated_deviation_and_grows_with_range(rng):
 def test_what_is_felt_is_what_the_cell_would_show_as_planned(rng, in_flange):
     force, facing = 500.0 * rng.standard_normal((5, 3)), turned(rng.standard_normal((5, 3)))
     force[2] = 0.0
-    cell = LoadCell(0.03, (0.01, -0.02, 0.03), (5.0, -3.0, 2.0), (0.0, 0.0, 0.0), 2e-5, in_flange)
+    cell = LoadCell(0.03, {"turn": (0.01, -0.02, 0.03), "bias": (5.0, -3.0, 2.0)}, 2e-5, in_flange)
     shown = cell.shown(cell.felt(force, np.broadcast_to([0.0, 0.5, 0.0], (5, 3)), facing)[:, :3], facing)
     loaded = force.any(axis=1)
     np.testing.assert_allclose(shown[loaded], force[loaded], atol=1e-9)

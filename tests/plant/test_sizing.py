@@ -7,7 +7,6 @@ import pytest
 
 from elastocal_proof.plant.campaigns import Design, schedule_of
 from elastocal_proof.plant.kinds import KINDS, Defect, drawn_defect, with_defects
-from elastocal_proof.plant.machine import on_stretches
 from elastocal_proof.plant.physical_robot import Motion
 from elastocal_proof.plant.sizing import Yardstick, size_for
 
@@ -50,7 +49,7 @@ def test_weights_that_differ_as_declared_are_absorbed_up_to_their_own_cost(fanuc
     declared = arm.masses
     heavier = replace(declared[2], mass_kg=declared[2].mass_kg * 1.2)
     nominal, off = (
-        replace(fanuc_specimen, structure=replace(fanuc_specimen.structure, masses=on_stretches(masses, arm)))
+        replace(fanuc_specimen, structure=replace(fanuc_specimen.structure, masses=masses))
         for masses in (declared, (*declared[:2], heavier, *declared[3:]))
     )
     signal = Yardstick(nominal, schedule, declared=declared).signal(off)

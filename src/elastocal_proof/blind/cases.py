@@ -19,8 +19,8 @@ import numpy as np
 from elastocal_proof.blind.folders import write_blind_campaign, write_truth
 from elastocal_proof.plant.arm import Arm, LinkMass, arm_from_file
 from elastocal_proof.plant.campaigns import Design, Slip, Table, possible_kinds, schedule_of, with_bad_rows
-from elastocal_proof.plant.kinds import KINDS, OUTSIDE, Defect, drawn_defect, truth_of, with_defects
-from elastocal_proof.plant.machine import on_stretches, usual_gravity_torque
+from elastocal_proof.plant.kinds import KINDS, OUTSIDE, Defect, drawn_defect, with_defects
+from elastocal_proof.plant.machine import usual_gravity_torque
 from elastocal_proof.plant.physical_robot import PhysicalRobot, Tracker, misplaced_base, specimen, stream
 from elastocal_proof.plant.sizing import Yardstick, size_for
 
@@ -212,14 +212,14 @@ def _drawn(case: Case, robot: PhysicalRobot, effect: str, seed: int) -> list[Def
     locations = kind.locations(arm)
     if case.group == SEVERAL_JOINTS:
         count = draws.integers(min(_FEWEST_JOINTS, len(locations)), len(locations) + 1)
-        chosen, plausible = sorted(draws.choice(len(locations), count, replace=False)), kind.plausible_on(arm)
+        chosen, plausible = sorted(draws.choice(len(locations), count, replace=False).tolist()), kind.plausible_on(arm)
         return [Defect(effect, locations[place], plausible * draws.uniform(0.5, 1.5), seed + place) for place in chosen]
     defect = drawn_defect(effect, arm, seed)
     if case.group == UNDECLARED:
         # The last of its locations: of all links.
         return [replace(defect, joints=locations[-1])]
     if case.group == GEAR_GRAVITY:
-        torque = usual_gravity_torque(arm, on_stretches(arm.masses, arm), arm.gravity_m_s2)
+        torque = usual_gravity_torque(arm, arm.masses, arm.gravity_m_s2)
         defect = replace(defect, joints=(int(draws.choice(np.flatnonzero(torque > _CARRIES * torque.max()))) + 1,))
     return [defect]
 
@@ -283,7 +283,12 @@ def make_case(case: Case, blind_folder: str | Path, sealed_folder: str | Path, r
 
     file, slips = case.robot_file(robots_folder), slipped if "bad_rows" in case.changes else None
     made = write_blind_campaign(folder, case.name, file, bad, design, schedule, case.declared(robot.arm), slips)
-    truth = {"case": asdict(case), "defects": [truth_of(robot, defect) | sizing for defect, sizing in sized]}
+    truth: dict[str, Any] = {"case": asdict(case), "defects": []}
+    for defect, sizing in sized:
+        # Those that are comparable with the catalogue's.
+        parameters = {name: float(value) for name, value in defect.on(robot)[1].items()}
+        stated = asdict(defect) | {"unit": KINDS[defect.effect].unit, "parameters": parameters}
+        truth["defects"].append(stated | sizing)
     if misplaced := robot.tracker.misplaced:
         truth["misplaced"] = {"shift_m": list(misplaced.shift_m), "turn_rad": list(misplaced.turn_rad)}
     return write_truth(Path(sealed_folder) / f"{case.name}.json", truth | made, folder)

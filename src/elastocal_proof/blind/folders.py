@@ -93,7 +93,9 @@ def write_robot(
     absent = ("masses", "gravity_m_s2", "compensator", "payload_kg", *undeclared)
     document = {key: value for key, value in nominal.items() if key not in absent}
     if declared:
-        document["masses"] = [asdict(mass) | {"centre_m": list(mass.centre_m)} for mass in declared]
+        document["masses"] = [
+            {"link": m.link, "mass_kg": m.mass_kg, "centre_m": [*m.centre_m], "relative_std": m.relative_std} for m in declared
+        ]
     document |= {"gravity_m_s2": list(robot.structure.gravity_m_s2), "payload_kg": round(arm.payload_kg, 1)}
     document["gear_ratio"] = list(arm.gear_ratio)
     if arm.compensated:

@@ -55,12 +55,14 @@ class LinkMass:
 
     `link`: 0 is the column; k turns with joint k. `centre_m`: in the frame directly behind the rotation of joint `link`; of the
     column in the axes of the base. `relative_std`: of the mass; of each component of the centre as a share of its distance.
+    `along`: where on the link it sits, 0 at its near end, 1 at its far end; None where it is nearest.
     """
 
     link: int
     mass_kg: float
     centre_m: tuple[float, ...]
     relative_std: float = _RELATIVE_STD
+    along: float | None = None
 
     def centre_std_m(self, least_m: float = _SHORTEST_CENTRE_M) -> float:
         """Standard deviation of each component of the declared centre, m, whose distance counts as `least_m` at least."""
@@ -71,20 +73,25 @@ class LinkMass:
 class Arm:
     """An arm, all fixed rotations and lengths sorted into stretches; what its file does not state is usual for its size.
 
-    `stretches`: n + 1 of them: the column, and one behind each drive; `lengths_m` (n + 1,). `axes` (n, 3): axis of each drive
-    with its sense, in the frame at the far end of the stretch before it. `compliance` (n,): rad/(N m); a specimen has others.
-    `limits` (n, 2): rad. `masses`: as declared. `gravity_m_s2`: in the axes of the base. `compensated`: by a gravity
-    compensator at the shoulder. `gear_ratio`: turns of the motor for one of each joint.
+    `stretches`: n + 1 of them: the column, and one behind each drive; `lengths_m` (n + 1,). `reach_m`: of all that joint 1
+    carries, stretched out. `axes` (n, 3): axis of each drive with its sense, in the frame at the far end of the stretch before
+    it. `compliance` (n,): rad/(N m); a specimen has others. `softness`: how many times softer these are than a heavy arm's, at
+    least 1; `load_share`: how large its loads are beside a heavy arm's, at most 1. `limits` (n, 2): rad. `masses`: as declared.
+    `gravity_m_s2`: in the axes of the base. `compensated`: by a gravity compensator at the shoulder. `gear_ratio`: turns of the
+    motor for one of each joint.
     """
 
     stretches: tuple[Stretch, ...]
     lengths_m: np.ndarray
+    reach_m: float
     axes: np.ndarray
     compliance: np.ndarray
+    softness: float
     limits: np.ndarray
     masses: tuple[LinkMass, ...]
     gravity_m_s2: tuple[float, ...]
     payload_kg: float
+    load_share: float
     compensated: bool
     gear_ratio: tuple[float, ...]
 
@@ -92,21 +99,6 @@ class Arm:
     def joints(self) -> int:
         """Number of drives, n."""
         return len(self.axes)
-
-    @property
-    def reach_m(self) -> float:
-        """Length of all that joint 1 carries, stretched out."""
-        return float(sum(self.lengths_m[1:]))
-
-    @property
-    def load_share(self) -> float:
-        """How large its loads are beside a heavy arm's, at most 1."""
-        return min(1.0, self.payload_kg / _HEAVY_KG)
-
-    @property
-    def softness(self) -> float:
-        """How many times softer the gears are than a heavy arm's, at least 1."""
-        return max(1.0, float(np.median(self.compliance)) / _STIFF_RAD_PER_NM)
 
     @property
     def points(self) -> tuple[str, ...]:
@@ -140,12 +132,15 @@ def arm_from_document(document: Mapping[str, Any], source: str = "robot") -> Arm
     return Arm(
         stretches,
         lengths,
+        reach,
         axes,
         compliance,
+        max(1.0, float(np.median(compliance)) / _STIFF_RAD_PER_NM),
         np.radians(np.array(document.get("joint_limits_deg", [[-360.0, 360.0]] * n), float)),
         tuple(masses or _usual_masses(stretches, payload * reach, reach)),
         tuple(map(float, document.get("gravity_m_s2", (0.0, 0.0, -standard_gravity)))),
         payload,
+        min(1.0, payload / _HEAVY_KG),
         # A file that declares no weights declares no compensator either.
         "compensator" in document or not masses,
         tuple(document.get("gear_ratio", [_USUAL_RATIOS[joint % len(_USUAL_RATIOS)] for joint in range(n)])),
@@ -197,7 +192,7 @@ def rotation_vector(rotation: np.ndarray) -> np.ndarray:
     return Rotation.from_matrix(np.array(rotation), assume_valid=True).as_rotvec()
 
 
-def true_masses(arm: Arm, draws: np.random.Generator, off_line_m: float, sideways: np.random.Generator) -> list[LinkMass]:
+def true_masses(arm: Arm, draws: np.random.Generator, off_line_m: float, sideways: np.random.Generator) -> tuple[LinkMass, ...]:
     """Masses and centres of one specimen, drawn about the declared ones as well as these are known.
 
     `off_line_m`: by how much centres lie off the lines of their links at most, in each direction across, as nobody declared.
@@ -211,4 +206,4 @@ def true_masses(arm: Arm, draws: np.random.Generator, off_line_m: float, sideway
             along = vector / max(float(np.linalg.norm(vector)), 1e-300)
             centre = centre + move - (move @ along) * along
         found.append(replace(mass, mass_kg=mass.mass_kg * (1.0 + mass.relative_std * heavier), centre_m=tuple(centre)))
-    return found
+    return tuple(found)

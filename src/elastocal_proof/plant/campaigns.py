@@ -112,7 +112,7 @@ def measured_table(robot: PhysicalRobot, design: Design, schedule: Schedule) -> 
     at, joints = [robot.arm.points.index(name) for name in points], range(1, robot.arm.joints + 1)
     columns = {name: getattr(schedule, name) for name in ("pose", "load", "repeat")}
     columns |= dict(zip([f"q{j}" for j in joints], schedule.angle.T, strict=True))
-    columns |= dict(zip(WRENCH, schedule.shown_wrench.T, strict=True))
+    columns |= dict(zip(WRENCH, [*schedule.force.T, *np.cross(schedule.lever, schedule.force).T], strict=True))
     if "approach" in design.covariates:
         columns |= dict(zip([f"approach{j}" for j in joints], schedule.sense.T.astype(float), strict=True))
     if "time" in design.covariates:

@@ -10,13 +10,12 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
 from elastocal_proof.plant import laws
 from elastocal_proof.plant.arm import Arm
-from elastocal_proof.plant.machine import long_links, on_stretches, turned_by, weighing_links
+from elastocal_proof.plant.machine import long_links, turned_by, weighing_links
 from elastocal_proof.plant.physical_robot import PhysicalRobot, stream
 
 OUTSIDE = "outside:"
@@ -50,17 +49,9 @@ def _nowhere(arm: Arm) -> list[Location]:
     return [()]
 
 
-def _each_joint(arm: Arm) -> list[Location]:
-    return [(joint,) for joint in range(1, arm.joints + 1)]
-
-
-def _joints_from(first: int) -> Callable[[Arm], list[Location]]:
-    """But for the last."""
-    return lambda arm: [(joint,) for joint in range(first, arm.joints)]
-
-
-def _each_pair(arm: Arm) -> list[Location]:
-    return list(combinations(range(1, arm.joints + 1), 2))
+def _joints(first: int, behind: int = 0) -> Callable[[Arm], list[Location]]:
+    """From one joint on, all that have so many behind them."""
+    return lambda arm: [(joint,) for joint in range(first, arm.joints + 1 - behind)]
 
 
 def _each_link(arm: Arm) -> list[Location]:
@@ -74,38 +65,40 @@ def _shoulder(arm: Arm) -> list[Location]:
 
 def _weighed(arm: Arm) -> list[Location]:
     """Joints that the upper arm turns, the forearm, and all links."""
-    return list(dict.fromkeys([*weighing_links(arm), turned_by(arm, on_stretches(arm.masses, arm))]))
+    return list(dict.fromkeys([*weighing_links(arm), turned_by(arm, arm.masses)]))
 
 
 _SOFT, _LOAD = (1.0, 0.0), (0.0, 1.0)
 KINDS: dict[str, Kind] = {
-    "joint_offset": Kind("rad", 3e-4, _each_joint, laws.joint_offset),
-    "link_geometry": Kind("m", 3e-4, _each_joint, laws.link_geometry),
+    "joint_offset": Kind("rad", 3e-4, _joints(1), laws.joint_offset),
+    "link_geometry": Kind("m", 3e-4, _joints(1), laws.link_geometry),
     # A wrong wavelength, at which the frame of the base was measured too.
     "tracker_scale": Kind("1", 2e-5, _nowhere, partial(laws.misread, "tracker", "scale")),
     "link_weight": Kind("kg", 100.0, _weighed, laws.link_weight, scale=_LOAD),
     "declared_masses": Kind("1", 0.3, _nowhere, laws.heavier_than_declared),
     "payload": Kind("kg", 25.0, _nowhere, laws.payload, scale=_LOAD),
     "compensator_torque": Kind("N/m", 1e5, _shoulder, laws.compensator_torque),
-    "transmission_harmonic": Kind("rad", 8e-5, _each_joint, laws.transmission_harmonic),
-    "transmission_ratio": Kind("rad/rad", 3e-4, _each_joint, laws.transmission_ratio),
-    "bearing_runout": Kind("m", 3e-5, _each_joint, laws.bearing_runout),
-    "motor_eccentricity": Kind("rad", 6e-5, _each_joint, laws.motor_eccentricity),
-    "transmission_order": Kind("rad", 8e-5, _each_joint, laws.transmission_order),
+    "transmission_harmonic": Kind("rad", 8e-5, _joints(1), laws.transmission_harmonic),
+    "transmission_ratio": Kind("rad/rad", 3e-4, _joints(1), laws.transmission_ratio),
+    "bearing_runout": Kind("m", 3e-5, _joints(1), laws.bearing_runout),
+    "motor_eccentricity": Kind("rad", 6e-5, _joints(1), laws.motor_eccentricity),
+    "transmission_order": Kind("rad", 8e-5, _joints(1), laws.transmission_order),
     "link_elasticity": Kind("1/(N m^2)", 1e-7, _each_link, laws.link_elasticity, scale=_SOFT),
-    "joint_tilt": Kind("rad/(N m)", 2e-7, _each_joint, laws.joint_tilt, scale=_SOFT),
+    "joint_tilt": Kind("rad/(N m)", 2e-7, _joints(1), laws.joint_tilt, scale=_SOFT),
     "base_compliance": Kind("rad/(N m)", 6e-8, _nowhere, laws.base_compliance, scale=_SOFT),
-    "cross_compliance": Kind("rad/(N m)", 8e-8, _each_pair, laws.cross_compliance, scale=_SOFT),
-    "joint_dependent_stiffness": Kind("1", 0.1, _each_joint, partial(laws.stiff_by_angle, lambda joint: joint), largest=0.8),
+    "cross_compliance": Kind(
+        "rad/(N m)", 8e-8, lambda arm: [*combinations(range(1, arm.joints + 1), 2)], laws.cross_compliance, scale=_SOFT
+    ),
+    "joint_dependent_stiffness": Kind("1", 0.1, _joints(1), partial(laws.stiff_by_angle, lambda joint: joint), largest=0.8),
     "compensator_stiffness": Kind("N/m", 3e6, _shoulder, laws.compensator_stiffness),
     "flange_flexibility": Kind("rad/(N m)", 2e-7, _nowhere, laws.flange_flexibility, scale=_SOFT),
-    "stiffening": Kind("1", 0.3, _each_joint, laws.stiffening, largest=0.95),
-    "lost_motion": Kind("rad", 7e-5, _each_joint, laws.lost_motion),
-    "hysteresis": Kind("rad", 5e-5, _each_joint, laws.hysteresis, needs=("approach",)),
+    "stiffening": Kind("1", 0.3, _joints(1), laws.stiffening, largest=0.95),
+    "lost_motion": Kind("rad", 7e-5, _joints(1), laws.lost_motion),
+    "hysteresis": Kind("rad", 5e-5, _joints(1), laws.hysteresis, needs=("approach",)),
     "force_scale": Kind("1", 0.02, _nowhere, partial(laws.misread, "cell", "scale"), largest=0.1),
-    "force_misalignment": Kind("rad", 0.02, _nowhere, partial(laws.wrong_cell, "turn_rad", "about_")),
-    "force_bias": Kind("N", 20.0, _nowhere, partial(laws.wrong_cell, "bias_N", "along_"), scale=_LOAD),
-    "application_point": Kind("m", 0.02, _nowhere, partial(laws.wrong_cell, "shift_m", "shift_")),
+    "force_misalignment": Kind("rad", 0.02, _nowhere, partial(laws.wrong_cell, "turn", "about_")),
+    "force_bias": Kind("N", 20.0, _nowhere, partial(laws.wrong_cell, "bias", "along_"), scale=_LOAD),
+    "application_point": Kind("m", 0.02, _nowhere, partial(laws.wrong_cell, "shift", "shift_")),
     "frame_drift": Kind("m/h", 1e-4, _nowhere, laws.frame_drift, needs=("time",)),
     "thermal_growth": Kind("1/K", 1.2e-5, _nowhere, laws.expanding, needs=("temperature",)),
     "setup_step": Kind("m", 1e-3, _nowhere, laws.setup_step),
@@ -113,12 +106,12 @@ KINDS: dict[str, Kind] = {
         "1/K", 1.2e-5, lambda arm: [(), *_each_link(arm)], laws.temperature_gradient, needs=("temperature",)
     ),
     "nest_eccentricity": Kind("m", 1e-4, _nowhere, laws.nest_eccentricity),
-    OUTSIDE + "cable_pull": Kind("rad/rad^2", 1e-4, _joints_from(3), laws.cable_pull),
-    OUTSIDE + "two_angles": Kind("rad", 2e-4, _joints_from(2), laws.two_angles),
-    OUTSIDE + "cable_transmission": Kind("rad/(N m)", 1e-7, _joints_from(2), laws.cable_transmission, scale=_SOFT),
-    OUTSIDE + "asymmetric_gear": Kind("rad/(N m)^2", 1e-10, _each_joint, laws.asymmetric_gear, scale=(1.0, -1.0)),
-    OUTSIDE + "slipping_zero": Kind("rad", 5e-5, _each_joint, laws.slipping_zero),
-    OUTSIDE + "warm_softening": Kind("1/K", 0.01, _each_joint, laws.warm_softening),
+    OUTSIDE + "cable_pull": Kind("rad/rad^2", 1e-4, _joints(3, 1), laws.cable_pull),
+    OUTSIDE + "two_angles": Kind("rad", 2e-4, _joints(2, 1), laws.two_angles),
+    OUTSIDE + "cable_transmission": Kind("rad/(N m)", 1e-7, _joints(2, 1), laws.cable_transmission, scale=_SOFT),
+    OUTSIDE + "asymmetric_gear": Kind("rad/(N m)^2", 1e-10, _joints(1), laws.asymmetric_gear, scale=(1.0, -1.0)),
+    OUTSIDE + "slipping_zero": Kind("rad", 5e-5, _joints(1), laws.slipping_zero),
+    OUTSIDE + "warm_softening": Kind("1/K", 0.01, _joints(1), laws.warm_softening),
     # A parallel rod: the stiffness of the shoulder depends on the angle of the elbow, or the other way round.
     OUTSIDE + "foreign_angle_stiffness": Kind(
         "1", 0.15, lambda arm: [(2,), (3,)], partial(laws.stiff_by_angle, lambda joint: 3 - joint), largest=0.8
@@ -129,7 +122,7 @@ KINDS: dict[str, Kind] = {
     OUTSIDE + "cell_crosstalk": Kind(
         "1/N", 5e-5, _nowhere, partial(laws.misread, "cell", "crosstalk_per_N"), scale=(0.0, -1.0)
     ),
-    OUTSIDE + "short_waves": Kind("rad", 8e-5, _each_joint, laws.short_waves),
+    OUTSIDE + "short_waves": Kind("rad", 8e-5, _joints(1), laws.short_waves),
 }
 
 
@@ -157,13 +150,6 @@ def with_defects(robot: PhysicalRobot, defects: Iterable[Defect], times: float =
     for defect in defects:
         robot = replace(defect, size=times * defect.size).on(robot)[0]
     return robot
-
-
-def truth_of(robot: PhysicalRobot, defect: Defect) -> dict[str, Any]:
-    """The ground truth of a defect: effect, joints, size, unit, the parameters that are comparable, seed."""
-    parameters = {name: float(value) for name, value in defect.on(robot)[1].items()}
-    document = {"effect": defect.effect, "joints": list(defect.joints), "size": float(defect.size)}
-    return document | {"unit": KINDS[defect.effect].unit, "parameters": parameters, "seed": int(defect.seed)}
 
 
 def drawn_defect(effect: str, arm: Arm, seed: int) -> Defect:

@@ -12,15 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from elastocal_proof.plant.machine import (
-    SEGMENTS,
-    Compensator,
-    Mass,
-    TaperedTube,
-    on_stretches,
-    usual_gravity_torque,
-    weighing_links,
-)
+from elastocal_proof.plant.arm import LinkMass
+from elastocal_proof.plant.machine import SEGMENTS, TaperedTube, usual_gravity_torque, weighing_links
 from elastocal_proof.plant.physical_robot import Motion, PhysicalRobot, Schedule, warmth_of_castings
 
 Draws = np.random.Generator
@@ -91,8 +84,9 @@ def link_weight(robot: PhysicalRobot, size: float, draws: Draws, *joints: int) -
     """Weight of the upper arm or the forearm, beside its line, or of all links as declared, by the joints that it turns."""
     link = weighing_links(robot.arm).get(tuple(joint + 1 for joint in joints))
     if link is not None:
-        along, aside = draws.uniform(0.25, 0.6), tuple(draws.uniform(-0.06, 0.06, 3))
-        return changed(robot, "structure", masses=(*robot.structure.masses, Mass(link, size, along, aside))), {}
+        along, aside = draws.uniform(0.25, 0.6), draws.uniform(-0.06, 0.06, 3)
+        heavy = LinkMass(link, size, tuple(along * robot.arm.stretches[link].vector_m + aside), along=along)
+        return changed(robot, "structure", masses=(*robot.structure.masses, heavy)), {}
     kilograms = {mass.link: mass.mass_kg for mass in robot.arm.masses if mass.link > 1}
     return _heavier(robot, 2, size / sum(kilograms.values())), {}
 
@@ -103,14 +97,13 @@ def heavier_than_declared(robot: PhysicalRobot, size: float, draws: Draws) -> Ap
 
 
 def _heavier(robot: PhysicalRobot, first_link: int, share: float) -> PhysicalRobot:
-    declared = [mass for mass in on_stretches(robot.arm.masses, robot.arm) if mass.stretch >= first_link]
-    more = [replace(mass, mass_kg=share * mass.mass_kg) for mass in declared]
+    more = [replace(mass, mass_kg=share * mass.mass_kg) for mass in robot.arm.masses if mass.link >= first_link]
     return changed(robot, "structure", masses=(*robot.structure.masses, *more))
 
 
 def payload(robot: PhysicalRobot, size: float, draws: Draws) -> Applied:
     centre = 0.15 * direction(draws)
-    heavier = changed(robot, "structure", payload=Mass(robot.arm.joints, size, 1.0, tuple(centre)))
+    heavier = changed(robot, "structure", payload=LinkMass(robot.arm.joints, size, tuple(centre)))
     return heavier, {"mass": size} | named("moment_", size * centre)
 
 
@@ -118,7 +111,7 @@ def compensator_torque(robot: PhysicalRobot, size: float, draws: Draws, joint: i
     """A coil spring whose pull the controller does not know."""
     anchor = (-draws.uniform(0.25, 0.4), 0.0, -draws.uniform(0.1, 0.3))
     crank = (draws.uniform(0.12, 0.22), 0.0, draws.uniform(-0.08, 0.08))
-    return changed(robot, "structure", compensator=Compensator(anchor, crank, size, draws.uniform(0.2, 0.35))), {}
+    return changed(robot, "structure", compensator=(anchor, crank, size, draws.uniform(0.2, 0.35))), {}
 
 
 # Transmission
@@ -375,19 +368,19 @@ def misread(part: str, field: str, robot: PhysicalRobot, size: float, draws: Dra
     return changed(robot, part, **{field: size}), {"scale": size} if field == "scale" else {}
 
 
-def wrong_cell(field: str, start: str, robot: PhysicalRobot, size: float, draws: Draws) -> Applied:
+def wrong_cell(error: str, start: str, robot: PhysicalRobot, size: float, draws: Draws) -> Applied:
     """An error in a frame that is drawn, of a cell at a location that is drawn.
 
     The catalogue's laws leave the moment as stated; those of a cell in the pull are not comparable.
     """
-    vector, error = size * direction(draws), field.partition("_")[0]
+    vector, cell = size * direction(draws), robot.cell
     # What is felt beyond what is shown is minus the bias of the display.
-    changes: dict[str, Any] = {field: tuple(-vector if error == "bias" else vector)}
+    errors = cell.errors | {error: -vector if error == "bias" else vector}
     # In the flange's axes or not, beside the errors of the load cell that are so already.
-    changes["in_flange"] = (*robot.cell.in_flange, error) if draws.integers(2) else robot.cell.in_flange
-    if error != "shift":
-        changes["mount"] = ("pull", "flange")[draws.integers(2)]
-    return changed(robot, "cell", **changes), named(start, vector) if changes.get("mount") != "pull" else {}
+    in_flange = (*cell.in_flange, error) if draws.integers(2) else cell.in_flange
+    mount = cell.mount if error == "shift" else ("pull", "flange")[draws.integers(2)]
+    comparable = error == "shift" or mount != "pull"
+    return changed(robot, "cell", errors=errors, in_flange=in_flange, mount=mount), named(start, vector) if comparable else {}
 
 
 def frame_drift(robot: PhysicalRobot, size: float, draws: Draws) -> Applied:

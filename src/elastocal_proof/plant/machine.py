@@ -51,49 +51,25 @@ class TaperedTube:
 
 
 @dataclass(frozen=True)
-class Mass:
-    """A weight on a stretch: 0 is the column, n the flange.
-
-    `along`: where on the stretch, 0 at its near end, 1 at its far end. `aside_m`: off its line, in the frame at the near end.
-    """
-
-    stretch: int
-    mass_kg: float
-    along: float = 0.5
-    aside_m: tuple[float, ...] = _NOWHERE
-
-
-@dataclass(frozen=True)
-class Compensator:
-    """A coil spring from the carousel to the upper arm: pull = stiffness (length - free length).
-
-    Its fixed end `anchor_m` and its moving end `crank_m` count from the shoulder, in the frames that turn with joints 1 and 2.
-    """
-
-    anchor_m: tuple[float, ...]
-    crank_m: tuple[float, ...]
-    stiffness_N_per_m: float
-    free_length_m: float
-
-
-@dataclass(frozen=True)
 class Structure:
     """Everything of an arm that its robot file does not declare. The default is an arm of drives alone.
 
     `base`: compliances of the foot along x, y, z (m/N) and about x, y, z (rad/(N m)). `flange`: the same between the last
     stretch and the flange, in the flange's frame. `bearings`: of a joint, from 1: compliances of its tilts across its axis,
     rad/(N m), in the order of the remaining axes, along which only a law lets it shift. `tubes`: elastic stretches. `payload`:
-    ``aside_m`` counts from the flange, in its frame. `wrong`: by how much a stretch's vector (m) and its far end's rotation
-    vector (rad) differ from the robot file. `gravity_m_s2`: in the axes of the base.
+    its centre counts from the flange, in its frame. `compensator`: a coil spring from the carousel to the upper arm: its fixed
+    and its moving end, m, from the shoulder, in the frames that turn with joints 1 and 2; its stiffness, N/m; its free length,
+    m. `wrong`: by how much a stretch's vector (m) and its far end's rotation vector (rad) differ from the robot file.
+    `gravity_m_s2`: in the axes of the base.
     """
 
     base: tuple[float, ...] = ()
     flange: tuple[float, ...] = ()
     bearings: dict[int, tuple[float, ...]] = field(default_factory=dict)
     tubes: dict[int, TaperedTube] = field(default_factory=dict)
-    masses: tuple[Mass, ...] = ()
-    payload: Mass | None = None
-    compensator: Compensator | None = None
+    masses: tuple[LinkMass, ...] = ()
+    payload: LinkMass | None = None
+    compensator: tuple[tuple[float, ...], tuple[float, ...], float, float] | None = None
     wrong: dict[int, tuple[ArrayLike, ArrayLike]] = field(default_factory=dict)
     gravity_m_s2: tuple[float, ...] = (0.0, 0.0, -standard_gravity)
 
@@ -156,33 +132,33 @@ class Machine:
         return force, position[:, self.sites], rotation.reshape(count, -1, 3, 3)[:, self.sites]
 
 
+# Name, axis and compliance of a joint, None of one that is commanded or a gear, which has laws of its own; whether it slides.
+_Joint = tuple[str, np.ndarray, float | None, bool]
+
+
+# Mass, where along the vector of its stretch it is, and aside of that.
+_Placed = tuple[float, float, np.ndarray]
+
+
 class _Tree:
     """Bodies so far; the frame in which the next one is placed; the springs' compliances by name."""
 
     def __init__(self, structure: Structure) -> None:
-        self.spec = mujoco.MjSpec()
+        self.spec, self.structure = mujoco.MjSpec(), structure
         self.spec.option.gravity = list(structure.gravity_m_s2)
         self.body, self.position, self.rotation = self.spec.worldbody, np.zeros(3), np.eye(3)
         self.compliance: dict[str, float] = {}
 
-    def descend(self, name: str) -> None:
-        """New body at the current frame."""
+    def descend(self, name: str, joints: Iterable[_Joint]) -> None:
+        """New body at the current frame, with its joints."""
         turn = Rotation.from_matrix(self.rotation).as_quat(scalar_first=True)
         self.body = self.body.add_body(name=name, pos=self.position, quat=turn, **_NOTHING)
         self.position, self.rotation = np.zeros(3), np.eye(3)
-
-    def joint(self, name: str, axis: np.ndarray, compliance: float | None = None, slides: bool = False) -> None:
-        """Joint of the current body; `compliance` None for one that is commanded or a gear, which has laws of its own."""
-        kind = mujoco.mjtJoint.mjJNT_SLIDE if slides else mujoco.mjtJoint.mjJNT_HINGE
-        self.body.add_joint(name=name, type=kind, axis=axis, armature=1.0)
-        if compliance is not None:
-            self.compliance[name] = compliance
-
-    def six_springs(self, name: str, compliances: Iterable[float]) -> None:
-        """Along and about x, y and z of the current body."""
-        for number, compliance in enumerate(compliances):
-            words = f"{name}_{'r' * (number // 3)}{'xyz'[number % 3]}"
-            self.joint(words, np.eye(3)[number % 3], compliance, slides=number < 3)
+        for word, axis, compliance, slides in joints:
+            kind = mujoco.mjtJoint.mjJNT_SLIDE if slides else mujoco.mjtJoint.mjJNT_HINGE
+            self.body.add_joint(name=word, type=kind, axis=axis, armature=1.0)
+            if compliance is not None:
+                self.compliance[word] = compliance
 
     def weigh(self, mass: float, place: np.ndarray) -> None:
         """Put a mass on the current body, in its frame; masses add up at their common centre."""
@@ -194,15 +170,15 @@ class _Tree:
         """A measuring point, in the frame of the current body."""
         self.body.add_site(name=name, pos=position, quat=Rotation.from_matrix(rotation).as_quat(scalar_first=True))
 
-    def walk(self, number: int, stretch: Stretch, structure: Structure, elsewhere: str) -> None:
+    def walk(self, number: int, stretch: Stretch, elsewhere: str) -> None:
         """From the near to the far end of a stretch; one measuring point may be put elsewhere."""
-        shift, turn = structure.wrong.get(number, (_NOWHERE, _NOWHERE))
-        vector, turn, tube = stretch.vector_m + np.array(shift), turned(turn), structure.tubes.get(number)
-        masses = [mass for mass in structure.masses if mass.stretch == number]
+        shift, turn = self.structure.wrong.get(number, (_NOWHERE, _NOWHERE))
+        vector, turn, tube = stretch.vector_m + np.array(shift), turned(turn), self.structure.tubes.get(number)
+        masses = [_placed(mass, stretch.vector_m) for mass in self.structure.masses if mass.link == number]
         start, facing = self.position, self.rotation
         if tube is None:
-            for mass in masses:
-                self.weigh(mass.mass_kg, start + facing @ (mass.along * vector + np.array(mass.aside_m)))
+            for mass_kg, along, aside in masses:
+                self.weigh(mass_kg, start + facing @ (along * vector + aside))
             self.position = start + facing @ vector
         else:
             self.bend(f"link{number}_", vector, tube, masses)
@@ -219,62 +195,73 @@ class _Tree:
                 self.mark(name, where, turns)
         self.rotation = facing @ stretch.rotation @ turn
 
-    def bend(self, name: str, vector: np.ndarray, tube: TaperedTube, masses: Iterable[Mass]) -> None:
+    def bend(self, name: str, vector: np.ndarray, tube: TaperedTube, masses: Iterable[_Placed]) -> None:
         """Rigid pieces with springs at the middle of each: the midpoint rule for the integral of M / EI along the link."""
         along = vector / np.linalg.norm(vector)
         first = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
         first /= np.linalg.norm(first)
-        across = (first, np.cross(along, first))
-        count, piece, step = SEGMENTS, float(np.linalg.norm(vector)) / SEGMENTS, vector / SEGMENTS
+        second = np.cross(along, first)
+        piece, step = float(np.linalg.norm(vector)) / SEGMENTS, vector / SEGMENTS
         self.position = self.position + self.rotation @ (0.5 * step)
-        for segment in range(count):
-            width = 1.0 - tube.taper * (segment + 0.5) / count
-            self.descend(f"{name}{segment}")
-            for which, axis in enumerate(across if np.isfinite(tube.shear_N) else ()):
-                self.joint(f"{name}shear{which}_{segment}", axis, piece / (tube.shear_N * width), slides=True)
-            if np.isfinite(tube.axial_N):
-                self.joint(f"{name}axial_{segment}", along, piece / (tube.axial_N * width), slides=True)
-            for which, axis in enumerate(across):
-                self.joint(f"{name}bend{which}_{segment}", axis, piece / (tube.bending_Nm2 * width**3))
-            self.joint(f"{name}twist_{segment}", along, piece / (tube.torsion_Nm2 * width**3))
-            for mass in masses:
+        for segment in range(SEGMENTS):
+            middle = (segment + 0.5) / SEGMENTS
+            width = 1.0 - tube.taper * middle
+            springs = [
+                ("shear0", first, tube.shear_N * width, True),
+                ("shear1", second, tube.shear_N * width, True),
+                ("axial", along, tube.axial_N * width, True),
+                ("bend0", first, tube.bending_Nm2 * width**3, False),
+                ("bend1", second, tube.bending_Nm2 * width**3, False),
+                ("twist", along, tube.torsion_Nm2 * width**3, False),
+            ]
+            # What a rigid tube does not do but by a law of its bends needs no coordinate.
+            springs = [spring for spring in springs if np.isfinite(spring[2]) or not spring[3]]
+            joints = [(f"{name}{word}_{segment}", axis, piece / stiff, slides) for word, axis, stiff, slides in springs]
+            self.descend(f"{name}{segment}", joints)
+            for mass_kg, share, aside in masses:
                 # On the segment that holds its place; the body's origin is the middle of the segment.
-                if min(int(mass.along * count), count - 1) == segment:
-                    off = (mass.along - (segment + 0.5) / count) * vector
-                    self.weigh(mass.mass_kg, off + np.array(mass.aside_m))
-            self.position = step if segment < count - 1 else 0.5 * step
+                if min(int(share * SEGMENTS), SEGMENTS - 1) == segment:
+                    self.weigh(mass_kg, (share - middle) * vector + aside)
+            self.position = step if segment < SEGMENTS - 1 else 0.5 * step
+
+
+def _placed(mass: LinkMass, vector: np.ndarray) -> _Placed:
+    centre, along = np.array(mass.centre_m), mass.along
+    if along is None:
+        along = float(np.clip(centre @ vector / (vector @ vector), 0.0, 1.0)) if vector.any() else 0.0
+    return mass.mass_kg, along, centre - along * vector
+
+
+def _six_springs(name: str, compliances: Iterable[float]) -> list[_Joint]:
+    """Along and about x, y and z."""
+    words = [f"{name}_{turns}{axis}" for turns in ("", "r") for axis in "xyz"]
+    return [(words[k], np.eye(3)[k % 3], compliance, k < 3) for k, compliance in enumerate(compliances)]
 
 
 def machine_of(arm: Arm, structure: Structure) -> Machine:
     """Build the model of an arm."""
     tree = _Tree(structure)
-    tree.descend("foot")
-    tree.six_springs("base", structure.base)
-    for number, stretch in enumerate(arm.stretches):
-        tree.walk(number, stretch, structure, arm.points[-1] if structure.flange else "")
-        if number < arm.joints:
-            tree.descend(f"arm{number + 1}")
-            axis = arm.axes[number]
-            tree.joint(f"drive{number + 1}", axis)
-            tree.joint(f"gear{number + 1}", axis)
-            across = [e for e in np.eye(3) if abs(e @ axis) < 0.5]
-            tilts = structure.bearings.get(number + 1, ())
-            for which in range(len(tilts)):
-                tree.joint(f"shift{number + 1}_{which}", across[which], 0.0, slides=True)
-            for which, compliance in enumerate(tilts):
-                tree.joint(f"tilt{number + 1}_{which}", across[which], compliance)
+    tree.descend("foot", _six_springs("base", structure.base))
+    for number, stretch in enumerate(arm.stretches, 1):
+        tree.walk(number - 1, stretch, arm.points[-1] if structure.flange else "")
+        if number <= arm.joints:
+            axis = arm.axes[number - 1]
+            across, tilts = [e for e in np.eye(3) if abs(e @ axis) < 0.5], structure.bearings.get(number, ())
+            joints: list[_Joint] = [(f"{name}{number}", axis, None, False) for name in ("drive", "gear")]
+            joints += [(f"shift{number}_{which}", across[which], 0.0, True) for which in range(len(tilts))]
+            joints += [(f"tilt{number}_{which}", across[which], tilt, False) for which, tilt in enumerate(tilts)]
+            tree.descend(f"arm{number}", joints)
     if structure.flange:
-        tree.descend("flange")
-        tree.six_springs("flange", structure.flange)
+        tree.descend("flange", _six_springs("flange", structure.flange))
         tree.mark(arm.points[-1], np.zeros(3), np.eye(3))
     if load := structure.payload:
-        tree.weigh(load.mass_kg, tree.position + tree.rotation @ np.array(load.aside_m))
-    if spring := structure.compensator:
+        tree.weigh(load.mass_kg, tree.position + tree.rotation @ np.array(load.centre_m))
+    if structure.compensator:
         # From the body before the shoulder's drive to the body behind it.
-        anchor = arm.stretches[1].vector_m + arm.stretches[1].rotation @ np.array(spring.anchor_m)
-        length, stiffness = [spring.free_length_m] * 2, [spring.stiffness_N_per_m, 0.0, 0.0]
-        tendon = tree.spec.add_tendon(name="compensator", stiffness=stiffness, springlength=length)
-        for body, name, place in (("arm1", "anchor", anchor), ("arm2", "crank", spring.crank_m)):
+        fixed, moving, stiffness, length = structure.compensator
+        anchor = arm.stretches[1].vector_m + arm.stretches[1].rotation @ np.array(fixed)
+        tendon = tree.spec.add_tendon(name="compensator", stiffness=[stiffness, 0.0, 0.0], springlength=[length] * 2)
+        for body, name, place in (("arm1", "anchor", anchor), ("arm2", "crank", moving)):
             tree.spec.body(body).add_site(name=name, pos=place)
             tendon.wrap_site(name)
     model = tree.spec.compile()
@@ -336,17 +323,7 @@ def equilibrium(
     raise RuntimeError(f"no equilibrium after {_SWEEPS} sweeps: the last moved by {change.max():.3g}")
 
 
-def on_stretches(masses: Iterable[LinkMass], arm: Arm) -> tuple[Mass, ...]:
-    """The same weights as a structure has them: along the line of the stretch, and aside of it."""
-    found = []
-    for mass in masses:
-        centre, vector = np.array(mass.centre_m), arm.stretches[mass.link].vector_m
-        along = float(np.clip(centre @ vector / (vector @ vector), 0.0, 1.0)) if vector.any() else 0.0
-        found.append(Mass(mass.link, mass.mass_kg, along, tuple((centre - along * vector).tolist())))
-    return tuple(found)
-
-
-def usual_gravity_torque(arm: Arm, masses: Iterable[Mass], gravity_m_s2: tuple[float, ...]) -> np.ndarray:
+def usual_gravity_torque(arm: Arm, masses: Iterable[LinkMass], gravity_m_s2: tuple[float, ...]) -> np.ndarray:
     """Root mean square torque of the links' weight on each drive over the arm's range of angles, (n,), N m."""
     low, high = arm.limits.T
     machine = machine_of(arm, Structure(masses=tuple(masses), gravity_m_s2=gravity_m_s2))
@@ -357,7 +334,7 @@ def usual_gravity_torque(arm: Arm, masses: Iterable[Mass], gravity_m_s2: tuple[f
     return np.sqrt((torque**2).mean(axis=0))
 
 
-def turned_by(arm: Arm, masses: Iterable[Mass]) -> tuple[int, ...]:
+def turned_by(arm: Arm, masses: Iterable[LinkMass]) -> tuple[int, ...]:
     """Joints, from 1, that weights turn where the arm stands upright."""
     torque = usual_gravity_torque(arm, masses, (0.0, 0.0, -standard_gravity))
     return tuple(int(joint) + 1 for joint in np.flatnonzero(torque > _NO_TORQUE * torque.max()))
@@ -372,8 +349,8 @@ def weighing_links(arm: Arm) -> dict[tuple[int, ...], int]:
     """The upper arm and the forearm by the joints that their weight turns."""
     found: dict[tuple[int, ...], int] = {}
     for link in long_links(arm):
-        turned = turned_by(arm, [Mass(link, 1.0)])
+        joints = turned_by(arm, [LinkMass(link, 1.0, tuple(0.5 * arm.stretches[link].vector_m))])
         # Of links that turn the same joints the first counts, and of all links two: the hand's weight is like a tool's.
-        if turned and turned[-1] == link and len(found) < 2:
-            found[turned] = link
+        if joints and joints[-1] == link and len(found) < 2:
+            found[joints] = link
     return found

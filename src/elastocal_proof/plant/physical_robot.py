@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from elastocal_proof.plant.arm import Arm, true_masses, turned
-from elastocal_proof.plant.machine import Machine, Structure, equilibrium, machine_of, on_stretches
+from elastocal_proof.plant.machine import Machine, Structure, equilibrium, machine_of
 
 _REFERENCE_C = 20.0
 # A thermometer on a motor shows a rise by RISE (1 - exp(-t / MOTOR)); the castings follow it by a first-order lag.
@@ -121,18 +122,16 @@ class LoadCell:
     """A cell between the pull and the flange, and where it pulls. The default is perfect.
 
     The experimenter pulls until the display shows what the plan says; a cell that errs makes the flange feel something else. So
-    the campaign holds what was shown, and the arm deflects by what was felt. `scale`: felt = (1 + scale) shown. `turn_rad`:
-    rotation vector by which the cell is mounted askew: it shows R(turn)^T felt. `bias_N`: shown without a force. `shift_m`:
-    where the force really acts, from where the plan says. `crosstalk_per_N`: quadratic: shown x gets k F_y F_z, and so on round
-    the axes. `in_flange`: which of "turn", "bias" and "shift" are fixed in the flange's axes rather than in the base's.
-    `mount`: in the line of "pull" one number is measured: a force that is wrong acts at the same lever and brings a wrong
-    moment. Between "flange" and tool six are: the forces may be wrong where the moments are right.
+    the campaign holds what was shown, and the arm deflects by what was felt. `scale`: felt = (1 + scale) shown. `errors`, each
+    (3,): "turn", rotation vector by which the cell is mounted askew: it shows R(turn)^T felt; "bias", N, shown without a force;
+    "shift", m: where the force really acts, from where the plan says. `crosstalk_per_N`: quadratic: shown x gets k F_y F_z, and
+    so on round the axes. `in_flange`: which of the errors are fixed in the flange's axes rather than in the base's. `mount`: in
+    the line of "pull" one number is measured: a force that is wrong acts at the same lever and brings a wrong moment. Between
+    "flange" and tool six are: the forces may be wrong where the moments are right.
     """
 
     scale: float = 0.0
-    turn_rad: tuple[float, ...] = (0.0, 0.0, 0.0)
-    bias_N: tuple[float, ...] = (0.0, 0.0, 0.0)
-    shift_m: tuple[float, ...] = (0.0, 0.0, 0.0)
+    errors: dict[str, ArrayLike] = field(default_factory=dict)
     crosstalk_per_N: float = 0.0
     in_flange: tuple[str, ...] = ()
     mount: str = "pull"
@@ -162,7 +161,7 @@ class LoadCell:
 
     def _in_base(self, name: str, flange_rotation: np.ndarray) -> np.ndarray:
         """An error in base axes, (S, 3)."""
-        error = np.array({"turn": self.turn_rad, "bias": self.bias_N, "shift": self.shift_m}[name])
+        error = np.array(self.errors.get(name, (0.0, 0.0, 0.0)))
         return flange_rotation @ error if name in self.in_flange else np.tile(error, (len(flange_rotation), 1))
 
 
@@ -188,11 +187,6 @@ class Schedule:
     time_s: np.ndarray
     training: np.ndarray
     seed: int
-
-    @property
-    def shown_wrench(self) -> np.ndarray:
-        """What the campaign says of the load, (S, 6), N, N m."""
-        return np.concatenate([self.force, np.cross(self.lever, self.force)], axis=1)
 
 
 # What a drive errs by, (S,), rad, by what was done.
@@ -245,8 +239,8 @@ def specimen(arm: Arm, seed: int, weighs: bool = True, off_line_m: float = 0.0) 
     """
     compliance = arm.compliance * stream(seed, "specimen").uniform(1.0 - _SPREAD, 1.0 + _SPREAD, arm.joints)
     draws = stream(seed, "weights"), stream(seed, "centres off the line")
-    masses = true_masses(arm, draws[0], off_line_m, draws[1]) if weighs else []
-    return PhysicalRobot(arm, compliance, Structure(masses=on_stretches(masses, arm), gravity_m_s2=arm.gravity_m_s2))
+    masses = true_masses(arm, draws[0], off_line_m, draws[1]) if weighs else ()
+    return PhysicalRobot(arm, compliance, Structure(masses=masses, gravity_m_s2=arm.gravity_m_s2))
 
 
 def seen_poses(robot: PhysicalRobot, schedule: Schedule, start: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
