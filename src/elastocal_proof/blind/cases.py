@@ -8,11 +8,12 @@ contents of config/blind.yaml.
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from itertools import combinations, product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -24,11 +25,8 @@ from elastocal_proof.plant.machine import usual_gravity_torque
 from elastocal_proof.plant.physical_robot import PhysicalRobot, Tracker, misplaced_base, specimen, stream
 from elastocal_proof.plant.sizing import Yardstick, size_for
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    Plan = Mapping[str, Any]
-    Sized = tuple[Defect, dict[str, Any]]
+Plan = Mapping[str, Any]
+Sized = tuple[Defect, dict[str, Any]]
 
 PROOF, TUNED = "proof", "tuned"
 NAMED = tuple(sorted(kind for kind in KINDS if not kind.startswith(OUTSIDE)))

@@ -40,16 +40,7 @@ from elastocal.validation.conformity import predicted_conformity
 from elastocal_proof.blind import schemas
 from elastocal_proof.blind.folders import write_blind_campaign
 from elastocal_proof.blind.rehearsal import ERRORS_OF_GEOMETRY, bow, hidden_robot, reached, with_misplaced_base
-from elastocal_proof.plant.campaigns import (
-    HELD_POINT,
-    ZEROS,
-    Design,
-    Slip,
-    Table,
-    schedule_of,
-    usual_force_N,
-    with_bad_rows,
-)
+from elastocal_proof.plant.campaigns import Design, Slip, Table, schedule_of, usual_force_N, with_bad_rows
 from elastocal_proof.plant.kinds import KINDS
 from elastocal_proof.plant.physical_robot import stream
 
@@ -146,7 +137,7 @@ def measure(robot_file: Path, effect: str, seed: int, frame: str = "base", slips
     schedule = schedule_of(plant.arm, design, seed)
 
     def lost(table: Table) -> tuple[Table, list[Slip]]:
-        kind, fitted = str(draws.choice([ZEROS, HELD_POINT])), design.poses - design.held_out
+        kind, fitted = str(draws.choice(["zeros", "held_point"])), design.poses - design.held_out
         tries = iter(lambda: with_bad_rows(table, plant, schedule, kind, 1, draws), None)
         return next((bad, slip) for bad, slip in tries if table["pose"][slip[0]["rows"][0]] < fitted)
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -17,15 +18,11 @@ from elastocal.campaigns.writing import write_campaign
 from elastocal.errors import InputError
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.json_files import read_json
+from elastocal_proof.plant.arm import Arm, LinkMass
 from elastocal_proof.plant.campaigns import Design, Slip, Table, measured_table
+from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
-
-    from elastocal_proof.plant.arm import Arm, LinkMass
-    from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule
-
-    Slipped = Callable[[Table], tuple[Table, list[Slip]]]
+Slipped = Callable[[Table], tuple[Table, list[Slip]]]
 
 ROBOT_FILE = "robot.yaml"
 

@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.application.calibrated import nominal_forward
 from elastocal.application.inverse_kinematics import SOLVED_M, find_beyond_limits, refine
+from elastocal.campaigns.reading import read_robot
 from elastocal.campaigns.tables import LARGEST_BYTES
 from elastocal.errors import InputError
 from elastocal.exchange.target_path import read_target_path
@@ -51,7 +52,7 @@ def hidden_robot(robot_file: str | Path, seed: int, effects: Sequence[str] = ())
     `effects`: keys of `KINDS`, each at a joint that is drawn; one that is drawn by default. Raises `InputError`: an effect that
     this arm cannot have.
     """
-    arm = arm_from_file(robot_file)
+    declared, arm = read_robot(robot_file), arm_from_file(robot_file)
     possible = sorted(
         name
         for name, kind in KINDS.items()
@@ -61,7 +62,7 @@ def hidden_robot(robot_file: str | Path, seed: int, effects: Sequence[str] = ())
         if name not in possible:
             raise InputError("rehearsal", "effects", repr(name), ", ".join(possible))
     # Nobody's catalogue offers a compensator to an arm whose file has none.
-    if "compensator:" not in Path(robot_file).read_text(encoding="utf-8"):
+    if declared.compensator is None:
         possible = [name for name in possible if name not in _COMPENSATORS]
     chosen, draws = tuple(effects), stream(seed, "errors of geometry")
     if not chosen:

@@ -5,7 +5,8 @@ Everything is counted from these rows, by the figures of the plan; see `summary`
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -15,15 +16,10 @@ from statsmodels.stats.proportion import proportion_confint
 
 from elastocal.diagnosis.verdict import ADEQUATE, CLASS, NAMED, NOT_TESTABLE, SEVERAL
 from elastocal.effects.protocol import effect_of
-from elastocal_proof.blind.cases import PROOF, TUNED, absent_on
+from elastocal_proof.blind.cases import PROOF, TUNED, Plan, absent_on
 from elastocal_proof.plant.kinds import OUTSIDE
 
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping, Sequence
-
-    from elastocal_proof.blind.cases import Plan
-
-    Document = Mapping[str, Any]
+Document = Mapping[str, Any]
 
 NONE = "none"
 # What a diagnosis calls mechanisms that the catalogue does not have.

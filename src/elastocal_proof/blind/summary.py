@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -11,17 +12,12 @@ from scipy.stats import bootstrap
 from elastocal.io.data_frames import write_csv
 from elastocal.io.json_files import read_json
 from elastocal.random_streams import stream
-from elastocal_proof.blind.cases import PROOF, TUNED
+from elastocal_proof.blind.cases import PROOF, TUNED, Plan
 from elastocal_proof.blind.folders import load_ground_truth
 from elastocal_proof.blind.scores import intervals_of, leading, rate, score
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
-
-    from elastocal_proof.blind.cases import Plan
-
-    Tables = Mapping[str, pd.DataFrame]
-    Figure = Mapping[str, Any]
+Tables = Mapping[str, pd.DataFrame]
+Figure = Mapping[str, Any]
 
 _RESAMPLES, _SEVERAL_AT_ONCE = 2000, 200
 # Held-out errors this near to the oracle's count as its own.

@@ -41,8 +41,6 @@ _PANELS = {
 _SHARES = LinearSegmentedColormap.from_list("shares", ["#ffffff", "#c6dbef", "#4292c6", "#08519c"])
 _LEAST_WRITTEN = 0.045
 _ALL = "all"
-
-
 _MODELS = {
     "uncorrected": "uncorrected",
     "geometry": "geometry alone",

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pandas as pd
 
@@ -11,15 +12,10 @@ from elastocal.counting import counted, grouped
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.documents import read_document
 from elastocal.report.words import plain
-from elastocal_proof.blind.cases import PROOF
+from elastocal_proof.blind.cases import PROOF, Plan
 from elastocal_proof.blind.scores import leading
 from elastocal_proof.blind.summary import BY_THE_BEST, OVER_THE_BEST, of_each_robot, rows_of, with_target
 from elastocal_proof.league.table import markdown
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from elastocal_proof.blind.cases import Plan
 
 _ABSENT = "–"
 _OUTCOMES = {"True": "reached", "False": "missed"}
