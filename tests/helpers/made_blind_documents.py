@@ -20,7 +20,7 @@ def truth(*places, group=None, level=50.0, robot="irb7600", setting="usual", **c
             "joints": list(joints),
             "of": "retained",
             "share_of_plausible": 0.5,
-            "signal": {"raw": 4 * level, "retained": level, "rms_m": 6e-5, "rms_rad": 6e-5},
+            "signal": {"raw": 4 * level, "retained": level},
             "parameters": {},
         }
         for effect, *joints in places

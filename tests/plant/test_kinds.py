@@ -22,7 +22,7 @@ def test_a_defect_of_no_size_leaves_the_robot_as_it_was_and_a_plausible_one_does
     defect = drawn_defect(kind, fanuc_specimen.arm, 3)
     tiny = replace(defect, size=1e-9 * defect.size)
     small, signal = (yardstick.signal(with_defects(fanuc_specimen, [each])) for each in (tiny, defect))
-    assert small["rms_m"] < 1e-9 and signal["raw"] > 0.1 and 0 <= signal["retained"] <= signal["raw"] * (1 + 1e-9)
+    assert small["raw"] < 1e-9 and signal["raw"] > 0.1 and 0 <= signal["retained"] <= signal["raw"] * (1 + 1e-9)
 
 
 def test_weight_is_of_the_upper_arm_of_the_forearm_or_of_all_links_by_the_joints_that_it_turns(fanuc_arm):

@@ -98,7 +98,7 @@ def test_an_arm_with_everything_is_in_equilibrium_by_mujocos_inverse_dynamics(ar
 
 
 def test_an_arm_that_finds_no_rest_is_an_error():
-    signs, loading = cycle([0.01, -0.01]), (np.zeros((1, 1)), np.zeros((1, 6)), np.zeros((1, 2)))
+    signs, loading = cycle([0.01, -0.01]), (np.zeros((1, 1)), lambda facing: np.zeros((1, 6)), np.zeros((1, 2)))
     with pytest.raises(RuntimeError, match=r"^no equilibrium after 60 sweeps: the last moved by 0\.02$"):
         equilibrium(machine_of(LEVER, Structure()), *loading, lambda torque, _: 0 * torque + next(signs))
 

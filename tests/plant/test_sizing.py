@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from elastocal_proof.blind.cases import size_for
 from elastocal_proof.plant.campaigns import Design, schedule_of
 from elastocal_proof.plant.kinds import KINDS, Defect, drawn_defect, with_defects
 from elastocal_proof.plant.physical_robot import Motion
-from elastocal_proof.plant.sizing import Yardstick, size_for
+from elastocal_proof.plant.sizing import Yardstick
 
 
 @pytest.mark.parametrize("target", [10.0, 200.0])

@@ -8,7 +8,7 @@ contents of config/blind.yaml.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from itertools import combinations, product
@@ -19,11 +19,11 @@ import numpy as np
 
 from elastocal_proof.blind.folders import write_blind_campaign, write_truth
 from elastocal_proof.plant.arm import Arm, LinkMass, arm_from_file
-from elastocal_proof.plant.campaigns import Design, Slip, Table, possible_kinds, schedule_of, with_bad_rows
+from elastocal_proof.plant.campaigns import LOAD, SLIPS, Design, Slip, Table, schedule_of, with_bad_rows
 from elastocal_proof.plant.kinds import KINDS, OUTSIDE, Defect, drawn_defect, with_defects
 from elastocal_proof.plant.machine import usual_gravity_torque
 from elastocal_proof.plant.physical_robot import PhysicalRobot, Tracker, misplaced_base, specimen, stream
-from elastocal_proof.plant.sizing import Yardstick, size_for
+from elastocal_proof.plant.sizing import Yardstick
 
 Plan = Mapping[str, Any]
 Sized = tuple[Defect, dict[str, Any]]
@@ -50,7 +50,7 @@ _LEVELS, _FAR_LEVELS, _PAIR_LEVELS = (25.0, 50.0, 200.0), (200.0,), (50.0, 200.0
 _MIDDLE, _HIGH = 50.0, 200.0
 # A stand that is knocked moves by a millimetre rather than by what can just be seen, and nobody's arm weighs a few kilograms.
 _KNOCKED, _HEAVY = 1e5, 1e6
-_DRAWS = 8
+_DRAWS, _ROUNDS = 8, 12
 # Times the plausible size.
 _IMPLAUSIBLE = 3.0
 
@@ -249,6 +249,42 @@ def _first_plausible(
     return None if least is None else _stated(yardstick, robot, least[1], level, quantity, least[2])
 
 
+def size_for(
+    yardstick: Yardstick,
+    robot_of_size: Callable[[float], PhysicalRobot],
+    start: float,
+    target: float,
+    quantity: str = "retained",
+    largest: float = np.inf,
+) -> float:
+    """Size of a defect at which its non-centrality, "retained" or "raw", is the target to one per cent.
+
+    `robot_of_size`: robot with the defect of a given size. Raises `ValueError`: no size up to the largest has it: the defect is
+    absorbed whatever its size, saturates, or would be larger than allowed.
+
+    The non-centrality of a linear effect grows with the square of its size; the secant of the logarithms allows for others.
+    """
+    size, exponent = float(start), 2.0
+    last: tuple[float, float] | None = None
+    for _ in range(_ROUNDS):
+        signal = yardstick.signal(robot_of_size(size))
+        value = signal[quantity]
+        # What is absorbed leaves rounding and second order, a millionth of the raw signal.
+        if value <= 1e-6 * signal["raw"] or not np.isfinite(value):
+            break
+        if abs(value / target - 1.0) < 0.01:
+            return size
+        if last is not None and last[0] != size:
+            slope = np.log(value / last[1]) / np.log(size / last[0])
+            exponent = slope if 0.3 < slope < 8.0 else 2.0
+        last = (size, value)
+        size = min(largest, size * float(np.clip((target / value) ** (1.0 / exponent), 0.02, 50.0)))
+        if size == last[0]:
+            break
+    found = f"{value:.3g} of {signal['raw']:.3g} raw at {size:.3g}"
+    raise ValueError(f"no size found for a {quantity} non-centrality of {target:g}: {found}")
+
+
 def _stated(
     yardstick: Yardstick, robot: PhysicalRobot, defects: list[Defect], level: float, quantity: str, draw: int
 ) -> list[Sized]:
@@ -276,7 +312,8 @@ def make_case(case: Case, blind_folder: str | Path, sealed_folder: str | Path, r
     def slipped(table: Table) -> tuple[Table, list[Slip]]:
         """One to so many bad rows, of one kind."""
         draws = stream(case.seed, "bad rows")
-        kind, count = str(draws.choice(possible_kinds(table))), int(draws.integers(1, case.changes["bad_rows"] + 1))
+        possible = [kind for kind in SLIPS if kind != LOAD or table["load"].any()]
+        kind, count = str(draws.choice(possible)), int(draws.integers(1, case.changes["bad_rows"] + 1))
         return with_bad_rows(table, bad, schedule, kind, count, draws)
 
     file, slips = case.robot_file(robots_folder), slipped if "bad_rows" in case.changes else None

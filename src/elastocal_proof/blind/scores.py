@@ -142,7 +142,6 @@ def _size(truth: Document) -> dict[str, Any]:
         "absorbed": by_raw or [defect["effect"] for defect in defects] == [_SCALE],
         "raw": sum(defect["signal"]["raw"] for defect in defects),
         "retained": sum(defect["signal"]["retained"] for defect in defects),
-        "signal_rms_m": float(np.linalg.norm([defect["signal"]["rms_m"] for defect in defects])),
     }
 
 

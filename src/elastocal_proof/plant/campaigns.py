@@ -9,7 +9,7 @@ import numpy as np
 
 from elastocal_proof.plant.arm import Arm, rotation_vector, turned
 from elastocal_proof.plant.laws import direction, sign
-from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, logged_temperature, read_poses, seen_poses, stream
+from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, logged_temperature, seen_poses, stream
 
 Table = dict[str, np.ndarray]
 # Its kind, and of the table, from 0, the rows in which something wrong stands.
@@ -105,7 +105,7 @@ def schedule_of(arm: Arm, design: Design, seed: int) -> Schedule:
 
 def measured_table(robot: PhysicalRobot, design: Design, schedule: Schedule) -> Table:
     """Columns of the file of measurements (rows,)."""
-    position, rotation = read_poses(robot, schedule)
+    position, rotation = robot.tracker.read(*seen_poses(robot, schedule), stream(schedule.seed, "readings"))
     if design.frame == "tracker":
         position, rotation = robot.tracker.in_own_frame(position, rotation)
     points = design.points or robot.arm.points
@@ -128,18 +128,12 @@ def measured_table(robot: PhysicalRobot, design: Design, schedule: Schedule) -> 
     return {name: column + 0.0 if column.dtype.kind == "f" else column for name, column in table.items()}
 
 
-def possible_kinds(table: Table) -> tuple[str, ...]:
-    """Of `SLIPS`: without orientations none can be wrong, without loads no load."""
-    absent = {ROTATION: "rx" not in table, LOAD: not table["load"].any()}
-    return tuple(kind for kind in SLIPS if not absent.get(kind, False))
-
-
 def with_bad_rows(
     table: Table, robot: PhysicalRobot, schedule: Schedule, kind: str, count: int, draws: np.random.Generator
 ) -> tuple[Table, list[Slip]]:
     """A measured table in which some rows, of different poses, are wrong; of swapped ones always two.
 
-    `table`: as `measured_table` gives it for this robot and schedule. `kind`: of `possible_kinds`.
+    `table`: as `measured_table` gives it for this robot and schedule. `kind`: of `SLIPS`, and of what the table has.
     """
     some = np.flatnonzero(table["load"]) if kind == LOAD else np.arange(kind == HELD_POINT, len(table["pose"]))
     mixed = draws.permutation(some)

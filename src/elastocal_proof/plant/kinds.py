@@ -15,7 +15,7 @@ import numpy as np
 
 from elastocal_proof.plant import laws
 from elastocal_proof.plant.arm import Arm
-from elastocal_proof.plant.machine import long_links, turned_by, weighing_links
+from elastocal_proof.plant.machine import long_links, weighing_links
 from elastocal_proof.plant.physical_robot import PhysicalRobot, stream
 
 OUTSIDE = "outside:"
@@ -63,18 +63,13 @@ def _shoulder(arm: Arm) -> list[Location]:
     return [(2,)] if arm.compensated else []
 
 
-def _weighed(arm: Arm) -> list[Location]:
-    """Joints that the upper arm turns, the forearm, and all links."""
-    return list(dict.fromkeys([*weighing_links(arm), turned_by(arm, arm.masses)]))
-
-
 _SOFT, _LOAD = (1.0, 0.0), (0.0, 1.0)
 KINDS: dict[str, Kind] = {
     "joint_offset": Kind("rad", 3e-4, _joints(1), laws.joint_offset),
     "link_geometry": Kind("m", 3e-4, _joints(1), laws.link_geometry),
     # A wrong wavelength, at which the frame of the base was measured too.
     "tracker_scale": Kind("1", 2e-5, _nowhere, partial(laws.misread, "tracker", "scale")),
-    "link_weight": Kind("kg", 100.0, _weighed, laws.link_weight, scale=_LOAD),
+    "link_weight": Kind("kg", 100.0, lambda arm: [*weighing_links(arm)], laws.link_weight, scale=_LOAD),
     "declared_masses": Kind("1", 0.3, _nowhere, laws.heavier_than_declared),
     "payload": Kind("kg", 25.0, _nowhere, laws.payload, scale=_LOAD),
     "compensator_torque": Kind("N/m", 1e5, _shoulder, laws.compensator_torque),

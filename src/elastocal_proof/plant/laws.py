@@ -44,6 +44,11 @@ def geared(robot: PhysicalRobot, joint: int, law: Callable[[Schedule, np.ndarray
     return added(robot, "gears", (joint, lambda done, torque, _: law(done, torque[:, joint])))
 
 
+def angled(robot: PhysicalRobot, joint: int, law: Callable[[np.ndarray], np.ndarray]) -> PhysicalRobot:
+    """With an error of this joint's drive by the angles of all joints."""
+    return added(robot, "drives", (joint, lambda done: law(done.angle)))
+
+
 def direction(draws: Draws) -> np.ndarray:
     vector = draws.standard_normal(3)
     return vector / np.linalg.norm(vector)
@@ -119,11 +124,7 @@ def compensator_torque(robot: PhysicalRobot, size: float, draws: Draws, joint: i
 
 def waving(robot: PhysicalRobot, joint: int, orders: Sequence[float], sizes: Sequence[float], phases: np.ndarray) -> Applied:
     """Teeth and eccentric wheels: the sum of sizes sin(orders q + phases); orders need not be whole."""
-
-    def turn(done: Schedule) -> np.ndarray:
-        return np.sin(np.outer(done.angle[:, joint], orders) + phases) @ np.array(sizes)
-
-    return added(robot, "drives", (joint, turn)), {}
+    return angled(robot, joint, lambda q: np.sin(np.outer(q[:, joint], orders) + phases) @ np.array(sizes)), {}
 
 
 def transmission_harmonic(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
@@ -153,7 +154,7 @@ def transmission_ratio(robot: PhysicalRobot, size: float, draws: Draws, joint: i
     """Of the joint's own ratio, or what the joint before it turns along."""
     of = joint if joint == 0 else joint - int(draws.integers(2))
     size = size * sign(draws)
-    return added(robot, "drives", (joint, lambda done: size * done.angle[:, of])), {f"per_q{of + 1}": size}
+    return angled(robot, joint, lambda q: size * q[:, of]), {f"per_q{of + 1}": size}
 
 
 def bearing_runout(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
@@ -175,17 +176,13 @@ def bearing_runout(robot: PhysicalRobot, size: float, draws: Draws, joint: int) 
 def cable_pull(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
     """A hose wound by its joint and the one before pulls in proportion to the product of the two angles."""
     size = size * sign(draws)
-    return added(robot, "drives", (joint, lambda done: size * done.angle[:, joint - 1] * done.angle[:, joint])), {}
+    return angled(robot, joint, lambda q: size * q[:, joint - 1] * q[:, joint]), {}
 
 
 def two_angles(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
     """A gear whose wave goes once round as its own joint and the one behind it turn, in step or against each other."""
     sense, phase = sign(draws), draws.uniform(0, TURN)
-
-    def turn(done: Schedule) -> np.ndarray:
-        return size * np.sin(done.angle[:, joint] + sense * done.angle[:, joint + 1] + phase)
-
-    return added(robot, "drives", (joint, turn)), {}
+    return angled(robot, joint, lambda q: size * np.sin(q[:, joint] + sense * q[:, joint + 1] + phase)), {}
 
 
 def slipping_zero(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:

@@ -279,7 +279,7 @@ def machine_of(arm: Arm, structure: Structure) -> Machine:
 def equilibrium(
     machine: Machine,
     drive: np.ndarray,
-    wrench: np.ndarray,
+    felt: Callable[[np.ndarray], np.ndarray],
     growth: np.ndarray,
     gear_deflection: Callable[[np.ndarray, np.ndarray], np.ndarray],
     laws: Iterable[tuple[str, Callable[[np.ndarray], np.ndarray]]] = (),
@@ -290,8 +290,9 @@ def equilibrium(
     Returns coordinates (S, coordinates), rad, m; generalized forces that their springs transmit, the same, N m, N; positions
     (S, points, 3), m, and rotations (S, points, 3, 3) of the measuring points, base frame.
 
-    `drive` (S, n): angles at which the drives really stand, rad. `wrench` (S, 6): that the flange really feels, at its
-    deflected origin, base axes; N, N m. `growth` (S, n + 1): relative growth of all lengths of each stretch. `gear_deflection`:
+    `drive` (S, n): angles at which the drives really stand, rad. `felt`: wrench (S, 6) that the flange really feels, at its
+    deflected origin, base axes, N, N m, by its rotations (S, 3, 3) before anything yields. `growth` (S, n + 1): relative growth
+    of all lengths of each stretch. `gear_deflection`:
     of the torques on the gears now and before the wrench came on, (S, n), N m: their deflections (S, n), rad. `laws`: starts of
     the names of structural springs, and what they yield beyond their compliance under a force (S,). `start` (S, n): deflections
     of the gears to begin with, such as those of a robot that differs little.
@@ -304,7 +305,8 @@ def equilibrium(
     beyond = [(index, law) for start, law in laws for name, index in machine.springs.items() if name.startswith(start)]
     coordinates = np.zeros((len(drive), machine.model.nq))
     coordinates[:, machine.drive] = drive
-    unloaded = machine.forces(coordinates, growth)[0][:, gear]
+    unloaded, _, facing = machine.forces(coordinates, growth)
+    unloaded, wrench = unloaded[:, gear], felt(facing[:, -1])
     if start is not None:
         coordinates[:, gear] = start
     for _ in range(_SWEEPS):
@@ -334,23 +336,23 @@ def usual_gravity_torque(arm: Arm, masses: Iterable[LinkMass], gravity_m_s2: tup
     return np.sqrt((torque**2).mean(axis=0))
 
 
-def turned_by(arm: Arm, masses: Iterable[LinkMass]) -> tuple[int, ...]:
-    """Joints, from 1, that weights turn where the arm stands upright."""
-    torque = usual_gravity_torque(arm, masses, (0.0, 0.0, -standard_gravity))
-    return tuple(int(joint) + 1 for joint in np.flatnonzero(torque > _NO_TORQUE * torque.max()))
-
-
 def long_links(arm: Arm) -> list[int]:
     """Links that are long enough to bend."""
     return [link for link in range(1, arm.joints + 1) if arm.lengths_m[link] > _SHORTEST_LINK_M]
 
 
-def weighing_links(arm: Arm) -> dict[tuple[int, ...], int]:
-    """The upper arm and the forearm by the joints that their weight turns."""
-    found: dict[tuple[int, ...], int] = {}
+def weighing_links(arm: Arm) -> dict[tuple[int, ...], int | None]:
+    """The upper arm, the forearm, and None for all links, by the joints, from 1, that they turn on an upright arm."""
+
+    def turned_by(*masses: LinkMass) -> tuple[int, ...]:
+        torque = usual_gravity_torque(arm, masses, (0.0, 0.0, -standard_gravity))
+        return tuple(int(joint) + 1 for joint in np.flatnonzero(torque > _NO_TORQUE * torque.max()))
+
+    found: dict[tuple[int, ...], int | None] = {}
     for link in long_links(arm):
-        joints = turned_by(arm, [LinkMass(link, 1.0, tuple(0.5 * arm.stretches[link].vector_m))])
+        joints = turned_by(LinkMass(link, 1.0, tuple(0.5 * arm.stretches[link].vector_m)))
         # Of links that turn the same joints the first counts, and of all links two: the hand's weight is like a tool's.
         if joints and joints[-1] == link and len(found) < 2:
             found[joints] = link
+    found.setdefault(turned_by(*arm.masses), None)
     return found

@@ -39,11 +39,6 @@ class Motion:
     turn_rad: tuple[float, ...]
     course: Callable[[np.ndarray], np.ndarray] = np.ones_like
 
-    def moved(self, time_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Shift (S, 3) in m and rotation (S, 3, 3) of the measurements at times (S,)."""
-        course = self.course(np.asarray(time_s, float))[:, None]
-        return course * np.array(self.shift_m), turned(course * np.array(self.turn_rad))
-
 
 def misplaced_base(seed: int) -> Motion:
     """A base frame that was found badly: tilted by about 0.3 mrad and shifted by about 0.2 mm, all measurements alike."""
@@ -93,8 +88,9 @@ class Tracker:
         position = (1.0 + self.scale) * position + self.refraction_per_m * far * sight
         for motion, about in ((self.drift, base), (self.move, stand), (self.misplaced, base)):
             if motion is not None:
-                shift, turn = motion.moved(time_s)
-                position = np.einsum("sij,stj->sti", turn, position - about) + about + shift[:, None]
+                course = motion.course(time_s)[:, None]
+                turn = turned(course * np.array(motion.turn_rad))
+                position = np.einsum("sij,stj->sti", turn, position - about) + about + (course * motion.shift_m)[:, None]
                 rotation = turn[:, None] @ rotation
         return position, rotation
 
@@ -252,23 +248,12 @@ def seen_poses(robot: PhysicalRobot, schedule: Schedule, start: np.ndarray | Non
     return robot.tracker.seen(position, rotation, schedule.time_s, schedule.angle[:, -1])
 
 
-def read_poses(robot: PhysicalRobot, schedule: Schedule, start: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """The same with the noise of the robot's tracker, alike whenever they are asked for."""
-    return robot.tracker.read(*seen_poses(robot, schedule, start), stream(schedule.seed, "readings"))
-
-
 def at_rest(
     robot: PhysicalRobot, schedule: Schedule, start: np.ndarray | None = None
 ) -> tuple[Machine, tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
     """The arm, and its equilibrium as of `machine.equilibrium`; arguments as of `seen_poses`."""
-    machine, drive = machine_of(robot.arm, robot.structure), driven(robot, schedule)
+    machine, felt = machine_of(robot.arm, robot.structure), partial(robot.cell.felt, schedule.force, schedule.lever)
     growth = warmth_of_castings(schedule.time_s)[:, None] * np.linspace(*robot.expansion_per_K, robot.arm.joints + 1)
-    facing = np.broadcast_to(np.eye(3), (len(drive), 3, 3))
-    if robot.cell.in_flange:
-        coordinates = np.zeros((len(drive), machine.model.nq))
-        coordinates[:, machine.drive] = drive
-        facing = machine.forces(coordinates, growth)[2][:, -1]
-    wrench = robot.cell.felt(schedule.force, schedule.lever, facing)
 
     def gear_deflection(torque: np.ndarray, unloaded: np.ndarray) -> np.ndarray:
         turn = robot.compliance * torque
@@ -277,7 +262,7 @@ def at_rest(
         return turn
 
     springs = [(name, partial(law, schedule)) for name, law in robot.springs]
-    return machine, equilibrium(machine, drive, wrench, growth, gear_deflection, springs, start)
+    return machine, equilibrium(machine, driven(robot, schedule), felt, growth, gear_deflection, springs, start)
 
 
 def driven(robot: PhysicalRobot, schedule: Schedule) -> np.ndarray:

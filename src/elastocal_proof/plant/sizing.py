@@ -1,4 +1,4 @@
-"""How large a defect is to the eye of a tracker, and how large it must be to have a given non-centrality.
+"""How large a defect is to the eye of a tracker: its non-centrality.
 
 With d the change that a defect makes in the measurements, noise free, of the poses that are not held out, in standard
 deviations, the raw non-centrality is |d|^2. What the declared model cannot absorb by other compliances X of its joints (and,
@@ -11,16 +11,15 @@ min over b, w of |d - X b - V w|^2 + |w|^2: the weights come in as prior informa
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
 
 from elastocal_proof.plant.arm import LinkMass, rotation_vector
 from elastocal_proof.plant.machine import Machine
-from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, at_rest, read_poses, seen_poses
+from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, at_rest, seen_poses, stream
 
-_ROUNDS = 12
 # Width of a link over the reach of the arm: within it centres of mass lie anywhere, as far as an analyst knows.
 _WIDTH_OF_REACH = 0.1
 
@@ -62,29 +61,22 @@ class Yardstick:
 
         Both in standard deviations; the last entries of the second are the weights, in theirs, that absorb the rest.
         """
-        seen = self._flat(self._apart(*seen_poses(robot, self.schedule, self._start)))
+        seen = self._change(*seen_poses(robot, self.schedule, self._start))
         return seen, self._left(seen)
 
     def residual(self, robot: PhysicalRobot) -> np.ndarray:
         """What cannot be absorbed of a robot's measurements with the noise that they have in its campaign."""
-        return self._left(self._flat(self._apart(*read_poses(robot, self.schedule, self._start))))
+        seen, draws = seen_poses(robot, self.schedule, self._start), stream(self.schedule.seed, "readings")
+        return self._left(self._change(*robot.tracker.read(*seen, draws)))
 
     def signal(self, robot: PhysicalRobot) -> dict[str, float]:
-        """How a robot differs from the faultless one.
+        """Non-centralities of a robot's change before and after absorption, ``raw`` and ``retained``."""
+        seen, left = self.seen_and_left(robot)
+        return {"raw": float(seen @ seen), "retained": float(left @ left)}
 
-        Non-centralities before and after absorption, ``raw`` and ``retained``, and RMS lengths of the changes of position and
-        orientation, ``rms_m`` and ``rms_rad``.
-        """
-        apart = self._apart(*seen_poses(robot, self.schedule, self._start))
-        seen = self._flat(apart)
-        left = self._left(seen)
-        rms = [float(np.sqrt((part**2).sum(axis=-1).mean())) for part in np.split(apart, 2, axis=-1)]
-        return {"raw": float(seen @ seen), "retained": float(left @ left), "rms_m": rms[0], "rms_rad": rms[1]}
-
-    def _apart(self, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
-        """Difference of poses of all points to those of the faultless robot, (S, targets, 6), m and rad."""
+    def _change(self, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
         turns = rotation_vector(rotation @ np.swapaxes(self.poses[1], -1, -2))
-        return np.concatenate([position - self.poses[0], turns], axis=-1)
+        return self._flat(np.concatenate([position - self.poses[0], turns], axis=-1))
 
     def _flat(self, apart: np.ndarray) -> np.ndarray:
         """Changes (S, targets, 6) as the analysis counts them: in standard deviations, of the poses that are not held out."""
@@ -122,39 +114,3 @@ def _responses(
             moments = np.cross(axes.T, weight) * mass.centre_std_m(_WIDTH_OF_REACH * robot.arm.reach_m)
             torques[number, 1:, state] = moments @ turn[:, gear]
     return jacobian, [*torques.reshape(-1, count, len(gear))]
-
-
-def size_for(
-    yardstick: Yardstick,
-    robot_of_size: Callable[[float], PhysicalRobot],
-    start: float,
-    target: float,
-    quantity: str = "retained",
-    largest: float = np.inf,
-) -> float:
-    """Size of a defect at which its non-centrality, "retained" or "raw", is the target to one per cent.
-
-    `robot_of_size`: robot with the defect of a given size. Raises `ValueError`: no size up to the largest has it: the defect is
-    absorbed whatever its size, saturates, or would be larger than allowed.
-
-    The non-centrality of a linear effect grows with the square of its size; the secant of the logarithms allows for others.
-    """
-    size, exponent = float(start), 2.0
-    last: tuple[float, float] | None = None
-    for _ in range(_ROUNDS):
-        signal = yardstick.signal(robot_of_size(size))
-        value = signal[quantity]
-        # What is absorbed leaves rounding and second order, a millionth of the raw signal.
-        if value <= 1e-6 * signal["raw"] or not np.isfinite(value):
-            break
-        if abs(value / target - 1.0) < 0.01:
-            return size
-        if last is not None and last[0] != size:
-            slope = np.log(value / last[1]) / np.log(size / last[0])
-            exponent = slope if 0.3 < slope < 8.0 else 2.0
-        last = (size, value)
-        size = min(largest, size * float(np.clip((target / value) ** (1.0 / exponent), 0.02, 50.0)))
-        if size == last[0]:
-            break
-    found = f"{value:.3g} of {signal['raw']:.3g} raw at {size:.3g}"
-    raise ValueError(f"no size found for a {quantity} non-centrality of {target:g}: {found}")
