@@ -26,7 +26,15 @@ def truth(*places, group=None, level=50.0, robot="irb7600", setting="usual", **c
         for effect, *joints in places
     ]
     effects = [effect for effect, *_ in places]
-    case = {"group": group, "robot": robot, "setting": setting, "effects": effects, "levels": [level] * len(defects)}
+    robots = "tuned" if robot in PLAN["tuned"] else "proof"
+    case = {
+        "group": group,
+        "robot": robot,
+        "robots": robots,
+        "setting": setting,
+        "effects": effects,
+        "levels": [level] * len(defects),
+    }
     return {
         "campaign": "case_x",
         "case": case,

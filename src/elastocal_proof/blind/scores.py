@@ -16,7 +16,7 @@ from statsmodels.stats.proportion import proportion_confint
 
 from elastocal.diagnosis.verdict import ADEQUATE, CLASS, NAMED, NOT_TESTABLE, SEVERAL
 from elastocal.effects.protocol import effect_of
-from elastocal_proof.blind.cases import PROOF, TUNED, Plan, absent_on
+from elastocal_proof.blind.cases import Plan, absent_on
 from elastocal_proof.plant.kinds import OUTSIDE
 
 Document = Mapping[str, Any]
@@ -56,16 +56,6 @@ def rate(hits: Iterable[bool]) -> dict[str, float]:
     return {"hits": count, "cases": cases, "rate": share, "low": low, "high": high}
 
 
-def leading(kinds: Iterable[str]) -> str:
-    """Which kind of robots a figure shows: that of the proof, or where there is none the one that was tuned on."""
-    return PROOF if PROOF in set(kinds) else TUNED
-
-
-def robots_of(plan: Plan, case: Document) -> str:
-    """Kind of robots to which the robot of a case belongs."""
-    return TUNED if case["robot"] in plan["tuned"] else PROOF
-
-
 def score(
     plan: Plan, truth: Document, verdict: Document, oracle: Document | None = None, limit: Document | None = None
 ) -> dict[str, Any]:
@@ -91,7 +81,7 @@ def score(
             "case": truth["campaign"],
             "group": case["group"],
             "robot": case["robot"],
-            "robots": robots_of(plan, case),
+            "robots": case["robots"],
             "setting": case["setting"],
             "truth": " + ".join(true) or NONE,
             "level": max(case["levels"], default=0.0),
@@ -209,7 +199,7 @@ def intervals_of(plan: Plan, truth: Document, verdict: Document) -> list[dict[st
         for effect in verdict["effects"]:
             if effect["name"] == defect["effect"]:
                 values += _comparable(defect, effect)
-    head: dict[str, Any] = {"robots": robots_of(plan, case), "truth": " + ".join(case["effects"]) or NONE}
+    head: dict[str, Any] = {"truth": " + ".join(case["effects"]) or NONE}
     head |= {"foreign": any(effect.startswith(OUTSIDE) for effect in case["effects"])}
     head |= {"level": max(case["levels"], default=0.0)}
     return [

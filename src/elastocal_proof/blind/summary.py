@@ -14,7 +14,7 @@ from elastocal.io.json_files import read_json
 from elastocal.random_streams import stream
 from elastocal_proof.blind.cases import PROOF, TUNED, Plan
 from elastocal_proof.blind.folders import load_ground_truth
-from elastocal_proof.blind.scores import intervals_of, leading, rate, score
+from elastocal_proof.blind.scores import intervals_of, rate, score
 
 Tables = Mapping[str, pd.DataFrame]
 Figure = Mapping[str, Any]
@@ -24,7 +24,7 @@ _RESAMPLES, _SEVERAL_AT_ONCE = 2000, 200
 WITHIN = 1.05
 _BINS = 10
 BY_THE_BEST, OVER_THE_BEST = ", by the best analyst", ", over the best analyst's, on the same cases"
-_RELIABILITY = ["robots", "group", "from", "to", "stated", "hits", "cases", "rate", "low", "high"]
+_RELIABILITY = ["group", "from", "to", "stated", "hits", "cases", "rate", "low", "high"]
 _COUNTED = ["detected", "holds_truth", "named_right", "wrong_name", "oracle_detected"]
 
 
@@ -39,28 +39,23 @@ def rows_of(table: pd.DataFrame) -> Iterator[Any]:
 
 
 def summarize(plan: Plan, cases: pd.DataFrame, intervals: pd.DataFrame, seed: int) -> pd.DataFrame:
-    """Every figure of the plan beside its target, for each kind of robots, of rows of `scores.score` and `scores.intervals_of`.
+    """Every figure of the plan beside its target, of rows of `scores.score` and `scores.intervals_of`.
 
     Rates have Clopper-Pearson intervals, ratios percentile bootstrap intervals [1] over cases. ``target_low`` and
     ``target_high`` are the range that the target leaves; ``holds`` is empty where there is no target or no case.
 
     [1] Efron, B. and Tibshirani, R. J., An Introduction to the Bootstrap, section 13.3, Chapman and Hall, 1993.
     """
-    rows: list[dict[str, Any]] = []
     cases = cases.assign(as_oracle=cases.after_rms_m / cases.oracle_rms_m <= WITHIN)
-    for robots in (PROOF, TUNED):
-        mine = cases[cases.robots == robots]
-        if len(mine):
-            of_these = intervals[intervals.robots == robots] if len(intervals) else intervals
-            tables = {"cases": mine, "statements": mine[mine.stated.notna()], "intervals": of_these}
-            rows += [{"robots": robots} | row for figure in plan["figures"] for row in _counted(plan, figure, tables, seed)]
-    return pd.DataFrame(rows)
+    tables = {"cases": cases, "statements": cases[cases.stated.notna()], "intervals": intervals}
+    rows = [row for figure in plan["figures"] for row in _counted(plan, figure, tables, seed)]
+    # Where one robot is of those that were tuned on, the whole proves nothing.
+    return pd.DataFrame(rows).assign(robots=PROOF if set(cases.robots) == {PROOF} else TUNED)
 
 
 def of_each_robot(plan: Plan, cases: pd.DataFrame, seed: int) -> dict[str, pd.DataFrame]:
-    """As `summarize`, of each robot of the leading kind by itself, by its name; without intervals of parameters."""
-    mine = cases[cases.robots == leading(cases.robots)]
-    return {str(name): summarize(plan, part, pd.DataFrame(), seed) for name, part in mine.groupby("robot")}
+    """As `summarize`, of each robot by itself, by its name; without intervals of parameters."""
+    return {str(name): summarize(plan, part, pd.DataFrame(), seed) for name, part in cases.groupby("robot")}
 
 
 def _counted(plan: Plan, figure: Figure, tables: Tables, seed: int) -> Iterator[dict[str, Any]]:
@@ -177,21 +172,19 @@ def calibration(rows: pd.DataFrame, seed: int) -> dict[str, Any]:
 
 
 def reliability(cases: pd.DataFrame) -> pd.DataFrame:
-    """Data of the reliability diagram [1], for each kind of robots, group of cases, or ``all``, and bin that has a case.
+    """Data of the reliability diagram [1], for each group of cases, or ``all``, and bin that has a case.
 
     [1] Murphy, A. H. and Winkler, R. L., Reliability of subjective probability forecasts of precipitation and temperature,
         Applied Statistics 26, 1977.
     """
     rows, found = cases[cases.stated.notna()], []
-    for robots in (PROOF, TUNED):
-        mine = rows[rows.robots == robots]
-        for group in ("all", *sorted(set(mine.group))):
-            part = mine if group == "all" else mine[mine.group == group]
-            which = _bin_of(part.stated.to_numpy(float))
-            for number in sorted(set(which.tolist())):
-                inside = part[which == number]
-                ends = {"from": number / _BINS, "to": (number + 1) / _BINS, "stated": inside.stated.mean()}
-                found.append({"robots": robots, "group": group} | ends | rate(inside.correct))
+    for group in ("all", *sorted(set(rows.group))):
+        part = rows if group == "all" else rows[rows.group == group]
+        which = _bin_of(part.stated.to_numpy(float))
+        for number in sorted(set(which.tolist())):
+            inside = part[which == number]
+            ends = {"from": number / _BINS, "to": (number + 1) / _BINS, "stated": inside.stated.mean()}
+            found.append({"group": group} | ends | rate(inside.correct))
     return pd.DataFrame(found, columns=_RELIABILITY)
 
 
@@ -200,12 +193,12 @@ def _bin_of(probability: np.ndarray) -> np.ndarray:
 
 
 def rates(cases: pd.DataFrame) -> pd.DataFrame:
-    """Shares of what came of the cases, by kind of robots, group, truth, setting and level.
+    """Shares of what came of the cases, by group, truth, setting and level.
 
     Also for ``all`` truths of a group together but those of which the model absorbs everything.
     """
     together = cases[cases.level_of == "retained"].assign(truth="all")
-    grouped = pd.concat([cases, together]).groupby(["robots", "group", "truth", "setting", "level"])
+    grouped = pd.concat([cases, together]).groupby(["group", "truth", "setting", "level"])
     shares = grouped.agg({"level_of": "first", "case": "size"} | dict.fromkeys(_COUNTED, "mean"))
     return shares.rename(columns={"case": "cases"}).reset_index()
 
