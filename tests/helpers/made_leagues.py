@@ -24,7 +24,7 @@ def made_entries(size_m, poses=40, seed=1, std_m=None, folds=4):
     pose = np.repeat(np.arange(poses), 2)
     off = draws.normal(0.0, size_m, (2 * poses, 3))
     columns = {"fold": pose % folds + 1, "set": np.zeros(2 * poses, int), "session": np.zeros(2 * poses, int), "pose": pose}
-    columns |= {"load": np.zeros(2 * poses, int), "target": np.tile([0, 1], poses), "outside_range": pose % 10 == 0}
+    columns |= {"load": np.zeros(2 * poses, int), "target": np.tile([0, 1], poses)}
     columns |= {f"d{axis}": off[:, number] for number, axis in enumerate("xyz")}
     return pd.DataFrame(columns | {f"std_{axis}": np.full(2 * poses, np.nan if std_m is None else std_m) for axis in "xyz"})
 
