@@ -193,8 +193,6 @@ def _joint_targets(
         "predicted_error_after_m": errors.error_m,
         "predicted_bound_m": np.where([each.startswith(NO_BOUND) for each in status], np.nan, errors.bound_m),
         "predicted_std_m": np.sqrt(errors.parameters_m**2 + errors.repeated_m**2 + errors.regression_m**2),
-        "predicted_rotation_before_rad": np.linalg.norm(found.error_before[:, 3:], axis=1),
-        "predicted_rotation_std_rad": errors.std_rad,
         "repeatability_m": errors.repeated_m,
         "outside_range": beyond,
         "status": status,

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.accuracy import accuracy_sentence, calibrate_on_case, campaign_accuracy
 from elastocal.campaigns.campaign import columns_of
 from elastocal.campaigns.holdout import measured_poses
 from elastocal.counting import counted, first_names
@@ -61,8 +60,7 @@ class Overview:
 def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
     """Look through a campaign; `folder`, `robots_folder` as in `reading.read_campaign`. Raises `InputError`.
 
-    The accuracy is that of a robot which is corrected by the declared model, if nothing is missing in it; none is stated where
-    the data are at fault or a compliance comes out negative, for then something is missing.
+    What is misplaced is not looked for where a compliance comes out negative, for then something is missing in the model.
     """
     descriptions, training, held_out = load_campaign(folder, robots_folder)
     whole, settings = case_from(descriptions, columns_of(training)), Settings()
@@ -79,16 +77,11 @@ def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
     rows += _identified(declared)
     attention = [fault.detail for fault in found]
     if diagnosable and not negative:
-        fitted = calibrate_on_case(case, declared.model, declared.estimate, declared.covariance, part.noise)
-        sentence = accuracy_sentence(campaign_accuracy(fitted))
-        rows.append(("accuracy", f"if the declared model is complete: {sentence}"))
         attention += [each["sentence"] for each in misplaced(_with_base(declared, case), campaign)]
     attention += [*controller_warnings(campaign), *part.warnings]
     if negative:
-        attention.append(
-            f"the compliance of joint {' and '.join(negative)} comes out negative: the declared model lacks something, so that"
-            " no accuracy is stated before the diagnosis"
-        )
+        joints = " and ".join(negative)
+        attention.append(f"the compliance of joint {joints} comes out negative: the declared model lacks something")
     attention += [
         *warnings_of(left_out),
         *_suspicious(case, declared, training, held_out),
