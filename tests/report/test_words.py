@@ -11,6 +11,7 @@ from elastocal.report.words import (
     in_common,
     length,
     listed,
+    location_words,
     millimetres,
     plain,
     probability_words,
@@ -46,6 +47,11 @@ def test_every_effect_of_the_catalogue_brings_its_own_physical_name_and_a_kind()
 )
 def test_locations_are_gathered(effect, locations, expected):
     assert effect_words(effect, locations).endswith(expected)
+
+
+def test_a_place_stands_without_the_effect_that_acts_there():
+    assert location_words("joint_offset", "joint 3") == "joint 3"
+    assert location_words("payload", "") == "the whole robot"
 
 
 def test_hypotheses_that_hold_the_first_are_stated_by_what_they_add_and_other_is_unknown_or_related():
