@@ -19,10 +19,10 @@ import numpy as np
 
 from elastocal_proof.blind.folders import write_blind_campaign, write_truth
 from elastocal_proof.plant.arm import Arm, LinkMass, arm_from_file
-from elastocal_proof.plant.campaigns import LOAD, SLIPS, Design, Slip, Table, schedule_of, with_bad_rows
+from elastocal_proof.plant.campaigns import SLIPS, Design, Slip, Table, schedule_of, with_bad_rows
 from elastocal_proof.plant.kinds import KINDS, OUTSIDE, Defect, drawn_defect, with_defects
 from elastocal_proof.plant.machine import usual_gravity_torque
-from elastocal_proof.plant.physical_robot import PhysicalRobot, Tracker, misplaced_base, specimen, stream
+from elastocal_proof.plant.physical_robot import Motion, PhysicalRobot, Tracker, specimen, stream
 from elastocal_proof.plant.sizing import Yardstick
 
 Plan = Mapping[str, Any]
@@ -51,6 +51,8 @@ _MIDDLE, _HIGH = 50.0, 200.0
 # A stand that is knocked moves by a millimetre rather than by what can just be seen, and nobody's arm weighs a few kilograms.
 _KNOCKED, _HEAVY = 1e5, 1e6
 _DRAWS, _ROUNDS = 8, 12
+# Of one axis, so that the whole is 0.3 mrad and 0.2 mm in the mean square.
+_TILT_RAD, _SHIFT_M = 3e-4 / np.sqrt(3.0), 2e-4 / np.sqrt(3.0)
 # Times the plausible size.
 _IMPLAUSIBLE = 3.0
 
@@ -133,6 +135,12 @@ def cases_of(plan: Plan, size: str, seed: int) -> list[Case]:
                 robots = TUNED if robot in plan["tuned"] else PROOF
                 found.append(Case(key, group, robot, effects, levels, setting, drawn, robots, plan["settings"][setting]))
     return sorted(found, key=lambda case: case.name)
+
+
+def misplaced_base(seed: int) -> Motion:
+    """A base frame that was found badly: tilted by about 0.3 mrad and shifted by about 0.2 mm, all measurements alike."""
+    draws = stream(seed, "tilted base")
+    return Motion(tuple(_SHIFT_M * draws.standard_normal(3)), tuple(_TILT_RAD * draws.standard_normal(3)))
 
 
 def absent_on(plan: Plan, robot: str) -> tuple[str, ...]:
@@ -312,7 +320,7 @@ def make_case(case: Case, blind_folder: str | Path, sealed_folder: str | Path, r
     def slipped(table: Table) -> tuple[Table, list[Slip]]:
         """One to so many bad rows, of one kind."""
         draws = stream(case.seed, "bad rows")
-        possible = [kind for kind in SLIPS if kind != LOAD or table["load"].any()]
+        possible = [kind for kind in SLIPS if kind != "load" or table["load"].any()]
         kind, count = str(draws.choice(possible)), int(draws.integers(1, case.changes["bad_rows"] + 1))
         return with_bad_rows(table, bad, schedule, kind, count, draws)
 

@@ -24,10 +24,11 @@ from elastocal.io.atomic_writes import atomic_write, check_places
 from elastocal.io.texts import read_text
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.report.words import at_joints, listed, physical_name
+from elastocal_proof.blind.cases import misplaced_base
 from elastocal_proof.plant.arm import arm_from_file, rotation_vector
 from elastocal_proof.plant.campaigns import SECONDS_PER_STATE, usual_force_N
 from elastocal_proof.plant.kinds import KINDS, OUTSIDE, Defect, drawn_defect, with_defects
-from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, misplaced_base, seen_poses, specimen, stream
+from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, seen_poses, specimen, stream
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -22,9 +22,7 @@ SECONDS_PER_STATE = 25.0
 # From the flange to where the force acts, base axes, on arms of such a reach.
 _LEVER_M, _LONG_M = (0.0, 0.5, 0.0), 2.5
 # What a lost beam, a slipped decimal point or a muddled sheet leave of a few rows.
-POSITION, ROTATION, JOINT_ANGLE, LOAD = "position", "rotation", "joint_angle", "load"
-HELD_POINT, ZEROS, SWAPPED = "held_point", "zeros", "swapped"
-SLIPS = (POSITION, ROTATION, JOINT_ANGLE, LOAD, HELD_POINT, ZEROS, SWAPPED)
+SLIPS = ("position", "rotation", "joint_angle", "load", "held_point", "zeros", "swapped")
 # How far off, in standard deviations of the tracker, evenly in the logarithm. Of a wrong angle or load it is how far the robot
 # would have stood, in the median row, from where it was read had it been as the row says.
 _SMALLEST, _LARGEST = 5.0, 1e5
@@ -135,27 +133,27 @@ def with_bad_rows(
 
     `table`: as `measured_table` gives it for this robot and schedule. `kind`: of `SLIPS`, and of what the table has.
     """
-    some = np.flatnonzero(table["load"]) if kind == LOAD else np.arange(kind == HELD_POINT, len(table["pose"]))
+    some = np.flatnonzero(table["load"]) if kind == "load" else np.arange(kind == "held_point", len(table["pose"]))
     mixed = draws.permutation(some)
-    first = np.sort(np.unique(table["pose"][mixed], return_index=True)[1])[: 2 if kind == SWAPPED else count]
+    first = np.sort(np.unique(table["pose"][mixed], return_index=True)[1])[: 2 if kind == "swapped" else count]
     rows = sorted(int(row) for row in mixed[first])
     bad = {name: column.copy() for name, column in table.items()}
     # How far off each row is, in standard deviations.
     sizes = _SMALLEST * (_LARGEST / _SMALLEST) ** draws.random(len(rows))
-    if kind in (JOINT_ANGLE, LOAD):
-        wrong = _wrong_angles if kind == JOINT_ANGLE else _wrong_loads
+    if kind in ("joint_angle", "load"):
+        wrong = _wrong_angles if kind == "joint_angle" else _wrong_loads
         return bad, [{"kind": kind, "rows": found} for found in wrong(bad, robot, schedule, rows, sizes, draws)]
     read = [name for name in _READ if name in table]
     before = np.array([table[name] for name in read])
     after = before.copy()
     for row, other, size in zip(rows, rows[::-1], sizes, strict=True):
-        if kind == POSITION:
+        if kind == "position":
             after[:3, row] += size * robot.tracker.sigma_m * direction(draws)
-        elif kind == ROTATION:
+        elif kind == "rotation":
             turn = min(size * robot.tracker.sigma_rad, np.pi) * direction(draws)
             after[3:, row] = rotation_vector(turned(turn) @ turned(before[3:, row]))
         else:
-            after[:, row] = 0.0 if kind == ZEROS else before[:, row - 1 if kind == HELD_POINT else other]
+            after[:, row] = 0.0 if kind == "zeros" else before[:, row - 1 if kind == "held_point" else other]
     return bad | dict(zip(read, after, strict=True)), [{"kind": kind, "rows": (row,)} for row in rows]
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from elastocal_proof.plant import laws
 from elastocal_proof.plant.arm import Arm
-from elastocal_proof.plant.machine import long_links, weighing_links
+from elastocal_proof.plant.machine import each_link, weighing_links
 from elastocal_proof.plant.physical_robot import PhysicalRobot, stream
 
 OUTSIDE = "outside:"
@@ -54,10 +54,6 @@ def _joints(first: int, behind: int = 0) -> Callable[[Arm], list[Location]]:
     return lambda arm: [(joint,) for joint in range(first, arm.joints + 1 - behind)]
 
 
-def _each_link(arm: Arm) -> list[Location]:
-    return [(link,) for link in long_links(arm)]
-
-
 def _shoulder(arm: Arm) -> list[Location]:
     """Where a gravity compensator can be, on arms that have one."""
     return [(2,)] if arm.compensated else []
@@ -78,7 +74,7 @@ KINDS: dict[str, Kind] = {
     "bearing_runout": Kind("m", 3e-5, _joints(1), laws.bearing_runout),
     "motor_eccentricity": Kind("rad", 6e-5, _joints(1), laws.motor_eccentricity),
     "transmission_order": Kind("rad", 8e-5, _joints(1), laws.transmission_order),
-    "link_elasticity": Kind("1/(N m^2)", 1e-7, _each_link, laws.link_elasticity, scale=_SOFT),
+    "link_elasticity": Kind("1/(N m^2)", 1e-7, each_link, laws.link_elasticity, scale=_SOFT),
     "joint_tilt": Kind("rad/(N m)", 2e-7, _joints(1), laws.joint_tilt, scale=_SOFT),
     "base_compliance": Kind("rad/(N m)", 6e-8, _nowhere, laws.base_compliance, scale=_SOFT),
     "cross_compliance": Kind(
@@ -98,7 +94,7 @@ KINDS: dict[str, Kind] = {
     "thermal_growth": Kind("1/K", 1.2e-5, _nowhere, laws.expanding, needs=("temperature",)),
     "setup_step": Kind("m", 1e-3, _nowhere, laws.setup_step),
     "temperature_gradient": Kind(
-        "1/K", 1.2e-5, lambda arm: [(), *_each_link(arm)], laws.temperature_gradient, needs=("temperature",)
+        "1/K", 1.2e-5, lambda arm: [(), *each_link(arm)], laws.temperature_gradient, needs=("temperature",)
     ),
     "nest_eccentricity": Kind("m", 1e-4, _nowhere, laws.nest_eccentricity),
     OUTSIDE + "cable_pull": Kind("rad/rad^2", 1e-4, _joints(3, 1), laws.cable_pull),
@@ -111,7 +107,7 @@ KINDS: dict[str, Kind] = {
     OUTSIDE + "foreign_angle_stiffness": Kind(
         "1", 0.15, lambda arm: [(2,), (3,)], partial(laws.stiff_by_angle, lambda joint: 3 - joint), largest=0.8
     ),
-    OUTSIDE + "stiffening_link": Kind("rad/(N m)^3", 1e-13, _each_link, laws.stiffening_link, scale=(1.0, -2.0)),
+    OUTSIDE + "stiffening_link": Kind("rad/(N m)^3", 1e-13, each_link, laws.stiffening_link, scale=(1.0, -2.0)),
     OUTSIDE + "foot_slip": Kind("m", 8e-5, _nowhere, laws.foot_slip),
     OUTSIDE + "refraction": Kind("1/m", 2e-6, _nowhere, partial(laws.misread, "tracker", "refraction_per_m")),
     OUTSIDE + "cell_crosstalk": Kind(

@@ -6,11 +6,12 @@ history; none is the catalogue's formula where a machine would do otherwise. `ki
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from elastocal_proof.plant.arm import LinkMass
 from elastocal_proof.plant.machine import SEGMENTS, TaperedTube, usual_gravity_torque, weighing_links
@@ -25,13 +26,13 @@ TURN = 2 * np.pi
 _BEARING_M, _LINK_M, _HEAVY_REACH_M = 0.15, 0.25, 2.5
 # In the first half of the training poses, with repeats and without, at a state in 25 s.
 _KNOCKED_S = (700.0, 2000.0)
-_HISTORY_STEPS = 48
-_RIGID = TaperedTube(np.inf, np.inf)
+_HISTORY_STEPS, _RIGID = 48, TaperedTube(np.inf, np.inf)
 
 
 def added(robot: PhysicalRobot, part: str, *laws: tuple[int | str, Callable[..., Any]]) -> PhysicalRobot:
     """With further laws of "drives", "gears" or "springs"."""
-    return replace(robot, **{part: (*getattr(robot, part), *laws)})
+    changes: dict[str, Any] = {part: (*getattr(robot, part), *laws)}
+    return replace(robot, **changes)
 
 
 def changed(robot: PhysicalRobot, part: str, **changes: Any) -> PhysicalRobot:
@@ -93,17 +94,13 @@ def link_weight(robot: PhysicalRobot, size: float, draws: Draws, *joints: int) -
         heavy = LinkMass(link, size, tuple(along * robot.arm.stretches[link].vector_m + aside), along=along)
         return changed(robot, "structure", masses=(*robot.structure.masses, heavy)), {}
     kilograms = {mass.link: mass.mass_kg for mass in robot.arm.masses if mass.link > 1}
-    return _heavier(robot, 2, size / sum(kilograms.values())), {}
+    return heavier_than_declared(robot, size / sum(kilograms.values()), draws, 2)[0], {}
 
 
-def heavier_than_declared(robot: PhysicalRobot, size: float, draws: Draws) -> Applied:
+def heavier_than_declared(robot: PhysicalRobot, size: float, draws: Draws, first_link: int = 1) -> Applied:
     """All links behind the column heavier by one share than the robot file says."""
-    return _heavier(robot, 1, size), {"share": size}
-
-
-def _heavier(robot: PhysicalRobot, first_link: int, share: float) -> PhysicalRobot:
-    more = [replace(mass, mass_kg=share * mass.mass_kg) for mass in robot.arm.masses if mass.link >= first_link]
-    return changed(robot, "structure", masses=(*robot.structure.masses, *more))
+    more = [replace(mass, mass_kg=size * mass.mass_kg) for mass in robot.arm.masses if mass.link >= first_link]
+    return changed(robot, "structure", masses=(*robot.structure.masses, *more)), {"share": size}
 
 
 def payload(robot: PhysicalRobot, size: float, draws: Draws) -> Applied:
@@ -122,9 +119,9 @@ def compensator_torque(robot: PhysicalRobot, size: float, draws: Draws, joint: i
 # Transmission
 
 
-def waving(robot: PhysicalRobot, joint: int, orders: Sequence[float], sizes: Sequence[float], phases: np.ndarray) -> Applied:
+def waving(robot: PhysicalRobot, joint: int, orders: ArrayLike, sizes: ArrayLike, phases: np.ndarray) -> Applied:
     """Teeth and eccentric wheels: the sum of sizes sin(orders q + phases); orders need not be whole."""
-    return angled(robot, joint, lambda q: np.sin(np.outer(q[:, joint], orders) + phases) @ np.array(sizes)), {}
+    return angled(robot, joint, lambda q: np.sin(np.outer(q[:, joint], np.array(orders)) + phases) @ np.array(sizes)), {}
 
 
 def transmission_harmonic(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
@@ -169,8 +166,7 @@ def bearing_runout(robot: PhysicalRobot, size: float, draws: Draws, joint: int) 
         for place, (motion, largest) in enumerate((("shift", size), ("tilt", size / _BEARING_M)))
         for which in range(2)
     ]
-    loose = changed(robot, "structure", bearings={number: (0.0, 0.0)} | bearings)
-    return added(loose, "springs", *laws), {}
+    return added(changed(robot, "structure", bearings={number: (0.0, 0.0)} | bearings), "springs", *laws), {}
 
 
 def cable_pull(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
@@ -281,13 +277,8 @@ def compensator_stiffness(robot: PhysicalRobot, size: float, draws: Draws, joint
 
 def stiffening(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
     """Teeth that come to bear one after another, each a third: theta = - sum_k d sign(tau) max(|tau| - tau_k, 0)."""
-    starts = usual_torque_Nm(robot, joint) * np.sort(draws.uniform(0.1, 0.8, 3))
-    drop = size * robot.compliance[joint] / 3
-
-    def turn(_: Schedule, torque: np.ndarray) -> np.ndarray:
-        return -np.sign(torque) * drop * np.maximum(np.abs(torque)[:, None] - starts, 0.0).sum(axis=1)
-
-    return geared(robot, joint, turn), {}
+    at, drop = usual_torque_Nm(robot, joint) * np.sort(draws.uniform(0.1, 0.8, 3)), size * robot.compliance[joint] / 3
+    return geared(robot, joint, lambda _, tau: -np.sign(tau) * drop * np.maximum(np.abs(tau)[:, None] - at, 0).sum(axis=1)), {}
 
 
 def lost_motion(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:

@@ -276,6 +276,11 @@ def machine_of(arm: Arm, structure: Structure) -> Machine:
     return Machine(model, drive, gear, springs, yields, sites, within - behind_drive, within[model.site_bodyid])
 
 
+# Coordinates (S, coordinates), rad, m; generalized forces that their springs transmit, the same, N m, N; positions, m, and
+# rotations of the measuring points, (S, points, 3), (S, points, 3, 3), base frame.
+Equilibrium = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+
 def equilibrium(
     machine: Machine,
     drive: np.ndarray,
@@ -284,18 +289,15 @@ def equilibrium(
     gear_deflection: Callable[[np.ndarray, np.ndarray], np.ndarray],
     laws: Iterable[tuple[str, Callable[[np.ndarray], np.ndarray]]] = (),
     start: np.ndarray | None = None,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+) -> Equilibrium:
     """Where the arm comes to rest in S states, by fixed-point iteration.
-
-    Returns coordinates (S, coordinates), rad, m; generalized forces that their springs transmit, the same, N m, N; positions
-    (S, points, 3), m, and rotations (S, points, 3, 3) of the measuring points, base frame.
 
     `drive` (S, n): angles at which the drives really stand, rad. `felt`: wrench (S, 6) that the flange really feels, at its
     deflected origin, base axes, N, N m, by its rotations (S, 3, 3) before anything yields. `growth` (S, n + 1): relative growth
-    of all lengths of each stretch. `gear_deflection`:
-    of the torques on the gears now and before the wrench came on, (S, n), N m: their deflections (S, n), rad. `laws`: starts of
-    the names of structural springs, and what they yield beyond their compliance under a force (S,). `start` (S, n): deflections
-    of the gears to begin with, such as those of a robot that differs little.
+    of all lengths of each stretch. `gear_deflection`: of the torques on the gears now and before the wrench came on, (S, n),
+    N m: their deflections (S, n), rad. `laws`: starts of the names of structural springs, and what they yield beyond their
+    compliance under a force (S,). `start` (S, n): deflections of the gears to begin with, such as those of a robot that differs
+    little.
 
     The forces depend on the deflections only through the geometry, by the share (force times arm) / stiffness, a thousandth or
     so, so that each sweep gains about three digits. With linear springs it is the modified Newton method with their stiffness
@@ -336,9 +338,9 @@ def usual_gravity_torque(arm: Arm, masses: Iterable[LinkMass], gravity_m_s2: tup
     return np.sqrt((torque**2).mean(axis=0))
 
 
-def long_links(arm: Arm) -> list[int]:
-    """Links that are long enough to bend."""
-    return [link for link in range(1, arm.joints + 1) if arm.lengths_m[link] > _SHORTEST_LINK_M]
+def each_link(arm: Arm) -> list[tuple[int, ...]]:
+    """Links, each by the joint before it, from 1, that are long enough to bend."""
+    return [(link,) for link in range(1, arm.joints + 1) if arm.lengths_m[link] > _SHORTEST_LINK_M]
 
 
 def weighing_links(arm: Arm) -> dict[tuple[int, ...], int | None]:
@@ -349,7 +351,7 @@ def weighing_links(arm: Arm) -> dict[tuple[int, ...], int | None]:
         return tuple(int(joint) + 1 for joint in np.flatnonzero(torque > _NO_TORQUE * torque.max()))
 
     found: dict[tuple[int, ...], int | None] = {}
-    for link in long_links(arm):
+    for (link,) in each_link(arm):
         joints = turned_by(LinkMass(link, 1.0, tuple(0.5 * arm.stretches[link].vector_m)))
         # Of links that turn the same joints the first counts, and of all links two: the hand's weight is like a tool's.
         if joints and joints[-1] == link and len(found) < 2:

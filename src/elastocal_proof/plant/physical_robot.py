@@ -11,15 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal_proof.plant.arm import Arm, true_masses, turned
-from elastocal_proof.plant.machine import Machine, Structure, equilibrium, machine_of
+from elastocal_proof.plant.machine import Equilibrium, Machine, Structure, equilibrium, machine_of
 
 _REFERENCE_C = 20.0
 # A thermometer on a motor shows a rise by RISE (1 - exp(-t / MOTOR)); the castings follow it by a first-order lag.
 _RISE_K, _MOTOR_S, _LAG_S = 10.0, 3000.0, 1200.0
-# Of what is random about the drives, by the seed of what is done.
-_EACH_APPROACH, _EACH_POSE = 11, 13
-# Of one axis, so that the whole is 0.3 mrad and 0.2 mm in the mean square.
-_TILT_RAD, _SHIFT_M = 3e-4 / np.sqrt(3.0), 2e-4 / np.sqrt(3.0)
 _PULLS, _SETTLED_N = 40, 1e-9
 # Largest share by which a gear of a specimen is softer or stiffer than the robot file says.
 _SPREAD = 0.15
@@ -38,12 +34,6 @@ class Motion:
     shift_m: tuple[float, ...]
     turn_rad: tuple[float, ...]
     course: Callable[[np.ndarray], np.ndarray] = np.ones_like
-
-
-def misplaced_base(seed: int) -> Motion:
-    """A base frame that was found badly: tilted by about 0.3 mrad and shifted by about 0.2 mm, all measurements alike."""
-    draws = stream(seed, "tilted base")
-    return Motion(tuple(_SHIFT_M * draws.standard_normal(3)), tuple(_TILT_RAD * draws.standard_normal(3)))
 
 
 @dataclass(frozen=True)
@@ -185,15 +175,6 @@ class Schedule:
     seed: int
 
 
-# What a drive errs by, (S,), rad, by what was done.
-DriveLaw = Callable[[Schedule], np.ndarray]
-# What a gear turns by beyond its linear spring, (S,), rad: by what was done and the torques on all gears (S, n), N m, now and
-# before the external load came on.
-GearLaw = Callable[[Schedule, np.ndarray, np.ndarray], np.ndarray]
-# What a structural spring yields beyond its compliance, (S,), rad or m: by what was done and its force (S,), N m or N.
-SpringLaw = Callable[[Schedule, np.ndarray], np.ndarray]
-
-
 def logged_temperature(time_s: np.ndarray) -> np.ndarray:
     """Of the thermometer at times (S,), °C."""
     return _REFERENCE_C - _RISE_K * np.expm1(-time_s / _MOTOR_S)
@@ -209,18 +190,20 @@ def warmth_of_castings(time_s: np.ndarray) -> np.ndarray:
 class PhysicalRobot:
     """All that is true of a robot and its instruments; the default is faultless.
 
-    `compliance` (n,): the gears' own, rad/(N m). `drives`, `gears`: laws, each of a joint from 0; `springs`: of structural
-    springs, by the start of their names. `expansion_per_K`: of the column and of the flange; in between it changes evenly from
-    stretch to stretch. No defects, as every arm has them: `repeatability_rad` (n,): each approach ends a little elsewhere;
-    `pose_rad` (n,): an error of the angles common to all measurements of a pose.
+    `compliance` (n,): the gears' own, rad/(N m). Laws of what was done, each of a joint from 0: `drives`: what a drive errs by,
+    (S,), rad; `gears`: what a gear turns by beyond its linear spring, (S,), rad, by the torques on all gears (S, n), N m, now
+    and before the external load came on. `springs`: what a structural spring, by the start of its name, yields beyond its
+    compliance, (S,), rad or m, by its force (S,), N m or N. `expansion_per_K`: of the column and of the flange; in between it
+    changes evenly from stretch to stretch. No defects, as every arm has them: `repeatability_rad` (n,): each approach ends a
+    little elsewhere; `pose_rad` (n,): an error of the angles common to all measurements of a pose.
     """
 
     arm: Arm
     compliance: np.ndarray
     structure: Structure = field(default_factory=Structure)
-    gears: tuple[tuple[int, GearLaw], ...] = ()
-    drives: tuple[tuple[int, DriveLaw], ...] = ()
-    springs: tuple[tuple[str, SpringLaw], ...] = ()
+    gears: tuple[tuple[int, Callable[[Schedule, np.ndarray, np.ndarray], np.ndarray]], ...] = ()
+    drives: tuple[tuple[int, Callable[[Schedule], np.ndarray]], ...] = ()
+    springs: tuple[tuple[str, Callable[[Schedule, np.ndarray], np.ndarray]], ...] = ()
     expansion_per_K: tuple[float, float] = (0.0, 0.0)
     cell: LoadCell = field(default_factory=LoadCell)
     tracker: Tracker = field(default_factory=Tracker)
@@ -234,8 +217,7 @@ def specimen(arm: Arm, seed: int, weighs: bool = True, off_line_m: float = 0.0) 
     `off_line_m`: by how much centres of mass lie off the lines of their links at most, across each, beyond what is declared.
     """
     compliance = arm.compliance * stream(seed, "specimen").uniform(1.0 - _SPREAD, 1.0 + _SPREAD, arm.joints)
-    draws = stream(seed, "weights"), stream(seed, "centres off the line")
-    masses = true_masses(arm, draws[0], off_line_m, draws[1]) if weighs else ()
+    masses = true_masses(arm, stream(seed, "weights"), off_line_m, stream(seed, "centres off the line")) if weighs else ()
     return PhysicalRobot(arm, compliance, Structure(masses=masses, gravity_m_s2=arm.gravity_m_s2))
 
 
@@ -248,9 +230,7 @@ def seen_poses(robot: PhysicalRobot, schedule: Schedule, start: np.ndarray | Non
     return robot.tracker.seen(position, rotation, schedule.time_s, schedule.angle[:, -1])
 
 
-def at_rest(
-    robot: PhysicalRobot, schedule: Schedule, start: np.ndarray | None = None
-) -> tuple[Machine, tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
+def at_rest(robot: PhysicalRobot, schedule: Schedule, start: np.ndarray | None = None) -> tuple[Machine, Equilibrium]:
     """The arm, and its equilibrium as of `machine.equilibrium`; arguments as of `seen_poses`."""
     machine, felt = machine_of(robot.arm, robot.structure), partial(robot.cell.felt, schedule.force, schedule.lever)
     growth = warmth_of_castings(schedule.time_s)[:, None] * np.linspace(*robot.expansion_per_K, robot.arm.joints + 1)
@@ -270,10 +250,8 @@ def driven(robot: PhysicalRobot, schedule: Schedule) -> np.ndarray:
     drive = schedule.angle.copy()
     for joint, law in robot.drives:
         drive[:, joint] += law(schedule)
-    for sigma, number, group in (
-        (robot.repeatability_rad, _EACH_APPROACH, schedule.approach),
-        (robot.pose_rad, _EACH_POSE, schedule.pose),
-    ):
+    # Each with random numbers of its own, by the seed of what is done.
+    for sigma, number, group in ((robot.repeatability_rad, 11, schedule.approach), (robot.pose_rad, 13, schedule.pose)):
         if any(sigma):
             draws = np.random.default_rng([schedule.seed, number])
             drive += np.array(sigma) * draws.standard_normal((int(group.max()) + 1, robot.arm.joints))[group]
