@@ -93,7 +93,7 @@ class Prediction:
 
     `parameters_m`, `repeated_m` (N,): root mean square by the uncertainty of the parameters, and by what each approach and each
     pose has of its own. `regression_m`, `form_m` (N,): by what a regression leaves beyond both, and by the form of the model.
-    `std_rad` (N,): of orientation. `error_m` (N,): by all of these and by what is not commanded. `bound_m` (N,): below which
+    `error_m` (N,): by all of these and by what is not commanded. `bound_m` (N,): below which
     each error is with `CONFIDENCE`. `rms_m`, `worst_m` (draws,): over the poses, of robots that the fit leaves possible.
     """
 
@@ -101,7 +101,6 @@ class Prediction:
     repeated_m: np.ndarray
     regression_m: np.ndarray
     form_m: np.ndarray
-    std_rad: np.ndarray
     error_m: np.ndarray
     bound_m: np.ndarray
     rms_m: np.ndarray
@@ -172,7 +171,6 @@ def predict_errors(
         repeated_m=np.sqrt(own[:, :3].sum(axis=1)),
         regression_m=np.sqrt(more[0]),
         form_m=np.sqrt(form),
-        std_rad=np.sqrt((ours + own)[:, 3:].sum(axis=1)),
         error_m=np.sqrt((ours + own)[:, :3].sum(axis=1) + more[0] + left_out + form),
         bound_m=np.sqrt(
             quantile_of_length((covariances[0] + covariances[1])[:, :3, :3] + alike[:, None, None] * np.eye(3)) ** 2 + left_out
