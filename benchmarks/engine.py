@@ -28,7 +28,7 @@ from elastocal.loop.whole import cases_in
 from elastocal_proof.blind.cases import cases_of, make_case
 from elastocal_proof.blind.folders import campaign_document, write_robot
 from elastocal_proof.plant.arm import arm_from_file
-from elastocal_proof.plant.campaigns import FLANGE, Design, measured_table, schedule_of
+from elastocal_proof.plant.campaigns import Design, measured_table, schedule_of
 from elastocal_proof.plant.kinds import Defect, with_defects
 from elastocal_proof.plant.physical_robot import specimen
 
@@ -40,7 +40,7 @@ LARGE = Design(
     held_out=0,
     ladder=(0.0,),
     repeats=1,
-    points=(FLANGE,),
+    points=("6DoF",),
     measured="position",
     covariates=("time",),
     declared=("joint_offset", "link_geometry"),
@@ -152,7 +152,7 @@ def _large(work: Path, measurements: int) -> Path:
         arm = arm_from_file(file)
         robot = with_defects(specimen(arm, 4), [Defect("transmission_harmonic", (2,), 1e-4, 1)])
         document = campaign_document("large", arm, LARGE) | {"compliance": "nominal", "holdout": {"fraction": 0.3, "seed": 1}}
-        table, _ = measured_table(robot, LARGE, schedule_of(arm, replace(LARGE, poses=measurements), 4))
+        table = measured_table(robot, LARGE, schedule_of(arm, replace(LARGE, poses=measurements), 4))
         write_campaign(folder, document | {"noise": {"position_m": robot.tracker.sigma_m}}, table, arm.joints, "parquet")
         write_robot(folder, file, robot, arm.masses)
     return folder

@@ -21,7 +21,6 @@ DOCUMENTS = {
     "config": "`config.yaml` at the top of the repository.",
     "campaign_source": "A file of `config/campaigns`: where a campaign of this project comes from.",
     "public_data": "`config/public_data.yaml`: importers of public data.",
-    "measurement_import": "`import.yaml`, by which an import of measurements can be repeated.",
 }
 # Each module of table schemas with where its tables lie.
 TABLES = {

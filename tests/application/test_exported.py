@@ -1,15 +1,16 @@
 """The calibrated robot as files: what a robot file can say, and what it leaves out."""
 
-import json
-
 import numpy as np
 import pytest
 from analysed_robots import analysed
 from made_calibrated import made_calibrated, plain_estimate, plain_model
 
-from elastocal.application.accuracy import predict_errors
-from elastocal.application.calibrated import calibrate_by_model, forward, without
-from elastocal.application.exported import find_left_out_m, fold_effects, sidecar
+from elastocal.application.calibrated import (
+    calibrate_by_model,
+    forward,
+    without,
+)
+from elastocal.application.exported import find_left_out_m, fold_effects
 from elastocal.effects.catalogue import candidates_on
 from elastocal.mechanics.robot_file import document_of, robot_from_document
 from elastocal.mechanics.sites import sites_of
@@ -67,17 +68,3 @@ def test_what_a_robot_file_cannot_say_is_left_out_and_changes_nothing_else():
     off = find_left_out_m(calibrated, angles, wrench)
     np.testing.assert_allclose(off, np.linalg.norm(ends[2] - ends[1], axis=1))
     assert off.max() > 1e-6
-
-
-def test_effects_and_springs_stand_in_the_sidecar_with_values_and_standard_errors():
-    calibrated = made_calibrated(analysed("gp180"), "joint_offset@2", "lost_motion@2")
-    accuracy = predict_errors(calibrated, *np.zeros((2, 1, 6))).accuracy("one pose")
-    document = json.loads(json.dumps(sidecar(calibrated, "cell7", "2026-11-23", accuracy)))
-    assert document["accuracy"]["rms_m"] == accuracy.rms_m and "Predicted" in document["accuracy"]["words"]
-    (effect,) = document["effects"]
-    assert effect["key"] == "lost_motion@2" and effect["joints"] == [2]
-    values = np.concatenate([calibrated.estimate.coefficients[-1], calibrated.estimate.shapes[-1]])
-    assert [parameter["value"] for parameter in effect["parameters"]] == values.tolist()
-    errors = np.sqrt(np.diag(calibrated.covariance))[-len(values) :]
-    np.testing.assert_allclose([parameter["std_error"] for parameter in effect["parameters"]], errors)
-    assert [p["value"] for p in document["joint_compliance"]] == calibrated.estimate.coefficients[0].tolist()

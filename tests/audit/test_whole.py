@@ -3,7 +3,7 @@
 import pytest
 from made_audits import CONFIGURATION, ROBOT, failed, forge
 
-from elastocal.io.provenance import provenance as written_by
+from elastocal.io.origin import provenance as written_by
 from elastocal.io.records import recorded
 from elastocal.io.storage import write_table
 from elastocal.study.simulation import INITIAL

@@ -6,11 +6,19 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from made_cells import DOCUMENT, POSES, Cell
+from made_cells import POSES, Cell
 from scipy.optimize import brentq
 from support import refused
 
-from elastocal.campaigns.holdout import SAME_POSE_RAD, beyond_range, blocks, configurations, find_repeated, number_alike, split
+from elastocal.campaigns.holdout import (
+    SAME_POSE_RAD,
+    beyond_range,
+    blocks_of_poses,
+    configurations,
+    find_repeated,
+    number_alike,
+    split,
+)
 
 
 def poses_of(measurements):
@@ -36,16 +44,8 @@ def test_split_is_the_same_whatever_the_order_of_the_rows(tmp_path_factory, rand
     assert parts(cell) == expected
 
 
-def test_a_block_of_neighbours_is_held_out_by_its_seed(cell):
-    found = {frozenset(parts(cell, blocks=3, seed=seed)[1]) for seed in range(20)}
-    # Blocks part the poses: whatever the seed, it is one of three, which together are all.
-    assert len(found) == 3 and sum(map(len, found)) == POSES == len(frozenset.union(*found))
-    cell.document["holdout"] = {"blocks": 3}
-    assert cell.read().holdout == {"blocks": 3, "seed": 1}
-
-
 # Rounded to whole poses; five to fit and two held out are enough.
-ENOUGH = [({"poses": [0, 2, 4, 6, 8]}, 5, 5), ({"fraction": 0.5}, 5, 5), ({"fraction": 0.16}, 8, 2), ({"blocks": 2}, 5, 5)]
+ENOUGH = [({"poses": [0, 2, 4, 6, 8]}, 5, 5), ({"fraction": 0.5}, 5, 5), ({"fraction": 0.16}, 8, 2)]
 
 
 @pytest.mark.parametrize(("holdout", "fitted", "held_out"), ENOUGH)
@@ -53,33 +53,18 @@ def test_whole_poses_are_held_out(cell, holdout, fitted, held_out):
     assert tuple(map(len, parts(cell, **holdout))) == (fitted, held_out)
 
 
-def test_a_session_is_held_out_where_five_poses_of_others_are_left(cell):
-    """Of the first seven poses two were measured in a session of their own; of six that leaves too few."""
-    later = np.array(cell.table["pose"]) < 2
-    cell.table["session"] = later.astype(int).tolist()
-    cell.table["target"] = [f"{name}2" if late else name for name, late in zip(cell.table["target"], later, strict=True)]
-    cell.document["targets"] = cell.document["targets"] | {"A2": DOCUMENT["targets"]["A"], "B2": DOCUMENT["targets"]["B"]}
-    cell.keep([n for n, pose in enumerate(cell.table["pose"]) if pose < 7])
-    fitted, held_out = parts(cell, session=1)
-    assert held_out == {(1, 0), (1, 1)} and len(fitted) == 5
-    cell.keep([n for n, pose in enumerate(cell.table["pose"]) if pose < 6])
-    with refused(cell.source, "holdout", "4 configurations to fit and 2 held out"):
-        cell.read()
-
-
 @pytest.mark.parametrize(
     ("holdout", "key", "words"),
     [
         ({}, "holdout", ["found {}"]),
-        ({"fraction": 0.3, "poses": [1, 2]}, "holdout", ["fraction, poses together", "one of"]),
-        ({"poses": [1, 2], "seed": 1}, "holdout", ["poses, seed together", "one of"]),
-        ({"seed": 1}, "holdout", ["seed alone", "{fraction, seed}"]),
+        ({"fraction": 0.3, "poses": [1, 2]}, "holdout", ["'fraction': 0.3, 'poses'", "one of"]),
+        ({"poses": [1, 2], "seed": 1}, "holdout", ["'seed': 1", "one of"]),
+        ({"seed": 1}, "holdout", ["{'seed': 1}", "{fraction, seed}"]),
         ({"poses": [3, 12]}, "holdout.poses", ["found 12", "0..9"]),
         ({"poses": [3, [1, 4]]}, "holdout.poses", ["[1, 4]", "0..9"]),
-        ({"blocks": 11}, "holdout.blocks", ["11", "at most as many as configurations, 10"]),
-        ({"blocks": 9}, "holdout", ["9 configurations to fit and 1 held out", "2 held out"]),
+        ({"poses": [3]}, "holdout", ["9 configurations to fit and 1 held out", "2 held out"]),
+        ({"poses": [3, 4, 5, 6, 7, 8]}, "holdout", ["4 configurations to fit and 6 held out", "5 to fit"]),
         ({"campaign": "../nowhere"}, "holdout.campaign", ["'../nowhere'", "campaign.yaml"]),
-        ({"session": 3}, "holdout.session", ["found 3", "sessions that were measured: 0"]),
     ],
 )
 def test_faulty_holdout_is_refused_in_one_line(cell, holdout, key, words):
@@ -88,10 +73,9 @@ def test_faulty_holdout_is_refused_in_one_line(cell, holdout, key, words):
         cell.read()
 
 
-@pytest.mark.parametrize("holdout", [{"fraction": 0.3, "seed": 2}, {"blocks": 3, "seed": 1}])
-def test_poses_of_one_configuration_are_fitted_or_held_out_together(cell, holdout):
+def test_poses_of_one_configuration_are_fitted_or_held_out_together(cell):
     """Every configuration is measured again under a pose number of its own: the draw is that of the configurations."""
-    once = parts(cell, **holdout)[1]
+    once = parts(cell, fraction=0.3, seed=2)[1]
     again = {name: list(column) for name, column in cell.table.items()}
     again["pose"] = [pose + POSES for pose in again["pose"]]
     cell.table = {name: [*column, *again[name]] for name, column in cell.table.items()}
@@ -113,10 +97,11 @@ def test_blocks_are_clusters_whatever_the_order_of_the_poses_and_whole_turns():
     rng = np.random.default_rng(1)
     centres = np.array([[0, 0, 0], [2, 0, 1], [0, 2, -1], [-2, -2, 0]])
     of = rng.permutation(np.repeat(np.arange(4), 6))
-    angles, order = centres[of] + 0.05 * rng.standard_normal((24, 3)), rng.permutation(24)
-    found = blocks(angles, 4)
+    angles, order = centres[of] + 0.15 * rng.standard_normal((24, 3)), rng.permutation(24)
+    found = blocks_of_poses(angles, np.arange(24), 4)
     assert len({(block, centre) for block, centre in zip(found, of, strict=True)}) == 4
-    np.testing.assert_array_equal(blocks(angles[order] + 2 * np.pi * rng.integers(-1, 2, (24, 3)), 4), found[order])
+    turned = angles[order] + 2 * np.pi * rng.integers(-1, 2, (24, 3))
+    np.testing.assert_array_equal(blocks_of_poses(turned, np.arange(24), 4), found[order])
 
 
 @pytest.mark.parametrize(("poses", "joints"), [(2, 1), (5, 6), (20, 2), (60, 6)])

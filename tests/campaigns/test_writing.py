@@ -7,9 +7,8 @@ from made_cells import assert_same
 from support import refused
 
 from elastocal.campaigns.reading import read_campaign
-from elastocal.campaigns.writing import campaign_template, robot_template, sheet_template, write_campaign
+from elastocal.campaigns.writing import campaign_template, sheet_template, write_campaign
 from elastocal.io.documents import check_document, read_schema
-from elastocal.mechanics.robot_file import robot_from_document
 
 
 @pytest.mark.parametrize("kind", ["csv", "parquet"])
@@ -28,14 +27,13 @@ def test_written_campaign_is_the_one_read_and_one_that_cannot_be_written_leaves_
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
 
 
-def test_every_key_is_explained_and_those_left_out_are_valid_once_uncommented():
-    arm = robot_from_document(yaml.safe_load(robot_template()), "robot.yaml")
-    for schema, text in (("robot", robot_template()), ("campaign", campaign_template("cell", arm))):
-        known, lines, shown = read_schema(schema)["properties"], text.splitlines(), yaml.safe_load(text)
-        check_document(shown, schema, "template")
-        assert set(known) <= {line.removeprefix("# ").partition(":")[0] for line in lines}
-        for number, line in enumerate(lines):
-            if line.startswith("# ") and line[2:].partition(":")[0] in known:
-                assert lines[number - 1].startswith("# "), "explained above"
-                check_document(shown | yaml.safe_load(line[2:]), schema, line)
+def test_every_key_is_explained_and_those_left_out_are_valid_once_uncommented(kuka):
+    text = campaign_template("cell", kuka)
+    known, lines, shown = read_schema("campaign")["properties"], text.splitlines(), yaml.safe_load(text)
+    check_document(shown, "campaign", "template")
+    assert set(known) <= {line.removeprefix("# ").partition(":")[0] for line in lines}
+    for number, line in enumerate(lines):
+        if line.startswith("# ") and line[2:].partition(":")[0] in known:
+            assert lines[number - 1].startswith("# "), "explained above"
+            check_document(shown | yaml.safe_load(line[2:]), "campaign", line)
     assert sheet_template(2) == "pose,load,repeat,target,q1,q2,fx,fy,fz,mx,my,mz,x,y,z\n"

@@ -12,15 +12,15 @@ ARM = "name: arm\nchain: Rz(q1) Tx(1.0) [tip]\n"
 
 
 def test_a_new_folder_is_a_campaign_that_lacks_measurements_and_what_is_there_stays(elastocal, refusal, tmp_path):
-    result = elastocal("init", tmp_path / "cell")
-    assert result.exit_code == 0 and "template" in result.output
+    assert "no robot file" in refusal("init", tmp_path / "cell") and not (tmp_path / "cell").exists()
+    (tmp_path / "robot.yaml").write_text(ARM)
+    assert elastocal("init", tmp_path / "cell", "--robot", tmp_path / "robot.yaml").exit_code == 0
     assert {path.name for path in (tmp_path / "cell").iterdir()} == {"campaign.yaml", "robot.yaml", "measurements.csv"}
     document, robot = read_descriptions(tmp_path / "cell", tmp_path)
-    assert document["campaign"] == "cell" and robot == tmp_path / "cell" / "robot.yaml"
+    assert document["campaign"] == "cell" and robot.read_text() == ARM
     (tmp_path / "measurements.csv").write_text("pose,load,repeat,target\n")
-    (tmp_path / "robot.yaml").write_text(ARM)
-    result = elastocal("init", tmp_path)
-    assert result.exit_code == 0 and "template" not in result.output
+    assert "already" in refusal("init", tmp_path, "--robot", tmp_path / "robot.yaml")
+    assert elastocal("init", tmp_path).exit_code == 0
     assert (tmp_path / "measurements.csv").read_text() == "pose,load,repeat,target\n"
     assert "point: tip" in (tmp_path / "campaign.yaml").read_text()
     assert refusal("init", tmp_path)

@@ -9,9 +9,9 @@ from elastocal_proof.blind.closed_loop import MODELS, PARTS
 from elastocal_proof.figures.blind import closed_loop, power_map, rates_and_targets, reliability_diagram
 
 
-def summary_row(quantity, rate, low, high, target, robots="proof"):
+def summary_row(quantity, rate, low, high, target):
     bounds = dict(zip(("target_low", "target_high"), target, strict=True))
-    return {"robots": robots, "quantity": quantity, "rate": rate, "low": low, "high": high, "target": "aim"} | bounds
+    return {"robots": "proof", "quantity": quantity, "rate": rate, "low": low, "high": high, "target": "aim"} | bounds
 
 
 MEAN = "held-out RMS after, over the oracle's, mean"
@@ -30,38 +30,37 @@ def test_targets_have_a_dot_with_its_interval_and_the_range_of_the_target():
     assert low == -high and high > 30
 
 
-def power_rows(effect, level, share, level_of="retained", robots="proof"):
-    row = {"robots": robots, "group": "single", "truth": effect, "level": level, "level_of": level_of}
+def power_rows(effect, level, share, level_of="retained"):
+    row = {"group": "single", "truth": effect, "level": level, "level_of": level_of}
     return row | dict.fromkeys(["detected", "holds_truth", "named_right", "oracle_detected"], share)
 
 
 def test_power_map_has_a_share_for_each_effect_and_level_and_marks_what_is_absorbed():
     rows = [power_rows("payload", level, share) for level, share in ((50.0, 0.5), (200.0, 0.9))]
     rows += [power_rows("force_scale", level, 0.0, "raw") for level in (50.0, 200.0)] + [power_rows("lost_motion", 200.0, 0.7)]
-    rows += [power_rows("all", 50.0, 0.7), power_rows("payload", 50.0, 0.11, robots="tuned")]
+    rows += [power_rows("all", 50.0, 0.7)]
     figure = power_map(pd.DataFrame(rows))
     assert row_labels(figure.axes[0]) == ["payload", "lost motion", "force scale *", "all effects"]
     assert texts_in_axes(figure) == ["50", "90", "70", "70"] * 4
     shares = np.ma.filled(figure.axes[0].images[0].get_array().astype(float), np.nan)
     # A level at which an effect has no case stays empty.
     np.testing.assert_array_equal(np.isnan(shares), [[False, False], [True, False], [False, False], [False, True]])
-    assert "no case" in texts_in_axes(power_map(pd.DataFrame(rows).query("robots == 'nobody'")))[0]
+    assert "no case" in texts_in_axes(power_map(pd.DataFrame(rows).query("group == 'none'")))[0]
 
 
 def test_the_reliability_diagram_shows_shares_with_their_intervals_against_what_was_stated_and_numbers_of_cases():
     rows = [
-        ("proof", "all", 0.9, 1.0, 0.97, 0.95, 0.9, 0.99, 100),
-        ("proof", "all", 0.3, 0.4, 0.35, 0.25, 0.0, 0.8, 4),
-        ("tuned", "all", 0.9, 1.0, 0.95, 1.0, 0.7, 1.0, 9),
-        ("proof", "single", 0.9, 1.0, 0.5, 0.0, 0.0, 0.4, 7),
+        ("all", 0.9, 1.0, 0.97, 0.95, 0.9, 0.99, 100),
+        ("all", 0.3, 0.4, 0.35, 0.25, 0.0, 0.8, 4),
+        ("single", 0.9, 1.0, 0.5, 0.0, 0.0, 0.4, 7),
     ]
-    table = pd.DataFrame(rows, columns=["robots", "group", "from", "to", "stated", "rate", "low", "high", "cases"])
+    table = pd.DataFrame(rows, columns=["group", "from", "to", "stated", "rate", "low", "high", "cases"])
     shares, counts = reliability_diagram(table).axes
     drawn = [container.lines[0].get_xydata().tolist() for container in shares.containers]
-    assert drawn == [[[0.97, 0.95], [0.35, 0.25]], [[0.95, 1.0]]]
+    assert drawn == [[[0.97, 0.95], [0.35, 0.25]]]
     ends = [path.vertices[:, 1].tolist() for path in shares.collections[0].get_paths()]
     assert ends == [pytest.approx([0.9, 0.99]), pytest.approx([0.0, 0.8])]
-    assert [patch.get_height() for patch in counts.patches] == [100, 4, 9]
+    assert [patch.get_height() for patch in counts.patches] == [100, 4]
     assert "No verdict" in texts_in_axes(reliability_diagram(table.iloc[:0]))[0]
 
 

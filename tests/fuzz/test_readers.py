@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from made_cells import ARM, DOCUMENT, Cell
 from study_folder import REPOSITORY
 
+from elastocal.campaigns.importers import campaign_sources
 from elastocal.campaigns.reading import campaign_files, read_campaign, read_robot
-from elastocal.campaigns.sources import campaign_sources
 from elastocal.io.documents import check_document, read_document
 from elastocal.mechanics.chain import parse_chain
 from elastocal.study.configuration import check_study, override

@@ -36,7 +36,7 @@ def at_rest(arm, angles, wrench, structure=None, compliance=None):
     compliance = arm.compliance if compliance is None else compliance
     machine = machine_of(arm, structure or Structure())
     growth = np.zeros((len(angles), arm.joints + 1))
-    return machine, equilibrium(machine, angles, wrench, growth, lambda torque, unloaded: compliance * torque)
+    return machine, equilibrium(machine, angles, lambda facing: wrench, growth, lambda torque, unloaded: compliance * torque)
 
 
 def forces_at(machine, angles):

@@ -22,13 +22,14 @@ from elastocal_proof.plant.campaigns import Design, schedule_of
 from elastocal_proof.plant.kinds import drawn_defect, with_defects
 from elastocal_proof.plant.physical_robot import specimen
 
-USUAL = {"poses": 12, "held_out": 4, "ladder": (0.0, 1.0, -1.0), "repeats": 3, "repeated_poses": 4, "points": ("flange",)}
+USUAL = {"poses": 12, "held_out": 4, "ladder": (0.0, 1.0, -1.0), "repeats": 3, "repeated_poses": 4}
 
 
 def diagnosed_campaign(top, robot, effects=(), **design):
     """Measure a robot of the plant with some defects, diagnose it, and write what an audit reads of it: the campaign `cell`."""
-    file, planned = ROBOTS / f"{robot}.yaml", Design(**USUAL | design)
+    file = ROBOTS / f"{robot}.yaml"
     arm = arm_from_file(file)
+    planned = Design(**USUAL | {"points": arm.points[-1:]} | design)
     bad = with_defects(specimen(arm, 4, weighs=False), [drawn_defect(effect, arm, 4) for effect in effects])
     write_blind_campaign(top / "cell", "cell", file, bad, planned, schedule_of(arm, planned, 3))
     results, reports = top / "results/loop/cell", top / "reports/loop/cell"

@@ -20,13 +20,21 @@ def truth(*places, group=None, level=50.0, robot="irb7600", setting="usual", **c
             "joints": list(joints),
             "of": "retained",
             "share_of_plausible": 0.5,
-            "signal": {"raw": 4 * level, "retained": level, "rms_m": 6e-5, "rms_rad": 6e-5},
+            "signal": {"raw": 4 * level, "retained": level},
             "parameters": {},
         }
         for effect, *joints in places
     ]
     effects = [effect for effect, *_ in places]
-    case = {"group": group, "robot": robot, "setting": setting, "effects": effects, "levels": [level] * len(defects)}
+    robots = "tuned" if robot in PLAN["tuned"] else "proof"
+    case = {
+        "group": group,
+        "robot": robot,
+        "robots": robots,
+        "setting": setting,
+        "effects": effects,
+        "levels": [level] * len(defects),
+    }
     return {
         "campaign": "case_x",
         "case": case,

@@ -5,7 +5,7 @@ import pandas as pd
 from made_remainders import smoothly_wrong_folder
 
 from elastocal.campaigns.campaign import columns_of
-from elastocal.loop.loading import load_whole_campaign
+from elastocal.loop.loading import described_campaign
 from elastocal_proof.league.methods import DataSet, dealt
 
 
@@ -13,7 +13,8 @@ def made_data_set(folder, robot, robots_folder, poses=24, **changes):
     """A data set of an unloaded robot that misses its poses by something smooth."""
     changes = {"frame": "tracker", "offset_m": "unknown", "declared": ["joint_offset"]} | changes
     smoothly_wrong_folder(folder, robot, poses=poses, **changes)
-    descriptions, seen = load_whole_campaign(folder, robots_folder)
+    descriptions, campaign = described_campaign(folder, robots_folder)
+    seen = campaign.measurements
     return DataSet(descriptions, columns_of(seen), dealt(seen, 4, np.random.default_rng(1)))
 
 
@@ -23,7 +24,7 @@ def made_entries(size_m, poses=40, seed=1, std_m=None, folds=4):
     pose = np.repeat(np.arange(poses), 2)
     off = draws.normal(0.0, size_m, (2 * poses, 3))
     columns = {"fold": pose % folds + 1, "set": np.zeros(2 * poses, int), "session": np.zeros(2 * poses, int), "pose": pose}
-    columns |= {"load": np.zeros(2 * poses, int), "target": np.tile([0, 1], poses), "outside_range": pose % 10 == 0}
+    columns |= {"load": np.zeros(2 * poses, int), "target": np.tile([0, 1], poses)}
     columns |= {f"d{axis}": off[:, number] for number, axis in enumerate("xyz")}
     return pd.DataFrame(columns | {f"std_{axis}": np.full(2 * poses, np.nan if std_m is None else std_m) for axis in "xyz"})
 

@@ -60,11 +60,8 @@ def candidate_table(count=30, chosen=1):
 
     return {
         "candidate": np.array(names, object),
-        "effect": np.array([name.split("@")[0] for name in names], object),
         "family": np.array([FAMILIES[number % len(FAMILIES)] for number in range(total)], object),
-        "joints": np.array([name.split("@")[1] for name in names], object),
         "shape": np.where(rank == 1, 44.7213, np.nan),
-        "parameters": np.ones(total, int),
         "log_bayes_factor": where_tested(100.0 - 7 * rank),
         "probability": where_tested(np.where(rank < chosen, 0.94, 0.01)),
         "chosen": rank < chosen,

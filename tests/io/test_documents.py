@@ -129,7 +129,6 @@ def test_what_would_steer_a_terminal_or_a_spreadsheet_is_refused_wherever_it_sta
         (CAMPAIGN | {"targets": {text: target}}, "campaign", "targets"),
         (CAMPAIGN | {"declared": [text]}, "campaign", "declared[0]"),
         (ROBOT | {"name": text}, "robot", "name"),
-        ({"columns": {"x": "X"}, "target": text}, "measurement_import", "target"),
     ):
         with refused("a.yaml", key, allowed):
             check_document(document, schema, "a.yaml")

@@ -1,10 +1,12 @@
 """Which configuration a file names."""
 
 import hashlib
+import json
 
 import pytest
 
-from elastocal.io.origin import canonical_json, configuration_sha256
+import elastocal
+from elastocal.io.origin import canonical_json, configuration_sha256, provenance
 
 
 def test_equal_configurations_have_one_digest_however_they_are_ordered():
@@ -13,3 +15,12 @@ def test_equal_configurations_have_one_digest_however_they_are_ordered():
     assert configuration_sha256(one) == hashlib.sha256(canonical_json(other).encode("utf-8")).hexdigest()
     with pytest.raises(ValueError, match="JSON"):
         canonical_json({"a": float("nan")})
+
+
+def test_provenance_holds_version_settings_and_whatever_else_is_given_and_does_not_depend_on_their_order():
+    settings = {"seed": 1, "loading": {"force_N": 1000, "offset_m": [0, 0.5, 0]}}
+    found = provenance(settings, noise_um="200")
+    assert found["elastocal_version"] == elastocal.__version__
+    assert found["configuration"] == settings and found["noise_um"] == "200" and json.loads(json.dumps(found)) == found
+    turned = {"loading": {"offset_m": (0, 0.5, 0), "force_N": 1000}, "seed": 1, "sources_sha256": "x"}
+    assert provenance(turned) == provenance(settings) != provenance(settings | {"seed": 2})

@@ -12,8 +12,6 @@ from elastocal.errors import InputError
 from elastocal.io.origin import Origin
 from elastocal.io.records import (
     JobRecord,
-    checksum,
-    files_of,
     input_digests,
     jobs_behind,
     read_record,
@@ -99,11 +97,8 @@ def test_any_altered_character_of_a_record_is_found():
 
 
 def test_sha256sum_reads_what_is_recorded():
-    def lines(*names):
-        called = [sys.executable, "-m", "elastocal.io.records", *names]
-        return subprocess.run(called, capture_output=True, text=True, check=True).stdout
-
-    assert lines(MEASURED) == "".join(f"{checksum(file)}  {file}\n" for file in files_of(MEASURED))
-    assert len(lines().splitlines()) == len(recorded()) == 6
-    done = subprocess.run(["sha256sum", "--check"], input=lines(), capture_output=True, text=True)
+    called = [sys.executable, "-m", "elastocal.io.records"]
+    lines = subprocess.run(called, capture_output=True, text=True, check=True).stdout
+    assert len(lines.splitlines()) == len(recorded()) == 6
+    done = subprocess.run(["sha256sum", "--check"], input=lines, capture_output=True, text=True)
     assert done.returncode == 0 and f"{FITTED}: OK\n" in done.stdout

@@ -11,6 +11,7 @@ from elastocal.diagnosis.settings import Settings
 from elastocal.errors import InputError
 from elastocal.io.json_files import write_json
 from elastocal.io.storage import read_table, write_table
+from elastocal.loop.diagnosis_tables import diagnosis_facts, step_fit
 from elastocal.loop.schemas import measurements
 from elastocal.loop.whole import cases_in
 from elastocal_proof.league.methods import (
@@ -19,9 +20,7 @@ from elastocal_proof.league.methods import (
     Method,
     dealt,
     entered,
-    fit_of_fold,
     fitted_physics,
-    fold_tables,
     load_data_set,
     mechanism_columns,
     method_from,
@@ -90,7 +89,7 @@ def test_frames_alone_have_no_parameters_of_the_robot_and_a_regression_lowers_wh
     assert all(owner.startswith(("frame ", "target ")) for owner in owners[0])
     assert {owner.partition("@")[0] for owner in owners[1] - owners[0]} == {"joint_offset"}
     alone, process = (
-        entered(Method(GEOMETRY, name), geometry, training, held_out, "random", 1)[0] for name in (None, "gaussian_process")
+        entered(Method(GEOMETRY, name), geometry, training, held_out, "random", 1) for name in (None, "gaussian_process")
     )
     assert (residual(process) ** 2).sum() < 0.64 * (residual(alone) ** 2).sum()
     assert np.isfinite(process["std_x"]).all() and np.isnan(alone["std_x"]).all()
@@ -104,7 +103,7 @@ def test_a_regression_that_is_not_there_is_refused_in_one_line():
 
 def test_each_observation_has_its_pose_target_and_residual(data, tmp_path):
     fold, training, (held_out,) = next(rounds("blocks", data))
-    columns, _ = entered(Method(GEOMETRY), fitted_physics(GEOMETRY, training), training, held_out, "blocks", 1)
+    columns = entered(Method(GEOMETRY), fitted_physics(GEOMETRY, training), training, held_out, "blocks", 1)
     fixed = {"fold": np.full(len(columns["pose"]), fold), "set": np.zeros(len(columns["pose"]), int)}
     write_table(tmp_path / "entries.parquet", ENTRIES, [fixed | columns], {})
     found = read_table(tmp_path / "entries.parquet", ENTRIES)
@@ -122,8 +121,7 @@ def diagnosed(kuka, config_folder, tmp_path_factory):
 
 def test_the_fit_of_a_fold_is_that_which_its_diagnosis_left(diagnosed):
     case, found = diagnosed
-    facts, _ = fold_tables(found, 2)
-    again = fit_of_fold(case, {"2": facts}, 2)
+    again = step_fit(case, diagnosis_facts(found)["steps"][-1])
     assert [effect.key for effect in again.model.effects] == [effect.key for effect in found.final.model.effects]
     np.testing.assert_allclose(again.residual, found.final.residual, atol=2e-8)
     assert len(fitted_physics(GEOMETRY, case).model.effects) < len(again.model.effects)

@@ -12,7 +12,7 @@ from analysed_robots import ROBOTS
 
 from elastocal_proof.plant.arm import arm_from_file, rotation_vector
 from elastocal_proof.plant.campaigns import Design, schedule_of
-from elastocal_proof.plant.kinds import KINDS, drawn_defect, truth_of, with_defects
+from elastocal_proof.plant.kinds import KINDS, drawn_defect, with_defects
 from elastocal_proof.plant.physical_robot import seen_poses, specimen
 
 GOLDEN = ROBOTS.parents[1] / "tests/golden/plant_defects.csv"
@@ -33,7 +33,7 @@ def row_of(name, kind, seed):
     defect = drawn_defect(kind, arm, seed)
     good, bad = (seen_poses(one, schedule) for one in (robot, with_defects(robot, [defect])))
     turn = rotation_vector(bad[1] @ np.swapaxes(good[1], -1, -2))
-    known = np.array([*truth_of(robot, defect)["parameters"].values()], float)
+    known = np.array([*defect.on(robot)[1].values()], float)
     found = {"shift_m": digest(bad[0] - good[0]), "turn_rad": digest(turn), "parameters": digest(known)}
     return dict(zip(KEY, (name, kind, seed), strict=True)) | {"size": defect.size} | found
 

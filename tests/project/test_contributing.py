@@ -90,7 +90,7 @@ def test_the_importer_makes_a_campaign_and_refuses_a_file_of_another_kind(config
     np.testing.assert_allclose(np.degrees(measurements.joint_angles), angles, atol=1e-9)
     np.testing.assert_allclose(1e3 * measurements.position, positions, atol=1e-9)
     path.write_text("J1;J2\n1;2\n", encoding="utf-8")
-    with refused(path, "header", "a table of owner/repository"):
+    with refused(path, "", "a table of owner/repository"):
         mine.write_campaign([path], tmp_path / "other", robots, "other")
 
 

@@ -11,12 +11,10 @@ from pathlib import Path
 import elastocal
 from snakemake.iocontainers import Wildcards
 
-from elastocal.campaigns.importers import importer
+from elastocal.campaigns.importers import campaign_sources, importer, named_league, user_campaign
 from elastocal.campaigns.reading import campaign_files
-from elastocal.campaigns.sources import campaign_sources, named_league, user_campaign
 from elastocal.errors import InputError
-from elastocal.io.origin import Origin, configuration_sha256, environment
-from elastocal.io.provenance import SOURCES_DIGEST
+from elastocal.io.origin import SOURCES_DIGEST, Origin, configuration_sha256, environment
 from elastocal.io.records import checksum
 from elastocal.report.outcome import outcome
 from elastocal.study.configuration import check_study, rows_read, override
@@ -267,7 +265,7 @@ def files_of_campaign(campaign):
 def robots_of_import(wildcards):
     """Files of the robots that an importer reads or names."""
     source = importer(SOURCES[wildcards.campaign]["importer"], CONFIG, f"campaign {wildcards.campaign}")
-    return expand(f"{CONFIG}/robots/{{robot}}.yaml", robot=source.all_robots)
+    return expand(f"{CONFIG}/robots/{{robot}}.yaml", robot=source.robots)
 
 
 def loop_reports(campaigns):
@@ -278,15 +276,6 @@ def reports_of_own(wildcards):
     if not OWN:
         sys.exit("diagnose: found no campaign; allowed: snakemake -j2 diagnose --config campaign=FOLDER")
     return files_behind(loop_reports(OWN))
-
-
-def folds_of_one(campaigns):
-    """Campaigns that hold out the folds of the same measurements, by the importer of these."""
-    folds = {}
-    for name in campaigns:
-        if "fold" in SOURCES[name]:
-            folds.setdefault(SOURCES[name]["importer"], []).append(name)
-    return folds
 
 
 def audited(wildcards):

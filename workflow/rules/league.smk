@@ -43,7 +43,6 @@ rule diagnose_league_folds:
         sources=sources("elastocal_proof.league.methods.diagnose_league_folds"),
     output:
         facts="results/league/{data}/{split}/diagnoses.json",
-        fits="results/league/{data}/{split}/fits.parquet",
         mechanisms="results/league/{data}/{split}/mechanisms.parquet",
     log:
         "results/logs/diagnose_league_folds/{data}/{split}.log",
@@ -61,8 +60,7 @@ rule enter_league:
         descriptions=league_files("descriptions"),
         measurements=league_files("measurements"),
         folds=league_files("folds"),
-        facts=diagnosis_file("facts"),
-        fits=diagnosis_file("fits"),
+        facts=diagnosed_facts,
         sources=sources("elastocal_proof.league.methods.enter_league"),
     output:
         entries="results/league/{data}/{split}/{method}.parquet",

@@ -51,14 +51,10 @@ def league_files(kind):
     return files
 
 
-def diagnosis_file(kind):
-    """A file of the diagnoses of the folds, for a method that needs them."""
-
-    def file(wildcards):
-        needed = LEAGUE["methods"][wildcards.method]["physics"] == "diagnosis"
-        return getattr(rules.diagnose_league_folds.output, kind) if needed else []
-
-    return file
+def diagnosed_facts(wildcards):
+    """Diagnoses of the folds, for a method that needs them."""
+    needed = LEAGUE["methods"][wildcards.method]["physics"] == "diagnosis"
+    return rules.diagnose_league_folds.output.facts if needed else []
 
 
 def entry_keys(league):

@@ -93,7 +93,7 @@ class Prediction:
 
     `parameters_m`, `repeated_m` (N,): root mean square by the uncertainty of the parameters, and by what each approach and each
     pose has of its own. `regression_m`, `form_m` (N,): by what a regression leaves beyond both, and by the form of the model.
-    `std_rad` (N,): of orientation. `error_m` (N,): by all of these and by what is not commanded. `bound_m` (N,): below which
+    `error_m` (N,): by all of these and by what is not commanded. `bound_m` (N,): below which
     each error is with `CONFIDENCE`. `rms_m`, `worst_m` (draws,): over the poses, of robots that the fit leaves possible.
     """
 
@@ -101,7 +101,6 @@ class Prediction:
     repeated_m: np.ndarray
     regression_m: np.ndarray
     form_m: np.ndarray
-    std_rad: np.ndarray
     error_m: np.ndarray
     bound_m: np.ndarray
     rms_m: np.ndarray
@@ -172,7 +171,6 @@ def predict_errors(
         repeated_m=np.sqrt(own[:, :3].sum(axis=1)),
         regression_m=np.sqrt(more[0]),
         form_m=np.sqrt(form),
-        std_rad=np.sqrt((ours + own)[:, 3:].sum(axis=1)),
         error_m=np.sqrt((ours + own)[:, :3].sum(axis=1) + more[0] + left_out + form),
         bound_m=np.sqrt(
             quantile_of_length((covariances[0] + covariances[1])[:, :3, :3] + alike[:, None, None] * np.eye(3)) ** 2 + left_out
@@ -381,23 +379,20 @@ def accuracy_sentence(accuracy: Accuracy) -> str:
     return text
 
 
-def error_rows(verdict: Mapping[str, Any], *others: tuple[Accuracy, float]) -> list[list[str]]:
-    """How far the robot is off before and after its correction: one table, the same in report, certificate and on the terminal.
+def error_rows(verdict: Mapping[str, Any]) -> list[list[str]]:
+    """How far the robot is off before and after its correction: one table, the same in report and certificate.
 
     What is measured and what is predicted, over which poses and in which frame, are different errors; each row says which.
     Columns: which RMS error, of the uncorrected robot, of the corrected one; no row where the data are at fault. `verdict`:
-    contents of verdict.json. `others`: accuracies over other poses, each with that of the uncorrected robot, m.
+    contents of verdict.json.
     """
     if not verdict.get("accuracy"):
         return []
     heldout, measured = verdict["heldout"], "measured at validation poses, noise included, after the best placement of the base"
-    stated = [(Accuracy(**verdict["accuracy"]), verdict["uncorrected_m"]), *others]
+    stated, before = Accuracy(**verdict["accuracy"]), millimetres(verdict["uncorrected_m"])
     return [
         [measured, millimetres(heldout["uncalibrated"]["rms_m"]), millimetres(heldout["delivered"]["rms_m"])],
-        *(
-            [f"predicted over {each.region}, {FRAMES[each.frame]}", millimetres(before), millimetres(each.rms_m)]
-            for each, before in stated
-        ),
+        [f"predicted over {stated.region}, {FRAMES[stated.frame]}", before, millimetres(stated.rms_m)],
     ]
 
 

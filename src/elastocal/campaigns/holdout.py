@@ -13,7 +13,6 @@ from elastocal.campaigns.measurements import is_file_in
 from elastocal.counting import counted
 from elastocal.errors import InputError
 
-_HOLDOUTS = ("fraction", "blocks", "session", "poses", "campaign")
 # Below these a fit or a test says nothing.
 FEWEST_TRAINING_POSES, FEWEST_HELD_OUT_POSES = 5, 2
 _NOWHERE_RAD = 1e9
@@ -27,18 +26,6 @@ def split(campaign: Campaign) -> tuple[Measurements, Measurements]:
     """
     held_out = held_out_mask(campaign.holdout, campaign.measurements, campaign.robot.reported_offset, campaign.name)
     return campaign.measurements.select(~held_out), campaign.measurements.select(held_out)
-
-
-def holdout_from(described: dict[str, Any], folder: Path, source: str) -> dict[str, Any]:
-    """``holdout`` of ``campaign.yaml`` in a folder: one way to part measurements, with a seed where poses are drawn."""
-    ways = [way for way in _HOLDOUTS if way in described]
-    drawn = ways in (["fraction"], ["blocks"])
-    if len(ways) != 1 or ("seed" in described and not drawn):
-        allowed = "one of {fraction, seed}, {blocks, seed}, {session}, {poses} or {campaign}"
-        raise InputError(source, "holdout", f"{', '.join(described)} together" if len(described) > 1 else "seed alone", allowed)
-    if "campaign" in described:
-        other_folder(described["campaign"], folder, source)
-    return {"seed": 1} | described if drawn else dict(described)
 
 
 def other_folder(named: str, folder: Path, source: str) -> Path:
@@ -62,7 +49,7 @@ def held_out_mask(holdout: Mapping[str, Any], measurements: Measurements, report
     pairs, index = measured_poses(measurements)
     measured = (measurements.joint_angles != reported_zero).any(axis=1) | measurements.position.any(axis=1)
     nothing = np.bincount(index, measured) == 0
-    if nothing.any() and np.median(np.bincount(index)) > 1 and {"fraction", "blocks"} & {*holdout}:
+    if nothing.any() and np.median(np.bincount(index)) > 1 and "fraction" in holdout:
         # Of several rows a pose one was lost: others tell of its pose, and a draw that counted it would part all poses anew.
         mask, known = np.ones(len(measurements), bool), ~nothing[index]
         mask[known] = held_out_mask(holdout, measurements.select(known), reported_zero, source)
@@ -77,18 +64,9 @@ def held_out_mask(holdout: Mapping[str, Any], measurements: Measurements, report
             allowed = f"poses that were measured, {pairs[:, 1].min()}..{pairs[:, 1].max()}"
             raise InputError(source, "holdout.poses", str(entry), allowed)
         chosen |= match
-    for session in np.atleast_1d(holdout.get("session", [])):
-        if session not in pairs[:, 0]:
-            allowed = f"sessions that were measured: {', '.join(map(str, np.unique(pairs[:, 0])))}"
-            raise InputError(source, "holdout.session", str(session), allowed)
-        chosen |= pairs[:, 0] == session
-    draws = np.random.Generator(np.random.PCG64(holdout.get("seed", 0)))
     if "fraction" in holdout:
+        draws = np.random.Generator(np.random.PCG64(holdout.get("seed", 1)))
         chosen = np.isin(configuration, draws.permutation(count)[: round(holdout["fraction"] * count)])
-    if parts := holdout.get("blocks"):
-        if parts > count:
-            raise InputError(source, "holdout.blocks", str(parts), f"at most as many as configurations, {count}")
-        chosen = blocks_of_poses(measurements.joint_angles, index, parts) == draws.integers(parts)
     fitted, tested = (len(np.unique(configuration[part])) for part in (~chosen, chosen))
     fewest = 0 if "campaign" in holdout else FEWEST_HELD_OUT_POSES
     if fitted < FEWEST_TRAINING_POSES or tested < fewest:
@@ -111,46 +89,6 @@ SAME_POSE_RAD = 0.02
 _ROUNDS = 100
 # How often a pose drawn like the others, from a box, is called beyond their range.
 _LEVEL = 0.05
-
-
-def blocks(joint_angles: np.ndarray, count: int) -> np.ndarray:
-    """Poses parted into blocks of neighbours whose sizes differ by one at most.
-
-    Bisecting k-means [1] with parts of given size: a block is cut across its principal direction [2], then across the line
-    between the means of its parts until these stay. No draw decides, and no block is too small to be held out. Joints count
-    alike, by the cosine and sine of their angles over their spread.
-
-    `joint_angles` (P, n): rad. `count`: of blocks, at most P. Returns (P,) of int: 0 .. count-1.
-
-    [1] Steinbach, M., Karypis, G. and Kumar, V., A comparison of document clustering techniques, KDD Workshop on Text Mining,
-        2000.
-    [2] Boley, D., Principal direction divisive partitioning, Data Mining and Knowledge Discovery 2, 1998.
-    """
-    circle = np.stack([np.cos(joint_angles), np.sin(joint_angles)], axis=-1)
-    circle = circle - circle.mean(axis=0)
-    spread = np.sqrt((circle**2).mean(axis=0).sum(axis=-1))
-    points = (circle / np.maximum(spread, SAME_POSE_RAD)[:, None]).reshape(len(joint_angles), -1)
-    found = np.zeros(len(points), int)
-    waiting = [(np.arange(len(points)), 0, count)]
-    while waiting:
-        members, first, parts = waiting.pop()
-        found[members] = first
-        if parts == 1:
-            continue
-        about = points[members] - points[members].mean(axis=0)
-        direction = np.linalg.svd(about, full_matrices=False)[2][0]
-        # The sign of a singular vector is arbitrary.
-        direction = direction * np.sign(direction[np.argmax(np.abs(direction))])
-        lower = parts // 2
-        cut = round(len(members) * lower / parts)
-        order = np.argsort(about @ direction, kind="stable")
-        for _ in range(_ROUNDS):
-            before, direction = set(order[:cut]), about[order[cut:]].mean(axis=0) - about[order[:cut]].mean(axis=0)
-            order = np.argsort(about @ direction, kind="stable")
-            if set(order[:cut]) == before:
-                break
-        waiting += [(members[order[:cut]], first, lower), (members[order[cut:]], first + lower, parts - lower)]
-    return found
 
 
 def configurations(joint_angles: np.ndarray, pose: np.ndarray) -> np.ndarray:
@@ -188,9 +126,46 @@ def number_alike(points: np.ndarray, within: float) -> np.ndarray:
 
 
 def blocks_of_poses(joint_angles: np.ndarray, pose: np.ndarray, count: int) -> np.ndarray:
-    """`blocks` of poses, ndarray of int (P,), by the means of their configurations; other arguments as of `configurations`."""
+    """Poses parted into blocks of neighbours, which have numbers of configurations that differ by one at most.
+
+    Bisecting k-means [1] with parts of given size: a block is cut across its principal direction [2], then across the line
+    between the means of its parts until these stay. No draw decides, and no block is too small to be held out. Joints count
+    alike, by the cosine and sine of their angles over their spread.
+
+    `joint_angles`, `pose`: as of `configurations`. `count`: of blocks, at most one for each configuration. Returns (P,) of int:
+    0 .. count-1.
+
+    [1] Steinbach, M., Karypis, G. and Kumar, V., A comparison of document clustering techniques, KDD Workshop on Text Mining,
+        2000.
+    [2] Boley, D., Principal direction divisive partitioning, Data Mining and Knowledge Discovery 2, 1998.
+    """
     configuration = configurations(joint_angles, pose)
-    return blocks(_means(_means(joint_angles, pose), configuration), count)[configuration]
+    angles = _means(_means(joint_angles, pose), configuration)
+    circle = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    circle = circle - circle.mean(axis=0)
+    spread = np.sqrt((circle**2).mean(axis=0).sum(axis=-1))
+    points = (circle / np.maximum(spread, SAME_POSE_RAD)[:, None]).reshape(len(angles), -1)
+    found = np.zeros(len(points), int)
+    waiting = [(np.arange(len(points)), 0, count)]
+    while waiting:
+        members, first, parts = waiting.pop()
+        found[members] = first
+        if parts == 1:
+            continue
+        about = points[members] - points[members].mean(axis=0)
+        direction = np.linalg.svd(about, full_matrices=False)[2][0]
+        # The sign of a singular vector is arbitrary.
+        direction = direction * np.sign(direction[np.argmax(np.abs(direction))])
+        lower = parts // 2
+        cut = round(len(members) * lower / parts)
+        order = np.argsort(about @ direction, kind="stable")
+        for _ in range(_ROUNDS):
+            before, direction = set(order[:cut]), about[order[cut:]].mean(axis=0) - about[order[:cut]].mean(axis=0)
+            order = np.argsort(about @ direction, kind="stable")
+            if set(order[:cut]) == before:
+                break
+        waiting += [(members[order[:cut]], first, lower), (members[order[cut:]], first + lower, parts - lower)]
+    return found[configuration]
 
 
 def _means(joint_angles: np.ndarray, group: np.ndarray) -> np.ndarray:

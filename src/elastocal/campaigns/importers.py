@@ -1,7 +1,8 @@
-"""Public measurements of real robots as campaigns: where they are, what their contents must be, how each format is read.
+"""The campaigns that a configuration names: public measurements of real robots, read as campaigns, and the user's own.
 
-config/public_data.yaml says all of it, see its schema, but for two MAT files that are read here. All are targets on an unloaded
-flange, measured by a tracker in a frame that nobody knows.
+config/public_data.yaml says where public measurements are, what their contents must be and how each table is read, see its
+schema, but for two MAT files that are read here. All are targets on an unloaded flange, measured by a tracker in a frame that
+nobody knows.
 """
 
 from __future__ import annotations
@@ -18,11 +19,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy
 
+from elastocal.campaigns.campaign import DOCUMENT
 from elastocal.campaigns.holdout import number_alike
-from elastocal.campaigns.reading import read_robot
+from elastocal.campaigns.reading import campaign_files, read_descriptions, read_robot
 from elastocal.campaigns.writing import write_campaign
 from elastocal.errors import InputError
-from elastocal.io.documents import check_document, read_document
+from elastocal.io.documents import check_document, document_path, named_document, read_document
+from elastocal.io.json_files import read_json
 
 # Names a folder that already has the files, for machines without a network.
 FOLDER_VARIABLE = "ELASTOCAL_DATA"
@@ -30,10 +33,9 @@ FOLDER_VARIABLE = "ELASTOCAL_DATA"
 
 @dataclass(frozen=True)
 class PublicFile:
-    """One file of a public repository.
+    """One file of a public repository, or an excerpt of it that comes with this project.
 
     `repository`: owner/name on GitHub. `path`: in the repository. `local`: where the file stands below a folder that has it.
-    `excerpt`: a part of it, which comes with this project and cannot be downloaded.
     """
 
     repository: str
@@ -42,7 +44,6 @@ class PublicFile:
     sha256: str
     local: str
     licence: str
-    excerpt: bool = False
 
     @property
     def address(self) -> str:
@@ -52,16 +53,15 @@ class PublicFile:
 
 def find_missing(names: Iterable[str], files: Mapping[str, PublicFile], kept: str | Path, box: str | Path) -> str | None:
     """The first of some files that is missing where `FOLDER_VARIABLE` stands for a network, see `fetch`; None without it."""
-    for name in names if os.environ.get(FOLDER_VARIABLE) else ():
-        if _at_hand(files[name], box) is None and not Path(kept, _name_copy(name, files[name])).is_file():
-            return files[name].local
-    return None
+    offline = os.environ.get(FOLDER_VARIABLE)
+    return next((files[name].local for name in names if offline and not _at_hand(name, files[name], kept, box)), None)
 
 
-def _at_hand(file: PublicFile, box: str | Path) -> Path | None:
-    """The file in the project's own folder, else in that of `FOLDER_VARIABLE`."""
-    folders = [box, *filter(None, [os.environ.get(FOLDER_VARIABLE)])]
-    return next((path for folder in folders if (path := Path(folder) / file.local).is_file()), None)
+def _at_hand(name: str, file: PublicFile, kept: str | Path, box: str | Path) -> Path | None:
+    """The file in the project's own folder, in that of `FOLDER_VARIABLE`, or as it was downloaded."""
+    given = os.environ.get(FOLDER_VARIABLE)
+    places = [Path(box, file.local), *([Path(given, file.local)] if given else []), Path(kept, _name_copy(name, file))]
+    return next((path for path in places if path.is_file()), None)
 
 
 def _name_copy(name: str, file: PublicFile) -> str:
@@ -77,26 +77,21 @@ def fetch(name: str, files: Mapping[str, PublicFile], folder: str | Path, box: s
     if name not in files:
         raise InputError("public data", "", repr(name), ", ".join(files))
     file = files[name]
-    if local := _at_hand(file, box):
-        found = hashlib.sha256(local.read_bytes()).hexdigest()
-        if found != file.sha256:
-            origin = "an excerpt of" if file.excerpt else "as in"
-            raise InputError(local, "", f"SHA-256 {found}", f"{file.sha256}, {origin} {file.address}")
-        return local
-    if file.excerpt:
-        raise InputError(Path(box) / file.local, "", "no such file", "the one that comes with this project")
+    if path := _at_hand(name, file, folder, box):
+        if (found := hashlib.sha256(path.read_bytes()).hexdigest()) != file.sha256:
+            raise InputError(path, "", f"SHA-256 {found}", f"{file.sha256}, of {file.address}")
+        return path
     # Loads what asks a network, which the rules, who look for files alone, do without.
     import pooch
 
     pooch.get_logger().setLevel(logging.ERROR)
     try:
-        kept = pooch.retrieve(file.address, f"sha256:{file.sha256}", _name_copy(name, file), folder)
+        return Path(pooch.retrieve(file.address, f"sha256:{file.sha256}", _name_copy(name, file), folder))
     except ValueError as error:
         raise InputError(file.address, "", f"other contents ({error})", f"SHA-256 {file.sha256}") from None
     except OSError as error:
         allowed = f"a network, or the folder in {FOLDER_VARIABLE} with {file.local}"
         raise InputError(file.address, "", f"no download ({error})", allowed) from None
-    return Path(kept)
 
 
 class PublicMeasurements(NamedTuple):
@@ -112,25 +107,21 @@ def _read_text(table: Mapping[str, Any], path: str | Path) -> PublicMeasurements
     # Neither pandas nor the parts of scipy load at each start of Snakemake, whose rules ask importers for their files alone.
     import pandas as pd
 
-    separator, kind, angles_of = table.get("separator", ","), table["kind"], table["angles"]
-    separator = r"\s+" if separator == "blanks" else separator
-    needed = {name for parts in table["positions"].values() for part in parts for name in part} | {*angles_of[:6]}
+    separator = r"\s+" if table.get("separator") == "blanks" else table.get("separator", ",")
+    others: dict[str, np.ndarray] = {}
     try:
         text = pd.read_csv(path, sep=separator, decimal=table.get("decimal", "."), names=table.get("names"), index_col=False)
-        if missing := sorted(needed - {*text}):
-            raise InputError(path, "header", f"no column {missing[0]!r}", kind)
-        angles = text[[name for name in angles_of if name in text]].to_numpy(float)
+        angles = text[[name for name in table["angles"] if name in text]].to_numpy(float)
         positions = {
             target: 1e-3 * sum(text[part].to_numpy(float) for part in parts) for target, parts in table["positions"].items()
         }
-        others: dict[str, np.ndarray] = {}
         if turn := table.get("orientation"):
             vectors = scipy.spatial.transform.Rotation.from_euler("XYZ", text[turn].to_numpy(float), degrees=True).as_rotvec()
             others |= dict(zip(("rx", "ry", "rz"), vectors.T, strict=True))
         if table.get("temperature") in text:
             others["temperature_c"] = text[table["temperature"]].to_numpy(float)
-    except (ValueError, OSError) as error:
-        raise error if isinstance(error, InputError) else InputError(path, "", str(error), kind) from None
+    except (KeyError, ValueError, OSError) as error:
+        raise InputError(path, "", str(error), table["kind"]) from None
     # Where a spreadsheet has cut the stamps down to 2,02011E+13 there are none.
     if table.get("time") in text and pd.api.types.is_integer_dtype(text[table["time"]]):
         stamps = pd.to_datetime(text[table["time"]].astype(str), format="%Y%m%d%H%M%S")
@@ -163,8 +154,8 @@ _MAT_FILES = {"fanuc_static": _read_fanuc_static, "motoman": _read_motoman}
 class Importer:
     """What makes campaigns of a public source: an entry of ``public_data.yaml``, whose schema says what its keys mean.
 
-    `files`: by the names that campaigns have for them, those of its parts too. `read`: makes measurements of a
-    file, of those with parts of one of the first.
+    `files`: by the names that campaigns have for them, those of its parts too. `read`: makes measurements of a file; of an
+    importer with parts each has its own. `robots`: that its campaigns name, and those of its parts, which it reads.
     """
 
     files: Mapping[str, PublicFile]
@@ -173,11 +164,6 @@ class Importer:
     noise: Mapping[str, float] | None = None
     same_pose_rad: float = 0.0
     parts: tuple[Importer, ...] = ()
-
-    @property
-    def all_robots(self) -> tuple[str, ...]:
-        """Robots that its campaigns name or that it reads."""
-        return (*self.robots, *(robot for part in self.parts for robot in part.robots))
 
     def write_campaign(
         self, paths: Sequence[str | Path], folder: str | Path, robots_folder: str | Path, name: str, **test: Mapping[str, Any]
@@ -188,11 +174,15 @@ class Importer:
         poses are dealt out in turn: cross-validation by whole poses (Geisser, The predictive sample reuse method with
         applications, JASA 70, 1975).
         """
+        import pandas as pd
+
         tables, targets, joints = [], list[str](), 6
         for session, (part, path) in enumerate(zip(self.parts or (self,), paths, strict=True)):
             angles, positions, others = part.read(path)
             joints = angles.shape[1]
-            pose, repeat = pose_and_repeat(angles, part.same_pose_rad)
+            # Poses are numbered as they first come.
+            pose = number_alike(angles, part.same_pose_rad)
+            repeat = pd.Series(pose).groupby(pose).cumcount().to_numpy()
             if self.parts:
                 angles = read_robot(Path(robots_folder) / f"{part.robots[0]}.yaml").model_angles(angles)
             # One row for each target of each measurement.
@@ -222,14 +212,6 @@ class Importer:
         write_campaign(folder, document, whole, joints)
 
 
-def pose_and_repeat(joint_angles: np.ndarray, tolerance_rad: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """Poses (N,) of joint angles (N, n), numbered as they first come, and repeats of each (N,), both from 0."""
-    import pandas as pd
-
-    pose = number_alike(joint_angles, tolerance_rad)
-    return pose, pd.Series(pose).groupby(pose).cumcount().to_numpy()
-
-
 @cache
 def read_importers(path: Path) -> dict[str, Importer]:
     """Importers of ``public_data.yaml`` by the names that ``importer`` of a campaign may have."""
@@ -244,7 +226,8 @@ def read_importers(path: Path) -> dict[str, Importer]:
             raise InputError(path, name, "no format", "a table, or parts that have one")
         files |= {each: file for part in parts for each, file in part.files.items()}
         stated = {key: entry[key] for key in ("noise", "same_pose_rad") if key in entry}
-        found[name] = Importer(files, read, tuple(entry["robots"]), **stated, parts=parts)
+        robots = (*entry["robots"], *(robot for part in parts for robot in part.robots))
+        found[name] = Importer(files, read, robots, **stated, parts=parts)
     return found
 
 
@@ -254,3 +237,63 @@ def importer(name: str, config: str | Path, source: str | Path) -> Importer:
     if name not in known:
         raise InputError(source, "importer", repr(name), ", ".join(known))
     return known[name]
+
+
+def campaign_sources(config: Mapping[str, Any], folder: str | Path, source: str = "config.yaml") -> dict[str, dict[str, Any]]:
+    """Documents of the campaigns that a configuration names, by the names of their files in `folder`, checked.
+
+    A simulated one has the document of its robot under ``robot_document``. `source`: file of the configuration.
+    """
+    found = {}
+    for name in named_campaigns(config):
+        document = named_document(folder, "campaigns", "campaign_source", name, source)
+        path = document_path(folder, "campaigns", name)
+        if document["source"] == "public":
+            importer(document["importer"], folder, path)
+        else:
+            document["robot_document"] = named_document(folder, "robots", "robot", document["robot"], path)
+            named_document(folder, "robots", "robot", document["declared_robot"], path)
+        found[name] = document
+    return found
+
+
+def named_campaigns(config: Mapping[str, Any]) -> list[str]:
+    """Campaigns that a configuration names, each once: simulated, measured, of the default run and of the league."""
+    looped = (name for key in ("campaigns", "measured", "main") for name in config["loop"][key])
+    return list(dict.fromkeys((*looped, *named_league(config))))
+
+
+def named_league(config: Mapping[str, Any]) -> list[str]:
+    """Data sets of all leagues, each once."""
+    return list(
+        dict.fromkeys(data for robots in config["league"]["data"].values() for names in robots.values() for data in names)
+    )
+
+
+def user_campaign(config: Mapping[str, Any], robots_folder: str | Path, results: str | Path) -> dict[str, str]:
+    """Folder of a user's own campaign by its name, spelled in one way however it was given; empty where there is none.
+
+    `config`: ``campaign`` is its folder. `results`: of each campaign by its name. An `InputError` refuses faults of its
+    documents, and a name that a campaign of this project has, or another one whose results are there.
+    """
+    if not config.get("campaign"):
+        return {}
+    # Snakemake takes a folder that is called 2026 for a number, and another spelling of one folder for another one.
+    place, here = Path(str(config["campaign"])).resolve(), Path.cwd()
+    folder = (place.relative_to(here) if place.is_relative_to(here) else place).as_posix()
+    for path in campaign_files(folder, robots_folder):
+        if set(path) & set("{}"):
+            raise InputError(path, "", "braces", "a path without braces, which Snakemake takes for wildcards")
+    document, _ = read_descriptions(folder, robots_folder)
+    name, source = document["campaign"], f"{folder}/{DOCUMENT}"
+    if name in named_campaigns(config):
+        raise InputError(source, "campaign", repr(name), "a name that no campaign of config.yaml has")
+    try:
+        earlier = Path(read_json(Path(results, name, "campaign.json"))["source"]).parent
+    except (OSError, ValueError, KeyError, TypeError):
+        # No results, or such as do not say of what they are.
+        earlier = None
+    if earlier is not None and earlier.is_dir() and not earlier.samefile(folder):
+        found = f"{name!r}, whose results are of {earlier.as_posix()}"
+        raise InputError(source, "campaign", found, f"another name, or first take away {Path(results, name).as_posix()}")
+    return {name: folder}

@@ -21,14 +21,7 @@ from elastocal.campaigns.campaign import (
     groups_of,
     targets_from,
 )
-from elastocal.campaigns.holdout import (
-    FEWEST_HELD_OUT_POSES,
-    SAME_POSE_RAD,
-    held_out_mask,
-    holdout_from,
-    measured_poses,
-    other_folder,
-)
+from elastocal.campaigns.holdout import FEWEST_HELD_OUT_POSES, SAME_POSE_RAD, held_out_mask, measured_poses, other_folder
 from elastocal.campaigns.measurements import CSV, FARTHEST_RAD, PARQUET, ROTATION, files_there, is_file_in, read_measurements
 from elastocal.campaigns.tables import Cells
 from elastocal.counting import counted
@@ -50,7 +43,9 @@ def read_campaign(folder: str | Path, robots_folder: str | Path, effects: Collec
     document, robot_path = read_descriptions(folder, robots_folder)
     robot = read_robot(robot_path)
     targets = targets_from(document["targets"], robot.chain, source)
-    holdout = holdout_from(document.get("holdout", DEFAULT_HOLDOUT), folder, source)
+    holdout = document.get("holdout", DEFAULT_HOLDOUT)
+    if "campaign" in holdout:
+        other_folder(holdout["campaign"], folder, source)
     for index, name in enumerate(document.get("declared", ())):
         if effects is not None and name not in set(effects):
             raise InputError(source, f"declared[{index}]", repr(name), closest_first(name, sorted(effects)))
@@ -60,7 +55,7 @@ def read_campaign(folder: str | Path, robots_folder: str | Path, effects: Collec
     _check_stated(document, measurements, robot, robot_path.name, source)
     held_out_mask(holdout, measurements, robot.reported_offset, source)
     place = {"table": Path(table.path).name, "header_line": table.header_line}
-    return assemble_campaign(document | {"holdout": holdout} | place, robot, measurements, source)
+    return assemble_campaign(document | place, robot, measurements, source)
 
 
 def read_descriptions(folder: str | Path, robots_folder: str | Path) -> tuple[dict[str, Any], Path]:
@@ -133,7 +128,12 @@ def _check_stated(document: Mapping[str, Any], measurements: Measurements, robot
 
 def _measurements(table: Cells, robot: Robot, targets: Sequence[Target], measured: str) -> Measurements:
     reported = table.matrix(f"q{j}" for j in range(1, robot.joints + 1))
-    _check_angles(reported, table, robot)
+    degrees = find_degrees(reported, robot)
+    if degrees.any(axis=1).mean() > _SINGLE_ROWS:
+        index, joint = np.argwhere(degrees)[0]
+        limits = "from {:.2f} to {:.2f} rad".format(*robot.joint_limits[joint])
+        allowed = f"rad, not degrees, of a joint that goes {limits} (counted otherwise: reported_joints of the robot file)"
+        raise table.fault(index, f"q{joint + 1}", allowed)
     names = {target.name: index for index, target in enumerate(targets)}
     labels = table.texts("target")
     unknown = next((index for index, label in enumerate(labels) if label not in names), None)
@@ -186,16 +186,6 @@ def find_degrees(reported: np.ndarray, robot: Robot) -> np.ndarray:
     # An angle that its opposite would bring inside the limits has rather a wrong sign, which is for the diagnosis to trace.
     beyond = np.minimum(off(reported), off(-reported)) > _BEYOND_LIMITS_RAD
     return np.asarray((np.abs(reported) > farthest) | (beyond & (off(np.radians(reported)) <= 0)))
-
-
-def _check_angles(reported: np.ndarray, table: Cells, robot: Robot) -> None:
-    """Refuse degrees in more than single rows of angles (N, n) as the controller reports them."""
-    wrong = find_degrees(reported, robot)
-    if wrong.any(axis=1).mean() > _SINGLE_ROWS:
-        index, joint = np.argwhere(wrong)[0]
-        limits = "from {:.2f} to {:.2f} rad".format(*robot.joint_limits[joint])
-        allowed = f"rad, not degrees, of a joint that goes {limits} (counted otherwise: reported_joints of the robot file)"
-        raise table.fault(index, f"q{joint + 1}", allowed)
 
 
 def _check_measurements(measurements: Measurements, table: Cells, robot: Robot, targets: Sequence[Target], source: str) -> None:

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.elastostatics import extended_chain, generalized_forces, spring_compliance, wrench_of_offset_force
-from elastocal.mechanics.kinematics import poses, poses_and_jacobians
+from elastocal.mechanics.kinematics import poses_and_jacobians, poses_of_points
 from elastocal.mechanics.robot import Robot
 from elastocal.random_streams import stream
 
@@ -58,15 +58,13 @@ def draw_measurements(robot: Robot, plan: Plan, seed: int, name: str) -> dict[st
     coordinates = chain.at(angles[pose])
     jacobian = poses_and_jacobians(chain, coordinates, replace(chain.end_effector, offset_m=(0.0, 0.0, 0.0)))[2]
     deflected = coordinates + generalized_forces(jacobian, wrench) @ spring_compliance(robot)
-    parts = []
-    for point in plan.points:
-        position, rotation = poses(chain, deflected, chain.point(point))
-        position = position + plan.noise_m * draws.standard_normal(position.shape)
-        turned = Rotation.from_rotvec(plan.noise_rad * draws.standard_normal(position.shape)) * Rotation.from_matrix(rotation)
-        part = {"pose": pose, "load": load, "repeat": repeat, "target": np.full(len(pose), point)}
-        part |= {f"q{joint + 1}": angles[pose, joint] for joint in range(robot.joints)}
-        part |= dict(zip(WRENCH_NAMES, wrench.T, strict=True))
-        part |= dict(zip("xyz", position.T, strict=True))
-        part |= dict(zip(("rx", "ry", "rz"), turned.as_rotvec().T, strict=True))
-        parts.append(part)
-    return {column: np.concatenate([part[column] for part in parts]) for column in parts[0]}
+    position, rotation = poses_of_points(chain, deflected, [chain.point(point) for point in plan.points])
+    noise = draws.standard_normal((len(plan.points), 2, len(pose), 3))
+    shift, turn = np.moveaxis(noise, 1, 0).reshape(2, -1, 3)
+    turned = Rotation.from_rotvec(plan.noise_rad * turn) * Rotation.from_matrix(rotation.reshape(-1, 3, 3))
+    read = np.column_stack([position.reshape(-1, 3) + plan.noise_m * shift, turned.as_rotvec()])
+    columns = {"pose": pose, "load": load, "repeat": repeat} | dict(zip(WRENCH_NAMES, wrench.T, strict=True))
+    columns |= {f"q{joint}": column for joint, column in enumerate(angles[pose].T, 1)}
+    table = {name: np.tile(column, len(plan.points)) for name, column in columns.items()}
+    table |= dict(zip(("x", "y", "z", "rx", "ry", "rz"), read.T, strict=True))
+    return table | {"target": np.repeat(plan.points, len(pose))}

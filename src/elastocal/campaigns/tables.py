@@ -32,18 +32,12 @@ A_HEADER_ALONE = "a header alone"
 LARGEST_BYTES, MOST_LINES = 100_000_000, 500_000
 # Lines of a file with their numbers, from 1.
 _Lines = Sequence[tuple[int, str]]
-
-
 # Least and largest value of a column, in its unit, and why. Generous: whatever lies beyond is in another unit, or no reading of
 # an instrument beside a robot.
-_Bound = tuple[float, float, str]
-_FORCE: _Bound = (-1e6, 1e6, "N, the weight of a hundred tonnes")
-_MOMENT: _Bound = (-1e7, 1e7, "N m, a hundred tonnes on a lever of ten metres")
-_PLACE: _Bound = (-2e7, 2e7, "m, half the circumference of the Earth")
-BOUNDS: Mapping[str, _Bound] = {
-    **dict.fromkeys(("fx", "fy", "fz"), _FORCE),
-    **dict.fromkeys(("mx", "my", "mz"), _MOMENT),
-    **dict.fromkeys("xyz", _PLACE),
+BOUNDS: Mapping[str, tuple[float, float, str]] = {
+    **dict.fromkeys(("fx", "fy", "fz"), (-1e6, 1e6, "N, the weight of a hundred tonnes")),
+    **dict.fromkeys(("mx", "my", "mz"), (-1e7, 1e7, "N m, a hundred tonnes on a lever of ten metres")),
+    **dict.fromkeys("xyz", (-2e7, 2e7, "m, half the circumference of the Earth")),
     "time_s": (-1e11, 1e11, "s, three thousand years either way: not milliseconds of a calendar"),
     "temperature_c": (-200.0, 200.0, "°C, in which arms work, not kelvin"),
     "u95_m": (1e-8, 0.1, "m, more than 0: a sixtieth of a laser's wavelength at least, at most what a robot is off by"),
@@ -149,15 +143,13 @@ def _show(cell: Any) -> str:
 class TextTable:
     """Cells of a table: decimal points throughout; `lines` has the line of the file of each row.
 
-    `units`: of the columns that have one in a row of units under the header. `left_out` says in words what of the file is no
-    cell of `columns`.
+    `units`: of the columns that have one in a row of units under the header.
     """
 
     path: str
     dialect: Dialect
     columns: dict[str, tuple[str, ...]]
     lines: tuple[int, ...]
-    left_out: tuple[str, ...] = ()
     units: dict[str, str] = field(default_factory=dict)
 
     def cells(self, columns: Mapping[str, str], scales: Mapping[str, float], kept: np.ndarray | None = None) -> Cells:
@@ -200,8 +192,8 @@ def read_text_table(
         names = _split_cells(line, separator, source, header)
     names = [name or f"column {place}" for place, name in enumerate(names, 1)]
     where = f"line {header}" if header else "--columns"
-    table = [(number, _split_cells(line, separator, source, number)) for number, line in kept if number > header]
-    rows = [row for row in table if any(row[1])]
+    split = ((number, _split_cells(line, separator, source, number)) for number, line in kept if number > header)
+    rows = [(number, cells) for number, cells in split if any(cells)]
     for number, cells in rows:
         # Separators at the end of the rows and not of the header are common.
         while len(cells) > len(names) and not cells[-1]:
@@ -215,11 +207,12 @@ def read_text_table(
         raise InputError(source, "", A_HEADER_ALONE, "one row for each measurement")
     if unknown := next((name for name in ignored if name not in names), None):
         raise InputError(source, where, f"no column {unknown!r} to ignore", closest_first(unknown, list(dict.fromkeys(names))))
-    numbers, cells_of = [number for number, _ in rows], [*zip(*(cells for _, cells in rows), strict=True)]
-    wanted_cells = [
-        (n, name, cells) for n, (name, cells) in enumerate(zip(names, cells_of, strict=True), 1) if name not in ignored
+    numbers, cells_of = [number for number, _ in rows], zip(*(cells for _, cells in rows), strict=True)
+    there = [
+        (name, cells)
+        for place, (name, cells) in enumerate(zip(names, cells_of, strict=True), 1)
+        if name not in ignored and (any(cells) or name != f"column {place}")
     ]
-    there = [(name, cells) for n, name, cells in wanted_cells if any(cells) or name != f"column {n}"]
     columns = dict(there)
     if len(columns) < len(there):
         twice = Counter(name for name, _ in there).most_common(1)[0][0]
@@ -231,15 +224,8 @@ def read_text_table(
             name: tuple(cell.replace(",", ".") if comma.fullmatch(cell) else cell for cell in cells)
             for name, cells in columns.items()
         }
-    unread = (
-        (len(table) - len(rows) - bool(units), "row", "of empty cells"),
-        (sum(number < header for number, _ in filled), "line", "above the header"),
-        (sum(number > header for number, _ in comments), "line", "of comments below the header"),
-        (len(wanted_cells) - len(there), "column", "without name and values"),
-    )
-    left_out = tuple(f"{counted(number, noun)} {what}" for number, noun, what in unread if number)
     below = {name: unit for name, unit in units.items() if unit and name in columns}
-    return TextTable(source, Dialect(separator, decimal, header or None, encoding), columns, tuple(numbers), left_out, below)
+    return TextTable(source, Dialect(separator, decimal, header or None, encoding), columns, tuple(numbers), below)
 
 
 def _read_lines(path: str | Path, encoding: str | None) -> tuple[list[str], str]:

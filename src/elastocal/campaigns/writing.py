@@ -40,7 +40,7 @@ def write_campaign(
 
 
 def campaign_template(name: str, robot: Robot, targets: Sequence[str] = (), measured: str = "position") -> str:
-    """Text of a campaign.yaml to fill in.
+    """Text of a campaign.yaml to fill in, each key explained; those that it leaves out stand as comments.
 
     `robot`: whose file is robot.yaml beside it. `targets`, `measured`: as the measurements have them that lie there.
     """
@@ -54,26 +54,15 @@ def campaign_template(name: str, robot: Robot, targets: Sequence[str] = (), meas
         "declared": ["joint_offset", "link_geometry"],
         "holdout": {"fraction": 0.3, "seed": 1},
     }
-    return _explain("campaign", document)
-
-
-def robot_template() -> str:
-    """Text of a robot.yaml to replace what is in it: an arm of six joints whose name says that it is nobody's."""
-    rules = read_schema("robot")["properties"]
-    return _explain("robot", {key: rules[key]["examples"][0] for key in ("name", "chain", "lengths_m", "joint_limits_deg")})
+    text = f"# {read_schema('campaign')['title']}. Keys behind # are optional.\n"
+    for key, rule in read_schema("campaign")["properties"].items():
+        meaning = textwrap.fill(rule.get("description", key), 110, initial_indent="# ", subsequent_indent="# ")
+        entry = f"{key}: {one_line(document[key])}" if key in document else f"# {key}: {one_line(rule['examples'][0])}"
+        text += f"\n{meaning}\n{entry}\n"
+    return text
 
 
 def sheet_template(joints: int) -> str:
     """Header of a measurements.csv to fill in, without optional covariates."""
     optional = ("session", "approach", "time_s", "temperature_c", "u95_m", "rx", "ry", "rz")
     return ",".join(name for name in file_columns(joints) if not name.startswith(optional)) + "\n"
-
-
-def _explain(schema: str, document: Mapping[str, Any]) -> str:
-    """A document as YAML in which each key of its schema is explained; those that it leaves out stand as comments."""
-    text = f"# {read_schema(schema)['title']}. Keys behind # are optional.\n"
-    for key, rule in read_schema(schema)["properties"].items():
-        meaning = textwrap.fill(rule.get("description", key), 110, initial_indent="# ", subsequent_indent="# ")
-        entry = f"{key}: {one_line(document[key])}" if key in document else f"# {key}: {one_line(rule['examples'][0])}"
-        text += f"\n{meaning}\n{entry}\n"
-    return text

@@ -5,66 +5,56 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 from typer import Argument, Option
 
 from elastocal.command.terminal import MOST_ROWS, pipeline, print_answer, print_lines, robots, workplace
 from elastocal.counting import counted
-from elastocal.errors import InputError, escaped, steering
+from elastocal.errors import InputError, steering
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from rich.console import Console
-
+_ROBOT = "robot.yaml"
 # Snakemake prints the second before its logger begins.
 _NOTHING, _NO_NEWS = "Nothing to be done", "Using workflow specific profile"
 
 
 def init(
     folder: Annotated[Path, Argument(help="New folder, or one that has measurements or a robot file already.")],
-    robot: Annotated[Path | None, Option(help="Robot file to copy there; a template where there is none.")] = None,
+    robot: Annotated[Path | None, Option(help="Robot file to copy there, where there is none.")] = None,
 ) -> None:
-    """Begin a campaign: a folder with files to fill in.
+    """Begin a campaign: campaign.yaml with every key explained.
 
-    campaign.yaml explains every key, and has the targets of measurements that lie there. No file that exists is replaced.
+    It has the targets of measurements that lie there; without any, measurements.csv is made to be filled in. No file that
+    exists is replaced.
     """
     from rich.console import Console
 
     from elastocal.campaigns.campaign import DOCUMENT
     from elastocal.campaigns.measurements import CSV, PARQUET, described_by
     from elastocal.campaigns.reading import read_robot
-    from elastocal.campaigns.writing import campaign_template, robot_template, sheet_template
+    from elastocal.campaigns.writing import campaign_template, sheet_template
     from elastocal.io.atomic_writes import check_places, write_text, write_together
     from elastocal.io.documents import LARGEST_BYTES
     from elastocal.io.texts import read_text
 
-    place = folder / "robot.yaml"
-    check_places(place, *(folder / name for name in (DOCUMENT, CSV, PARQUET)))
+    check_places(*(folder / name for name in (_ROBOT, DOCUMENT, CSV, PARQUET)))
     if (folder / DOCUMENT).exists():
         raise InputError(folder / DOCUMENT, "", "a campaign that is there already", "a folder without campaign.yaml")
-    if robot is not None and place.exists():
-        raise InputError(place, "", "a robot that is there already", "a folder without robot.yaml, or no --robot")
-    text = robot_template() if robot is None else read_text(robot, LARGEST_BYTES)
-    source = place if place.exists() else robot
-    arm = None if source is None else read_robot(source)
-    there = [name for name in (place.name, CSV, PARQUET) if (folder / name).exists()]
-    targets, measured = described_by(folder)
-    written = [name for name in (place.name, CSV, DOCUMENT) if name not in there and (name != CSV or PARQUET not in there)]
-    with write_together(folder, written) as partial:
-        if place.name in written:
-            write_text(partial / place.name, text)
-        arm = arm or read_robot(partial / place.name)
-        if CSV in written:
-            write_text(partial / CSV, sheet_template(arm.joints))
-        write_text(partial / DOCUMENT, campaign_template(folder.resolve().name, arm, targets, measured))
-    template = ["! robot.yaml is a template: enter your robot's chain and lengths, or use `elastocal import urdf` or `dh`"]
-    answer = f"{folder.as_posix()}: {', '.join(written)}"
+    if (folder / _ROBOT).exists() == (robot is not None):
+        found = "a robot that is there already" if robot else "no robot file"
+        raise InputError(folder / _ROBOT, "", found, "one robot file: there, or with --robot")
+    arm, (targets, measured) = read_robot(robot or folder / _ROBOT), described_by(folder)
+    files = {} if robot is None else {_ROBOT: read_text(robot, LARGEST_BYTES)}
+    if not (folder / CSV).exists() and not (folder / PARQUET).exists():
+        files[CSV] = sheet_template(arm.joints)
+    files[DOCUMENT] = campaign_template(folder.resolve().name, arm, targets, measured)
+    with write_together(folder, files) as partial:
+        for name, text in files.items():
+            write_text(partial / name, text)
     first = "check campaign.yaml for the frame and where targets sit" if targets else "fill in measurements.csv"
     following = f"{first}, then elastocal check {folder.as_posix()}"
-    print_answer(True, answer, template if source is None else [], following, Console())
+    print_answer(True, f"{folder.as_posix()}: {', '.join(files)}", [], following, Console())
 
 
 def check(folder: Annotated[Path, Argument(help="Folder of the campaign.")]) -> None:
@@ -73,7 +63,6 @@ def check(folder: Annotated[Path, Argument(help="Folder of the campaign.")]) -> 
     The exit code is 1 where the data are at fault and cannot be diagnosed.
     """
     from rich.console import Console
-    from rich.table import Table
 
     from elastocal.loop.overview import overview
 
@@ -82,15 +71,9 @@ def check(folder: Annotated[Path, Argument(help="Folder of the campaign.")]) -> 
     if found.diagnosable:
         more = f"; {counted(len(found.attention), 'remark')} below" if found.attention else ""
         answer = f"{found.campaign} can be diagnosed: {counted(found.testable, 'candidate effect')} can be tested{more}"
-    print_answer(found.diagnosable, answer, [], "", console)
-    table = Table(show_header=False, box=None, pad_edge=False)
-    table.add_column(style="bold", no_wrap=True)
-    table.add_column(overflow="fold")
-    for name, words in found.rows:
-        table.add_row(f"  {name}", escaped(words))
-    console.print(table)
+    details = [*(f"{name:<16}{words}" for name, words in found.rows), *(f"! {sentence}" for sentence in found.attention)]
     following = f"elastocal diagnose {folder}" if found.diagnosable else "mend the data, then check again"
-    print_lines([*(f"! {sentence}" for sentence in found.attention), f"next: {following}"], console)
+    print_answer(found.diagnosable, answer, details, following, console)
     raise typer.Exit(0 if found.diagnosable else 1)
 
 
@@ -104,7 +87,7 @@ def diagnose(
     """
     from rich.console import Console
 
-    campaign = str(folder.resolve())
+    campaign, console = str(folder.resolve()), Console(stderr=True)
     # Braces are wildcards to Snakemake, the others mapping and comment of YAML.
     if mark := next((mark for mark in ("{", "}", ": ", " #") if mark in campaign), steering(campaign)):
         raise InputError(folder, "", repr(mark), "a path without it, which Snakemake does not take for a path")
@@ -112,27 +95,19 @@ def diagnose(
     words = ["-m", "snakemake", f"-j{cores}", "diagnose", "--config", f"campaign={campaign}"]
     # What is installed beside the package runs in the working directory.
     words += [] if snakefile.parent == place else ["--snakefile", str(snakefile)]
+    current = False
     with subprocess.Popen(
         [sys.executable, *words], cwd=place, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     ) as run:
-        current = _follow(run.stdout or (), Console(stderr=True))
+        for line in map(str.rstrip, run.stdout or ()):
+            current = current or line.startswith(_NOTHING)
+            if not line.startswith(_NO_NEWS):
+                print_lines([line], console)
+    # Where there is nothing to do, Snakemake prints no outcome.
     if current and not run.returncode:
-        print_lines(_outcome(folder, place), Console(stderr=True))
+        from elastocal.campaigns.reading import read_descriptions
+        from elastocal.report.outcome import outcome
+
+        name = read_descriptions(folder, robots())[0]["campaign"]
+        print_lines(outcome([f"reports/loop/{name}/report.pdf"], place), console)
     raise typer.Exit(run.returncode)
-
-
-def _follow(lines: Iterable[str], console: Console) -> bool:
-    """Show the lines of a run as they come; returns whether there was nothing to do, where Snakemake prints no outcome."""
-    current = False
-    for line in map(str.rstrip, lines):
-        current = current or line.startswith(_NOTHING)
-        if not line.startswith(_NO_NEWS):
-            print_lines([line], console)
-    return current
-
-
-def _outcome(folder: Path, place: Path) -> list[str]:
-    from elastocal.campaigns.reading import read_descriptions
-    from elastocal.report.outcome import outcome
-
-    return outcome([f"reports/loop/{read_descriptions(folder, robots())[0]['campaign']}/report.pdf"], place)

@@ -10,13 +10,11 @@ from typer import Argument, Option
 from elastocal.command.terminal import LARGEST_SEED, print_answer, print_lines, robots, workplace
 from elastocal.counting import counted
 
-_ROBOT, _TARGETS, _PATH = "kuka", "targets.csv", "path.csv"
 # Fewer candidates than a real plan takes, for a demonstration of a minute.
 _PLAN = (
     "--poses 25 --candidates 2000 --force 1000 --pull --base-known --measured pose --noise 60um --orientation-noise 60urad "
     "--target 6DoF=0,0,0 --target 3DoF=0,0,0"
 )
-_TOLERANCE = "0.2mm"
 # Of every real robot it is true, and so no secret.
 _WEIGHTS = "gravity sag in the verdict is right too: the robot bends under its own weight, and its file declares none"
 
@@ -32,14 +30,15 @@ def demo(
     A physical simulation with hidden defects stands in for the robot: it is planned for, measured, checked, diagnosed,
     corrected and certified by the commands that a real robot needs, which are printed. Nothing but this package is needed.
     """
-    import numpy as np
     from rich.console import Console
 
+    from elastocal.application.frames import root_mean_square
     from elastocal.campaigns.measurements import CSV
     from elastocal.campaigns.reading import read_descriptions, read_robot
     from elastocal_proof.blind.rehearsal import fill_sheet, hidden_robot, hidden_words, measured_errors, write_milling_path
 
-    console, file = Console(stderr=True), robots() / f"{_ROBOT}.yaml"
+    console = Console(stderr=True)
+    file, path, targets = robots() / "kuka.yaml", folder / "path.csv", folder / "targets.csv"
     robot, defects = hidden_robot(file, seed, effect or ["transmission_harmonic"])
     command = context.find_root().command
 
@@ -55,24 +54,19 @@ def demo(
     print_lines(["", f"# The simulated robot is measured: {counted(count, 'measurement')} in {folder / CSV}"], console)
     run("check", folder)
     run("diagnose", folder)
-    write_milling_path(folder / _PATH, read_robot(file), robot, seed)
-    run("correct", folder, folder / _PATH, "--output", folder / _TARGETS)
-    run("certificate", folder, "--tolerance", _TOLERANCE, may_fail=True)
-    missed = {
-        name: 1e3 * np.sqrt((off**2).mean())
-        for name, off in measured_errors(folder / _PATH, folder / _TARGETS, robot, seed).items()
-    }
-    report = workplace() / "reports" / "loop" / folder.resolve().name / "report.html"
+    write_milling_path(path, read_robot(file), robot, seed)
+    run("correct", folder, path, "--output", targets)
+    run("certificate", folder, "--tolerance", "0.2mm", may_fail=True)
+    missed = {name: 1e3 * root_mean_square(off) for name, off in measured_errors(path, targets, robot, seed).items()}
     answer = (
         f"The simulated robot follows a milling path under load: position error {missed['uncorrected']:.2f} mm RMS before, "
         f"{missed['corrected']:.3f} mm after (noise and repeatability alone: {missed['noise alone']:.3f} mm)"
     )
     details = [
         f"hidden in it: {hidden_words(defects, effect or ())}, beside errors of every link, joint zero, gear and weight",
-        *([] if read_robot(file).masses else [_WEIGHTS]),
-        f"report: {report}",
+        _WEIGHTS,
+        f"report: {workplace() / 'reports' / 'loop' / folder.resolve().name / 'report.html'}",
     ]
     print_lines([""], console)
-    print_answer(
-        missed["corrected"] < missed["uncorrected"], answer, details, "the same with your robot: elastocal --help", console
-    )
+    better = missed["corrected"] < missed["uncorrected"]
+    print_answer(better, answer, details, "the same with your robot: elastocal --help", console)

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 from typer import Argument, Option
 
-from elastocal.command.terminal import MOST_ROWS, example, robots
+from elastocal.command.terminal import MOST_ROWS, example, print_lines, robots
 from elastocal.counting import counted
-from elastocal.errors import InputError, printable
+from elastocal.errors import InputError
 
 if TYPE_CHECKING:
     from elastocal.exchange.measurement_table import ImportedMeasurements
@@ -81,7 +80,7 @@ def dh(
 @importing.command(epilog=example("elastocal import csv tracker.csv --folder campaigns/cell --target SMR1"))
 def csv(
     file: Annotated[Path, Argument(help="The table: CSV, tabs, semicolons, spaces.")],
-    folder: Annotated[Path, Option(help="Folder of the campaign; measurements.csv and import.yaml go there.")],
+    folder: Annotated[Path, Option(help="Folder of the campaign; measurements.csv goes there.")],
     angles: Annotated[str | None, Option(help="Unit of angles whose header has none: deg, rad, mrad.")] = None,
     lengths: Annotated[str | None, Option(help="Unit of lengths whose header has none: m, mm, um, in.")] = None,
     rotation: Annotated[
@@ -97,13 +96,12 @@ def csv(
         list[str] | None,
         Option(help="Name of the target where no column has it; of each of several in a row NAME=X,Y,Z, its columns."),
     ] = None,
-    wrench: Annotated[Literal["on-robot", "by-robot"] | None, Option(help="Forces on the robot, or by it.")] = None,
+    wrench: Annotated[Literal["on-robot", "by-robot"], Option(help="Forces on the robot, or by it.")] = "on-robot",
     skip_empty: Annotated[bool, Option("--skip-empty", help="Leave out rows without a position.")] = False,
     decimal: Annotated[Literal["point", "comma"] | None, Option(help="Mark of decimals. Default: found out.")] = None,
     encoding: Annotated[str | None, Option(help="Such as cp1252. Default: UTF-8, or UTF-16 by its mark.")] = None,
     header: Annotated[int | None, Option(min=1, max=MOST_ROWS, help="Line with the names. Default: found out.")] = None,
     robot: Annotated[Path | None, Option(help="Its joint_names are names of columns. Default: the campaign's robot.")] = None,
-    options: Annotated[Path | None, Option(help="import.yaml of an earlier import, to repeat it.")] = None,
     force: Annotated[bool, Option("--force", help="Replace a measurements.csv that is filled in.")] = False,
 ) -> None:
     """Make measurements.csv of another program's table.
@@ -111,25 +109,20 @@ def csv(
     Columns are found by their usual names (q1 or J1 or Axis 1, x, y, z, qw .. qz, r11 .. r33, t11 .. t34, fx .. mz, pose,
     load, repeat, target, time) or as the robot's file calls its joints, units by brackets or endings ("X [mm]", x_mm). What is
     ambiguous is asked for. Poses, loads and repeats are counted where no column numbers them. The end of the output states
-    what was read, how, and what was left out; import.yaml has the options, and what was found out.
+    what was read, how, and what was left out.
     """
+    from rich.console import Console
+
     from elastocal.campaigns.campaign import DOCUMENT
     from elastocal.campaigns.measurements import CSV, PARQUET, write_measurements
     from elastocal.campaigns.reading import read_descriptions, read_robot
-    from elastocal.exchange.measurement_table import (
-        IMPORT,
-        ImportOptions,
-        import_options_text,
-        read_import_options,
-        read_measurement_table,
-    )
-    from elastocal.io.atomic_writes import check_places, write_text, write_together
+    from elastocal.exchange.measurement_table import ImportOptions, read_measurement_table
+    from elastocal.io.atomic_writes import check_places, write_together
 
-    check_places(folder / CSV, folder / PARQUET, folder / IMPORT)
+    check_places(folder / CSV, folder / PARQUET)
     if (folder / PARQUET).exists() or ((folder / CSV).exists() and not force and _is_filled(folder / CSV)):
         allowed = "another folder, or --force to replace measurements.csv"
         raise InputError(folder, "", "measurements that are there already", allowed)
-    earlier = read_import_options(options) if options else ImportOptions()
     alone = target is not None and len(target) == 1 and "=" not in target[0]
     targets = {
         name: [header.strip() for header in headers.split(",")]
@@ -137,42 +130,41 @@ def csv(
     }
     if wrong := next((name for name, headers in targets.items() if len({*headers}) != 3), None):
         raise InputError("--target", "", f"{wrong}={','.join(targets[wrong])}", "NAME=X,Y,Z, the columns of its position")
-    units = _pairs("--unit", unit) | {kind: word for kind, word in (("angles", angles), ("lengths", lengths)) if word}
-    stated: dict[str, Any] = {"rotation": rotation, "wrench": wrench, "skip_empty": skip_empty, "decimal": decimal}
-    stated |= {"header": header, "encoding": encoding, "names": names and [name.strip() for name in names.split(",")]}
-    chosen = replace(
-        earlier,
-        ignore=[*(earlier.ignore or ()), *(ignore or ())] or None,
-        columns=dict(earlier.columns or {}) | _pairs("--column", column),
-        units=dict(earlier.units or {}) | units,
-        target=target[0] if target and alone else None if targets else earlier.target,
-        targets=targets or (None if alone else earlier.targets),
-        **{name: value for name, value in stated.items() if value},
+    options = ImportOptions(
+        decimal=decimal,
+        header=header,
+        encoding=encoding,
+        columns=_pairs("--column", column),
+        units=_pairs("--unit", unit) | {kind: word for kind, word in (("angles", angles), ("lengths", lengths)) if word},
+        rotation=rotation,
+        target=target[0] if target and alone else None,
+        wrench=wrench,
+        skip_empty=skip_empty,
+        ignore=ignore or [],
+        targets=targets,
+        names=[name.strip() for name in names.split(",")] if names else (),
     )
     known: set[str] = set()
     if (folder / DOCUMENT).is_file():
         document, there = read_descriptions(folder, robots())
         robot, known = robot or there, {*document["targets"]}
-    found = read_measurement_table(file, chosen, None if robot is None else read_robot(robot))
-    with write_together(folder, (CSV, IMPORT)) as partial:
+    found = read_measurement_table(file, options, None if robot is None else read_robot(robot))
+    with write_together(folder, (CSV,)) as partial:
         write_measurements(partial / CSV, found.table, found.joints)
-        write_text(partial / IMPORT, import_options_text(found.options, file))
-    lines = [*_summary(found), f"written: {(folder / CSV).as_posix()}, {(folder / IMPORT).as_posix()}"]
+    lines = [*_summary(found), f"written: {(folder / CSV).as_posix()}"]
     if known and (new := ", ".join(sorted({*found.table["target"].tolist()} - known))):
         lines.append(f"! campaign.yaml there has no target {new}: name it there, or in place of one of its own")
-    _tell(lines)
+    print_lines(lines, Console())
 
 
 def _write(result: Imported, output: Path) -> None:
     """Write the robot file, and print what was read."""
+    from rich.console import Console
+
     from elastocal.exchange.robot_text import summary, write_robot
 
     write_robot(result, output)
-    _tell([*summary(result), f"written: {output.as_posix()}"])
-
-
-def _tell(lines: list[str]) -> None:
-    typer.echo("\n".join(map(printable, lines)))
+    print_lines([*summary(result), f"written: {output.as_posix()}"], Console())
 
 
 def _pairs(option: str, texts: list[str] | None) -> dict[str, str]:
@@ -195,32 +187,32 @@ def _is_filled(path: Path) -> bool:
         return True
     places = sheet.filter(regex=r"^r?[xyz] *$")
     # Rows of a file without such columns may hold anything.
-    return len(sheet) > 0 and (places.empty or bool((places.fillna("").map(str.strip) != "").any(axis=None)))
+    return len(sheet) > 0 and (places.empty or bool(places.fillna("").map(str.strip).any(axis=None)))
 
 
 def _summary(found: ImportedMeasurements) -> list[str]:
+    """What was read, how, and what was left out."""
     import numpy as np
 
     from elastocal.mechanics.components import WRENCH_NAMES
 
     table, options = found.table, found.options
-    columns, units = options.columns or {}, options.units or {}
+    columns, units = options.columns, options.units
     poses = len(np.unique(np.column_stack([table.get("session", np.zeros_like(table["pose"])), table["pose"]]), axis=0))
-    targets = ", ".join(sorted(set(table["target"].tolist())))
-    first = [
-        f"{counted(len(table['pose']), 'measurement')} of {targets} at {counted(poses, 'pose')}, "
-        f"{counted(found.joints, 'joint')}",
-        f"file: names of columns {f'in line {options.header}' if options.header else 'as stated'}, "
-        f"separator {options.separator}, decimal {options.decimal}, encoding {options.encoding}",
-    ]
-    if found.skipped:
-        first.append(f"left out: {counted(found.skipped, 'row')} without a position")
+    targets, joints = ", ".join(sorted(set(table["target"].tolist()))), counted(found.joints, "joint")
     read = [f"{name} from {header!r}{f' in {units[name]}' if name in units else ''}" for name, header in columns.items()]
     lists = {
+        "left out": [f"{counted(found.skipped, 'row')} without a position"] if found.skipped else [],
         "counted, as no column has it": [name for name in ("pose", "load", "repeat") if name not in columns],
         "taken for zero, as no column has it": [name for name in WRENCH_NAMES if name not in columns],
         "not used": found.ignored,
     }
-    lines = [*first, f"read: {'; '.join(read)}", f"orientations: {options.rotation}"]
-    lines += [f"{what}: {', '.join(names)}" for what, names in lists.items() if names]
-    return [*lines, *(f"note: {note}" for note in found.notes)]
+    return [
+        f"{counted(len(table['pose']), 'measurement')} of {targets} at {counted(poses, 'pose')}, {joints}",
+        f"file: names of columns {f'in line {options.header}' if options.header else 'as stated'}, "
+        f"separator {options.separator}, decimal {options.decimal}, encoding {options.encoding}",
+        f"read: {'; '.join(read)}",
+        f"orientations: {options.rotation}",
+        *(f"{what}: {', '.join(names)}" for what, names in lists.items() if names),
+        *(f"note: {note}" for note in found.notes),
+    ]

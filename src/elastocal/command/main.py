@@ -28,7 +28,6 @@ COMMANDS: dict[Callable[..., None], str] = {
     certificate: "campaigns/cell --tolerance 0.2mm",
     export: "campaigns/cell --output calibrated",
 }
-_ORDER = ("demo", "import", *(command.__name__ for command in COMMANDS))
 
 
 class InOrder(TyperGroup):
@@ -36,7 +35,7 @@ class InOrder(TyperGroup):
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Names of all subcommands."""
-        return sorted(super().list_commands(ctx), key=_ORDER.index)
+        return ["demo", "import", *(command.__name__ for command in COMMANDS if command is not demo)]
 
 
 # Without the boxes of rich the last line says what is wrong with an option.
@@ -54,22 +53,15 @@ for _command, _typed in COMMANDS.items():
 app.add_typer(importing)
 
 
-def _print_version(wanted: bool) -> None:
-    if wanted:
-        typer.echo(f"elastocal {elastocal.__version__}")
-        raise typer.Exit
-
-
-@app.callback()
-def with_version(
-    version: Annotated[
-        bool, Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
-    ] = False,
-) -> None:
+@app.callback(invoke_without_command=True)
+def with_version(version: Annotated[bool, Option("--version", help="Print the version and exit.")] = False) -> None:
     """From a robot and a laser tracker to a corrected robot.
 
     The order of the work: plan, measure, check, diagnose, correct, certificate.
     """
+    if version:
+        typer.echo(f"elastocal {elastocal.__version__}")
+        raise typer.Exit
 
 
 def main() -> None:

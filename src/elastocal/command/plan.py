@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import inspect
 import os
 import shutil
 import tempfile
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from typer import Argument, Option
 
@@ -26,6 +24,8 @@ from elastocal.counting import counted
 from elastocal.errors import InputError, text_fault
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from elastocal.application.planning.cell import Cell
     from elastocal.application.planning.plan import Plan, Survey
     from elastocal.campaigns.campaign import Target
@@ -38,28 +38,27 @@ _LONGEST_NAME = 80
 _LOWEST_FLOOR_M = 1e3
 
 
-@dataclass(frozen=True)
-class _Options:
-    """What the command line states."""
-
-    robot: Annotated[Path, Argument(help="Robot file.")]
-    folder: Annotated[Path, Option(help="New campaign folder, with a sheet to fill in.")]
-    poses: Annotated[int, Option(min=1, max=MOST_POSES, help="Poses to fit.")] = 20
-    held_out: Annotated[int, Option(min=3, max=MOST_POSES, help="Random poses that judge the result and fit nothing.")] = 9
-    number: Annotated[int, Option("--candidates", min=10, max=MOST_ROWS, help="Random configurations to choose from.")] = 10_000
-    force: Annotated[float, Option(min=0.0, max=1e6, help="Force of the load in N; 0 for none.")] = 0.0
-    pull: Annotated[bool, Option("--pull", help="The load pulls in any direction. Default: it hangs.")] = False
+def plan(
+    robot: Annotated[Path, Argument(help="Robot file.")],
+    folder: Annotated[Path, Option(help="New campaign folder, with a sheet to fill in.")],
+    poses: Annotated[int, Option(min=1, max=MOST_POSES, help="Poses to fit.")] = 20,
+    held_out: Annotated[int, Option(min=3, max=MOST_POSES, help="Random poses that judge the result and fit nothing.")] = 9,
+    number: Annotated[
+        int, Option("--candidates", min=10, max=MOST_ROWS, help="Random configurations to choose from.")
+    ] = 10_000,
+    force: Annotated[float, Option(min=0.0, max=1e6, help="Force of the load in N; 0 for none.")] = 0.0,
+    pull: Annotated[bool, Option("--pull", help="The load pulls in any direction. Default: it hangs.")] = False,
     measured: Annotated[
         Literal["position", "pose"],
         Option(help="What is read of a target, and by default with which noise: of a laser tracker, or of its 6DoF probe."),
-    ] = "position"
-    base_known: Annotated[bool, Option("--base-known", help="Measurements are in the base frame.")] = False
+    ] = "position",
+    base_known: Annotated[bool, Option("--base-known", help="Measurements are in the base frame.")] = False,
     target: Annotated[
         list[str] | None,
         Option(help="A target and its measuring point: POINT, POINT=x,y,z in m, or with a name of its own A:POINT=x,y,z."),
-    ] = None
-    tracker: Annotated[str | None, Option(help="Position of the tracker, x,y,z in m, base axes.")] = None
-    box: Annotated[list[str] | None, Option(help="Box to keep out of: xmin,xmax,ymin,ymax,zmin,zmax in m, base axes.")] = None
+    ] = None,
+    tracker: Annotated[str | None, Option(help="Position of the tracker, x,y,z in m, base axes.")] = None,
+    box: Annotated[list[str] | None, Option(help="Box to keep out of: xmin,xmax,ymin,ymax,zmin,zmax in m, base axes.")] = None,
     floor: Annotated[
         float,
         Option(
@@ -67,15 +66,13 @@ class _Options:
             max=_LOWEST_FLOOR_M,
             help="Height in m, base axes, that forearm and targets stay above: the plane that the base stands on.",
         ),
-    ] = 0.0
-    noise: Annotated[str | None, Option(help="Standard deviation of a coordinate, such as 0.03mm. Default: usual.")] = None
+    ] = 0.0,
+    noise: Annotated[str | None, Option(help="Standard deviation of a coordinate, such as 0.03mm. Default: usual.")] = None,
     orientation_noise: Annotated[
         str | None, Option(help="Standard deviation of a rotation about an axis, such as 0.01deg. Default: usual.")
-    ] = None
-    seed: Annotated[int, Option(min=0, max=LARGEST_SEED, help="Seed of the random numbers.")] = 1
-
-
-def plan(**words: Any) -> None:
+    ] = None,
+    seed: Annotated[int, Option(min=0, max=LARGEST_SEED, help="Seed of the random numbers.")] = 1,
+) -> None:
     """Choose where to measure; write a sheet to print.
 
     The chosen poses and loads determine the robot's parameters best, among those that the arm, the cell and the tracker allow.
@@ -83,59 +80,45 @@ def plan(**words: Any) -> None:
     """
     from rich.console import Console
 
-    from elastocal.application.planning.plan import choose_plan, find_allowed_candidates
+    from elastocal.application.planning.plan import SENSORS, Survey, choose_plan, find_allowed_candidates
     from elastocal.campaigns.measurements import CSV
     from elastocal.campaigns.reading import read_robot
     from elastocal.io.texts import kind_of
 
-    options, console = _Options(**words), Console(stderr=True)
-    folder, survey = options.folder, _survey(options, read_robot(options.robot))
-    cell = _cell(options, survey.robot)
+    arm, console, (_, position_m, orientation_rad) = read_robot(robot), Console(stderr=True), SENSORS[measured]
+    if noise is not None:
+        position_m = length_m("--noise", noise)
+    if orientation_noise is not None:
+        if measured != "pose":
+            raise InputError("--orientation-noise", "", "positions, which have no orientation", "--measured pose beside it")
+        orientation_rad = angle_rad("--orientation-noise", orientation_noise)
+    targets = _read_targets(target or [arm.chain.end_effector.name], arm.chain)
+    survey = Survey(arm, targets, not base_known, measured, position_m, orientation_rad, force, pull)
+    cell = _cell(arm, box or (), tracker, floor)
     if os.path.lexists(folder):
         raise InputError(folder, "", f"{kind_of(os.lstat(folder).st_mode)} that is there", "a new one")
     with console.status("planning"):
-        some = find_allowed_candidates(survey, cell, options.number, options.seed)
-        found = choose_plan(survey, some, options.poses, options.held_out, options.seed)
-    worth = _worth(survey, options, found)
-    rows = _write(survey, cell, options, found, worth)
+        some = find_allowed_candidates(survey, cell, number, seed)
+        found = choose_plan(survey, some, poses, held_out, seed)
+    worth = _worth(survey, found, bool(noise and (orientation_noise or measured == "position")))
+    rows = _write(folder, robot, survey, cell, found, worth)
     answer = (
-        f"{counted(options.poses, 'pose')} to fit and {options.held_out} held out, of {len(some.joint_angles):,} that the cell "
-        f"allows: {counted(rows, 'measurement')}"
+        f"{counted(poses, 'pose')} to fit and {held_out} held out, of {len(some.joint_angles):,} that the cell allows: "
+        f"{counted(rows, 'measurement')}"
     )
     following = f"measure, fill in {folder / CSV}, then elastocal check {folder}"
     print_answer(True, answer, [*worth, f"sheet to print: {folder / SHEET}"], following, console)
 
 
-# Where typer looks for the options of a command.
-plan.__signature__ = inspect.signature(_Options, eval_str=True)  # type: ignore[attr-defined]
-
-
-def _survey(options: _Options, arm: Robot) -> Survey:
-    """What is measured and how well, as stated or usual; options that do not go together are refused."""
-    from elastocal.application.planning.plan import SENSORS, Survey
-
-    _, position_m, orientation_rad = SENSORS[options.measured]
-    if options.noise is not None:
-        position_m = length_m("--noise", options.noise)
-    if options.orientation_noise is not None:
-        if options.measured != "pose":
-            raise InputError("--orientation-noise", "", "positions, which have no orientation", "--measured pose beside it")
-        orientation_rad = angle_rad("--orientation-noise", options.orientation_noise)
-    targets = _read_targets(options.target or [arm.chain.end_effector.name], arm.chain)
-    known, loads = options.base_known, (options.force, options.pull)
-    return Survey(arm, targets, not known, options.measured, position_m, orientation_rad, *loads)
-
-
-def _cell(options: _Options, arm: Robot) -> Cell:
+def _cell(arm: Robot, boxed: Iterable[str], tracker: str | None, floor: float) -> Cell:
     from elastocal.application.inverse_kinematics import reach_m
     from elastocal.application.planning.cell import COLUMN_SHARE, RADIUS_SHARE, Cell
 
-    boxes = tuple(numbers("--box", text, 6).reshape(3, 2) for text in options.box or ())
+    boxes = tuple(numbers("--box", text, 6).reshape(3, 2) for text in boxed)
     if wrong := [corner.ravel().tolist() for corner in boxes if (corner[:, 0] >= corner[:, 1]).any()]:
         raise InputError("--box", "", str(wrong[0]), "xmin,xmax,ymin,ymax,zmin,zmax with each min below its max")
-    tracker = None if options.tracker is None else numbers("--tracker", options.tracker, 3)
-    reach = reach_m(arm)
-    return Cell(boxes, tracker, RADIUS_SHARE * reach, options.floor, COLUMN_SHARE * reach)
+    place, reach = None if tracker is None else numbers("--tracker", tracker, 3), reach_m(arm)
+    return Cell(boxes, place, RADIUS_SHARE * reach, floor, COLUMN_SHARE * reach)
 
 
 def _read_targets(described: list[str], chain: Chain) -> tuple[Target, ...]:
@@ -161,29 +144,27 @@ def _read_targets(described: list[str], chain: Chain) -> tuple[Target, ...]:
     return tuple(found.values())
 
 
-def _worth(survey: Survey, options: _Options, found: Plan) -> list[str]:
-    """What a plan is worth, in sentences."""
+def _worth(survey: Survey, found: Plan, stated: bool) -> list[str]:
+    """What a plan is worth, in sentences; `stated`: whether the noise is."""
     import numpy as np
 
     from elastocal.application.accuracy import millimetres
     from elastocal.application.frames import BASE, FRAMES, ROBOT
     from elastocal.application.planning.plan import SENSORS
 
-    pose = survey.measured == "pose"
     random = 1e3 * np.quantile(found.random_m[:, -1], [0.05, 0.5, 0.95])
-    stated = options.noise and (options.orientation_noise or not pose)
     return [
         f"Predicted position error of a robot that is corrected by the fit, {FRAMES[ROBOT if survey.unknown_base else BASE]}: "
         f"{millimetres(found.accuracy_m[-1])} RMS over configurations that the cell allows; with as many random poses "
         f"{random[1]:.3f} mm ({random[0]:.3f} to {random[2]:.3f}).",
         "It is a standard error by the uncertainty of the parameters alone, without the tracker's noise.",
         f"Assumed noise: {1e6 * survey.position_m:.3g} µm"
-        + (f", {1e6 * survey.orientation_rad:.3g} µrad" if pose else "")
+        + (f", {1e6 * survey.orientation_rad:.3g} µrad" if survey.measured == "pose" else "")
         + ("." if stated else f"; {SENSORS[survey.measured][0]}."),
     ]
 
 
-def _write(survey: Survey, cell: Cell, options: _Options, found: Plan, worth: list[str]) -> int:
+def _write(folder: Path, robot: Path, survey: Survey, cell: Cell, found: Plan, worth: list[str]) -> int:
     """Write the campaign to fill in: descriptions, a sheet whose measurement columns are empty, and its pages; its rows."""
     import yaml
 
@@ -200,14 +181,14 @@ def _write(survey: Survey, cell: Cell, options: _Options, found: Plan, worth: li
     from elastocal.report.typesetting import compile_document
 
     table, names = sheet(survey, found), (ROBOT, CSV, SHEET, PICTURE, DOCUMENT)
-    with write_together(options.folder, names) as partial, tempfile.TemporaryDirectory() as scratch:
-        write_text(partial / ROBOT, read_text(options.robot, LARGEST_BYTES))
+    with write_together(folder, names) as partial, tempfile.TemporaryDirectory() as scratch:
+        write_text(partial / ROBOT, read_text(robot, LARGEST_BYTES))
         write_csv(partial / CSV, table)
         pages = {f"poses{page}": figure for page, figure in enumerate(pose_pictures(survey.robot, found))}
         pictures = save_all({"overview": plan_picture(survey.robot, cell, found), **pages}, scratch)
         facts = plan_facts(survey, found, table, worth)
         compile_document(partial / SHEET, "plan.typ", {"facts": facts}, pictures.values())
         shutil.copyfile(f"{scratch}/overview.png", partial / PICTURE)
-        document = campaign_document(options.folder.name, ROBOT, survey, found)
+        document = campaign_document(folder.name, ROBOT, survey, found)
         write_text(partial / DOCUMENT, yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=120))
     return len(table)

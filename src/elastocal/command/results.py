@@ -6,18 +6,16 @@ import math
 import tempfile
 from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from typer import Argument, Option
 
-from elastocal.command.terminal import PhysicsOnly, diagnosed_campaign, length_m, print_answer, robots, workplace
+from elastocal.command.terminal import diagnosed_campaign, length_m, print_answer, robots, workplace
 from elastocal.counting import counted, first_names, grouped
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     import numpy as np
     import pandas as pd
 
@@ -29,7 +27,7 @@ if TYPE_CHECKING:
     from elastocal.mechanics.robot import Robot
 
 DOCUMENT, PAGES = "certificate.json", "certificate.pdf"
-ROBOT, URDF, SIDECAR = _EXPORTED = "robot.yaml", "robot.urdf", "effects.json"
+ROBOT, URDF = _EXPORTED = "robot.yaml", "robot.urdf"
 _ROUNDING_MM = 1e-5
 # Lines that a message names.
 _NAMED = 5
@@ -51,8 +49,6 @@ def correct(
         bool,
         Option("--allow-large-steps", help="Accept joints that turn by more than 5 times what the path turns, and 10 degrees."),
     ] = False,
-    physics_only: PhysicsOnly = False,
-    partial: Annotated[bool, Option("--partial", help="Write the file even if some targets cannot be reached.")] = False,
 ) -> None:
     """Compute the joint targets that reach the wanted poses.
 
@@ -66,18 +62,10 @@ def correct(
     import numpy as np
     from rich.console import Console
 
-    from elastocal.application.accuracy import (
-        accuracy_sentence,
-        before_m,
-        campaign_accuracy,
-        error_rows,
-        millimetres,
-        predict_errors,
-    )
+    from elastocal.application.accuracy import accuracy_sentence, before_m, millimetres, predict_errors
     from elastocal.application.calibrated import beyond_fitted, regressed
     from elastocal.application.compensation import find_joint_targets
     from elastocal.application.frames import root_mean_square
-    from elastocal.diagnosis.misplaced import point_sentence
     from elastocal.exchange.controllers import axes_of, check_name, controller_of, targets_of
     from elastocal.exchange.target_path import NO_BOUND, OK, read_target_path_of
     from elastocal.io.atomic_writes import check_places, write_text, write_together
@@ -94,82 +82,73 @@ def correct(
     check_places(*files)
     if not output.parent.is_dir():
         raise InputError(output, "", "no such folder", "a file in a folder that is there")
-    campaign = diagnosed_campaign(folder, physics_only)
+    campaign = diagnosed_campaign(folder)
     calibrated = campaign.calibrated
-    prismatic = calibrated.robot.chain.prismatic
-    named = axes_of(controller, prismatic, axes) if controller else ()
-    wanted = read_target_path_of(path, calibrated.robot)
+    robot = calibrated.robot
+    named = axes_of(controller, robot.chain.prismatic, axes) if controller else ()
+    wanted = read_target_path_of(path, robot)
     wrench = np.zeros((len(wanted), 6)) if wanted.wrench is None else wanted.wrench
     with console.status("correcting"):
         found = find_joint_targets(calibrated, wanted.position, wanted.rotation, wrench, wanted.start)
-    good = found.status == OK
-    if not good.all() and not partial:
-        rows = first_names([f"line {wanted.lines[row]} is {found.status[row]}" for row in (~good).nonzero()[0]], _NAMED)
-        reached = "poses that the robot reaches within its limits, in the posture that q1..qn state if any, or --partial"
+    if (failed := np.flatnonzero(found.status != OK)).size:
+        rows = first_names([f"line {wanted.lines[row]} is {found.status[row]}" for row in failed], _NAMED)
+        reached = "poses that the robot reaches within its limits, in the posture that q1..qn state if any"
         raise InputError(path, "", rows, reached)
-    if controller and not good.any():
-        raise InputError(path, "", "no pose that the robot reaches", "one at least, for a program")
-    swings = _swings(wanted, found, good, calibrated.robot)
+    swings = _swings(wanted, found, robot)
     if swings and not allow_large_steps:
-        more = f" and {counted(len(swings) - 1, 'more large step')}" if len(swings) > 1 else ""
-        raise InputError(path, "", swings[0] + more, "targets between, another posture, or --allow-large-steps")
+        raise InputError(path, "", first_names(swings, 1), "targets between, another posture, or --allow-large-steps")
     outside, loaded = beyond_fitted(calibrated, found.joint_angles, wrench)
-    beyond, heavy = outside | loaded, beyond_fitted(calibrated, found.joint_angles, wrench, _LOADS_BOUNDED)[1]
-    bounded = good & ~outside & ~heavy
+    heavy = beyond_fitted(calibrated, found.joint_angles, wrench, _LOADS_BOUNDED)[1]
     status = found.status.astype(object)
-    status[good & outside] = f"{NO_BOUND}joints outside the fitted range"
-    status[good & heavy] = f"{NO_BOUND}loads beyond {_LOADS_BOUNDED:g} times the measured ones"
-    errors = predict_errors(calibrated, found.joint_angles, wrench)
+    status[outside] = f"{NO_BOUND}joints outside the fitted range"
+    status[heavy] = f"{NO_BOUND}loads beyond {_LOADS_BOUNDED:g} times the measured ones"
+    bounded, beyond = status == OK, outside | loaded
+    errors = predict_errors(calibrated, found.joint_angles, wrench, draws=0)
     before = before_m(calibrated, wanted.position, wanted.rotation, found.error_before)
-    with write_together(output.parent, [file.name for file in files]) as folder_of_all:
-        write_csv(folder_of_all / output.name, _joint_targets(wanted, wrench, found, before, errors, beyond, status))
+    with write_together(output.parent, [file.name for file in files]) as partial:
+        write_csv(partial / output.name, _joint_targets(wanted, wrench, found, before, errors, beyond, status))
         if controller:
-            targets = targets_of(found.joint_angles[good], prismatic, named)
-            write_text(folder_of_all / files[1].name, controller.program(name, targets, _notes(campaign, wrench[good])))
-    share = f"{grouped(good.sum())} of {counted(len(good), 'target')}"
-    stated, lines = [], []
+            targets = targets_of(found.joint_angles, robot.chain.prismatic, named)
+            write_text(partial / files[1].name, controller.program(name, targets, _notes(campaign, wrench)))
+    lines = []
     if bounded.any():
-        known = errors if bounded.all() else predict_errors(calibrated, found.joint_angles[bounded], wrench[bounded])
-        accuracy = known.accuracy("the targets" if bounded[good].all() else "the targets with a bound")
-        stated.append((accuracy, root_mean_square(before[bounded])))
-        lines.append(accuracy_sentence(accuracy))
-    table = error_rows(campaign.verdict, *stated)
-    lines = [*(f"{where}: {off} uncorrected, {after} corrected" for where, off, after in table), *lines]
-    if good.any():
-        lines += [accuracy_sentence(campaign_accuracy(calibrated)), point_sentence(campaign.case.campaign)]
+        known = predict_errors(calibrated, found.joint_angles[bounded], wrench[bounded])
+        accuracy = known.accuracy("the targets" if bounded.all() else "the targets with a bound")
+        uncorrected = f"uncorrected they would be missed by {millimetres(root_mean_square(before[bounded]))} RMS"
+        lines += [accuracy_sentence(accuracy), uncorrected]
+    count = counted(len(wanted), "target")
     if calibrated.remainder is not None:
-        added = np.linalg.norm(regressed(calibrated, found.joint_angles[good], wrench[good]), axis=1)
+        added = np.linalg.norm(regressed(calibrated, found.joint_angles, wrench), axis=1)
         size = f"{millimetres(root_mean_square(added[added > 0.0]))} RMS" if added.any() else "nothing"
-        acts = f"{grouped((added > 0.0).sum())} of {counted(len(added), 'target')}"
         words = campaign.verdict["remainder"]["words"]
-        lines.append(f"a {words} on what the model leaves corrects {acts} by {size}; --physics-only leaves it out")
+        lines.append(f"a {words} on what the model leaves corrects {grouped((added > 0.0).sum())} of {count} by {size}")
     if controller:
         called = ", ".join(f"q{number} as {axis}" for number, axis in enumerate(named, 1))
-        lines.append(f"{files[1].name} goes to {share}: {controller.words}, {called}")
-    alarms = [*(each["sentence"] for each in campaign.verdict["misplaced"])]
+        lines.append(f"{files[1].name} goes to all of them: {controller.words}, {called}")
+    alarms = [each["sentence"] for each in campaign.verdict["misplaced"]]
     if swings:
         alarms.append(first_names(swings, _NAMED))
-    if unbounded := int((good & ~bounded).sum()):
+    if not bounded.all():
         what = f"{_LOADS_BOUNDED:g} times the measured loads or outside the fitted range of joints"
-        alarms.append(f"no bound is stated for {grouped(unbounded)} of {counted(int(good.sum()), 'target')}: beyond {what}")
+        alarms.append(f"no bound is stated for {grouped((~bounded).sum())} of {count}: beyond {what}")
     if beyond.any():
-        some = f"{grouped(beyond.sum())} of {counted(len(beyond), 'target')}"
-        alarms.append(f"{some} lie beyond the poses or loads of the campaign: their predicted errors are extrapolated")
+        some = f"{grouped(beyond.sum())} of {count} lie beyond the poses or loads of the campaign"
+        alarms.append(f"{some}: their predicted errors are extrapolated")
     lines += [*(f"! {alarm}" for alarm in alarms), *map(str, files)]
-    print_answer(good.all(), f"{share} corrected", lines, f"elastocal certificate {folder} --tolerance 0.2mm", console)
+    print_answer(True, f"{count} corrected", lines, f"elastocal certificate {folder} --tolerance 0.2mm", console)
 
 
-def _swings(wanted: TargetPath, found: Correction, good: np.ndarray, robot: Robot) -> list[str]:
-    """A line for each joint that moves farther from one reached target to the next than `allowed_steps`."""
+def _swings(wanted: TargetPath, found: Correction, robot: Robot) -> list[str]:
+    """A line for each joint that moves farther from one target to the next than `allowed_steps`."""
     from elastocal.application.compensation import large_steps
 
-    lines = [wanted.lines[row] for row in good.nonzero()[0]]
-    return [
-        f"line {lines[row]}: joint {joint + 1} shifts by {1e3 * step:.0f} mm, {1e3 * most:.0f} allowed"
-        if robot.chain.prismatic[joint]
-        else f"line {lines[row]}: joint {joint + 1} turns by {math.degrees(step):.1f} degrees, {math.degrees(most):.1f} allowed"
-        for row, joint, step, most in large_steps(robot, wanted.position[good], wanted.rotation[good], found.joint_angles[good])
-    ]
+    def words(row: int, joint: int, step: float, most: float) -> str:
+        if robot.chain.prismatic[joint]:
+            return f"line {wanted.lines[row]}: joint {joint + 1} shifts by {1e3 * step:.0f} mm, {1e3 * most:.0f} allowed"
+        turns = f"turns by {math.degrees(step):.1f} degrees, {math.degrees(most):.1f} allowed"
+        return f"line {wanted.lines[row]}: joint {joint + 1} {turns}"
+
+    return [words(*step) for step in large_steps(robot, wanted.position, wanted.rotation, found.joint_angles)]
 
 
 def _notes(campaign: Diagnosed, wrench: np.ndarray) -> list[str]:
@@ -206,28 +185,26 @@ def _joint_targets(
     from elastocal.exchange.target_path import NO_BOUND
     from elastocal.mechanics.components import WRENCH_NAMES
 
-    pose = np.column_stack([wanted.position, Rotation.from_matrix(wanted.rotation).as_rotvec()])
-    columns = dict(zip(("x", "y", "z", "rx", "ry", "rz"), pose.T, strict=True)) | dict(zip(WRENCH_NAMES, wrench.T, strict=True))
-    angles = {f"q{joint}": column for joint, column in enumerate(found.joint_angles.T, 1)}
-    nominal = {f"q{joint}_uncorrected": column for joint, column in enumerate(found.uncorrected.T, 1)}
+    pose = np.hstack([wanted.position, Rotation.from_matrix(wanted.rotation).as_rotvec(), wrench])
+    commands = pd.DataFrame(found.joint_angles).rename(columns=lambda joint: f"q{joint + 1}")
+    nominal = pd.DataFrame(found.uncorrected).rename(columns=lambda joint: f"q{joint + 1}_uncorrected")
     stated = {
         "predicted_error_before_m": before,
         "predicted_error_after_m": errors.error_m,
         "predicted_bound_m": np.where([each.startswith(NO_BOUND) for each in status], np.nan, errors.bound_m),
         "predicted_std_m": np.sqrt(errors.parameters_m**2 + errors.repeated_m**2 + errors.regression_m**2),
-        "predicted_rotation_before_rad": np.linalg.norm(found.error_before[:, 3:], axis=1),
-        "predicted_rotation_std_rad": errors.std_rad,
         "repeatability_m": errors.repeated_m,
         "outside_range": beyond,
+        "status": status,
     }
-    return pd.DataFrame(angles | stated | {"status": status} | columns | nominal)
+    asked = pd.DataFrame(pose, columns=["x", "y", "z", "rx", "ry", "rz", *WRENCH_NAMES])
+    return pd.concat([commands, pd.DataFrame(stated), asked, nominal], axis=1)
 
 
 def certificate(
     folder: Annotated[Path, Argument(help="Folder of a diagnosed campaign.")],
     tolerance: Annotated[str, Option(help="Largest allowed RMS position error, such as 0.2mm.")],
     risk: Annotated[float, Option(min=0.001, max=0.5, help="Accepted risk of a wrong decision.")] = 0.05,
-    physics_only: PhysicsOnly = False,
 ) -> None:
     """Certify a robot against a tolerance: pass, fail or undecided.
 
@@ -248,7 +225,7 @@ def certificate(
 
     console = Console(stderr=True)
     limit = length_m("--tolerance", tolerance)
-    found = diagnosed_campaign(folder, physics_only)
+    found = diagnosed_campaign(folder)
     place = workplace() / "reports" / "loop" / found.name
     check_places(place / PAGES, place / DOCUMENT, top=workplace() / "reports")
     if data_at_fault(found.verdict):
@@ -262,29 +239,10 @@ def certificate(
             pictures = save_all({"budget": budget}, scratch).values()
             compile_document(partial / PAGES, "certificate.typ", {"facts": facts}, pictures)
             write_json(partial / DOCUMENT, document)
-    passed, (answer, *details) = facts["decision"] == "pass", _lines(document)
+    passed, answer = facts["decision"] == "pass", f"{facts['decision']}, as predicted: {facts['headline']}"
+    details = [facts["decision_sentences"], facts["point"], *(f"! {each['sentence']}" for each in document["misplaced"])]
     print_answer(passed, answer, [*details, str(place / PAGES), str(place / DOCUMENT)], facts["now"], console)
     raise typer.Exit(0 if passed else 1)
-
-
-def _lines(document: Mapping[str, Any]) -> list[str]:
-    """The answer in three lines: the decision by its criterion; over which poses and of which point; why, or what it lacks."""
-    from elastocal.application.accuracy import Accuracy, millimetres
-    from elastocal.application.frames import FRAMES
-
-    found, accuracy = document["conformity"], Accuracy(**document["accuracy"])
-    answer = f"{found['decision']}: no error is predicted of a robot of which nothing was fitted"
-    if accuracy.fitted or accuracy.form_m:
-        answer = (
-            f"{found['decision']}, as predicted: the RMS position error of the corrected robot is"
-            f" {millimetres(accuracy.rms_m)}, {1 - found['accepted_risk']:.0%} sure to be below"
-            f" {millimetres(found['limit_m'])}, the tolerance {millimetres(found['tolerance_m'])}"
-        )
-    poses = f"In {FRAMES[accuracy.frame].removeprefix('in ')}, over {accuracy.region} ({accuracy.poses})"
-    where = f"{poses}, {millimetres(accuracy.worst_m)} at the worst of them. {document['point']}"
-    rest = [f"Too little for a pass: {'; '.join(found['shortfalls'])}."] if found["shortfalls"] else []
-    rest.append("Nobody has measured the corrected robot: command corrected targets, measure them, and compare.")
-    return [answer, where, " ".join(rest), *(f"! {each['sentence']}" for each in document["misplaced"])]
 
 
 def export(
@@ -294,10 +252,10 @@ def export(
         Path | None, Option(help="The URDF that the robot was imported from. Its joint origins are changed, nothing else.")
     ] = None,
 ) -> None:
-    """Write the calibrated robot: robot file, URDF, effects.
+    """Write the calibrated robot: as a robot file, and as the URDF that it came from.
 
-    A URDF holds the geometry; effects.json holds springs and effects as well. None holds the regression on the
-    remainder: what is lost with it is said, and the accuracy stated is without.
+    A robot file holds geometry, springs and weights, a URDF the geometry alone. Neither holds other effects or the regression
+    on the remainder: what is lost with them is said, and the accuracy stated is without the regression.
     """
     import numpy as np
     import yaml
@@ -305,40 +263,35 @@ def export(
 
     from elastocal.application.accuracy import accuracy_sentence, campaign_accuracy
     from elastocal.application.calibrated import regressed
-    from elastocal.application.exported import find_left_out_m, fold_effects, sidecar
+    from elastocal.application.exported import find_left_out_m, fold_effects
     from elastocal.exchange.urdf_writing import write_calibrated_origins
     from elastocal.io.atomic_writes import check_places, write_text, write_together
-    from elastocal.io.json_files import write_json
     from elastocal.mechanics.robot_file import document_of
 
-    console = Console(stderr=True)
     check_places(*(output / name for name in _EXPORTED))
     if urdf is not None and (output / URDF).resolve() == urdf.resolve():
         raise InputError(urdf, "", "the file that would be replaced", "a URDF outside of --output")
     whole = diagnosed_campaign(folder)
     # No file has the regression: what stands in them is of a robot without.
     calibrated, states = whole.by_physics().calibrated, whole.case.observations.states
-    nominal, robot = calibrated.robot, fold_effects(calibrated).robot
-    drop_in = None if urdf is None else write_calibrated_origins(urdf, nominal, robot)
-    stated = f"Calibrated by elastocal from the campaign {whole.name}."
-    text = yaml.safe_dump(document_of(robot), sort_keys=False, default_flow_style=None, width=128)
-    accuracy = campaign_accuracy(calibrated)
-    document = sidecar(calibrated, whole.name, date.today().isoformat(), accuracy)
-    lines = [accuracy_sentence(accuracy), *(str(output / name) for name in (ROBOT, *([URDF] if urdf else []), SIDECAR))]
-    with write_together(output, _EXPORTED) as partial:
-        write_text(partial / ROBOT, f"# {stated}\n{text}")
-        if drop_in is not None:
-            (partial / URDF).write_bytes(drop_in.content)
-            lines += _drop_in(drop_in, partial / URDF, nominal, robot, states.joint_angles)
-        write_json(partial / SIDECAR, document)
+    nominal, folded = calibrated.robot, fold_effects(calibrated)
     at, under = nominal.reported_angles(states.joint_angles), states.wrench
-    if document["effects"]:
-        names = ", ".join(entry["key"] for entry in document["effects"])
-        lines.insert(0, f"! only {SIDECAR} holds {names}: {_sizes(find_left_out_m(calibrated, at, under))}")
+    lines = []
     if whole.calibrated.remainder is not None:
         words, lost = whole.verdict["remainder"]["words"], np.linalg.norm(regressed(whole.calibrated, at, under), axis=1)
-        lines.insert(0, f"! no file holds the {words} on the remainder, which elastocal correct adds: {_sizes(lost)}")
-    print_answer(True, f"{whole.name}: calibrated robot in {output}", lines, "", console)
+        lines.append(f"! no file holds the {words} on the remainder, which elastocal correct adds: {_sizes(lost)}")
+    if folded.left_out:
+        names = ", ".join(calibrated.model.effects[number].key for number in folded.left_out)
+        lines.append(f"! no file holds {names}: {_sizes(find_left_out_m(calibrated, at, under))}")
+    lines += [accuracy_sentence(campaign_accuracy(calibrated)), str(output / ROBOT)]
+    drop_in = None if urdf is None else write_calibrated_origins(urdf, nominal, folded.robot)
+    text = yaml.safe_dump(document_of(folded.robot), sort_keys=False, default_flow_style=None, width=128)
+    with write_together(output, _EXPORTED) as partial:
+        write_text(partial / ROBOT, f"# Calibrated by elastocal from the campaign {whole.name}.\n{text}")
+        if drop_in is not None:
+            (partial / URDF).write_bytes(drop_in.content)
+            lines += [str(output / URDF), *_drop_in(drop_in, partial / URDF, nominal, folded.robot, at)]
+    print_answer(True, f"{whole.name}: calibrated robot in {output}", lines, "", Console(stderr=True))
 
 
 def _sizes(off: np.ndarray) -> str:
@@ -346,8 +299,8 @@ def _sizes(off: np.ndarray) -> str:
     return f"up to {1e3 * off.max():.3f} mm at the measured poses ({1e3 * float((off**2).mean()) ** 0.5:.3f} mm RMS)"
 
 
-def _drop_in(drop_in: CorrectedUrdf, path: Path, nominal: Robot, robot: Robot, angles: np.ndarray) -> list[str]:
-    """Lines to print: what became of the user's URDF, and how far its poses at measured angles are from the robot file's."""
+def _drop_in(drop_in: CorrectedUrdf, path: Path, nominal: Robot, robot: Robot, reported: np.ndarray) -> list[str]:
+    """What became of the user's URDF, and how far it is from the robot file at reported angles (N, n)."""
     import numpy as np
 
     from elastocal.exchange.urdf import read_urdf
@@ -355,8 +308,8 @@ def _drop_in(drop_in: CorrectedUrdf, path: Path, nominal: Robot, robot: Robot, a
     from elastocal.mechanics.kinematics import poses
 
     _, chain = nominal_chain(read_urdf(path), drop_in.base, drop_in.tip, path.as_posix())
-    theirs, _ = poses(chain, angles, chain.end_effector)
-    mine, _ = poses(robot.chain, robot.model_angles(nominal.reported_angles(angles)), robot.chain.end_effector)
+    theirs, _ = poses(chain, nominal.model_angles(reported), chain.end_effector)
+    mine, _ = poses(robot.chain, robot.model_angles(reported), robot.chain.end_effector)
     off = 1e3 * float(np.linalg.norm(theirs - mine, axis=1).max())
     changed = counted(drop_in.changed, "joint origin")
     lines = [f"{URDF}: {changed} changed, nothing else; put it where the old one is, beside its meshes"]

@@ -7,9 +7,7 @@ import math
 import re
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-from typer import Option
+from typing import TYPE_CHECKING
 
 from elastocal.errors import InputError, escaped
 
@@ -24,8 +22,8 @@ if TYPE_CHECKING:
 _METRES = {"mm": 1e-3, "um": 1e-6, "µm": 1e-6, "m": 1.0}
 _RADIANS = {"deg": math.radians(1.0), "°": math.radians(1.0), "rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "µrad": 1e-6}
 _QUANTITY = re.compile(r"(\d+(?:\.\d*)?|\.\d+)\s*([a-zµ°]+)")
-# No instrument repeats better than the least (`fitting.noise.FINEST`); no accuracy, noise or tolerance of a robot is larger.
-_BOUNDS_M, _BOUNDS_RAD = (1e-8, 0.1), (1e-8, 0.2)
+# m and rad: no instrument repeats better (`fitting.noise.FINEST`).
+_LEAST = 1e-8
 # Trackers stand at up to a hundred metres, targets within an arm's reach of where they are fixed, as in a campaign.
 _FARTHEST_PLACE_M, FARTHEST_TARGET_M = 1e3, 10.0
 # Draws are numbered in 32 bits; more poses, rows or lines than these are slips of the keyboard.
@@ -35,29 +33,23 @@ LARGEST_SEED, MOST_POSES, MOST_ROWS = 2**32 - 1, 10_000, 10_000_000
 _SNAKEFILE = "Snakefile"
 # Where a wheel has the Snakefile, rules and configuration; see `data-files` in pyproject.toml.
 _INSTALLED = f"share/elastocal/{_SNAKEFILE}"
-PhysicsOnly = Annotated[
-    bool, Option("--physics-only", help="Leave out the regression on what the model leaves: correct by named effects alone.")
-]
 
 
 def length_m(option: str, text: str) -> float:
     """A length such as ``0.2mm`` in metres; refused without its unit, or of a size that no instrument or robot has."""
-    return _quantity(option, text, _METRES, _BOUNDS_M, "a length with its unit such as 0.2mm or 60um")
+    return _quantity(option, text, _METRES, 0.1, "a length with its unit such as 0.2mm or 60um, 0.01 um to 0.1 m")
 
 
 def angle_rad(option: str, text: str) -> float:
     """An angle such as ``0.01deg`` in rad; refused without its unit, or of a size that no noise has."""
-    return _quantity(option, text, _RADIANS, _BOUNDS_RAD, "an angle with its unit such as 0.01deg, 0.1mrad or 60urad")
+    return _quantity(option, text, _RADIANS, 0.2, "an angle with its unit such as 0.01deg or 60urad, 0.01 urad to 0.2 rad")
 
 
-def _quantity(option: str, text: str, units: Mapping[str, float], bounds: tuple[float, float], examples: str) -> float:
-    """A number with one of some units, of which the one of size 1 is SI, between bounds."""
+def _quantity(option: str, text: str, units: Mapping[str, float], largest: float, allowed: str) -> float:
     match = _QUANTITY.fullmatch(text.strip())
     value = float(match[1]) * units.get(match[2], 0.0) if match else 0.0
-    least, largest = bounds
-    if not least <= value <= largest:
-        unit = next(unit for unit, size in units.items() if size == 1.0)
-        raise InputError(option, "", repr(text), f"{examples}, {1e6 * least:g} u{unit} to {largest:g} {unit}")
+    if not _LEAST <= value <= largest:
+        raise InputError(option, "", repr(text), allowed)
     return value
 
 
@@ -75,10 +67,10 @@ def numbers(option: str, text: str, count: int, largest: float = _FARTHEST_PLACE
     return found
 
 
-def example(*commands: str) -> str:
-    """The end of a help text: commands to type, on lines that are not wrapped."""
+def example(command: str) -> str:
+    """The end of a help text: a command to type, on a line that is not wrapped."""
     # \b keeps click from joining the lines of a paragraph.
-    return "\n".join(["\b", "Example:" if len(commands) == 1 else "Examples:", *(f"  {command}" for command in commands)])
+    return f"\b\nExample:\n  {command}"
 
 
 def print_answer(passed: bool, answer: str, details: Iterable[str], following: str, console: Console) -> None:
@@ -86,8 +78,8 @@ def print_answer(passed: bool, answer: str, details: Iterable[str], following: s
 
     A detail that asks for attention begins with "! " already.
     """
-    lines = [f"{'✓' if passed else '!'} {answer}", *(line if line.startswith("! ") else f"  {line}" for line in details)]
-    print_lines([*lines, *([f"next: {following}"] if following else [])], console)
+    shown = [line if line.startswith("! ") else f"  {line}" for line in details]
+    print_lines([f"{'✓' if passed else '!'} {answer}", *shown, *([f"next: {following}"] if following else [])], console)
 
 
 def print_lines(lines: Iterable[str], console: Console) -> None:
@@ -98,11 +90,18 @@ def print_lines(lines: Iterable[str], console: Console) -> None:
 
 def pipeline() -> Path:
     """The folder with the Snakefile: of the checkout, where there is one, else what this package installed; none is refused."""
-    found = _checkout() or _installed()
-    if found is None:
-        allowed = "a folder inside of a checkout of elastocal, or its wheel installed in an environment"
-        raise InputError(Path.cwd(), "", "no Snakefile here or above", allowed)
-    return found
+    if found := _checkout():
+        return found
+    try:
+        files = metadata.distribution("elastocal").files or []
+    except metadata.PackageNotFoundError:
+        files = []
+    # Wherever the installer has put it.
+    for file in (Path(str(each.locate())).resolve() for each in files if each.as_posix().endswith(_INSTALLED)):
+        if file.is_file():
+            return file.parent
+    allowed = "a folder inside of a checkout of elastocal, or its wheel installed in an environment"
+    raise InputError(Path.cwd(), "", "no Snakefile here or above", allowed)
 
 
 def robots() -> Path:
@@ -123,17 +122,7 @@ def _checkout() -> Path | None:
     return None
 
 
-def _installed() -> Path | None:
-    """What the wheel of this package brought, wherever the installer has put it."""
-    try:
-        files = metadata.distribution("elastocal").files or []
-    except metadata.PackageNotFoundError:
-        return None
-    found = [Path(str(file.locate())).resolve() for file in files if file.as_posix().endswith(_INSTALLED)]
-    return next((file.parent for file in found if file.is_file()), None)
-
-
-def diagnosed_campaign(folder: Path, physics_only: bool = False) -> Diagnosed:
+def diagnosed_campaign(folder: Path) -> Diagnosed:
     """A campaign with what its diagnosis found, as `load_diagnosed`; results by other libraries or pins come with a warning."""
     from rich.console import Console
 
@@ -145,4 +134,4 @@ def diagnosed_campaign(folder: Path, physics_only: bool = False) -> Diagnosed:
     if other := [name for name in sorted(was | now) if was.get(name) != now.get(name)]:
         there, here = (", ".join(f"{name} {each.get(name, 'none')[:12]}" for name in other) for each in (was, now))
         print_lines([f"warning: {folder} was diagnosed with {there}; here are {here}"], Console(stderr=True))
-    return found.by_physics() if physics_only else found
+    return found

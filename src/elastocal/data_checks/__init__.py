@@ -1,4 +1,4 @@
-"""Faults of the data, looked for before any physics: units, signs, frames, permutations; one module for each kind.
+"""Faults of the data, looked for before any physics: units, signs, frames, permutations; and what a campaign is warned of.
 
-A module with NAMES is looked for: see `protocol`. Imports `fitting` and what that imports.
+Imports `fitting` and what that imports.
 """

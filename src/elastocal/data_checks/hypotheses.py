@@ -1,6 +1,8 @@
-"""The list of ways in which a file may have to be read otherwise: senses, axes, units, order of rows, frames and targets.
+"""Ways in which a file may have to be read otherwise: one list of hypotheses, compared by how well the data then fit.
 
-Senses, axes and units are facts, not parameters: each is tried, none is fitted. Where the base or the targets are is fitted.
+Senses, axes, units, order of rows, frames and targets. Tried where the measurements as written are absurdly far from the
+nominal robot; the simplest that mends them is named. Senses, axes and units are facts: each is tried, none is fitted. Where the
+base or the targets are is fitted, and must fit far better.
 """
 
 from __future__ import annotations
@@ -15,15 +17,25 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.campaign import groups_of
-from elastocal.data_checks.placement import spread
+from elastocal.data_checks.placement import FAR_BETTER, IMPLAUSIBLE_M, IMPLAUSIBLE_RAD, placed, rms, robustly_placed, spread
+from elastocal.data_checks.protocol import Fault, Value
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from elastocal.campaigns.campaign import Campaign, Measurements
+    from elastocal.data_checks.placement import Placement
 
+_IMPLAUSIBLE = np.array([IMPLAUSIBLE_M, IMPLAUSIBLE_RAD])
 # Poses enough to compare some two hundred hypotheses.
-POSES = 40
+_POSES = 40
+# What a correction leaves as it is may come out this much larger by chance.
+_NO_WORSE = 1.2
+# Hypotheses whose misfits differ by less than this share, or by less than a tracker could tell, fit alike; so many are said.
+_ALIKE, _ALIKE_M, _MOST_ALIKE = 1.1, 1e-4, 5
+# A base that stands less far off than this may be the zero of the first joint or the height of the column, a target the length
+# of the last link: for physics to tell. Ten times what geometric errors of industrial robots reach.
+_NEAR_M, _NEAR_RAD = 0.05, 0.05
 # Metres for each unit that people write for metres.
 _LENGTHS = {
     "millimetres": 1e-3,
@@ -35,13 +47,6 @@ _LENGTHS = {
     "hundredths of what they should be": 100.0,
     "thousandths of what they should be": 1e3,
 }
-# What rotation vectors were multiplied by before they were written.
-_TURNS = {
-    0.5: "halves of what they should be",
-    2.0: "doubles of what they should be",
-    180 / np.pi: "degrees",
-    np.pi / 180: "radians converted twice",
-}
 # Angles that people write for a rotation vector, as letters of scipy: capital ones turn about the moved axes.
 _EULER = {"XYZ": "Euler angles about the moved x, y, z", "xyz": "angles about the fixed x, y, z (roll, pitch, yaw)"}
 
@@ -50,56 +55,140 @@ _EULER = {"XYZ": "Euler angles about the moved x, y, z", "xyz": "angles about th
 class Hypothesis:
     """One way in which the file may have to be read otherwise.
 
-    `name`: of the fault that it would be. `detail`: one sentence in plain words; of what is fitted, "frame" or "targets" alone,
-    for the sentence comes from the fit. `read`: a campaign so. `joints`: from 1.
+    `name`: of the fault that it would be. `detail`: one sentence in plain words. `read`: a campaign so. `joints`: from 1.
+    `found`: of what is fitted, the sentence of placements as written and so read; None where it is near enough for physics.
     """
 
     name: str
     detail: str
     read: Callable[[Campaign], Campaign]
     joints: tuple[int, ...] = ()
+    found: Callable[[Placement, Placement], str | None] | None = None
+
+
+def other_interpretations(campaign: Campaign) -> list[Fault]:
+    """The simplest way to read the file otherwise that lets absurd measurements fit, beside those that fit as well; or none."""
+    few, by_rows, loaded = spread(campaign, _POSES), shifts(campaign), campaign.measurements.load > 0
+    found = _mended(few, [*discrete(few), *by_rows], fitted(few))
+    if found or not loaded.any():
+        return found
+    # Rows of one pose that stand a row off show it at the last load alone, where the next pose's stand.
+    return _mended(spread(replace(campaign, measurements=campaign.measurements.select(loaded)), _POSES), by_rows)
+
+
+def _mended(campaign: Campaign, *tried: Sequence[Hypothesis]) -> list[Fault]:
+    """Fault of the hypothesis that mends the measurements: of the first list, unless one of the next is far better."""
+    written = robustly_placed(campaign)
+    if (written.misfit <= _IMPLAUSIBLE).all():
+        return []
+    found = [best for some in tried if some and (best := _best(campaign, written, some))]
+    if len(found) > 1 and found[1][0] >= found[0][0] / FAR_BETTER:
+        found.pop()
+    return [fault for _, fault in found[-1:] if fault]
+
+
+def _best(campaign: Campaign, written: Placement, tried: Sequence[Hypothesis]) -> tuple[float, Fault | None] | None:
+    """What the first of those that fit best leaves, m, and its fault, if it is one; None where it does not convince."""
+    left = np.array([_length(placed(each.read(campaign)).misfit) for each in tried])
+    alike = [each for each, lies in zip(tried, left, strict=True) if lies <= max(_ALIKE * left.min(), left.min() + _ALIKE_M)]
+    best, others = alike[0], tuple(each.detail for each in alike[1 : 1 + _MOST_ALIKE])
+    found = robustly_placed(best.read(campaign))
+    evidence = _evidence(written, found)
+    if evidence is None:
+        return None
+    detail = best.found(written, found) if best.found else best.detail
+    poses = Value("poses compared", float(len(np.unique(found.observations.states.pose))), "–")
+    fault = Fault(best.name, best.joints, detail, (poses,), evidence, alternatives=others) if detail else None
+    return _length(found.misfit), fault
+
+
+def _length(misfit: np.ndarray) -> float:
+    """What is left of positions and orientations together, m."""
+    return float(np.hypot(misfit[0], IMPLAUSIBLE_M / IMPLAUSIBLE_RAD * misfit[1]))
+
+
+def _evidence(written: Placement, found: Placement) -> tuple[float, float] | None:
+    """RMS before and after, of positions or else of orientations; None where a correction does not convince."""
+    before, after, target = written.misfit, found.misfit, found.observations.target
+    predicted = [found.predicted[target == number] for number in np.unique(target)]
+    extent = max(rms(np.linalg.norm(points - points.mean(axis=0), axis=1)) for points in predicted)
+    # Where the robot hardly moves, anything that gathers the measurements in one place would fit.
+    limit = np.minimum(before / FAR_BETTER, np.minimum(_IMPLAUSIBLE, [extent / FAR_BETTER, np.inf]))
+    better = (before > _IMPLAUSIBLE) & (after < limit)
+    no_worse = after <= np.maximum(_NO_WORSE * before, _IMPLAUSIBLE)
+    for one, other in ((0, 1), (1, 0)):
+        if better[one] and no_worse[other]:
+            return float(before[one]), float(after[one])
+    return None
 
 
 def discrete(campaign: Campaign) -> list[Hypothesis]:
     """Everything that is no fit, the simplest first."""
     oriented = campaign.measured == "pose"
-    lists = [_senses(campaign.robot.joints), _lengths(campaign), _rotations() if oriented else ()]
-    return [each for some in (*lists, _axes(campaign.frame == "tracker" and not oriented, oriented)) for each in some]
+    axes = _axes(campaign.frame == "tracker" and not oriented, oriented)
+    return [*_senses(campaign.robot.joints), *_lengths(campaign), *(_rotations() if oriented else ()), *axes]
 
 
 def fitted(campaign: Campaign) -> list[Hypothesis]:
     """Base or targets elsewhere, as far as the campaign says that it knows them."""
-    found, offsets = [], any(target.offset_m is not None for target in campaign.targets)
+    found, targets = [], campaign.targets
     if campaign.frame == "base":
-        found.append(Hypothesis("wrong_frame", "frame", lambda c: replace(c, frame="tracker")))
-    if campaign.measured == "pose" and any(target.rotation is not None for target in campaign.targets):
-        found.append(Hypothesis("wrong_target", "targets", partial(_with_unknown, {"rotation": None})))
-    if offsets:
-        found.append(Hypothesis("wrong_target", "targets", partial(_with_unknown, {"offset_m": None, "rotation": None})))
+        detail, read = "the base stands elsewhere", partial(replace, frame="tracker")
+        found.append(Hypothesis("wrong_frame", detail, read, found=_base_elsewhere))
+    unknown: dict[str, dict[str, Any]] = {}
+    if campaign.measured == "pose" and any(target.rotation is not None for target in targets):
+        unknown["targets are turned otherwise"] = {"rotation": None}
+    if any(target.offset_m is not None for target in targets):
+        unknown["targets sit elsewhere"] = {"offset_m": None, "rotation": None}
+    for detail, parts in unknown.items():
+        found.append(Hypothesis("wrong_target", detail, partial(_with_unknown, parts), found=_targets_elsewhere))
     return found
+
+
+def _base_elsewhere(_: Placement, found: Placement) -> str | None:
+    """Sentence of a base that stands elsewhere, of several sessions the farthest."""
+    away = float(np.linalg.norm(found.estimate.frame_position, axis=1).max())
+    turned = float(Rotation.from_matrix(found.estimate.frame_rotation).magnitude().max())
+    if away <= _NEAR_M and turned <= _NEAR_RAD:
+        return None
+    where = f"{away:.3g} m away, turned by {np.degrees(turned):.3g}°"
+    return f"measurements do not lie in the base frame: the robot would stand {where}"
+
+
+def _targets_elsewhere(written: Placement, found: Placement) -> str | None:
+    """Sentence of targets that sit elsewhere or are turned, with the remedy."""
+    before, after, targets = written.estimate, found.estimate, found.model.targets
+    turns = Rotation.from_matrix(before.target_rotation.transpose(0, 2, 1) @ after.target_rotation).magnitude()
+    away = np.linalg.norm(after.target_offset - before.target_offset, axis=1)
+    if away.max() <= _NEAR_M and turns.max() <= IMPLAUSIBLE_RAD:
+        return None
+    said = {}
+    if away.max() > IMPLAUSIBLE_M:
+        said["offset_m"] = f"{targets[int(np.argmax(away))].name} would sit {1e3 * away.max():.3g} mm from there"
+    if turns.max() > IMPLAUSIBLE_RAD:
+        said["rotation"] = f"{targets[int(np.argmax(turns))].name} would be turned by {np.degrees(turns.max()):.3g}°"
+    remedy = " and ".join(f"{key}: unknown" for key in said)
+    fits = f"where its mount is not as stated, {remedy} in campaign.yaml fits it, and known values may stand there"
+    return f"targets do not sit where the campaign says: {' and '.join(said.values())}; {fits}"
 
 
 def shifts(campaign: Campaign) -> list[Hypothesis]:
     """Measured columns that stand a row further up or down, of all measurements: those left have others beside them."""
-    measurements = campaign.measurements
+    measurements, found = campaign.measurements, []
     of_target = [measurements.session, measurements.target]
     alike = {
         "row": [measurements.session],
         "row of its target": of_target,
         "pose": [*of_target, measurements.load, measurements.repeat],
     }
-    found = []
-    for (kind, keys), steps in product(alike.items(), (1, -1)):
-        order, source = np.argsort(measurements.row, kind="stable"), np.full(len(measurements), -1)
-        number = groups_of(np.column_stack(keys))[1][order]
-        for members in (order[number == group] for group in range(number.max() + 1)):
-            first, second = members[:-1], members[1:]
-            source[second if steps > 0 else first] = first if steps > 0 else second
-        # Rows whose columns would come from before the first or from behind the last are left out.
-        there = partial(np.take, indices=np.maximum(source, 0), axis=0)
-        moved = columns(position=there, rotation_vector=there)(campaign).measurements.select(source >= 0)
-        detail = f"the measured columns fit one {kind} further {'down' if steps > 0 else 'up'}"
-        found.append(Hypothesis("shuffled_rows", detail, partial(_with_spread, moved)))
+    for kind, keys in alike.items():
+        group = groups_of(np.column_stack(keys))[1]
+        order = np.lexsort((measurements.row, group))
+        rows = np.array([order[:-1], order[1:]])[:, group[order[1:]] == group[order[:-1]]]
+        # No row has another beside it where each load has a number of its own.
+        for way, (source, at) in (("down", rows), ("up", rows[::-1])) if rows.size else ():
+            detail = f"the measured columns fit one {kind} further {way}"
+            found.append(Hypothesis("shuffled_rows", detail, partial(_moved, measurements, source, at)))
     return found
 
 
@@ -131,9 +220,6 @@ def _lengths(campaign: Campaign) -> Iterator[Hypothesis]:
 def _rotations() -> Iterator[Hypothesis]:
     detail = "the rotation vectors fit turned round, as if they took base axes into the target's"
     yield Hypothesis("wrong_sign", detail, columns(rotation_vector=np.negative))
-    for factor, words in _TURNS.items():
-        detail = f"the rotation vectors look like {words}: measurements fit {1 / factor:.4g} times the written rotation vectors"
-        yield Hypothesis("wrong_unit", detail, columns(rotation_vector=partial(np.multiply, 1 / factor)))
     for letters, words in _EULER.items():
         detail = f"the columns of the rotation vector look like {words}, in rad"
         yield Hypothesis("wrong_unit", detail, columns(rotation_vector=partial(_from_angles, letters)))
@@ -182,8 +268,10 @@ def columns(**functions: Callable[[np.ndarray], np.ndarray]) -> Callable[[Campai
     return read
 
 
-def _with_spread(measurements: Measurements, campaign: Campaign) -> Campaign:
-    return spread(replace(campaign, measurements=measurements), POSES)
+def _moved(measurements: Measurements, source: np.ndarray, at: np.ndarray, campaign: Campaign) -> Campaign:
+    read = measurements.select(source)
+    moved = replace(measurements.select(at), position=read.position, rotation_vector=read.rotation_vector)
+    return spread(replace(campaign, measurements=moved), _POSES)
 
 
 def _with_angles(matrix: np.ndarray, campaign: Campaign) -> Campaign:

@@ -13,7 +13,7 @@ from elastocal.campaigns.campaign import groups_of
 from elastocal.fitting.least_squares import nominal_poses, registered_to
 from elastocal.fitting.model import declared_model, measured_in_base
 from elastocal.fitting.observations import select_states, single_observations
-from elastocal.mechanics.kinematics import position_jacobians, rotation_vectors
+from elastocal.mechanics.kinematics import rotation_vectors
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
@@ -27,9 +27,8 @@ IMPLAUSIBLE_M, IMPLAUSIBLE_RAD = 0.02, 0.1
 # A correction must lower the residual by this factor.
 FAR_BETTER = 5.0
 # Share of the measurements that frames and targets are first fitted to, and steps of fitting to those that fit best. Those
-# beyond so many robust standard deviations take no part in the last fit.
+# beyond so many robust standard deviations, by the median of their distances, take no part in the last fit.
 _CORE, _CORE_STEPS, _APART = 0.6, 5, 5.0
-# Largest distances that an RMS leaves out: single measurements say nothing of all.
 _TRIMMED = 0.1
 
 
@@ -46,29 +45,38 @@ class Placement:
     estimate: Estimate
 
     @cached_property
-    def predicted(self) -> tuple[np.ndarray, np.ndarray | None]:
-        """Positions that the robot gives the targets, ndarray (N, 3), m, and orientations (N, 3, 3), as `measured`."""
-        (position, rotation), target = self.nominal, self.observations.target
-        turned = None if self.observations.rotation is None else rotation @ self.estimate.target_rotation[target]
-        return position + (rotation @ self.estimate.target_offset[target][..., None])[..., 0], turned
+    def predicted(self) -> np.ndarray:
+        """Positions that the robot gives the targets, ndarray (N, 3), m."""
+        position, rotation = self.nominal
+        return position + (rotation @ self.estimate.target_offset[self.observations.target][..., None])[..., 0]
 
     @cached_property
     def measured(self) -> tuple[np.ndarray, np.ndarray | None]:
-        """Positions and orientations; these None where positions alone are measured."""
+        """Positions (N, 3), m, and orientations (N, 3, 3); these None where positions alone are measured."""
         return measured_in_base(self.estimate, self.observations)
 
     @cached_property
     def distance(self) -> np.ndarray:
         """From the predicted to the measured position, ndarray (N,), m."""
-        return np.linalg.norm(self.measured[0] - self.predicted[0], axis=1)
+        return np.linalg.norm(self.measured[0] - self.predicted, axis=1)
 
     @cached_property
     def turn(self) -> np.ndarray | None:
         """Angle between predicted and measured orientation, ndarray (N,), rad; None where positions are measured."""
-        seen, predicted = self.measured[1], self.predicted[1]
-        if seen is None or predicted is None:
+        if (seen := self.measured[1]) is None:
             return None
+        predicted = self.nominal[1] @ self.estimate.target_rotation[self.observations.target]
         return np.linalg.norm(rotation_vectors(seen @ predicted.transpose(0, 2, 1)), axis=1)
+
+    @cached_property
+    def misfit(self) -> np.ndarray:
+        """What is left of positions (m) and orientations (rad) of the target that fits worst, ndarray (2,).
+
+        RMS without the largest tenth: single measurements say nothing of all.
+        """
+        target, parts = self.observations.target, (self.distance, self.turn)
+        each = [target == number for number in np.unique(target)]
+        return np.array([0.0 if part is None else max(_trimmed_rms(part[mine]) for mine in each) for part in parts])
 
 
 def placed(campaign: Campaign, estimate: Estimate | None = None) -> Placement:
@@ -95,7 +103,7 @@ def robustly_placed(campaign: Campaign) -> Placement:
         for members in of_each_target(campaign.measurements):
             limit = np.quantile(distance[members], _CORE)
             if step == _CORE_STEPS:
-                limit = max(limit, _APART * robust_sigma(distance[members], 3))
+                limit = max(limit, _APART * np.median(distance[members]) / np.sqrt(chdtri(3, 0.5)))
             kept[members] = distance[members] <= limit
         some, nominal = select_states(found.observations, kept), (part[kept] for part in found.nominal)
         found = replace(found, estimate=registered_to(found.model, some, *nominal))
@@ -112,32 +120,13 @@ def spread(campaign: Campaign, poses: int = MANY_POSES) -> Campaign:
     return replace(campaign, measurements=seen.select(np.sort(np.concatenate(chosen))))
 
 
-def jacobians_at_targets(campaign: Campaign, estimate: Estimate) -> np.ndarray:
-    """How the target of each measurement moves with the joints, ndarray (N, 3, n)."""
-    chain, seen, offsets = campaign.robot.chain, campaign.measurements, estimate.target_offset
-    points = [replace(chain.point(t.point), offset_m=tuple(at)) for t, at in zip(campaign.targets, offsets, strict=True)]
-    return position_jacobians(chain, seen.joint_angles, points, seen.target)
-
-
 def rms(values: np.ndarray) -> float:
     """Root of the mean square, of an array of any shape."""
     return float(np.sqrt((values**2).mean()))
 
 
-def trimmed_rms(distance: np.ndarray) -> float:
-    """RMS of distances (N,) without the largest tenth."""
+def _trimmed_rms(distance: np.ndarray) -> float:
     return rms(np.sort(distance)[: max(int((1 - _TRIMMED) * len(distance)), 1)])
-
-
-def robust_sigma(distance: np.ndarray, components: int) -> float:
-    """Standard deviation of each component of vectors, from the median of their lengths (N,).
-
-    The median absolute deviation [1] for vectors: divided by the median of the chi distribution.
-
-    [1] Hampel, F. R., The influence curve and its role in robust estimation, Journal of the American Statistical Association
-        69, 1974.
-    """
-    return float(np.median(distance) / np.sqrt(chdtri(components, 0.5)))
 
 
 def of_each_target(measurements: Measurements) -> list[np.ndarray]:

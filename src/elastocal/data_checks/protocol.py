@@ -23,12 +23,11 @@ class Value:
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault that the measurements show.
+    """A fault that the measurements show, and that must be mended before anything is traced.
 
     `joints`: joints concerned, counted from 1; empty where there are none. `detail`: one sentence in plain words. `evidence`:
-    RMS residual as written and with the correction, m. Where only orientations show the fault: of a point 1 m away. `rows`:
-    rows of the file concerned; empty where all are. `decisive`: whether the measurements must be corrected before anything is
-    traced. `alternatives`: what would explain the measurements as well, in plain words.
+    RMS residual as written and with the correction, m. Where only orientations show the fault: of a point 1 m away.
+    `alternatives`: what would explain the measurements as well, in plain words.
     """
 
     name: str
@@ -36,8 +35,6 @@ class Fault:
     detail: str
     parameters: tuple[Value, ...]
     evidence: tuple[float, float]
-    rows: tuple[int, ...]
-    decisive: bool
     alternatives: tuple[str, ...] = ()
 
 

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.counting import counted
-from elastocal.data_checks.faults import faults
+from elastocal.data_checks.faults import compliance_warnings, faults
 from elastocal.data_checks.protocol import Fault
-from elastocal.data_checks.warnings import fitted_compliance_warnings
 from elastocal.diagnosis import refit, verdict
 from elastocal.diagnosis.gross_errors import (
     Deviations,
@@ -96,11 +95,10 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
     tell = progress or (lambda line: None)
     part = first_kept(case, settings)
     known = faults(part.case.campaign)
-    decisive = [fault for fault in known if fault.decisive]
-    if decisive:
+    if known:
         # Where all measurements mean something else, no single row is wrong.
         part = fitted_to(case, np.ones(len(case.campaign.measurements), bool), settings)
-    elif not known:
+    else:
         part = with_probable_centres(part, settings)
         case = replace(case, model=part.case.model)
     tell(f"declared model fitted to {counted(len(part.case.observations), 'measurement')}")
@@ -108,7 +106,7 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
     about, start, most_pose_error_rad = part.declared, None, np.inf
     measurements, errors = case.campaign.measurements, Deviations.none(len(part.kept), case.model.rows)
     good = np.zeros(len(part.kept), bool)
-    for number in range(0 if decisive else settings.gross_error_rounds):
+    for number in range(0 if known else settings.gross_error_rounds):
         if not found:
             found = _explained(part, settings, seed, tell, start, most_pose_error_rad)
             about = found.fitted
@@ -301,14 +299,13 @@ def _document(
     warnings: Sequence[str],
 ) -> dict[str, Any]:
     declared, final = steps[1].fitted, steps[-1].fitted
-    decisive = [fault for fault in known if fault.decisive]
     springs, tested = refit.Averaged({}, {}), set[str]()
     stated: dict[str, Any] = {
-        "verdict": verdict.NAMED if len(decisive) == 1 else verdict.SEVERAL,
-        "effects": [verdict.fault_entry(fault) for fault in decisive],
+        "verdict": verdict.NAMED if len(known) == 1 else verdict.SEVERAL,
+        "effects": [verdict.fault_entry(fault) for fault in known],
     } | dict.fromkeys(("probabilities", "misfit", "other_models_m"))
     untestable: dict[str, str] = {}
-    remarks = [*warnings, *(f"{fault.name}: {fault.detail}" for fault in known if not fault.decisive)]
+    remarks = [*warnings]
     if found:
         problem, conclusion = found.linearized.problem, found.conclusion
         models, nothing = found.posterior.models, found.posterior.nothing
@@ -335,7 +332,7 @@ def _document(
         if not found.settled:
             words = f"the problem was linearised {settings.linearizations} times, and each time another model was found"
             remarks.append(f"{words}: more may be missing")
-    remarks += fitted_compliance_warnings(final) + verdict.scatter_warnings(final.noise, noise, settings.relinearize_noise)
+    remarks += compliance_warnings(final) + verdict.scatter_warnings(final.noise, noise, settings.relinearize_noise)
     for name, fitted in (("declared", declared), ("final", final)):
         if not fitted.converged:
             remarks.append(f"the fit of the {name} model did not converge: its parameters are not to be relied on")

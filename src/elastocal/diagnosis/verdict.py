@@ -387,7 +387,7 @@ def sag_entries(name: str, members: Sequence[Candidate], final: Fit, observation
 
 
 def fault_entry(fault: Fault) -> dict[str, Any]:
-    """Entry of a decisive fault of the data."""
+    """Entry of a fault of the data."""
     nothing: dict[str, Any] = {"members": [], "locations": [], "adopted": False}
     nothing |= dict.fromkeys(("probability", "p_value", "heldout_gain"))
     return nothing | {

@@ -162,7 +162,6 @@ def _read_table(path: str | Path, options: DhOptions) -> tuple[list[str], np.nda
         f"file: names of columns in line {text.dialect.header}, separator {text.dialect.separator}, "
         f"decimal {text.dialect.decimal}, encoding {text.dialect.encoding}",
         *([f"not used: {', '.join(options.ignore)}"] if options.ignore else []),
-        *text.left_out,
     ]
     return read.texts("joint") if "joint" in headers else [], rows, notes
 

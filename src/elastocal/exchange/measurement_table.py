@@ -1,20 +1,18 @@
 """Measurements of another program's table, as a campaign has them.
 
 What a name, a unit or a notation leaves open is asked for, never guessed: an angle without unit, ``rx, ry, rz`` that may be a
-rotation vector or Euler angles. What was found out is returned as options with which the import can be repeated.
+rotation vector or Euler angles. What was found out is returned, too.
 """
 
-import hashlib
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-import yaml
 
 from elastocal.campaigns.holdout import number_alike
 from elastocal.campaigns.measurements import file_columns
@@ -40,12 +38,10 @@ from elastocal.exchange.column_names import (
     rotation_vectors,
     scales_of,
 )
-from elastocal.io.documents import check_document, read_document
 from elastocal.io.texts import plain_number
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 
-IMPORT = "import.yaml"
 # Angles that a controller reports twice at one standstill agree to better; poses of a plan lie degrees apart.
 SAME_POSE = 1e-3
 # Nanoseconds since 1970 are 2e18.
@@ -65,32 +61,15 @@ class ImportOptions(Dialect):
     without a position are left out. `names`: of the columns of a table without a header, in their order.
     """
 
-    columns: Mapping[str, str] | None = None
-    units: Mapping[str, str] | None = None
+    columns: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
     rotation: str | None = None
     target: str | None = None
     wrench: str = "on-robot"
     skip_empty: bool = False
-    ignore: Sequence[str] | None = None
-    targets: Mapping[str, Sequence[str]] | None = None
-    names: Sequence[str] | None = None
-
-
-def read_import_options(path: str | Path) -> ImportOptions:
-    """Options of an earlier import; an InputError names an unknown key or a value that none may have."""
-    document = read_document(path) or {}
-    check_document(document, "measurement_import", Path(path).as_posix())
-    known = {field.name for field in fields(ImportOptions)}
-    return ImportOptions(**{key: value for key, value in document.items() if key in known})
-
-
-def import_options_text(options: ImportOptions, source: str | Path) -> str:
-    """Text of the options with which a table, `source`, was imported."""
-    digest = hashlib.sha256(Path(source).read_bytes()).hexdigest()
-    document: dict[str, Any] = {"source": Path(source).name, "sha256": digest}
-    document |= {key: value for key, value in asdict(options).items() if value is not None}
-    body = yaml.safe_dump(document, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120)
-    return f"# The import again: elastocal import csv FILE --options {IMPORT} --folder FOLDER\n{body}"
+    ignore: Sequence[str] = ()
+    targets: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    names: Sequence[str] = ()
 
 
 def _one_row_each(text: TextTable, targets: Mapping[str, Sequence[str]]) -> TextTable:
@@ -141,9 +120,9 @@ def _times(read: Cells) -> np.ndarray:
 class ImportedMeasurements:
     """Measurements as a campaign has them.
 
-    `table` (N,): columns of measurements.csv. `options`: with which the same comes out again: nothing is left to be found out.
+    `table` (N,): columns of measurements.csv. `options`: those given, and what was found out.
     `ignored`: headers of columns that are not used. `skipped`: rows without a position that were left out. `notes`: how columns
-    were understood that may surprise, and what else was left out.
+    were understood that may surprise, and which were not read.
     """
 
     table: dict[str, np.ndarray]
@@ -161,8 +140,8 @@ def read_measurement_table(path: str | Path, options: ImportOptions, robot: Robo
     `InputError`: what is missing or ambiguous, with the option that says it; or line and column of what is no number or no
     rotation.
     """
-    mapped = dict(options.columns or {})
-    for name in (*mapped, *(set(options.units or {}) - {"angles", "lengths"})):
+    mapped = dict(options.columns)
+    for name in (*mapped, *(set(options.units) - {"angles", "lengths"})):
         if not is_name(name):
             raise InputError("--column", "", repr(name), closest_first(name, [*file_columns(6), "qw", "e1", "r11", "t11"]))
 
@@ -174,7 +153,7 @@ def read_measurement_table(path: str | Path, options: ImportOptions, robot: Robo
         only_joints = any(name and find_joints([name]) for name in names) and len(cells) > 1
         return has_position(names) or (only_joints and not any(plain_number(cell) is not None for cell in cells))
 
-    text = read_text_table(path, is_header, options, options.ignore or (), units_in=read_units, names=options.names or ())
+    text = read_text_table(path, is_header, options, options.ignore, units_in=read_units, names=options.names)
     notes = [f"units in the row under the header: {len(text.units)}"] if text.units else []
     if options.targets:
         text, first = _one_row_each(text, options.targets), next(iter(options.targets.values()))
@@ -190,7 +169,7 @@ def read_measurement_table(path: str | Path, options: ImportOptions, robot: Robo
     orientation = columns_of_rotation(rotation, columns)
     _check_complete(text, columns, angles, (*position, *orientation), robot)
     wanted = [*angles, *position, *orientation, *(name for name in WRENCH_NAMES if name in columns)]
-    given = options.units or {}
+    given = options.units
     units = find_units(text, columns, wanted, stated, given, robot)
     kept = _filled_rows(text, columns, position, options.skip_empty)
     read = text.cells(columns, scales_of(units), kept)
@@ -231,9 +210,9 @@ def read_measurement_table(path: str | Path, options: ImportOptions, robot: Robo
         units=units,
         rotation=rotation,
     )
-    ignored = (*(header for header in text.columns if header not in used.values()), *(options.ignore or ()))
+    ignored = (*(header for header in text.columns if header not in used.values()), *options.ignore)
     skipped = len(text.lines) - len(kept)
-    return ImportedMeasurements(table, len(angles), resolved, ignored, skipped, (*text.left_out, *notes))
+    return ImportedMeasurements(table, len(angles), resolved, ignored, skipped, tuple(notes))
 
 
 def _check_complete(

@@ -3,7 +3,7 @@
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from importlib import resources
 from itertools import islice
@@ -82,18 +82,13 @@ def _validator(schema: str) -> Any:
             if len(set(entries)) < len(entries):
                 yield jsonschema.ValidationError("an entry twice")
 
-    def of_pattern(_: Any, pattern: str, instance: Any, __: Any) -> Iterator[Exception]:
-        """The rule pattern; to Python, as to no other reader of a schema, the sign $ also means before a last line break."""
-        if isinstance(instance, str) and not re.fullmatch(pattern, instance):
-            yield jsonschema.ValidationError("another text")
-
     types = {
         "integer": lambda _, value: isinstance(value, int) and not isinstance(value, bool),
         "number": lambda _, value: isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value),
     }
     base = jsonschema.Draft202012Validator
-    rules, checked = {"uniqueItems": each_once, "pattern": of_pattern}, base.TYPE_CHECKER.redefine_many(types)
-    validator = jsonschema.validators.extend(base, rules, type_checker=checked)
+    checked = base.TYPE_CHECKER.redefine_many(types)
+    validator = jsonschema.validators.extend(base, {"uniqueItems": each_once}, type_checker=checked)
     return validator(read_schema(schema), format_checker=jsonschema.FormatChecker(["date"]))
 
 
@@ -164,17 +159,17 @@ def check_document(document: Any, schema: str, source: str) -> None:
     """Check a document of the file `source` against a schema, as `read_schema` names it; the first key at fault is refused."""
     errors = islice(_validator(schema).iter_errors(document), _MOST_FAULTS)
     if error := min(errors, key=lambda error: [str(part) for part in error.absolute_path], default=None):
-        key, found, allowed = _explained(error)
-        path = [*error.absolute_path]
-        if error.validator == "additionalProperties":
-            path.append(next(name for name in error.instance if name not in error.schema.get("properties", {})))
-        line = _line_of(source, path)
-        raise InputError(source, ", ".join(part for part in (line, key) if part), found, allowed)
+        raise _refusal(source, *_explained(error))
     for place, text in _texts(document):
-        # White space between the transforms of a chain is free; headers of another table are nobody's names.
-        if fault := None if place[:1] == ("columns",) else text_fault(" ".join(text.split()) if place == ("chain",) else text):
-            key, line = _key_of(place), _line_of(source, place)
-            raise InputError(source, ", ".join(part for part in (line, key) if part), *fault)
+        # White space between the transforms of a chain is free.
+        if fault := text_fault(" ".join(text.split()) if place == ("chain",) else text):
+            raise _refusal(source, place, *fault)
+
+
+def _refusal(source: str, path: Sequence[str | int], found: str, allowed: str) -> InputError:
+    """An error at a key, with its line where the file has it."""
+    key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")
+    return InputError(source, ", ".join(filter(None, (_line_of(source, path), key))), found, allowed)
 
 
 def _texts(value: Any, path: tuple[str | int, ...] = ()) -> Iterator[tuple[tuple[str | int, ...], str]]:
@@ -188,41 +183,35 @@ def _texts(value: Any, path: tuple[str | int, ...] = ()) -> Iterator[tuple[tuple
 
 
 def _line_of(source: str, path: Sequence[str | int]) -> str:
-    """Line of the file at which a key stands, or what it should stand in; empty where there is no such file any more."""
+    """Line of the file at which a key stands, or what it should stand in; empty where the file has neither."""
     try:
         node = yaml.compose(read_text(source, LARGEST_BYTES), Loader=_Loader)
     except (InputError, yaml.YAMLError):
         return ""
-    mark = node.start_mark if node else None
+    line = ""
     for part in path:
         if isinstance(node, yaml.SequenceNode) and isinstance(part, int) and part < len(node.value):
-            node = node.value[part]
-            mark = node.start_mark
-            continue
-        entries = node.value if isinstance(node, yaml.MappingNode) else []
-        entry = next(((key, value) for key, value in entries if key.value == str(part)), None)
-        if entry is None:
-            # Such as a value of the command line, which the file does not have.
-            return ""
-        mark, node = entry[0].start_mark, entry[1]
-    return f"line {mark.line + 1}" if mark and path else ""
+            place = node = node.value[part]
+        else:
+            entries = node.value if isinstance(node, yaml.MappingNode) else []
+            place, node = next(((key, value) for key, value in entries if key.value == str(part)), (None, None))
+        if place is None:
+            break
+        line = f"line {place.start_mark.line + 1}"
+    return line
 
 
-def _key_of(path: Iterable[str | int]) -> str:
-    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")
-
-
-def _explained(error: Any) -> tuple[str, str, str]:
-    """Key, what was found and what is allowed, of one violation."""
-    key, schema = _key_of(error.absolute_path), error.schema
+def _explained(error: Any) -> tuple[list[str | int], str, str]:
+    """Where one violation is, what was found there and what is allowed."""
+    path, schema = [*error.absolute_path], error.schema
     if error.validator == "additionalProperties":
         known = sorted(schema.get("properties", {}))
         unknown = next(name for name in error.instance if name not in known)
-        return f"{key}.{unknown}".lstrip("."), "an unknown key", f"{closest(unknown, known)} ({', '.join(known)})".strip()
+        return [*path, unknown], "an unknown key", f"{closest(unknown, known)} ({', '.join(known)})".strip()
     if error.validator == "required":
         missing = next(name for name in error.validator_value if name not in error.instance)
-        return f"{key}.{missing}".lstrip("."), "nothing", _admitted(schema["properties"][missing])
-    return key, "nothing" if error.instance is None else repr(error.instance), _admitted(schema) or error.message
+        return [*path, missing], "nothing", _admitted(schema["properties"][missing])
+    return path, "nothing" if error.instance is None else repr(error.instance), _admitted(schema) or error.message
 
 
 _KINDS = {"number": "a finite number", "object": "keys with values, such as name: value", "null": "nothing"}
@@ -233,6 +222,7 @@ _OTHERS = {
     "minProperties": "{} or more keys",
     "pattern": "text that matches {}",
     "format": "a {} such as 2026-11-20",
+    "uniqueItems": "each entry once",
 }
 
 
@@ -242,17 +232,13 @@ def _admitted(schema: Mapping[str, Any]) -> str:
     kind = " or ".join(_KINDS.get(each, each) for each in kinds)
     parts = [" | ".join(map(str, schema["enum"])) if "enum" in schema else "" if "minItems" in schema else kind]
     for low, high, unit in _RANGES:
-        least, most = schema.get(low, ""), schema.get(high, "")
-        if least == most:
-            parts.append(f"{least}{unit}" if low in schema else "")
-        elif high not in schema or low not in schema:
-            parts.append(f"{least}{most} or {'more' if low in schema else 'fewer'}{unit}")
-        else:
-            parts.append(f"{least} to {most}{unit}")
+        least, most = schema.get(low), schema.get(high)
+        if least is not None and most is not None:
+            parts.append(f"{least}{unit}" if least == most else f"{least} to {most}{unit}")
+        elif least is not None or most is not None:
+            parts.append(f"{least} or more{unit}" if most is None else f"{most} or fewer{unit}")
     parts += [words.format(schema[rule]) for rule, words in _OTHERS.items() if rule in schema]
-    parts += ["each entry once"] if schema.get("uniqueItems") else []
-    meaning = f" ({schema['description']})" if "description" in schema else ""
-    return ", ".join(filter(None, parts)) + meaning
+    return ", ".join(filter(None, parts)) + (f" ({schema['description']})" if "description" in schema else "")
 
 
 def document_path(folder: str | Path, kind: str, name: str) -> str:

@@ -1,4 +1,4 @@
-"""Which commit, configuration, seed and environment a file comes from, in words that stand in the file or beside it."""
+"""Which commit, configuration, seed and environment a file comes from, as it stands in the file or beside it."""
 
 import hashlib
 import json
@@ -7,6 +7,10 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from elastocal import __version__
+
+# Parameters of rules that tell Snakemake of edited sources, and a job what to call: nothing of what was configured.
+SOURCES_DIGEST, STEP = "sources_sha256", "step"
 # Of what a run on one machine has installed; a wheel comes without.
 _LOCK = "requirements/run.lock"
 # What numbers may depend on wherever there is no such list.
@@ -45,3 +49,11 @@ def environment(folder: str | Path) -> dict[str, str]:
     lock = Path(folder, _LOCK)
     pinned = {_LOCK: hashlib.sha256(lock.read_bytes()).hexdigest()} if lock.is_file() else {}
     return {name: version(name) for name in _LIBRARIES} | pinned
+
+
+def provenance(settings: Any, **more: Any) -> dict[str, Any]:
+    """What a table was made from, as JSON has it: `settings`, a mapping or parameters of a rule, and further facts."""
+    kept = {name: value for name, value in settings.items() if name not in (SOURCES_DIGEST, STEP)}
+    leaves = json.loads(json.dumps(kept, sort_keys=True, default=list))
+    digest = hashlib.sha256(json.dumps(leaves, sort_keys=True).encode()).hexdigest()[:16]
+    return {"elastocal_version": __version__, "configuration": leaves, "configuration_sha256": digest, **more}

@@ -1,8 +1,7 @@
 """What each job read and wrote, when, and from which commit, configuration, seed and environment: a record beside every output.
 
 A record has the SHA-256 of its output and of all that the job read: whoever reads a file next finds a byte that was altered, in
-it or in anything behind it. `python -m elastocal.io.records | sha256sum --check` judges all files, with the name of one behind
-`records` this one.
+it or in anything behind it. `python -m elastocal.io.records | sha256sum --check` judges all files.
 """
 
 import hashlib
@@ -129,9 +128,8 @@ def jobs_behind(targets: Iterable[str], within: str | Path = "") -> list[JobReco
         path = left.pop()
         if path not in digests:
             job, digests[path] = _intact(path, within)
-            if (job.started, job.name) not in found:
-                left += [*filter(_made, job.outputs), *job.made_inputs]
             found[job.started, job.name] = job
+            left += [*filter(_made, job.outputs), *job.made_inputs]
     for job in found.values():
         for path, digest in job.made_inputs.items():
             if digests[path] != digest:
@@ -154,17 +152,12 @@ def checksum(path: str | Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def files_of(path: str, within: str | Path = "") -> list[str]:
-    """The file, or all files below the folder but for hidden ones: Snakemake notes the time in one, after the step."""
-    folder = Path(within, path)
-    if not folder.is_dir():
-        return [path]
-    files = [file for file in folder.rglob("*") if file.is_file() and not file.name.startswith(".")]
-    return sorted(file.relative_to(within).as_posix() for file in files)
-
-
 def _digests(path: str, within: str | Path = "") -> dict[str, str]:
-    return {file: checksum(Path(within, file)) for file in files_of(path, within)}
+    """SHA-256 of the file, or of all files below the folder but for hidden ones: Snakemake notes the time in one."""
+    folder = Path(within, path)
+    files = [file for file in folder.rglob("*") if file.is_file() and not file.name.startswith(".")]
+    names = sorted(file.relative_to(within).as_posix() for file in files) if folder.is_dir() else [path]
+    return {name: checksum(Path(within, name)) for name in names}
 
 
 def _intact(path: str, within: str | Path = "") -> tuple[JobRecord, str]:
@@ -194,6 +187,6 @@ def _made(path: str) -> bool:
 
 if __name__ == "__main__":
     try:
-        sys.stdout.writelines(_lines(read_record(sys.argv[1])[1] if sys.argv[1:] else recorded()))
+        sys.stdout.writelines(_lines(recorded()))
     except InputError as error:
         sys.exit(str(error))

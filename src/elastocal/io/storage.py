@@ -22,6 +22,8 @@ from elastocal.io.texts import check_file
 # Of each column one value or an array.
 Block = Mapping[str, np.ndarray | Sequence[str] | Sequence[float]]
 _TABLE, _PROVENANCE = "elastocal.table", "elastocal.provenance"
+# One value for each row group, and one for each row.
+_TEXTS = ("string", "text")
 _AS_WRITTEN = "the file as the pipeline wrote it (delete it and it is made again)"
 
 
@@ -48,10 +50,6 @@ class TableSchema:
     name: str
     columns: tuple[Column, ...]
 
-    def column(self, name: str) -> Column:
-        """The column called `name`."""
-        return next(column for column in self.columns if column.name == name)
-
 
 def write_table(path: str | Path, schema: TableSchema, blocks: Iterable[Block], provenance: Mapping[str, Any]) -> None:
     """Write a table block by block, each a row group; the file appears whole or not at all.
@@ -59,24 +57,17 @@ def write_table(path: str | Path, schema: TableSchema, blocks: Iterable[Block], 
     `blocks`: one value or array for each column; all arrays of a block have the same length. `provenance`: JSON-serialisable;
     says from what the table was made. Raises `InputError`: a column that is missing, too many, not finite or out of range.
     """
-    fields = [pa.field(c.name, _arrow_type(c), False, {"unit": c.unit, "meaning": c.meaning}) for c in schema.columns]
+    fields = pa.schema(
+        [pa.field(c.name, _arrow_type(c), False, {"unit": c.unit, "meaning": c.meaning}) for c in schema.columns]
+    )
     floats = [c.name for c in schema.columns if c.type.startswith("float")]
-    with (
-        atomic_write(path) as partial,
-        pq.ParquetWriter(
-            partial,
-            pa.schema(fields),
-            compression="zstd",
-            compression_level=1,
-            use_dictionary=[c.name for c in schema.columns if c.name not in floats],
-            use_byte_stream_split=floats,
-        ) as writer,
-    ):
+    coded = [c.name for c in schema.columns if c.name not in floats]
+    kind = {"compression": "zstd", "compression_level": 1, "use_dictionary": coded, "use_byte_stream_split": floats}
+    with atomic_write(path) as partial, pq.ParquetWriter(partial, fields, **kind) as writer:
         for block in blocks:
-            values = _checked(path, schema, block)
-            if len(next(iter(values.values()))):
-                arrays = [_array(values[c.name], _arrow_type(c)) for c in schema.columns]
-                writer.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields)), row_group_size=2**30)
+            arrays = [_array(values, fields.field(name).type) for name, values in _checked(path, schema, block).items()]
+            if len(arrays[0]):
+                writer.write_table(pa.Table.from_arrays(arrays, schema=fields), row_group_size=2**30)
         metadata = {_TABLE: schema.name, _PROVENANCE: provenance}
         writer.add_key_value_metadata({key: json.dumps(value, sort_keys=True) for key, value in metadata.items()})
 
@@ -89,26 +80,25 @@ def read_blocks(
     `columns`: only these; all without. `**where`: column = value: only row groups with this value throughout. Raises
     `InputError`: a file that cannot be read or is another table.
     """
-    wanted = schema.columns if columns is None else [schema.column(name) for name in columns]
+    wanted = [c.name for c in schema.columns] if columns is None else [*columns]
     with _parquet_file(path) as file:
         name = _metadata(path, file, _TABLE, schema.name)
         if name != schema.name:
             raise InputError(path, f"metadata {_TABLE}", name, schema.name)
-        fields = file.schema_arrow
+        types = {field.name: field.type for field in file.schema_arrow}
         for column in schema.columns:
-            index = fields.get_field_index(column.name)
-            if index < 0 or fields.field(index).type != _arrow_type(column):
-                found = "nothing" if index < 0 else f"type {fields.field(index).type}"
+            if types.get(column.name) != _arrow_type(column):
+                found = f"type {types[column.name]}" if column.name in types else "nothing"
                 raise InputError(path, f"column {column.name}", found, f"type {_arrow_type(column)}")
         positions = {file.metadata.schema.column(i).path: i for i in range(file.metadata.num_columns)}
         for group in range(file.num_row_groups):
             if any(_constant(file, group, positions[name]) != value for name, value in where.items()):
                 continue
             try:
-                table = file.read_row_group(group, [c.name for c in wanted], use_threads=False)
+                table = file.read_row_group(group, wanted, use_threads=False)
             except (OSError, pa.ArrowException) as error:
                 raise InputError(path, f"row group {group}", f"unreadable data ({error})", _AS_WRITTEN) from None
-            yield {c.name: np.concatenate([_values(chunk) for chunk in table.column(c.name).chunks]) for c in wanted}
+            yield {name: np.concatenate([_values(chunk) for chunk in table.column(name).chunks]) for name in wanted}
 
 
 def read_table(
@@ -116,12 +106,11 @@ def read_table(
 ) -> dict[str, np.ndarray]:
     """Read a whole table; as `read_blocks`, with the blocks joined."""
     blocks = list(read_blocks(path, schema, columns, **where))
-    if not blocks and not where:
-        wanted = schema.columns if columns is None else [schema.column(name) for name in columns]
-        return {c.name: np.zeros(0, object if c.type in ("string", "text") else c.type) for c in wanted}
-    if not blocks:
+    if where and not blocks:
         raise InputError(path, ", ".join(where), ", ".join(map(repr, where.values())), "values in the file")
-    return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
+    wanted = [c for c in schema.columns if columns is None or c.name in columns]
+    none = {c.name: np.zeros(0, object if c.type in _TEXTS else c.type) for c in wanted}
+    return {name: np.concatenate([block[name] for block in blocks or [none]]) for name in none}
 
 
 def read_provenance(path: str | Path) -> dict[str, Any]:
@@ -180,27 +169,22 @@ def _values(chunk: pa.Array) -> np.ndarray:
 
 
 def _checked(path: str | Path, schema: TableSchema, block: Block) -> dict[str, np.ndarray]:
+    """Arrays of a block in the order of the schema, of one length each."""
     names = [c.name for c in schema.columns]
     if set(block) != set(names):
         raise InputError(path, "columns", ", ".join(sorted(set(block) ^ set(names))), f"those of {schema.name}")
-    values: dict[str, np.ndarray | str] = {}
-    for column in schema.columns:
-        value = block[column.name]
-        if column.type == "text":
-            value = np.array(value, dtype=object)
-        elif column.type == "string":
-            value = value if isinstance(value, str) else np.asarray(value, dtype=object)
-        else:
-            value = np.ascontiguousarray(value, dtype=column.type)
-            if column.type.startswith("float") and not column.missing and not np.isfinite(value).all():
-                row = int(np.argmin(np.isfinite(value)))
-                raise InputError(path, f"column {column.name}, row {row}", str(value[row]), "finite numbers")
-            if column.minimum is not None and (value < column.minimum).any():
-                row = int(np.argmax(value < column.minimum))
-                raise InputError(path, f"column {column.name}, row {row}", str(value[row]), f">= {column.minimum}")
-        values[column.name] = value
-    lengths = {len(v) for c, v in values.items() if not isinstance(v, str)}
+    single = {name: value for name, value in block.items() if isinstance(value, str)}
+    values = {c.name: np.ascontiguousarray(block[c.name], object if c.type in _TEXTS else c.type) for c in schema.columns}
+    lengths = {len(value) for name, value in values.items() if name not in single}
     if len(lengths) != 1:
         raise InputError(path, "rows", f"columns of {sorted(lengths)} rows", "columns of one length")
-    rows = lengths.pop()
-    return {n: np.full(rows, v, dtype=object) if isinstance(v, str) else v for n, v in values.items()}
+    (rows,) = lengths
+    for column in schema.columns:
+        value = values[column.name]
+        finite = np.ones(len(value), bool) if column.missing or column.type in _TEXTS else np.isfinite(value)
+        large = np.ones(len(value), bool) if column.minimum is None else value >= column.minimum
+        for good, allowed in ((finite, "finite numbers"), (large, f">= {column.minimum}")):
+            if not good.all():
+                row = int(np.argmin(good))
+                raise InputError(path, f"column {column.name}, row {row}", str(value[row]), allowed)
+    return values | {name: np.full(rows, value, dtype=object) for name, value in single.items()}

@@ -3,16 +3,15 @@ contents of its certificate, how good the robot is, against what, and how sure t
 
 from __future__ import annotations
 
-import platform
 from dataclasses import asdict, dataclass, replace
 from datetime import date
 from functools import cached_property
-from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from elastocal import __version__
 from elastocal.application.accuracy import (
     REGION,
     calibrate_on_case,
@@ -37,47 +36,41 @@ from elastocal.remainder.corrected import predictor_of
 from elastocal.validation.conformity import PASS, UNDECIDED, joint_ranges, predicted_conformity, shortfalls
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable
 
     from elastocal.application.calibrated import CalibratedRobot
-    from elastocal.fitting.model import Case, Estimate, Model
-    from elastocal.fitting.noise import Noise
-    from elastocal.io.records import JobRecord
-    from elastocal.mechanics.robot import Robot
-
-_LIBRARIES = ("elastocal", "numpy", "scipy")
+    from elastocal.fitting.model import Case
 
 
 @dataclass(frozen=True)
 class Diagnosed:
     """A campaign and what its diagnosis found.
 
-    `name`: of the campaign. `case`: of the training poses, without their gross errors. `model`, `estimate`, `covariance`,
-    `noise`: the final ones. `form_m`: what other models leave open. `verdict`: verdict.json. `origin`: ``commit`` of the jobs
-    that made it, ``code_sha256`` and ``data_sha256`` of all that they read of the program and of the campaign, ``environment``.
+    `name`: of the campaign. `case`: of the training poses, without their gross errors. `facts`, `verdict`: contents of
+    diagnosis.json and verdict.json. `origin`: ``commit`` of the jobs that made them, ``code_sha256`` and ``data_sha256`` of all
+    that they read of the program and of the campaign, ``environment``.
     """
 
     name: str
     case: Case
-    model: Model
-    estimate: Estimate
-    covariance: np.ndarray
-    noise: Noise
-    form_m: float
+    facts: dict[str, Any]
     verdict: dict[str, Any]
     origin: dict[str, Any]
 
     @cached_property
     def calibrated(self) -> CalibratedRobot:
         """By the final model, its errors as large as the verdict says after a look at held-out poses."""
-        more, again, accuracy = None, self.verdict["remainder"], self.verdict["accuracy"]
+        step, again, accuracy = self.facts["steps"][-1], self.verdict["remainder"], self.verdict["accuracy"]
+        model, estimate = step_model(self.case, step)
+        more = None
         if again and again["regression"]:
-            predictor = predictor_of(again, self.model, self.estimate, self.case.observations)
+            predictor = predictor_of(again, model, estimate, self.case.observations)
             noise_m = self.verdict["noise"]["position_m"]
-            more = regression_on(self.case, self.estimate, predictor, again["spread"]["typical"], noise_m)
-        found = calibrate_on_case(self.case, self.model, self.estimate, self.covariance, self.noise, more)
+            more = regression_on(self.case, estimate, predictor, again["spread"]["typical"], noise_m)
+        found = calibrate_on_case(self.case, model, estimate, np.array(self.facts["covariance"]), noise_from(step), more)
         contradicted = bool(accuracy and accuracy["contradicted"])
-        return set_form(found, accuracy["form_m"] if contradicted else self.form_m, contradicted)
+        form_m = accuracy["form_m"] if contradicted else self.facts["document"].get("other_models_m") or 0.0
+        return set_form(found, form_m, contradicted)
 
     def by_physics(self) -> Diagnosed:
         """The same without the regression on the remainder, as if there were none."""
@@ -101,30 +94,21 @@ def load_diagnosed(folder: str | Path, robots_folder: str | Path, top: str | Pat
     jobs_behind([f"{reports}/report.html"], top)
     jobs = jobs_behind([f"{reports}/verdict.json"], top)
     check_sources(jobs, top, f"results of this version: {fresh}")
-    data = _data_of(jobs, f"{results}/campaign.json")
+    reader = next(job for job in jobs if f"{results}/campaign.json" in job.outputs)
+    # The user's files may have moved since.
+    data = {(Path(file).name, reader.inputs[file]) for file in reader.own or reader.made_inputs}
     now = {(Path(file).name, checksum(file)) for file in campaign_files(folder, robots_folder)}
     if not data <= now <= {(Path(file).name, digest) for job in jobs for file, digest in job.inputs.items()}:
         raise InputError(folder, "", "changes since its diagnosis", f"a campaign as it was diagnosed: {fresh}")
     facts = read_json(tables / "diagnosis.json")
     case = load_case(tables / "campaign.json", tables / "training.parquet")
-    case = case.select(~rows_left_out(case, facts))
-    model, estimate = step_model(case, facts["steps"][-1])
     origin = {
         "commit": _listed(job.origin.commit for job in jobs),
         "code_sha256": configuration_sha256({file: digest for job in jobs for file, digest in job.sources.items()}),
         "data_sha256": configuration_sha256(sorted(data)),
         "environment": {name: _listed(job.environment.get(name, "none") for job in jobs) for name in jobs[-1].environment},
     }
-    noise, form_m = noise_from(facts["steps"][-1]), facts["document"].get("other_models_m") or 0.0
-    return Diagnosed(name, case, model, estimate, np.array(facts["covariance"]), noise, form_m, read_json(verdict), origin)
-
-
-def _data_of(jobs: Sequence[JobRecord], first: str) -> set[tuple[str, str]]:
-    """Names and SHA-256 of the campaign's files as step 1 read them: the user's, which may have moved, or its folder's."""
-    job = next(job for job in jobs if first in job.outputs)
-    folder = Path(next(iter(job.inputs))).parent
-    files = job.own or [file for file in job.inputs if Path(file).parent == folder]
-    return {(Path(file).name, job.inputs[file]) for file in files}
+    return Diagnosed(name, case.select(~rows_left_out(case, facts)), facts, read_json(verdict), origin)
 
 
 def _listed(values: Iterable[str]) -> str:
@@ -139,25 +123,27 @@ def certificate(
     `folder`, `robots_folder`: as in `reading.read_campaign`. `found`: the campaign. Returns JSON-serialisable.
     """
     document = read_descriptions(folder, robots_folder)[0]
-    calibrated, verdict = found.calibrated, found.verdict
+    calibrated, verdict, heldout = found.calibrated, found.verdict, found.verdict["heldout"]
     robot, states, poses = calibrated.robot, found.case.observations.states, campaign_poses(calibrated)
     prediction = predict_errors(calibrated, *poses)
-    accuracy = prediction.accuracy(REGION)
+    accuracy, worst = prediction.accuracy(REGION), int(np.argmax(prediction.error_m))
     decision = predicted_conformity(prediction.rms_m, accuracy.poses, tolerance_m, accepted_risk)
-    heldout = verdict["heldout"]
-    judged = heldout["configurations"]
-    missing = shortfalls(judged, states, robot)
+    missing = shortfalls(heldout["configurations"], states, robot)
     if not accuracy.fitted:
         missing = ["nothing fitted: no error of 0 is predicted of a robot of which nothing was fitted", *missing]
     if missing and decision.decision == PASS:
         decision = replace(decision, decision=UNDECIDED)
+    joints = [
+        {"value": value, "unit": "m" if slides else "rad"}
+        for value, slides in zip(poses[0][worst].tolist(), robot.chain.prismatic, strict=True)
+    ]
     return {
         "campaign": found.name,
         "robot": robot.name,
         "serial": document.get("serial_number", ""),
         "date": date.today().isoformat(),
         "stated": {"measured_on": document.get("measured_on", "")} | document.get("certificate", {}),
-        "versions": {name: metadata.version(name) for name in _LIBRARIES} | {"python": platform.python_version()},
+        "version": __version__,
         "origin": found.origin,
         "files": {Path(file).name: checksum(file) for file in campaign_files(folder, robots_folder)},
         "verdict": verdict["verdict"],
@@ -170,8 +156,8 @@ def certificate(
         "accuracy": asdict(accuracy),
         "point": point_sentence(found.case.campaign),
         "misplaced": verdict["misplaced"],
-        "worst_pose": _worst_pose(robot, poses[0], prediction.error_m),
-        "conformity": asdict(decision) | {"configurations": judged, "shortfalls": missing},
+        "worst_pose": {"joints": joints, "error_m": float(prediction.error_m[worst])},
+        "conformity": asdict(decision) | {"configurations": heldout["configurations"], "shortfalls": missing},
         "joint_ranges": joint_ranges(states, robot),
         "budget": [{"name": name, "rms_m": rms} for name, rms in error_budget(calibrated, *poses).items()],
         "budget_states": accuracy.poses,
@@ -200,13 +186,3 @@ def error_budget(calibrated: CalibratedRobot, reported_angles: np.ndarray, wrenc
         "repeatability": root_mean_square(rest.repeated_m),
         **{name: end for name, end in ends.items() if end},
     }
-
-
-def _worst_pose(robot: Robot, reported_angles: np.ndarray, error_m: np.ndarray) -> dict[str, Any]:
-    """Where the corrected robot is predicted to be worst: command in rad and m, RMS error there."""
-    place = int(np.argmax(error_m))
-    joints = [
-        {"value": float(value), "unit": "m" if slides else "rad"}
-        for value, slides in zip(reported_angles[place], robot.chain.prismatic, strict=True)
-    ]
-    return {"joints": joints, "error_m": float(error_m[place])}

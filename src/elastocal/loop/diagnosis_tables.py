@@ -17,7 +17,7 @@ from elastocal.fitting.least_squares import fit
 from elastocal.fitting.model import Estimate, case_from, parameters
 from elastocal.fitting.noise import noise_facts, noise_from
 from elastocal.io.json_files import read_json, write_json
-from elastocal.io.provenance import provenance
+from elastocal.io.origin import provenance
 from elastocal.io.storage import read_table, write_table
 from elastocal.loop.schemas import STEPS, measurements
 from elastocal.mechanics.robot_file import robot_from_document
@@ -64,28 +64,26 @@ def load_case(descriptions_path: str | Path, measurements_path: str | Path, part
 def step_blocks(diagnosis: Diagnosis) -> Iterator[dict[str, np.ndarray | list[str]]]:
     """Blocks of the steps table."""
     for number, step in enumerate(diagnosis.steps):
-        columns = parameter_columns(step.fitted)
-        yield {"step": np.full(len(columns["value"]), number), **columns}
+        yield {"step": np.full(len(step.fitted.held), number), **parameter_columns(step.fitted)}
 
 
 def diagnosis_facts(diagnosis: Diagnosis) -> dict[str, Any]:
     """What diagnosis.json holds: of each step its model, with the priors under which it was fitted, and its estimate."""
-    steps = []
-    for step in diagnosis.steps:
-        effects, estimate = step.fitted.model.effects, step.fitted.estimate
-        steps.append(
-            {
-                "name": step.name,
-                "kind": step.kind,
-                "noise": noise_facts(step.fitted.noise),
-                "effects": [effect.key for effect in effects],
-                "priors": [[parameter.prior_std for parameter in effect.parameters] for effect in effects],
-                "estimate": {"sessions": [int(session) for session in estimate.sessions]}
-                | {name: getattr(estimate, name).tolist() for name in _PLACEMENTS}
-                | {name: [values.tolist() for values in getattr(estimate, name)] for name in _OF_EFFECTS},
-            }
-        )
-    return {"document": diagnosis.document, "steps": steps}
+    return {"document": diagnosis.document, "steps": [_step_facts(step) for step in diagnosis.steps]}
+
+
+def _step_facts(step: Step) -> dict[str, Any]:
+    effects, estimate = step.fitted.model.effects, step.fitted.estimate
+    parts: dict[str, Any] = {name: getattr(estimate, name).tolist() for name in _PLACEMENTS}
+    parts |= {name: [values.tolist() for values in getattr(estimate, name)] for name in _OF_EFFECTS}
+    return {
+        "name": step.name,
+        "kind": step.kind,
+        "noise": noise_facts(step.fitted.noise),
+        "effects": [effect.key for effect in effects],
+        "priors": [[parameter.prior_std for parameter in effect.parameters] for effect in effects],
+        "estimate": {"sessions": [int(session) for session in estimate.sessions]} | parts,
+    }
 
 
 def final_parameters(facts: Mapping[str, Any], columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -143,8 +141,7 @@ def candidate_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     untestable = dict.fromkeys(candidates, "the measurements are at fault")
     if evidence:
         problem, untestable = evidence.linearized.problem, evidence.linearized.untestable
-        factors = initial_screening(problem)[1]
-        inclusion = np.zeros(len(problem.units))
+        factors, inclusion = initial_screening(problem)[1], np.zeros(len(problem.units))
         for model, probability in zip(evidence.posterior.models, evidence.posterior.probabilities, strict=True):
             inclusion[list(model.units)] += probability
         best = evidence.conclusion.best
@@ -156,21 +153,8 @@ def candidate_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
                 rows.append((unit.candidate, shape, factors[number], inclusion[number], number in chosen, ""))
     tested = {row[0].key for row in rows}
     rows += [(each, None, None, None, False, untestable[key]) for key, each in candidates.items() if key not in tested]
-    return [
-        {
-            "candidate": each.key,
-            "effect": each.effect,
-            "family": each.family,
-            "joints": "+".join(map(str, each.joints)),
-            "shape": shape,
-            "parameters": len(each.parameters),
-            "log_bayes_factor": factor,
-            "probability": inclusion,
-            "chosen": picked,
-            "note": note,
-        }
-        for each, shape, factor, inclusion, picked, note in rows
-    ]
+    names = ("candidate", "family", "shape", "log_bayes_factor", "probability", "chosen", "note")
+    return [dict(zip(names, (each.key, each.family, *stated), strict=True)) for each, *stated in rows]
 
 
 def parameter_columns(fitted: Fit) -> dict[str, np.ndarray | list[str]]:

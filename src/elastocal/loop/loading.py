@@ -10,7 +10,7 @@ from elastocal.campaigns.holdout import split
 from elastocal.effects.catalogue import effects
 from elastocal.io.documents import read_document
 from elastocal.io.json_files import write_json
-from elastocal.io.provenance import provenance
+from elastocal.io.origin import provenance
 from elastocal.io.storage import write_table
 from elastocal.loop.schemas import measurements
 
@@ -36,25 +36,20 @@ def load_campaign(folder: str | Path, robots_folder: str | Path) -> tuple[dict[s
     Returns `descriptions`: ``campaign`` and ``robot``, the documents; ``held_out`` with the same of the campaign that holds the
     test, or None; measurements to fit and to test. Raises `InputError`.
     """
-    campaign = reading.read_campaign(folder, robots_folder, effects())
-    descriptions = _descriptions(folder, robots_folder, campaign)
+    descriptions, campaign = described_campaign(folder, robots_folder)
     training, held_out = split(campaign)
-    other = reading.held_out_campaign(campaign, folder, robots_folder, effects())
-    if other is None:
-        return descriptions | {"held_out": None}, training, held_out
-    elsewhere = f"{folder}/{campaign.holdout['campaign']}"
-    return descriptions | {"held_out": _descriptions(elsewhere, robots_folder, other)}, training, other.measurements
+    test, other = None, reading.held_out_campaign(campaign, folder, robots_folder, effects())
+    if other is not None:
+        test, _ = described_campaign(f"{folder}/{campaign.holdout['campaign']}", robots_folder)
+        held_out = other.measurements
+    return descriptions | {"held_out": test}, training, held_out
 
 
-def load_whole_campaign(folder: str | Path, robots_folder: str | Path) -> tuple[dict[str, Any], Measurements]:
-    """Read a campaign as `load_campaign`, without parting its measurements and without the campaign that holds the test."""
+def described_campaign(folder: str | Path, robots_folder: str | Path) -> tuple[dict[str, Any], Campaign]:
+    """A campaign as `load_campaign` reads it, as a whole and without the campaign that holds the test."""
     campaign = reading.read_campaign(folder, robots_folder, effects())
-    return _descriptions(folder, robots_folder, campaign), campaign.measurements
-
-
-def _descriptions(folder: str | Path, robots_folder: str | Path, campaign: Campaign) -> dict[str, Any]:
     document, robot_path = reading.read_descriptions(folder, robots_folder)
     # What a campaign may leave out gets its default here, so that no later step has to know what its absence means.
     complete = {"compliance": "nominal", "declared": [], "holdout": DEFAULT_HOLDOUT} | document
     complete |= {"table": campaign.table, "header_line": campaign.header_line}
-    return {"source": f"{folder}/{DOCUMENT}", "campaign": complete, "robot": read_document(robot_path)}
+    return {"source": f"{folder}/{DOCUMENT}", "campaign": complete, "robot": read_document(robot_path)}, campaign

@@ -11,17 +11,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.accuracy import accuracy_sentence, calibrate_on_case, campaign_accuracy
 from elastocal.campaigns.campaign import columns_of
+from elastocal.campaigns.holdout import measured_poses
 from elastocal.counting import counted, first_names
-from elastocal.data_checks.faults import faults
-from elastocal.data_checks.warnings import controller_warnings
+from elastocal.data_checks.faults import controller_warnings, faults
 from elastocal.diagnosis.gross_errors import entries_of, first_kept, gross_errors, warnings_of
 from elastocal.diagnosis.linearize import linearized
 from elastocal.diagnosis.misplaced import misplaced
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import Case, case_from, joint_compliances
+from elastocal.fitting.model import case_from, joint_compliances
 from elastocal.fitting.tolerances import effective_parameters
 from elastocal.loop.loading import load_campaign
 from elastocal.validation.placing import repeat_warnings
@@ -61,8 +60,7 @@ class Overview:
 def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
     """Look through a campaign; `folder`, `robots_folder` as in `reading.read_campaign`. Raises `InputError`.
 
-    The accuracy is that of a robot which is corrected by the declared model, if nothing is missing in it; none is stated where
-    the data are at fault or a compliance comes out negative, for then something is missing.
+    What is misplaced is not looked for where a compliance comes out negative, for then something is missing in the model.
     """
     descriptions, training, held_out = load_campaign(folder, robots_folder)
     whole, settings = case_from(descriptions, columns_of(training)), Settings()
@@ -70,55 +68,43 @@ def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
     errors = gross_errors(part.declared, part.noise, whole.campaign.measurements, part.kept, settings)
     left_out = entries_of(replace(errors, gross=~part.kept), whole.campaign, held_out=False)
     case, campaign, declared = part.case, part.case.campaign, part.to_all(part.declared)
-    candidates = list(case.candidates.values())
-    untestable = linearized(part.declared, part.searched, candidates, settings).untestable
+    untestable = linearized(part.declared, part.searched, [*case.candidates.values()], settings).untestable
+    testable = len(case.candidates) - len(untestable)
     found, negative = faults(campaign), _negative_springs(declared)
-    diagnosable, testable = not any(fault.decisive for fault in found), len(candidates) - len(untestable)
+    diagnosable = not found
+    rows = _read(case, training, held_out)
+    rows.append(("noise", f"{1e6 * part.noise.position_m:.0f} µm a coordinate, from {_SOURCES[part.noise.source]}"))
+    rows += _identified(declared)
     attention = [fault.detail for fault in found]
-    accuracy: list[tuple[str, str]] = []
     if diagnosable and not negative:
-        fitted = calibrate_on_case(case, declared.model, declared.estimate, declared.covariance, part.noise)
-        sentence = accuracy_sentence(campaign_accuracy(fitted))
-        accuracy = [("accuracy", f"if the declared model is complete: {sentence}")]
         attention += [each["sentence"] for each in misplaced(_with_base(declared, case), campaign)]
     attention += [*controller_warnings(campaign), *part.warnings]
     if negative:
-        attention.append(
-            f"the compliance of joint {' and '.join(negative)} comes out negative: the declared model lacks something, so that"
-            " no accuracy is stated before the diagnosis"
-        )
-    attention += [*warnings_of(left_out), *_suspicious(case, declared, _poses(training), _poses(held_out))]
-    attention += repeat_warnings(training, held_out)
-    reasons = Counter(untestable.values()).most_common()
-    rows = [
-        *_read(case, training, held_out),
-        ("noise", f"{1e6 * part.noise.position_m:.0f} µm a coordinate, from {_SOURCES[part.noise.source]}"),
-        *_identified(declared),
-        *accuracy,
-        ("testable", counted(testable, "candidate effect")),
-        *(("", f"{count} not testable: {reason}") for reason, count in reasons),
+        joints = " and ".join(negative)
+        attention.append(f"the compliance of joint {joints} comes out negative: the declared model lacks something")
+    attention += [
+        *warnings_of(left_out),
+        *_suspicious(case, declared, training, held_out),
+        *repeat_warnings(training, held_out),
     ]
+    reasons = Counter(untestable.values()).most_common()
+    rows += [("testable", counted(testable, "candidate effect")), *(("", f"{n} not testable: {why}") for why, n in reasons)]
     return Overview(campaign.name, diagnosable, testable, rows, attention)
 
 
 def _read(case: Case, training: Measurements, held_out: Measurements) -> list[tuple[str, str]]:
     """What was read."""
     campaign, states = case.campaign, case.observations.states
-    count = len(np.unique(states.session))
-    sessions = f", {count} sessions" if count > 1 else ""
+    sessions, most = counted(len(np.unique(states.session)), "session"), int(states.repeats.max())
+    force = np.linalg.norm(states.wrench[:, :3], axis=1).max()
     # Numbers of loads are labels; 0 is none.
-    loads = {int(load) for load in states.load}
-    loaded, force = len(loads - {0}), np.linalg.norm(states.wrench[:, :3], axis=1).max()
-    parts = [*(["unloaded"] if 0 in loads else []), *([counted(loaded, "load")] if loaded else [])]
-    most = int(states.repeats.max())
-    repeats = "each state measured once" if most == 1 else f"a state measured up to {most} times"
-    poses = f"{counted(_poses(training), 'pose')} to fit and {counted(_poses(held_out), 'validation pose')}"
-    targets = ", ".join(target.name for target in campaign.targets)
-    robot = f"{campaign.name}: {campaign.robot.name}, {counted(campaign.robot.joints, 'joint')}"
+    loaded = np.unique(states.load[states.load != 0]).size
+    loads = f"{counted(loaded, 'load')} of up to {force:,.0f} N" if loaded else "no load"
     return [
-        ("read", f"{robot}, {campaign.measured} in the {campaign.frame} frame"),
-        ("", f"{poses}; {counted(len(training), 'measurement')} of {targets}{sessions}"),
-        ("", " and ".join(parts) + (f" of up to {force:,.0f} N" if loaded else "") + f"; {repeats}"),
+        ("read", f"{campaign.name}: {campaign.robot.name}, {counted(campaign.robot.joints, 'joint')}"),
+        ("", f"{campaign.measured} of {', '.join(target.name for target in campaign.targets)} in the {campaign.frame} frame"),
+        ("", f"{counted(_poses(training), 'pose')} to fit and {counted(_poses(held_out), 'validation pose')} in {sessions}"),
+        ("", f"{counted(len(training), 'measurement')}, up to {most} of a state, {loads}"),
     ]
 
 
@@ -140,12 +126,11 @@ def _with_base(declared: Fit, case: Case) -> Fit:
     base = case.candidates.get("base_placement")
     if base is None or case.campaign.frame != "base":
         return declared
-    model = replace(declared.model, effects=(*declared.model.effects, base))
-    return fit(model, case.observations, declared.noise)
+    return fit(replace(declared.model, effects=(*declared.model.effects, base)), case.observations, declared.noise)
 
 
 def _poses(part: Measurements) -> int:
-    return len(np.unique(np.column_stack([part.session, part.pose]), axis=0))
+    return len(measured_poses(part)[0])
 
 
 def _negative_springs(declared: Fit) -> list[str]:
@@ -158,10 +143,10 @@ def _negative_springs(declared: Fit) -> list[str]:
     return [str(joint + 1) for joint in np.flatnonzero(below)]
 
 
-def _suspicious(case: Case, declared: Fit, poses: int, judged: int) -> list[str]:
+def _suspicious(case: Case, declared: Fit, training: Measurements, held_out: Measurements) -> list[str]:
     """What little or one-sided measurements cannot show."""
     found, states, numbers = [], case.observations.states, declared.residual.size
-    effective, parameters = effective_parameters(declared), int((~declared.held).sum())
+    effective, parameters, poses = effective_parameters(declared), int((~declared.held).sum()), _poses(training)
     least = int(np.ceil(poses * Settings().numbers_a_parameter * effective / numbers))
     if least > poses:
         found.append(
@@ -171,12 +156,13 @@ def _suspicious(case: Case, declared: Fit, poses: int, judged: int) -> list[str]
         )
     if states.repeats.max() == 1:
         found.append("no pose is repeated: the noise is what the campaign declares, or what the model leaves")
-    if judged < FEWEST_HELD_OUT:
+    if (judged := _poses(held_out)) < FEWEST_HELD_OUT:
         found.append(f"{judged} held-out poses say little of the error: {FEWEST_HELD_OUT} or more would")
     forces = states.wrench[states.wrench.any(axis=1), :3]
     if len(forces):
-        spread = np.linalg.svd(forces, compute_uv=False)
-        if spread[1] < _ONE_DIRECTION * spread[0]:
+        # A single force has a single singular value.
+        largest, second = [*np.linalg.svd(forces, compute_uv=False), 0.0][:2]
+        if second < _ONE_DIRECTION * largest:
             found.append("all loads pull along one line: compliances across it are not shown")
     elif case.campaign.compliance == "identify":
         found.append("no measurement is under a load: compliances are not identifiable")

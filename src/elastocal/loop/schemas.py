@@ -2,49 +2,40 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.campaigns.measurements import file_columns
 from elastocal.io.storage import Column, TableSchema, read_table
-from elastocal.mechanics.components import COMPONENTS, WRENCH
+from elastocal.mechanics.components import COMPONENTS, WRENCH_NAMES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-_IDENTITY = (
-    Column("session", "int32", "", "sessions have each their own tracker frame"),
-    Column("pose", "int32", "", "number of the pose in its session"),
-    Column("load", "int32", "", "number of the load, 0 where unloaded"),
-    Column("repeat", "int32", "", "number of the fresh approach to this pose and load"),
-    Column("target", "int32", "", "number of the target, in the order of the campaign, from 0", minimum=0),
-    Column("row", "int32", "", "row in the file of measurements, 1 for the first of data", minimum=1),
-)
+_STATE = ("session", "pose", "load", "repeat", "target", "row")
+# What a campaign may not have recorded; it is not a number there.
+_OPTIONAL = ("rx", "ry", "rz", "approach", "time_s", "temperature_c", "u95_m")
 
 
-def _angles_and_wrench(joints: int) -> tuple[Column, ...]:
-    return (
-        *(Column(f"q{j}", "float64", "rad", f"angle of joint {j} of the chain") for j in range(1, joints + 1)),
-        *(Column(name, "float64", unit, f"{meaning}, at the last measuring point") for name, unit, meaning in WRENCH),
-    )
+def _columns(joints: int) -> dict[str, Column]:
+    """Columns of a file of measurements as the library takes them: targets by number, angles as the chain counts them."""
+    found = {name: replace(c, missing=name.startswith(_OPTIONAL)) for name, c in file_columns(joints).items()}
+    found |= {name: replace(found[name], meaning=f"angle of joint {name[1:]} of the chain") for name in _angles(joints)}
+    target = Column("target", "int32", "", "number of the target, in the order of the campaign, from 0", minimum=0)
+    row = Column("row", "int32", "", "row in the file of measurements, 1 for the first of data", minimum=1)
+    return found | {"target": target, "row": row}
+
+
+def _angles(joints: int) -> list[str]:
+    return [f"q{joint}" for joint in range(1, joints + 1)]
 
 
 def measurements(joints: int) -> TableSchema:
     """Measurements of a campaign, as the library takes them; what was not recorded is not a number."""
-    return TableSchema(
-        "measurements",
-        (
-            *_IDENTITY,
-            *_angles_and_wrench(joints),
-            *(Column(axis, "float64", "m", f"measured position along {axis}") for axis in "xyz"),
-            *(Column(f"r{axis}", "float64", "rad", f"measured rotation vector about {axis}", missing=True) for axis in "xyz"),
-            *(Column(f"approach{j + 1}", "float64", "", f"approach of joint {j + 1}", missing=True) for j in range(joints)),
-            Column("time_s", "float64", "s", "time since any instant", missing=True),
-            Column("temperature_c", "float64", "°C", "temperature", missing=True),
-            Column("u95_m", "float64", "m", "expanded uncertainty of this position, 95 % of one coordinate", missing=True),
-        ),
-    )
+    return TableSchema("measurements", (*_columns(joints).values(),))
 
 
 STEPS = TableSchema(
@@ -63,17 +54,16 @@ STEPS = TableSchema(
 
 
 def residuals(joints: int) -> TableSchema:
-    """Every measurement, before and after."""
+    """Every measurement, before and after; positions in base axes."""
+    columns = _columns(joints)
     return TableSchema(
         "residuals",
         (
-            *_IDENTITY,
+            *(columns[name] for name in _STATE),
             Column("held_out", "bool", "", "whether no step but the last has seen it"),
             Column("gross_error", "bool", "", "whether no model explains the row, so that every fit and error leaves it out"),
             Column("outside_range", "bool", "", "whether its held-out pose lies outside the range of the fitted poses"),
-            Column("time_s", "float64", "s", "time since any instant", missing=True),
-            *_angles_and_wrench(joints),
-            *(Column(axis, "float64", "m", f"measured position along {axis}, base axes") for axis in "xyz"),
+            *(columns[name] for name in ("time_s", *_angles(joints), *WRENCH_NAMES, *"xyz")),
             *(
                 Column(f"{stage}_{name}", "float64", unit, f"{meaning}, measured less predicted, {words}", missing=True)
                 for stage, words in (("before", "declared model"), ("after", "with the effects found"))
@@ -96,4 +86,4 @@ def worst_measurement(table: Mapping[str, np.ndarray]) -> int:
 
 def angles_of(table: Mapping[str, np.ndarray], joints: int) -> np.ndarray:
     """Joint angles (N, n) of a residuals table, as the model of the robot counts them, rad."""
-    return np.column_stack([table[f"q{joint}"] for joint in range(1, joints + 1)])
+    return np.column_stack([table[name] for name in _angles(joints)])

@@ -24,7 +24,7 @@ from elastocal.diagnosis.misplaced import misplaced
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.model import Case, case_from
 from elastocal.io.json_files import read_json, write_json
-from elastocal.io.provenance import provenance
+from elastocal.io.origin import provenance
 from elastocal.io.storage import write_table
 from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop.loading import load_campaign
@@ -109,18 +109,16 @@ def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     declared wrongly, see there. ``physics``: accuracy and ``uncorrected_m`` of a robot that is corrected without the regression
     on the remainder; None where there is none.
     """
-    verdict, case = judge(diagnosis, held_out, seed), diagnosis.case
-    stated: dict[str, Any] = {"accuracy": None, "uncorrected_m": None, "physics": None}
-    costs, wrong = dict[str, float](), list[dict[str, Any]]()
+    verdict, costs = judge(diagnosis, held_out, seed), dict[str, float]()
+    stated: dict[str, Any] = {"accuracy": None, "uncorrected_m": None, "physics": None, "misplaced": []}
     if not data_at_fault(verdict.document):
         found = calibrated_by(diagnosis, verdict.held_out, verdict.delivered)
-        stated |= _accuracy(found)
+        stated |= _accuracy(found) | {"misplaced": misplaced(diagnosis.final, diagnosis.case.campaign)}
         if found.remainder is not None:
             stated["physics"] = _accuracy(calibrated_by(diagnosis, verdict.held_out, verdict.delivered, physics_only=True))
         costs = effect_costs(replace(found, remainder=None), *campaign_poses(found))
-        wrong = misplaced(diagnosis.final, case.campaign)
     effects = [effect | {"cost_m": costs.get(effect["name"])} for effect in verdict.document["effects"]]
-    return replace(verdict, document=verdict.document | stated | {"effects": effects, "misplaced": wrong})
+    return replace(verdict, document=verdict.document | stated | {"effects": effects})
 
 
 def _accuracy(found: CalibratedRobot) -> dict[str, Any]:

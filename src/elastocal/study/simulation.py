@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.io.provenance import provenance
+from elastocal.io.origin import provenance
 from elastocal.io.storage import TableSchema, read_blocks, write_table
 from elastocal.mechanics.chain import parse_chain
 from elastocal.mechanics.components import COMPONENT_NAMES, COMPONENTS, WRENCH, WRENCH_NAMES

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 _WORD = re.compile(r"([TR])([xyz])\((-?)([^()]+)\)|\[([^\[\]]+)\]")
 _JOINT = re.compile(r"q\d+")

@@ -5,9 +5,11 @@ from __future__ import annotations
 import hashlib
 import json
 import zlib
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -15,12 +17,8 @@ import pyarrow.parquet as pq
 
 from elastocal_proof.audit.arm import Arm
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-    from pathlib import Path
-
-    _Document = Mapping[str, Any]
-    _Documents = Mapping[str, _Document]
+_Document = Mapping[str, Any]
+_Documents = Mapping[str, _Document]
 
 POSITION, WRENCH = ("x", "y", "z"), ("fx", "fy", "fz", "mx", "my", "mz")
 COMPONENTS = ("dx", "dy", "dz", "rx", "ry", "rz")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import numpy as np
 import pandas as pd
@@ -12,9 +12,6 @@ import yaml
 
 from elastocal_proof.audit.arm import Arm
 from elastocal_proof.audit.audited import POSITION, WRENCH, Audited, Finding, compare, numbers, require
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 # Positions are some metres, rotations some radians; near half a turn rotation vectors lose digits.
 _DIGITS = 1e-10

@@ -8,8 +8,9 @@ effects or masses, are left out.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -22,9 +23,6 @@ from statsmodels.robust.norms import HuberT
 
 from elastocal_proof.audit.arm import Arm, cantilever
 from elastocal_proof.audit.audited import COMPONENTS, POSITION, WRENCH, Audited, Finding, compare
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
 
 _STATE, _TURN = ["session", "pose", "load"], ["rx", "ry", "rz"]
 # Steps of a fit end at so many standard errors of the scatter that is there; standard errors belong to the step before.

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from elastocal_proof.audit.audited import ROUNDING, Audited, Finding, compare, numbers, require_each_once
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-    from typing import Any
 
 # Deflections are differences of positions of metres; so much is lost of their digits (m, rad).
 _DIGITS = 1e-14

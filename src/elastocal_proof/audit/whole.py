@@ -5,9 +5,10 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from importlib import resources
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -18,9 +19,6 @@ from elastocal import __version__
 from elastocal.io.records import RECORDS, recorded
 from elastocal_proof.audit import campaigns, fits, study
 from elastocal_proof.audit.audited import Audited, Finding, require
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 
 _SHA, _OWN_WORDS = "hashlib, SHA-256", "its own metadata"
 # By what every file is checked, whatever it holds; other checks work something out again.

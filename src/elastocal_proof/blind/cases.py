@@ -8,31 +8,25 @@ contents of config/blind.yaml.
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from itertools import combinations, product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from elastocal_proof.blind.folders import write_blind_campaign, write_truth
 from elastocal_proof.plant.arm import Arm, LinkMass, arm_from_file
-from elastocal_proof.plant.bad_rows import possible_kinds, with_bad_rows
-from elastocal_proof.plant.campaigns import Design, schedule_of
-from elastocal_proof.plant.kinds import KINDS, OUTSIDE, Defect, drawn_defect, truth_of, with_defects
-from elastocal_proof.plant.machine import on_stretches, usual_gravity_torque
-from elastocal_proof.plant.physical_robot import PhysicalRobot, Tracker, misplaced_base, specimen, stream
-from elastocal_proof.plant.sizing import Yardstick, size_for
+from elastocal_proof.plant.campaigns import SLIPS, Design, Slip, Table, schedule_of, with_bad_rows
+from elastocal_proof.plant.kinds import KINDS, OUTSIDE, Defect, drawn_defect, with_defects
+from elastocal_proof.plant.machine import usual_gravity_torque
+from elastocal_proof.plant.physical_robot import Motion, PhysicalRobot, Tracker, specimen, stream
+from elastocal_proof.plant.sizing import Yardstick
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from elastocal_proof.plant.bad_rows import Slip
-    from elastocal_proof.plant.campaigns import Table
-
-    Plan = Mapping[str, Any]
-    Sized = tuple[Defect, dict[str, Any]]
+Plan = Mapping[str, Any]
+Sized = tuple[Defect, dict[str, Any]]
 
 PROOF, TUNED = "proof", "tuned"
 NAMED = tuple(sorted(kind for kind in KINDS if not kind.startswith(OUTSIDE)))
@@ -56,7 +50,9 @@ _LEVELS, _FAR_LEVELS, _PAIR_LEVELS = (25.0, 50.0, 200.0), (200.0,), (50.0, 200.0
 _MIDDLE, _HIGH = 50.0, 200.0
 # A stand that is knocked moves by a millimetre rather than by what can just be seen, and nobody's arm weighs a few kilograms.
 _KNOCKED, _HEAVY = 1e5, 1e6
-_DRAWS = 8
+_DRAWS, _ROUNDS = 8, 12
+# Of one axis, so that the whole is 0.3 mrad and 0.2 mm in the mean square.
+_TILT_RAD, _SHIFT_M = 3e-4 / np.sqrt(3.0), 2e-4 / np.sqrt(3.0)
 # Times the plausible size.
 _IMPLAUSIBLE = 3.0
 
@@ -141,6 +137,12 @@ def cases_of(plan: Plan, size: str, seed: int) -> list[Case]:
     return sorted(found, key=lambda case: case.name)
 
 
+def misplaced_base(seed: int) -> Motion:
+    """A base frame that was found badly: tilted by about 0.3 mrad and shifted by about 0.2 mm, all measurements alike."""
+    draws = stream(seed, "tilted base")
+    return Motion(tuple(_SHIFT_M * draws.standard_normal(3)), tuple(_TILT_RAD * draws.standard_normal(3)))
+
+
 def absent_on(plan: Plan, robot: str) -> tuple[str, ...]:
     """Effects that a robot cannot have."""
     return tuple(plan["absent"].get(robot, ()))
@@ -216,24 +218,22 @@ def _drawn(case: Case, robot: PhysicalRobot, effect: str, seed: int) -> list[Def
     locations = kind.locations(arm)
     if case.group == SEVERAL_JOINTS:
         count = draws.integers(min(_FEWEST_JOINTS, len(locations)), len(locations) + 1)
-        chosen, plausible = sorted(draws.choice(len(locations), count, replace=False)), kind.plausible_on(arm)
+        chosen, plausible = sorted(draws.choice(len(locations), count, replace=False).tolist()), kind.plausible_on(arm)
         return [Defect(effect, locations[place], plausible * draws.uniform(0.5, 1.5), seed + place) for place in chosen]
     defect = drawn_defect(effect, arm, seed)
     if case.group == UNDECLARED:
         # The last of its locations: of all links.
         return [replace(defect, joints=locations[-1])]
     if case.group == GEAR_GRAVITY:
-        torque = usual_gravity_torque(arm, on_stretches(arm.masses, arm), arm.gravity_m_s2)
+        torque = usual_gravity_torque(arm, arm.masses, arm.gravity_m_s2)
         defect = replace(defect, joints=(int(draws.choice(np.flatnonzero(torque > _CARRIES * torque.max()))) + 1,))
     return [defect]
 
 
 def yardstick_of(case: Case, robot: PhysicalRobot) -> Yardstick:
     """To which the defective robots of a case are compared; `robot`: faultless."""
-    arm, design = robot.arm, case.design
-    targets = [arm.points.index(point) for point in design.targets_on(arm)]
-    free, done = design.frame == "tracker", schedule_of(arm, design, case.seed)
-    return Yardstick(robot, done, targets, free_frame=free, declared=case.declared(arm))
+    free, done = case.design.frame == "tracker", schedule_of(robot.arm, case.design, case.seed)
+    return Yardstick(robot, done, free_frame=free, declared=case.declared(robot.arm))
 
 
 def _first_plausible(
@@ -257,13 +257,49 @@ def _first_plausible(
     return None if least is None else _stated(yardstick, robot, least[1], level, quantity, least[2])
 
 
+def size_for(
+    yardstick: Yardstick,
+    robot_of_size: Callable[[float], PhysicalRobot],
+    start: float,
+    target: float,
+    quantity: str = "retained",
+    largest: float = np.inf,
+) -> float:
+    """Size of a defect at which its non-centrality, "retained" or "raw", is the target to one per cent.
+
+    `robot_of_size`: robot with the defect of a given size. Raises `ValueError`: no size up to the largest has it: the defect is
+    absorbed whatever its size, saturates, or would be larger than allowed.
+
+    The non-centrality of a linear effect grows with the square of its size; the secant of the logarithms allows for others.
+    """
+    size, exponent = float(start), 2.0
+    last: tuple[float, float] | None = None
+    for _ in range(_ROUNDS):
+        signal = yardstick.signal(robot_of_size(size))
+        value = signal[quantity]
+        # What is absorbed leaves rounding and second order, a millionth of the raw signal.
+        if value <= 1e-6 * signal["raw"] or not np.isfinite(value):
+            break
+        if abs(value / target - 1.0) < 0.01:
+            return size
+        if last is not None and last[0] != size:
+            slope = np.log(value / last[1]) / np.log(size / last[0])
+            exponent = slope if 0.3 < slope < 8.0 else 2.0
+        last = (size, value)
+        size = min(largest, size * float(np.clip((target / value) ** (1.0 / exponent), 0.02, 50.0)))
+        if size == last[0]:
+            break
+    found = f"{value:.3g} of {signal['raw']:.3g} raw at {size:.3g}"
+    raise ValueError(f"no size found for a {quantity} non-centrality of {target:g}: {found}")
+
+
 def _stated(
     yardstick: Yardstick, robot: PhysicalRobot, defects: list[Defect], level: float, quantity: str, draw: int
 ) -> list[Sized]:
     """Defects with their sizes as in the ground truth, each with its own signal."""
     found: list[Sized] = []
     for defect in defects:
-        signal, share = asdict(yardstick.signal(with_defects(robot, [defect]))), _share_of_plausible(robot, defect)
+        signal, share = yardstick.signal(with_defects(robot, [defect])), _share_of_plausible(robot, defect)
         sizing = {"non_centrality": level, "of": quantity, "draw": draw, "signal": signal, "share_of_plausible": share}
         found.append((defect, sizing))
     return found
@@ -284,12 +320,18 @@ def make_case(case: Case, blind_folder: str | Path, sealed_folder: str | Path, r
     def slipped(table: Table) -> tuple[Table, list[Slip]]:
         """One to so many bad rows, of one kind."""
         draws = stream(case.seed, "bad rows")
-        kind, count = str(draws.choice(possible_kinds(table))), int(draws.integers(1, case.changes["bad_rows"] + 1))
+        possible = [kind for kind in SLIPS if kind != "load" or table["load"].any()]
+        kind, count = str(draws.choice(possible)), int(draws.integers(1, case.changes["bad_rows"] + 1))
         return with_bad_rows(table, bad, schedule, kind, count, draws)
 
     file, slips = case.robot_file(robots_folder), slipped if "bad_rows" in case.changes else None
     made = write_blind_campaign(folder, case.name, file, bad, design, schedule, case.declared(robot.arm), slips)
-    truth = {"case": asdict(case), "defects": [truth_of(robot, defect) | sizing for defect, sizing in sized]}
+    truth: dict[str, Any] = {"case": asdict(case), "defects": []}
+    for defect, sizing in sized:
+        # Those that are comparable with the catalogue's.
+        parameters = {name: float(value) for name, value in defect.on(robot)[1].items()}
+        stated = asdict(defect) | {"unit": KINDS[defect.effect].unit, "parameters": parameters}
+        truth["defects"].append(stated | sizing)
     if misplaced := robot.tracker.misplaced:
         truth["misplaced"] = {"shift_m": list(misplaced.shift_m), "turn_rad": list(misplaced.turn_rad)}
     return write_truth(Path(sealed_folder) / f"{case.name}.json", truth | made, folder)

@@ -31,7 +31,7 @@ from elastocal.fitting.model import declared_model
 from elastocal.fitting.observations import select_states
 from elastocal.fitting.tolerances import fit_declared
 from elastocal.io.data_frames import read_frame, write_csv
-from elastocal.io.provenance import provenance
+from elastocal.io.origin import provenance
 from elastocal.io.storage import write_table
 from elastocal.loop.whole import calibrated_by, cases_in
 from elastocal.mechanics.kinematics import jacobians, pose_differences
@@ -40,8 +40,7 @@ from elastocal.validation.conformity import predicted_conformity
 from elastocal_proof.blind import schemas
 from elastocal_proof.blind.folders import write_blind_campaign
 from elastocal_proof.blind.rehearsal import ERRORS_OF_GEOMETRY, bow, hidden_robot, reached, with_misplaced_base
-from elastocal_proof.plant.bad_rows import HELD_POINT, ZEROS, with_bad_rows
-from elastocal_proof.plant.campaigns import Design, schedule_of, usual_force_N
+from elastocal_proof.plant.campaigns import Design, Slip, Table, schedule_of, usual_force_N, with_bad_rows
 from elastocal_proof.plant.kinds import KINDS
 from elastocal_proof.plant.physical_robot import stream
 
@@ -54,8 +53,6 @@ if TYPE_CHECKING:
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Case
     from elastocal.mechanics.robot import Robot
-    from elastocal_proof.plant.bad_rows import Slip
-    from elastocal_proof.plant.campaigns import Table
     from elastocal_proof.plant.physical_robot import PhysicalRobot
 
 UNCORRECTED, GEOMETRY, DECLARED, FOUND, TRUE = "uncorrected", "geometry", "declared", "found", "true"
@@ -140,7 +137,7 @@ def measure(robot_file: Path, effect: str, seed: int, frame: str = "base", slips
     schedule = schedule_of(plant.arm, design, seed)
 
     def lost(table: Table) -> tuple[Table, list[Slip]]:
-        kind, fitted = str(draws.choice([ZEROS, HELD_POINT])), design.poses - design.held_out
+        kind, fitted = str(draws.choice(["zeros", "held_point"])), design.poses - design.held_out
         tries = iter(lambda: with_bad_rows(table, plant, schedule, kind, 1, draws), None)
         return next((bad, slip) for bad, slip in tries if table["pose"][slip[0]["rows"][0]] < fitted)
 
@@ -235,7 +232,7 @@ def _moved(made: Measured, commands: np.ndarray, seed: int) -> dict[str, Any]:
     """What the robot does with its commands, with chance of its own."""
     wanted = made.wanted
     position, rotation = reached(made.plant, commands, wanted.wrench, seed + 1)
-    read, _, _ = made.plant.tracker.read(position[:, None], rotation[:, None], stream(seed, "measured again"))
+    read, _ = made.plant.tracker.read(position[:, None], rotation[:, None], stream(seed, "measured again"))
     return {
         "part": wanted.part,
         "pose": np.arange(len(wanted.part)),

@@ -5,9 +5,10 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -17,17 +18,11 @@ from elastocal.campaigns.writing import write_campaign
 from elastocal.errors import InputError
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.json_files import read_json
-from elastocal_proof.plant.campaigns import Design, measured_table
+from elastocal_proof.plant.arm import Arm, LinkMass
+from elastocal_proof.plant.campaigns import Design, Slip, Table, measured_table
+from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
-
-    from elastocal_proof.plant.arm import Arm, LinkMass
-    from elastocal_proof.plant.bad_rows import Slip
-    from elastocal_proof.plant.campaigns import Table
-    from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule
-
-    Slipped = Callable[[Table], tuple[Table, list[Slip]]]
+Slipped = Callable[[Table], tuple[Table, list[Slip]]]
 
 ROBOT_FILE = "robot.yaml"
 
@@ -39,7 +34,7 @@ def campaign_document(name: str, arm: Arm, design: Design) -> dict[str, Any]:
         "robot": ROBOT_FILE,
         "measured": design.measured,
         "frame": design.frame,
-        "targets": {f"{point}": {"point": point, "offset_m": [0, 0, 0]} for point in design.targets_on(arm)},
+        "targets": {f"{point}": {"point": point, "offset_m": [0, 0, 0]} for point in design.points or arm.points},
         "compliance": "identify",
         "declared": list(design.declared),
         "holdout": {"poses": list(range(design.poses - design.held_out, design.poses))},
@@ -65,7 +60,7 @@ def write_blind_campaign(
     `folder`: the campaign's own. `name`: of the campaign; must not give the ground truth away. `robot_file`: of which the robot
     is a specimen. `declared`: weights as they are declared to the analyst. `slipped`: what goes wrong in the file.
     """
-    table, outliers = measured_table(robot, design, schedule)
+    table = measured_table(robot, design, schedule)
     table, slips = slipped(table) if slipped else (table, [])
     write_campaign(folder, campaign_document(name, robot.arm, design), table, robot.arm.joints, "parquet")
     write_robot(folder, robot_file, robot, declared, design.undeclared)
@@ -78,7 +73,6 @@ def write_blind_campaign(
         "masses": [asdict(mass) for mass in robot.structure.masses],
         "declared_masses": [asdict(mass) for mass in declared],
         "noise": {name: getattr(robot.tracker, name) for name in ("sigma_m", "sigma_m_per_m", "sigma_rad")},
-        "outliers": [list(outlier) for outlier in outliers],
         "measurements": len(table["pose"]),
         "made_with": {"mujoco": mujoco.__version__, "numpy": np.__version__, "python": platform.python_version()},
     } | ({"bad_rows": slips} if slipped else {})
@@ -96,7 +90,9 @@ def write_robot(
     absent = ("masses", "gravity_m_s2", "compensator", "payload_kg", *undeclared)
     document = {key: value for key, value in nominal.items() if key not in absent}
     if declared:
-        document["masses"] = [asdict(mass) | {"centre_m": list(mass.centre_m)} for mass in declared]
+        document["masses"] = [
+            {"link": m.link, "mass_kg": m.mass_kg, "centre_m": [*m.centre_m], "relative_std": m.relative_std} for m in declared
+        ]
     document |= {"gravity_m_s2": list(robot.structure.gravity_m_s2), "payload_kg": round(arm.payload_kg, 1)}
     document["gear_ratio"] = list(arm.gear_ratio)
     if arm.compensated:

@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.application.calibrated import nominal_forward
 from elastocal.application.inverse_kinematics import SOLVED_M, find_beyond_limits, refine
+from elastocal.campaigns.reading import read_robot
 from elastocal.campaigns.tables import LARGEST_BYTES
 from elastocal.errors import InputError
 from elastocal.exchange.target_path import read_target_path
@@ -23,10 +24,11 @@ from elastocal.io.atomic_writes import atomic_write, check_places
 from elastocal.io.texts import read_text
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.report.words import at_joints, listed, physical_name
+from elastocal_proof.blind.cases import misplaced_base
 from elastocal_proof.plant.arm import arm_from_file, rotation_vector
-from elastocal_proof.plant.campaigns import SECONDS_PER_STATE, lever_of, usual_force_N
+from elastocal_proof.plant.campaigns import SECONDS_PER_STATE, usual_force_N
 from elastocal_proof.plant.kinds import KINDS, OUTSIDE, Defect, drawn_defect, with_defects
-from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, misplaced_base, seen_poses, specimen, stream
+from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, seen_poses, specimen, stream
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -51,7 +53,7 @@ def hidden_robot(robot_file: str | Path, seed: int, effects: Sequence[str] = ())
     `effects`: keys of `KINDS`, each at a joint that is drawn; one that is drawn by default. Raises `InputError`: an effect that
     this arm cannot have.
     """
-    arm = arm_from_file(robot_file)
+    declared, arm = read_robot(robot_file), arm_from_file(robot_file)
     possible = sorted(
         name
         for name, kind in KINDS.items()
@@ -61,7 +63,7 @@ def hidden_robot(robot_file: str | Path, seed: int, effects: Sequence[str] = ())
         if name not in possible:
             raise InputError("rehearsal", "effects", repr(name), ", ".join(possible))
     # Nobody's catalogue offers a compensator to an arm whose file has none.
-    if "compensator:" not in Path(robot_file).read_text(encoding="utf-8"):
+    if declared.compensator is None:
         possible = [name for name in possible if name not in _COMPENSATORS]
     chosen, draws = tuple(effects), stream(seed, "errors of geometry")
     if not chosen:
@@ -117,7 +119,7 @@ def fill_sheet(path: Path, document: Mapping[str, Any], robot: PhysicalRobot, se
     mounts = [where(each.get("rotation", np.zeros(3)), f"mount {name}", np.pi / 2) for name, each in targets.items()]
     position = position[:, at] + (rotation[:, at] @ offsets[..., None])[..., 0]
     rotation = rotation[:, at] @ Rotation.from_rotvec(mounts).as_matrix()
-    position, rotation, _ = robot.tracker.read(position, rotation, stream(seed, "readings"))
+    position, rotation = robot.tracker.read(position, rotation, stream(seed, "readings"))
     if document["frame"] == "tracker":
         position, rotation = robot.tracker.in_own_frame(position, rotation)
     seen = number, pd.Index(list(targets)).get_indexer(sheet["target"])
@@ -210,7 +212,10 @@ def require_numbers(table: pd.DataFrame, names: Sequence[str], source: str) -> N
 
 def _schedule(arm: Arm, states: pd.DataFrame, seed: int, source: str) -> Schedule:
     wrench, count = states[list(WRENCH_NAMES)].to_numpy(float), len(states)
-    (force, moment), lever = np.split(wrench, 2, axis=1), lever_of(wrench)
+    force, moment = np.split(wrench, 2, axis=1)
+    square = (force**2).sum(axis=1, keepdims=True)
+    # The shortest at which the forces have their moments.
+    lever = np.divide(np.cross(force, moment), square, out=np.zeros_like(force), where=square > 0)
     wrong = np.abs(np.cross(lever, force) - moment).max(axis=1) > 1e-6 * (1.0 + np.abs(moment).max(axis=1))
     if wrong.any():
         row = int(np.argmax(wrong))
@@ -219,7 +224,7 @@ def _schedule(arm: Arm, states: pd.DataFrame, seed: int, source: str) -> Schedul
     drawn = stream(seed, "approaches").choice([-1, 1], (count, arm.joints))
     sense = states[approach].fillna(0).to_numpy(int) if set(approach) <= set(states) else np.zeros_like(drawn)
     return Schedule(
-        angle=arm.angles_shown_as(states[[f"q{j}" for j in range(1, arm.joints + 1)]].to_numpy(float)),
+        angle=states[[f"q{j}" for j in range(1, arm.joints + 1)]].to_numpy(float),
         force=force,
         lever=lever,
         **{name: states[name].to_numpy(int) for name in _STATE},

@@ -5,7 +5,8 @@ Everything is counted from these rows, by the figures of the plan; see `summary`
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -13,18 +14,12 @@ from scipy.stats import norm
 from scipy.stats import t as t_distribution
 from statsmodels.stats.proportion import proportion_confint
 
-from elastocal.diagnosis.judge import ABOUT_ERRORS
 from elastocal.diagnosis.verdict import ADEQUATE, CLASS, NAMED, NOT_TESTABLE, SEVERAL
 from elastocal.effects.protocol import effect_of
-from elastocal_proof.blind.cases import PROOF, TUNED, absent_on
-from elastocal_proof.plant.kinds import KINDS, OUTSIDE
+from elastocal_proof.blind.cases import Plan, absent_on
+from elastocal_proof.plant.kinds import OUTSIDE
 
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping, Sequence
-
-    from elastocal_proof.blind.cases import Plan
-
-    Document = Mapping[str, Any]
+Document = Mapping[str, Any]
 
 NONE = "none"
 # What a diagnosis calls mechanisms that the catalogue does not have.
@@ -45,8 +40,6 @@ EXACT_ALIASES: dict[tuple[str, tuple[int, ...]], str] = {
 }
 _STD_ERRORS = 2.0
 _CREDIBLE = 0.95
-_STATED = ("stated", "top", "correct", "held", "set_size", "set_probability", "nothing", "alarm_p_value")
-_COVARIATES = {need for kind in KINDS.values() for need in kind.needs}
 
 
 def rate(hits: Iterable[bool]) -> dict[str, float]:
@@ -61,22 +54,6 @@ def rate(hits: Iterable[bool]) -> dict[str, float]:
     share = count / cases if cases else float("nan")
     low, high = 0.0 if count == 0 else float(low), 1.0 if count == cases else float(high)
     return {"hits": count, "cases": cases, "rate": share, "low": low, "high": high}
-
-
-def headed(head: str, hits: Iterable[bool]) -> dict[str, float]:
-    """The figures of a rate under a name: ``<head>``, ``<head>_low``, ``<head>_high``."""
-    found = rate(hits)
-    return {head: found["rate"], f"{head}_low": found["low"], f"{head}_high": found["high"]}
-
-
-def leading(kinds: Iterable[str]) -> str:
-    """Which kind of robots a figure shows: that of the proof, or where there is none the one that was tuned on."""
-    return PROOF if PROOF in set(kinds) else TUNED
-
-
-def robots_of(plan: Plan, case: Document) -> str:
-    """Kind of robots to which the robot of a case belongs."""
-    return TUNED if case["robot"] in plan["tuned"] else PROOF
 
 
 def score(
@@ -99,13 +76,12 @@ def score(
     meant = [{effect["name"], *map(effect_of, effect["alternatives"])} for effect in effects]
     held = np.array([[name in each for each in meant] for name in true], bool)
     aliases = [EXACT_ALIASES.get((defect["effect"], tuple(defect["joints"]))) for defect in defects]
-    unrecorded = _COVARIATES - set(truth["design"]["covariates"])
     return (
         {
             "case": truth["campaign"],
             "group": case["group"],
             "robot": case["robot"],
-            "robots": robots_of(plan, case),
+            "robots": case["robots"],
             "setting": case["setting"],
             "truth": " + ".join(true) or NONE,
             "level": max(case["levels"], default=0.0),
@@ -118,14 +94,11 @@ def score(
             "wrong_name": kind == NAMED and names != true,
             "remains": bool((verdict.get("repeatable") or {}).get("remains")),
             "joints": " + ".join("-".join(map(str, defect["joints"])) for defect in defects),
-            "right_place": places(defects, "effect") == places(effects, "name"),
             "exact_alias": any(alias and alias not in absent_on(plan, case["robot"]) for alias in aliases),
-            "hidden": any(set(KINDS[defect["effect"]].needs) & unrecorded for defect in defects),
         }
         | _size(truth)
         | _errors(verdict)
         | {
-            "oracle_p_value": np.nan if oracle is None else oracle["p_value"],
             "oracle_detected": np.nan if oracle is None else float(oracle["detected"]),
             "oracle_rms_m": np.nan if oracle is None else oracle["heldout"]["rms_m"],
         }
@@ -149,54 +122,29 @@ def _apart_from_setup(truth: Document, verdict: Document) -> tuple[str, list[Doc
     return (ADEQUATE, one, SEVERAL)[min(len(kept), 2)], kept
 
 
-def places(effects: Iterable[Document], name: str) -> dict[str, set[int]]:
-    """Joints of each effect; those of one mechanism at several joints together."""
-    found: dict[str, set[int]] = {}
-    for effect in effects:
-        found.setdefault(effect[name], set()).update(effect["joints"])
-    return found
-
-
 def _size(truth: Document) -> dict[str, Any]:
     """How large the effects are; for several the squares add up."""
-    defects = truth["defects"]
-    raw, retained = (sum(defect["signal"][kind] for defect in defects) for kind in ("raw", "retained"))
-    rms_m = float(np.sqrt(sum(defect["signal"]["rms_m"] ** 2 for defect in defects)))
-    by_raw = any(defect["of"] == "raw" for defect in defects)
+    defects, by_raw = truth["defects"], any(defect["of"] == "raw" for defect in truth["defects"])
     return {
         # Of what all these effects' levels are the non-centrality.
         "level_of": "raw" if by_raw else "retained",
         # What the model absorbs whatever its size is no question of level.
         "absorbed": by_raw or [defect["effect"] for defect in defects] == [_SCALE],
-        "raw": raw,
-        "retained": retained,
-        "signal_rms_m": rms_m,
-        "signal_over_noise": rms_m / (np.sqrt(3.0) * truth["noise"]["sigma_m"]),
-        "times_plausible": max((defect["share_of_plausible"] for defect in defects), default=np.nan),
+        "raw": sum(defect["signal"]["raw"] for defect in defects),
+        "retained": sum(defect["signal"]["retained"] for defect in defects),
     }
 
 
 def _errors(verdict: Document) -> dict[str, Any]:
     """Held-out errors, and whether they got worse by more than chance with an effect that was adopted."""
-    held = verdict["heldout"] or {"before": {"rms_m": np.nan}, "after": {"rms_m": np.nan}}
-    before, after, floor = held["before"]["rms_m"], held["after"]["rms_m"], held.get("noise_floor_rms_m")
-    reduction, std_error = 1.0 - after / before, held.get("reduction_std_error", np.nan)
-    worse = bool(reduction + _STD_ERRORS * std_error < 0.0)
     # A fault of the data ends a diagnosis before any model is fitted.
-    warned = bool(verdict["heldout"]) and any(ABOUT_ERRORS in warning for warning in verdict["warnings"])
-    adopted = bool(verdict["heldout"]) and any(effect.get("adopted", False) for effect in verdict["effects"])
+    held = verdict["heldout"] or {"before": {"rms_m": np.nan}, "after": {"rms_m": np.nan}}
+    before, after = held["before"]["rms_m"], held["after"]["rms_m"]
     return {
         "before_rms_m": before,
         "after_rms_m": after,
-        "noise_floor_rms_m": np.nan if floor is None else floor,
-        "reduction": reduction,
-        "reduction_std_error": std_error,
-        "adopted": adopted,
-        "worse": worse,
-        # A warning does not excuse it, as there always is one.
-        "worse_adopted": adopted and worse,
-        "warned": warned,
-        "worse_unwarned": worse and not warned,
+        "adopted": bool(verdict["heldout"]) and any(effect.get("adopted", False) for effect in verdict["effects"]),
+        "worse": bool(1.0 - after / before + _STD_ERRORS * held.get("reduction_std_error", np.nan) < 0.0),
     }
 
 
@@ -205,24 +153,18 @@ def stated(truth: Document, verdict: Document) -> dict[str, Any]:
 
     A hypothesis is a set of mechanisms, as in ``verdict.json``; the empty set is "nothing". ``stated``: probability of the most
     probable set, ``top``; ``correct``: whether that is the true one; ``held``: whether the smallest set of hypotheses that
-    reaches 95 %, or all of them where they do not, holds the true one; ``set_size``, ``set_probability``: of these.
+    reaches 95 %, or all of them where they do not, holds the true one.
     """
-    probabilities = verdict.get("probabilities")
-    if not probabilities or not probabilities["sets"]:
-        return dict.fromkeys(_STATED, np.nan)
-    sets = [(frozenset(entry["mechanisms"]), entry["probability"]) for entry in probabilities["sets"]]
-    ranked = sorted(sets, key=lambda entry: -entry[1])
-    reached = np.cumsum([probability for _, probability in ranked])
-    believed, (top, probability) = ranked[: int(np.searchsorted(reached, _CREDIBLE)) + 1], ranked[0]
+    ranked = sorted((verdict.get("probabilities") or {"sets": []})["sets"], key=lambda entry: -entry["probability"])
+    if not ranked:
+        return dict.fromkeys(("stated", "top", "correct", "held"), np.nan)
+    reached, top = np.cumsum([entry["probability"] for entry in ranked]), ranked[0]
+    believed = ranked[: int(np.searchsorted(reached, _CREDIBLE)) + 1]
     return {
-        "stated": probability,
-        "top": " + ".join(sorted(top)) or NONE,
-        "correct": is_true(top, truth),
-        "held": any(is_true(mechanisms, truth) for mechanisms, _ in believed),
-        "set_size": len(believed),
-        "set_probability": sum(share for _, share in believed),
-        "nothing": probabilities["nothing"],
-        "alarm_p_value": probabilities["alarm_p_value"],
+        "stated": top["probability"],
+        "top": " + ".join(sorted(top["mechanisms"])) or NONE,
+        "correct": is_true(top["mechanisms"], truth),
+        "held": any(is_true(entry["mechanisms"], truth) for entry in believed),
     }
 
 
@@ -257,7 +199,7 @@ def intervals_of(plan: Plan, truth: Document, verdict: Document) -> list[dict[st
         for effect in verdict["effects"]:
             if effect["name"] == defect["effect"]:
                 values += _comparable(defect, effect)
-    head: dict[str, Any] = {"robots": robots_of(plan, case), "truth": " + ".join(case["effects"]) or NONE}
+    head: dict[str, Any] = {"truth": " + ".join(case["effects"]) or NONE}
     head |= {"foreign": any(effect.startswith(OUTSIDE) for effect in case["effects"])}
     head |= {"level": max(case["levels"], default=0.0)}
     return [

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -11,26 +12,20 @@ from scipy.stats import bootstrap
 from elastocal.io.data_frames import write_csv
 from elastocal.io.json_files import read_json
 from elastocal.random_streams import stream
-from elastocal_proof.blind.cases import PROOF, TUNED
+from elastocal_proof.blind.cases import PROOF, TUNED, Plan
 from elastocal_proof.blind.folders import load_ground_truth
-from elastocal_proof.blind.scores import headed, intervals_of, leading, rate, score
+from elastocal_proof.blind.scores import intervals_of, rate, score
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
-
-    from elastocal_proof.blind.cases import Plan
-
-    Tables = Mapping[str, pd.DataFrame]
-    Figure = Mapping[str, Any]
+Tables = Mapping[str, pd.DataFrame]
+Figure = Mapping[str, Any]
 
 _RESAMPLES, _SEVERAL_AT_ONCE = 2000, 200
 # Held-out errors this near to the oracle's count as its own.
 WITHIN = 1.05
 _BINS = 10
 BY_THE_BEST, OVER_THE_BEST = ", by the best analyst", ", over the best analyst's, on the same cases"
-_RELIABILITY = ["robots", "group", "from", "to", "stated", "hits", "cases", "rate", "low", "high"]
-_COUNTED = ("detected", "holds_truth", "named_right", "wrong_name", "oracle_detected")
-_SIZES = ("signal_rms_m", "signal_over_noise", "times_plausible")
+_RELIABILITY = ["group", "from", "to", "stated", "hits", "cases", "rate", "low", "high"]
+_COUNTED = ["detected", "holds_truth", "named_right", "wrong_name", "oracle_detected"]
 
 
 def with_target(summary: pd.DataFrame) -> pd.DataFrame:
@@ -44,28 +39,23 @@ def rows_of(table: pd.DataFrame) -> Iterator[Any]:
 
 
 def summarize(plan: Plan, cases: pd.DataFrame, intervals: pd.DataFrame, seed: int) -> pd.DataFrame:
-    """Every figure of the plan beside its target, for each kind of robots, of rows of `scores.score` and `scores.intervals_of`.
+    """Every figure of the plan beside its target, of rows of `scores.score` and `scores.intervals_of`.
 
     Rates have Clopper-Pearson intervals, ratios percentile bootstrap intervals [1] over cases. ``target_low`` and
     ``target_high`` are the range that the target leaves; ``holds`` is empty where there is no target or no case.
 
     [1] Efron, B. and Tibshirani, R. J., An Introduction to the Bootstrap, section 13.3, Chapman and Hall, 1993.
     """
-    rows: list[dict[str, Any]] = []
     cases = cases.assign(as_oracle=cases.after_rms_m / cases.oracle_rms_m <= WITHIN)
-    for robots in (PROOF, TUNED):
-        mine = cases[cases.robots == robots]
-        if len(mine):
-            of_these = intervals[intervals.robots == robots] if len(intervals) else intervals
-            tables = {"cases": mine, "statements": mine[mine.stated.notna()], "intervals": of_these}
-            rows += [{"robots": robots} | row for figure in plan["figures"] for row in _counted(plan, figure, tables, seed)]
-    return pd.DataFrame(rows)
+    tables = {"cases": cases, "statements": cases[cases.stated.notna()], "intervals": intervals}
+    rows = [row for figure in plan["figures"] for row in _counted(plan, figure, tables, seed)]
+    # Where one robot is of those that were tuned on, the whole proves nothing.
+    return pd.DataFrame(rows).assign(robots=PROOF if set(cases.robots) == {PROOF} else TUNED)
 
 
 def of_each_robot(plan: Plan, cases: pd.DataFrame, seed: int) -> dict[str, pd.DataFrame]:
-    """As `summarize`, of each robot of the leading kind by itself, by its name; without intervals of parameters."""
-    mine = cases[cases.robots == leading(cases.robots)]
-    return {str(name): summarize(plan, part, pd.DataFrame(), seed) for name, part in mine.groupby("robot")}
+    """As `summarize`, of each robot by itself, by its name; without intervals of parameters."""
+    return {str(name): summarize(plan, part, pd.DataFrame(), seed) for name, part in cases.groupby("robot")}
 
 
 def _counted(plan: Plan, figure: Figure, tables: Tables, seed: int) -> Iterator[dict[str, Any]]:
@@ -105,16 +95,12 @@ def _measured(figure: Figure, part: pd.DataFrame, words: str, judged: bool, seed
         hits = sampled[figure["hits"]].to_numpy(float), sampled[figure["best"]].to_numpy(float)
         found = _bootstrapped(hits, _ratio_of_sums, stream(seed, "blind", f"{words} over the limit", 0))
         yield _row(f"{words}{OVER_THE_BEST}", found, target)
-    elif measure in ("calibration_error", "by_chance"):
-        yield _row(words, calibration(part, seed)[measure], target)
+    elif measure == "calibration_error":
+        yield _row(words, calibration(part, seed), target)
     elif measure in ("median_ratio", "mean_ratio"):
         ratio = (part.after_rms_m / part.oracle_rms_m).to_numpy()
         name, statistic = ("median", np.median) if measure == "median_ratio" else ("mean", np.mean)
         yield _row(words, _bootstrapped((ratio,), statistic, stream(seed, "blind", f"{name} ratio", 0)), target)
-    elif measure == "removed":
-        before, after, best = (part[name].to_numpy() ** 2 for name in ("before_rms_m", "after_rms_m", "oracle_rms_m"))
-        draws = stream(seed, "blind", f"removed at {part.level.iloc[0]:g}", 0)
-        yield _row(words, _bootstrapped((before - after, before - best), _ratio_of_sums, draws), target)
     else:
         raise ValueError(f"no measure {measure!r}")
 
@@ -169,44 +155,36 @@ def calibration_error(probability: np.ndarray, correct: np.ndarray) -> np.ndarra
     return sum(np.abs(((probability - correct) * (which == b)).sum(axis=-1)) for b in range(_BINS)) / probability.shape[-1]
 
 
-def calibration(rows: pd.DataFrame, seed: int) -> dict[str, dict[str, Any]]:
+def calibration(rows: pd.DataFrame, seed: int) -> dict[str, Any]:
     """The expected calibration error of stated cases, with a basic bootstrap interval [1] of 95 % over cases.
-
-    ``by_chance``: its mean with outcomes drawn by what is stated, as in consistency resampling [2], which draws that too.
 
     [1] Davison, A. C. and Hinkley, D. V., Bootstrap Methods and their Application, section 5.2, Cambridge University Press,
         1997.
-    [2] Bröcker, J. and Smith, L. A., Increasing the reliability of reliability diagrams, Weather and Forecasting 22, 2007.
     """
     probability, correct = rows.stated.to_numpy(float), rows.correct.to_numpy(bool)
-    error, low, high, chance = float(calibration_error(probability, correct)), np.nan, np.nan, np.nan
+    error, low, high = float(calibration_error(probability, correct)), np.nan, np.nan
     if len(rows) > 1:
-        draws = stream(seed, "blind", "calibration error", 0)
-        picked = draws.integers(len(rows), size=(_RESAMPLES, len(rows)))
+        picked = stream(seed, "blind", "calibration error", 0).integers(len(rows), size=(_RESAMPLES, len(rows)))
         again = calibration_error(probability[picked], correct[picked])
         # The basic interval: a resample of a calibrated sample is less calibrated, by what the sample is already.
         low, high = np.maximum(2.0 * error - np.quantile(again, [0.975, 0.025]), 0.0)
-        chance = float(calibration_error(probability, draws.random((_RESAMPLES, len(rows))) < probability).mean())
-    found = {"hits": None, "cases": len(rows), "low": float(low), "high": float(high), "rate": error}
-    return {"calibration_error": found, "by_chance": found | {"low": np.nan, "high": np.nan, "rate": chance}}
+    return {"hits": None, "cases": len(rows), "low": float(low), "high": float(high), "rate": error}
 
 
 def reliability(cases: pd.DataFrame) -> pd.DataFrame:
-    """Data of the reliability diagram [1], for each kind of robots, group of cases, or ``all``, and bin that has a case.
+    """Data of the reliability diagram [1], for each group of cases, or ``all``, and bin that has a case.
 
     [1] Murphy, A. H. and Winkler, R. L., Reliability of subjective probability forecasts of precipitation and temperature,
         Applied Statistics 26, 1977.
     """
     rows, found = cases[cases.stated.notna()], []
-    for robots in (PROOF, TUNED):
-        mine = rows[rows.robots == robots]
-        for group in ("all", *sorted(set(mine.group))):
-            part = mine if group == "all" else mine[mine.group == group]
-            which = _bin_of(part.stated.to_numpy(float))
-            for number in sorted(set(which.tolist())):
-                inside = part[which == number]
-                ends = {"from": number / _BINS, "to": (number + 1) / _BINS, "stated": inside.stated.mean()}
-                found.append({"robots": robots, "group": group} | ends | rate(inside.correct))
+    for group in ("all", *sorted(set(rows.group))):
+        part = rows if group == "all" else rows[rows.group == group]
+        which = _bin_of(part.stated.to_numpy(float))
+        for number in sorted(set(which.tolist())):
+            inside = part[which == number]
+            ends = {"from": number / _BINS, "to": (number + 1) / _BINS, "stated": inside.stated.mean()}
+            found.append({"group": group} | ends | rate(inside.correct))
     return pd.DataFrame(found, columns=_RELIABILITY)
 
 
@@ -215,19 +193,14 @@ def _bin_of(probability: np.ndarray) -> np.ndarray:
 
 
 def rates(cases: pd.DataFrame) -> pd.DataFrame:
-    """Shares of what came of the cases, and medians of their sizes, by kind of robots, group, truth, setting and level.
+    """Shares of what came of the cases, by group, truth, setting and level.
 
     Also for ``all`` truths of a group together but those of which the model absorbs everything.
     """
-    keys, found = ["robots", "group", "truth", "setting", "level", "hidden"], []
     together = cases[cases.level_of == "retained"].assign(truth="all")
-    for values, part in pd.concat([cases, together]).groupby(keys):
-        row = dict(zip(keys, values, strict=True)) | {"level_of": part.level_of.iloc[0], "cases": len(part)}
-        for name in _COUNTED:
-            row |= headed(name, part[name].dropna())
-        row |= {name: part[name].median() for name in _SIZES}
-        found.append(row | {"retained_share": (part.retained / part.raw).median() ** 0.5})
-    return pd.DataFrame(found)
+    grouped = pd.concat([cases, together]).groupby(["group", "truth", "setting", "level"])
+    shares = grouped.agg({"level_of": "first", "case": "size"} | dict.fromkeys(_COUNTED, "mean"))
+    return shares.rename(columns={"case": "cases"}).reset_index()
 
 
 def score_cases(job: Any) -> None:

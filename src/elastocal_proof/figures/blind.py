@@ -17,7 +17,6 @@ from elastocal.campaigns.reading import read_robot
 from elastocal.figures.style import PALETTE, ink_on, note, panels, save, styled
 from elastocal.io.origin import Origin
 from elastocal_proof.blind.cases import PROOF, TUNED
-from elastocal_proof.blind.scores import leading
 from elastocal_proof.blind.summary import rows_of, with_target
 
 if TYPE_CHECKING:
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-LOOKS = {PROOF: (PALETTE[0], "o", "robots of the proof"), TUNED: ("#8a8a8a", "D", "robots on which it was developed")}
+_COLOR, _ROBOTS = PALETTE[0], {PROOF: "robots of the proof", TUNED: "robots on which it was developed"}
 _AIM = "#cfe8d5"
 _LINE = 40
 _PER_CENT, _FARTHEST = 100.0, 10.0
@@ -41,8 +40,6 @@ _PANELS = {
 _SHARES = LinearSegmentedColormap.from_list("shares", ["#ffffff", "#c6dbef", "#4292c6", "#08519c"])
 _LEAST_WRITTEN = 0.045
 _ALL = "all"
-
-
 _MODELS = {
     "uncorrected": "uncorrected",
     "geometry": "geometry alone",
@@ -68,34 +65,27 @@ def rates_and_targets(summary: pd.DataFrame) -> Figure:
     _dots(axes[1, 0], aimed[ratio], names[1], lambda value: _PER_CENT * (value - 1.0))
     farthest = np.nanmax(np.abs(_PER_CENT * (aimed[ratio][["rate", "low", "high"]].to_numpy(float) - 1.0)), initial=6.0)
     axes[1, 0].set(xlim=(-1.1 * farthest, 1.1 * farthest), xlabel="held-out RMS above the oracle's (%)")
-    looks = [look for robots, look in LOOKS.items() if robots in set(aimed.robots)]
-    handles: list[Artist] = [
-        Line2D([], [], color=color, marker=marker, markersize=4.5, linewidth=1.2, label=label) for color, marker, label in looks
-    ]
+    label = _ROBOTS[summary.robots.iloc[0]]
+    handles: list[Artist] = [Line2D([], [], color=_COLOR, marker="o", markersize=4.5, linewidth=1.2, label=label)]
     handles.append(Patch(color=_AIM, label="target"))
     figure.legend(handles=handles, title="bars are 95 % intervals", title_fontsize=7.5, loc="outside lower center", ncols=3)
     return figure
 
 
 def _dots(axis: Axes, rows: pd.DataFrame, names: list[str], scaled: Callable[[float], float]) -> None:
-    robots = [key for key in LOOKS if key in set(rows.robots)]
-    for aim in rows_of(rows.drop_duplicates("quantity")):
-        place: float = names.index(aim.quantity)
+    for row in rows_of(rows):
+        place = names.index(row.quantity)
         # A target without an upper end goes as far as anything is drawn.
-        low, high = scaled(aim.target_low), scaled(min(aim.target_high, _FARTHEST))
+        low, high = scaled(row.target_low), scaled(min(row.target_high, _FARTHEST))
         # A target of a single value is a line that can be seen.
         axis.barh(place, max(high - low, 0.8), left=low - (0.4 if high == low else 0.0), height=0.86, color=_AIM, zorder=0)
-    for number, key in enumerate(robots):
-        color, marker, _ = LOOKS[key]
-        for row in rows_of(rows[rows.robots == key]):
-            place = names.index(row.quantity) + 0.32 * (number - (len(robots) - 1) / 2)
-            if not np.isfinite(row.rate):
-                # The interval of nothing is everything, which would look like a result.
-                at = "axes fraction", "data"
-                axis.annotate("no cases", (0.01, place), xycoords=at, va="center", color=color, fontsize=7)
-                continue
-            axis.plot([scaled(row.low), scaled(row.high)], [place, place], color=color, linewidth=1.2)
-            axis.plot(scaled(row.rate), place, marker, color=color, markersize=4.2)
+        if not np.isfinite(row.rate):
+            # The interval of nothing is everything, which would look like a result.
+            at = "axes fraction", "data"
+            axis.annotate("no cases", (0.01, place), xycoords=at, va="center", color=_COLOR, fontsize=7)
+            continue
+        axis.plot([scaled(row.low), scaled(row.high)], [place, place], color=_COLOR, linewidth=1.2)
+        axis.plot(scaled(row.rate), place, "o", color=_COLOR, markersize=4.2)
     axis.set(yticks=range(len(names)), ylim=(len(names) - 0.4, -0.6))
     axis.set_yticklabels([textwrap.fill(name, _LINE) for name in names], fontsize=7)
     axis.grid(visible=False, axis="y")
@@ -111,25 +101,18 @@ def reliability_diagram(reliability: pd.DataFrame) -> Figure:
     figure, axes = panels(2, 1, 118, height_ratios=(3, 1), sharex=True)
     shares, counts = axes[0, 0], axes[1, 0]
     shares.plot([0, 1], [0, 1], color="black", linewidth=0.8, linestyle=":")
-    present = [robots for robots in LOOKS if robots in set(rows.robots)]
-    for number, robots in enumerate(present):
-        color, marker, label = LOOKS[robots]
-        part = rows[rows.robots == robots]
-        errors = [part.rate - part.low, part.high - part.rate]
-        shares.errorbar(part.stated, part.rate, errors, color=color, marker=marker, markersize=4.5, linewidth=1.2, label=label)
-        width = (part["to"] - part["from"]) * 0.8 / len(present)
-        left = part["from"] + 0.1 * (part["to"] - part["from"]) + number * width
-        counts.bar(left, part.cases, width, align="edge", color=color)
+    errors, width = [rows.rate - rows.low, rows.high - rows.rate], rows["to"] - rows["from"]
+    shares.errorbar(rows.stated, rows.rate, errors, color=_COLOR, marker="o", markersize=4.5, linewidth=1.2)
+    counts.bar(rows["from"] + 0.1 * width, rows.cases, 0.8 * width, align="edge", color=_COLOR)
     shares.set(xlim=(0, 1), ylim=(0, 1), ylabel="share of cases in which it is true")
     counts.set(yscale="log", xlabel="stated probability of the most probable mechanisms", ylabel="cases")
-    shares.legend(loc="upper left")
     return figure
 
 
 @styled
 def power_map(rates: pd.DataFrame) -> Figure:
     """Shares of rates.csv detected and named for each effect and size, beside the oracle that knows the effect."""
-    single = rates[(rates.robots == leading(rates.robots)) & (rates.group == "single")]
+    single = rates[rates.group == "single"]
     if single.empty:
         return note("This run has no case with one effect.")
     table, levels = single.set_index(["truth", "level"]), sorted(single.level.unique())

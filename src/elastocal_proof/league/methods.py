@@ -2,48 +2,39 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from elastocal.campaigns.campaign import columns_of, measurements_from
+from elastocal.campaigns.campaign import Measurements, columns_of, measurements_from
 from elastocal.campaigns.holdout import blocks_of_poses, configurations, measured_poses
-from elastocal.diagnosis.diagnose import diagnose
+from elastocal.diagnosis.diagnose import Diagnosis, diagnose
 from elastocal.diagnosis.refit import squares_explained
 from elastocal.diagnosis.settings import Settings
 from elastocal.errors import InputError
+from elastocal.fitting.least_squares import Fit
 from elastocal.fitting.model import Case, case_from
 from elastocal.fitting.tolerances import estimated_noise, fit_declared
 from elastocal.io.json_files import read_json, write_json
-from elastocal.io.provenance import provenance
+from elastocal.io.origin import provenance
 from elastocal.io.storage import read_table, write_table
-from elastocal.loop.diagnosis_tables import diagnosis_facts, parameter_columns, step_fit
-from elastocal.loop.loading import load_whole_campaign
+from elastocal.loop.diagnosis_tables import diagnosis_facts, step_fit
+from elastocal.loop.loading import described_campaign
 from elastocal.loop.schemas import measurements
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.random_streams import stream
 from elastocal.remainder.corrected import corrected
 from elastocal.remainder.regressions import REGRESSIONS
 from elastocal.validation.held_out import position_residuals
-from elastocal.validation.placing import outside_poses, placed
-from elastocal_proof.league.schemas import ENTRIES, FITS, FOLDS, MECHANISMS
+from elastocal.validation.placing import placed
+from elastocal_proof.league.schemas import ENTRIES, FOLDS, MECHANISMS
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-    from pathlib import Path
-
-    from elastocal.campaigns.campaign import Measurements
-    from elastocal.diagnosis.diagnose import Diagnosis
-    from elastocal.fitting.least_squares import Fit
-    from elastocal.fitting.model import Case
-
-    Columns = Mapping[str, np.ndarray]
-
+Columns = Mapping[str, np.ndarray]
 RANDOM, BLOCKS, SESSION = "random", "blocks", "session"
 FRAMES, GEOMETRY, DIAGNOSIS = "frames", "geometry", "diagnosis"
-# Of the steps of a diagnosis only the last is kept.
-_KEPT = 0
 
 
 @dataclass(frozen=True)
@@ -121,38 +112,24 @@ def fitted_physics(physics: str, case: Case) -> Fit:
     return fit_declared(model, case.observations, estimated_noise(case)[0])
 
 
-def entered(
-    method: Method, fitted: Fit, case: Case, held_out: Case, split: str, seed: int
-) -> tuple[dict[str, np.ndarray], Any]:
-    """Columns (M,) of what a method, fitted to the poses of a case, predicts of held-out ones, and the regression's setting.
+def entered(method: Method, fitted: Fit, case: Case, held_out: Case, split: str, seed: int) -> dict[str, np.ndarray]:
+    """Columns (M,) of what a method, fitted to the poses of a case, predicts of held-out ones.
 
     A regression is tuned within the training poses by the same kind of split that judges, see `remainder.corrected`; frames and
     targets of another campaign are fitted to it, whatever the method. What a method does not state is not a number.
     """
-    seen, setting, std = held_out.observations, None, None
+    seen, std = held_out.observations, None
     if method.regression is None:
         residual = position_residuals(*placed(fitted, case, held_out), seen)
     else:
         blocks, within_range = split != RANDOM, method.within_range
         found = corrected(fitted, case, held_out, method.regression, blocks=blocks, within_range=within_range, seed=seed)
-        residual, std, setting = found.residual, found.std, found.chosen["setting"]
+        residual, std = found.residual, found.std
     columns = {name: getattr(seen.states, name)[seen.state] for name in ("session", "pose", "load")}
-    columns |= {"target": seen.target, "outside_range": outside_poses(fitted, case, held_out)[seen.cluster]}
+    columns["target"] = seen.target
     for head, values in (("d", residual), ("std_", np.full_like(residual, np.nan) if std is None else std)):
         columns |= {f"{head}{axis}": values[:, number] for number, axis in enumerate("xyz")}
-    return columns, setting
-
-
-def fold_tables(diagnosis: Diagnosis, fold: int) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Of one fold: facts, as diagnosis.json with the last step alone, and columns of the fits table."""
-    facts, columns = diagnosis_facts(diagnosis), parameter_columns(diagnosis.final)
-    count = len(columns["value"])
-    return facts | {"steps": facts["steps"][-1:]}, {"fold": np.full(count, fold), "step": np.full(count, _KEPT), **columns}
-
-
-def fit_of_fold(case: Case, facts: Mapping[str, Any], fold: int) -> Fit:
-    """The physical model as the diagnosis of a fold left it; `facts`: of all folds by their numbers."""
-    return step_fit(case, facts[str(fold)]["steps"][-1])
+    return columns
 
 
 def mechanism_columns(diagnosis: Diagnosis, fold: int) -> dict[str, np.ndarray | list[str]]:
@@ -173,7 +150,8 @@ def mechanism_columns(diagnosis: Diagnosis, fold: int) -> dict[str, np.ndarray |
 
 def deal_league_folds(job: Any) -> None:
     """A data set of the league, checked, with its poses dealt into folds."""
-    descriptions, seen = load_whole_campaign(job.params.folder, job.params.robots)
+    descriptions, campaign = described_campaign(job.params.folder, job.params.robots)
+    seen = campaign.measurements
     origin = provenance(job.params, **job.wildcards)
     draws = stream(job.params.seed, job.wildcards.data, "league folds", 0)
     write_table(job.output.measurements, measurements(seen.joint_angles.shape[1]), [columns_of(seen)], origin)
@@ -182,33 +160,27 @@ def deal_league_folds(job: Any) -> None:
 
 
 def diagnose_league_folds(job: Any) -> None:
-    """What the training poses of each fold lack, by the whole diagnosis."""
+    """What the training poses of each fold lack, by the whole diagnosis: its last step and the mechanisms."""
     data = load_data_set(job.input.descriptions, job.input.measurements, job.input.folds)
-    facts, fits, mechanisms = {}, [], []
+    facts, mechanisms = {}, []
     for fold, training, _ in rounds(job.wildcards.split, data):
         found = diagnose(training, Settings(), job.params.seed)
-        facts[str(fold)], columns = fold_tables(found, fold)
-        fits.append(columns)
+        facts[str(fold)] = diagnosis_facts(found)["steps"][-1]
         mechanisms.append(mechanism_columns(found, fold))
-    origin = provenance(job.params, **job.wildcards)
     write_json(job.output.facts, facts)
-    write_table(job.output.fits, FITS, fits, origin)
-    write_table(job.output.mechanisms, MECHANISMS, mechanisms, origin)
+    write_table(job.output.mechanisms, MECHANISMS, mechanisms, provenance(job.params, **job.wildcards))
 
 
 def enter_league(job: Any) -> None:
     """What one method predicts of the poses of each fold, which it has not seen."""
     split, method = job.wildcards.split, method_from(job.params.method, job.wildcards.method, "config.yaml")
-    files = zip(job.input.descriptions, job.input.measurements, job.input.folds, strict=True)
-    data, *others = (load_data_set(*paths) for paths in files)
-    blocks, settings = [], {}
+    steps = read_json(job.input.facts) if method.physics == DIAGNOSIS else {}
+    data, *others = map(load_data_set, job.input.descriptions, job.input.measurements, job.input.folds)
+    blocks = []
     for fold, training, tests in rounds(split, data, others):
-        if method.physics == DIAGNOSIS:
-            fitted = fit_of_fold(training, read_json(job.input.facts), fold)
-        else:
-            fitted = fitted_physics(method.physics, training)
+        fitted = step_fit(training, steps[str(fold)]) if steps else fitted_physics(method.physics, training)
         for number, held_out in enumerate(tests, 1 if others else 0):
-            columns, settings[str(fold)] = entered(method, fitted, training, held_out, split, job.params.seed)
+            columns = entered(method, fitted, training, held_out, split, job.params.seed)
             count = len(columns["pose"])
             blocks.append({"fold": np.full(count, fold), "set": np.full(count, number)} | columns)
-    write_table(job.output.entries, ENTRIES, blocks, provenance(job.params, chosen=settings, **job.wildcards))
+    write_table(job.output.entries, ENTRIES, blocks, provenance(job.params, **job.wildcards))

@@ -1,7 +1,6 @@
 """Every table that the league keeps, column by column."""
 
 from elastocal.io.storage import Column, TableSchema
-from elastocal.loop.schemas import STEPS
 
 _FOLD = Column("fold", "int32", "", "number of the fold whose poses are held out, from 1", minimum=1)
 _POSE = (
@@ -17,8 +16,6 @@ FOLDS = TableSchema(
         Column("blocks", "int32", "", "block of joint space that holds the pose, from 1", minimum=1),
     ),
 )
-
-FITS = TableSchema("league fits", (_FOLD, *STEPS.columns))
 
 MECHANISMS = TableSchema(
     "mechanisms",
@@ -38,11 +35,7 @@ ENTRIES = TableSchema(
         *_POSE,
         Column("load", "int32", "", "number of the load, 0 where unloaded"),
         Column("target", "int32", "", "number of the target, from 0", minimum=0),
-        Column("outside_range", "bool", "", "whether the pose lies outside the range of the training poses"),
         *(Column(f"d{axis}", "float64", "m", f"measured less predicted along {axis}, base axes") for axis in "xyz"),
-        *(
-            Column(f"std_{axis}", "float64", "m", f"standard deviation that the method states along {axis}", missing=True)
-            for axis in "xyz"
-        ),
+        *(Column(f"std_{axis}", "float64", "m", f"standard deviation stated along {axis}", missing=True) for axis in "xyz"),
     ),
 )

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -11,18 +12,12 @@ from elastocal.campaigns.campaign import groups_of
 from elastocal.counting import counted
 from elastocal.random_streams import stream
 from elastocal.remainder.corrected import NORMAL_WIDTH
-from elastocal.validation.held_out import Errors, intervals, share_below_largest, summary
-from elastocal_proof.league.methods import BLOCKS, DIAGNOSIS, RANDOM, SESSION
+from elastocal.validation.held_out import Errors, intervals, summary
+from elastocal_proof.league.methods import BLOCKS, DIAGNOSIS, RANDOM, SESSION, Method
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    from elastocal_proof.league.methods import Method
-
-    # Rows of the entries table by data set, split and method.
-    Row = Mapping[Any, Any]
-    Entries = Mapping[tuple[str, str, str], pd.DataFrame]
-
+# A row of the league's table; and rows of the entries table by data set, split and method.
+Row = Mapping[Any, Any]
+Entries = Mapping[tuple[str, str, str], pd.DataFrame]
 _REPLICATES = 1000
 _POSE = ["set", "session", "pose"]
 _TITLES = {
@@ -40,32 +35,33 @@ _LEAST_PROBABLE = 0.05
 def league_table(entries: Entries, robots: Mapping[str, Sequence[str]], reference: str, seed: int) -> pd.DataFrame:
     """One row for each data set, split and method, all of whose methods predict the same poses.
 
-    `robots`: data sets by the names of their robots. RMS with 95 % limits by a bootstrap over poses; ``share_below_max``: of
-    all such poses, at 95 % confidence; ``ratio``: RMS over that of the reference, ``ratio_to_best``: over the best of the row's
-    data set and split; ``covered``: coordinates inside the 95 % intervals that the method states; ``outside``: poses outside
-    the range of the training poses.
+    `robots`: data sets by the names of their robots. RMS with 95 % limits by a bootstrap over poses; ``ratio``: RMS over that
+    of the reference, ``ratio_to_best``: over the best of the row's data set and split; ``covered``: coordinates inside the 95 %
+    intervals that the method states.
     """
     robot_of = {data: robot for robot, names in robots.items() for data in names}
     rows: list[dict[str, Any]] = []
     for data, split in dict.fromkeys(key[:2] for key in entries):
         mine = {method: part for (name, way, method), part in entries.items() if (name, way) == (data, split)}
-        errors = [_errors(part) for part in mine.values()]
-        rms = np.array([summary(error.distance)["rms_m"] for error in errors])
+        distances = [np.linalg.norm(part[["dx", "dy", "dz"]].to_numpy(), axis=1) for part in mine.values()]
+        poses = [groups_of(part[_POSE].to_numpy())[1] for part in mine.values()]
+        errors = [Errors(*each) for each in zip(distances, poses, strict=True)]
+        figures = [summary(error.distance) for error in errors]
+        rms = [each["rms_m"] for each in figures]
         places = {"ratio": list(mine).index(reference), "ratio_to_best": int(np.argmin(rms))}
-        limits, over = intervals(errors, _REPLICATES, stream(seed, data, f"league {split}", 0), places["ratio"])
-        to_best = intervals(errors, _REPLICATES, stream(seed, data, f"league {split}", 1), places["ratio_to_best"])[1]
+        drawn = [
+            intervals(errors, _REPLICATES, stream(seed, data, f"league {split}", number), place)
+            for number, place in enumerate(places.values())
+        ]
         for number, (method, part) in enumerate(mine.items()):
-            figures, (low, high) = summary(errors[number].distance), limits[number]["rms_m"]
-            row: dict[str, Any] = {"robot": robot_of[data], "data": data, "split": split, "method": method}
-            row |= {"poses": errors[number].poses, "rms_mm": 1e3 * rms[number]}
-            row |= {"rms_low_mm": 1e3 * low, "rms_high_mm": 1e3 * high}
-            row |= {"p95_mm": 1e3 * figures["p95_m"], "max_mm": 1e3 * figures["max_m"]}
-            row |= {"share_below_max": share_below_largest(errors[number].poses)}
-            for (name, place), reduction in zip(places.items(), (over, to_best), strict=True):
+            low, high = drawn[0][0][number]["rms_m"]
+            row = {"robot": robot_of[data], "data": data, "split": split, "method": method, "poses": errors[number].poses}
+            metres = {"rms": rms[number], "rms_low": low, "rms_high": high, "max": figures[number]["max_m"]}
+            row |= {f"{name}_mm": 1e3 * value for name, value in metres.items()}
+            for (name, place), (_, reduction) in zip(places.items(), drawn, strict=True):
                 ends = {f"{name}_low": 1.0 - reduction[number].high, f"{name}_high": 1.0 - reduction[number].low}
                 row |= {name: rms[number] / rms[place]} | ends
-            outside = part.groupby(_POSE)["outside_range"].first().mean()
-            rows.append(row | {"covered": _covered(part), "outside": float(outside)})
+            rows.append(row | {"covered": _covered(part)})
     return pd.DataFrame(rows)
 
 
@@ -84,11 +80,6 @@ def mechanism_table(found: Mapping[str, pd.DataFrame], robots: Mapping[str, Sequ
                 row |= {name: values.mean(), f"{name}_low": values.min(), f"{name}_high": values.max()}
             rows.append(row)
     return pd.DataFrame(rows)
-
-
-def _errors(entries: pd.DataFrame) -> Errors:
-    distance = np.linalg.norm(entries[["dx", "dy", "dz"]].to_numpy(), axis=1)
-    return Errors(distance, groups_of(entries[_POSE].to_numpy())[1])
 
 
 def _covered(entries: pd.DataFrame) -> float:
@@ -163,15 +154,13 @@ def _lead(table: pd.DataFrame, ours: set[str]) -> str:
 
 
 def _mechanisms(table: pd.DataFrame) -> str:
-    place = {name: number for number, name in enumerate(dict.fromkeys(table["data"]))}
-    shown = table[table["probability_high"] >= _LEAST_PROBABLE].sort_values("share", ascending=False)
-    shown = shown.sort_values("data", key=lambda data: data.map(place), kind="stable")
-    rows = []
-    for each in shown.to_dict("records"):
-        share, low, high = (100 * each[key] for key in ("share", "share_low", "share_high"))
-        row = {"data": _words(each["data"]), "mechanism": _words(each["mechanism"])}
-        row["probability"] = f"{each['probability']:.2f} ({each['probability_low']:.2f}–{each['probability_high']:.2f})"
-        rows.append(row | {"share of the squared error": f"{share:.0f} % ({low:.0f}–{high:.0f})"})
+    shown, rows = table[table["probability_high"] >= _LEAST_PROBABLE], []
+    for _, part in shown.groupby("data", sort=False):
+        for each in part.sort_values("share", ascending=False).to_dict("records"):
+            share, low, high = (100 * each[key] for key in ("share", "share_low", "share_high"))
+            row = {"data": _words(each["data"]), "mechanism": _words(each["mechanism"])}
+            row["probability"] = f"{each['probability']:.2f} ({each['probability_low']:.2f}–{each['probability_high']:.2f})"
+            rows.append(row | {"share of the squared error": f"{share:.0f} % ({low:.0f}–{high:.0f})"})
     return markdown(rows)
 
 

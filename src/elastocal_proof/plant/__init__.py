@@ -3,5 +3,3 @@
 Of elastocal only `errors` is imported, and the laws of the defects are on purpose not those of the catalogue, so that an
 agreement of the two is a finding and not the same line of code run twice.
 """
-
-from elastocal_proof.plant import laws  # noqa: F401 - it enters its defects into the table of kinds

@@ -1,33 +1,25 @@
 """Defects: all that can be wrong with a physical robot, named as in the catalogue, or ``outside:...`` where it is not there.
 
-The table of their kinds, which `laws` fills, and the joints at which they can be. A defect has one size, which scales it, and a
-seed, from which its other details (directions, phases, thresholds) are drawn; they do not change with the size.
+A defect has one size, which scales it, and a seed, from which its other details (directions, phases, thresholds) are drawn;
+they do not change with the size.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations
-from typing import Any
 
 import numpy as np
-from scipy.constants import g as standard_gravity
 
-from elastocal.errors import InputError
+from elastocal_proof.plant import laws
 from elastocal_proof.plant.arm import Arm
-from elastocal_proof.plant.machine import Mass, on_stretches, usual_gravity_torque
+from elastocal_proof.plant.machine import each_link, weighing_links
 from elastocal_proof.plant.physical_robot import PhysicalRobot, stream
 
 OUTSIDE = "outside:"
-Draws = np.random.Generator
 Location = tuple[int, ...]
-# The defective robot, and those parameters that the catalogue's law of this effect has in common with what was done, by the
-# catalogue's names; exactly or to first order in the size.
-Applied = tuple[PhysicalRobot, dict[str, float]]
-_SHORTEST_LINK_M = 0.1
-# Share of the largest torque below which a weight does not turn a joint.
-_NO_TORQUE = 0.003
 
 
 @dataclass(frozen=True)
@@ -43,7 +35,7 @@ class Kind:
     unit: str
     plausible: float
     locations: Callable[[Arm], list[Location]]
-    apply: Callable[..., Applied]
+    apply: Callable[..., laws.Applied]
     needs: tuple[str, ...] = ()
     largest: float = np.inf
     scale: tuple[float, float] = (0.0, 0.0)
@@ -53,73 +45,84 @@ class Kind:
         return self.plausible * arm.softness ** self.scale[0] * arm.load_share ** self.scale[1]
 
 
-KINDS: dict[str, Kind] = {}
-
-
-def kind(
-    effect: str, unit: str, plausible: float, locations: Callable[[Arm], list[Location]], **more: Any
-) -> Callable[[Callable[..., Applied]], Callable[..., Applied]]:
-    def keep(apply: Callable[..., Applied]) -> Callable[..., Applied]:
-        KINDS[effect] = Kind(unit, plausible, locations, apply, **more)
-        return apply
-
-    return keep
-
-
-def nowhere(arm: Arm) -> list[Location]:
+def _nowhere(arm: Arm) -> list[Location]:
     return [()]
 
 
-def each_joint(arm: Arm) -> list[Location]:
-    return [(joint,) for joint in range(1, arm.joints + 1)]
+def _joints(first: int, behind: int = 0) -> Callable[[Arm], list[Location]]:
+    """From one joint on, all that have so many behind them."""
+    return lambda arm: [(joint,) for joint in range(first, arm.joints + 1 - behind)]
 
 
-def joints_from(first: int) -> Callable[[Arm], list[Location]]:
-    """But for the last."""
-    return lambda arm: [(joint,) for joint in range(first, arm.joints)]
-
-
-def each_pair(arm: Arm) -> list[Location]:
-    return list(combinations(range(1, arm.joints + 1), 2))
-
-
-def each_link(arm: Arm) -> list[Location]:
-    return [(link,) for link in range(1, arm.joints + 1) if arm.lengths_m[link] > _SHORTEST_LINK_M]
-
-
-def shoulder(arm: Arm) -> list[Location]:
+def _shoulder(arm: Arm) -> list[Location]:
     """Where a gravity compensator can be, on arms that have one."""
     return [(2,)] if arm.compensated else []
 
 
-def turned_by(arm: Arm, masses: Iterable[Mass]) -> Location:
-    """Joints, from 1, that weights turn where the arm stands upright."""
-    torque = usual_gravity_torque(arm, masses, (0.0, 0.0, -standard_gravity))
-    return tuple(int(joint) + 1 for joint in np.flatnonzero(torque > _NO_TORQUE * torque.max()))
-
-
-def weighing_links(arm: Arm) -> dict[Location, int]:
-    """The upper arm and the forearm by the joints that their weight turns."""
-    found: dict[Location, int] = {}
-    for (link,) in each_link(arm):
-        turned = turned_by(arm, [Mass(link, 1.0)])
-        # Of links that turn the same joints the first counts, and of all links two: the hand's weight is like a tool's.
-        if turned and turned[-1] == link and len(found) < 2:
-            found[turned] = link
-    return found
-
-
-def weighed(arm: Arm) -> list[Location]:
-    everything = turned_by(arm, on_stretches(arm.masses, arm))
-    return list(dict.fromkeys([*weighing_links(arm), everything]))
+_SOFT, _LOAD = (1.0, 0.0), (0.0, 1.0)
+KINDS: dict[str, Kind] = {
+    "joint_offset": Kind("rad", 3e-4, _joints(1), laws.joint_offset),
+    "link_geometry": Kind("m", 3e-4, _joints(1), laws.link_geometry),
+    # A wrong wavelength, at which the frame of the base was measured too.
+    "tracker_scale": Kind("1", 2e-5, _nowhere, partial(laws.misread, "tracker", "scale")),
+    "link_weight": Kind("kg", 100.0, lambda arm: [*weighing_links(arm)], laws.link_weight, scale=_LOAD),
+    "declared_masses": Kind("1", 0.3, _nowhere, laws.heavier_than_declared),
+    "payload": Kind("kg", 25.0, _nowhere, laws.payload, scale=_LOAD),
+    "compensator_torque": Kind("N/m", 1e5, _shoulder, laws.compensator_torque),
+    "transmission_harmonic": Kind("rad", 8e-5, _joints(1), laws.transmission_harmonic),
+    "transmission_ratio": Kind("rad/rad", 3e-4, _joints(1), laws.transmission_ratio),
+    "bearing_runout": Kind("m", 3e-5, _joints(1), laws.bearing_runout),
+    "motor_eccentricity": Kind("rad", 6e-5, _joints(1), laws.motor_eccentricity),
+    "transmission_order": Kind("rad", 8e-5, _joints(1), laws.transmission_order),
+    "link_elasticity": Kind("1/(N m^2)", 1e-7, each_link, laws.link_elasticity, scale=_SOFT),
+    "joint_tilt": Kind("rad/(N m)", 2e-7, _joints(1), laws.joint_tilt, scale=_SOFT),
+    "base_compliance": Kind("rad/(N m)", 6e-8, _nowhere, laws.base_compliance, scale=_SOFT),
+    "cross_compliance": Kind(
+        "rad/(N m)", 8e-8, lambda arm: [*combinations(range(1, arm.joints + 1), 2)], laws.cross_compliance, scale=_SOFT
+    ),
+    "joint_dependent_stiffness": Kind("1", 0.1, _joints(1), partial(laws.stiff_by_angle, lambda joint: joint), largest=0.8),
+    "compensator_stiffness": Kind("N/m", 3e6, _shoulder, laws.compensator_stiffness),
+    "flange_flexibility": Kind("rad/(N m)", 2e-7, _nowhere, laws.flange_flexibility, scale=_SOFT),
+    "stiffening": Kind("1", 0.3, _joints(1), laws.stiffening, largest=0.95),
+    "lost_motion": Kind("rad", 7e-5, _joints(1), laws.lost_motion),
+    "hysteresis": Kind("rad", 5e-5, _joints(1), laws.hysteresis, needs=("approach",)),
+    "force_scale": Kind("1", 0.02, _nowhere, partial(laws.misread, "cell", "scale"), largest=0.1),
+    "force_misalignment": Kind("rad", 0.02, _nowhere, partial(laws.wrong_cell, "turn", "about_")),
+    "force_bias": Kind("N", 20.0, _nowhere, partial(laws.wrong_cell, "bias", "along_"), scale=_LOAD),
+    "application_point": Kind("m", 0.02, _nowhere, partial(laws.wrong_cell, "shift", "shift_")),
+    "frame_drift": Kind("m/h", 1e-4, _nowhere, laws.frame_drift, needs=("time",)),
+    "thermal_growth": Kind("1/K", 1.2e-5, _nowhere, laws.expanding, needs=("temperature",)),
+    "setup_step": Kind("m", 1e-3, _nowhere, laws.setup_step),
+    "temperature_gradient": Kind(
+        "1/K", 1.2e-5, lambda arm: [(), *each_link(arm)], laws.temperature_gradient, needs=("temperature",)
+    ),
+    "nest_eccentricity": Kind("m", 1e-4, _nowhere, laws.nest_eccentricity),
+    OUTSIDE + "cable_pull": Kind("rad/rad^2", 1e-4, _joints(3, 1), laws.cable_pull),
+    OUTSIDE + "two_angles": Kind("rad", 2e-4, _joints(2, 1), laws.two_angles),
+    OUTSIDE + "cable_transmission": Kind("rad/(N m)", 1e-7, _joints(2, 1), laws.cable_transmission, scale=_SOFT),
+    OUTSIDE + "asymmetric_gear": Kind("rad/(N m)^2", 1e-10, _joints(1), laws.asymmetric_gear, scale=(1.0, -1.0)),
+    OUTSIDE + "slipping_zero": Kind("rad", 5e-5, _joints(1), laws.slipping_zero),
+    OUTSIDE + "warm_softening": Kind("1/K", 0.01, _joints(1), laws.warm_softening),
+    # A parallel rod: the stiffness of the shoulder depends on the angle of the elbow, or the other way round.
+    OUTSIDE + "foreign_angle_stiffness": Kind(
+        "1", 0.15, lambda arm: [(2,), (3,)], partial(laws.stiff_by_angle, lambda joint: 3 - joint), largest=0.8
+    ),
+    OUTSIDE + "stiffening_link": Kind("rad/(N m)^3", 1e-13, each_link, laws.stiffening_link, scale=(1.0, -2.0)),
+    OUTSIDE + "foot_slip": Kind("m", 8e-5, _nowhere, laws.foot_slip),
+    OUTSIDE + "refraction": Kind("1/m", 2e-6, _nowhere, partial(laws.misread, "tracker", "refraction_per_m")),
+    OUTSIDE + "cell_crosstalk": Kind(
+        "1/N", 5e-5, _nowhere, partial(laws.misread, "cell", "crosstalk_per_N"), scale=(0.0, -1.0)
+    ),
+    OUTSIDE + "short_waves": Kind("rad", 8e-5, _joints(1), laws.short_waves),
+}
 
 
 @dataclass(frozen=True)
 class Defect:
     """One thing that is wrong with a robot.
 
-    `effect`: a key of `KINDS`. `joints`: from 1; empty where it belongs to none. `size`: in the unit of its kind. `seed`: of
-    its details.
+    `effect`: a key of `KINDS`. `joints`: from 1, one of its locations; empty where it belongs to none. `size`: in the unit of
+    its kind, up to its largest. `seed`: of its details.
     """
 
     effect: str
@@ -127,19 +130,17 @@ class Defect:
     size: float
     seed: int = 0
 
+    def on(self, robot: PhysicalRobot) -> laws.Applied:
+        """The robot with it, and those of its parameters that are comparable."""
+        draws = stream(self.seed, f"details of {self.effect}")
+        return KINDS[self.effect].apply(robot, self.size, draws, *(joint - 1 for joint in self.joints))
+
 
 def with_defects(robot: PhysicalRobot, defects: Iterable[Defect], times: float = 1.0) -> PhysicalRobot:
     """A robot with defects, one after another, each so many times as large."""
     for defect in defects:
-        robot = _applied(robot, replace(defect, size=times * defect.size))[0]
+        robot = replace(defect, size=times * defect.size).on(robot)[0]
     return robot
-
-
-def truth_of(robot: PhysicalRobot, defect: Defect) -> dict[str, Any]:
-    """The ground truth of a defect: effect, joints, size, unit, the parameters that are comparable, seed."""
-    parameters = {name: float(value) for name, value in _applied(robot, defect)[1].items()}
-    document = {"effect": defect.effect, "joints": list(defect.joints), "size": float(defect.size)}
-    return document | {"unit": KINDS[defect.effect].unit, "parameters": parameters, "seed": int(defect.seed)}
 
 
 def drawn_defect(effect: str, arm: Arm, seed: int) -> Defect:
@@ -147,16 +148,3 @@ def drawn_defect(effect: str, arm: Arm, seed: int) -> Defect:
     locations = KINDS[effect].locations(arm)
     drawn = stream(seed, f"place of {effect}").integers(len(locations))
     return Defect(effect, locations[drawn], KINDS[effect].plausible_on(arm), seed)
-
-
-def _applied(robot: PhysicalRobot, defect: Defect) -> Applied:
-    if defect.effect not in KINDS:
-        raise InputError("defect", "effect", repr(defect.effect), ", ".join(KINDS))
-    kind = KINDS[defect.effect]
-    if defect.joints not in kind.locations(robot.arm):
-        allowed = ", ".join(map(str, kind.locations(robot.arm)))
-        raise InputError("defect", f"joints of {defect.effect}", str(defect.joints), allowed)
-    if not 0.0 <= defect.size <= kind.largest:
-        raise InputError("defect", f"size of {defect.effect}", f"{defect.size:g}", f"0 to {kind.largest:g} {kind.unit}")
-    draws = stream(defect.seed, f"details of {defect.effect}")
-    return kind.apply(robot, defect.size, draws, *(joint - 1 for joint in defect.joints))

@@ -13,21 +13,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.constants import g as standard_gravity
 from scipy.spatial.transform import Rotation
 
 from elastocal.errors import InputError
 from elastocal_proof.plant.arm import Arm, LinkMass, Stretch, turned
 
-# Start of the names of some structural springs, and what they deflect by, beyond their compliance, under a force (S,).
-StructureLaw = tuple[str, Callable[[np.ndarray], np.ndarray]]
 # MuJoCo wants mass in each moving body; this weighs nothing beside a load of newtons.
 _NOTHING = {"ipos": (0.0, 0.0, 0.0), "mass": 1e-12, "inertia": [1e-12] * 3, "explicitinertial": True}
 _SWEEPS, _POSES = 60, 64
+# Share of the largest torque below which a weight does not turn a joint.
+_NO_TORQUE, _SHORTEST_LINK_M = 0.003, 0.1
+# Of an elastic link.
+SEGMENTS = 6
 # Of the largest deflection: a hundredth of a picometre of millimetres.
 _TOLERANCE = 1e-11
 _NOWHERE = (0.0, 0.0, 0.0)
@@ -49,54 +51,26 @@ class TaperedTube:
 
 
 @dataclass(frozen=True)
-class Mass:
-    """A weight on a stretch: 0 is the column, n the flange.
-
-    `along`: where on the stretch, 0 at its near end, 1 at its far end. `aside_m`: off its line, in the frame at the near end.
-    """
-
-    stretch: int
-    mass_kg: float
-    along: float = 0.5
-    aside_m: tuple[float, ...] = _NOWHERE
-
-
-@dataclass(frozen=True)
-class Compensator:
-    """A coil spring from the carousel to the upper arm: pull = stiffness (length - free length).
-
-    Its fixed end `anchor_m` and its moving end `crank_m` count from the shoulder, in the frames that turn with joints 1 and 2.
-    """
-
-    anchor_m: tuple[float, ...]
-    crank_m: tuple[float, ...]
-    stiffness_N_per_m: float
-    free_length_m: float
-
-
-@dataclass(frozen=True)
 class Structure:
     """Everything of an arm that its robot file does not declare. The default is an arm of drives alone.
 
     `base`: compliances of the foot along x, y, z (m/N) and about x, y, z (rad/(N m)). `flange`: the same between the last
-    stretch and the flange, in the flange's frame. `tilt`: of a joint, from 1: compliances across its axis, rad/(N m), in the
-    order of the remaining axes. `loose`: joints, from 1, whose bearings let the arm shift across the axis as a law says.
-    `tubes`: elastic stretches, each cut into so many `segments`. `payload`: ``aside_m`` counts from the flange, in its frame.
-    `wrong_vectors_m`, `wrong_turns`: by how much a stretch's vector and its far end's rotation vector (rad) differ from the
-    robot file. `gravity_m_s2`: in the axes of the base.
+    stretch and the flange, in the flange's frame. `bearings`: of a joint, from 1: compliances of its tilts across its axis,
+    rad/(N m), in the order of the remaining axes, along which only a law lets it shift. `tubes`: elastic stretches. `payload`:
+    its centre counts from the flange, in its frame. `compensator`: a coil spring from the carousel to the upper arm: its fixed
+    and its moving end, m, from the shoulder, in the frames that turn with joints 1 and 2; its stiffness, N/m; its free length,
+    m. `wrong`: by how much a stretch's vector (m) and its far end's rotation vector (rad) differ from the robot file.
+    `gravity_m_s2`: in the axes of the base.
     """
 
     base: tuple[float, ...] = ()
     flange: tuple[float, ...] = ()
-    tilt: dict[int, tuple[float, float]] = field(default_factory=dict)
-    loose: tuple[int, ...] = ()
+    bearings: dict[int, tuple[float, ...]] = field(default_factory=dict)
     tubes: dict[int, TaperedTube] = field(default_factory=dict)
-    segments: int = 6
-    masses: tuple[Mass, ...] = ()
-    payload: Mass | None = None
-    compensator: Compensator | None = None
-    wrong_vectors_m: dict[int, tuple[float, ...]] = field(default_factory=dict)
-    wrong_turns: dict[int, tuple[float, ...]] = field(default_factory=dict)
+    masses: tuple[LinkMass, ...] = ()
+    payload: LinkMass | None = None
+    compensator: tuple[tuple[float, ...], tuple[float, ...], float, float] | None = None
+    wrong: dict[int, tuple[ArrayLike, ArrayLike]] = field(default_factory=dict)
     gravity_m_s2: tuple[float, ...] = (0.0, 0.0, -standard_gravity)
 
 
@@ -105,7 +79,7 @@ class Machine:
     """A compiled model and where in it what is.
 
     `drive`, `gear` (n,) of int: coordinates that are commanded, and those that spring behind them. `springs`: structural
-    coordinates by name, such as ``base_x``, ``tilt2_0``, ``link3_4_bend0``. `compliance` (coordinates,): of structural springs,
+    coordinates by name, such as ``base_x``, ``tilt2_0``, ``link3_bend0_4``. `compliance` (coordinates,): of structural springs,
     m/N or rad/(N m); zero elsewhere. `sites` (points,) of int: measuring points, the flange last. `body_stretch`,
     `site_stretch` (bodies,), (all sites,) of int: of whose vector the place of each body and site is a part.
     """
@@ -158,33 +132,33 @@ class Machine:
         return force, position[:, self.sites], rotation.reshape(count, -1, 3, 3)[:, self.sites]
 
 
+# Name, axis and compliance of a joint, None of one that is commanded or a gear, which has laws of its own; whether it slides.
+_Joint = tuple[str, np.ndarray, float | None, bool]
+
+
+# Mass, where along the vector of its stretch it is, and aside of that.
+_Placed = tuple[float, float, np.ndarray]
+
+
 class _Tree:
     """Bodies so far; the frame in which the next one is placed; the springs' compliances by name."""
 
     def __init__(self, structure: Structure) -> None:
-        self.spec = mujoco.MjSpec()
+        self.spec, self.structure = mujoco.MjSpec(), structure
         self.spec.option.gravity = list(structure.gravity_m_s2)
         self.body, self.position, self.rotation = self.spec.worldbody, np.zeros(3), np.eye(3)
         self.compliance: dict[str, float] = {}
 
-    def descend(self, name: str) -> None:
-        """New body at the current frame."""
+    def descend(self, name: str, joints: Iterable[_Joint]) -> None:
+        """New body at the current frame, with its joints."""
         turn = Rotation.from_matrix(self.rotation).as_quat(scalar_first=True)
         self.body = self.body.add_body(name=name, pos=self.position, quat=turn, **_NOTHING)
         self.position, self.rotation = np.zeros(3), np.eye(3)
-
-    def joint(self, name: str, axis: np.ndarray, compliance: float | None = None, slides: bool = False) -> None:
-        """Joint of the current body; `compliance` None for one that is commanded or a gear, which has laws of its own."""
-        kind = mujoco.mjtJoint.mjJNT_SLIDE if slides else mujoco.mjtJoint.mjJNT_HINGE
-        self.body.add_joint(name=name, type=kind, axis=axis, armature=1.0)
-        if compliance is not None:
-            self.compliance[name] = compliance
-
-    def six_springs(self, name: str, compliances: Iterable[float]) -> None:
-        """Along and about x, y and z of the current body."""
-        for number, compliance in enumerate(compliances):
-            words = f"{name}_{'r' * (number // 3)}{'xyz'[number % 3]}"
-            self.joint(words, np.eye(3)[number % 3], compliance, slides=number < 3)
+        for word, axis, compliance, slides in joints:
+            kind = mujoco.mjtJoint.mjJNT_SLIDE if slides else mujoco.mjtJoint.mjJNT_HINGE
+            self.body.add_joint(name=word, type=kind, axis=axis, armature=1.0)
+            if compliance is not None:
+                self.compliance[word] = compliance
 
     def weigh(self, mass: float, place: np.ndarray) -> None:
         """Put a mass on the current body, in its frame; masses add up at their common centre."""
@@ -196,86 +170,98 @@ class _Tree:
         """A measuring point, in the frame of the current body."""
         self.body.add_site(name=name, pos=position, quat=Rotation.from_matrix(rotation).as_quat(scalar_first=True))
 
-    def walk(self, number: int, stretch: Stretch, structure: Structure, elsewhere: str) -> None:
+    def walk(self, number: int, stretch: Stretch, elsewhere: str) -> None:
         """From the near to the far end of a stretch; one measuring point may be put elsewhere."""
-        vector = stretch.vector_m + np.array(structure.wrong_vectors_m.get(number, _NOWHERE))
-        turn, tube = turned(structure.wrong_turns.get(number, _NOWHERE)), structure.tubes.get(number)
-        masses = [mass for mass in structure.masses if mass.stretch == number]
+        shift, turn = self.structure.wrong.get(number, (_NOWHERE, _NOWHERE))
+        vector, turn, tube = stretch.vector_m + np.array(shift), turned(turn), self.structure.tubes.get(number)
+        masses = [_placed(mass, stretch.vector_m) for mass in self.structure.masses if mass.link == number]
         start, facing = self.position, self.rotation
         if tube is None:
-            for mass in masses:
-                self.weigh(mass.mass_kg, start + facing @ (mass.along * vector + np.array(mass.aside_m)))
+            for mass_kg, along, aside in masses:
+                self.weigh(mass_kg, start + facing @ (along * vector + aside))
             self.position = start + facing @ vector
         else:
-            self.bend(f"link{number}_", vector, tube, structure.segments, masses)
+            self.bend(f"link{number}_", vector, tube, masses)
             facing = np.eye(3)
-        for point in stretch.points:
+        for name, (place, turns) in stretch.points.items():
             # What is wrong about a stretch is wrong at its far end.
-            if np.allclose(point.position_m, stretch.vector_m, atol=1e-12):
-                where, turns = self.position, facing @ point.rotation @ turn
+            if np.allclose(place, stretch.vector_m, atol=1e-12):
+                where, turns = self.position, facing @ turns @ turn
             elif tube is None:
-                where, turns = start + facing @ point.position_m, facing @ point.rotation
+                where, turns = start + facing @ place, facing @ turns
             else:
-                raise InputError("structure", f"tubes[{number}]", f"[{point.name}] inside it", "points at the end of a link")
-            if point.name != elsewhere:
-                self.mark(point.name, where, turns)
+                raise InputError("structure", f"tubes[{number}]", f"[{name}] inside it", "points at the end of a link")
+            if name != elsewhere:
+                self.mark(name, where, turns)
         self.rotation = facing @ stretch.rotation @ turn
 
-    def bend(self, name: str, vector: np.ndarray, tube: TaperedTube, count: int, masses: Iterable[Mass]) -> None:
+    def bend(self, name: str, vector: np.ndarray, tube: TaperedTube, masses: Iterable[_Placed]) -> None:
         """Rigid pieces with springs at the middle of each: the midpoint rule for the integral of M / EI along the link."""
         along = vector / np.linalg.norm(vector)
         first = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
         first /= np.linalg.norm(first)
-        across = (first, np.cross(along, first))
-        piece, step = float(np.linalg.norm(vector)) / count, vector / count
+        second = np.cross(along, first)
+        piece, step = float(np.linalg.norm(vector)) / SEGMENTS, vector / SEGMENTS
         self.position = self.position + self.rotation @ (0.5 * step)
-        for segment in range(count):
-            start, width = f"{name}{segment}_", 1.0 - tube.taper * (segment + 0.5) / count
-            self.descend(f"{name}{segment}")
-            for which, axis in enumerate(across if np.isfinite(tube.shear_N) else ()):
-                self.joint(f"{start}shear{which}", axis, piece / (tube.shear_N * width), slides=True)
-            if np.isfinite(tube.axial_N):
-                self.joint(f"{start}axial", along, piece / (tube.axial_N * width), slides=True)
-            for which, axis in enumerate(across):
-                self.joint(f"{start}bend{which}", axis, piece / (tube.bending_Nm2 * width**3))
-            self.joint(f"{start}twist", along, piece / (tube.torsion_Nm2 * width**3))
-            for mass in masses:
+        for segment in range(SEGMENTS):
+            middle = (segment + 0.5) / SEGMENTS
+            width = 1.0 - tube.taper * middle
+            springs = [
+                ("shear0", first, tube.shear_N * width, True),
+                ("shear1", second, tube.shear_N * width, True),
+                ("axial", along, tube.axial_N * width, True),
+                ("bend0", first, tube.bending_Nm2 * width**3, False),
+                ("bend1", second, tube.bending_Nm2 * width**3, False),
+                ("twist", along, tube.torsion_Nm2 * width**3, False),
+            ]
+            # What a rigid tube does not do but by a law of its bends needs no coordinate.
+            springs = [spring for spring in springs if np.isfinite(spring[2]) or not spring[3]]
+            joints = [(f"{name}{word}_{segment}", axis, piece / stiff, slides) for word, axis, stiff, slides in springs]
+            self.descend(f"{name}{segment}", joints)
+            for mass_kg, share, aside in masses:
                 # On the segment that holds its place; the body's origin is the middle of the segment.
-                if min(int(mass.along * count), count - 1) == segment:
-                    off = (mass.along - (segment + 0.5) / count) * vector
-                    self.weigh(mass.mass_kg, off + np.array(mass.aside_m))
-            self.position = step if segment < count - 1 else 0.5 * step
+                if min(int(share * SEGMENTS), SEGMENTS - 1) == segment:
+                    self.weigh(mass_kg, (share - middle) * vector + aside)
+            self.position = step if segment < SEGMENTS - 1 else 0.5 * step
+
+
+def _placed(mass: LinkMass, vector: np.ndarray) -> _Placed:
+    centre, along = np.array(mass.centre_m), mass.along
+    if along is None:
+        along = float(np.clip(centre @ vector / (vector @ vector), 0.0, 1.0)) if vector.any() else 0.0
+    return mass.mass_kg, along, centre - along * vector
+
+
+def _six_springs(name: str, compliances: Iterable[float]) -> list[_Joint]:
+    """Along and about x, y and z."""
+    words = [f"{name}_{turns}{axis}" for turns in ("", "r") for axis in "xyz"]
+    return [(words[k], np.eye(3)[k % 3], compliance, k < 3) for k, compliance in enumerate(compliances)]
 
 
 def machine_of(arm: Arm, structure: Structure) -> Machine:
     """Build the model of an arm."""
     tree = _Tree(structure)
-    tree.descend("foot")
-    tree.six_springs("base", structure.base)
-    for number, stretch in enumerate(arm.stretches):
-        tree.walk(number, stretch, structure, arm.points[-1] if structure.flange else "")
-        if number < arm.joints:
-            tree.descend(f"arm{number + 1}")
-            axis = arm.axes[number]
-            tree.joint(f"drive{number + 1}", axis)
-            tree.joint(f"gear{number + 1}", axis)
-            across = [e for e in np.eye(3) if abs(e @ axis) < 0.5]
-            for which in range(2 if number + 1 in structure.loose else 0):
-                tree.joint(f"shift{number + 1}_{which}", across[which], 0.0, slides=True)
-            for which, compliance in enumerate(structure.tilt.get(number + 1, ())):
-                tree.joint(f"tilt{number + 1}_{which}", across[which], compliance)
+    tree.descend("foot", _six_springs("base", structure.base))
+    for number, stretch in enumerate(arm.stretches, 1):
+        tree.walk(number - 1, stretch, arm.points[-1] if structure.flange else "")
+        if number <= arm.joints:
+            axis = arm.axes[number - 1]
+            across, tilts = [e for e in np.eye(3) if abs(e @ axis) < 0.5], structure.bearings.get(number, ())
+            joints: list[_Joint] = [(f"{name}{number}", axis, None, False) for name in ("drive", "gear")]
+            joints += [(f"shift{number}_{which}", across[which], 0.0, True) for which in range(len(tilts))]
+            joints += [(f"tilt{number}_{which}", across[which], tilt, False) for which, tilt in enumerate(tilts)]
+            tree.descend(f"arm{number}", joints)
     if structure.flange:
-        tree.descend("flange")
-        tree.six_springs("flange", structure.flange)
+        tree.descend("flange", _six_springs("flange", structure.flange))
         tree.mark(arm.points[-1], np.zeros(3), np.eye(3))
     if load := structure.payload:
-        tree.weigh(load.mass_kg, tree.position + tree.rotation @ np.array(load.aside_m))
-    if spring := structure.compensator:
+        tree.weigh(load.mass_kg, tree.position + tree.rotation @ np.array(load.centre_m))
+    if structure.compensator:
         # From the body before the shoulder's drive to the body behind it.
-        anchor = arm.stretches[1].vector_m + arm.stretches[1].rotation @ np.array(spring.anchor_m)
-        length, stiffness = [spring.free_length_m] * 2, [spring.stiffness_N_per_m, 0.0, 0.0]
-        tendon = tree.spec.add_tendon(name="compensator", stiffness=stiffness, springlength=length)
-        for body, name, place in (("arm1", "anchor", anchor), ("arm2", "crank", spring.crank_m)):
+        fixed, moving, stiffness, length = structure.compensator
+        anchor = arm.stretches[1].vector_m + arm.stretches[1].rotation @ np.array(fixed)
+        tendon = tree.spec.add_tendon(name="compensator", stiffness=[stiffness, 0.0, 0.0], springlength=[length] * 2)
+        for body, name, place in (("arm1", "anchor", anchor), ("arm2", "crank", moving)):
             tree.spec.body(body).add_site(name=name, pos=place)
             tendon.wrap_site(name)
     model = tree.spec.compile()
@@ -290,34 +276,28 @@ def machine_of(arm: Arm, structure: Structure) -> Machine:
     return Machine(model, drive, gear, springs, yields, sites, within - behind_drive, within[model.site_bodyid])
 
 
-class Equilibrium(NamedTuple):
-    """Where an arm came to rest, in S states.
-
-    `coordinates` (S, coordinates): rad, m. `force` (S, coordinates): generalized force that each coordinate's spring transmits,
-    N m, N. `position`, `rotation` (S, points, 3), (S, points, 3, 3): of the measuring points, base frame, m.
-    """
-
-    coordinates: np.ndarray
-    force: np.ndarray
-    position: np.ndarray
-    rotation: np.ndarray
+# Coordinates (S, coordinates), rad, m; generalized forces that their springs transmit, the same, N m, N; positions, m, and
+# rotations of the measuring points, (S, points, 3), (S, points, 3, 3), base frame.
+Equilibrium = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 def equilibrium(
     machine: Machine,
     drive: np.ndarray,
-    wrench: np.ndarray,
+    felt: Callable[[np.ndarray], np.ndarray],
     growth: np.ndarray,
     gear_deflection: Callable[[np.ndarray, np.ndarray], np.ndarray],
-    laws: Iterable[StructureLaw] = (),
+    laws: Iterable[tuple[str, Callable[[np.ndarray], np.ndarray]]] = (),
     start: np.ndarray | None = None,
 ) -> Equilibrium:
     """Where the arm comes to rest in S states, by fixed-point iteration.
 
-    `drive` (S, n): angles at which the drives really stand, rad. `wrench` (S, 6): that the flange really feels, at its
-    deflected origin, base axes; N, N m. `growth` (S, n + 1): relative growth of all lengths of each stretch. `gear_deflection`:
-    of the torques on the gears now and before the wrench came on, (S, n), N m: their deflections (S, n), rad. `start` (S, n):
-    deflections of the gears to begin with, such as those of a robot that differs little.
+    `drive` (S, n): angles at which the drives really stand, rad. `felt`: wrench (S, 6) that the flange really feels, at its
+    deflected origin, base axes, N, N m, by its rotations (S, 3, 3) before anything yields. `growth` (S, n + 1): relative growth
+    of all lengths of each stretch. `gear_deflection`: of the torques on the gears now and before the wrench came on, (S, n),
+    N m: their deflections (S, n), rad. `laws`: starts of the names of structural springs, and what they yield beyond their
+    compliance under a force (S,). `start` (S, n): deflections of the gears to begin with, such as those of a robot that differs
+    little.
 
     The forces depend on the deflections only through the geometry, by the share (force times arm) / stiffness, a thousandth or
     so, so that each sweep gains about three digits. With linear springs it is the modified Newton method with their stiffness
@@ -327,7 +307,8 @@ def equilibrium(
     beyond = [(index, law) for start, law in laws for name, index in machine.springs.items() if name.startswith(start)]
     coordinates = np.zeros((len(drive), machine.model.nq))
     coordinates[:, machine.drive] = drive
-    unloaded = machine.forces(coordinates, growth)[0][:, gear]
+    unloaded, _, facing = machine.forces(coordinates, growth)
+    unloaded, wrench = unloaded[:, gear], felt(facing[:, -1])
     if start is not None:
         coordinates[:, gear] = start
     for _ in range(_SWEEPS):
@@ -341,22 +322,12 @@ def equilibrium(
         change[:, machine.drive] = size[:, machine.drive] = 0.0
         # The poses are those of `coordinates`; once the next would be the same they need no further sweep.
         if change.max(initial=0.0) <= _TOLERANCE * max(size.max(initial=0.0), 1e-9):
-            return Equilibrium(coordinates, force, position, rotation)
+            return coordinates, force, position, rotation
         coordinates = following
     raise RuntimeError(f"no equilibrium after {_SWEEPS} sweeps: the last moved by {change.max():.3g}")
 
 
-def on_stretches(masses: Iterable[LinkMass], arm: Arm) -> tuple[Mass, ...]:
-    """The same weights as a structure has them: along the line of the stretch, and aside of it."""
-    found = []
-    for mass in masses:
-        centre, vector = np.array(mass.centre_m), arm.stretches[mass.link].vector_m
-        along = float(np.clip(centre @ vector / (vector @ vector), 0.0, 1.0)) if vector.any() else 0.0
-        found.append(Mass(mass.link, mass.mass_kg, along, tuple((centre - along * vector).tolist())))
-    return tuple(found)
-
-
-def usual_gravity_torque(arm: Arm, masses: Iterable[Mass], gravity_m_s2: tuple[float, ...]) -> np.ndarray:
+def usual_gravity_torque(arm: Arm, masses: Iterable[LinkMass], gravity_m_s2: tuple[float, ...]) -> np.ndarray:
     """Root mean square torque of the links' weight on each drive over the arm's range of angles, (n,), N m."""
     low, high = arm.limits.T
     machine = machine_of(arm, Structure(masses=tuple(masses), gravity_m_s2=gravity_m_s2))
@@ -365,3 +336,25 @@ def usual_gravity_torque(arm: Arm, masses: Iterable[Mass], gravity_m_s2: tuple[f
     coordinates[:, machine.drive] = low + (high - low) * np.random.default_rng(0).random((_POSES, arm.joints))
     torque = machine.forces(coordinates, np.zeros((_POSES, arm.joints + 1)))[0][:, machine.gear]
     return np.sqrt((torque**2).mean(axis=0))
+
+
+def each_link(arm: Arm) -> list[tuple[int, ...]]:
+    """Links, each by the joint before it, from 1, that are long enough to bend."""
+    return [(link,) for link in range(1, arm.joints + 1) if arm.lengths_m[link] > _SHORTEST_LINK_M]
+
+
+def weighing_links(arm: Arm) -> dict[tuple[int, ...], int | None]:
+    """The upper arm, the forearm, and None for all links, by the joints, from 1, that they turn on an upright arm."""
+
+    def turned_by(*masses: LinkMass) -> tuple[int, ...]:
+        torque = usual_gravity_torque(arm, masses, (0.0, 0.0, -standard_gravity))
+        return tuple(int(joint) + 1 for joint in np.flatnonzero(torque > _NO_TORQUE * torque.max()))
+
+    found: dict[tuple[int, ...], int | None] = {}
+    for (link,) in each_link(arm):
+        joints = turned_by(LinkMass(link, 1.0, tuple(0.5 * arm.stretches[link].vector_m)))
+        # Of links that turn the same joints the first counts, and of all links two: the hand's weight is like a tool's.
+        if joints and joints[-1] == link and len(found) < 2:
+            found[joints] = link
+    found.setdefault(turned_by(*arm.masses), None)
+    return found

@@ -8,17 +8,14 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from elastocal_proof.plant.arm import Arm, off_the_line, true_masses, turned
-from elastocal_proof.plant.machine import Equilibrium, Machine, Structure, equilibrium, machine_of, on_stretches
+from elastocal_proof.plant.arm import Arm, true_masses, turned
+from elastocal_proof.plant.machine import Equilibrium, Machine, Structure, equilibrium, machine_of
 
 _REFERENCE_C = 20.0
 # A thermometer on a motor shows a rise by RISE (1 - exp(-t / MOTOR)); the castings follow it by a first-order lag.
 _RISE_K, _MOTOR_S, _LAG_S = 10.0, 3000.0, 1200.0
-# Of what is random about the drives, by the seed of what is done.
-_EACH_APPROACH, _EACH_POSE = 11, 13
-# Of one axis, so that the whole is 0.3 mrad and 0.2 mm in the mean square.
-_TILT_RAD, _SHIFT_M = 3e-4 / np.sqrt(3.0), 2e-4 / np.sqrt(3.0)
 _PULLS, _SETTLED_N = 40, 1e-9
 # Largest share by which a gear of a specimen is softer or stiffer than the robot file says.
 _SPREAD = 0.15
@@ -37,17 +34,6 @@ class Motion:
     shift_m: tuple[float, ...]
     turn_rad: tuple[float, ...]
     course: Callable[[np.ndarray], np.ndarray] = np.ones_like
-
-    def moved(self, time_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Shift (S, 3) in m and rotation (S, 3, 3) of the measurements at times (S,)."""
-        course = self.course(np.asarray(time_s, float))[:, None]
-        return course * np.array(self.shift_m), turned(course * np.array(self.turn_rad))
-
-
-def misplaced_base(seed: int) -> Motion:
-    """A base frame that was found badly: tilted by about 0.3 mrad and shifted by about 0.2 mm, all measurements alike."""
-    draws = stream(seed, "tilted base")
-    return Motion(tuple(_SHIFT_M * draws.standard_normal(3)), tuple(_TILT_RAD * draws.standard_normal(3)))
 
 
 @dataclass(frozen=True)
@@ -92,23 +78,20 @@ class Tracker:
         position = (1.0 + self.scale) * position + self.refraction_per_m * far * sight
         for motion, about in ((self.drift, base), (self.move, stand), (self.misplaced, base)):
             if motion is not None:
-                shift, turn = motion.moved(time_s)
-                position = np.einsum("sij,stj->sti", turn, position - about) + about + shift[:, None]
+                course = motion.course(time_s)[:, None]
+                turn = turned(course * np.array(motion.turn_rad))
+                position = np.einsum("sij,stj->sti", turn, position - about) + about + (course * motion.shift_m)[:, None]
                 rotation = turn[:, None] @ rotation
         return position, rotation
 
-    def read(
-        self, position: np.ndarray, rotation: np.ndarray, draws: np.random.Generator
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Poses as seen with noise and outliers, and (S, targets) of bool which are outliers."""
+    def read(self, position: np.ndarray, rotation: np.ndarray, draws: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+        """Poses as seen, with noise and outliers."""
         # A generator each, so that measurements that come later change none that are there.
         chance, metres, radians = draws.spawn(3)
         sigma = self.sigma_at(position)[..., None]
-        outlier = chance.random(position.shape[:2]) < self.outliers
-        large = np.where(outlier, self.outlier_sigmas, 1.0)[..., None]
+        large = np.where(chance.random(position.shape[:2]) < self.outliers, self.outlier_sigmas, 1.0)[..., None]
         position = position + large * sigma * metres.standard_normal(position.shape)
-        turn = turned(large * self.sigma_rad * radians.standard_normal(position.shape))
-        return position, turn @ rotation, outlier
+        return position, turned(large * self.sigma_rad * radians.standard_normal(position.shape)) @ rotation
 
     def sigma_at(self, position: np.ndarray) -> np.ndarray:
         """Standard deviation (...) of a coordinate at positions (..., 3), m."""
@@ -125,18 +108,16 @@ class LoadCell:
     """A cell between the pull and the flange, and where it pulls. The default is perfect.
 
     The experimenter pulls until the display shows what the plan says; a cell that errs makes the flange feel something else. So
-    the campaign holds what was shown, and the arm deflects by what was felt. `scale`: shown = (1 + scale) felt. `turn_rad`:
-    rotation vector by which the cell is mounted askew: it shows R(turn)^T felt. `bias_N`: shown without a force. `shift_m`:
-    where the force really acts, from where the plan says. `crosstalk_per_N`: quadratic: shown x gets k F_y F_z, and so on round
-    the axes. `in_flange`: which of "turn", "bias" and "shift" are fixed in the flange's axes rather than in the base's.
-    `mount`: in the line of "pull" one number is measured: a force that is wrong acts at the same lever and brings a wrong
-    moment. Between "flange" and tool six are: the forces may be wrong where the moments are right.
+    the campaign holds what was shown, and the arm deflects by what was felt. `scale`: felt = (1 + scale) shown. `errors`, each
+    (3,): "turn", rotation vector by which the cell is mounted askew: it shows R(turn)^T felt; "bias", N, shown without a force;
+    "shift", m: where the force really acts, from where the plan says. `crosstalk_per_N`: quadratic: shown x gets k F_y F_z, and
+    so on round the axes. `in_flange`: which of the errors are fixed in the flange's axes rather than in the base's. `mount`: in
+    the line of "pull" one number is measured: a force that is wrong acts at the same lever and brings a wrong moment. Between
+    "flange" and tool six are: the forces may be wrong where the moments are right.
     """
 
     scale: float = 0.0
-    turn_rad: tuple[float, ...] = (0.0, 0.0, 0.0)
-    bias_N: tuple[float, ...] = (0.0, 0.0, 0.0)
-    shift_m: tuple[float, ...] = (0.0, 0.0, 0.0)
+    errors: dict[str, ArrayLike] = field(default_factory=dict)
     crosstalk_per_N: float = 0.0
     in_flange: tuple[str, ...] = ()
     mount: str = "pull"
@@ -146,7 +127,7 @@ class LoadCell:
         turn, bias = (self._in_base(name, flange_rotation) for name in ("turn", "bias"))
         askew = np.einsum("sji,sj->si", turned(turn), felt)
         crossed = self.crosstalk_per_N * np.roll(felt, -1, axis=1) * np.roll(felt, -2, axis=1)
-        return (1.0 + self.scale) * askew + bias + crossed
+        return askew / (1.0 + self.scale) + bias + crossed
 
     def felt(self, force: np.ndarray, lever: np.ndarray, flange_rotation: np.ndarray) -> np.ndarray:
         """Wrench on the flange (S, 6), which solves shown = cell(felt) by fixed-point iteration: what lacks is pulled more.
@@ -166,7 +147,7 @@ class LoadCell:
 
     def _in_base(self, name: str, flange_rotation: np.ndarray) -> np.ndarray:
         """An error in base axes, (S, 3)."""
-        error = np.array({"turn": self.turn_rad, "bias": self.bias_N, "shift": self.shift_m}[name])
+        error = np.array(self.errors.get(name, (0.0, 0.0, 0.0)))
         return flange_rotation @ error if name in self.in_flange else np.tile(error, (len(flange_rotation), 1))
 
 
@@ -193,20 +174,6 @@ class Schedule:
     training: np.ndarray
     seed: int
 
-    @property
-    def shown_wrench(self) -> np.ndarray:
-        """What the campaign says of the load, (S, 6), N, N m."""
-        return np.concatenate([self.force, np.cross(self.lever, self.force)], axis=1)
-
-
-# What a drive errs by, (S,), rad, by what was done.
-DriveLaw = Callable[[Schedule], np.ndarray]
-# What a gear turns by beyond its linear spring, (S,), rad: by what was done and the torques on all gears (S, n), N m, now and
-# before the external load came on.
-GearLaw = Callable[[Schedule, np.ndarray, np.ndarray], np.ndarray]
-# What a structural spring yields beyond its compliance, (S,), rad or m: by what was done and its force (S,), N m or N.
-SpringLaw = Callable[[Schedule, np.ndarray], np.ndarray]
-
 
 def logged_temperature(time_s: np.ndarray) -> np.ndarray:
     """Of the thermometer at times (S,), °C."""
@@ -223,20 +190,21 @@ def warmth_of_castings(time_s: np.ndarray) -> np.ndarray:
 class PhysicalRobot:
     """All that is true of a robot and its instruments; the default is faultless.
 
-    `compliance` (n,): the gears' own, rad/(N m). `drives`, `gears`: laws, each of a joint from 0; `springs`: of structural
-    springs, by the start of their names. `gradient_per_K` (float, float): further expansion of the column and of the flange; in
-    between it changes evenly from stretch to stretch. No defects, as every arm has them: `repeatability_rad` (n,): each
-    approach ends a little elsewhere; `pose_rad` (n,): an error of the angles common to all measurements of a pose.
+    `compliance` (n,): the gears' own, rad/(N m). Laws of what was done, each of a joint from 0: `drives`: what a drive errs by,
+    (S,), rad; `gears`: what a gear turns by beyond its linear spring, (S,), rad, by the torques on all gears (S, n), N m, now
+    and before the external load came on. `springs`: what a structural spring, by the start of its name, yields beyond its
+    compliance, (S,), rad or m, by its force (S,), N m or N. `expansion_per_K`: of the column and of the flange; in between it
+    changes evenly from stretch to stretch. No defects, as every arm has them: `repeatability_rad` (n,): each approach ends a
+    little elsewhere; `pose_rad` (n,): an error of the angles common to all measurements of a pose.
     """
 
     arm: Arm
     compliance: np.ndarray
     structure: Structure = field(default_factory=Structure)
-    gears: tuple[tuple[int, GearLaw], ...] = ()
-    drives: tuple[tuple[int, DriveLaw], ...] = ()
-    springs: tuple[tuple[str, SpringLaw], ...] = ()
-    expansion_per_K: float = 0.0
-    gradient_per_K: tuple[float, float] = (0.0, 0.0)
+    gears: tuple[tuple[int, Callable[[Schedule, np.ndarray, np.ndarray], np.ndarray]], ...] = ()
+    drives: tuple[tuple[int, Callable[[Schedule], np.ndarray]], ...] = ()
+    springs: tuple[tuple[str, Callable[[Schedule, np.ndarray], np.ndarray]], ...] = ()
+    expansion_per_K: tuple[float, float] = (0.0, 0.0)
     cell: LoadCell = field(default_factory=LoadCell)
     tracker: Tracker = field(default_factory=Tracker)
     repeatability_rad: tuple[float, ...] = ()
@@ -249,10 +217,8 @@ def specimen(arm: Arm, seed: int, weighs: bool = True, off_line_m: float = 0.0) 
     `off_line_m`: by how much centres of mass lie off the lines of their links at most, across each, beyond what is declared.
     """
     compliance = arm.compliance * stream(seed, "specimen").uniform(1.0 - _SPREAD, 1.0 + _SPREAD, arm.joints)
-    masses = true_masses(arm.masses, stream(seed, "weights")) if weighs else ()
-    if off_line_m:
-        masses = off_the_line(masses, arm, off_line_m, stream(seed, "centres off the line"))
-    return PhysicalRobot(arm, compliance, Structure(masses=on_stretches(masses, arm), gravity_m_s2=arm.gravity_m_s2))
+    masses = true_masses(arm, stream(seed, "weights"), off_line_m, stream(seed, "centres off the line")) if weighs else ()
+    return PhysicalRobot(arm, compliance, Structure(masses=masses, gravity_m_s2=arm.gravity_m_s2))
 
 
 def seen_poses(robot: PhysicalRobot, schedule: Schedule, start: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -260,28 +226,14 @@ def seen_poses(robot: PhysicalRobot, schedule: Schedule, start: np.ndarray | Non
 
     `start` (S, n): deflections of the gears of a robot that differs little; saves time.
     """
-    rest = at_rest(robot, schedule, start)[1]
-    return robot.tracker.seen(rest.position, rest.rotation, schedule.time_s, schedule.angle[:, -1])
-
-
-def read_poses(
-    robot: PhysicalRobot, schedule: Schedule, start: np.ndarray | None = None
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Poses of all targets with the noise of the robot's tracker, the same whenever they are asked for; as `Tracker.read`."""
-    return robot.tracker.read(*seen_poses(robot, schedule, start), stream(schedule.seed, "readings"))
+    _, _, position, rotation = at_rest(robot, schedule, start)[1]
+    return robot.tracker.seen(position, rotation, schedule.time_s, schedule.angle[:, -1])
 
 
 def at_rest(robot: PhysicalRobot, schedule: Schedule, start: np.ndarray | None = None) -> tuple[Machine, Equilibrium]:
-    """The arm in equilibrium; arguments as of `seen_poses`."""
-    machine, drive = machine_of(robot.arm, robot.structure), driven(robot, schedule)
-    per_kelvin = robot.expansion_per_K + np.linspace(*robot.gradient_per_K, robot.arm.joints + 1)
-    growth = warmth_of_castings(schedule.time_s)[:, None] * per_kelvin
-    facing = np.broadcast_to(np.eye(3), (len(drive), 3, 3))
-    if robot.cell.in_flange:
-        coordinates = np.zeros((len(drive), machine.model.nq))
-        coordinates[:, machine.drive] = drive
-        facing = machine.forces(coordinates, growth)[2][:, -1]
-    wrench = robot.cell.felt(schedule.force, schedule.lever, facing)
+    """The arm, and its equilibrium as of `machine.equilibrium`; arguments as of `seen_poses`."""
+    machine, felt = machine_of(robot.arm, robot.structure), partial(robot.cell.felt, schedule.force, schedule.lever)
+    growth = warmth_of_castings(schedule.time_s)[:, None] * np.linspace(*robot.expansion_per_K, robot.arm.joints + 1)
 
     def gear_deflection(torque: np.ndarray, unloaded: np.ndarray) -> np.ndarray:
         turn = robot.compliance * torque
@@ -290,7 +242,7 @@ def at_rest(robot: PhysicalRobot, schedule: Schedule, start: np.ndarray | None =
         return turn
 
     springs = [(name, partial(law, schedule)) for name, law in robot.springs]
-    return machine, equilibrium(machine, drive, wrench, growth, gear_deflection, springs, start)
+    return machine, equilibrium(machine, driven(robot, schedule), felt, growth, gear_deflection, springs, start)
 
 
 def driven(robot: PhysicalRobot, schedule: Schedule) -> np.ndarray:
@@ -298,10 +250,8 @@ def driven(robot: PhysicalRobot, schedule: Schedule) -> np.ndarray:
     drive = schedule.angle.copy()
     for joint, law in robot.drives:
         drive[:, joint] += law(schedule)
-    for sigma, number, group in (
-        (robot.repeatability_rad, _EACH_APPROACH, schedule.approach),
-        (robot.pose_rad, _EACH_POSE, schedule.pose),
-    ):
+    # Each with random numbers of its own, by the seed of what is done.
+    for sigma, number, group in ((robot.repeatability_rad, 11, schedule.approach), (robot.pose_rad, 13, schedule.pose)):
         if any(sigma):
             draws = np.random.default_rng([schedule.seed, number])
             drive += np.array(sigma) * draws.standard_normal((int(group.max()) + 1, robot.arm.joints))[group]

@@ -1,4 +1,4 @@
-"""How large a defect is to the eye of a tracker, and how large it must be to have a given non-centrality.
+"""How large a defect is to the eye of a tracker: its non-centrality.
 
 With d the change that a defect makes in the measurements, noise free, of the poses that are not held out, in standard
 deviations, the raw non-centrality is |d|^2. What the declared model cannot absorb by other compliances X of its joints (and,
@@ -11,65 +11,42 @@ min over b, w of |d - X b - V w|^2 + |w|^2: the weights come in as prior informa
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
 
-from elastocal_proof.plant.arm import rotation_vector
-from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, at_rest, read_poses, seen_poses
+from elastocal_proof.plant.arm import LinkMass, rotation_vector
+from elastocal_proof.plant.machine import Machine
+from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule, at_rest, seen_poses, stream
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
-
-    from elastocal_proof.plant.arm import LinkMass
-    from elastocal_proof.plant.machine import Machine
-
-_ROUNDS = 12
-
-
-@dataclass(frozen=True)
-class Signal:
-    """Of a defect: non-centralities before and after absorption, and RMS lengths of the changes of position and orientation."""
-
-    raw: float
-    retained: float
-    rms_m: float
-    rms_rad: float
+# Width of a link over the reach of the arm: within it centres of mass lie anywhere, as far as an analyst knows.
+_WIDTH_OF_REACH = 0.1
 
 
 class Yardstick:
     """The faultless robot at a schedule, to which defective ones are compared.
 
-    `targets`: which measuring points are read; all by default. `free_frame`: whether the analysis fits the tracker's frame.
-    `declared`: weights as they are declared to the analysis.
+    `free_frame`: whether the analysis fits the tracker's frame. `declared`: weights as they are declared to the analysis.
     """
 
     def __init__(
-        self,
-        robot: PhysicalRobot,
-        schedule: Schedule,
-        targets: Iterable[int] | None = None,
-        free_frame: bool = False,
-        declared: Sequence[LinkMass] = (),
+        self, robot: PhysicalRobot, schedule: Schedule, free_frame: bool = False, declared: Sequence[LinkMass] = ()
     ) -> None:
         self.robot, self.schedule = robot, schedule
-        self.targets = list(range(len(robot.arm.points)) if targets is None else targets)
-        machine, rest = at_rest(robot, schedule)
-        self._start = rest.coordinates[:, machine.gear]
-        self.poses = robot.tracker.seen(rest.position, rest.rotation, schedule.time_s, schedule.angle[:, -1])
-        jacobian, torques = _responses(machine, rest.coordinates, robot, declared)
-        springs = [np.eye(robot.arm.joints)[joint] * rest.force[:, machine.gear] for joint in range(robot.arm.joints)]
+        machine, (coordinates, force, position, rotation) = at_rest(robot, schedule)
+        self._start = coordinates[:, machine.gear]
+        self.poses = robot.tracker.seen(position, rotation, schedule.time_s, schedule.angle[:, -1])
+        jacobian, torques = _responses(machine, coordinates, robot, declared)
+        springs = [np.eye(robot.arm.joints)[joint] * force[:, machine.gear] for joint in range(robot.arm.joints)]
         columns, weights = (
-            [self._flat(np.einsum("stij,sj->sti", jacobian[:, self.targets], turn)) for turn in turns]
+            [self._flat(np.einsum("stij,sj->sti", jacobian, turn)) for turn in turns]
             for turns in (springs, [robot.compliance * torque for torque in torques])
         )
-        position = self.poses[0][:, self.targets]
         for axis in np.eye(3) if free_frame else ():
-            along, nothing = np.broadcast_to(axis, position.shape), np.zeros_like(position)
+            along, nothing = np.broadcast_to(axis, self.poses[0].shape), np.zeros_like(self.poses[0])
             columns.append(self._flat(np.concatenate([along, nothing], axis=-1)))
-            columns.append(self._flat(np.concatenate([np.cross(axis, position), along], axis=-1)))
+            columns.append(self._flat(np.concatenate([np.cross(axis, self.poses[0]), along], axis=-1)))
         height = len(columns[0])
         # A column of nothing, such as the compliance of a joint that no load turns, absorbs nothing.
         columns = [column / np.linalg.norm(column) for column in columns if column.any()]
@@ -84,35 +61,33 @@ class Yardstick:
 
         Both in standard deviations; the last entries of the second are the weights, in theirs, that absorb the rest.
         """
-        return self._with_left(self._apart(*seen_poses(robot, self.schedule, self._start)))
+        seen = self._change(*seen_poses(robot, self.schedule, self._start))
+        return seen, self._left(seen)
 
     def residual(self, robot: PhysicalRobot) -> np.ndarray:
         """What cannot be absorbed of a robot's measurements with the noise that they have in its campaign."""
-        return self._with_left(self._apart(*read_poses(robot, self.schedule, self._start)[:2]))[1]
+        seen, draws = seen_poses(robot, self.schedule, self._start), stream(self.schedule.seed, "readings")
+        return self._left(self._change(*robot.tracker.read(*seen, draws)))
 
-    def signal(self, robot: PhysicalRobot) -> Signal:
-        """How a robot differs from the faultless one."""
-        apart = self._apart(*seen_poses(robot, self.schedule, self._start))
-        seen, left = self._with_left(apart)
-        rms = [float(np.sqrt((part**2).sum(axis=-1).mean())) for part in np.split(apart, 2, axis=-1)]
-        return Signal(float(seen @ seen), float(left @ left), *rms)
+    def signal(self, robot: PhysicalRobot) -> dict[str, float]:
+        """Non-centralities of a robot's change before and after absorption, ``raw`` and ``retained``."""
+        seen, left = self.seen_and_left(robot)
+        return {"raw": float(seen @ seen), "retained": float(left @ left)}
 
-    def _apart(self, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
-        """Difference of poses of all points to those of the faultless robot, (S, targets, 6), m and rad."""
+    def _change(self, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
         turns = rotation_vector(rotation @ np.swapaxes(self.poses[1], -1, -2))
-        return np.concatenate([position - self.poses[0], turns], axis=-1)[:, self.targets]
+        return self._flat(np.concatenate([position - self.poses[0], turns], axis=-1))
 
     def _flat(self, apart: np.ndarray) -> np.ndarray:
         """Changes (S, targets, 6) as the analysis counts them: in standard deviations, of the poses that are not held out."""
         tracker = self.robot.tracker
-        metres = apart[..., :3] / tracker.sigma_at(self.poses[0])[:, self.targets, None]
+        metres = apart[..., :3] / tracker.sigma_at(self.poses[0])[..., None]
         counted = np.concatenate([metres, apart[..., 3:] / tracker.sigma_rad], axis=-1)
         return counted[self.schedule.training].ravel()
 
-    def _with_left(self, apart: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        seen = self._flat(apart)
+    def _left(self, seen: np.ndarray) -> np.ndarray:
         whole = np.append(seen, np.zeros(self._priors))
-        return seen, whole - self._absorbed @ (self._absorbed.T @ whole)
+        return whole - self._absorbed @ (self._absorbed.T @ whole)
 
 
 def _responses(
@@ -136,42 +111,6 @@ def _responses(
             axes = data.xmat[link].reshape(3, 3)
             mujoco.mj_jac(model, data, shift, turn, data.xpos[link] + axes @ mass.centre_m, link)
             torques[number, 0, state] = mass.relative_std * (weight @ shift[:, gear])
-            moments = np.cross(axes.T, weight) * mass.allowed_centre_std_m(robot.arm.reach_m)
+            moments = np.cross(axes.T, weight) * mass.centre_std_m(_WIDTH_OF_REACH * robot.arm.reach_m)
             torques[number, 1:, state] = moments @ turn[:, gear]
     return jacobian, [*torques.reshape(-1, count, len(gear))]
-
-
-def size_for(
-    yardstick: Yardstick,
-    robot_of_size: Callable[[float], PhysicalRobot],
-    start: float,
-    target: float,
-    quantity: str = "retained",
-    largest: float = np.inf,
-) -> float:
-    """Size of a defect at which its non-centrality, "retained" or "raw", is the target to one per cent.
-
-    `robot_of_size`: robot with the defect of a given size. Raises `ValueError`: no size up to the largest has it: the defect is
-    absorbed whatever its size, saturates, or would be larger than allowed.
-
-    The non-centrality of a linear effect grows with the square of its size; the secant of the logarithms allows for others.
-    """
-    size, exponent = float(start), 2.0
-    last: tuple[float, float] | None = None
-    for _ in range(_ROUNDS):
-        signal = yardstick.signal(robot_of_size(size))
-        value: float = getattr(signal, quantity)
-        # What is absorbed leaves rounding and second order, a millionth of the raw signal.
-        if value <= 1e-6 * signal.raw or not np.isfinite(value):
-            break
-        if abs(value / target - 1.0) < 0.01:
-            return size
-        if last is not None and last[0] != size:
-            slope = np.log(value / last[1]) / np.log(size / last[0])
-            exponent = slope if 0.3 < slope < 8.0 else 2.0
-        last = (size, value)
-        size = min(largest, size * float(np.clip((target / value) ** (1.0 / exponent), 0.02, 50.0)))
-        if size == last[0]:
-            break
-    found = f"{value:.3g} of {signal.raw:.3g} raw at {size:.3g}"
-    raise ValueError(f"no size found for a {quantity} non-centrality of {target:g}: {found}")

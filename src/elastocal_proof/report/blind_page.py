@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pandas as pd
 
@@ -11,15 +12,9 @@ from elastocal.counting import counted, grouped
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.documents import read_document
 from elastocal.report.words import plain
-from elastocal_proof.blind.cases import PROOF
-from elastocal_proof.blind.scores import leading
+from elastocal_proof.blind.cases import PROOF, Plan
 from elastocal_proof.blind.summary import BY_THE_BEST, OVER_THE_BEST, of_each_robot, rows_of, with_target
 from elastocal_proof.league.table import markdown
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from elastocal_proof.blind.cases import Plan
 
 _ABSENT = "–"
 _OUTCOMES = {"True": "reached", "False": "missed"}
@@ -40,21 +35,20 @@ non-centrality of 50. Brackets hold 95 % intervals: of shares Clopper–Pearson,
 
 def reached_words(summary: pd.DataFrame) -> str:
     """How many targets are reached."""
-    robots = leading(summary.robots)
-    judged = with_target(summary[summary.robots == robots]).dropna(subset="holds")
+    judged = with_target(summary).dropna(subset="holds")
     held = int((judged.holds.astype(str) == "True").sum())
-    where = "the robots of the proof" if robots == PROOF else "robots on which the method was developed, which proves nothing"
+    proven = summary.robots.iloc[0] == PROOF
+    where = "the robots of the proof" if proven else "robots on which the method was developed, which proves nothing"
     return f"{held} of {counted(len(judged), 'figure')} with a target reach it on {where}."
 
 
 def target_rows(plan: Plan, summary: pd.DataFrame, of_each: Mapping[str, pd.DataFrame]) -> list[dict[str, str]]:
     """Each quantity with a target as a row of words, beside what every robot has alone and what the best analyst finds."""
-    mine = summary[summary.robots == leading(summary.robots)]
-    of_all = {row.quantity: row for row in rows_of(mine)}
+    of_all = {row.quantity: row for row in rows_of(summary)}
     alone = {name: {row.quantity: row for row in rows_of(one)} for name, one in of_each.items()}
     beside = {figure["words"]: figure["beside"] for figure in plan["figures"] if "beside" in figure}
     rows = []
-    for row in rows_of(with_target(mine)):
+    for row in rows_of(with_target(summary)):
         compared = row.quantity.removesuffix(OVER_THE_BEST)
         found, limit = of_all.get(beside.get(compared), row), of_all.get(f"{compared}{BY_THE_BEST}")
         cells = {"quantity": found.quantity, "target": row.target, "outcome": _OUTCOMES.get(str(row.holds), "no case")}
