@@ -73,6 +73,11 @@ def test_faulty_holdout_is_refused_in_one_line(cell, holdout, key, words):
         cell.read()
 
 
+def test_the_seed_of_a_draw_is_1_where_none_is_stated(cell):
+    one, other, unstated = (parts(cell, fraction=0.4, **seed) for seed in ({"seed": 1}, {"seed": 5}, {}))
+    assert one == unstated != other
+
+
 def test_poses_of_one_configuration_are_fitted_or_held_out_together(cell):
     """Every configuration is measured again under a pose number of its own: the draw is that of the configurations."""
     once = parts(cell, fraction=0.3, seed=2)[1]
@@ -102,6 +107,7 @@ def test_blocks_are_clusters_whatever_the_order_of_the_poses_and_whole_turns():
     assert len({(block, centre) for block, centre in zip(found, of, strict=True)}) == 4
     turned = angles[order] + 2 * np.pi * rng.integers(-1, 2, (24, 3))
     np.testing.assert_array_equal(blocks_of_poses(turned, np.arange(24), 4), found[order])
+    np.testing.assert_array_equal(blocks_of_poses(np.tile(angles, (2, 1)), np.arange(48), 4), np.tile(found, 2))
 
 
 @pytest.mark.parametrize(("poses", "joints"), [(2, 1), (5, 6), (20, 2), (60, 6)])

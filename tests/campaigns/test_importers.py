@@ -96,6 +96,7 @@ def test_what_comes_with_the_project_is_used_stated_and_not_looked_for_in_the_ne
 
 def test_importers_name_robots_and_campaigns_name_their_files():
     assert all((ROBOTS / f"{robot}.yaml").is_file() for each in ALL.values() for robot in each.robots)
+    assert ALL["fanuc_joint"].robots == ("fanuc_measured", "fanuc_static", "fanuc_cpa")
     documents = map(read_document, (CONFIG / "campaigns").glob("*.yaml"))
     public = [document for document in documents if document["source"] == "public"]
     assert {document["importer"] for document in public} == set(ALL)

@@ -1,5 +1,7 @@
 """Simulated campaigns: without noise they are the elastostatics of the study, at states as planned."""
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -35,3 +37,14 @@ def test_without_noise_it_is_the_elastostatics_of_the_reduced_robot_at_states_as
         low, high = robot.joint_limits.T
         assert ((angles >= low) & (angles <= high)).all()
         assert len(np.unique(angles, axis=0)) == PLAN.poses == len(np.unique(np.column_stack([part["pose"], angles]), axis=0))
+
+
+def test_noise_has_its_size_in_positions_and_in_orientations(robot):
+    exact, moved, turned = (
+        draw_measurements(robot, replace(PLAN, noise_m=noise_m, noise_rad=noise_rad), 1, "exact")
+        for noise_m, noise_rad in ((0.0, 0.0), (1e-3, 0.0), (0.0, 1e-3))
+    )
+    for table, names, others in ((moved, "xyz", ("rx", "ry", "rz")), (turned, ("rx", "ry", "rz"), "xyz")):
+        off = np.array([table[name] - exact[name] for name in names])
+        assert 0.5e-3 < np.sqrt((np.sort(off**2, axis=1)[:, :-10]).mean()) < 2e-3
+        assert all((table[name] == exact[name]).all() for name in others)

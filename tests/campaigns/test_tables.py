@@ -40,6 +40,7 @@ def test_a_table_is_read_with_what_is_stated_and_without_what_is_empty(tmp_path,
 def test_what_is_found_out_is_told(tmp_path):
     found = read(tmp_path, "Tracker 7\r\n# made by hand\r\n\r\nx;y;n;\r\n1,5;-2,25e-3;P1;\r\n;\r\n# end", "utf-16")
     assert found.dialect == Dialect("semicolon", "comma", 4, "utf-16") and found.lines == (5,)
+    assert [*found.columns] == ["x", "y", "n"]
 
 
 @pytest.mark.parametrize(

@@ -54,6 +54,14 @@ def test_one_measurement_in_four_far_off_moves_the_robust_fit_by_nothing_and_the
     assert placed(campaign).distance[~far].min() > 0.01
 
 
+def test_the_robust_fit_of_normal_errors_is_the_fit_to_all_and_single_rows_are_no_misfit(fanuc):
+    campaign = made(fanuc, 1, Plan(poses=12, loads=0, tracker=True))
+    np.testing.assert_array_equal(robustly_placed(campaign).estimate.frame_position, placed(campaign).estimate.frame_position)
+    exact = made(fanuc, 1, EXACT)
+    one = np.where(exact.measurements.pose[:, None] == 3, 0.3, 0.0)
+    assert placed(with_measured(exact, position=exact.measurements.position + one)).misfit.max() < 1e-6
+
+
 @pytest.mark.parametrize(("wanted", "poses"), [(4, [0, 4, 7, 11]), (2, [0, 11]), (50, list(range(12)))])
 def test_poses_are_spread_over_the_campaign_at_their_lowest_load_and_first_repeat(fanuc, wanted, poses):
     campaign = made(fanuc, 1, Plan(poses=12, loads=2, repeats=2))
