@@ -78,6 +78,7 @@ rule study:
 rule loop:
     input:
         loop_reports(config["loop"]["campaigns"]),
+        "reports/loop/campaigns.csv",
         lambda wildcards: files_behind(rules.loop.input),
 
 

@@ -1,6 +1,7 @@
 """Figures of a campaign: what is drawn is what the tables hold, and nothing is cut off."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from drawn_figures import assert_nothing_cut_off, legend_entries, row_labels, texts
 from made_certificates import made_document
@@ -8,7 +9,7 @@ from made_loop_tables import candidate_table, plainly, residual_table, step_rows
 from made_loop_tables import probabilities as stated
 from matplotlib.quiver import Quiver, QuiverKey
 
-from elastocal.figures.loop import METRICS, arrows, before_after, budget_bars, probabilities
+from elastocal.figures.loop import METRICS, arrows, before_after, budget_bars, campaign_errors, probabilities
 
 LONG = ("link_elasticity@1+2+3+6[one section]", "force_misalignment[flange axes]", "transmission_harmonic@1[orders 31-36]")
 LONG_SETS = [
@@ -100,6 +101,30 @@ def test_an_interval_reaches_from_end_to_end_or_is_not_drawn():
     for step, (one, other) in zip(steps, lines_of(mean, "interval"), strict=True):
         assert [one[0], other[0]] == pytest.approx([1e6 * step["heldout_mean_m_low"], 1e6 * step["heldout_mean_m_high"]])
     assert np.isnan([x for line in lines_of(largest, "interval") for x, _ in line]).all()
+
+
+TABLE = pd.DataFrame(
+    {
+        "campaign": ["ur10_a_on_b", "wam_grid"],
+        "poses": [24, 1],
+        **{f"before_rms{end}_mm": values for end, values in (("", [0.4, 2.0]), ("_low", [0.3, 1.8]), ("_high", [0.5, np.inf]))},
+        **{f"after_rms{end}_mm": values for end, values in (("", [0.2, 1.9]), ("_low", [0.1, 1.7]), ("_high", [0.3, 2.2]))},
+    }
+)
+
+
+def test_each_campaign_has_both_errors_at_their_values():
+    (axis,) = campaign_errors(TABLE).axes
+    assert row_labels(axis) == ["UR10 A, judged on B", "WAM grid"]
+    before, after = (container.lines[0].get_xydata() for container in axis.containers)
+    np.testing.assert_allclose(before, [[0.4, 1], [2.0, 0]])
+    np.testing.assert_allclose(after, [[0.2, 1], [1.9, 0]])
+    assert all(np.isfinite(line.get_segments()).all() for container in axis.containers for line in container.lines[2])
+    # Sessions of one campaign stand by their poses.
+    assert row_labels(campaign_errors(TABLE.assign(campaign="fanuc_joint")).axes[0]) == [
+        "FANUC joint, 24 poses",
+        "FANUC joint, 1 pose",
+    ]
 
 
 def test_each_hypothesis_has_a_bar_as_long_as_its_probability():

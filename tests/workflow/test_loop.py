@@ -172,7 +172,7 @@ def test_a_new_effect_is_a_module_and_a_new_campaign_a_file_that_is_read_again_w
     assert "\nsag@2," in cell.path(candidates).read_text(encoding="utf-8")
     measurements = pq.ParquetFile(cell.path(training)).read()
     assert set(measurements.column("pose").to_pylist()) < set(range(8))
-    planned = cell.planned("reports/loop/tiny/verdict.json")
+    planned = cell.planned("reports/loop/tiny/verdict.json", "reports/loop/campaigns.csv")
     assert {job for job in planned if job[0] in STEPS} == {(step, "tiny") for step in STEPS[1:]}
     cell.replace("config/robots/kuka.yaml", "compliance_urad_per_Nm: [", "compliance_urad_per_Nm: [1")
     assert cell.planned(training) == {("read_campaign", "tiny")}

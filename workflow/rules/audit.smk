@@ -7,7 +7,8 @@ hold, reports/audit.txt; where one does not, it ends with an error. Files of oth
 # Targets that are audited where they have finished, by what each makes last.
 AUDITED_TOO = {
     "study": "reports/study.pdf",
-    **{f"campaign {name}": f"reports/loop/{name}/report.pdf" for name in SOURCES},
+    "loop": "reports/loop/campaigns.csv",
+    "measured": "reports/loop/measured.csv",
     "league": "reports/league/all/league.csv",
     "league_small": "reports/league/small/league.csv",
     "blind": "reports/blind/summary.csv",

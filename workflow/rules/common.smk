@@ -278,6 +278,15 @@ def reports_of_own(wildcards):
     return files_behind(loop_reports(OWN))
 
 
+def folds_of_one(campaigns):
+    """Campaigns that hold out the folds of the same measurements, by the importer of these."""
+    folds = {}
+    for name in campaigns:
+        if "fold" in SOURCES[name]:
+            folds.setdefault(SOURCES[name]["importer"], []).append(name)
+    return folds
+
+
 def audited(wildcards):
     """What is audited; asked for before any job of the run begins, so that nobody waits for results that cannot be audited."""
     if find_spec("pinocchio") is None:

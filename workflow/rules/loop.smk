@@ -111,6 +111,59 @@ rule judge_campaign:
         "../scripts/run_step.py"
 
 
+rule summarize_campaigns:
+    input:
+        verdicts=lambda wildcards: expand("reports/loop/{name}/verdict.json", name=config["loop"][wildcards.kind]),
+        residuals=lambda wildcards: expand("reports/loop/{name}/residuals.parquet", name=config["loop"][wildcards.kind]),
+    output:
+        table=shown(
+            "reports/loop/{kind}.csv",
+            "loop_overview",
+            "Campaigns",
+            campaign="all of {kind}",
+            shows="All campaigns",
+            kind="table",
+        ),
+    wildcard_constraints:
+        kind="campaigns|measured",
+    params:
+        step="elastocal.loop.summary.summarize_campaigns",
+        campaigns=lambda wildcards: config["loop"][wildcards.kind],
+        folds=lambda wildcards: folds_of_one(config["loop"][wildcards.kind]),
+        seed=config["seed"],
+    script:
+        "../scripts/run_step.py"
+
+
+rule draw_campaign_errors:
+    input:
+        table=rules.summarize_campaigns.output.table,
+    output:
+        pdf="reports/loop/{kind}.pdf",
+        png=shown(
+            "reports/loop/{kind}.png",
+            "loop_all_errors",
+            "Campaigns",
+            campaign="all of {kind}",
+            shows="Held-out errors before and after",
+            kind="figure",
+        ),
+    wildcard_constraints:
+        kind="campaigns|measured",
+    script:
+        "../scripts/draw_campaign_errors.py"
+
+
+rule measured_pictures:
+    """The picture of docs/measured_data.md, from finished campaigns of measured data."""
+    input:
+        picture="reports/loop/measured.png",
+    output:
+        picture="docs/measured_data.png",
+    shell:
+        "cp {input.picture} {output.picture} 2> {log}"
+
+
 rule diagnose:
     input:
         reports_of_own,
@@ -119,4 +172,6 @@ rule diagnose:
 rule measured:
     input:
         loop_reports(config["loop"]["measured"]),
+        "reports/loop/measured.csv",
+        "reports/loop/measured.png",
         lambda wildcards: files_behind(rules.measured.input),

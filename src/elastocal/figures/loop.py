@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from elastocal.counting import first_names
-from elastocal.figures.style import MILLI, PALETTE, STAGES, note, panels, styled
+from elastocal.counting import counted, first_names
+from elastocal.figures.style import MILLI, PALETTE, STAGES, label_decades, legend_below, note, panels, styled
 from elastocal.report.words import candidate_words, capital, hypotheses_words, in_words, probability_words, unit_of
 
 # Of more states than this only one is drawn in each cell of a grid of so many columns.
@@ -174,6 +174,35 @@ def before_after(steps: Sequence[Mapping[str, Any]], noise_floor_m: float | None
     if noise_floor_m:
         handles.append(Line2D([], [], color="black", linestyle=":", linewidth=1.2, label="RMS that noise alone leaves"))
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    return figure
+
+
+@styled
+def campaign_errors(table: pd.DataFrame) -> Figure:
+    """Root mean square errors with their intervals, a line for each campaign.
+
+    `table`: ``campaign``, ``poses``, and ``before_rms_mm``, ``before_rms_low_mm``, ``before_rms_high_mm``, the same for after:
+    mm.
+    """
+    rows = np.arange(len(table))[::-1]
+    figure, axes = panels(1, 1, 24 + 6 * len(table))
+    axis = axes[0, 0]
+    axis.hlines(rows, table["after_rms_mm"], table["before_rms_mm"], color="#c8c8c8", lw=2.5, zorder=1)
+    for stage, (words, color) in STAGES.items():
+        rms, low, high = (table[f"{stage}_rms{end}_mm"].to_numpy(float) for end in ("", "_low", "_high"))
+        # An interval that is open above is drawn to the value alone.
+        span = [rms - low, np.where(np.isfinite(high), high - rms, 0.0)]
+        axis.errorbar(rms, rows, xerr=span, fmt="o", color=color, ms=4, lw=1.2, capsize=2, label=words, zorder=2)
+    # Robots and series in capitals, as people write them.
+    names = table["campaign"].str.replace("_on_", ", judged on ").str.replace("_", " ")
+    names = names.str.replace(r"^\w+|\b\w\b", lambda word: word[0].upper(), regex=True)
+    # A campaign with two sessions has two lines.
+    names = names.where(~names.duplicated(keep=False), names + ", " + table["poses"].map(lambda count: counted(count, "pose")))
+    axis.set_yticks(rows, names)
+    axis.set(xscale="log", xlabel="RMS position error of held-out poses (mm), with 95 % intervals")
+    label_decades(axis.xaxis)
+    axis.grid(visible=False, axis="y")
+    legend_below(figure, 2)
     return figure
 
 
