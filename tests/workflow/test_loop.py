@@ -112,7 +112,7 @@ EDITS = {
     "figures of the study and style of all figures": (["figures/study", "figures/style"], set(), set(STEPS)),
     "the judgement": (["diagnosis/judge"], set(STEPS[2:]), set(STEPS[:2])),
     "an effect": (["effects/gravity"], set(STEPS[1:]), {"simulate", "measure"}),
-    "a fault": (["data_checks/loads"], set(STEPS[1:]), set(STEPS[:1])),
+    "a fault": (["data_checks/faults"], set(STEPS[1:]), set(STEPS[:1])),
 }
 
 

@@ -162,14 +162,14 @@ def _targets_elsewhere(written: Placement, found: Placement) -> str | None:
     away = np.linalg.norm(after.target_offset - before.target_offset, axis=1)
     if away.max() <= _NEAR_M and turns.max() <= IMPLAUSIBLE_RAD:
         return None
-    said = {}
+    wrong = {}
     if away.max() > IMPLAUSIBLE_M:
-        said["offset_m"] = f"{targets[int(np.argmax(away))].name} would sit {1e3 * away.max():.3g} mm from there"
+        wrong["offset_m"] = f"{targets[int(np.argmax(away))].name} would sit {1e3 * away.max():.3g} mm from there"
     if turns.max() > IMPLAUSIBLE_RAD:
-        said["rotation"] = f"{targets[int(np.argmax(turns))].name} would be turned by {np.degrees(turns.max()):.3g}°"
-    remedy = " and ".join(f"{key}: unknown" for key in said)
+        wrong["rotation"] = f"{targets[int(np.argmax(turns))].name} would be turned by {np.degrees(turns.max()):.3g}°"
+    remedy = " and ".join(f"{key}: unknown" for key in wrong)
     fits = f"where its mount is not as stated, {remedy} in campaign.yaml fits it, and known values may stand there"
-    return f"targets do not sit where the campaign says: {' and '.join(said.values())}; {fits}"
+    return f"targets do not sit where the campaign says: {' and '.join(wrong.values())}; {fits}"
 
 
 def shifts(campaign: Campaign) -> list[Hypothesis]:
