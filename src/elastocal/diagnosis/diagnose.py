@@ -20,7 +20,7 @@ from elastocal.effects.catalogue import effects
 from elastocal.fitting.least_squares import ON_THE_WAY, SETTLED, fit
 from elastocal.fitting.model import Case, joint_compliances, parameter_values
 from elastocal.fitting.noise import noise_facts
-from elastocal.fitting.observations import Observations, sample_of
+from elastocal.fitting.observations import Observations
 from elastocal.fitting.tolerances import effective_parameters
 from elastocal.random_streams import stream
 from elastocal.remainder.repeatable import Repeatable, repeatable_part
@@ -96,25 +96,18 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         case = replace(case, model=part.case.model)
     tell(f"declared model fitted to {counted(len(part.case.observations), 'measurement')}")
     found: Evidence | None = None
-    about, start, most_pose_error_rad = part.declared, None, np.inf
+    about, most_pose_error_rad = part.declared, np.inf
     measurements, errors = case.campaign.measurements, Deviations.none(len(part.kept), case.model.rows)
     good = np.zeros(len(part.kept), bool)
     for number in range(0 if decisive else settings.gross_error_rounds):
         if not found:
-            found = _explained(part, settings, seed, tell, start, most_pose_error_rad)
+            found = _explained(part, settings, seed, tell, most_pose_error_rad)
             about = found.fitted
         errors = gross_errors(about, part.noise, measurements, part.kept, settings)
         # A row that a model without it explains stays, whatever the next model says of it: no set of rows comes back.
         good |= ~part.kept & ~errors.gross
-        remaining = ~errors.gross | good
-        if (remaining == part.kept).all() or number + 1 == settings.gross_error_rounds:
+        if number + 1 == settings.gross_error_rounds:
             break
-        # The model found looks at all rows once more, without these, before another search is made.
-        like = None if (remaining & ~part.kept).any() else part.searched
-        some = sample_of(case.select(remaining).observations, settings.searched_observations, like)
-        about = fit(about.model, some, about.noise, about.estimate, True, ON_THE_WAY)
-        errors = gross_errors(about, part.noise, measurements, remaining, settings)
-        good |= ~remaining & ~errors.gross
         last, part = part, fitted_to(case, ~errors.gross | good, settings, part)
         if part is last:
             break
@@ -126,9 +119,6 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
                 # Rows of so little weight that the search would find the same.
                 about = again
                 continue
-        # What was linearised about a model found is so again: from the declared one the way is the same and twice as long.
-        relinearized = len(found.linearized.about.model.effects) > len(part.declared.model.effects)
-        start = (about, found.conclusion.best.named) if relinearized else None
         most_pose_error_rad = found.linearized.most_pose_error_rad
         # Its statistics make room for those of the next search.
         found = None
@@ -195,28 +185,18 @@ def _losses(bare: Fit, models: Sequence[Fit], observations: Observations, settin
     return found if found[-1] else []
 
 
-def _explained(
-    part: Kept,
-    settings: Settings,
-    seed: int,
-    tell: Callable[[str], None],
-    start: tuple[Fit, tuple[str, ...]] | None,
-    most_pose_error_rad: float,
-) -> Evidence:
+def _explained(part: Kept, settings: Settings, seed: int, tell: Callable[[str], None], most_pose_error_rad: float) -> Evidence:
     """Evidence about the declared model, and again about the model found where that, or its noise, is far from it.
 
-    At once about a model, with the mechanisms that it has beyond the declared one, where the search is to ``start``. What an
-    error common to the measurements of a pose takes beyond what robots repeat to must be chance: where it is a function of the
-    joints no more of it is thought of. And where what is left is one, the search goes on about each model that is new.
+    What an error common to the measurements of a pose takes beyond what robots repeat to must be chance: where it is a function
+    of the joints no more of it is thought of. And where what is left is one, the search goes on about each model that is new.
     """
     candidates, searched, declared = list(part.case.candidates.values()), part.searched, part.declared
-    about, before = start or (declared, None)
+    about, before = declared, tuple[str, ...]()
     tested: tuple[Fit, Repeatable | None] | None = None
     # The fit to all measurements starts where that to some ends.
     enough = SETTLED if searched is part.case.observations else ON_THE_WAY
-    if start:
-        about = fit(about.model, searched, about.noise, about.estimate, True, ON_THE_WAY)
-    for round_number in range(1 if start else 0, settings.linearizations):
+    for round_number in range(settings.linearizations):
         problem, near = linearized(about, searched, candidates, settings, most_pose_error_rad), about if before else None
         nothing, alone = initial_screening(problem.problem)
         draws = stream(seed, part.case.campaign.name, "null distribution", round_number)
@@ -307,7 +287,7 @@ def _document(
         owners = [(owner, parameter.name) for owner, parameter in declared.parameters]
         averages = refit.averaged(found.linearized, found.posterior, chosen, owners)
         springs = averages if kept is chosen else refit.averaged(found.linearized, found.posterior, nothing, owners)
-        entries = verdict.effect_entries(found, with_effects, averages, case.observations)
+        entries = verdict.effect_entries(found, with_effects, averages)
         untestable, other = found.linearized.untestable, refit.other_predictions(problem, found.posterior, kept)
         tested = {unit.candidate.key for unit in problem.units if unit.candidate}
         stated = {
@@ -320,7 +300,7 @@ def _document(
         }
         if entries and not found.adopted:
             remarks.append("what was found is too uncertain to make predictions better: the model stays as declared")
-        remarks += verdict.implausible(with_effects, entries, case.campaign.robot.payload_kg)
+        remarks += verdict.implausible(with_effects, entries)
         if not found.settled:
             words = f"the problem was linearised {settings.linearizations} times, and each time another model was found"
             remarks.append(f"{words}: more may be missing")

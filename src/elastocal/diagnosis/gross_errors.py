@@ -14,15 +14,13 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.linalg import lapack, solve_triangular
 from scipy.special import chdtri, fdtri, gammaincinv
 
 from elastocal.counting import counted
 from elastocal.diagnosis.evidence import Grid
 from elastocal.diagnosis.linearize import Linearized, linearized
-from elastocal.diagnosis.statistics import WhiteRows
 from elastocal.fitting.least_squares import evaluated, fit
-from elastocal.fitting.linearization import Linearization, linearize
+from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import conditions, parameters, residuals
 from elastocal.fitting.noise import Noise, measurement_covariances
 from elastocal.fitting.observations import (
@@ -41,7 +39,6 @@ if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
     from elastocal.diagnosis.settings import Settings
     from elastocal.fitting.least_squares import Fit
-    from elastocal.fitting.linearization import Linearization
     from elastocal.fitting.model import Case, Estimate, Model
     from elastocal.fitting.noise import Noise
 
@@ -49,9 +46,7 @@ if TYPE_CHECKING:
 _SCALE_QUANTILES = (0.5, 0.75)
 # Least share of a row's variance that is its own and not that of the parameters fitted to it.
 _LEAST_OWN = 0.01
-# Shares of the error common to a pose that a fit states.
-_POSE_SHARES = (0.0, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)
-# Rows of which the scale is estimated at most, to a percent; more determine the parameters so well that one hardly counts.
+# Rows that are looked at closely at most, if not far off; more determine the parameters so well that one hardly counts.
 _MOST = 4_000
 # Extrapolated rows of which the usual error is known.
 _FEWEST_TO_COMPARE = 5
@@ -85,99 +80,45 @@ class Yardstick:
     covariance: np.ndarray | None
 
 
-@dataclass(frozen=True)
-class _Beside:
-    """Rows of measurements beside a model, of which a sample and all that lie far off are looked at closely.
+def yardstick_of(fitted: Fit, noise: Noise, rows: int) -> Yardstick:
+    """The noise that was declared or repeats show, and the error common to a pose that a fit to so many rows states."""
+    under_it = (noise.position_m / fitted.noise.position_m) ** 2 * fitted.covariance
+    return Yardstick(replace(noise, pose_rad=fitted.noise.pose_rad), under_it if rows <= _MOST and under_it.size else None)
 
-    `residual` (N, rows). `far` (N,): whole distance in standard deviations of the sensor. `sample`, `closely` (N,): poses
-    spread over those kept; these, and what is as far off as a quarter of all. `parts`: which of the latter; their
-    linearisation; variance (m, rows, rows) of each, and that of a radian in each joint. `noise`: of one row.
+
+def _beside(
+    model: Model, estimate: Estimate, measurements: Measurements, yardstick: Yardstick, fitted: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Residuals (N, rows), and distances from the prediction by the other rows in standard deviations, (N,).
+
+    ``fitted`` says which rows the parameters were fitted to, (N,): residuals of these are smaller, those of others larger. Of
+    very many rows those at poses spread over all are looked at closely, and what is as far off as a quarter of these; others
+    have their whole distance in standard deviations of the sensor.
     """
-
-    residual: np.ndarray
-    far: np.ndarray
-    sample: np.ndarray
-    closely: np.ndarray
-    parts: list[tuple[slice, Linearization, np.ndarray, np.ndarray]]
-    noise: Noise
-
-    @classmethod
-    def of(cls, model: Model, estimate: Estimate, measurements: Measurements, noise: Noise, kept: np.ndarray) -> _Beside:
-        single, sample = single_observations(measurements), kept.copy()
-        sample[kept] = spread_poses(select_states(single, kept), _MOST)
-        near, residual = spread_poses(single, _MOST), np.empty((len(single), model.rows))
-        for _, seen, part in parts_of(single, 0):
-            residual[seen] = residuals(model, estimate, part, conditions(model, estimate, part.states))
-        far = np.linalg.norm(residual / np.repeat([noise.position_m, noise.orientation_rad], 3)[: model.rows], axis=1)
-        closely = near | sample | (far > np.quantile(far[near], _SCALE_QUANTILES[-1]))
-        some, parts = select_states(single, closely), []
-        for _, seen, part in parts_of(some, len(parameters(model, estimate))):
-            line, spread = linearize(model, estimate, part, conditions(model, estimate, part.states)), noise.spread(part)
-            jacobian = line.joint_jacobian
-            own = measurement_covariances(noise, jacobian[:, None], model.rows, None if spread is None else spread[:, None])
-            parts.append((seen, line, own, jacobian @ jacobian.transpose(0, 2, 1)))
-        return cls(residual, far, sample, closely, parts, noise)
-
-    def yardstick(self, fitted: Fit, kept: np.ndarray) -> Yardstick:
-        """As `yardstick_of`, by the rows that were fitted, (N,) of bool."""
-        free, mine, rows = ~fitted.held, self.sample[self.closely], fitted.model.rows
-        negligible = self.sample.sum() < kept.sum() or not free.any()
-        sizes = np.array([p.plausible for _, p in fitted.parameters])[free]
-        best = (np.inf, Yardstick(self.noise, None))
-        for share in _POSE_SHARES if fitted.noise.pose_rad else (0.0,):
-            covariance, white = None, self._white(share * fitted.noise.pose_rad)
-            if not negligible:
-                information = np.diag((sizes / fitted.prior_std[free]) ** 2)
-                for (seen, line, _, _), each in zip(self.parts, white, strict=True):
-                    seen_by = (each @ (line.sensitivities[..., free] * sizes))[mine[seen]].reshape(-1, len(sizes))
-                    information += seen_by.T @ seen_by
-                covariance = np.zeros((len(free), len(free)))
-                covariance[np.ix_(free, free)] = np.linalg.pinv(information, hermitian=True) * np.outer(sizes, sizes)
-            distance = self._distances(white, covariance, np.ones(len(mine), bool))[mine]
-            volume = -np.concatenate([np.log(np.diagonal(each, axis1=1, axis2=2)).sum(axis=1) for each in white])[mine].mean()
-            # Rows do not scatter less than the noise that is known of them: a share that says so is too large.
-            spread = volume + rows * np.log(max(np.median(distance) / np.sqrt(2 * gammaincinv(rows / 2, 0.5)), 1.0))
-            found = Yardstick(replace(self.noise, pose_rad=share * fitted.noise.pose_rad), covariance)
-            best = min(best, (spread, found), key=lambda each: each[0])
-        return best[1]
-
-    def distances(self, yardstick: Yardstick, fitted: np.ndarray) -> np.ndarray:
-        """From the prediction by the other rows, in standard deviations, (N,); `far` where nothing looks closely.
-
-        ``fitted`` says which rows the parameters were fitted to, (N,): residuals of these are smaller, those of others larger.
-        """
-        found, white = self.far.copy(), self._white(yardstick.noise.pose_rad)
-        found[self.closely] = self._distances(white, yardstick.covariance, fitted[self.closely])
-        return found
-
-    def _white(self, pose_rad: float) -> list[np.ndarray]:
-        return [np.linalg.inv(np.linalg.cholesky(own + pose_rad**2 * common)) for _, _, own, common in self.parts]
-
-    def _distances(self, white: list[np.ndarray], covariance: np.ndarray | None, fitted: np.ndarray) -> np.ndarray:
-        found = np.empty(len(fitted))
-        for (seen, line, _, _), each in zip(self.parts, white, strict=True):
-            off = each @ line.residual[..., None]
-            matrix = np.tile(np.eye(each.shape[1]), (len(each), 1, 1))
-            if covariance is not None:
-                rows = each @ line.sensitivities
-                share = (rows.reshape(-1, len(covariance)) @ covariance).reshape(rows.shape) @ rows.transpose(0, 2, 1)
-                matrix += np.where(fitted[seen], -1.0, 1.0)[:, None, None] * share
-                own = fitted[seen] & (np.trace(share, axis1=1, axis2=2) > 1.0 - _LEAST_OWN)
-                values, axes = np.linalg.eigh(matrix[own])
-                matrix[own] = (axes * np.maximum(values, _LEAST_OWN)[:, None]) @ axes.transpose(0, 2, 1)
-            found[seen] = np.sqrt((off * np.linalg.solve(matrix, off)).sum(axis=(1, 2)))
-        return found
-
-
-def yardstick_of(fitted: Fit, noise: Noise, measurements: Measurements) -> Yardstick:
-    """What the rows that a model was fitted to say of themselves, beside the noise that was declared or repeats show.
-
-    Of the error common to a pose that the fit states the share counts that makes the generalized variance of most rows smallest
-    (an S-estimate; Davies, Annals of Statistics 1987): the rest may be that of the very errors that are looked for, or of a law
-    that is not linear.
-    """
-    every = np.ones(len(measurements), bool)
-    return _Beside.of(fitted.model, fitted.estimate, measurements, noise, every).yardstick(fitted, every)
+    single, noise, covariance = single_observations(measurements), yardstick.noise, yardstick.covariance
+    near, residual = spread_poses(single, _MOST), np.empty((len(single), model.rows))
+    for _, seen, part in parts_of(single, 0):
+        residual[seen] = residuals(model, estimate, part, conditions(model, estimate, part.states))
+    distance = np.linalg.norm(residual / np.repeat([noise.position_m, noise.orientation_rad], 3)[: model.rows], axis=1)
+    closely = near | (distance > np.quantile(distance[near], _SCALE_QUANTILES[-1]))
+    found = np.empty(closely.sum())
+    for _, seen, part in parts_of(select_states(single, closely), len(parameters(model, estimate))):
+        line, spread = linearize(model, estimate, part, conditions(model, estimate, part.states)), noise.spread(part)
+        jacobian = line.joint_jacobian
+        spread = None if spread is None else spread[:, None]
+        own = measurement_covariances(noise.of_measurements, jacobian[:, None], model.rows, spread)
+        white = np.linalg.inv(np.linalg.cholesky(own + noise.pose_rad**2 * jacobian @ jacobian.transpose(0, 2, 1)))
+        off, matrix = white @ line.residual[..., None], np.tile(np.eye(model.rows), (len(white), 1, 1))
+        if covariance is not None:
+            mine, rows = fitted[closely][seen], white @ line.sensitivities
+            share = (rows.reshape(-1, len(covariance)) @ covariance).reshape(rows.shape) @ rows.transpose(0, 2, 1)
+            matrix += np.where(mine, -1.0, 1.0)[:, None, None] * share
+            least = mine & (np.trace(share, axis1=1, axis2=2) > 1.0 - _LEAST_OWN)
+            values, axes = np.linalg.eigh(matrix[least])
+            matrix[least] = (axes * np.maximum(values, _LEAST_OWN)[:, None]) @ axes.transpose(0, 2, 1)
+        found[seen] = np.sqrt((off * np.linalg.solve(matrix, off)).sum(axis=(1, 2)))
+    distance[closely] = found
+    return residual, distance
 
 
 def beyond_chance(distance: np.ndarray, rows: int, kept: np.ndarray, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
@@ -187,17 +128,21 @@ def beyond_chance(distance: np.ndarray, rows: int, kept: np.ndarray, settings: S
     is the root mean square of what does not stand out by the first, and the limit that of an F distribution. Where more than
     `gross_error_share` of all stand out, none does: then it is the model that is wrong.
     """
-    ordered = np.sort(np.where(kept, distance, np.inf))
-    usual = ordered[(np.array(_SCALE_QUANTILES) * (len(ordered) - 1)).astype(int)]
-    scale = np.max(
-        usual[np.isfinite(usual)] / np.sqrt(2 * gammaincinv(rows / 2, _SCALE_QUANTILES))[np.isfinite(usual)], initial=1.0
-    )
+    scale = _robust_scale(distance, rows, kept)
     inside = distance <= scale * most_by_chance(len(distance), rows, settings)
     if inside.mean() < 1.0 - settings.gross_error_share:
         return distance / scale, np.zeros(len(distance), bool)
     scale = max(1.0, float(np.sqrt((distance[inside] ** 2).mean() / rows)))
     gross = distance > scale * most_by_chance(len(distance), rows, settings, inside.sum() * rows)
     return distance / scale, gross if gross.mean() <= settings.gross_error_share else np.zeros(len(gross), bool)
+
+
+def _robust_scale(distance: np.ndarray, rows: int, kept: np.ndarray) -> float:
+    """Scale of distances by two of their quantiles, one at least; those not kept count as large."""
+    ordered = np.sort(np.where(kept, distance, np.inf))
+    usual = ordered[(np.array(_SCALE_QUANTILES) * (len(ordered) - 1)).astype(int)]
+    expected = np.sqrt(2 * gammaincinv(rows / 2, _SCALE_QUANTILES))
+    return float(np.max((usual / expected)[np.isfinite(usual)], initial=1.0))
 
 
 def most_by_chance(count: int, rows: int, settings: Settings, freedom: float = np.inf) -> float:
@@ -211,9 +156,9 @@ def most_by_chance(count: int, rows: int, settings: Settings, freedom: float = n
 
 def gross_errors(fitted: Fit, noise: Noise, measurements: Measurements, kept: np.ndarray, settings: Settings) -> Deviations:
     """Judge the rows of a campaign by a fit to those that are ``kept``, (N,), and the noise declared or shown by repeats."""
-    rows = _Beside.of(fitted.model, fitted.estimate, measurements, noise, kept)
-    distance = rows.distances(rows.yardstick(fitted, kept), kept)
-    return Deviations(rows.residual, *beyond_chance(distance, fitted.model.rows, kept, settings))
+    yardstick = yardstick_of(fitted, noise, kept.sum())
+    residual, distance = _beside(fitted.model, fitted.estimate, measurements, yardstick, kept)
+    return Deviations(residual, *beyond_chance(distance, fitted.model.rows, kept, settings))
 
 
 def held_out_gross_errors(
@@ -224,18 +169,17 @@ def held_out_gross_errors(
     Where a prediction is extrapolated, ``outside`` (N,), the model errs first: such a row has to be farther off, and farther
     than most of them.
     """
-    model, estimate = there
-    measurements = held_out.campaign.measurements
+    (model, estimate), measurements = there, held_out.campaign.measurements
     if model is not fitted.model or estimate is not fitted.estimate:
         yardstick = replace(yardstick, covariance=None)
     every = np.ones(len(measurements), bool)
-    rows = _Beside.of(model, estimate, measurements, yardstick.noise, every)
-    distance, gross = beyond_chance(rows.distances(yardstick, ~every), model.rows, every, settings)
+    residual, distance = _beside(model, estimate, measurements, yardstick, ~every)
+    distance, gross = beyond_chance(distance, model.rows, every, settings)
     least = settings.extrapolated_error
     if outside.sum() >= _FEWEST_TO_COMPARE:
         least = max(least, float(np.median(distance[outside])) / np.sqrt(2 * gammaincinv(model.rows / 2, 0.5)))
     far = distance > least * most_by_chance(len(distance), model.rows, settings)
-    return Deviations(rows.residual, distance, gross & (far | ~outside))
+    return Deviations(residual, distance, gross & (far | ~outside))
 
 
 def entries_of(found: Deviations, campaign: Campaign, held_out: bool) -> list[dict[str, Any]]:
@@ -350,97 +294,33 @@ def improbable(line: Linearized) -> np.ndarray:
     """Which observations all candidates together do not explain, ndarray of bool (M,).
 
     The whitened residual has the covariance I + X D X' + W S W', with X the declared sensitivities, D their priors, W those of
-    all candidates, S their mean square sizes. The worst are taken out until what is left agrees; then those that it predicts
-    come back.
+    all candidates, S their mean square sizes. The worst are taken out, one after the other, until what is left agrees; where
+    that would be more than `gross_error_share` of all, none is.
     """
     rows, settings = line.rows, line.settings
     observed, own = rows.residual.shape
-    kept = np.ones(observed, bool)
     grid = Grid.of_settings(settings)
     sizes = np.sqrt(np.exp(grid.log_weights) @ grid.scales**2)
-    declared = (rows.declared * line.priors[0]).reshape(rows.residual.size, -1)
-    columns = (sizes * rows.candidates.dense()).reshape(rows.residual.size, -1)
-    covariance, residual = np.eye(len(columns)) + columns @ columns.T, rows.residual.ravel()
-    precision, limit = _precision(covariance, declared), most_by_chance(observed, own, settings)
-    while kept.mean() > 1.0 - settings.gross_error_share:
+    columns = np.concatenate([rows.declared * line.priors[0], sizes * rows.candidates.dense()], axis=2)
+    columns, residual = columns.reshape(rows.residual.size, -1), rows.residual.ravel()
+    precision, limit = np.linalg.inv(np.eye(len(columns)) + columns @ columns.T), most_by_chance(observed, own, settings)
+    kept = np.ones(observed, bool)
+    while kept.mean() >= 1.0 - settings.gross_error_share:
         distance = _deletion_distances(precision, residual, kept, own)
         worst = int(np.argmax(distance))
-        if distance[worst] <= limit:
-            break
-        kept[worst] = False
-        precision = _without(precision, np.arange(worst * own, (worst + 1) * own))
-    if not kept.all():
-        covariance = covariance + _pose_error(rows, line.pose_errors_rad, covariance, declared, np.repeat(kept, own))
-    whole = _precision(covariance, declared)
-    while not kept.all():
-        out = np.flatnonzero(np.repeat(~kept, own))
-        distance = _deletion_distances(_without(whole, out), residual, kept, own)
-        variance = np.linalg.inv(whole[np.ix_(out, out)])
-        rest = (variance @ (whole @ residual)[out]).reshape(-1, own, 1)
-        distance[~kept] = np.sqrt((rest * np.linalg.solve(_blocks(variance, own), rest)).sum(axis=(1, 2)))
-        back = ~kept & ~beyond_chance(distance, own, kept, settings)[1]
-        if not back.any():
-            break
-        kept |= back
-    return ~kept
-
-
-def _precision(covariance: np.ndarray, declared: np.ndarray) -> np.ndarray:
-    """Inverse of a covariance to which that of declared columns of unit size is added (Woodbury's identity)."""
-    root = np.linalg.cholesky(covariance)
-    basis, _ = _declared_basis(root, declared)
-    inverse = lapack.dpotri(root, lower=1)[0]
-    inverse = np.tril(inverse) + np.tril(inverse, -1).T
-    beside = solve_triangular(root, basis, lower=True, trans="T")
-    return inverse - beside @ beside.T
-
-
-def _log_likelihood(covariance: np.ndarray, declared: np.ndarray, residual: np.ndarray) -> float:
-    """Logarithm of the density of a residual of zero mean under that sum, but for a constant."""
-    root = np.linalg.cholesky(covariance)
-    basis, log_size = _declared_basis(root, declared)
-    white = solve_triangular(root, residual, lower=True)
-    squares = white @ white - ((basis.T @ white) ** 2).sum()
-    return float(-0.5 * squares - np.log(np.diag(root)).sum() - log_size)
-
-
-def _declared_basis(root: np.ndarray, declared: np.ndarray) -> tuple[np.ndarray, float]:
-    """Whitened declared columns beside their priors, made orthonormal, (n, P) without the latter; half the log determinant."""
-    white = solve_triangular(root, declared, lower=True)
-    basis, triangle = np.linalg.qr(np.concatenate([white, np.eye(declared.shape[1])]))
-    return basis[: len(declared)], float(np.log(np.abs(np.diag(triangle))).sum())
-
-
-def _without(precision: np.ndarray, out: np.ndarray) -> np.ndarray:
-    """The inverse covariance of the rows without some, in whose place it is zero."""
-    left = precision - precision[:, out] @ np.linalg.solve(precision[np.ix_(out, out)], precision[out])
-    left[out], left[:, out] = 0.0, 0.0
-    return left
-
-
-def _pose_error(
-    rows: WhiteRows, pose_errors_rad: np.ndarray, covariance: np.ndarray, declared: np.ndarray, known: np.ndarray
-) -> np.ndarray:
-    """Covariance of the error common to a pose, at the size that makes the rows known most probable."""
-    residual, own = rows.residual.ravel()[known], rows.residual.shape[1]
-    jacobian, pose = rows.jacobian.reshape(len(known), -1), np.repeat(rows.pose, own)
-    common = (jacobian @ jacobian.T) * (pose[:, None] == pose)
-    best = (-np.inf, 0.0)
-    for tau in pose_errors_rad:
-        likely = _log_likelihood((covariance + tau**2 * common)[np.ix_(known, known)], declared[known], residual)
-        best = max(best, (likely, float(tau)))
-    return best[1] ** 2 * common
+        if distance[worst] <= limit * _robust_scale(distance, own, kept):
+            return ~kept
+        # The inverse covariance of the others, in which there is zero in its place.
+        kept[worst], out = False, slice(worst * own, (worst + 1) * own)
+        precision -= precision[:, out] @ np.linalg.solve(precision[out, out], precision[out])
+        precision[out], precision[:, out] = 0.0, 0.0
+    return np.zeros(observed, bool)
 
 
 def _deletion_distances(precision: np.ndarray, residual: np.ndarray, kept: np.ndarray, own: int) -> np.ndarray:
     """Length of the deletion residual of each observation that is kept, 0 of others, (M,)."""
-    blocks = np.where(kept[:, None, None], _blocks(precision, own), np.eye(own))
+    every = np.arange(len(kept))
+    blocks = precision.reshape(len(kept), own, len(kept), own)[every, :, every]
     along = (precision @ residual).reshape(-1, own, 1)
-    squares = (along * np.linalg.solve(blocks, along)).sum(axis=(1, 2))
+    squares = (along * np.linalg.solve(np.where(kept[:, None, None], blocks, np.eye(own)), along)).sum(axis=(1, 2))
     return np.where(kept, np.sqrt(np.maximum(squares, 0.0)), 0.0)
-
-
-def _blocks(matrix: np.ndarray, own: int) -> np.ndarray:
-    """Blocks on the diagonal, ndarray (M, own, own)."""
-    every = np.arange(len(matrix) // own)
-    return matrix.reshape(len(every), own, len(every), own)[every, :, every]

@@ -21,8 +21,6 @@ from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.refit import Averaged, squares_beyond
 from elastocal.effects.catalogue import effects
 from elastocal.effects.protocol import Candidate, Parameter, Shape
-from elastocal.effects.sizes import lever_m
-from elastocal.fitting.linearization import effect_columns
 from elastocal.fitting.model import joint_compliances
 
 if TYPE_CHECKING:
@@ -33,7 +31,6 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.settings import Settings
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.noise import Noise
-    from elastocal.fitting.observations import Observations
     from elastocal.remainder.repeatable import Repeatable
 
 Location = tuple[int | str, ...]
@@ -45,9 +42,8 @@ _OF_THE_SETUP = "drift"
 _TELLING = 1e-3
 # Standard errors beyond which a value is taken at its word, and times the plausible size that no machine reaches.
 _SURE, _IMPLAUSIBLE = 2.0, 3.0
-# Units of masses and first moments, and of their products with a compliance; what of an entry goes with them.
-_OF_MASS = {"kg": "rad kg/(N m)", "kg m": "rad kg m/(N m)"}
-_SCALED = ("value", "std_error", "prior_std")
+# Units of masses and first moments.
+_OF_MASS = ("kg", "kg m")
 
 
 @dataclass(frozen=True)
@@ -62,11 +58,6 @@ class Hypothesis:
     def named(self) -> tuple[str, ...]:
         """Its mechanisms of the catalogue."""
         return tuple(name for name in self.mechanisms if name != OTHER)
-
-    @property
-    def kind(self) -> str:
-        """Verdict to which it belongs: nothing of the catalogue, one mechanism of some, or more than one."""
-        return (UNEXPLAINED, CLASS)[len(self.named)] if len(self.named) < 2 else SEVERAL
 
 
 @dataclass(frozen=True)
@@ -122,13 +113,13 @@ def concluded(problem: Problem, posterior: Posterior, alarm: Alarm) -> Conclusio
     if not alarm.raised:
         return Conclusion(ADEQUATE, hypotheses, nothing, {}, mechanisms, nothing.probability)
     # The alarm has decided that something is missing; the posterior says what: first how many mechanisms, then which.
-    there = [h for h in hypotheses if h.mechanisms]
-    kinds = (UNEXPLAINED, CLASS, SEVERAL)
-    kind = max(kinds, key=lambda kind: sum(h.probability for h in there if h.kind == kind))
-    best = next((h for h in there if h.kind == kind), nothing)
+    there, kinds = [h for h in hypotheses if h.mechanisms], (UNEXPLAINED, CLASS, SEVERAL)
+    of_kind = {kind: [h for h in there if min(len(h.named), 2) == number] for number, kind in enumerate(kinds)}
+    kind = max(kinds, key=lambda kind: sum(h.probability for h in of_kind[kind]))
+    best = next(iter(of_kind[kind]), nothing)
     sure, stated = _least_expected_loss([best, *(h for h in there if h != best)], problem.settings)
     if not stated or kind == UNEXPLAINED:
-        unknown = sum(h.probability for h in there if h.kind == UNEXPLAINED) + (0.0 if stated else nothing.probability)
+        unknown = sum(h.probability for h in of_kind[UNEXPLAINED]) + (0.0 if stated else nothing.probability)
         return Conclusion(UNEXPLAINED, hypotheses, best if stated else nothing, {}, mechanisms, unknown)
     named = sure and kind == CLASS and OTHER not in best.mechanisms
     alternatives = {name: () if named else _instead_of(name, best, stated) for name in best.named}
@@ -161,32 +152,29 @@ def _least_expected_loss(ranked: Sequence[Hypothesis], settings: Settings) -> tu
 def hypotheses_of(problem: Problem, posterior: Posterior) -> tuple[Hypothesis, ...]:
     """Probability of each set of mechanisms, the most probable first; "nothing" is always among them."""
     found: dict[tuple[str, ...], tuple[float, int]] = {(): (0.0, -1)}
-    stated = zip(mechanisms_of_models(problem, posterior), posterior.probabilities, strict=True)
-    for number, (names, probability) in enumerate(stated):
+    for number, (model, probability) in enumerate(zip(posterior.models, posterior.probabilities.tolist(), strict=True)):
+        names = tuple(sorted(_acting(problem, model, probability)))
         held, best = found.get(names, (0.0, number))
-        found[names] = held + float(probability), number if best < 0 else best
+        found[names] = held + probability, number if best < 0 else best
     ranked = sorted(found.items(), key=lambda item: -item[1][0])
     return tuple(Hypothesis(names, probability, model) for names, (probability, model) in ranked)
 
 
-def mechanisms_of_models(problem: Problem, posterior: Posterior) -> list[tuple[str, ...]]:
-    """What each model says that acts, in the order of the names: its mechanisms, and something unknown beside a smooth error.
+def _acting(problem: Problem, model: Model, probability: float) -> set[str]:
+    """What a model says that acts: its mechanisms, and something unknown beside a smooth error.
 
     Neither is quite what the machine does: that counts as a part of the other which makes displacements that the other cannot
     make, but within the tolerance of laws. Nothing related to a mechanism acts where the smooth error is far larger.
     """
-    found, of_laws, of_unknown = [], problem.settings.law_tolerance**2, problem.settings.smooth_tolerance**2
-    for model, probability in zip(posterior.models, posterior.probabilities, strict=True):
-        names = {problem.units[unit].mechanism for unit in model.units}
-        known = names - {OTHER}
-        if known and known != names and probability > _TELLING:
-            (by_laws, beyond_unknown), (by_unknown, beyond_laws) = squares_beyond(problem, model, known)
-            if beyond_laws < of_laws * by_laws:
-                names = known
-            elif beyond_unknown < of_laws * by_unknown or by_laws < of_unknown * by_unknown:
-                names = {OTHER}
-        found.append(tuple(sorted(names)))
-    return found
+    names = {problem.units[unit].mechanism for unit in model.units}
+    known = names - {OTHER}
+    if not known or known == names or probability <= _TELLING:
+        return names
+    of_laws, of_unknown = problem.settings.law_tolerance**2, problem.settings.smooth_tolerance**2
+    (by_laws, beyond_unknown), (by_unknown, beyond_laws) = squares_beyond(problem, model, known)
+    if beyond_laws < of_laws * by_laws:
+        return known
+    return {OTHER} if beyond_unknown < of_laws * by_unknown or by_laws < of_unknown * by_unknown else names
 
 
 def locations_of(problem: Problem, model: Model, mechanism: str) -> list[Location]:
@@ -206,17 +194,9 @@ def location_probabilities(problem: Problem, posterior: Posterior, mechanism: st
 
 def _instead_of(name: str, best: Hypothesis, credible: Iterable[Hypothesis]) -> tuple[str, ...]:
     """What stands instead of one mechanism in the other credible hypotheses."""
-    rest = set(best.mechanisms) - {name}
-    found: list[str] = []
-    for hypothesis in credible:
-        others = set(hypothesis.mechanisms) - rest
-        if hypothesis != best and name not in others:
-            found += [other for other in hypothesis.mechanisms if other in others and other not in found]
-        if hypothesis != best and others == {name, OTHER} and OTHER not in found:
-            found.append(OTHER)
-    if OTHER in best.mechanisms and OTHER not in found:
-        found.append(OTHER)
-    return tuple(found)
+    each = [[other for other in h.mechanisms if other == name or other not in best.mechanisms] for h in credible if h != best]
+    instead = [other for others in each if name not in others or {*others} == {name, OTHER} for other in others]
+    return tuple(dict.fromkeys(other for other in (*instead, *{OTHER}.intersection(best.mechanisms)) if other != name))
 
 
 def contradictions(final: Fit, measured: Noise, settings: Settings) -> list[str]:
@@ -273,31 +253,24 @@ def probability_facts(found: Evidence) -> dict[str, Any]:
     Returns ``nothing``, ``stated``: that of what the verdict leaves open, ``alarm_p_value``, ``mechanisms`` by name, and
     ``sets`` of mechanisms with the locations of their most probable model.
     """
-    problem, hypotheses = found.linearized.problem, found.conclusion.hypotheses
-    listed = [(h, found.posterior.models[h.model]) for h in hypotheses if h.probability >= _TELLING]
-    sets = [
-        {
-            "mechanisms": list(h.mechanisms),
-            "probability": h.probability,
-            "locations": {
-                name: [location_words(name, at) for at in locations_of(problem, model, name)] for name in h.mechanisms
-            },
-        }
-        for h, model in listed
-    ]
+    problem, conclusion, models, sets = found.linearized.problem, found.conclusion, found.posterior.models, []
+    for each in (h for h in conclusion.hypotheses if h.probability >= _TELLING):
+        where = {name: locations_of(problem, models[each.model], name) for name in each.mechanisms}
+        said = {name: [location_words(name, at) for at in locations] for name, locations in where.items()}
+        sets.append({"mechanisms": list(each.mechanisms), "probability": each.probability, "locations": said})
     return {
-        "nothing": next(h.probability for h in hypotheses if not h.mechanisms),
-        "stated": found.conclusion.probability,
+        "nothing": next(h.probability for h in conclusion.hypotheses if not h.mechanisms),
+        "stated": conclusion.probability,
         "alarm_p_value": found.alarm.p_value,
-        "mechanisms": {name: value for name, value in found.conclusion.mechanisms.items() if value >= _TELLING},
+        "mechanisms": {name: value for name, value in conclusion.mechanisms.items() if value >= _TELLING},
         "sets": sets,
     }
 
 
-def effect_entries(found: Evidence, final: Fit, averages: Averaged, observations: Observations) -> list[dict[str, Any]]:
+def effect_entries(found: Evidence, final: Fit, averages: Averaged) -> list[dict[str, Any]]:
     """Entries of the effects found, those of the most probable mechanisms first.
 
-    `final`: of the most probable model. `averages`: what the other models add to it. `observations`: to which it was fitted.
+    `final`: of the most probable model. `averages`: what the other models add to it.
     """
     problem, conclusion = found.linearized.problem, found.conclusion
     numbers = found.posterior.models[conclusion.best.model].units if conclusion.best.named else ()
@@ -319,7 +292,7 @@ def effect_entries(found: Evidence, final: Fit, averages: Averaged, observations
                     for at, value in where.items()
                     if value >= _TELLING
                 ],
-                "parameters": sag_entries(name, members, final, observations) + values,
+                "parameters": values,
                 "p_value": found.alarm.p_value,
                 "heldout_gain": None,
                 "alternatives": list(conclusion.alternatives[name]),
@@ -332,13 +305,13 @@ def effect_entries(found: Evidence, final: Fit, averages: Averaged, observations
 def parameter_entries(member: Candidate, final: Fit, averages: Averaged) -> list[dict[str, Any]]:
     """Parameters and shapes of one candidate in a fit.
 
-    Where the compliances are those of the robot file a mass is given as its product with that of the joint that it turns most,
-    which measurements tell.
+    Where the compliances are those of the robot file no mass is identifiable: measurements tell the product of both alone.
     """
     effect = next(effect for effect in final.model.effects if effect.key == member.key)
     mine, values = final.places_of(member.key), np.concatenate(final.values_of(member.key))
     unknowns: list[Parameter | Shape] = [*effect.parameters, *effect.shapes]
-    entries = [
+    as_masses = final.model.identifies_compliance or member.family != "gravity"
+    return [
         {
             "name": f"{member.key} {parameter.name}",
             "value": float(value) + averages.shift.get((member.key, parameter.name), 0.0),
@@ -346,43 +319,14 @@ def parameter_entries(member: Candidate, final: Fit, averages: Averaged) -> list
             "unit": parameter.unit,
             "prior_std": getattr(parameter, "prior_std", None),
             "held": bool(final.held[index]),
-            "identifiable": not final.held[index] and (member.key, parameter.name) not in averages.of_prior,
+            "identifiable": not final.held[index]
+            and (member.key, parameter.name) not in averages.of_prior
+            and (as_masses or parameter.unit not in _OF_MASS),
         }
         # Where a shape has no slope, such as the row of a step, a search has chosen it.
         | ({"shape": True, "identifiable": True} if isinstance(parameter, Shape) else {})
         for parameter, value, index in zip(unknowns, values, mine, strict=True)
     ]
-    as_masses = final.model.identifies_compliance or member.family != "gravity"
-    return entries if as_masses else [_product(entry, final) if entry["unit"] in _OF_MASS else entry for entry in entries]
-
-
-def _product(entry: dict[str, Any], final: Fit) -> dict[str, Any]:
-    """The entry of a mass, or of a first moment, times the compliance of the joint that a weight at the end turns most."""
-    sites, compliance = final.model.sites, final.model.nominal_compliance
-    turned = [c * lever_m(sites, j) if sites.carried_links(j) else 0.0 for j, c in enumerate(compliance)]
-    joint = int(np.argmax(turned))
-    owner, name = entry["name"].rsplit(" ", 1)
-    scaled = {key: None if entry[key] is None else float(compliance[joint] * entry[key]) for key in _SCALED}
-    return entry | scaled | {"name": f"{owner} compliance_of_joint_{joint + 1}_times_{name}", "unit": _OF_MASS[entry["unit"]]}
-
-
-def sag_entries(name: str, members: Sequence[Candidate], final: Fit, observations: Observations) -> list[dict[str, Any]]:
-    """How far an effect's weight, at all its locations, lets a target sag at most, m, where no masses are identified.
-
-    Its standard error is by the delta method. Returns one entry; none where the effect is not of gravity.
-    """
-    if members[0].family != "gravity" or final.model.identifies_compliance or final.joint_jacobian is None:
-        return []
-    jacobian = final.joint_jacobian[:, :3]
-    columns = effect_columns([(m, ()) for m in members], final.conditions_of(observations.states), jacobian, observations.state)
-    mine = np.concatenate([final.places_of(member.key) for member in members])
-    sag = columns @ np.concatenate([final.values_of(member.key)[0] for member in members])
-    most = int(np.argmax((sag**2).sum(axis=1)))
-    size = float(np.linalg.norm(sag[most]))
-    along = sag[most] @ columns[most] / max(size, np.finfo(float).tiny)
-    error = float(np.sqrt(along @ final.covariance[np.ix_(mine, mine)] @ along))
-    found = {"name": f"{name} largest_sag", "value": size, "std_error": error, "unit": "m", "prior_std": None}
-    return [found | {"held": False, "identifiable": True}]
 
 
 def fault_entry(fault: Fault) -> dict[str, Any]:
@@ -413,22 +357,15 @@ def _estimates(final: Fit, effect: Candidate) -> Iterator[tuple[float, float, Pa
         yield value, error, parameter, bool(abs(value) > _IMPLAUSIBLE * parameter.plausible + _SURE * error)
 
 
-def implausible(final: Fit, entries: Iterable[Mapping[str, Any]], rated_kg: float | None = None) -> list[str]:
-    """Warnings of parameters of `effect_entries` that nature does not allow.
-
-    `rated_kg`: payload for which the robot is rated; looked at where compliances are identified, without which no mass is.
-    """
+def implausible(final: Fit, entries: Iterable[Mapping[str, Any]]) -> list[str]:
+    """Warnings of parameters of `effect_entries` that nature does not allow."""
     fitted = {effect.key: effect for effect in final.model.effects}
     found = []
     for key in [key for entry in entries for key in entry["members"]]:
         for value, error, parameter, too_large in _estimates(final, fitted[key]):
-            size = f"{value:.3g} ± {error:.2g} {parameter.unit}"
+            size = f"{key}: {parameter.name} is {value:.3g} ± {error:.2g} {parameter.unit}"
             if parameter.sign * value < -_SURE * error:
-                needed = "positive" if parameter.sign > 0 else "negative"
-                found.append(f"{key}: {parameter.name} is {size}, and by its physics {needed}")
+                found.append(f"{size}, and by its physics {'positive' if parameter.sign > 0 else 'negative'}")
             if too_large:
-                found.append(f"{key}: {parameter.name} is {size}, more than {_IMPLAUSIBLE:g} times what such an effect reaches")
-            carried = parameter.carried and final.model.identifies_compliance
-            if rated_kg is not None and carried and value - _SURE * error > rated_kg:
-                found.append(f"{key}: {parameter.name} is {size}, beyond the rated payload of {rated_kg:g} kg")
+                found.append(f"{size}, more than {_IMPLAUSIBLE:g} times what such an effect reaches")
     return found
