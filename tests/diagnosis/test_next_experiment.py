@@ -14,7 +14,7 @@ from elastocal.diagnosis.next_experiment import (
     DATA_AT_FAULT,
     NOT_DISTINGUISHABLE,
     NOTHING_AMBIGUOUS,
-    Rivals,
+    Pair,
     best_of,
     drawn,
     observations_at,
@@ -166,7 +166,7 @@ def test_posteriors_are_those_of_dense_generalized_least_squares_at_the_pose_err
         assert not found[without].any() and not spread[without].any()
 
 
-def made_rivals(rng, size=5):
+def made_pair(rng, size=5):
     """Two normal distributions of coefficients, of which each lacks one."""
     found = []
     for lacking in (0, 1):
@@ -178,27 +178,27 @@ def made_rivals(rng, size=5):
 
 def test_experiments_in_turn_separate_as_both_together_by_eight_bhattacharyya_distances():
     rng = np.random.default_rng(0)
-    one, other = made_rivals(rng)
+    one, other = made_pair(rng)
     A = rng.standard_normal((2, 3, 5))
     rows = A.reshape(6, 5)
     spreads = [np.eye(6) + rows @ C @ rows.T for _, C in (one, other)]
     middle, off = sum(spreads) / 2, rows @ (one[0] - other[0])
     log_dets = [np.linalg.slogdet(each)[1] for each in (middle, *spreads)]
     expected = off @ np.linalg.solve(middle, off) + 4 * log_dets[0] - 2 * log_dets[1] - 2 * log_dets[2]
-    rivals = Rivals.of(one, other)
-    assert rivals.gained(rows[None])[0] == pytest.approx(expected)
-    assert rivals.after(A[0]).after(A[1]).separation == pytest.approx(expected)
+    pairs = Pair.of(one, other)
+    assert pairs.gained(rows[None])[0] == pytest.approx(expected)
+    assert pairs.after(A[0]).after(A[1]).separation == pytest.approx(expected)
 
 
 def test_the_experiments_chosen_separate_the_nearest_by_more_than_random_ones():
     rng = np.random.default_rng(1)
-    first, second, third = (*made_rivals(rng), made_rivals(rng)[1])
-    rivals, rows = [Rivals.of(first, second), Rivals.of(first, third)], 0.3 * rng.standard_normal((40, 3, 5))
-    chosen, separations = best_of(rivals, np.ones(2), rows, 4)
+    first, second, third = (*made_pair(rng), made_pair(rng)[1])
+    pairs, rows = [Pair.of(first, second), Pair.of(first, third)], 0.3 * rng.standard_normal((40, 3, 5))
+    chosen, separations = best_of(pairs, np.ones(2), rows, 4)
     assert len(set(chosen)) == 4 and (np.diff(separations, axis=0) > 0).all()
-    np.testing.assert_allclose(separations[-1], [pair.gained(rows[chosen].reshape(1, 12, 5))[0] for pair in rivals])
+    np.testing.assert_allclose(separations[-1], [pair.gained(rows[chosen].reshape(1, 12, 5))[0] for pair in pairs])
     drawn_at_random = [rng.choice(40, 4, replace=False) for _ in range(50)]
-    others = [min(pair.gained(rows[some].reshape(1, 12, 5))[0] for pair in rivals) for some in drawn_at_random]
+    others = [min(pair.gained(rows[some].reshape(1, 12, 5))[0] for pair in pairs) for some in drawn_at_random]
     assert separations[-1].min() > np.quantile(others, 0.98)
 
 

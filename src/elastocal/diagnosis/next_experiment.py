@@ -117,7 +117,7 @@ def posteriors_of(
 
 
 @dataclass(frozen=True)
-class Rivals:
+class Pair:
     """Two hypotheses after some experiments.
 
     `apart` (U,): difference of their means. `covariances` (3, U, U): the mean of both, and each. `separation`: of what was
@@ -129,7 +129,7 @@ class Rivals:
     separation: float = 0.0
 
     @classmethod
-    def of(cls, one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray]) -> Rivals:
+    def of(cls, one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray]) -> Pair:
         """Of two normal distributions of the coefficients."""
         return cls(one[0] - other[0], np.array([(one[1] + other[1]) / 2, one[1], other[1]]))
 
@@ -140,20 +140,20 @@ class Rivals:
         squares = (off * np.linalg.solve(predicted[0], off)).sum(axis=(1, 2))
         return squares + np.array([4.0, -2.0, -2.0]) @ np.linalg.slogdet(predicted)[1]
 
-    def after(self, rows: np.ndarray) -> Rivals:
+    def after(self, rows: np.ndarray) -> Pair:
         """Both after one experiment (R, U), on average over what it may measure."""
         seen = rows @ self.covariances
         gain = np.linalg.solve(np.eye(len(rows)) + seen @ rows.T, seen).swapaxes(1, 2)
         separation = self.separation + float(self.gained(rows[None])[0])
-        return Rivals(self.apart - gain[0] @ (rows @ self.apart), self.covariances - gain @ seen, separation)
+        return Pair(self.apart - gain[0] @ (rows @ self.apart), self.covariances - gain @ seen, separation)
 
 
-def best_of(rivals: Sequence[Rivals], weights: np.ndarray, rows: np.ndarray, count: int) -> tuple[list[int], np.ndarray]:
+def best_of(pairs: Sequence[Pair], weights: np.ndarray, rows: np.ndarray, count: int) -> tuple[list[int], np.ndarray]:
     """So many experiments, each the best after those before it, and the separation of each pair after each, (count, pairs).
 
     `weights` (pairs,): of each pair in the bound. `rows` (E, R, U): of what is chosen from.
     """
-    chosen, separations, present = list[int](), [], list(rivals)
+    chosen, separations, present = list[int](), [], list(pairs)
     for _ in range(count):
         bound = weights @ np.exp([-(pair.separation + pair.gained(rows)) / 8.0 for pair in present])
         bound[chosen] = np.inf
@@ -193,11 +193,11 @@ def propose(diagnosis: Diagnosis, stream: np.random.Generator, poses: int = 10) 
     angles, wrench = drawn(states, campaign.robot, _DRAWN, stream)
     rows = whitened_rows(linearized, observations_at(model, states, angles, wrench), columns, models[0].pose_error_rad) / factor
     leading, *following = posteriors_of(linearized, columns, models, factor)
-    rivals = [Rivals.of(leading, each) for each in following]
+    pairs = [Pair.of(leading, each) for each in following]
     probabilities = np.array([each.probability for each in others])
-    chosen, separations = best_of(rivals, np.sqrt(kept[0].probability * probabilities), rows, poses)
+    chosen, separations = best_of(pairs, np.sqrt(kept[0].probability * probabilities), rows, poses)
     whole = np.sqrt(_MOST_POSES / poses) * rows[chosen].reshape(1, -1, rows.shape[-1])
-    reached = np.array([bool(resolved(pair.gained(whole)[0]) >= 0.5) for pair in rivals])
+    reached = np.array([bool(resolved(pair.gained(whole)[0]) >= 0.5) for pair in pairs])
     unreachable = [each.mechanisms for each, within in zip(others, reached, strict=True) if not within]
     # What is distinguishable from the best holds no more probability than is left open where nothing is ambiguous.
     left = kept[0].probability / (kept[0].probability + probabilities[reached].sum())

@@ -256,8 +256,8 @@ def probability_facts(found: Evidence) -> dict[str, Any]:
     problem, conclusion, models, sets = found.linearized.problem, found.conclusion, found.posterior.models, []
     for each in (h for h in conclusion.hypotheses if h.probability >= _TELLING):
         where = {name: locations_of(problem, models[each.model], name) for name in each.mechanisms}
-        said = {name: [location_words(name, at) for at in locations] for name, locations in where.items()}
-        sets.append({"mechanisms": list(each.mechanisms), "probability": each.probability, "locations": said})
+        words = {name: [location_words(name, at) for at in locations] for name, locations in where.items()}
+        sets.append({"mechanisms": list(each.mechanisms), "probability": each.probability, "locations": words})
     return {
         "nothing": next(h.probability for h in conclusion.hypotheses if not h.mechanisms),
         "stated": conclusion.probability,
