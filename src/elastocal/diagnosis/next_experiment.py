@@ -201,7 +201,7 @@ def propose(diagnosis: Diagnosis, stream: np.random.Generator, poses: int = 10) 
     unreachable = [each.mechanisms for each, within in zip(others, reached, strict=True) if not within]
     # What is distinguishable from the best holds no more probability than is left open where nothing is ambiguous.
     left = kept[0].probability / (kept[0].probability + probabilities[reached].sum())
-    if not reached.any() or left >= linearized.settings.credible:
+    if unreachable and left >= linearized.settings.credible:
         return _stated(campaign.robot, best, NOT_DISTINGUISHABLE, unreachable)
     nearest = int(np.argmin(np.where(reached, separations[-1], np.inf)))
     point = " ".join(dict.fromkeys(target.point for target in model.targets))
