@@ -42,6 +42,9 @@ if TYPE_CHECKING:
     from elastocal.fitting.model import Case, Estimate, Model
     from elastocal.fitting.noise import Noise
 
+    # What rows are judged by: noise of one row, and covariance of the parameters.
+    Yardstick = tuple[Noise, np.ndarray | None]
+
 # Shares of the distances from which the scale is estimated: the second sees tails that are heavier than normal ones.
 _SCALE_QUANTILES = (0.5, 0.75)
 # Least share of a row's variance that is its own and not that of the parameters fitted to it.
@@ -72,18 +75,11 @@ class Deviations:
         return cls(np.zeros((count, rows)), np.zeros(count), np.zeros(count, bool))
 
 
-@dataclass(frozen=True)
-class Yardstick:
-    """What rows are judged by: noise of one row, and covariance (P, P) of the parameters under it, None where negligible."""
-
-    noise: Noise
-    covariance: np.ndarray | None
-
-
 def yardstick_of(fitted: Fit, noise: Noise, rows: int) -> Yardstick:
-    """The noise that was declared or repeats show, and the error common to a pose that a fit to so many rows states."""
+    """The noise that was declared or repeats show, with the error common to a pose that a fit to so many rows states, and the
+    covariance (P, P) of its parameters under it, None where that is negligible."""
     under_it = (noise.position_m / fitted.noise.position_m) ** 2 * fitted.covariance
-    return Yardstick(replace(noise, pose_rad=fitted.noise.pose_rad), under_it if rows <= _MOST and under_it.size else None)
+    return replace(noise, pose_rad=fitted.noise.pose_rad), under_it if rows <= _MOST and under_it.size else None
 
 
 def _beside(
@@ -95,7 +91,7 @@ def _beside(
     very many rows those at poses spread over all are looked at closely, and what is as far off as a quarter of these; others
     have their whole distance in standard deviations of the sensor.
     """
-    single, noise, covariance = single_observations(measurements), yardstick.noise, yardstick.covariance
+    (noise, covariance), single = yardstick, single_observations(measurements)
     near, residual = spread_poses(single, _MOST), np.empty((len(single), model.rows))
     for _, seen, part in parts_of(single, 0):
         residual[seen] = residuals(model, estimate, part, conditions(model, estimate, part.states))
@@ -171,7 +167,7 @@ def held_out_gross_errors(
     """
     (model, estimate), measurements = there, held_out.campaign.measurements
     if model is not fitted.model or estimate is not fitted.estimate:
-        yardstick = replace(yardstick, covariance=None)
+        yardstick = yardstick[0], None
     every = np.ones(len(measurements), bool)
     residual, distance = _beside(model, estimate, measurements, yardstick, ~every)
     distance, gross = beyond_chance(distance, model.rows, every, settings)
@@ -259,12 +255,9 @@ def first_kept(case: Case, settings: Settings) -> Kept:
     """
     measurements, candidates = case.campaign.measurements, list(case.candidates.values())
     pulling = extreme_loads(measurements, settings)
-    whole = part = fitted_to(case, ~pulling, settings)
-    for _ in range(settings.gross_error_rounds):
-        errors = gross_errors(part.declared, part.noise, measurements, part.kept, settings)
-        last, part = part, fitted_to(case, ~errors.gross, settings, part)
-        if part is last:
-            break
+    whole = fitted_to(case, ~pulling, settings)
+    errors = gross_errors(whole.declared, whole.noise, measurements, whole.kept, settings)
+    part = fitted_to(case, ~errors.gross, settings, whole)
     observations, most = case.observations, settings.gross_start_numbers // case.model.rows
     few = spread_poses(observations, most)
     if part is whole and not few.all():
