@@ -20,7 +20,7 @@ from elastocal.effects.catalogue import effects
 from elastocal.fitting.least_squares import ON_THE_WAY, SETTLED, fit
 from elastocal.fitting.model import Case, joint_compliances, parameter_values
 from elastocal.fitting.noise import noise_facts
-from elastocal.fitting.observations import Observations
+from elastocal.fitting.observations import Observations, sample_of
 from elastocal.fitting.tolerances import effective_parameters
 from elastocal.random_streams import stream
 from elastocal.remainder.repeatable import Repeatable, repeatable_part
@@ -96,18 +96,25 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         case = replace(case, model=part.case.model)
     tell(f"declared model fitted to {counted(len(part.case.observations), 'measurement')}")
     found: Evidence | None = None
-    about, most_pose_error_rad = part.declared, np.inf
+    about, start, most_pose_error_rad = part.declared, None, np.inf
     measurements, errors = case.campaign.measurements, Deviations.none(len(part.kept), case.model.rows)
     good = np.zeros(len(part.kept), bool)
     for number in range(0 if decisive else settings.gross_error_rounds):
         if not found:
-            found = _explained(part, settings, seed, tell, most_pose_error_rad)
+            found = _explained(part, settings, seed, tell, start, most_pose_error_rad)
             about = found.fitted
         errors = gross_errors(about, part.noise, measurements, part.kept, settings)
         # A row that a model without it explains stays, whatever the next model says of it: no set of rows comes back.
         good |= ~part.kept & ~errors.gross
-        if number + 1 == settings.gross_error_rounds:
+        remaining = ~errors.gross | good
+        if (remaining == part.kept).all() or number + 1 == settings.gross_error_rounds:
             break
+        # The model found looks at all rows once more, without these, before another search is made.
+        like = None if (remaining & ~part.kept).any() else part.searched
+        some = sample_of(case.select(remaining).observations, settings.searched_observations, like)
+        about = fit(about.model, some, about.noise, about.estimate, True, ON_THE_WAY)
+        errors = gross_errors(about, part.noise, measurements, remaining, settings)
+        good |= ~remaining & ~errors.gross
         last, part = part, fitted_to(case, ~errors.gross | good, settings, part)
         if part is last:
             break
@@ -119,6 +126,9 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
                 # Rows of so little weight that the search would find the same.
                 about = again
                 continue
+        # What was linearised about a model found is so again: from the declared one the way is the same and twice as long.
+        relinearized = len(found.linearized.about.model.effects) > len(part.declared.model.effects)
+        start = (about, found.conclusion.best.named) if relinearized else None
         most_pose_error_rad = found.linearized.most_pose_error_rad
         # Its statistics make room for those of the next search.
         found = None
@@ -185,18 +195,28 @@ def _losses(bare: Fit, models: Sequence[Fit], observations: Observations, settin
     return found if found[-1] else []
 
 
-def _explained(part: Kept, settings: Settings, seed: int, tell: Callable[[str], None], most_pose_error_rad: float) -> Evidence:
+def _explained(
+    part: Kept,
+    settings: Settings,
+    seed: int,
+    tell: Callable[[str], None],
+    start: tuple[Fit, tuple[str, ...]] | None,
+    most_pose_error_rad: float,
+) -> Evidence:
     """Evidence about the declared model, and again about the model found where that, or its noise, is far from it.
 
-    What an error common to the measurements of a pose takes beyond what robots repeat to must be chance: where it is a function
-    of the joints no more of it is thought of. And where what is left is one, the search goes on about each model that is new.
+    At once about a model, with the mechanisms that it has beyond the declared one, where the search is to ``start``. What an
+    error common to the measurements of a pose takes beyond what robots repeat to must be chance: where it is a function of the
+    joints no more of it is thought of. And where what is left is one, the search goes on about each model that is new.
     """
     candidates, searched, declared = list(part.case.candidates.values()), part.searched, part.declared
-    about, before = declared, tuple[str, ...]()
+    about, before = start or (declared, None)
     tested: tuple[Fit, Repeatable | None] | None = None
     # The fit to all measurements starts where that to some ends.
     enough = SETTLED if searched is part.case.observations else ON_THE_WAY
-    for round_number in range(settings.linearizations):
+    if start:
+        about = fit(about.model, searched, about.noise, about.estimate, True, ON_THE_WAY)
+    for round_number in range(1 if start else 0, settings.linearizations):
         problem, near = linearized(about, searched, candidates, settings, most_pose_error_rad), about if before else None
         nothing, alone = initial_screening(problem.problem)
         draws = stream(seed, part.case.campaign.name, "null distribution", round_number)
