@@ -20,7 +20,7 @@ from elastocal.counting import counted
 from elastocal.diagnosis.evidence import Grid
 from elastocal.diagnosis.linearize import Linearized, linearized
 from elastocal.fitting.least_squares import evaluated, fit
-from elastocal.fitting.linearization import linearize
+from elastocal.fitting.linearization import Linearization, linearize
 from elastocal.fitting.model import conditions, parameters, residuals
 from elastocal.fitting.noise import Noise, measurement_covariances
 from elastocal.fitting.observations import (
@@ -39,17 +39,17 @@ if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
     from elastocal.diagnosis.settings import Settings
     from elastocal.fitting.least_squares import Fit
+    from elastocal.fitting.linearization import Linearization
     from elastocal.fitting.model import Case, Estimate, Model
     from elastocal.fitting.noise import Noise
-
-    # What rows are judged by: noise of one row, and covariance of the parameters.
-    Yardstick = tuple[Noise, np.ndarray | None]
 
 # Shares of the distances from which the scale is estimated: the second sees tails that are heavier than normal ones.
 _SCALE_QUANTILES = (0.5, 0.75)
 # Least share of a row's variance that is its own and not that of the parameters fitted to it.
 _LEAST_OWN = 0.01
-# Rows that are looked at closely at most, if not far off; more determine the parameters so well that one hardly counts.
+# Shares of the error common to a pose that a fit states.
+_POSE_SHARES = (0.0, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)
+# Rows of which the scale is estimated at most, to a percent; more determine the parameters so well that one hardly counts.
 _MOST = 4_000
 # Extrapolated rows of which the usual error is known.
 _FEWEST_TO_COMPARE = 5
@@ -75,46 +75,107 @@ class Deviations:
         return cls(np.zeros((count, rows)), np.zeros(count), np.zeros(count, bool))
 
 
-def yardstick_of(fitted: Fit, noise: Noise, rows: int) -> Yardstick:
-    """The noise that was declared or repeats show, with the error common to a pose that a fit to so many rows states, and the
-    covariance (P, P) of its parameters under it, None where that is negligible."""
-    under_it = (noise.position_m / fitted.noise.position_m) ** 2 * fitted.covariance
-    return replace(noise, pose_rad=fitted.noise.pose_rad), under_it if rows <= _MOST and under_it.size else None
+@dataclass(frozen=True)
+class Yardstick:
+    """What rows are judged by: noise of one row, and covariance (P, P) of the parameters under it, None where negligible."""
+
+    noise: Noise
+    covariance: np.ndarray | None
 
 
-def _beside(
-    model: Model, estimate: Estimate, measurements: Measurements, yardstick: Yardstick, fitted: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Residuals (N, rows), and distances from the prediction by the other rows in standard deviations, (N,).
+@dataclass(frozen=True)
+class _Beside:
+    """Rows of measurements beside a model, of which a sample and all that lie far off are looked at closely.
 
-    ``fitted`` says which rows the parameters were fitted to, (N,): residuals of these are smaller, those of others larger. Of
-    very many rows those at poses spread over all are looked at closely, and what is as far off as a quarter of these; others
-    have their whole distance in standard deviations of the sensor.
+    `residual` (N, rows). `far` (N,): whole distance in standard deviations of the sensor. `sample`, `closely` (N,): poses
+    spread over those kept; these, and what is as far off as a quarter of all. `parts`: which of the latter; their
+    linearisation; variance (m, rows, rows) of each, and that of a radian in each joint. `noise`: of one row.
     """
-    (noise, covariance), single = yardstick, single_observations(measurements)
-    near, residual = spread_poses(single, _MOST), np.empty((len(single), model.rows))
-    for _, seen, part in parts_of(single, 0):
-        residual[seen] = residuals(model, estimate, part, conditions(model, estimate, part.states))
-    distance = np.linalg.norm(residual / np.repeat([noise.position_m, noise.orientation_rad], 3)[: model.rows], axis=1)
-    closely = near | (distance > np.quantile(distance[near], _SCALE_QUANTILES[-1]))
-    found = np.empty(closely.sum())
-    for _, seen, part in parts_of(select_states(single, closely), len(parameters(model, estimate))):
-        line, spread = linearize(model, estimate, part, conditions(model, estimate, part.states)), noise.spread(part)
-        jacobian = line.joint_jacobian
-        spread = None if spread is None else spread[:, None]
-        own = measurement_covariances(noise.of_measurements, jacobian[:, None], model.rows, spread)
-        white = np.linalg.inv(np.linalg.cholesky(own + noise.pose_rad**2 * jacobian @ jacobian.transpose(0, 2, 1)))
-        off, matrix = white @ line.residual[..., None], np.tile(np.eye(model.rows), (len(white), 1, 1))
-        if covariance is not None:
-            mine, rows = fitted[closely][seen], white @ line.sensitivities
-            share = (rows.reshape(-1, len(covariance)) @ covariance).reshape(rows.shape) @ rows.transpose(0, 2, 1)
-            matrix += np.where(mine, -1.0, 1.0)[:, None, None] * share
-            least = mine & (np.trace(share, axis1=1, axis2=2) > 1.0 - _LEAST_OWN)
-            values, axes = np.linalg.eigh(matrix[least])
-            matrix[least] = (axes * np.maximum(values, _LEAST_OWN)[:, None]) @ axes.transpose(0, 2, 1)
-        found[seen] = np.sqrt((off * np.linalg.solve(matrix, off)).sum(axis=(1, 2)))
-    distance[closely] = found
-    return residual, distance
+
+    residual: np.ndarray
+    far: np.ndarray
+    sample: np.ndarray
+    closely: np.ndarray
+    parts: list[tuple[slice, Linearization, np.ndarray, np.ndarray]]
+    noise: Noise
+
+    @classmethod
+    def of(cls, model: Model, estimate: Estimate, measurements: Measurements, noise: Noise, kept: np.ndarray) -> _Beside:
+        single, sample = single_observations(measurements), kept.copy()
+        sample[kept] = spread_poses(select_states(single, kept), _MOST)
+        near, residual = spread_poses(single, _MOST), np.empty((len(single), model.rows))
+        for _, seen, part in parts_of(single, 0):
+            residual[seen] = residuals(model, estimate, part, conditions(model, estimate, part.states))
+        far = np.linalg.norm(residual / np.repeat([noise.position_m, noise.orientation_rad], 3)[: model.rows], axis=1)
+        closely = near | sample | (far > np.quantile(far[near], _SCALE_QUANTILES[-1]))
+        some, parts = select_states(single, closely), []
+        for _, seen, part in parts_of(some, len(parameters(model, estimate))):
+            line, spread = linearize(model, estimate, part, conditions(model, estimate, part.states)), noise.spread(part)
+            jacobian = line.joint_jacobian
+            own = measurement_covariances(noise, jacobian[:, None], model.rows, None if spread is None else spread[:, None])
+            parts.append((seen, line, own, jacobian @ jacobian.transpose(0, 2, 1)))
+        return cls(residual, far, sample, closely, parts, noise)
+
+    def yardstick(self, fitted: Fit, kept: np.ndarray) -> Yardstick:
+        """As `yardstick_of`, by the rows that were fitted, (N,) of bool."""
+        free, mine, rows = ~fitted.held, self.sample[self.closely], fitted.model.rows
+        negligible = self.sample.sum() < kept.sum() or not free.any()
+        sizes = np.array([p.plausible for _, p in fitted.parameters])[free]
+        best = (np.inf, Yardstick(self.noise, None))
+        for share in _POSE_SHARES if fitted.noise.pose_rad else (0.0,):
+            covariance, white = None, self._white(share * fitted.noise.pose_rad)
+            if not negligible:
+                information = np.diag((sizes / fitted.prior_std[free]) ** 2)
+                for (seen, line, _, _), each in zip(self.parts, white, strict=True):
+                    seen_by = (each @ (line.sensitivities[..., free] * sizes))[mine[seen]].reshape(-1, len(sizes))
+                    information += seen_by.T @ seen_by
+                covariance = np.zeros((len(free), len(free)))
+                covariance[np.ix_(free, free)] = np.linalg.pinv(information, hermitian=True) * np.outer(sizes, sizes)
+            distance = self._distances(white, covariance, np.ones(len(mine), bool))[mine]
+            volume = -np.concatenate([np.log(np.diagonal(each, axis1=1, axis2=2)).sum(axis=1) for each in white])[mine].mean()
+            # Rows do not scatter less than the noise that is known of them: a share that says so is too large.
+            spread = volume + rows * np.log(max(np.median(distance) / np.sqrt(2 * gammaincinv(rows / 2, 0.5)), 1.0))
+            found = Yardstick(replace(self.noise, pose_rad=share * fitted.noise.pose_rad), covariance)
+            best = min(best, (spread, found), key=lambda each: each[0])
+        return best[1]
+
+    def distances(self, yardstick: Yardstick, fitted: np.ndarray) -> np.ndarray:
+        """From the prediction by the other rows, in standard deviations, (N,); `far` where nothing looks closely.
+
+        ``fitted`` says which rows the parameters were fitted to, (N,): residuals of these are smaller, those of others larger.
+        """
+        found, white = self.far.copy(), self._white(yardstick.noise.pose_rad)
+        found[self.closely] = self._distances(white, yardstick.covariance, fitted[self.closely])
+        return found
+
+    def _white(self, pose_rad: float) -> list[np.ndarray]:
+        return [np.linalg.inv(np.linalg.cholesky(own + pose_rad**2 * common)) for _, _, own, common in self.parts]
+
+    def _distances(self, white: list[np.ndarray], covariance: np.ndarray | None, fitted: np.ndarray) -> np.ndarray:
+        found = np.empty(len(fitted))
+        for (seen, line, _, _), each in zip(self.parts, white, strict=True):
+            off = each @ line.residual[..., None]
+            matrix = np.tile(np.eye(each.shape[1]), (len(each), 1, 1))
+            if covariance is not None:
+                rows = each @ line.sensitivities
+                share = (rows.reshape(-1, len(covariance)) @ covariance).reshape(rows.shape) @ rows.transpose(0, 2, 1)
+                matrix += np.where(fitted[seen], -1.0, 1.0)[:, None, None] * share
+                own = fitted[seen] & (np.trace(share, axis1=1, axis2=2) > 1.0 - _LEAST_OWN)
+                values, axes = np.linalg.eigh(matrix[own])
+                matrix[own] = (axes * np.maximum(values, _LEAST_OWN)[:, None]) @ axes.transpose(0, 2, 1)
+            found[seen] = np.sqrt((off * np.linalg.solve(matrix, off)).sum(axis=(1, 2)))
+        return found
+
+
+def yardstick_of(fitted: Fit, noise: Noise, measurements: Measurements) -> Yardstick:
+    """What the rows that a model was fitted to say of themselves, beside the noise that was declared or repeats show.
+
+    Of the error common to a pose that the fit states the share counts that makes the generalized variance of most rows smallest
+    (an S-estimate; Davies, Annals of Statistics 1987): the rest may be that of the very errors that are looked for, or of a law
+    that is not linear.
+    """
+    every = np.ones(len(measurements), bool)
+    return _Beside.of(fitted.model, fitted.estimate, measurements, noise, every).yardstick(fitted, every)
 
 
 def beyond_chance(distance: np.ndarray, rows: int, kept: np.ndarray, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
@@ -152,9 +213,9 @@ def most_by_chance(count: int, rows: int, settings: Settings, freedom: float = n
 
 def gross_errors(fitted: Fit, noise: Noise, measurements: Measurements, kept: np.ndarray, settings: Settings) -> Deviations:
     """Judge the rows of a campaign by a fit to those that are ``kept``, (N,), and the noise declared or shown by repeats."""
-    yardstick = yardstick_of(fitted, noise, kept.sum())
-    residual, distance = _beside(fitted.model, fitted.estimate, measurements, yardstick, kept)
-    return Deviations(residual, *beyond_chance(distance, fitted.model.rows, kept, settings))
+    rows = _Beside.of(fitted.model, fitted.estimate, measurements, noise, kept)
+    distance = rows.distances(rows.yardstick(fitted, kept), kept)
+    return Deviations(rows.residual, *beyond_chance(distance, fitted.model.rows, kept, settings))
 
 
 def held_out_gross_errors(
@@ -165,17 +226,18 @@ def held_out_gross_errors(
     Where a prediction is extrapolated, ``outside`` (N,), the model errs first: such a row has to be farther off, and farther
     than most of them.
     """
-    (model, estimate), measurements = there, held_out.campaign.measurements
+    model, estimate = there
+    measurements = held_out.campaign.measurements
     if model is not fitted.model or estimate is not fitted.estimate:
-        yardstick = yardstick[0], None
+        yardstick = replace(yardstick, covariance=None)
     every = np.ones(len(measurements), bool)
-    residual, distance = _beside(model, estimate, measurements, yardstick, ~every)
-    distance, gross = beyond_chance(distance, model.rows, every, settings)
+    rows = _Beside.of(model, estimate, measurements, yardstick.noise, every)
+    distance, gross = beyond_chance(rows.distances(yardstick, ~every), model.rows, every, settings)
     least = settings.extrapolated_error
     if outside.sum() >= _FEWEST_TO_COMPARE:
         least = max(least, float(np.median(distance[outside])) / np.sqrt(2 * gammaincinv(model.rows / 2, 0.5)))
     far = distance > least * most_by_chance(len(distance), model.rows, settings)
-    return Deviations(residual, distance, gross & (far | ~outside))
+    return Deviations(rows.residual, distance, gross & (far | ~outside))
 
 
 def entries_of(found: Deviations, campaign: Campaign, held_out: bool) -> list[dict[str, Any]]:
@@ -255,9 +317,12 @@ def first_kept(case: Case, settings: Settings) -> Kept:
     """
     measurements, candidates = case.campaign.measurements, list(case.candidates.values())
     pulling = extreme_loads(measurements, settings)
-    whole = fitted_to(case, ~pulling, settings)
-    errors = gross_errors(whole.declared, whole.noise, measurements, whole.kept, settings)
-    part = fitted_to(case, ~errors.gross, settings, whole)
+    whole = part = fitted_to(case, ~pulling, settings)
+    for _ in range(settings.gross_error_rounds):
+        errors = gross_errors(part.declared, part.noise, measurements, part.kept, settings)
+        last, part = part, fitted_to(case, ~errors.gross, settings, part)
+        if part is last:
+            break
     observations, most = case.observations, settings.gross_start_numbers // case.model.rows
     few = spread_poses(observations, most)
     if part is whole and not few.all():

@@ -107,7 +107,7 @@ def without_gross_errors(diagnosis: Diagnosis, held_out: Case) -> tuple[Deviatio
     if data_at_fault(diagnosis.document):
         return errors, part, poses
     settings, noise = Settings(), noise_from(diagnosis.document).of_measurements
-    yardstick = yardstick_of(final, noise, len(diagnosis.case.campaign.measurements))
+    yardstick = yardstick_of(final, noise, diagnosis.case.campaign.measurements)
     outside = poses[state_clusters(measurements)]
     for _ in range(settings.gross_error_rounds):
         # Frames of another campaign are fitted to what is kept of it.
