@@ -81,7 +81,6 @@ def test_units_of_the_catalogue_have_columns_of_their_own_that_share_out_all(cat
     assert len({unit.place for unit in against}) == len(laws)
     # Their kinds are equally likely, however many locations each has.
     assert np.exp([unit.log_prior for unit in against]) == pytest.approx(len(laws) / 3 / np.array([2, 1, 1, 2]))
-    assert len({unit.key for unit in units}) == len(units)
 
 
 FEATURES = 40

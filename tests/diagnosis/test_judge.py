@@ -110,7 +110,6 @@ def test_a_step_that_makes_predictions_worse_is_a_warning(made):
     worse = bare, replace(declared, fitted=final.fitted), replace(final, fitted=declared.fitted)
     said = about_errors(judged(worse, case, held_out))
     assert any(warning.startswith("the RMS error of the validation poses grew from") for warning in said)
-    assert said[-1] == "the step 'with joint_offset' raised the RMS error of the validation poses"
 
 
 def test_poses_outside_the_fitted_range_are_counted_flagged_and_warned_of(made):

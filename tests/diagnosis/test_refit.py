@@ -45,7 +45,7 @@ def found(kuka):
 def test_priors_arrive_in_the_fit(found):
     campaign, declared, line, models = found
     best = models.models[0]
-    assert [line.problem.units[number].key for number in best.units] == ["offset@3"]
+    assert [line.problem.units[number].candidate.key for number in best.units] == ["offset@3"]
     chosen = selected(line, best)
     (effect, shapes), *others = chosen
     assert not others and shapes.size == 0

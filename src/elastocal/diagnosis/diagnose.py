@@ -328,7 +328,7 @@ def _document(
         }
         if entries and not found.adopted:
             remarks.append("what was found is too uncertain to make predictions better: the model stays as declared")
-        remarks += verdict.implausible(with_effects, entries, case.campaign.robot.payload_kg)
+        remarks += verdict.implausible(with_effects, entries)
         if not found.settled:
             words = f"the problem was linearised {settings.linearizations} times, and each time another model was found"
             remarks.append(f"{words}: more may be missing")

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import gammaln, logit, logsumexp
 
-from elastocal.effects.protocol import Candidate, at_shapes, require_unique
+from elastocal.effects.protocol import Candidate
 from elastocal.random_streams import stream
 
 if TYPE_CHECKING:
@@ -90,12 +90,6 @@ class Unit:
     law: Law | None = None
     smallest: int = 0
     largest: int = -1
-
-    @property
-    def key(self) -> str:
-        """Unique name: key of the candidate, with the shape values."""
-        name = self.candidate.key if self.candidate else f"{OTHER}{list(self.location)} {self.law.name if self.law else ''}"
-        return at_shapes(name, self.shapes)
 
     @property
     def place(self) -> tuple[str, tuple[int | str, ...], str]:
@@ -165,7 +159,6 @@ def units_of(
         whole = np.arange(start, start + law.features), np.ones(law.features), np.zeros(law.features, int)
         units.append(Unit(OTHER, law.location, None, (), *whole, log_share, law=law, largest=len(settings.scales) - 1))
         start += law.features
-    require_unique([unit.key for unit in units])
     return tuple(units)
 
 
@@ -194,73 +187,68 @@ def laws_of(campaign: Conditions, features: int) -> list[Law]:
     ]
     found = []
     for location, cause, words, size, coordinates, counts in places:
-        inputs = [_Inputs(campaign, cause, coordinate) for coordinate in coordinates]
-        if any(each.differ.any() for each in inputs):
+        inputs = {coordinate: _inputs(campaign, cause, coordinate) for coordinate in coordinates}
+        if any(each(campaign).size for each in inputs.values()):
             name = f"{cause}{words}"
             draws = stream(_SEED, f"other {name}", "random Fourier features", location[0] if location else 0)
             parts = tuple(
-                (each.coordinate, _principal(campaign, each, location, draws, loaded, count, 1.0 / len(counts)))
-                for each in inputs
+                (at, _principal(campaign, each, (cause, at, location), draws, loaded, count, 1.0 / len(counts)))
+                for at, each in inputs.items()
                 for loaded, count in counts.items()
             )
             found.append(Law(location, name, size, parts, sum(counts.values()) * len(inputs)))
     return found
 
 
-class _Inputs:
-    """What one coordinate goes by, each of size about one in a campaign, without what does not differ there."""
+def _inputs(campaign: Conditions, cause: str, coordinate: int) -> _Waves:
+    """What one coordinate goes by in some states, each of size about one in a campaign, less what does not differ there."""
 
-    def __init__(self, campaign: Conditions, cause: str, coordinate: int) -> None:
-        self.cause, self.coordinate = cause, coordinate
-        known = self.plain(campaign)
-        self.center = known.mean(axis=0)
-        self.spread = np.abs(known - self.center).max(axis=0, initial=0.0)
-        self.differ = self.spread > _ROUNDING * np.maximum(np.abs(known).max(axis=0, initial=0.0), 1.0)
-
-    def of(self, around: Conditions) -> np.ndarray:
-        """In some states, ndarray (S, D)."""
-        return (self.plain(around) - self.center)[:, self.differ] / self.spread[self.differ]
-
-    def plain(self, around: Conditions) -> np.ndarray:
-        """In its own units, angles as points of a circle."""
-        at = self.coordinate
-        if self.cause == TIME:
+    def plain(around: Conditions) -> np.ndarray:
+        """In its own units, angles as points of a circle, ndarray (S, D)."""
+        if cause == TIME:
             known = [each for each in (around.time_s, around.temperature_c, around.progress) if each is not None]
-        elif self.cause == FORCE:
-            known = [around.total[:, at]]
-        elif self.cause == PLACE:
+        elif cause == FORCE:
+            known = [around.total[:, coordinate]]
+        elif cause == PLACE:
             known = list(around.motion.position[0])
         else:
-            joints = slice(at, at + 1) if self.cause == OWN else slice(max(at - 1, 0), at + 2)
+            joints = slice(coordinate, coordinate + 1) if cause == OWN else slice(max(coordinate - 1, 0), coordinate + 2)
             known = [wave(angle) for angle in around.joint_angles[:, joints].T for wave in (np.cos, np.sin)]
-            known.append(around.total[:, at])
-            if self.cause == OWN and around.approach is not None:
-                known.append(around.approach[:, at])
+            known.append(around.total[:, coordinate])
+            if cause == OWN and around.approach is not None:
+                known.append(around.approach[:, coordinate])
         return np.array(known, float).reshape(len(known), len(around.joint_angles)).T
+
+    known = plain(campaign)
+    center = known.mean(axis=0)
+    spread = np.abs(known - center).max(axis=0, initial=0.0)
+    differ = spread > _ROUNDING * np.maximum(np.abs(known).max(axis=0, initial=0.0), 1.0)
+    return lambda around: (plain(around) - center)[:, differ] / spread[differ]
 
 
 def _principal(
     campaign: Conditions,
-    inputs: _Inputs,
-    location: tuple[int, ...],
+    inputs: _Waves,
+    what: tuple[str, int, tuple[int, ...]],
     draws: np.random.Generator,
     loaded: bool,
     count: int,
     variance: float,
 ) -> _Waves:
     """So many principal components (S, count) of random functions of the inputs of such a variance, in proportion to the load
-    or without it, less what has a name in the catalogue."""
-    known = inputs.of(campaign)
+    or without it, less what has a name in the catalogue. `what`: cause, coordinate and location."""
+    cause, coordinate, location = what
+    known = inputs(campaign)
     low, high = np.log(_LENGTH_SCALES)
     lengths = np.exp(draws.uniform(low, high, _DRAWN))
     frequency, phase = draws.standard_normal((known.shape[1], _DRAWN)) / lengths, draws.uniform(0, 2 * np.pi, _DRAWN)
     size = np.sqrt(2.0 * variance / _DRAWN) if known.shape[1] else 0.0
     random = size * np.cos(known @ frequency + phase)
-    straight = inputs.cause in (OWN, NEIGHBOURS) and not loaded
-    angle = campaign.joint_angles[:, inputs.coordinate if straight else 0]
+    straight = cause in (OWN, NEIGHBOURS) and not loaded
+    angle = campaign.joint_angles[:, coordinate if straight else 0]
     # Of what is taken off: the first in time of a joint, or all.
-    first = np.argmin(known[:, -1]) if location and inputs.cause == TIME else slice(None)
-    mean = np.zeros(_DRAWN) if inputs.cause == PLACE else random[first].reshape(-1, _DRAWN).mean(axis=0)
+    first = np.argmin(known[:, -1]) if location and cause == TIME else slice(None)
+    mean = np.zeros(_DRAWN) if cause == PLACE else random[first].reshape(-1, _DRAWN).mean(axis=0)
     center, squares = angle.mean(), ((angle - angle.mean()) ** 2).sum()
     slope = (angle - center) @ random / squares if straight and squares > _ROUNDING else np.zeros_like(mean)
     largest = max(np.abs(_load(campaign, location)).max(initial=0.0), _ROUNDING)
@@ -268,13 +256,13 @@ def _principal(
     def waves(around: Conditions, random: np.ndarray) -> np.ndarray:
         found = random - mean
         if straight:
-            found -= np.outer(around.joint_angles[:, inputs.coordinate] - center, slope)
+            found -= np.outer(around.joint_angles[:, coordinate] - center, slope)
         return found * (_load(around, location) / largest)[:, None] if loaded else found
 
     seen = waves(campaign, random)
     _, vectors = np.linalg.eigh(seen.T @ seen)
     axes = vectors[:, ::-1][:, :count]
-    return lambda around: waves(around, size * np.cos(inputs.of(around) @ frequency + phase)) @ axes
+    return lambda around: waves(around, size * np.cos(inputs(around) @ frequency + phase)) @ axes
 
 
 def _load(around: Conditions, location: tuple[int, ...]) -> np.ndarray:

@@ -62,16 +62,14 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     errors, part, outside = without_gross_errors(diagnosis, held_out)
     left_out = entries_of(errors, held_out.campaign, held_out=True)
     rows, heldout, warnings = heldout_errors(steps, case, part, outside, seed)
-    of_all, heldout["with_gross_errors"] = [row["heldout_rms_m"] for row in rows], None
-    if left_out:
-        whole = [figures.summary(error.distance) for error in _errors(steps, case, held_out)[1]]
-        of_all = [error["rms_m"] for error in whole]
-        heldout["with_gross_errors"] = {"before": whole[_declared(steps)], "after": whole[-1]}
-        warnings.append(
-            f"held-out errors are without {counted(len(left_out), 'gross error')}: with all rows the RMS is"
-            f" {1e3 * of_all[-1]:.3g} mm instead of {1e3 * heldout['after']['rms_m']:.3g} mm"
-        )
+    whole = [figures.summary(error.distance) for error in _errors(steps, case, held_out)[1]] if left_out else []
+    of_all = [error["rms_m"] for error in whole] or [row["heldout_rms_m"] for row in rows]
     rows = [row | {"heldout_rms_all_rows_m": rms} for row, rms in zip(rows, of_all, strict=True)]
+    heldout["with_gross_errors"] = {"before": whole[_declared(steps)], "after": whole[-1]} if left_out else None
+    if left_out:
+        gross, sizes = counted(len(left_out), "gross error"), [1e3 * each["rms_m"] for each in (whole[-1], heldout["after"])]
+        words = "with all rows the RMS is {:.3g} mm instead of {:.3g} mm".format(*sizes)
+        warnings.append(f"held-out errors are without {gross}: {words}")
     # By what share each step lowers the held-out RMS.
     pairs = [(last, row) for last, row in pairwise(rows) if row["kind"] == "effect"]
     gains = {row["step"].removeprefix("with "): float(1 - row["heldout_rms_m"] / last["heldout_rms_m"]) for last, row in pairs}
@@ -148,9 +146,6 @@ def heldout_errors(
         low, high = (1e3 * rows[number][f"heldout_{name}"] for number in (before, after))
         if high > low:
             warnings.append(f"the {_ERRORS[name]} {ABOUT_ERRORS} grew from {low:.3f} to {high:.3f} mm")
-    for last, row in pairwise(rows[before:]):
-        if row["heldout_rms_m"] > last["heldout_rms_m"]:
-            warnings.append(f"the step '{row['step']}' raised the RMS error {ABOUT_ERRORS}")
     by_range = figures.errors_by_range({"before": errors[before], "after": errors[after]}, outside)
     heldout = {
         "uncalibrated": figures.summary(errors[0].distance) | {"reduction_ci95": [of_calibration.low, of_calibration.high]},

@@ -63,11 +63,6 @@ class Hypothesis:
         """Its mechanisms of the catalogue."""
         return tuple(name for name in self.mechanisms if name != OTHER)
 
-    @property
-    def kind(self) -> str:
-        """Verdict to which it belongs: nothing of the catalogue, one mechanism of some, or more than one."""
-        return (UNEXPLAINED, CLASS)[len(self.named)] if len(self.named) < 2 else SEVERAL
-
 
 @dataclass(frozen=True)
 class Conclusion:
@@ -122,13 +117,13 @@ def concluded(problem: Problem, posterior: Posterior, alarm: Alarm) -> Conclusio
     if not alarm.raised:
         return Conclusion(ADEQUATE, hypotheses, nothing, {}, mechanisms, nothing.probability)
     # The alarm has decided that something is missing; the posterior says what: first how many mechanisms, then which.
-    there = [h for h in hypotheses if h.mechanisms]
-    kinds = (UNEXPLAINED, CLASS, SEVERAL)
-    kind = max(kinds, key=lambda kind: sum(h.probability for h in there if h.kind == kind))
-    best = next((h for h in there if h.kind == kind), nothing)
+    there, kinds = [h for h in hypotheses if h.mechanisms], (UNEXPLAINED, CLASS, SEVERAL)
+    of_kind = {kind: [h for h in there if min(len(h.named), 2) == number] for number, kind in enumerate(kinds)}
+    kind = max(kinds, key=lambda kind: sum(h.probability for h in of_kind[kind]))
+    best = next(iter(of_kind[kind]), nothing)
     sure, stated = _least_expected_loss([best, *(h for h in there if h != best)], problem.settings)
     if not stated or kind == UNEXPLAINED:
-        unknown = sum(h.probability for h in there if h.kind == UNEXPLAINED) + (0.0 if stated else nothing.probability)
+        unknown = sum(h.probability for h in of_kind[UNEXPLAINED]) + (0.0 if stated else nothing.probability)
         return Conclusion(UNEXPLAINED, hypotheses, best if stated else nothing, {}, mechanisms, unknown)
     named = sure and kind == CLASS and OTHER not in best.mechanisms
     alternatives = {name: () if named else _instead_of(name, best, stated) for name in best.named}
@@ -161,32 +156,29 @@ def _least_expected_loss(ranked: Sequence[Hypothesis], settings: Settings) -> tu
 def hypotheses_of(problem: Problem, posterior: Posterior) -> tuple[Hypothesis, ...]:
     """Probability of each set of mechanisms, the most probable first; "nothing" is always among them."""
     found: dict[tuple[str, ...], tuple[float, int]] = {(): (0.0, -1)}
-    stated = zip(mechanisms_of_models(problem, posterior), posterior.probabilities, strict=True)
-    for number, (names, probability) in enumerate(stated):
+    for number, (model, probability) in enumerate(zip(posterior.models, posterior.probabilities.tolist(), strict=True)):
+        names = tuple(sorted(_acting(problem, model, probability)))
         held, best = found.get(names, (0.0, number))
-        found[names] = held + float(probability), number if best < 0 else best
+        found[names] = held + probability, number if best < 0 else best
     ranked = sorted(found.items(), key=lambda item: -item[1][0])
     return tuple(Hypothesis(names, probability, model) for names, (probability, model) in ranked)
 
 
-def mechanisms_of_models(problem: Problem, posterior: Posterior) -> list[tuple[str, ...]]:
-    """What each model says that acts, in the order of the names: its mechanisms, and something unknown beside a smooth error.
+def _acting(problem: Problem, model: Model, probability: float) -> set[str]:
+    """What a model says that acts: its mechanisms, and something unknown beside a smooth error.
 
     Neither is quite what the machine does: that counts as a part of the other which makes displacements that the other cannot
     make, but within the tolerance of laws. Nothing related to a mechanism acts where the smooth error is far larger.
     """
-    found, of_laws, of_unknown = [], problem.settings.law_tolerance**2, problem.settings.smooth_tolerance**2
-    for model, probability in zip(posterior.models, posterior.probabilities, strict=True):
-        names = {problem.units[unit].mechanism for unit in model.units}
-        known = names - {OTHER}
-        if known and known != names and probability > _TELLING:
-            (by_laws, beyond_unknown), (by_unknown, beyond_laws) = squares_beyond(problem, model, known)
-            if beyond_laws < of_laws * by_laws:
-                names = known
-            elif beyond_unknown < of_laws * by_unknown or by_laws < of_unknown * by_unknown:
-                names = {OTHER}
-        found.append(tuple(sorted(names)))
-    return found
+    names = {problem.units[unit].mechanism for unit in model.units}
+    known = names - {OTHER}
+    if not known or known == names or probability <= _TELLING:
+        return names
+    of_laws, of_unknown = problem.settings.law_tolerance**2, problem.settings.smooth_tolerance**2
+    (by_laws, beyond_unknown), (by_unknown, beyond_laws) = squares_beyond(problem, model, known)
+    if beyond_laws < of_laws * by_laws:
+        return known
+    return {OTHER} if beyond_unknown < of_laws * by_unknown or by_laws < of_unknown * by_unknown else names
 
 
 def locations_of(problem: Problem, model: Model, mechanism: str) -> list[Location]:
@@ -206,17 +198,9 @@ def location_probabilities(problem: Problem, posterior: Posterior, mechanism: st
 
 def _instead_of(name: str, best: Hypothesis, credible: Iterable[Hypothesis]) -> tuple[str, ...]:
     """What stands instead of one mechanism in the other credible hypotheses."""
-    rest = set(best.mechanisms) - {name}
-    found: list[str] = []
-    for hypothesis in credible:
-        others = set(hypothesis.mechanisms) - rest
-        if hypothesis != best and name not in others:
-            found += [other for other in hypothesis.mechanisms if other in others and other not in found]
-        if hypothesis != best and others == {name, OTHER} and OTHER not in found:
-            found.append(OTHER)
-    if OTHER in best.mechanisms and OTHER not in found:
-        found.append(OTHER)
-    return tuple(found)
+    each = [[other for other in h.mechanisms if other == name or other not in best.mechanisms] for h in credible if h != best]
+    instead = [other for others in each if name not in others or {*others} == {name, OTHER} for other in others]
+    return tuple(dict.fromkeys(other for other in (*instead, *{OTHER}.intersection(best.mechanisms)) if other != name))
 
 
 def contradictions(final: Fit, measured: Noise, settings: Settings) -> list[str]:
@@ -273,23 +257,16 @@ def probability_facts(found: Evidence) -> dict[str, Any]:
     Returns ``nothing``, ``stated``: that of what the verdict leaves open, ``alarm_p_value``, ``mechanisms`` by name, and
     ``sets`` of mechanisms with the locations of their most probable model.
     """
-    problem, hypotheses = found.linearized.problem, found.conclusion.hypotheses
-    listed = [(h, found.posterior.models[h.model]) for h in hypotheses if h.probability >= _TELLING]
-    sets = [
-        {
-            "mechanisms": list(h.mechanisms),
-            "probability": h.probability,
-            "locations": {
-                name: [location_words(name, at) for at in locations_of(problem, model, name)] for name in h.mechanisms
-            },
-        }
-        for h, model in listed
-    ]
+    problem, conclusion, models, sets = found.linearized.problem, found.conclusion, found.posterior.models, []
+    for each in (h for h in conclusion.hypotheses if h.probability >= _TELLING):
+        where = {name: locations_of(problem, models[each.model], name) for name in each.mechanisms}
+        words = {name: [location_words(name, at) for at in locations] for name, locations in where.items()}
+        sets.append({"mechanisms": list(each.mechanisms), "probability": each.probability, "locations": words})
     return {
-        "nothing": next(h.probability for h in hypotheses if not h.mechanisms),
-        "stated": found.conclusion.probability,
+        "nothing": next(h.probability for h in conclusion.hypotheses if not h.mechanisms),
+        "stated": conclusion.probability,
         "alarm_p_value": found.alarm.p_value,
-        "mechanisms": {name: value for name, value in found.conclusion.mechanisms.items() if value >= _TELLING},
+        "mechanisms": {name: value for name, value in conclusion.mechanisms.items() if value >= _TELLING},
         "sets": sets,
     }
 
@@ -414,22 +391,15 @@ def _estimates(final: Fit, effect: Candidate) -> Iterator[tuple[float, float, Pa
         yield value, error, parameter, bool(abs(value) > _IMPLAUSIBLE * parameter.plausible + _SURE * error)
 
 
-def implausible(final: Fit, entries: Iterable[Mapping[str, Any]], rated_kg: float | None = None) -> list[str]:
-    """Warnings of parameters of `effect_entries` that nature does not allow.
-
-    `rated_kg`: payload for which the robot is rated; looked at where compliances are identified, without which no mass is.
-    """
+def implausible(final: Fit, entries: Iterable[Mapping[str, Any]]) -> list[str]:
+    """Warnings of parameters of `effect_entries` that nature does not allow."""
     fitted = {effect.key: effect for effect in final.model.effects}
     found = []
     for key in [key for entry in entries for key in entry["members"]]:
         for value, error, parameter, too_large in _estimates(final, fitted[key]):
-            size = f"{value:.3g} ± {error:.2g} {parameter.unit}"
+            size = f"{key}: {parameter.name} is {value:.3g} ± {error:.2g} {parameter.unit}"
             if parameter.sign * value < -_SURE * error:
-                needed = "positive" if parameter.sign > 0 else "negative"
-                found.append(f"{key}: {parameter.name} is {size}, and by its physics {needed}")
+                found.append(f"{size}, and by its physics {'positive' if parameter.sign > 0 else 'negative'}")
             if too_large:
-                found.append(f"{key}: {parameter.name} is {size}, more than {_IMPLAUSIBLE:g} times what such an effect reaches")
-            carried = parameter.carried and final.model.identifies_compliance
-            if rated_kg is not None and carried and value - _SURE * error > rated_kg:
-                found.append(f"{key}: {parameter.name} is {size}, beyond the rated payload of {rated_kg:g} kg")
+                found.append(f"{size}, more than {_IMPLAUSIBLE:g} times what such an effect reaches")
     return found

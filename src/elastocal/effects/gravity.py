@@ -166,7 +166,7 @@ def payload(own: Effect, sites: Sites) -> Candidates:
     mass, law = own.size("mass", sites), partial(_sagging, places=[(sites.joints, axis) for axis in (None, 0, 1, 2)])
     moments = [Parameter(f"moment_{axis}", "kg m", _LEVER_M * mass) for axis in "xyz"]
     # Where neither a load nor what the links weigh is known, what hangs on the flange is not distinguishable from that.
-    tool = own.candidate((), [Parameter("mass", "kg", mass, carried=True), *moments], law, {"load"})
+    tool = own.candidate((), [Parameter("mass", "kg", mass), *moments], law, {"load"})
     # A mass alone is most of what a tool does.
     yield from (tool, small_form(tool, "mass", slice(1)))
 

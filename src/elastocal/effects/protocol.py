@@ -45,7 +45,7 @@ class Parameter:
     distinguish only in part, as in ridge regression (Hoerl and Kennard 1970), reported with the estimate; None, as nearly
     everywhere, for no prior. `sign`: that such an effect has by its physics; 0 where it may have either. `order`: of a
     harmonic, whose plausible size falls with it; 1 elsewhere. `sized`: whether the prior was estimated from the measurements.
-    `most`: times its plausible size that a search allows for. `carried`: whether it is a mass that counts as payload.
+    `most`: times its plausible size that a search allows for.
     """
 
     name: str
@@ -56,7 +56,6 @@ class Parameter:
     order: int = 1
     sized: bool = False
     most: float = np.inf
-    carried: bool = False
 
 
 @dataclass(frozen=True)
