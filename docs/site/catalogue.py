@@ -54,7 +54,8 @@ FAMILIES = {
 ROBOT = read_robot(Path(__file__).resolve().parents[2] / "config" / "robots" / "gp180.yaml")
 FORMULAS = yaml.safe_load(Path(__file__).with_name("effect_formulas.yaml").read_text(encoding="utf-8"))
 NEEDS = {
-    "load": "a load, or declared masses",
+    "load": "a load, or the weight of the arm",
+    "load on the joints": "a load on the joints, or declared masses",
     "external load": "an external load",
     "approach": "the sense of approach of each joint",
     "time": "the time of each measurement",
@@ -124,7 +125,8 @@ def _table(effect: Effect) -> str:
         for parameter in candidate.parameters
     ]
     lines = [f"Where it can act on the arm shown: {count} candidates; shown is ``{candidate.key}``."]
-    if needs := sorted(candidate.needs):
+    # A load on the joints is a load.
+    if needs := sorted(candidate.needs - ({"load"} if "load on the joints" in candidate.needs else set())):
         lines.append(f"It can be found only with {' and '.join(NEEDS[need] for need in needs)}.")
     for shape in candidate.shapes:
         unit = "" if shape.unit == "1" else f" {shape.unit}"

@@ -19,9 +19,11 @@ from synthetic import (
 )
 
 from elastocal.effects.catalogue import candidates_on
+from elastocal.effects.conditions import conditions_of, offered
 from elastocal.effects.gravity import declared_weight, lever_of_pull
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import conditions, displaced_coordinates, parameters
+from elastocal.mechanics.kinematics import motion
 from elastocal.mechanics.robot import Mass
 from elastocal.mechanics.sites import sites_of
 
@@ -149,3 +151,26 @@ def test_a_bias_is_there_wherever_something_is_recorded_be_it_a_moment_alone(fan
         force = np.eye(6)[[axis, axis]]
         expected = around.load_by(np.concatenate([force, 0 * force[:1]]))[:, :6] * around.compliance
         np.testing.assert_allclose(turned, expected, rtol=1e-12)
+
+
+def test_structure_bears_the_usual_weight_where_neither_masses_nor_loads_are_known(fanuc):
+    """Half of each link at either end, six times the rated load in all: slopes of its potential energy."""
+    states = made_states(6, 4, seed=7)
+    states.wrench[:] = 0.0
+    sites = replace(sites_of(replace(fanuc, payload_kg=100.0)), usual_weight=True)
+    around = conditions_of(sites, fanuc.compliance, states)
+    assert sites.usual_masses.sum() == pytest.approx(600.0)
+    assert offered(sites, states) & {"load", "load on the joints"} == {"load"}
+
+    def energy(coordinates):
+        ends = motion(sites.chain, coordinates, sites.followed).position[1 : sites.joints + 2]
+        return -np.einsum("k,kis,i->s", sites.usual_masses, ends, np.array(sites.gravity_m_s2))
+
+    commanded = np.zeros((4, sites.chain.coordinates))
+    commanded[:, :6] = states.joint_angles
+    for coordinate in (*sites.base, *sites.tilt[1], *sites.link_end[2]):
+        step = np.zeros(sites.chain.coordinates)
+        step[coordinate] = 1e-4
+        slope = (energy(commanded + step) - energy(commanded - step)) / 2e-4
+        np.testing.assert_allclose(around.total[:, coordinate], -slope, atol=1e-3)
+    assert not around.total[:, :6].any()

@@ -1,13 +1,16 @@
 """Mutation testing of a random sample: how often do the tests notice a small fault in the code?
 
-mutmut makes the mutants and says which tests of the same room cover them. Left out are mutants that only change
-the text of a string, annotations, and what mutmut never changes: code outside functions, and decorated functions.
+mutmut makes the mutants and says which tests of the same room cover them. Steps of the study that none of these runs are run by
+the small study, whose golden tables are their tests. Left out are mutants that only change the text of a string, annotations,
+and what mutmut never changes: code outside functions, and decorated functions.
 
 Usage: python tests/mutation/sample.py [SEED SIZE [ROOM ...]], from the top of the repository.
 """
 
+import os
 import random
 import re
+import subprocess
 import sys
 from itertools import islice
 from pathlib import Path
@@ -87,6 +90,14 @@ def run(mutants, room):
     _run(mutants, max_children=1)
 
 
+def noticed_by_the_study(mutant):
+    """Whether the golden tables of the small study, made by the code with a mutant, are others."""
+    command = [sys.executable, "-m", "pytest", "-q", "-x", "--slow", "all", "-k", "what_it_was"]
+    command.append("tests/workflow/test_reproducibility.py")
+    environment = os.environ | {"MUTANT_UNDER_TEST": mutant}
+    return subprocess.run(command, cwd="mutants", env=environment, capture_output=True).returncode == 1
+
+
 def scores(sample):
     """Share of mutants that the tests notice, with Wilson's 95 % interval, of each room and of all."""
     rows = []
@@ -109,6 +120,12 @@ if __name__ == "__main__":
     for room, part in sample.groupby("room", sort=False):
         run(list(part["mutant"]), room)
         codes = {mutant: code for module in part["module"].unique() for mutant, code in exit_codes(PACKAGE / module).items()}
-        done.append(part.assign(status=[status_by_exit_code[codes[mutant]] for mutant in part["mutant"]]))
+        part = part.assign(status=[status_by_exit_code[codes[mutant]] for mutant in part["mutant"]])
+        if room == "study":
+            alone = part["mutant"][part["status"] == "no tests"]
+            if len(alone) and noticed_by_the_study(""):
+                raise AssertionError("the golden tables of the small study are others without any mutant")
+            part.loc[[place for place, mutant in alone.items() if noticed_by_the_study(mutant)], "status"] = "killed"
+        done.append(part)
         pd.concat(done).to_csv("reports/mutants.csv", index=False)
     print(scores(pd.concat(done)).round(2).to_string(index=False))

@@ -14,11 +14,13 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.linalg import lapack, solve_triangular
 from scipy.special import chdtri, fdtri, gammaincinv
 
 from elastocal.counting import counted
 from elastocal.diagnosis.evidence import Grid
 from elastocal.diagnosis.linearize import Linearized, linearized
+from elastocal.diagnosis.statistics import WhiteRows
 from elastocal.fitting.least_squares import ON_THE_WAY, evaluated, fit
 from elastocal.fitting.linearization import Linearization, linearize
 from elastocal.fitting.model import conditions, parameters, residuals
@@ -185,21 +187,17 @@ def beyond_chance(distance: np.ndarray, rows: int, kept: np.ndarray, settings: S
     is the root mean square of what does not stand out by the first, and the limit that of an F distribution. Where more than
     `gross_error_share` of all stand out, none does: then it is the model that is wrong.
     """
-    scale = _robust_scale(distance, rows, kept)
+    ordered = np.sort(np.where(kept, distance, np.inf))
+    usual = ordered[(np.array(_SCALE_QUANTILES) * (len(ordered) - 1)).astype(int)]
+    scale = np.max(
+        usual[np.isfinite(usual)] / np.sqrt(2 * gammaincinv(rows / 2, _SCALE_QUANTILES))[np.isfinite(usual)], initial=1.0
+    )
     inside = distance <= scale * most_by_chance(len(distance), rows, settings)
     if inside.mean() < 1.0 - settings.gross_error_share:
         return distance / scale, np.zeros(len(distance), bool)
     scale = max(1.0, float(np.sqrt((distance[inside] ** 2).mean() / rows)))
     gross = distance > scale * most_by_chance(len(distance), rows, settings, inside.sum() * rows)
     return distance / scale, gross if gross.mean() <= settings.gross_error_share else np.zeros(len(gross), bool)
-
-
-def _robust_scale(distance: np.ndarray, rows: int, kept: np.ndarray) -> float:
-    """Scale of distances by two of their quantiles, one at least; those not kept count as large."""
-    ordered = np.sort(np.where(kept, distance, np.inf))
-    usual = ordered[(np.array(_SCALE_QUANTILES) * (len(ordered) - 1)).astype(int)]
-    expected = np.sqrt(2 * gammaincinv(rows / 2, _SCALE_QUANTILES))
-    return float(np.max((usual / expected)[np.isfinite(usual)], initial=1.0))
 
 
 def most_by_chance(count: int, rows: int, settings: Settings, freedom: float = np.inf) -> float:
@@ -362,33 +360,97 @@ def improbable(line: Linearized) -> np.ndarray:
     """Which observations all candidates together do not explain, ndarray of bool (M,).
 
     The whitened residual has the covariance I + X D X' + W S W', with X the declared sensitivities, D their priors, W those of
-    all candidates, S their mean square sizes. The worst are taken out, one after the other, until what is left agrees; where
-    that would be more than `gross_error_share` of all, none is.
+    all candidates, S their mean square sizes. The worst are taken out until what is left agrees; then those that it predicts
+    come back.
     """
     rows, settings = line.rows, line.settings
     observed, own = rows.residual.shape
+    kept = np.ones(observed, bool)
     grid = Grid.of_settings(settings)
     sizes = np.sqrt(np.exp(grid.log_weights) @ grid.scales**2)
-    columns = np.concatenate([rows.declared * line.priors[0], sizes * rows.candidates.dense()], axis=2)
-    columns, residual = columns.reshape(rows.residual.size, -1), rows.residual.ravel()
-    precision, limit = np.linalg.inv(np.eye(len(columns)) + columns @ columns.T), most_by_chance(observed, own, settings)
-    kept = np.ones(observed, bool)
-    while kept.mean() >= 1.0 - settings.gross_error_share:
+    declared = (rows.declared * line.priors[0]).reshape(rows.residual.size, -1)
+    columns = (sizes * rows.candidates.dense()).reshape(rows.residual.size, -1)
+    covariance, residual = np.eye(len(columns)) + columns @ columns.T, rows.residual.ravel()
+    precision, limit = _precision(covariance, declared), most_by_chance(observed, own, settings)
+    while kept.mean() > 1.0 - settings.gross_error_share:
         distance = _deletion_distances(precision, residual, kept, own)
         worst = int(np.argmax(distance))
-        if distance[worst] <= limit * _robust_scale(distance, own, kept):
-            return ~kept
-        # The inverse covariance of the others, in which there is zero in its place.
-        kept[worst], out = False, slice(worst * own, (worst + 1) * own)
-        precision -= precision[:, out] @ np.linalg.solve(precision[out, out], precision[out])
-        precision[out], precision[:, out] = 0.0, 0.0
-    return np.zeros(observed, bool)
+        if distance[worst] <= limit:
+            break
+        kept[worst] = False
+        precision = _without(precision, np.arange(worst * own, (worst + 1) * own))
+    if not kept.all():
+        covariance = covariance + _pose_error(rows, line.pose_errors_rad, covariance, declared, np.repeat(kept, own))
+    whole = _precision(covariance, declared)
+    while not kept.all():
+        out = np.flatnonzero(np.repeat(~kept, own))
+        distance = _deletion_distances(_without(whole, out), residual, kept, own)
+        variance = np.linalg.inv(whole[np.ix_(out, out)])
+        rest = (variance @ (whole @ residual)[out]).reshape(-1, own, 1)
+        distance[~kept] = np.sqrt((rest * np.linalg.solve(_blocks(variance, own), rest)).sum(axis=(1, 2)))
+        back = ~kept & ~beyond_chance(distance, own, kept, settings)[1]
+        if not back.any():
+            break
+        kept |= back
+    return ~kept
+
+
+def _precision(covariance: np.ndarray, declared: np.ndarray) -> np.ndarray:
+    """Inverse of a covariance to which that of declared columns of unit size is added (Woodbury's identity)."""
+    root = np.linalg.cholesky(covariance)
+    basis, _ = _declared_basis(root, declared)
+    inverse = lapack.dpotri(root, lower=1)[0]
+    inverse = np.tril(inverse) + np.tril(inverse, -1).T
+    beside = solve_triangular(root, basis, lower=True, trans="T")
+    return inverse - beside @ beside.T
+
+
+def _log_likelihood(covariance: np.ndarray, declared: np.ndarray, residual: np.ndarray) -> float:
+    """Logarithm of the density of a residual of zero mean under that sum, but for a constant."""
+    root = np.linalg.cholesky(covariance)
+    basis, log_size = _declared_basis(root, declared)
+    white = solve_triangular(root, residual, lower=True)
+    squares = white @ white - ((basis.T @ white) ** 2).sum()
+    return float(-0.5 * squares - np.log(np.diag(root)).sum() - log_size)
+
+
+def _declared_basis(root: np.ndarray, declared: np.ndarray) -> tuple[np.ndarray, float]:
+    """Whitened declared columns beside their priors, made orthonormal, (n, P) without the latter; half the log determinant."""
+    white = solve_triangular(root, declared, lower=True)
+    basis, triangle = np.linalg.qr(np.concatenate([white, np.eye(declared.shape[1])]))
+    return basis[: len(declared)], float(np.log(np.abs(np.diag(triangle))).sum())
+
+
+def _without(precision: np.ndarray, out: np.ndarray) -> np.ndarray:
+    """The inverse covariance of the rows without some, in whose place it is zero."""
+    left = precision - precision[:, out] @ np.linalg.solve(precision[np.ix_(out, out)], precision[out])
+    left[out], left[:, out] = 0.0, 0.0
+    return left
+
+
+def _pose_error(
+    rows: WhiteRows, pose_errors_rad: np.ndarray, covariance: np.ndarray, declared: np.ndarray, known: np.ndarray
+) -> np.ndarray:
+    """Covariance of the error common to a pose, at the size that makes the rows known most probable."""
+    residual, own = rows.residual.ravel()[known], rows.residual.shape[1]
+    jacobian, pose = rows.jacobian.reshape(len(known), -1), np.repeat(rows.pose, own)
+    common = (jacobian @ jacobian.T) * (pose[:, None] == pose)
+    best = (-np.inf, 0.0)
+    for tau in pose_errors_rad:
+        likely = _log_likelihood((covariance + tau**2 * common)[np.ix_(known, known)], declared[known], residual)
+        best = max(best, (likely, float(tau)))
+    return best[1] ** 2 * common
 
 
 def _deletion_distances(precision: np.ndarray, residual: np.ndarray, kept: np.ndarray, own: int) -> np.ndarray:
     """Length of the deletion residual of each observation that is kept, 0 of others, (M,)."""
-    every = np.arange(len(kept))
-    blocks = precision.reshape(len(kept), own, len(kept), own)[every, :, every]
+    blocks = np.where(kept[:, None, None], _blocks(precision, own), np.eye(own))
     along = (precision @ residual).reshape(-1, own, 1)
-    squares = (along * np.linalg.solve(np.where(kept[:, None, None], blocks, np.eye(own)), along)).sum(axis=(1, 2))
+    squares = (along * np.linalg.solve(blocks, along)).sum(axis=(1, 2))
     return np.where(kept, np.sqrt(np.maximum(squares, 0.0)), 0.0)
+
+
+def _blocks(matrix: np.ndarray, own: int) -> np.ndarray:
+    """Blocks on the diagonal, ndarray (M, own, own)."""
+    every = np.arange(len(matrix) // own)
+    return matrix.reshape(len(every), own, len(every), own)[every, :, every]

@@ -116,8 +116,18 @@ class Conditions:
         return on_each
 
     @cached_property
+    def usual_gravity(self) -> np.ndarray:
+        """Generalized force of the usual masses on every coordinate beyond the joints, whose sag has its own law; (S, C)."""
+        every, ends = slice(None), enumerate(self.sites.usual_masses, 1)
+        found = np.sum([self._weighing(end, mass, mass * self.motion.position[end], every) for end, mass in ends], axis=0)
+        found[: self.sites.joints] = 0.0
+        return found.T
+
+    @cached_property
     def total(self) -> np.ndarray:
-        """External load and weight of the declared masses on every coordinate of the sites, (S, C)."""
+        """External load and weight of the declared masses, or of usual ones, on every coordinate of the sites, (S, C)."""
+        if self.sites.usual_weight:
+            return self.load + self.usual_gravity
         return self.load + self.gravity if self.sites.masses else self.load
 
     @cached_property
@@ -209,12 +219,14 @@ def with_total(conditions: Conditions, total: np.ndarray) -> Conditions:
 def offered(sites: Sites, states: States) -> frozenset[str]:
     """What is there that effects may need.
 
-    Returns "load": an external load, or declared masses; "external load", without which the compliances are not identifiable;
-    "approach", where it is known somewhere; "time" and "temperature", where they change.
+    Returns "load": an external load or a weight; "load on the joints": that, or declared masses; "external load", without which
+    the compliances are not identifiable; "approach", where it is known somewhere; "time" and "temperature", where they change.
     """
     external = bool(states.wrench.any())
+    loaded = bool(sites.masses) or external
     there = {
-        "load": bool(sites.masses) or external,
+        "load": sites.usual_weight or loaded,
+        "load on the joints": loaded,
         "external load": external,
         "approach": states.approach is not None and bool(states.approach.any()),
         "time": states.time_s is not None and np.ptp(states.time_s) > 0,

@@ -9,7 +9,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.effects.gravity import compensated_joint, wave_parameters
-from elastocal.effects.protocol import Candidate, Parameter, Shape, effect, every_joint, small_form, turning_joints, waves
+from elastocal.effects.protocol import (
+    LOADED_JOINTS,
+    Candidate,
+    Parameter,
+    Shape,
+    effect,
+    every_joint,
+    load_behind,
+    small_form,
+    turning_joints,
+    waves,
+)
 from elastocal.effects.sizes import JOINT, PER_LENGTH, SHIFT, STIFFEST, Size
 
 if TYPE_CHECKING:
@@ -93,7 +104,8 @@ def link_elasticity(own: Effect, sites: Sites, links: tuple[int, ...], detail: s
     names = ("bending_1_over_EI", "torsion_1_over_GJ")
     parameters = own.parameters("1/EI", names, "1/(N m^2)", sites, before, over=length)
     joints = tuple(k for k in links if k)
-    yield own.candidate(joints, parameters, law, {"load"}, shapes=(_TAPER,), detail=detail, location_name=detail)
+    needs = load_behind(sites, max(links))
+    yield own.candidate(joints, parameters, law, needs, shapes=(_TAPER,), detail=detail, location_name=detail)
 
 
 def _end_compliance(sites: Sites, link: int, taper: float) -> tuple[np.ndarray, np.ndarray]:
@@ -126,7 +138,7 @@ def joint_tilt(own: Effect, sites: Sites, joint: int) -> Candidates:
     across = [axis for axis in range(3) if sites.prismatic[joint] or axis != sites.joint_axes[joint]]
     tilts = own.parameters("tilt", [f"tilt_about_{'xyz'[axis]}" for axis in across], "rad/(N m)", sites, joint)
     law = _springs([sites.tilt[joint][axis]] for axis in across)
-    yield own.candidate((joint + 1,), tilts, law, {"load"})
+    yield own.candidate((joint + 1,), tilts, law, load_behind(sites, joint))
 
 
 @_effect(
@@ -163,7 +175,9 @@ def cross_compliance(own: Effect, sites: Sites, one: int, other: int) -> Candida
     joints, seen at the end-effector alone, it is not distinguishable from bending of the link between them.
     """
     both, coupling = (one + 1, other + 1), own.parameters("coupling", ["compliance"], "rad/(N m)", sites, one, other)
-    yield own.candidate(both, coupling, lambda around: [{one: around.total[:, other], other: around.total[:, one]}], {"load"})
+    yield own.candidate(
+        both, coupling, lambda around: [{one: around.total[:, other], other: around.total[:, one]}], LOADED_JOINTS
+    )
 
 
 @_effect(
@@ -178,7 +192,7 @@ def joint_dependent_stiffness(own: Effect, sites: Sites, joint: int) -> Candidat
     """
 
     variation = own.parameters("variation", ["cos_q", "sin_q"], "rad/(N m)", sites, joint)
-    yield own.of_joint(joint, variation, lambda around: _softer(around, joint, 1), {"load"})
+    yield own.of_joint(joint, variation, lambda around: _softer(around, joint, 1), LOADED_JOINTS)
 
 
 def _softer(around: Conditions, joint: int, *orders: int) -> list[np.ndarray]:
@@ -202,7 +216,7 @@ def compensator_stiffness(own: Effect, sites: Sites, joint: int) -> Candidates:
     """
 
     variation = wave_parameters(own, "variation", "rad/(N m)", sites, joint)
-    yield own.of_joint(joint, variation, lambda around: _softer(around, joint, 1, 2), {"load"})
+    yield own.of_joint(joint, variation, lambda around: _softer(around, joint, 1, 2), LOADED_JOINTS)
 
 
 @_effect(
@@ -219,6 +233,6 @@ def flange_flexibility(own: Effect, sites: Sites) -> Candidates:
     """
     shifts = own.parameters("shift", [f"shift_{axis}" for axis in "xyz"], "m/N", sites)
     turns = own.parameters("turn", [f"turn_{axis}" for axis in "xyz"], "rad/(N m)", sites, sites.joints - 1)
-    every = own.candidate((), (*shifts, *turns), _springs([c] for c in sites.link_end[-1]), {"load"})
+    every = own.candidate((), (*shifts, *turns), _springs([c] for c in sites.link_end[-1]), LOADED_JOINTS)
     # Turns alone are most of what a flange does.
     yield from (every, small_form(every, "turns", slice(3, None)))

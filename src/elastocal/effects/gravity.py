@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.effects.conditions import MASS_PARAMETERS
-from elastocal.effects.protocol import Candidate, Parameter, effect, small_form, turning_joints, waves
+from elastocal.effects.protocol import LOADED_JOINTS, Candidate, Parameter, effect, small_form, turning_joints, waves
 from elastocal.effects.sizes import LOAD, RATED, REACH, SAG, TORQUE, Size
 
 if TYPE_CHECKING:
@@ -166,7 +166,7 @@ def payload(own: Effect, sites: Sites) -> Candidates:
     mass, law = own.size("mass", sites), partial(_sagging, places=[(sites.joints, axis) for axis in (None, 0, 1, 2)])
     moments = [Parameter(f"moment_{axis}", "kg m", _LEVER_M * mass) for axis in "xyz"]
     # Where neither a load nor what the links weigh is known, what hangs on the flange is not distinguishable from that.
-    tool = own.candidate((), [Parameter("mass", "kg", mass), *moments], law, {"load"})
+    tool = own.candidate((), [Parameter("mass", "kg", mass), *moments], law, LOADED_JOINTS - {"load"})
     # A mass alone is most of what a tool does.
     yield from (tool, small_form(tool, "mass", slice(1)))
 
@@ -222,7 +222,7 @@ def _wrong(own: Effect, parameters: tuple[Parameter, ...], frame: str, change: C
             changed = [(force, np.cross(lever, force)) for force, _ in changed]
         return _turned(around, changed)
 
-    return own.candidate((), parameters, law, {"load"}, detail=frame)
+    return own.candidate((), parameters, law, LOADED_JOINTS, detail=frame)
 
 
 def lever_of_pull(wrench: np.ndarray, rotation: np.ndarray) -> np.ndarray:
@@ -302,4 +302,4 @@ def force_scale(own: Effect, sites: Sites) -> Candidates:
     it.
     """
     scale = own.parameters("scale", ["scale"], "1", sites)
-    yield own.candidate((), scale, lambda around: _turned(around, [np.split(around.wrench, 2, axis=1)]), {"load"})
+    yield own.candidate((), scale, lambda around: _turned(around, [np.split(around.wrench, 2, axis=1)]), LOADED_JOINTS)

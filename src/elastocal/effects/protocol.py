@@ -33,7 +33,17 @@ if TYPE_CHECKING:
     Turns = Callable[..., Iterable[np.ndarray]]
 
 
+# Needs of laws that go with the load on the joints.
+LOADED_JOINTS = frozenset({"load", "load on the joints"})
 WAVES = {"cos": np.cos, "sin": np.sin}
+
+
+def load_behind(sites: Sites, joints: int) -> frozenset[str]:
+    """Needs of the law of what yields to the load, behind so many joints.
+
+    A weight that is only usual, not declared, loads columns and rails: behind a joint that turns `link_weight` has it.
+    """
+    return frozenset({"load"}) if all(sites.prismatic[:joints]) else LOADED_JOINTS
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects.protocol import WAVES, Parameter, Shape, effect, every_joint, turning_joints, waves
+from elastocal.effects.protocol import LOADED_JOINTS, WAVES, Parameter, Shape, effect, every_joint, turning_joints, waves
 from elastocal.effects.sizes import JOINT, Size, full_torque_Nm
 
 if TYPE_CHECKING:
@@ -208,7 +208,7 @@ def stiffening(own: Effect, sites: Sites, joint: int, detail: str) -> Candidates
         load = around.total[:, joint]
         return [load - _AS_AT_REST[detail](load, torque)]
 
-    yield own.of_joint(joint, beyond, turns, {"load"}, shapes=(meeting,), detail=detail)
+    yield own.of_joint(joint, beyond, turns, LOADED_JOINTS, shapes=(meeting,), detail=detail)
 
 
 @_gearbox("lost motion (backlash)", Size("play", 1e-4, "a third of an arc minute", sign=1), at=turning_joints)
@@ -222,7 +222,9 @@ def lost_motion(own: Effect, sites: Sites, joint: int) -> Candidates:
     """
     play = own.parameters("play", ["half_play"], "rad", sites)
     taken_up = Shape("torque", "N m", *(_PLAY * full_torque_Nm(sites, joint)).tolist())
-    yield own.of_joint(joint, play, lambda around, at: [np.tanh(around.total[:, joint] / at)], {"load"}, shapes=(taken_up,))
+    yield own.of_joint(
+        joint, play, lambda around, at: [np.tanh(around.total[:, joint] / at)], LOADED_JOINTS, shapes=(taken_up,)
+    )
 
 
 @_gearbox(

@@ -113,6 +113,9 @@ class Estimate:
 def declared_model(campaign: Campaign, effects: Iterable[Candidate] = ()) -> Model:
     """The model that a campaign declares, with its declared effects."""
     sites, measurements = sites_of(campaign.robot), campaign.measurements
+    # Under an arm whose first joint turns, a base that yields and the sag of that arm are one thing until weights are known.
+    unknown = not sites.masses and not measurements.wrench.any()
+    sites = replace(sites, usual_weight=sites.prismatic[0] and unknown)
     springs = (joint_compliance(sites),) if campaign.compliance == "identify" else ()
     weight = (declared_weight(sites),) if sites.masses else ()
     return Model(

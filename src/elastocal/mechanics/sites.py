@@ -16,13 +16,14 @@ import numpy as np
 
 from elastocal.mechanics.chain import SIX, Chain, MeasuringPoint, with_inserted
 from elastocal.mechanics.kinematics import motion, poses
-from elastocal.mechanics.robot import STANDING, Compensator, Mass, Robot, usual_compliance
+from elastocal.mechanics.robot import STANDING, Compensator, Mass, Robot, usual_compliance, usual_payload_kg
 
 if TYPE_CHECKING:
     from typing import Any
 
 # Below this a link is a point.
 _SHORTEST_M = 1e-6
+_MASS_OVER_RATED = 6.0
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,8 @@ class Sites:
     in which each joint turns about its axis, +1 or -1. `prismatic`: which joints shift along their axis instead; theirs are
     metres and newtons. `masses`: what the links weigh, where the robot file says so. `gravity_m_s2`: base axes.
     `payload_kg`: as in `Robot`. `compliance` (n,): of the joints as in `Robot`, usual ones of rigid joints: the scale of
-    what yields beside them.
+    what yields beside them. `usual_weight`: whether the structure, but no joint, bears the weight of `usual_masses`: where
+    no masses and no loads are known of an arm that slides.
     """
 
     chain: Chain
@@ -57,6 +59,7 @@ class Sites:
     compensator: Compensator | None = None
     payload_kg: float | None = None
     compliance: tuple[float, ...] = ()
+    usual_weight: bool = False
 
     @cached_property
     def followed(self) -> tuple[MeasuringPoint, ...]:
@@ -68,6 +71,17 @@ class Sites:
         bodies = [self.tilt[mass.link - 1] if mass.link else self.base for mass in self.masses]
         places = [self.chain.end_effector.after, *(after[moved[-1]] for moved in (*self.link_end, *bodies))]
         return tuple(MeasuringPoint("followed", place) for place in places)
+
+    @cached_property
+    def usual_masses(self) -> np.ndarray:
+        """Masses at the far ends of links 0..n, where none are declared, ndarray (n + 1,), kg.
+
+        Arms weigh six times what they carry; by length, half of each link at either end.
+        """
+        lengths = np.linalg.norm(self.link_vectors_m[1:], axis=1)
+        rated = usual_payload_kg(self.chain) if self.payload_kg is None else self.payload_kg
+        halves = 0.5 * _MASS_OVER_RATED * rated * lengths / max(lengths.sum(), _SHORTEST_M)
+        return np.append(0.0, halves) + np.append(halves, 0.0)
 
     @property
     def shoulder(self) -> int | None:

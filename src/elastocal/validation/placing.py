@@ -10,6 +10,7 @@ from scipy.linalg import blas
 
 from elastocal.campaigns.holdout import beyond_range, find_repeated
 from elastocal.counting import counted
+from elastocal.effects.protocol import LOADED_JOINTS
 from elastocal.fitting.least_squares import evaluated, fit_frames
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import conditions, of_placement
@@ -70,7 +71,7 @@ def carried_over(fitted: Fit, model: Model, states: States) -> Fit:
 
     `states`: of the other campaign.
     """
-    there, estimate = model.offered(states) | {"load", "external load"}, fitted.estimate
+    there, estimate = model.offered(states) | {*LOADED_JOINTS, "external load"}, fitted.estimate
     kept = [n for n, effect in enumerate(fitted.model.effects) if not effect.of_setup and effect.needs <= there]
     known = replace(fitted.model, effects=tuple(fitted.model.effects[n] for n in kept))
     coefficients, shapes = (tuple(values[n] for n in kept) for values in (estimate.coefficients, estimate.shapes))
