@@ -87,6 +87,14 @@ def test_poses_of_one_configuration_are_fitted_or_held_out_together(cell):
     assert parts(cell)[1] == once | {(session, pose + POSES) for session, pose in once}
 
 
+def test_a_lost_row_with_a_pose_number_of_its_own_changes_no_draw(cell):
+    before = parts(cell, fraction=0.3, seed=2)
+    lost = {"pose": POSES, "target": "A", "time_s": 60.0 * len(cell.table["pose"])}
+    cell.table = {name: [*column, lost.get(name, 0)] for name, column in cell.table.items()}
+    after = parts(cell)
+    assert tuple(poses - {(0, POSES)} for poses in after) == before
+
+
 def test_poses_of_one_configuration_alone_are_refused_soon(cell):
     for name in [name for name in cell.table if name.startswith("q")]:
         cell.table[name] = [cell.table[name][0]] * len(cell.table[name])

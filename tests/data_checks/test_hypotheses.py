@@ -36,12 +36,12 @@ def test_loads_that_are_numbered_throughout_have_no_row_beside_them(campaign):
     assert not [fault for fault in other_interpretations(turned) if fault.name == "shuffled_rows"]
 
 
-@pytest.mark.parametrize(("sign", "words"), [(1.0, "taken from"), (-1.0, "added to")])
-def test_a_joint_counted_from_its_neighbour_is_named_with_it(campaign, sign, words):
+@pytest.mark.parametrize(("joint", "sign", "words"), [(2, 1.0, "taken from"), (2, -1.0, "added to"), (5, -1.0, "added to")])
+def test_a_joint_counted_from_its_neighbour_is_named_with_it(campaign, joint, sign, words):
     angles = campaign.measurements.joint_angles.copy()
-    angles[:, 2] += sign * angles[:, 1]
+    angles[:, joint] += sign * angles[:, joint - 1]
     (fault,) = other_interpretations(with_measured(campaign, joint_angles=angles))
-    assert fault.joints == (2, 3)
+    assert fault.joints == (joint, joint + 1)
     assert words in fault.detail
 
 

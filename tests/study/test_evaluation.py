@@ -7,7 +7,15 @@ import pytest
 from made_studies import studies_of
 from support import random_loads
 
-from elastocal.study.evaluation import average, find_length, metrics_table, over_studies_table, replicates_table, to_weights
+from elastocal.study.evaluation import (
+    average,
+    find_length,
+    metrics,
+    metrics_table,
+    over_studies_table,
+    replicates_table,
+    to_weights,
+)
 from elastocal.study.metrics import make_judge, position_errors
 from elastocal.study.simulation import bootstrap_weights, true_deflections, weight_blocks
 
@@ -79,6 +87,7 @@ def test_share_of_nonpositive_compliances_counts_data_sets_and_takes_trust_away(
 def test_metrics_are_equations_13_and_14_of_the_averages(judge, estimates, weights, counts):
     averages = average(blocks_of(estimates, weights), judge, "stiffness", counts)
     table = metrics_table(averages, judge.reference, (0, 1))
+    assert set(table) == {column.name for column in metrics(6).columns}
     stiffness = (1 / estimates).mean(axis=0)
     delta = 100 * (stiffness * judge.reference - 1)
     np.testing.assert_array_equal(table["length"], [1, 2, 3])

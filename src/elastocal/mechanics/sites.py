@@ -91,8 +91,8 @@ class Sites:
     def carried_links(self, joint: int) -> list[int]:
         """Links with a length behind a joint, from 0, whose weight can turn it, as numbers from 1."""
         turned = self._weight_turns[:, 0, joint] > _SHORTEST_M
-        links = range(joint + 1, self.joints + 1)
-        return [k for k in links if turned[k] and np.linalg.norm(self.link_vectors_m[k]) > _SHORTEST_M]
+        long = np.linalg.norm(self.link_vectors_m, axis=1) > _SHORTEST_M
+        return np.flatnonzero(turned & long).tolist()
 
     def longest_weight_torque_Nm(self, joint: int) -> float:  # noqa: N802 - units in names keep their case
         """Torque on a joint, from 0, by all declared masses behind it, each at the longest lever of the middle of its link."""
