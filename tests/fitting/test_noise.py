@@ -42,23 +42,7 @@ def test_uncertainties_of_measurements_are_the_declared_noise(fanuc):
     u95 = 1.959964 * np.array([3e-5, 4e-5, 5e-5])
     stated = replace(stated, measurements=replace(stated.measurements, u95_m=u95))
     found = chosen_noise(stated, *drawn(fanuc, 0, poses=1, repeats=1)[:2])[0]
-    assert found.position_m == found.usual_m == pytest.approx(1e-5 * np.sqrt(50 / 3))
-
-
-def test_repeats_of_positions_that_are_stated_to_be_worse_are_weighed_accordingly(fanuc):
-    """One sensor at 50 µm for half of the poses, at 250 µm for the others; the figure is that of the usual measurement."""
-    model, estimate, fine = drawn(fanuc, 12, poses=60)
-    coarse = drawn(fanuc, 12, poses=60)[2]
-    worse = fine.pose % 2 == 1
-    extra = np.sqrt(24.0) * SENSOR_M * np.random.default_rng(5).standard_normal(fine.position.shape)
-    position = np.where(worse[:, None], coarse.position + extra, fine.position)
-    stated = replace(fine, position=position, u95_m=1.959964 * np.where(worse, 5.0, 1.0) * SENSOR_M)
-    # Of the worse poses two of five repeats: unweighed contrasts would say 14 % less.
-    found = noise_from_repeats(model, estimate, stated.select(~worse | (fine.repeat < 2)))
-    usual = SENSOR_M * np.sqrt((2 * 25.0 + 5 * 1.0) / 7.0)
-    assert found.usual_m == pytest.approx(usual, rel=1e-6)
-    # 1350 contrasts: 6 % is three standard errors.
-    np.testing.assert_allclose(found.position_m, usual, rtol=0.06)
+    assert found.position_m == pytest.approx(1e-5 * np.sqrt(50 / 3))
 
 
 HANDS = tuple(Target(name, "hand", (0.0, 0.0, 0.0)) for name in "AB")

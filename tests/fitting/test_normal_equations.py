@@ -145,24 +145,17 @@ def dense_covariance(seen, jacobian, noise):
     joints, common = jacobian.reshape(-1, 6) * noise.joint_rad, jacobian.reshape(-1, 6) * noise.pose_rad
     state, pose = np.repeat(seen.state, rows), np.repeat(seen.cluster, rows)
     sensor = np.tile(([noise.position_m] * 3 + [noise.orientation_rad] * 3)[:rows], len(seen))
-    if seen.position_std is not None:
-        of_positions = np.tile(np.arange(rows) < 3, len(seen))
-        sensor = sensor * np.where(of_positions, np.repeat(seen.position_std, rows) / noise.usual_m, 1.0)
     one = (joints @ joints.T) * (state[:, None] == state) + np.diag(sensor**2)
     # What a pose has in common no repeat averages.
     return one / seen.states.repeats[state] + (common @ common.T) * (pose[:, None] == pose)
 
 
-@pytest.mark.parametrize("stated", [False, True], ids=["alike", "each of its own"])
 @pytest.mark.parametrize("pose_rad", [0.0, 2e-5, 1e-3])
-def test_whitened_rows_are_those_of_a_dense_cholesky_factor(case, pose_rad, stated):
+def test_whitened_rows_are_those_of_a_dense_cholesky_factor(case, pose_rad):
     """Poses of one state and of three, which share an error of the joints where there is one."""
     seen, jacobian = case
     seen = replace(seen, states=replace(seen.states, pose=np.array([0, 1, 1, 1, 2, 2, 3])))
     noise = replace(OF_JOINTS, pose_rad=pose_rad)
-    if stated:
-        seen = replace(seen, position_std=np.random.default_rng(3).uniform(2e-5, 3e-4, len(seen)))
-        noise = replace(noise, usual_m=1e-4)
     covariance = dense_covariance(seen, jacobian, noise)
     values = np.random.default_rng(2).standard_normal((len(seen), seen.rows, 5))
     found = whitening(seen, jacobian, noise).apply(values).reshape(-1, 5)

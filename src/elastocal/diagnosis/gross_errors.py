@@ -112,9 +112,9 @@ class _Beside:
         closely = near | sample | (far > np.quantile(far[near], _SCALE_QUANTILES[-1]))
         some, parts = select_states(single, closely), []
         for _, seen, part in parts_of(some, len(parameters(model, estimate))):
-            line, spread = linearize(model, estimate, part, conditions(model, estimate, part.states)), noise.spread(part)
+            line = linearize(model, estimate, part, conditions(model, estimate, part.states))
             jacobian = line.joint_jacobian
-            own = measurement_covariances(noise, jacobian[:, None], model.rows, None if spread is None else spread[:, None])
+            own = measurement_covariances(noise, jacobian[:, None], model.rows)
             parts.append((seen, line, own, jacobian @ jacobian.transpose(0, 2, 1)))
         return cls(residual, far, sample, closely, parts, noise)
 

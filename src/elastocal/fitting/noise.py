@@ -16,13 +16,7 @@ from scipy.special import gammaincinv
 
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import conditions
-from elastocal.fitting.observations import (
-    each_approach,
-    groups_by_size,
-    select_states,
-    standard_uncertainty,
-    without_outlying_repeats,
-)
+from elastocal.fitting.observations import each_approach, groups_by_size, select_states, without_outlying_repeats
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -30,13 +24,14 @@ if TYPE_CHECKING:
 
     from elastocal.campaigns.campaign import Campaign, Measurements
     from elastocal.fitting.model import Estimate, Model
-    from elastocal.fitting.observations import Observations
 
 # Fewer contrasts of repeats than this do not separate the joints' part from the sensor's; fewer than the second say nothing of
 # their own; as many as the third tell every deviation to a percent, and more only take time.
 FEWEST_FOR_JOINTS, FEWEST, MOST = 60, 9, 20_000
 # No sensor repeats to less than this, m or rad: a sixtieth of the wavelength of a laser.
 FINEST = 1e-8
+# Half width of the interval that holds 95 % of a normal distribution, in standard deviations (JCGM 100:2008, section 6).
+_COVERAGE = 1.959964
 # How sure the joint part should be to be no smaller than taken: too small a value raises false alarms, too large one costs
 # power.
 _UPPER = 0.8
@@ -51,9 +46,7 @@ class Noise:
 
     `source`: one of "repeats", "declared", "residual". `position_m`, `orientation_rad`: sensor part, each component.
     `joint_rad` (n,): repeatability of each joint. `degrees_of_freedom`: contrasts of repeats behind the figures; 0 where they
-    are declared. `pose_rad`: error of each joint that all measurements of a pose have in common. `usual_m`: where measurements
-    state uncertainties of their own, that with which a measurement has `position_m`; others are in proportion. 0 where all are
-    alike.
+    are declared. `pose_rad`: error of each joint that all measurements of a pose have in common.
     """
 
     source: str
@@ -62,7 +55,6 @@ class Noise:
     joint_rad: np.ndarray
     degrees_of_freedom: int = 0
     pose_rad: float = 0.0
-    usual_m: float = 0.0
 
     @property
     def of_measurements(self) -> Noise:
@@ -73,12 +65,6 @@ class Noise:
         """The same with the noise of single measurements multiplied."""
         position, orientation, joint = factor * self.position_m, factor * self.orientation_rad, factor * self.joint_rad
         return replace(self, position_m=position, orientation_rad=orientation, joint_rad=joint)
-
-    def spread(self, observations: Observations) -> np.ndarray | None:
-        """Standard deviation of each position over `position_m`, (M,); None where all are alike."""
-        if not self.usual_m or observations.position_std is None:
-            return None
-        return observations.position_std / self.usual_m
 
     def sensor_std(self, rows: int) -> np.ndarray:
         """The sensor's part of each component of a measurement, (rows,)."""
@@ -97,16 +83,17 @@ def noise_from(facts: Mapping[str, Any]) -> Noise:
 
 
 def chosen_noise(campaign: Campaign, model: Model, estimate: Estimate) -> tuple[Noise | None, list[str]]:
-    """Noise from repeats where there are enough, else as a campaign, or each of its measurements, declares it.
+    """Noise from repeats where there are enough, else as a campaign declares it, or by what its measurements state.
 
-    A ratio of the two outside the chi-squared interval of 99 % of a variance is a warning. Returns `noise`: None where there
-    are neither.
+    Of expanded uncertainties of the measurements, 95 % of one coordinate, the root mean square counts. A ratio of the two
+    outside the chi-squared interval of 99 % of a variance is a warning. Returns `noise`: None where there are neither.
     """
-    repeats, usual = noise_from_repeats(model, estimate, campaign.measurements), _usual(campaign.measurements)
-    stated, declared = campaign.noise or {}, None
-    if usual or stated:
-        position, joints = usual or stated["position_m"], np.zeros(campaign.robot.joints) + stated.get("joint_rad", 0.0)
-        declared = Noise("declared", position, stated.get("orientation_rad", position), joints, usual_m=usual)
+    repeats, stated = noise_from_repeats(model, estimate, campaign.measurements), campaign.noise or {}
+    u95, declared = campaign.measurements.u95_m, None
+    if stated or u95 is not None:
+        position = stated["position_m"] if u95 is None else float(np.sqrt((u95**2).mean())) / _COVERAGE
+        joints = np.zeros(campaign.robot.joints) + stated.get("joint_rad", 0.0)
+        declared = Noise("declared", position, stated.get("orientation_rad", position), joints)
     if repeats is None:
         return declared, [] if declared else ["no repeats and no declared noise: nothing says how large the residual may be"]
     if declared is None:
@@ -117,13 +104,6 @@ def chosen_noise(campaign: Campaign, model: Model, estimate: Estimate) -> tuple[
     if low < ratio < high:
         return repeats, []
     return repeats, [f"repeats show {ratio:.2f} times the declared noise of positions; the repeats are used"]
-
-
-def _usual(measurements: Measurements) -> float:
-    """Root mean square of the standard deviations that measurements state, m; 0 where they do not."""
-    if measurements.u95_m is None:
-        return 0.0
-    return float(np.sqrt((standard_uncertainty(measurements.u95_m) ** 2).mean()))
 
 
 def noise_from_repeats(model: Model, estimate: Estimate, measurements: Measurements) -> Noise | None:
@@ -144,7 +124,7 @@ def noise_from_repeats(model: Model, estimate: Estimate, measurements: Measureme
     if start.min() < FINEST:
         # The same number again and again is a sensor that stands still or digits that were cut off, not one without noise.
         return None
-    sensor = Noise("repeats", float(start[0]), float(start[-1]), np.zeros(joints), total, usual_m=_usual(measurements))
+    sensor = Noise("repeats", float(start[0]), float(start[-1]), np.zeros(joints), total)
     if total < FEWEST_FOR_JOINTS:
         return sensor
     both = np.log(start)
@@ -188,25 +168,16 @@ def hidden_repeatability(model: Model, estimate: Estimate, measurements: Measure
     return float(np.sqrt(mean)), 2.0 * mean**2 / float(weights @ (deviations**2 - mean) ** 2)
 
 
-def measurement_covariances(noise: Noise, jacobians: np.ndarray, rows: int, spread: np.ndarray | None = None) -> np.ndarray:
+def measurement_covariances(noise: Noise, jacobians: np.ndarray, rows: int) -> np.ndarray:
     """Covariance of all measurements of one approach, ndarray (G, k * rows, k * rows).
 
-    `jacobians` (G, k, rows, n): of the k targets, with respect to the joints. `rows`: 3 for positions, 6 for poses. `spread`
-    (G, k): of `Noise.spread`.
+    `jacobians` (G, k, rows, n): of the k targets, with respect to the joints. `rows`: 3 for positions, 6 for poses.
     """
     groups, targets = jacobians.shape[:2]
     stacked = jacobians.reshape(groups, targets * rows, -1) * noise.joint_rad
-    sensor = np.tile(noise.sensor_std(rows) ** 2, targets)
-    if spread is not None:
-        sensor = sensor * of_components(spread, rows).reshape(groups, -1) ** 2
     covariance = stacked @ stacked.transpose(0, 2, 1)
-    covariance[:, np.arange(targets * rows), np.arange(targets * rows)] += sensor
+    covariance[:, np.arange(targets * rows), np.arange(targets * rows)] += np.tile(noise.sensor_std(rows) ** 2, targets)
     return covariance
-
-
-def of_components(spread: np.ndarray, rows: int) -> np.ndarray:
-    """Spread (..., rows) of each component of observations from that of positions (...); orientations are alike."""
-    return np.where(np.arange(rows) < 3, spread[..., None], 1.0)
 
 
 @dataclass(frozen=True)
@@ -244,18 +215,15 @@ def _contrasts(model: Model, estimate: Estimate, measurements: Measurements) -> 
         return None
     at = replace(estimate, coefficients=(), shapes=())
     line = linearize(bare, at, some, conditions(bare, at, some.states))
-    # As if all positions were alike; repeats of a state are taken to be.
-    spread = np.ones(len(some)) if some.position_std is None else some.position_std / _usual(measurements)
-    scale, sensors, squares, found = of_components(spread, model.rows), model.rows // 3, np.zeros(model.rows // 3), []
+    sensors, squares, found = model.rows // 3, np.zeros(model.rows // 3), []
     targets_of = np.bincount(some.state)[some.state]
     for members in groups_by_size(np.unique(repeated[chosen], return_inverse=True)[1][some.state]):
         for count in np.unique(targets_of[members[:, 0]]):
             mine = members[targets_of[members[:, 0]] == count].reshape(-1, members.shape[1] // count, count)
             groups, repeats = mine.shape[:2]
-            each = scale[mine[:, 0]].reshape(groups, count, sensors, 3)
             vectors = helmert(repeats) @ line.residual[mine].reshape(groups, repeats, -1)
-            vectors = vectors.reshape(groups, repeats - 1, count, sensors, 3) / each[:, None]
-            jacobian = line.joint_jacobian[mine[:, 0]].reshape(*each.shape, -1) / each[..., None]
+            vectors = vectors.reshape(groups, repeats - 1, count, sensors, 3)
+            jacobian = line.joint_jacobian[mine[:, 0]].reshape(groups, count, sensors, 3, -1)
             along = np.einsum("gtsxn,grtsx->grsn", jacobian, vectors)
             gram = np.einsum("gtsxn,gtsxm->gsnm", jacobian, jacobian)
             squares += (vectors**2).sum(axis=(0, 1, 2, 4))

@@ -16,7 +16,7 @@ from scipy.linalg.lapack import dpotrf
 from elastocal.effects.conditions import at_states
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import conditions, displaced_coordinates, residuals
-from elastocal.fitting.noise import measurement_covariances, of_components
+from elastocal.fitting.noise import measurement_covariances
 from elastocal.fitting.observations import groups_by_size, parts_of
 
 if TYPE_CHECKING:
@@ -142,12 +142,10 @@ def whitening(observations: Observations, jacobian: np.ndarray | None, noise: No
 
     `jacobian` (M, rows, n): with respect to the joints; where they do not err it is not looked at. `noise`: of one measurement.
     """
-    rows, spread, repeats = observations.rows, noise.spread(observations), observations.states.repeats[observations.state]
+    rows, repeats = observations.rows, observations.states.repeats[observations.state]
     if not noise.pose_rad and not noise.joint_rad.any():
-        std = np.tile(noise.sensor_std(rows), (len(observations), 1))
-        if spread is not None:
-            std *= of_components(spread, rows)
-        return Whitening(((np.arange(len(std))[:, None], (np.sqrt(repeats)[:, None] / std)[..., None] * np.eye(rows)),))
+        each = (np.sqrt(repeats)[:, None] / noise.sensor_std(rows))[..., None] * np.eye(rows)
+        return Whitening(((np.arange(len(each))[:, None], each),))
     assert jacobian is not None
     blocks = []
     for members in groups_by_size(observations.cluster if noise.pose_rad else observations.state):
@@ -155,8 +153,7 @@ def whitening(observations: Observations, jacobian: np.ndarray | None, noise: No
         state = np.repeat(observations.state[members], rows, axis=1)
         alike = (state[:, :, None] == state[:, None, :]) / np.repeat(repeats[members], rows, axis=1)[:, None, :]
         common = noise.pose_rad**2 * (stacked @ stacked.transpose(0, 2, 1))
-        each = None if spread is None else spread[members]
-        covariance = alike * measurement_covariances(noise, jacobian[members], rows, each) + common
+        covariance = alike * measurement_covariances(noise, jacobian[members], rows) + common
         blocks.append((members, np.linalg.inv(np.linalg.cholesky(covariance))))
     return Whitening(tuple(blocks))
 
