@@ -305,7 +305,7 @@ def test_a_fit_of_more_states_than_are_kept_is_the_same_and_keeps_no_jacobian(fa
     seen.position[[5, 20]] += 3e-3
     noise = replace(NOISE, joint_rad=np.full(6, joint_rad))
     kept = fit(model, seen, noise)
-    monkeypatch.setattr("elastocal.fitting.least_squares._MOST_STATES", 10)
+    monkeypatch.setattr("elastocal.fitting.normal_equations._MOST_STATES", 10)
     monkeypatch.setattr("elastocal.fitting.observations._MOST_HELD", 16 * 180)
     found = fit(model, seen, noise)
     assert kept.joint_jacobian is not None and found.joint_jacobian is None and found.conditions is None

@@ -182,7 +182,7 @@ def test_products_by_factors_are_those_of_the_columns_written_out(fanuc, offset,
     weights, found = np.random.default_rng(90).uniform(0.3, 1.0, len(seen)), []
     for fewest in (0, 1000):
         monkeypatch.setattr("elastocal.fitting.normal_equations._COLUMNS_A_COORDINATE", fewest)
-        measurements = Parts(model, seen, noise, conditions(model, estimate, seen.states), plausible)
+        measurements = Parts(model, seen, noise, estimate, plausible)
         measurements.linearize(estimate)
         measurements.whiten()
         found.append(measurements.normal_equations(weights))
@@ -201,7 +201,7 @@ def test_normal_equations_of_a_linear_problem_are_those_written_out(kind, at_onc
     left, off, weights = waves(states.joint_angles, 3), 1e-4 * rng.standard_normal((20, 3)), rng.uniform(0.2, 1.0, 20)
     model, seen = gantry_model(linear_law(3)), seen_off(states, off)
     estimate = replace(made_estimate(model), coefficients=(np.array([1e-4, -2e-4, 3e-5]),))
-    parts = Parts(model, seen, noise, conditions(model, estimate, states), plausible)
+    parts = Parts(model, seen, noise, estimate, plausible)
     assert len(parts.parts) == 1 if at_once is None else len(parts.parts) > 2
     parts.linearize(estimate)
     parts.whiten()
@@ -226,7 +226,7 @@ def test_squares_of_another_estimate_are_whitened_in_the_axes_in_which_the_step_
     model = model_of(fanuc, targets=TARGETS)
     estimate = made_estimate(model, seed=3)
     seen = with_noise(seen_exactly(model, estimate, made_states(6, 9, seed=4)), np.random.default_rng(5))
-    parts = Parts(model, seen, OF_JOINTS, conditions(model, estimate, seen.states), np.ones(12))
+    parts = Parts(model, seen, OF_JOINTS, estimate, np.ones(12))
     parts.linearize(estimate)
     parts.whiten()
     there = stepped(model, estimate, np.array([0, 0, 0, 0.3, -0.2, 0.1, *[0.0] * 6]))

@@ -120,7 +120,9 @@ class Linearized:
         found = np.isin([owner for owner, _ in fitted.parameters], list(self.candidates))
         residual = line.residual + line.moved_by(np.where(found, self._values, 0.0))
         nothing = Factored.of([], white(line.coordinate_jacobian), some.state, len(some.states))
-        rows = WhiteRows(white(line.sensitivities_to(~found)), nothing, white(residual), white(jacobian), some.cluster)
+        rows = WhiteRows(
+            white(line.columns.of_columns(~found).dense()), nothing, white(residual), white(jacobian), some.cluster
+        )
         return rows, line.conditions
 
     @property

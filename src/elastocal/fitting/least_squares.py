@@ -10,19 +10,16 @@ from scipy.spatial.transform import Rotation
 from scipy.special import gammaincinv
 
 from elastocal.campaigns.campaign import NOT_TURNED
-from elastocal.effects.conditions import at_states, with_springs
+from elastocal.effects.conditions import at_states
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import (
     Estimate,
     conditions,
-    joint_compliances,
     limits,
-    mass_corrections,
     nonlinear_parameters,
     of_placement,
     parameter_values,
     parameters,
-    residuals,
     stepped,
 )
 from elastocal.fitting.noise import Noise
@@ -44,9 +41,8 @@ if TYPE_CHECKING:
 # Of more observations than this a sample tells where a fit starts, in so many rounds.
 _MOST_REGISTERED, _ROUNDS = 5_000, 200
 _SETTLED_M = 1e-9
-# States beyond which conditions are not kept from step to step, and with a fit, but found again: they take some ten kilobytes
-# each, and there is one fit after another.
-_MOST_STATES, _MOST_STATES_OF_A_FIT = 20_000, 2_000
+# States beyond which conditions are not kept with a fit, but found again: there is one fit after another.
+_MOST_STATES = 2_000
 _STEPS = 30
 # A step that does not help is halved so often at most: one of a 64th that does not help points the wrong way, or along a kink.
 _HALVINGS = 6
@@ -233,9 +229,7 @@ def robustly(
             step[leaving] = ends
         return step, covariance, held
 
-    few = len(observations.states) <= _MOST_STATES
-    around = conditions(model, estimate, observations.states) if few else None
-    measurements, weights = Parts(model, observations, noise, around, plausible), np.ones(len(observations))
+    measurements, weights = Parts(model, observations, noise, estimate, plausible), np.ones(len(observations))
     measurements.linearize(estimate)
     scale, last, stuck = 1.0, np.zeros(len(plausible)), False
     for number in range(_STEPS):
@@ -292,15 +286,9 @@ def robustly(
             if stuck:
                 break
             stuck = True
-    line, around = measurements.parts[0].line, None
-    if line is not None:
-        around = with_springs(line.conditions, joint_compliances(model, estimate), mass_corrections(model, estimate))
-        residual = residuals(model, estimate, observations, around)
-    else:
-        measurements.linearize(estimate)
-        residual = measurements.residual
-    around = around if len(observations.states) <= _MOST_STATES_OF_A_FIT else None
-    whitener, jacobian = measurements.whitener(), measurements.jacobian()
+    around = measurements.end(estimate)
+    around = around if len(observations.states) <= _MOST_STATES else None
+    residual, whitener, jacobian = measurements.residual_at(estimate), measurements.whitener(), measurements.jacobian()
     return Fit(model, estimate, noise, held, covariance, weights, whitener, residual, jacobian, around, converged)
 
 

@@ -221,6 +221,11 @@ def mass_corrections(model: Model, estimate: Estimate) -> np.ndarray:
     return _values_of(DECLARED_WEIGHT, model, estimate, np.zeros(MASS_PARAMETERS * len(model.sites.masses)))
 
 
+def sprung(model: Model, estimate: Estimate, around: Conditions) -> Conditions:
+    """Conditions with the springs and the masses of an estimate."""
+    return with_springs(around, joint_compliances(model, estimate), mass_corrections(model, estimate))
+
+
 def _values_of(name: str, model: Model, estimate: Estimate, otherwise: np.ndarray) -> np.ndarray:
     for effect, values in zip(model.effects, estimate.coefficients, strict=True):
         if effect.effect == name:
@@ -233,7 +238,7 @@ def displaced_coordinates(model: Model, estimate: Estimate, conditions: Conditio
 
     Springs yield to the total load, the external one and the weight that the robot file declares.
     """
-    around = with_springs(conditions, joint_compliances(model, estimate), mass_corrections(model, estimate))
+    around = sprung(model, estimate, conditions)
     displaced = model.sites.chain.at(around.joint_angles)
     if not model.identifies_compliance:
         displaced[:, : model.sites.joints] += around.total[:, : model.sites.joints] * model.nominal_compliance
