@@ -233,7 +233,7 @@ class Parts:
             if self.factors and size > _COLUMNS_A_COORDINATE * len(line.columns.spans):
                 columns = replace(line.columns, jacobian=turned.apply(line.columns.jacobian))
                 gram += columns.gram()
-                along += columns.times(right[..., None])[:, 0]
+                along += columns.times_by_pose(right[..., None], np.zeros(len(right), int))[0, 0]
             else:
                 left = turned.apply(line.sensitivities).reshape(right.size, size)
                 gram += left.T @ left

@@ -191,34 +191,18 @@ def errors_by_range(errors: Mapping[str, Errors], outside: np.ndarray) -> dict[s
     return found
 
 
-@dataclass(frozen=True)
-class Refit:
-    """A model fitted without one part of some observations.
-
-    `within` (S,) of bool: states of the part left out. `estimate`: fitted to the rest. `there`: the same for the part left out.
-    """
-
-    within: np.ndarray
-    rest: Observations
-    left_out: Observations
-    estimate: Estimate
-    there: Estimate
-
-
-def refits(fitted: Fit, observations: Observations, part: np.ndarray) -> Iterator[Refit]:
+def refits(fitted: Fit, observations: Observations, part: np.ndarray) -> Iterator[Estimate]:
     """Fit a model without each part of the observations in turn, as a fit from the nominal robot would with the same shapes.
 
-    A session that is left out has its frame fitted to itself, see `placing.placed_estimate`.
-
-    `observations`: which it was fitted to, or some of them. `part` (S,) of int: of each state, by whole poses.
+    `observations`: which it was fitted to, or some of them. `part` (S,) of int: of each state, by whole poses. Yields the fit
+    to the rest, for all observations: a session that was left out has its frame fitted to itself, see `placed_estimate`.
     """
     model, noise = fitted.model, fitted.noise
     if len(observations) < len(fitted.weights):
         fitted = fit(model, observations, noise, fitted.estimate, reweighted=True, settled=ON_THE_WAY)
     found, owners = fitted.estimate, [owner for owner, _ in fitted.parameters]
     for number, (step, held) in zip(np.unique(part), _steps_without(fitted, observations, part), strict=True):
-        within = part == number
-        rest, left_out = select_states(observations, ~within), select_states(observations, within)
+        rest = select_states(observations, part != number)
         seen = np.isin(found.sessions, rest.states.session)
         kept = ~np.isin(owners, [f"frame {session}" for session in np.array(found.sessions)[~seen]])
         refit = None
@@ -234,7 +218,7 @@ def refits(fitted: Fit, observations: Observations, part: np.ndarray) -> Iterato
             refit = robustly(model, rest, noise, start, held[kept], reweighted=True, settled=_PROVEN)
         if refit is None or not refit.converged:
             refit = fit(model, rest, noise, replace(registered(model, rest), shapes=found.shapes))
-        yield Refit(within, rest, left_out, refit.estimate, placed_estimate(refit, left_out))
+        yield placed_estimate(refit, observations)
 
 
 def _steps_without(fitted: Fit, observations: Observations, part: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
