@@ -52,8 +52,9 @@ def test_products_are_those_of_the_columns_written_out_however_many_states_are_t
     # States of one pose one after the other, not all poses of one size.
     pose = columns.state // 2
     with mock.patch.object(linearization, "_AT_ONCE", at_once):
-        gram, of_poses = columns.gram(), columns.times_by_pose(right, pose)
+        gram, products, of_poses = columns.gram(), columns.times(right), columns.times_by_pose(right, pose)
     np.testing.assert_allclose(gram, np.tensordot(dense, dense, ((0, 1), (0, 1))), atol=1e-10)
+    np.testing.assert_allclose(products, np.tensordot(dense, right, ((0, 1), (0, 1))), atol=1e-10)
     expected = [np.einsum("mrk,mrn->nk", dense[pose == p], right[pose == p]) for p in range(pose.max() + 1)]
     np.testing.assert_allclose(of_poses, expected, atol=1e-10)
 

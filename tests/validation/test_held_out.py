@@ -11,9 +11,8 @@ from synthetic import NOISE, made_estimate, made_model, made_states, seen_exactl
 from elastocal.campaigns.campaign import Target
 from elastocal.fitting.least_squares import evaluated, fit
 from elastocal.fitting.model import stepped
-from elastocal.fitting.noise import Noise
+from elastocal.fitting.noise import Noise, with_size
 from elastocal.fitting.observations import select_states, state_clusters
-from elastocal.fitting.tolerances import with_size
 from elastocal.validation.held_out import (
     METRICS,
     Errors,

@@ -24,7 +24,8 @@ from elastocal.diagnosis.statistics import WhiteRows
 from elastocal.fitting.least_squares import ON_THE_WAY, evaluated, fit
 from elastocal.fitting.linearization import Linearization, linearize
 from elastocal.fitting.model import conditions, parameters, residuals
-from elastocal.fitting.noise import Noise, measurement_covariances
+from elastocal.fitting.noise import Noise, estimated_noise, fit_declared
+from elastocal.fitting.normal_equations import measurement_covariances
 from elastocal.fitting.observations import (
     Observations,
     measured_in,
@@ -35,7 +36,6 @@ from elastocal.fitting.observations import (
     spread_poses,
     without_outlying_repeats,
 )
-from elastocal.fitting.tolerances import estimated_noise, fit_declared
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements

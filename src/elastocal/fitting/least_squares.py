@@ -22,7 +22,6 @@ from elastocal.fitting.model import (
     parameters,
     stepped,
 )
-from elastocal.fitting.noise import Noise
 from elastocal.fitting.normal_equations import Parts, solve_normal, whitening
 from elastocal.fitting.observations import parts_of, sample_of
 from elastocal.mechanics.kinematics import poses_of_points
@@ -33,6 +32,7 @@ if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
     from elastocal.effects.protocol import Parameter
     from elastocal.fitting.model import Model
+    from elastocal.fitting.noise import Noise
     from elastocal.fitting.normal_equations import Whitening
     from elastocal.fitting.observations import Observations, States
 

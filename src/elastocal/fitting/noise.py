@@ -1,7 +1,13 @@
-"""Noise of the measurements: a sensor part, alike in all directions, and the repeatability of the joints, by the Jacobian.
+"""What is taken of errors before effects are sought: noise of the measurements, and tolerances of what a campaign declares.
 
-Repeats of a state tell both: each repeat is a fresh approach, so that the joints come to rest a little differently and move all
-targets together, while the sensor errs for each target on its own.
+Noise is a sensor part, alike in all directions, and the repeatability of the joints, by the Jacobian. Repeats of a state tell
+both: each repeat is a fresh approach, so that the joints come to rest a little differently and move all targets together, while
+the sensor errs for each target on its own.
+
+A robot is off its drawing by so many times what is plausible; one number for all declared geometry, by type II maximum
+likelihood (Good, The Estimation of Probabilities, 1965), together with how many times the noise taken the measurements
+scatter. Both come of the declared model alone, so that all models of a campaign, with effects and without, have the same
+geometry beforehand.
 """
 
 from __future__ import annotations
@@ -14,16 +20,20 @@ import scipy  # Its optimizers load where a campaign has repeats enough for them
 from scipy.linalg import helmert
 from scipy.special import gammaincinv
 
+from elastocal.fitting.least_squares import ON_THE_WAY, STARTED_FROM, fit, registered
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.model import conditions
-from elastocal.fitting.observations import each_approach, groups_by_size, select_states, without_outlying_repeats
+from elastocal.fitting.model import conditions, parameter_values
+from elastocal.fitting.observations import each_approach, groups_by_size, sample_of, select_states, without_outlying_repeats
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
     from typing import Any
 
     from elastocal.campaigns.campaign import Campaign, Measurements
-    from elastocal.fitting.model import Estimate, Model
+    from elastocal.effects.protocol import Candidate
+    from elastocal.fitting.least_squares import Fit
+    from elastocal.fitting.model import Case, Estimate, Model
+    from elastocal.fitting.observations import Observations
 
 # Fewer contrasts of repeats than this do not separate the joints' part from the sensor's; fewer than the second say nothing of
 # their own; as many as the third tell every deviation to a percent, and more only take time.
@@ -38,6 +48,15 @@ _UPPER = 0.8
 _SMALLEST_RAD, _LARGEST_RAD = 1e-8, 1e-2
 # Deviations of a joint that are tried between these: steps of two fifths.
 _DEVIATIONS = 40
+# Sizes of declared geometry, in plausible sizes: measured robots exceed data-sheet tolerances tenfold, and none is ten times
+# better than these.
+SIZES = np.geomspace(0.1, 10.0, 9)
+# Noise that is there over the noise taken, in steps that change no verdict.
+_FACTORS = np.geomspace(1.0, 1e4, 185)
+# Shares of a prior's variance that measurements leave below this are rounding.
+_ROUNDING = 1e-14
+# Noise that is taken before anything is known of it, m and rad.
+_ASSUMED = 1e-4
 
 
 @dataclass(frozen=True)
@@ -106,6 +125,22 @@ def chosen_noise(campaign: Campaign, model: Model, estimate: Estimate) -> tuple[
     return repeats, [f"repeats show {ratio:.2f} times the declared noise of positions; the repeats are used"]
 
 
+def estimated_noise(case: Case) -> tuple[Noise, list[str]]:
+    """Noise from repeats or as declared, from the residual of the declared model where there is neither; and warnings."""
+    start = registered(case.model, case.observations)
+    noise, warnings = chosen_noise(case.campaign, case.model, start)
+    if noise is None:
+        assumed = Noise("residual", _ASSUMED, _ASSUMED, np.zeros(case.campaign.robot.joints))
+        # The widest prior leaves nearly what none would leave, without parameters that nothing determines.
+        model = with_size(case.model, SIZES[-1])
+        left = fit(model, case.observations, assumed, start).residual
+        typical = [max(float(np.sqrt((part**2).mean())), FINEST) for part in (left[:, :3], left[:, -3:])]
+        noise = replace(assumed, position_m=typical[0], orientation_rad=typical[1])
+        # What parameters have taken of it is given back.
+        noise = noise.scaled(most_probable(fit(model, case.observations, noise, start, settled=ON_THE_WAY))[1])
+    return noise, warnings
+
+
 def noise_from_repeats(model: Model, estimate: Estimate, measurements: Measurements) -> Noise | None:
     """Noise by restricted maximum likelihood from the differences between repeats.
 
@@ -166,18 +201,6 @@ def hidden_repeatability(model: Model, estimate: Estimate, measurements: Measure
     weights /= weights.sum()
     mean = float(weights @ deviations**2)
     return float(np.sqrt(mean)), 2.0 * mean**2 / float(weights @ (deviations**2 - mean) ** 2)
-
-
-def measurement_covariances(noise: Noise, jacobians: np.ndarray, rows: int) -> np.ndarray:
-    """Covariance of all measurements of one approach, ndarray (G, k * rows, k * rows).
-
-    `jacobians` (G, k, rows, n): of the k targets, with respect to the joints. `rows`: 3 for positions, 6 for poses.
-    """
-    groups, targets = jacobians.shape[:2]
-    stacked = jacobians.reshape(groups, targets * rows, -1) * noise.joint_rad
-    covariance = stacked @ stacked.transpose(0, 2, 1)
-    covariance[:, np.arange(targets * rows), np.arange(targets * rows)] += np.tile(noise.sensor_std(rows) ** 2, targets)
-    return covariance
 
 
 @dataclass(frozen=True)
@@ -255,3 +278,66 @@ def _negative_log_likelihood(logs: np.ndarray, contrasts: _Contrasts) -> tuple[f
     slopes = contrasts.count + precision * (explained.sum(axis=0) - contrasts.squares)
     variance = np.diagonal(gram, axis1=1, axis2=2) - (gram * (gram @ left)).sum(axis=2)
     return total, np.concatenate([slopes, deviation**2 * (variance - rest**2).sum(axis=0)])
+
+
+def fit_declared(model: Model, observations: Observations, noise: Noise) -> Fit:
+    """Fit a declared model, its geometry under priors of the most probable size; without geometry as `least_squares.fit`."""
+    if not declared_geometry(model):
+        return fit(model, observations, noise)
+    wide = fit(with_size(model, SIZES[-1]), sample_of(observations, STARTED_FROM), noise, settled=ON_THE_WAY)
+    return fit(with_size(model, most_probable(wide)[0]), observations, noise, wide.estimate, reweighted=True)
+
+
+def declared_geometry(model: Model) -> set[str]:
+    """Names of declared effects whose size is estimated: those whose parameters have no prior of their own, but for springs."""
+    return {
+        effect.effect
+        for effect in model.effects
+        if effect.family != "declared" and all(p.prior_std is None or p.sized for p in effect.parameters)
+    }
+
+
+def with_size(model: Model, size: float) -> Model:
+    """A declared model with priors of a size, in plausible sizes, on its geometry."""
+    sized = declared_geometry(model)
+    effects = [
+        with_prior(effect, [size * p.plausible for p in effect.parameters]) if effect.effect in sized else effect
+        for effect in model.effects
+    ]
+    return replace(model, effects=tuple(effects))
+
+
+def with_prior(candidate: Candidate, deviations: Sequence[float] | np.ndarray) -> Candidate:
+    """A candidate with normal priors about zero whose standard deviations were estimated."""
+    pairs = zip(candidate.parameters, deviations, strict=True)
+    return replace(candidate, parameters=tuple(replace(p, prior_std=float(std), sized=True) for p, std in pairs))
+
+
+def most_probable(wide: Fit) -> tuple[float, float]:
+    """Size of declared geometry, in plausible sizes, and noise over the noise taken that make the measurements most probable.
+
+    In closed form from a fit under the widest prior: given frames and targets the geometry is linear, and the principal axes of
+    its covariance in units of the prior are independent. The noise is no less than the noise taken.
+    """
+    mine = np.flatnonzero(np.array([parameter.sized for _, parameter in wide.parameters], bool) & ~wide.held)
+    prior = wide.prior_std[mine]
+    left, axes = np.linalg.eigh(wide.covariance[np.ix_(mine, mine)] / np.outer(prior, prior))
+    left = np.clip(left, _ROUNDING, 1.0)
+    shift, seen = axes.T @ (parameter_values(wide.model, wide.estimate)[mine] / prior), 1.0 / left - 1.0
+    # Squares of the whitened residual were all of it zero, beside frames and targets.
+    squares = (wide.whitened(wide.residual) ** 2).sum() + ((seen + 2.0) * shift**2).sum()
+    freedom = max(wide.weights.sum() * wide.residual.shape[1] - (~wide.held).sum() + len(mine), 1.0)
+    variance = _FACTORS[:, None, None] ** 2
+    wider = ((SIZES / SIZES[-1]) ** 2)[:, None]
+    explained = ((shift / left) ** 2 * wider / (variance + seen * wider)).sum(axis=2)
+    volume = np.log1p(wider * seen / variance).sum(axis=2)
+    variance = variance[..., 0]
+    evidence = -0.5 * (freedom * np.log(variance) + (squares - explained) / variance + volume)
+    factor, size = np.unravel_index(np.argmax(evidence), evidence.shape)
+    return float(SIZES[size]), float(_FACTORS[factor])
+
+
+def effective_parameters(fitted: Fit) -> float:
+    """Free parameters, with a prior the share that it leaves open: trace of a ridge's hat matrix (Hastie et al., 3.4.1)."""
+    free = ~fitted.held
+    return float(free.sum() - (np.diag(fitted.covariance)[free] / fitted.prior_std[free] ** 2).sum())

@@ -15,7 +15,6 @@ from scipy.linalg.lapack import dpotrf
 
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import conditions, displaced_coordinates, residuals, sprung
-from elastocal.fitting.noise import measurement_covariances
 from elastocal.fitting.observations import groups_by_size, parts_of
 
 if TYPE_CHECKING:
@@ -136,6 +135,18 @@ class Whitening:
         return Whitening(tuple(blocks))
 
 
+def measurement_covariances(noise: Noise, jacobians: np.ndarray, rows: int) -> np.ndarray:
+    """Covariance of all measurements of one approach, ndarray (G, k * rows, k * rows).
+
+    `jacobians` (G, k, rows, n): of the k targets, with respect to the joints. `rows`: 3 for positions, 6 for poses.
+    """
+    groups, targets = jacobians.shape[:2]
+    stacked = jacobians.reshape(groups, targets * rows, -1) * noise.joint_rad
+    covariance = stacked @ stacked.transpose(0, 2, 1)
+    covariance[:, np.arange(targets * rows), np.arange(targets * rows)] += np.tile(noise.sensor_std(rows) ** 2, targets)
+    return covariance
+
+
 def whitening(observations: Observations, jacobian: np.ndarray | None, noise: Noise) -> Whitening:
     """Whitening of averaged observations.
 
@@ -233,7 +244,7 @@ class Parts:
             if self.factors and size > _COLUMNS_A_COORDINATE * len(line.columns.spans):
                 columns = replace(line.columns, jacobian=turned.apply(line.columns.jacobian))
                 gram += columns.gram()
-                along += columns.times_by_pose(right[..., None], np.zeros(len(right), int))[0, 0]
+                along += columns.times(right[..., None])[:, 0]
             else:
                 left = turned.apply(line.sensitivities).reshape(right.size, size)
                 gram += left.T @ left

@@ -28,8 +28,8 @@ from elastocal.effects.catalogue import declared_candidates
 from elastocal.effects.catalogue import effects as catalogue
 from elastocal.exchange.target_path import OK
 from elastocal.fitting.model import declared_model
+from elastocal.fitting.noise import fit_declared
 from elastocal.fitting.observations import select_states
-from elastocal.fitting.tolerances import fit_declared
 from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import write_table
