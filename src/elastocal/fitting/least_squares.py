@@ -154,24 +154,13 @@ def evaluated(model: Model, observations: Observations, noise: Noise, estimate: 
     return replace(robustly(model, observations, noise, estimate, frozen=True), weights=np.ones(len(observations)))
 
 
-def fit_frames(fitted: Fit, model: Model, observations: Observations, own_targets: bool = True) -> Estimate:
+def fit_frames(fitted: Fit, model: Model, observations: Observations) -> Estimate:
     """Fit frames and targets of other observations; everything else stays as it was found.
 
-    `model`: the same effects with the targets of these observations. `own_targets`: whether these observations have targets of
-    their own; where not, those of the fit stay as they were found.
+    `model`: the same effects with the targets of these observations.
     """
     found = fitted.estimate
-    if not own_targets:
-        known = [
-            replace(target, offset_m=tuple(at), rotation=NOT_TURNED)
-            for target, at in zip(model.targets, found.target_offset, strict=True)
-        ]
-        model = replace(model, targets=tuple(known))
-    start = registered(model, observations)
-    start = replace(start, coefficients=found.coefficients, shapes=found.shapes)
-    if not own_targets:
-        # To the last bit, which a rotation vector does not keep.
-        start = replace(start, target_rotation=found.target_rotation)
+    start = replace(registered(model, observations), coefficients=found.coefficients, shapes=found.shapes)
     frozen = ~of_placement(owner for owner, _ in parameters(model, start))
     return robustly(model, observations, fitted.noise, start, frozen).estimate
 

@@ -209,13 +209,6 @@ class Linearization:
         """With respect to `parameters`, ndarray (M, rows, P)."""
         return self.columns.dense()
 
-    def moved_by(self, values: np.ndarray) -> np.ndarray:
-        """By how much predictions move where parameters grow by some values (P,), ndarray (M, rows)."""
-        columns = self.columns
-        moved = np.zeros((columns.jacobian.shape[2], columns.values.shape[1]))
-        np.add.at(moved, columns.coordinate, values[columns.column, None] * columns.values)
-        return (columns.jacobian @ moved.T[columns.state, :, None])[..., 0]
-
 
 def linearize(model: Model, estimate: Estimate, observations: Observations, conditions: Conditions) -> Linearization:
     """Residuals of a model and their sensitivities; arguments as of `predict`.
