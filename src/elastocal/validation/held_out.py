@@ -200,22 +200,12 @@ def refits(fitted: Fit, observations: Observations, part: np.ndarray) -> Iterato
     model, noise = fitted.model, fitted.noise
     if len(observations) < len(fitted.weights):
         fitted = fit(model, observations, noise, fitted.estimate, reweighted=True, settled=ON_THE_WAY)
-    found, owners = fitted.estimate, [owner for owner, _ in fitted.parameters]
+    found, placements = fitted.estimate, of_placement(owner for owner, _ in fitted.parameters)
     for number, (step, held) in zip(np.unique(part), _steps_without(fitted, observations, part), strict=True):
-        rest = select_states(observations, part != number)
-        seen = np.isin(found.sessions, rest.states.session)
-        kept = ~np.isin(owners, [f"frame {session}" for session in np.array(found.sessions)[~seen]])
-        refit = None
+        rest, refit = select_states(observations, part != number), None
         # Where the rest does not say where a frame or a target is, the nominal robot does.
-        if not (held & of_placement(owners) & kept).any():
-            start = replace(
-                found,
-                sessions=tuple(np.array(found.sessions)[seen].tolist()),
-                frame_rotation=found.frame_rotation[seen],
-                frame_position=found.frame_position[seen],
-            )
-            start = stepped(model, start, step[kept])
-            refit = robustly(model, rest, noise, start, held[kept], reweighted=True, settled=_PROVEN)
+        if not held[placements].any():
+            refit = robustly(model, rest, noise, stepped(model, found, step), held, reweighted=True, settled=_PROVEN)
         if refit is None or not refit.converged:
             refit = fit(model, rest, noise, replace(registered(model, rest), shapes=found.shapes))
         yield placed_estimate(refit, observations)

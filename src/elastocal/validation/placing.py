@@ -56,9 +56,8 @@ def placed_estimate(fitted: Fit, observations: Observations) -> Estimate:
     unseen = ~np.isin(observations.states.session, found.sessions)
     if not unseen.any():
         return found
-    places = zip(
-        fitted.model.targets, found.target_offset, Rotation.from_matrix(found.target_rotation).as_rotvec(), strict=True
-    )
+    turns = Rotation.from_matrix(found.target_rotation).as_rotvec()
+    places = zip(fitted.model.targets, found.target_offset, turns, strict=True)
     known = [replace(target, offset_m=tuple(at), rotation=tuple(turn)) for target, at, turn in places]
     there = fit_frames(fitted, replace(fitted.model, targets=tuple(known)), select_states(observations, unseen))
     sessions = np.array([*found.sessions, *there.sessions])
