@@ -232,6 +232,8 @@ def test_squares_of_another_estimate_are_whitened_in_the_axes_in_which_the_step_
     there = stepped(model, estimate, np.array([0, 0, 0, 0.3, -0.2, 0.1, *[0.0] * 6]))
     residual = residuals(model, there, seen, conditions(model, there, seen.states))
     turned = residual @ there.frame_rotation[0].T @ estimate.frame_rotation[0]
-    expected = (whitening(seen, parts.jacobian(), OF_JOINTS).apply(turned) ** 2).sum()
+    expected = (whitening(seen, parts.parts[0].jacobian, OF_JOINTS).apply(turned) ** 2).sum()
     assert parts.squares(np.ones(len(seen)), there) == pytest.approx(expected, rel=1e-6)
-    assert parts.squares(np.ones(len(seen)), there) != pytest.approx((parts.whitener().apply(residual) ** 2).sum(), rel=1e-3)
+    assert parts.squares(np.ones(len(seen)), there) != pytest.approx(
+        (parts.parts[0].whitener.apply(residual) ** 2).sum(), rel=1e-3
+    )

@@ -41,8 +41,6 @@ if TYPE_CHECKING:
 # Of more observations than this a sample tells where a fit starts, in so many rounds.
 _MOST_REGISTERED, _ROUNDS = 5_000, 200
 _SETTLED_M = 1e-9
-# States beyond which conditions are not kept with a fit, but found again: there is one fit after another.
-_MOST_STATES = 2_000
 _STEPS = 30
 # A step that does not help is halved so often at most: one of a 64th that does not help points the wrong way, or along a kink.
 _HALVINGS = 6
@@ -275,10 +273,7 @@ def robustly(
             if stuck:
                 break
             stuck = True
-    around = measurements.end(estimate)
-    around = around if len(observations.states) <= _MOST_STATES else None
-    residual, whitener, jacobian = measurements.residual_at(estimate), measurements.whitener(), measurements.jacobian()
-    return Fit(model, estimate, noise, held, covariance, weights, whitener, residual, jacobian, around, converged)
+    return Fit(model, estimate, noise, held, covariance, weights, *measurements.ended(estimate), converged)
 
 
 def sizes_of(model: Model, estimate: Estimate) -> np.ndarray:

@@ -26,8 +26,9 @@ if TYPE_CHECKING:
 
 # Correlation beyond which a parameter is not identifiable because of a shape.
 _BOUND_TO_SHAPE = 0.5
-# States beyond which conditions are not kept from step to step, but found again: they take some ten kilobytes each.
-_MOST_STATES = 20_000
+# States beyond which conditions are not kept from step to step, and with a fit, but found again: they take some ten kilobytes
+# each, and there is one fit after another.
+_MOST_STATES, _MOST_STATES_OF_A_FIT = 20_000, 2_000
 # Columns for each coordinate from which on products by factors cost less than those of the columns written out.
 _COLUMNS_A_COORDINATE = 4
 
@@ -218,7 +219,7 @@ class Parts:
         for part in self.parts:
             if part.around is not None:
                 part.line = linearize(self.model, estimate, part.observations, part.around)
-            found.append(part.line.residual if part.line else self._residual(part, estimate))
+            found.append(part.line.residual if part.line else self._residual_of(part, estimate))
         self.residual = np.concatenate(found)
 
     def whiten(self) -> None:
@@ -257,7 +258,7 @@ class Parts:
 
     def squares(self, weights: np.ndarray, estimate: Estimate | None = None) -> float:
         """Sum of squares of the residual, weighted and whitened as in `normal_equations`; of this or another estimate."""
-        residual = self.residual if estimate is None else self.residual_at(estimate)
+        residual = self.residual if estimate is None else self._residual(estimate)
         # A residual in the base axes of an estimate in those of the one by which it is whitened.
         estimate = estimate or self.estimate
         turn = self.origin.frame_rotation.transpose(0, 2, 1) @ estimate.frame_rotation
@@ -267,28 +268,26 @@ class Parts:
             residual = (vectors @ turn[session].transpose(0, 2, 1)).reshape(residual.shape)
         return float((self._whitened(residual * np.sqrt(weights)[:, None]) ** 2).sum())
 
-    def end(self, estimate: Estimate) -> Conditions | None:
-        """Take loads where the last step led, by the springs of an estimate; of all states, where they are kept together."""
+    def ended(self, estimate: Estimate) -> tuple[Whitening, np.ndarray, np.ndarray | None, Conditions | None]:
+        """What is kept of a fit at its last estimate, of all observations, under the loads where its last step led.
+
+        Whitening; residual (M, rows); Jacobian with respect to the joints (M, rows, n), None where there are too many to keep
+        it; conditions, None where there are.
+        """
         for part in self.parts:
             if part.line is not None:
                 part.around = sprung(self.model, estimate, part.line.conditions)
-        return self.parts[0].around if len(self.parts) == 1 else None
+        blocks = [(members + part.seen.start, factor) for part in self.parts for members, factor in part.whitener.blocks]
+        kept = [part.jacobian for part in self.parts if part.jacobian is not None]
+        around = (
+            self.parts[0].around if len(self.observations.states) <= _MOST_STATES_OF_A_FIT and len(self.parts) == 1 else None
+        )
+        return Whitening(tuple(blocks)), self._residual(estimate), np.concatenate(kept) if kept else None, around
 
-    def residual_at(self, estimate: Estimate) -> np.ndarray:
-        """Of all observations, ndarray (M, rows), under the loads of the present step."""
-        return np.concatenate([self._residual(part, estimate) for part in self.parts])
+    def _residual(self, estimate: Estimate) -> np.ndarray:
+        return np.concatenate([self._residual_of(part, estimate) for part in self.parts])
 
-    def whitener(self) -> Whitening:
-        """Of all observations."""
-        pairs = [(members + part.seen.start, factor) for part in self.parts for members, factor in part.whitener.blocks]
-        return Whitening(tuple(pairs))
-
-    def jacobian(self) -> np.ndarray | None:
-        """Of all observations with respect to the joints, ndarray (M, rows, n); None where it was not kept."""
-        found = [part.jacobian for part in self.parts if part.jacobian is not None]
-        return np.concatenate(found) if found else None
-
-    def _residual(self, part: _Part, estimate: Estimate) -> np.ndarray:
+    def _residual_of(self, part: _Part, estimate: Estimate) -> np.ndarray:
         return residuals(self.model, estimate, part.observations, self._around(part, estimate))
 
     def _whitened(self, residual: np.ndarray) -> np.ndarray:
