@@ -255,8 +255,8 @@ def robustly(
             if after > before - least and halving == first:
                 # What it fell from was under the loads of the step before.
                 before = objective(origin, measurements.squares(weights, origin))
-                if after > before - least and (nonlinear | yielding).any():
-                    there = measurements.copy().normal_equations(weights)
+                if after > before - least and (nonlinear | yielding).any() and measurements.kept:
+                    there = measurements.normal_equations(weights)
                     rest = solved(*there, parameter_values(model, estimate), frozen | nonlinear | yielding)[0]
                     acceleration = rest / share**2
                     estimate = stepped(model, origin, share * step + share**2 * acceleration)

@@ -18,8 +18,8 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from elastocal.effects.conditions import Conditions, with_springs, with_total
-from elastocal.effects.gravity import DECLARED_WEIGHT
 from elastocal.fitting.model import (
+    SPRINGS,
     displaced_by,
     displaced_coordinates,
     joint_compliances,
@@ -48,8 +48,6 @@ _AT_ONCE = 1_500_000
 # Relative step of the central difference in a shape parameter; of the forward difference in what loads the springs, in
 # plausible sizes: laws of gears bend little over that.
 _SHAPE_STEP, _SPRING_STEP = 1e-4, 1e-4
-# Parameters on which the laws of other effects depend: they turn a wrench into angles, or are part of the load.
-_SPRINGS = ("joint_compliance", DECLARED_WEIGHT)
 
 
 @dataclass(frozen=True)
@@ -241,7 +239,7 @@ def linearize(model: Model, estimate: Estimate, observations: Observations, cond
         jacobian[part : part + 3, first : first + 3, seen] = rotation[seen].transpose(1, 2, 0)
         laws += [{coordinate: np.ones(len(observations.states))} for coordinate in range(first, first + 3)]
     for effect, values, shapes in zip(model.effects, estimate.coefficients, estimate.shapes, strict=True):
-        laws += _spring_laws(effect, model, estimate, around) if effect.effect in _SPRINGS else laws_of(effect, shapes, around)
+        laws += _spring_laws(effect, model, estimate, around) if effect.effect in SPRINGS else laws_of(effect, shapes, around)
         laws += _shape_laws(effect, values, shapes, around)
     columns = Factored.of(laws, np.moveaxis(jacobian, -1, 0), observations.state, len(observations.states))
     return Linearization(residual, columns, replace(around, motion=moved))
@@ -284,7 +282,7 @@ def _spring_laws(spring: Candidate, model: Model, estimate: Estimate, around: Co
     others = [
         found
         for found in zip(model.effects, estimate.coefficients, estimate.shapes, strict=True)
-        if (found[0].family in ("gravity", "load") if springs else "load" in found[0].needs and found[0].effect not in _SPRINGS)
+        if (found[0].family in ("gravity", "load") if springs else "load" in found[0].needs and found[0].effect not in SPRINGS)
     ]
     if not others:
         return laws

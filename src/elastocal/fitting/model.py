@@ -33,6 +33,8 @@ _ANYWHERE_M, _ANYWHERE_RAD = 1.0, 1.0
 # Fixed-point iterations of the load at the displaced pose. Each shrinks what is left by deflection over reach, some 1 / 500 at
 # 3 kN, from ten micrometres at the commanded pose.
 _PASSES = 2
+# Effects on which the laws of others depend: they turn a wrench into angles, or are part of the load.
+SPRINGS = ("joint_compliance", DECLARED_WEIGHT)
 
 
 @dataclass(frozen=True)
@@ -240,11 +242,9 @@ def displaced_coordinates(model: Model, estimate: Estimate, conditions: Conditio
     """
     around = sprung(model, estimate, conditions)
     displaced = model.sites.chain.at(around.joint_angles)
-    if not model.identifies_compliance:
-        displaced[:, : model.sites.joints] += around.total[:, : model.sites.joints] * model.nominal_compliance
+    displaced[:, : model.sites.joints] += around.total[:, : model.sites.joints] * around.compliance
     effects = zip(model.effects, estimate.coefficients, estimate.shapes, strict=True)
-    # The errors of masses are part of the total load.
-    for coordinate, by in displaced_by((each for each in effects if each[0].effect != DECLARED_WEIGHT), around).items():
+    for coordinate, by in displaced_by((each for each in effects if each[0].effect not in SPRINGS), around).items():
         displaced[:, coordinate] += by
     return displaced
 

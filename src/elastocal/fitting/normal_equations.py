@@ -6,7 +6,6 @@ states in which they were taken; what the data do not identify is held at its va
 
 from __future__ import annotations
 
-from copy import copy
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -202,22 +201,17 @@ class Parts:
     ) -> None:
         self.model, self.observations, self.noise, self.plausible = model, observations, noise, plausible
         self.parts = [_Part(*edges) for edges in parts_of(observations, len(plausible))]
-        for part in self.parts if len(observations.states) <= _MOST_STATES else ():
+        self.kept = len(observations.states) <= _MOST_STATES
+        for part in self.parts if self.kept else ():
             part.around = conditions(model, estimate, part.observations.states)
         # What is whitened over several states has no factors any more, one of which belongs to the state.
         self.factors = not noise.pose_rad or observations.cluster.max() + 1 == len(observations.states)
-
-    def copy(self) -> Parts:
-        """The same, which goes its own way from here."""
-        other = copy(self)
-        other.parts = [copy(part) for part in self.parts]
-        return other
 
     def linearize(self, estimate: Estimate) -> None:
         """Go to an estimate."""
         self.estimate, found = estimate, []
         for part in self.parts:
-            if part.around is not None:
+            if self.kept:
                 part.line = linearize(self.model, estimate, part.observations, part.around)
             found.append(part.line.residual if part.line else self._residual_of(part, estimate))
         self.residual = np.concatenate(found)
