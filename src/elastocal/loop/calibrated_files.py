@@ -143,7 +143,7 @@ def certificate(
     robot, states, poses = calibrated.robot, found.case.observations.states, campaign_poses(calibrated)
     prediction = predict_errors(calibrated, *poses)
     accuracy = prediction.accuracy(REGION)
-    decision = predicted_conformity(prediction.rms_m, accuracy.poses, tolerance_m, accepted_risk)
+    decision = predicted_conformity(prediction.rms_m, tolerance_m, accepted_risk)
     heldout = verdict["heldout"]
     judged = heldout["configurations"]
     missing = shortfalls(judged, states, robot)

@@ -268,7 +268,7 @@ def stated_accuracy(robot_file: Path, effect: str, seed: int, frame: str) -> lis
         mine = good & np.isin(wanted.part, members)
         prediction = predict_errors(calibrated, targets.joint_angles[mine], operating.part(mine))
         stated, distance = prediction.accuracy(part), np.linalg.norm(off[mine], axis=1)
-        decided = predicted_conformity(prediction.rms_m, stated.poses, tolerance, _RISK)
+        decided = predicted_conformity(prediction.rms_m, tolerance, _RISK)
         rows.append(
             {"robot": robot_file.stem, "effect": effect, "seed": seed, "frame": frame, "part": part}
             | {"verdict": made.found.document["verdict"], "poses": stated.poses}
