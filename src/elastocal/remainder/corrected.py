@@ -120,7 +120,7 @@ def _chosen(
     count = min(_FOLDS, configuration.max() + 1)
     shuffled = np.random.default_rng(seed).permutation(configuration.max() + 1)[configuration] % count
     fold = blocks_of_poses(states.joint_angles, pose, count) if blocks else shuffled
-    without = np.stack([position_residuals(model, each, observations) for each in refits(fitted, observations, fold[pose])])
+    without = np.stack([position_residuals(model, other, observations) for other in refits(fitted, observations, fold[pose])])
     whole = position_residuals(model, fitted.estimate, observations)
     return tuned(names, inputs, configuration[each], fold[each], whole, without, seed)
 
