@@ -211,7 +211,7 @@ class Parts:
         """Go to an estimate."""
         self.estimate, found = estimate, []
         for part in self.parts:
-            if self.kept:
+            if part.around is not None:
                 part.line = linearize(self.model, estimate, part.observations, part.around)
             found.append(part.line.residual if part.line else self._residual_of(part, estimate))
         self.residual = np.concatenate(found)
