@@ -146,7 +146,11 @@ class Factored:
 
     def times(self, right: np.ndarray) -> np.ndarray:
         """Products of the columns with other rows (M, rows, q), ndarray (K, q)."""
-        return self.times_by_pose(right, np.zeros(len(right), int))[0].T
+        found = np.zeros((len(self.values), right.shape[2]))
+        for states, products in self._products(right):
+            for number, (_, span) in enumerate(self.spans):
+                found[span] += self.values[span, states] @ products[:, number]
+        return self._fold @ found
 
     def times_by_pose(self, right: np.ndarray, pose: np.ndarray) -> np.ndarray:
         """Products of the columns with other rows (M, rows, n), of the measurements of each pose, ndarray (G, n, K).
