@@ -22,7 +22,7 @@ from elastocal.campaigns.importers import FOLDER_VARIABLE, importer
 from elastocal.campaigns.writing import write_campaign
 from elastocal.fitting.least_squares import fit, registered
 from elastocal.fitting.model import parameters
-from elastocal.fitting.tolerances import estimated_noise
+from elastocal.fitting.noise import estimated_noise
 from elastocal.io.documents import read_document
 from elastocal.loop.whole import cases_in
 from elastocal_proof.blind.cases import cases_of, make_case

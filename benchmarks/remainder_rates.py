@@ -19,8 +19,7 @@ from elastocal.campaigns.simulation import Plan as Survey
 from elastocal.campaigns.simulation import draw_measurements
 from elastocal.campaigns.writing import write_campaign
 from elastocal.fitting.model import Case
-from elastocal.fitting.noise import Noise
-from elastocal.fitting.tolerances import fit_declared
+from elastocal.fitting.noise import Noise, fit_declared
 from elastocal.loop.whole import cases_in
 from elastocal.remainder.corrected import corrected, inputs_of
 from elastocal.remainder.repeatable import repeatable_part

@@ -8,7 +8,7 @@ from elastocal.campaigns.campaign import columns_of
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import effect_columns, linearize
 from elastocal.fitting.model import case_from
-from elastocal.fitting.tolerances import estimated_noise
+from elastocal.fitting.noise import estimated_noise
 from elastocal.loop.loading import load_campaign
 from elastocal_proof.blind.cases import Case, make_case
 from elastocal_proof.blind.scores import EXACT_ALIASES

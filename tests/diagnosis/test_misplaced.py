@@ -7,7 +7,7 @@ from made_folders import made_folder
 from scipy.spatial.transform import Rotation
 
 from elastocal.diagnosis.misplaced import misplaced, point_sentence
-from elastocal.fitting.tolerances import estimated_noise, fit_declared
+from elastocal.fitting.noise import estimated_noise, fit_declared
 from elastocal.loop.overview import overview
 from elastocal.loop.whole import cases_in
 from elastocal.mechanics.kinematics import poses

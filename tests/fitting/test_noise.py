@@ -1,9 +1,14 @@
-"""Noise from repeats: what was put in comes out, within what so many repeats can tell."""
+"""Noise from repeats: what was put in comes out, within what so many repeats can tell; else what the declared model leaves.
+
+Declared geometry has one prior, whose size the measurements make most probable; and what priors leave of parameters.
+"""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_campaigns import Plan, made
+from planted import planted
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
@@ -12,14 +17,24 @@ from synthetic import made_estimate, made_measurements, made_model
 
 from elastocal.campaigns.campaign import Campaign, Target
 from elastocal.fitting import noise as noise_module
+from elastocal.fitting.least_squares import fit
+from elastocal.fitting.model import Case, declared_model
 from elastocal.fitting.noise import (
+    SIZES,
     Noise,
     chosen_noise,
+    declared_geometry,
+    effective_parameters,
+    estimated_noise,
+    fit_declared,
     hidden_repeatability,
+    most_probable,
     noise_facts,
     noise_from,
     noise_from_repeats,
+    with_size,
 )
+from elastocal.fitting.observations import averaged
 
 TARGETS = tuple(Target(name, point, (0.1, 0.05, 0.0)) for name, point in (("A", "6DoF"), ("B", "3DoF"), ("C", "2DoF")))
 SENSOR_M, SENSOR_RAD = 50e-6, 30e-6
@@ -42,23 +57,7 @@ def test_uncertainties_of_measurements_are_the_declared_noise(fanuc):
     u95 = 1.959964 * np.array([3e-5, 4e-5, 5e-5])
     stated = replace(stated, measurements=replace(stated.measurements, u95_m=u95))
     found = chosen_noise(stated, *drawn(fanuc, 0, poses=1, repeats=1)[:2])[0]
-    assert found.position_m == found.usual_m == pytest.approx(1e-5 * np.sqrt(50 / 3))
-
-
-def test_repeats_of_positions_that_are_stated_to_be_worse_are_weighed_accordingly(fanuc):
-    """One sensor at 50 µm for half of the poses, at 250 µm for the others; the figure is that of the usual measurement."""
-    model, estimate, fine = drawn(fanuc, 12, poses=60)
-    coarse = drawn(fanuc, 12, poses=60)[2]
-    worse = fine.pose % 2 == 1
-    extra = np.sqrt(24.0) * SENSOR_M * np.random.default_rng(5).standard_normal(fine.position.shape)
-    position = np.where(worse[:, None], coarse.position + extra, fine.position)
-    stated = replace(fine, position=position, u95_m=1.959964 * np.where(worse, 5.0, 1.0) * SENSOR_M)
-    # Of the worse poses two of five repeats: unweighed contrasts would say 14 % less.
-    found = noise_from_repeats(model, estimate, stated.select(~worse | (fine.repeat < 2)))
-    usual = SENSOR_M * np.sqrt((2 * 25.0 + 5 * 1.0) / 7.0)
-    assert found.usual_m == pytest.approx(usual, rel=1e-6)
-    # 1350 contrasts: 6 % is three standard errors.
-    np.testing.assert_allclose(found.position_m, usual, rtol=0.06)
+    assert found.position_m == pytest.approx(1e-5 * np.sqrt(50 / 3))
 
 
 HANDS = tuple(Target(name, "hand", (0.0, 0.0, 0.0)) for name in "AB")
@@ -202,3 +201,76 @@ def test_noise_comes_back_from_its_document():
     back = noise_from({"noise": noise_facts(noise), "warnings": []})
     np.testing.assert_array_equal(back.joint_rad, noise.joint_rad)
     assert replace(back, joint_rad=None) == replace(noise, joint_rad=None)
+
+
+JOINTS = (2, 3, 4, 5)
+
+
+def campaign_of(robot, offset, **options):
+    """A robot whose joints 2 to 5 are off by an angle or its opposite, and its model with these offsets declared."""
+    keys = [f"joint_offset@{joint}" for joint in JOINTS]
+    campaign = planted(robot, {key: [offset * (-1) ** n] for n, key in enumerate(keys)}, seed=2, **options)
+    return campaign, campaign.declared.model.with_effects([campaign.candidates[key] for key in keys])
+
+
+def wide_fit(campaign, model, share=1.0):
+    return fit(with_size(model, SIZES[-1]), campaign.observations, campaign.declared.noise.scaled(share))
+
+
+@pytest.mark.parametrize(("offset", "size"), [(1e-4, 0.1), (1e-3, 1.0), (1e-2, 10.0)])
+def test_declared_geometry_has_the_size_that_the_measurements_make_most_probable(offset, size, kuka):
+    campaign, model = campaign_of(kuka, offset)
+    # Springs of the joints have no size: they have no prior.
+    assert declared_geometry(model) == {"joint_offset"}
+    assert most_probable(wide_fit(campaign, model))[0] == pytest.approx(size, rel=0.01)
+    fitted = fit_declared(model, campaign.observations, campaign.declared.noise)
+    priors = {owner: parameter.prior_std for owner, parameter in fitted.parameters}
+    assert [priors[f"joint_offset@{joint}"] for joint in JOINTS] == pytest.approx([size * 1e-3] * 4, rel=0.01)
+    assert priors["joint_compliance"] is None
+
+
+@pytest.mark.parametrize("share", [1.0, 0.1, 0.01])
+def test_the_size_is_the_same_whatever_noise_was_taken_and_the_noise_comes_back(share, kuka):
+    """Noise that is declared far too small must not make sizes small: they would be so many standard errors, not so many mm."""
+    campaign, model = campaign_of(kuka, 1e-3)
+    size, factor = most_probable(wide_fit(campaign, model, share))
+    assert size == pytest.approx(1.0, rel=0.01)
+    assert factor == pytest.approx(1.0 / share, rel=0.15)
+
+
+def test_effective_parameters_are_the_trace_of_the_hat_matrix(kuka):
+    campaign, model = campaign_of(kuka, 1e-4, poses=6)
+    fitted = fit(with_size(model, 0.1), campaign.observations, campaign.declared.noise.scaled(30.0))
+    rows = np.concatenate([white.reshape(-1, len(fitted.held)) for _, _, white in fitted.sensitivities(campaign.observations)])
+    assert effective_parameters(fitted) == pytest.approx(np.trace(rows @ fitted.covariance @ rows.T), rel=1e-3)
+    assert effective_parameters(fitted) < (~fitted.held).sum() - 0.5
+
+
+def case_of(robot, off=0.0, turned=0.0, noise=None, oriented=True, repeats=1):
+    """A known robot whose measurements are off by so much and turned by so much: nothing is left to fit."""
+    plan = Plan(poses=8, loads=1, repeats=repeats, noise=0.0, force=0.0, oriented=oriented)
+    campaign = replace(made(robot, 3, plan), compliance="nominal", noise=noise)
+    seen = campaign.measurements
+    seen = replace(seen, position=seen.position + off)
+    if oriented:
+        turns = Rotation.from_rotvec(np.zeros_like(seen.position) + turned)
+        vectors = turns * Rotation.from_rotvec(seen.rotation_vector)
+        seen = replace(seen, rotation_vector=vectors.as_rotvec())
+    campaign = replace(campaign, measurements=seen)
+    return Case(campaign, averaged(seen), declared_model(campaign), {})
+
+
+def errors(seed, size, repeats=1):
+    return size * np.random.default_rng(seed).standard_normal((8 * 2 * 4 * repeats, 3))
+
+
+@pytest.mark.parametrize("oriented", [False, True])
+def test_noise_is_the_root_mean_square_of_the_residual_where_nothing_else_says_it(fanuc, oriented):
+    off, turned = errors(1, 70e-6), errors(2, 20e-6)
+    noise, warnings = estimated_noise(case_of(fanuc, off, turned, oriented=oriented))
+    assert noise.source == "residual" and noise.degrees_of_freedom == 0 and noise.pose_rad == 0.0
+    assert noise.position_m == pytest.approx(np.sqrt((off**2).mean()), rel=1e-6)
+    # Where no orientation is measured it counts as in a declaration, as many radians as metres.
+    assert noise.orientation_rad == pytest.approx(np.sqrt(((turned if oriented else off) ** 2).mean()), rel=1e-6)
+    np.testing.assert_array_equal(noise.joint_rad, np.zeros(6))
+    assert len(warnings) == 1 and "no repeats and no declared noise" in warnings[0]

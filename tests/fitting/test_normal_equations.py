@@ -145,24 +145,17 @@ def dense_covariance(seen, jacobian, noise):
     joints, common = jacobian.reshape(-1, 6) * noise.joint_rad, jacobian.reshape(-1, 6) * noise.pose_rad
     state, pose = np.repeat(seen.state, rows), np.repeat(seen.cluster, rows)
     sensor = np.tile(([noise.position_m] * 3 + [noise.orientation_rad] * 3)[:rows], len(seen))
-    if seen.position_std is not None:
-        of_positions = np.tile(np.arange(rows) < 3, len(seen))
-        sensor = sensor * np.where(of_positions, np.repeat(seen.position_std, rows) / noise.usual_m, 1.0)
     one = (joints @ joints.T) * (state[:, None] == state) + np.diag(sensor**2)
     # What a pose has in common no repeat averages.
     return one / seen.states.repeats[state] + (common @ common.T) * (pose[:, None] == pose)
 
 
-@pytest.mark.parametrize("stated", [False, True], ids=["alike", "each of its own"])
 @pytest.mark.parametrize("pose_rad", [0.0, 2e-5, 1e-3])
-def test_whitened_rows_are_those_of_a_dense_cholesky_factor(case, pose_rad, stated):
+def test_whitened_rows_are_those_of_a_dense_cholesky_factor(case, pose_rad):
     """Poses of one state and of three, which share an error of the joints where there is one."""
     seen, jacobian = case
     seen = replace(seen, states=replace(seen.states, pose=np.array([0, 1, 1, 1, 2, 2, 3])))
     noise = replace(OF_JOINTS, pose_rad=pose_rad)
-    if stated:
-        seen = replace(seen, position_std=np.random.default_rng(3).uniform(2e-5, 3e-4, len(seen)))
-        noise = replace(noise, usual_m=1e-4)
     covariance = dense_covariance(seen, jacobian, noise)
     values = np.random.default_rng(2).standard_normal((len(seen), seen.rows, 5))
     found = whitening(seen, jacobian, noise).apply(values).reshape(-1, 5)
@@ -189,7 +182,7 @@ def test_products_by_factors_are_those_of_the_columns_written_out(fanuc, offset,
     weights, found = np.random.default_rng(90).uniform(0.3, 1.0, len(seen)), []
     for fewest in (0, 1000):
         monkeypatch.setattr("elastocal.fitting.normal_equations._COLUMNS_A_COORDINATE", fewest)
-        measurements = Parts(model, seen, noise, conditions(model, estimate, seen.states), plausible)
+        measurements = Parts(model, seen, noise, estimate, plausible)
         measurements.linearize(estimate)
         measurements.whiten()
         found.append(measurements.normal_equations(weights))
@@ -208,7 +201,7 @@ def test_normal_equations_of_a_linear_problem_are_those_written_out(kind, at_onc
     left, off, weights = waves(states.joint_angles, 3), 1e-4 * rng.standard_normal((20, 3)), rng.uniform(0.2, 1.0, 20)
     model, seen = gantry_model(linear_law(3)), seen_off(states, off)
     estimate = replace(made_estimate(model), coefficients=(np.array([1e-4, -2e-4, 3e-5]),))
-    parts = Parts(model, seen, noise, conditions(model, estimate, states), plausible)
+    parts = Parts(model, seen, noise, estimate, plausible)
     assert len(parts.parts) == 1 if at_once is None else len(parts.parts) > 2
     parts.linearize(estimate)
     parts.whiten()
@@ -233,12 +226,14 @@ def test_squares_of_another_estimate_are_whitened_in_the_axes_in_which_the_step_
     model = model_of(fanuc, targets=TARGETS)
     estimate = made_estimate(model, seed=3)
     seen = with_noise(seen_exactly(model, estimate, made_states(6, 9, seed=4)), np.random.default_rng(5))
-    parts = Parts(model, seen, OF_JOINTS, conditions(model, estimate, seen.states), np.ones(12))
+    parts = Parts(model, seen, OF_JOINTS, estimate, np.ones(12))
     parts.linearize(estimate)
     parts.whiten()
     there = stepped(model, estimate, np.array([0, 0, 0, 0.3, -0.2, 0.1, *[0.0] * 6]))
     residual = residuals(model, there, seen, conditions(model, there, seen.states))
     turned = residual @ there.frame_rotation[0].T @ estimate.frame_rotation[0]
-    expected = (whitening(seen, parts.jacobian(), OF_JOINTS).apply(turned) ** 2).sum()
+    expected = (whitening(seen, parts.parts[0].jacobian, OF_JOINTS).apply(turned) ** 2).sum()
     assert parts.squares(np.ones(len(seen)), there) == pytest.approx(expected, rel=1e-6)
-    assert parts.squares(np.ones(len(seen)), there) != pytest.approx((parts.whitener().apply(residual) ** 2).sum(), rel=1e-3)
+    assert parts.squares(np.ones(len(seen)), there) != pytest.approx(
+        (parts.parts[0].whitener.apply(residual) ** 2).sum(), rel=1e-3
+    )

@@ -22,7 +22,7 @@ def test_a_smooth_remainder_remains_with_its_size_and_its_signs_turned_it_does_n
     case, fitted = smooth
     found = repeatable_part(fitted, case.observations, 1)
     left = np.sqrt((fitted.residual**2).sum(axis=1).mean())
-    assert found.remains and found.p_value <= 0.01 and found.configurations == case.observations.cluster.max() + 1
+    assert found.remains and found.p_value <= 0.01
     assert 0.4 * left < found.rms_m < left and found.rms_std_error_m < 0.3 * found.rms_m
 
 

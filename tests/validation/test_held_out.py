@@ -11,9 +11,8 @@ from synthetic import NOISE, made_estimate, made_model, made_states, seen_exactl
 from elastocal.campaigns.campaign import Target
 from elastocal.fitting.least_squares import evaluated, fit
 from elastocal.fitting.model import stepped
-from elastocal.fitting.noise import Noise
+from elastocal.fitting.noise import Noise, with_size
 from elastocal.fitting.observations import select_states, state_clusters
-from elastocal.fitting.tolerances import with_size
 from elastocal.validation.held_out import (
     METRICS,
     Errors,
@@ -197,11 +196,12 @@ def test_what_only_the_part_left_out_identifies_goes_back_to_where_fits_start(fa
     (found,) = fitted.estimate.coefficients
     assert not fitted.held[-6:].any() and found[0] > 1.9 * fanuc.compliance[0]
     for number, refit in enumerate(refits(fitted, seen, part)):
-        (without,) = refit.estimate.coefficients
+        (without,) = refit.coefficients
         if number == 1:
             np.testing.assert_allclose(without, fanuc.compliance, rtol=1e-12)
-            from_nothing = fit(fitted.model, refit.rest, NOISE).estimate
-            errors = [position_residuals(fitted.model, each, refit.left_out) for each in (refit.there, from_nothing)]
+            from_nothing = fit(fitted.model, select_states(seen, part != 1), NOISE).estimate
+            left_out = select_states(seen, part == 1)
+            errors = [position_residuals(fitted.model, each, left_out) for each in (refit, from_nothing)]
             np.testing.assert_allclose(*errors, atol=1e-2 * NOISE.position_m)
             assert np.abs(errors[0]).max() > 10 * NOISE.position_m
         else:
@@ -214,16 +214,16 @@ def test_a_step_that_equations_after_it_do_not_prove_is_followed_by_others(fanuc
     fitted, seen = loaded_in(fanuc, np.ones(24, bool))
     off = stepped(fitted.model, fitted.estimate, np.where(np.arange(len(fitted.held)) < 6, 0.3, 0.0))
     far = evaluated(fitted.model, seen, NOISE, off)
-    for refit, again in zip(refits(far, seen, part), refits(fitted, seen, part), strict=True):
-        errors = [position_residuals(fitted.model, each.there, refit.left_out) for each in (refit, again)]
+    for pair in zip(refits(far, seen, part), refits(fitted, seen, part), strict=True):
+        errors = [position_residuals(fitted.model, each, seen) for each in pair]
         np.testing.assert_allclose(*errors, atol=1e-3 * NOISE.position_m)
 
 
 def test_a_refit_that_does_not_converge_is_made_from_nothing(fanuc, monkeypatch):
     fitted, seen = loaded_in(fanuc, np.ones(24, bool))
     monkeypatch.setattr("elastocal.validation.held_out.robustly", lambda *given, **options: replace(fitted, converged=False))
-    refit = next(refits(fitted, seen, np.arange(24) // 6))
-    (found,), (from_nothing,) = (each.coefficients for each in (refit.estimate, fit(fitted.model, refit.rest, NOISE).estimate))
+    (found,) = next(refits(fitted, seen, np.arange(24) // 6)).coefficients
+    (from_nothing,) = fit(fitted.model, select_states(seen, np.arange(24) >= 6), NOISE).estimate.coefficients
     np.testing.assert_array_equal(found, from_nothing)
 
 
@@ -235,9 +235,9 @@ def test_a_target_that_only_the_part_left_out_shows_is_placed_as_from_nothing(fa
     some = replace(some, rotation=None if seen.rotation is None else seen.rotation[kept])
     fitted = fit(fitted.model, some, NOISE, fitted.estimate)
     refit = list(refits(fitted, some, part))[2]
-    from_nothing = fit(fitted.model, refit.rest, NOISE).estimate
-    np.testing.assert_array_equal(refit.estimate.target_offset[1], from_nothing.target_offset[1])
-    assert np.abs(refit.estimate.target_offset[1] - fitted.estimate.target_offset[1]).max() > 1e-3
+    from_nothing = fit(fitted.model, select_states(some, part != 2), NOISE).estimate
+    np.testing.assert_array_equal(refit.target_offset[1], from_nothing.target_offset[1])
+    assert np.abs(refit.target_offset[1] - fitted.estimate.target_offset[1]).max() > 1e-3
 
 
 def of_sessions(robot, poses=24, sessions=3):
@@ -252,10 +252,8 @@ def of_sessions(robot, poses=24, sessions=3):
 
 def left_out_errors(fitted, seen, part):
     """Distance of each observation from its prediction by a refit without its part."""
-    distance = np.empty(len(seen))
-    for refit in refits(fitted, seen, part):
-        distance[refit.within[seen.state]] = position_errors(fitted.model, refit.there, refit.left_out).distance
-    return distance
+    distances = [position_errors(fitted.model, each, seen).distance for each in refits(fitted, seen, part)]
+    return np.choose(np.unique(part, return_inverse=True)[1][seen.state], distances)
 
 
 def test_errors_are_those_of_a_fit_to_the_rest(fanuc):

@@ -27,9 +27,8 @@ from elastocal.diagnosis.verdict import Evidence
 from elastocal.effects.catalogue import effects
 from elastocal.fitting.least_squares import ON_THE_WAY, SETTLED, fit
 from elastocal.fitting.model import Case, joint_compliances, parameter_values
-from elastocal.fitting.noise import noise_facts
+from elastocal.fitting.noise import effective_parameters, noise_facts
 from elastocal.fitting.observations import Observations
-from elastocal.fitting.tolerances import effective_parameters
 from elastocal.random_streams import stream
 from elastocal.remainder.repeatable import Repeatable, repeatable_part
 from elastocal.validation.held_out import left_out_squares

@@ -24,7 +24,8 @@ from elastocal.diagnosis.statistics import WhiteRows
 from elastocal.fitting.least_squares import ON_THE_WAY, evaluated, fit
 from elastocal.fitting.linearization import Linearization, linearize
 from elastocal.fitting.model import conditions, parameters, residuals
-from elastocal.fitting.noise import Noise, measurement_covariances
+from elastocal.fitting.noise import Noise, estimated_noise, fit_declared
+from elastocal.fitting.normal_equations import measurement_covariances
 from elastocal.fitting.observations import (
     Observations,
     measured_in,
@@ -35,7 +36,6 @@ from elastocal.fitting.observations import (
     spread_poses,
     without_outlying_repeats,
 )
-from elastocal.fitting.tolerances import estimated_noise, fit_declared
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
@@ -112,9 +112,9 @@ class _Beside:
         closely = near | sample | (far > np.quantile(far[near], _SCALE_QUANTILES[-1]))
         some, parts = select_states(single, closely), []
         for _, seen, part in parts_of(some, len(parameters(model, estimate))):
-            line, spread = linearize(model, estimate, part, conditions(model, estimate, part.states)), noise.spread(part)
+            line = linearize(model, estimate, part, conditions(model, estimate, part.states))
             jacobian = line.joint_jacobian
-            own = measurement_covariances(noise, jacobian[:, None], model.rows, None if spread is None else spread[:, None])
+            own = measurement_covariances(noise, jacobian[:, None], model.rows)
             parts.append((seen, line, own, jacobian @ jacobian.transpose(0, 2, 1)))
         return cls(residual, far, sample, closely, parts, noise)
 

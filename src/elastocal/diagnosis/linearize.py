@@ -118,9 +118,11 @@ class Linearized:
             return whitener.apply(values * root.reshape(-1, *[1] * (values.ndim - 1)))
 
         found = np.isin([owner for owner, _ in fitted.parameters], list(self.candidates))
-        residual = line.residual + line.moved_by(np.where(found, self._values, 0.0))
+        residual = line.residual + line.columns.of_columns(found).dense() @ self._values[found]
         nothing = Factored.of([], white(line.coordinate_jacobian), some.state, len(some.states))
-        rows = WhiteRows(white(line.sensitivities_to(~found)), nothing, white(residual), white(jacobian), some.cluster)
+        rows = WhiteRows(
+            white(line.columns.of_columns(~found).dense()), nothing, white(residual), white(jacobian), some.cluster
+        )
         return rows, line.conditions
 
     @property

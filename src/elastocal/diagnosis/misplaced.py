@@ -3,7 +3,7 @@
 A fit takes up in lengths of links what a declaration has wrong by millimetres, and its errors on held-out poses show nothing of
 it; but the flange is then elsewhere than the reflector says. Along each axis of each place is asked whether a shift of any size
 there, beside geometry of one usual size everywhere else, makes the measurements more probable. The size of all else is the most
-probable one, as in `fitting.tolerances`: of a robot that was made badly everywhere nothing is misplaced.
+probable one, as in `fitting.noise`: of a robot that was made badly everywhere nothing is misplaced.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.fitting.model import parameter_values
-from elastocal.fitting.tolerances import SIZES
+from elastocal.fitting.noise import SIZES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

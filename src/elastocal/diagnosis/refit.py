@@ -21,8 +21,8 @@ from elastocal.diagnosis.search import UNLIKELY, Model, Posterior, Problem, solv
 from elastocal.diagnosis.statistics import Statistics, normal_equations
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.model import parameter_values
+from elastocal.fitting.noise import with_prior
 from elastocal.fitting.normal_equations import whitening
-from elastocal.fitting.tolerances import with_prior
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence

@@ -10,22 +10,18 @@ from scipy.spatial.transform import Rotation
 from scipy.special import gammaincinv
 
 from elastocal.campaigns.campaign import NOT_TURNED
-from elastocal.effects.conditions import at_states, with_springs
+from elastocal.effects.conditions import at_states
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import (
     Estimate,
     conditions,
-    joint_compliances,
     limits,
-    mass_corrections,
     nonlinear_parameters,
     of_placement,
     parameter_values,
     parameters,
-    residuals,
     stepped,
 )
-from elastocal.fitting.noise import Noise
 from elastocal.fitting.normal_equations import Parts, solve_normal, whitening
 from elastocal.fitting.observations import parts_of, sample_of
 from elastocal.mechanics.kinematics import poses_of_points
@@ -36,6 +32,7 @@ if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
     from elastocal.effects.protocol import Parameter
     from elastocal.fitting.model import Model
+    from elastocal.fitting.noise import Noise
     from elastocal.fitting.normal_equations import Whitening
     from elastocal.fitting.observations import Observations, States
 
@@ -44,9 +41,6 @@ if TYPE_CHECKING:
 # Of more observations than this a sample tells where a fit starts, in so many rounds.
 _MOST_REGISTERED, _ROUNDS = 5_000, 200
 _SETTLED_M = 1e-9
-# States beyond which conditions are not kept from step to step, and with a fit, but found again: they take some ten kilobytes
-# each, and there is one fit after another.
-_MOST_STATES, _MOST_STATES_OF_A_FIT = 20_000, 2_000
 _STEPS = 30
 # A step that does not help is halved so often at most: one of a 64th that does not help points the wrong way, or along a kink.
 _HALVINGS = 6
@@ -158,24 +152,13 @@ def evaluated(model: Model, observations: Observations, noise: Noise, estimate: 
     return replace(robustly(model, observations, noise, estimate, frozen=True), weights=np.ones(len(observations)))
 
 
-def fit_frames(fitted: Fit, model: Model, observations: Observations, own_targets: bool = True) -> Estimate:
+def fit_frames(fitted: Fit, model: Model, observations: Observations) -> Estimate:
     """Fit frames and targets of other observations; everything else stays as it was found.
 
-    `model`: the same effects with the targets of these observations. `own_targets`: whether these observations have targets of
-    their own; where not, those of the fit stay as they were found.
+    `model`: the same effects with the targets of these observations.
     """
     found = fitted.estimate
-    if not own_targets:
-        known = [
-            replace(target, offset_m=tuple(at), rotation=NOT_TURNED)
-            for target, at in zip(model.targets, found.target_offset, strict=True)
-        ]
-        model = replace(model, targets=tuple(known))
-    start = registered(model, observations)
-    start = replace(start, coefficients=found.coefficients, shapes=found.shapes)
-    if not own_targets:
-        # To the last bit, which a rotation vector does not keep.
-        start = replace(start, target_rotation=found.target_rotation)
+    start = replace(registered(model, observations), coefficients=found.coefficients, shapes=found.shapes)
     frozen = ~of_placement(owner for owner, _ in parameters(model, start))
     return robustly(model, observations, fitted.noise, start, frozen).estimate
 
@@ -233,9 +216,7 @@ def robustly(
             step[leaving] = ends
         return step, covariance, held
 
-    few = len(observations.states) <= _MOST_STATES
-    around = conditions(model, estimate, observations.states) if few else None
-    measurements, weights = Parts(model, observations, noise, around, plausible), np.ones(len(observations))
+    measurements, weights = Parts(model, observations, noise, estimate, plausible), np.ones(len(observations))
     measurements.linearize(estimate)
     scale, last, stuck = 1.0, np.zeros(len(plausible)), False
     for number in range(_STEPS):
@@ -274,8 +255,8 @@ def robustly(
             if after > before - least and halving == first:
                 # What it fell from was under the loads of the step before.
                 before = objective(origin, measurements.squares(weights, origin))
-                if after > before - least and (nonlinear | yielding).any():
-                    there = measurements.copy().normal_equations(weights)
+                if after > before - least and (nonlinear | yielding).any() and measurements.kept:
+                    there = measurements.normal_equations(weights)
                     rest = solved(*there, parameter_values(model, estimate), frozen | nonlinear | yielding)[0]
                     acceleration = rest / share**2
                     estimate = stepped(model, origin, share * step + share**2 * acceleration)
@@ -292,16 +273,7 @@ def robustly(
             if stuck:
                 break
             stuck = True
-    line, around = measurements.parts[0].line, None
-    if line is not None:
-        around = with_springs(line.conditions, joint_compliances(model, estimate), mass_corrections(model, estimate))
-        residual = residuals(model, estimate, observations, around)
-    else:
-        measurements.linearize(estimate)
-        residual = measurements.residual
-    around = around if len(observations.states) <= _MOST_STATES_OF_A_FIT else None
-    whitener, jacobian = measurements.whitener(), measurements.jacobian()
-    return Fit(model, estimate, noise, held, covariance, weights, whitener, residual, jacobian, around, converged)
+    return Fit(model, estimate, noise, held, covariance, weights, *measurements.ended(estimate), converged)
 
 
 def sizes_of(model: Model, estimate: Estimate) -> np.ndarray:

@@ -18,14 +18,15 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from elastocal.effects.conditions import Conditions, with_springs, with_total
-from elastocal.effects.gravity import DECLARED_WEIGHT
 from elastocal.fitting.model import (
+    SPRINGS,
     displaced_by,
     displaced_coordinates,
     joint_compliances,
     laws_of,
     mass_corrections,
     off_measured,
+    sprung,
     target_points,
 )
 from elastocal.fitting.observations import groups_by_size
@@ -47,8 +48,6 @@ _AT_ONCE = 1_500_000
 # Relative step of the central difference in a shape parameter; of the forward difference in what loads the springs, in
 # plausible sizes: laws of gears bend little over that.
 _SHAPE_STEP, _SPRING_STEP = 1e-4, 1e-4
-# Parameters on which the laws of other effects depend: they turn a wrench into angles, or are part of the load.
-_SPRINGS = ("joint_compliance", DECLARED_WEIGHT)
 
 
 @dataclass(frozen=True)
@@ -184,21 +183,19 @@ class Factored:
 class Linearization:
     """A model about an estimate, for M observations.
 
-    `residual` (M, rows): measured less predicted, base axes, m and rad. `columns`: sensitivities to the P `parameters`, zero to
-    those of targets. `target_columns` (M, rows, Q): sensitivities to the parameters of targets. `of_targets` (Q,) of int: which
-    parameters these are. `conditions`: where the robot has yielded to, by this estimate.
+    `residual` (M, rows): measured less predicted, base axes, m and rad. `columns`: sensitivities to the P `parameters`; to them
+    the place of a target that is fitted is another few coordinates, which move no other target. `conditions`: where the robot
+    has yielded to, by this estimate.
     """
 
     residual: np.ndarray
     columns: Factored
-    target_columns: np.ndarray
-    of_targets: np.ndarray
     conditions: Conditions
 
     @property
     def coordinate_jacobian(self) -> np.ndarray:
         """Of each target with respect to the coordinates of the sites, ndarray (M, rows, C)."""
-        return self.columns.jacobian
+        return self.columns.jacobian[..., : self.conditions.sites.chain.coordinates]
 
     @property
     def joint_jacobian(self) -> np.ndarray:
@@ -208,20 +205,7 @@ class Linearization:
     @cached_property
     def sensitivities(self) -> np.ndarray:
         """With respect to `parameters`, ndarray (M, rows, P)."""
-        return self.sensitivities_to(np.ones(self.columns.columns, bool))
-
-    def sensitivities_to(self, kept: np.ndarray) -> np.ndarray:
-        """With respect to some of the parameters, ndarray of bool (P,)."""
-        found, mine = self.columns.of_columns(kept).dense(), kept[self.of_targets]
-        found[..., (np.cumsum(kept) - 1)[self.of_targets[mine]]] = self.target_columns[..., mine]
-        return found
-
-    def moved_by(self, values: np.ndarray) -> np.ndarray:
-        """By how much predictions move where parameters grow by some values (P,), those of targets left out; (M, rows)."""
-        columns = self.columns
-        moved = np.zeros((columns.jacobian.shape[2], columns.values.shape[1]))
-        np.add.at(moved, columns.coordinate, values[columns.column, None] * columns.values)
-        return (columns.jacobian @ moved.T[columns.state, :, None])[..., 0]
+        return self.columns.dense()
 
 
 def linearize(model: Model, estimate: Estimate, observations: Observations, conditions: Conditions) -> Linearization:
@@ -230,38 +214,35 @@ def linearize(model: Model, estimate: Estimate, observations: Observations, cond
     Sensitivities are analytic, but for shapes (central differences) and for what springs do by way of other effects (forward
     differences).
     """
-    around = with_springs(conditions, joint_compliances(model, estimate), mass_corrections(model, estimate))
+    around = sprung(model, estimate, conditions)
     coordinates = displaced_coordinates(model, estimate, around)
     count, rows, chain, points = len(observations), model.rows, model.sites.chain, target_points(model, estimate)
+    placed = [(index, part) for index, parts in model.fitted_parts for part in range(parts.start, parts.stop, 3)]
     moved = motion(chain, coordinates, (*model.sites.followed, *points))
     position, rotation = np.empty((count, 3)), np.empty((count, 3, 3))
     # Component first, so that every effect's arithmetic runs along the observations.
-    jacobian = np.empty((rows, chain.coordinates, count))
+    jacobian = np.zeros((rows, chain.coordinates + 3 * len(placed), count))
     for index, point in enumerate(points):
         seen = np.flatnonzero(observations.target == index)
         state, number = observations.state[seen], len(model.sites.followed) + index
         at = moved.position[number][:, state]
         position[seen], rotation[seen] = at.T, np.moveaxis(moved.rotation[number][..., state], -1, 0)
-        jacobian[..., seen] = moved.jacobian(point.after, at, rows, state)
+        jacobian[:, : chain.coordinates, seen] = moved.jacobian(point.after, at, rows, state)
     residual = off_measured(estimate, observations, position, rotation @ estimate.target_rotation[observations.target])
     laws: list[Mapping[int, np.ndarray]] = []
     for session in estimate.sessions if model.fitted_frames else ():
         in_session = (observations.states.session == session).astype(float)
         laws += [{coordinate: in_session} for coordinate in model.sites.base]
     # A target's shift along the axes of its measuring point and, for poses, its turn about them, where it is seen.
-    target_columns = np.zeros((count, rows, sum(parts.stop - parts.start for _, parts in model.fitted_parts)))
-    of_targets, first = len(laws) + np.arange(target_columns.shape[2]), 0
-    for index, parts in model.fitted_parts:
-        seen = observations.target == index
-        for part in range(parts.start, parts.stop, 3):
-            target_columns[seen, part : part + 3, first : first + 3] = rotation[seen]
-            first += 3
-    laws += [{} for _ in of_targets]
+    for first, (index, part) in zip(range(chain.coordinates, jacobian.shape[1], 3), placed, strict=True):
+        seen = np.flatnonzero(observations.target == index)
+        jacobian[part : part + 3, first : first + 3, seen] = rotation[seen].transpose(1, 2, 0)
+        laws += [{coordinate: np.ones(len(observations.states))} for coordinate in range(first, first + 3)]
     for effect, values, shapes in zip(model.effects, estimate.coefficients, estimate.shapes, strict=True):
-        laws += _spring_laws(effect, model, estimate, around) if effect.effect in _SPRINGS else laws_of(effect, shapes, around)
+        laws += _spring_laws(effect, model, estimate, around) if effect.effect in SPRINGS else laws_of(effect, shapes, around)
         laws += _shape_laws(effect, values, shapes, around)
     columns = Factored.of(laws, np.moveaxis(jacobian, -1, 0), observations.state, len(observations.states))
-    return Linearization(residual, columns, target_columns, of_targets, replace(around, motion=moved))
+    return Linearization(residual, columns, replace(around, motion=moved))
 
 
 def effect_columns(
@@ -301,7 +282,7 @@ def _spring_laws(spring: Candidate, model: Model, estimate: Estimate, around: Co
     others = [
         found
         for found in zip(model.effects, estimate.coefficients, estimate.shapes, strict=True)
-        if (found[0].family in ("gravity", "load") if springs else "load" in found[0].needs and found[0].effect not in _SPRINGS)
+        if (found[0].family in ("gravity", "load") if springs else "load" in found[0].needs and found[0].effect not in SPRINGS)
     ]
     if not others:
         return laws

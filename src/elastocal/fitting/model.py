@@ -33,6 +33,8 @@ _ANYWHERE_M, _ANYWHERE_RAD = 1.0, 1.0
 # Fixed-point iterations of the load at the displaced pose. Each shrinks what is left by deflection over reach, some 1 / 500 at
 # 3 kN, from ten micrometres at the commanded pose.
 _PASSES = 2
+# Effects on which the laws of others depend: they turn a wrench into angles, or are part of the load.
+SPRINGS = ("joint_compliance", DECLARED_WEIGHT)
 
 
 @dataclass(frozen=True)
@@ -222,6 +224,11 @@ def mass_corrections(model: Model, estimate: Estimate) -> np.ndarray:
     return _values_of(DECLARED_WEIGHT, model, estimate, np.zeros(MASS_PARAMETERS * len(model.sites.masses)))
 
 
+def sprung(model: Model, estimate: Estimate, around: Conditions) -> Conditions:
+    """Conditions with the springs and the masses of an estimate."""
+    return with_springs(around, joint_compliances(model, estimate), mass_corrections(model, estimate))
+
+
 def _values_of(name: str, model: Model, estimate: Estimate, otherwise: np.ndarray) -> np.ndarray:
     for effect, values in zip(model.effects, estimate.coefficients, strict=True):
         if effect.effect == name:
@@ -234,13 +241,11 @@ def displaced_coordinates(model: Model, estimate: Estimate, conditions: Conditio
 
     Springs yield to the total load, the external one and the weight that the robot file declares.
     """
-    around = with_springs(conditions, joint_compliances(model, estimate), mass_corrections(model, estimate))
+    around = sprung(model, estimate, conditions)
     displaced = model.sites.chain.at(around.joint_angles)
-    if not model.identifies_compliance:
-        displaced[:, : model.sites.joints] += around.total[:, : model.sites.joints] * model.nominal_compliance
+    displaced[:, : model.sites.joints] += around.total[:, : model.sites.joints] * around.compliance
     effects = zip(model.effects, estimate.coefficients, estimate.shapes, strict=True)
-    # The errors of masses are part of the total load.
-    for coordinate, by in displaced_by((each for each in effects if each[0].effect != DECLARED_WEIGHT), around).items():
+    for coordinate, by in displaced_by((each for each in effects if each[0].effect not in SPRINGS), around).items():
         displaced[:, coordinate] += by
     return displaced
 

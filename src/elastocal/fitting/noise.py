@@ -1,7 +1,13 @@
-"""Noise of the measurements: a sensor part, alike in all directions, and the repeatability of the joints, by the Jacobian.
+"""What is taken of errors before effects are sought: noise of the measurements, and tolerances of what a campaign declares.
 
-Repeats of a state tell both: each repeat is a fresh approach, so that the joints come to rest a little differently and move all
-targets together, while the sensor errs for each target on its own.
+Noise is a sensor part, alike in all directions, and the repeatability of the joints, by the Jacobian. Repeats of a state tell
+both: each repeat is a fresh approach, so that the joints come to rest a little differently and move all targets together, while
+the sensor errs for each target on its own.
+
+A robot is off its drawing by so many times what is plausible; one number for all declared geometry, by type II maximum
+likelihood (Good, The Estimation of Probabilities, 1965), together with how many times the noise taken the measurements
+scatter. Both come of the declared model alone, so that all models of a campaign, with effects and without, have the same
+geometry beforehand.
 """
 
 from __future__ import annotations
@@ -14,22 +20,19 @@ import scipy  # Its optimizers load where a campaign has repeats enough for them
 from scipy.linalg import helmert
 from scipy.special import gammaincinv
 
+from elastocal.fitting.least_squares import ON_THE_WAY, STARTED_FROM, fit, registered
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.model import conditions
-from elastocal.fitting.observations import (
-    each_approach,
-    groups_by_size,
-    select_states,
-    standard_uncertainty,
-    without_outlying_repeats,
-)
+from elastocal.fitting.model import conditions, parameter_values
+from elastocal.fitting.observations import each_approach, groups_by_size, sample_of, select_states, without_outlying_repeats
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
     from typing import Any
 
     from elastocal.campaigns.campaign import Campaign, Measurements
-    from elastocal.fitting.model import Estimate, Model
+    from elastocal.effects.protocol import Candidate
+    from elastocal.fitting.least_squares import Fit
+    from elastocal.fitting.model import Case, Estimate, Model
     from elastocal.fitting.observations import Observations
 
 # Fewer contrasts of repeats than this do not separate the joints' part from the sensor's; fewer than the second say nothing of
@@ -37,12 +40,23 @@ if TYPE_CHECKING:
 FEWEST_FOR_JOINTS, FEWEST, MOST = 60, 9, 20_000
 # No sensor repeats to less than this, m or rad: a sixtieth of the wavelength of a laser.
 FINEST = 1e-8
+# Half width of the interval that holds 95 % of a normal distribution, in standard deviations (JCGM 100:2008, section 6).
+_COVERAGE = 1.959964
 # How sure the joint part should be to be no smaller than taken: too small a value raises false alarms, too large one costs
 # power.
 _UPPER = 0.8
 _SMALLEST_RAD, _LARGEST_RAD = 1e-8, 1e-2
 # Deviations of a joint that are tried between these: steps of two fifths.
 _DEVIATIONS = 40
+# Sizes of declared geometry, in plausible sizes: measured robots exceed data-sheet tolerances tenfold, and none is ten times
+# better than these.
+SIZES = np.geomspace(0.1, 10.0, 9)
+# Noise that is there over the noise taken, in steps that change no verdict.
+_FACTORS = np.geomspace(1.0, 1e4, 185)
+# Shares of a prior's variance that measurements leave below this are rounding.
+_ROUNDING = 1e-14
+# Noise that is taken before anything is known of it, m and rad.
+_ASSUMED = 1e-4
 
 
 @dataclass(frozen=True)
@@ -51,9 +65,7 @@ class Noise:
 
     `source`: one of "repeats", "declared", "residual". `position_m`, `orientation_rad`: sensor part, each component.
     `joint_rad` (n,): repeatability of each joint. `degrees_of_freedom`: contrasts of repeats behind the figures; 0 where they
-    are declared. `pose_rad`: error of each joint that all measurements of a pose have in common. `usual_m`: where measurements
-    state uncertainties of their own, that with which a measurement has `position_m`; others are in proportion. 0 where all are
-    alike.
+    are declared. `pose_rad`: error of each joint that all measurements of a pose have in common.
     """
 
     source: str
@@ -62,7 +74,6 @@ class Noise:
     joint_rad: np.ndarray
     degrees_of_freedom: int = 0
     pose_rad: float = 0.0
-    usual_m: float = 0.0
 
     @property
     def of_measurements(self) -> Noise:
@@ -73,12 +84,6 @@ class Noise:
         """The same with the noise of single measurements multiplied."""
         position, orientation, joint = factor * self.position_m, factor * self.orientation_rad, factor * self.joint_rad
         return replace(self, position_m=position, orientation_rad=orientation, joint_rad=joint)
-
-    def spread(self, observations: Observations) -> np.ndarray | None:
-        """Standard deviation of each position over `position_m`, (M,); None where all are alike."""
-        if not self.usual_m or observations.position_std is None:
-            return None
-        return observations.position_std / self.usual_m
 
     def sensor_std(self, rows: int) -> np.ndarray:
         """The sensor's part of each component of a measurement, (rows,)."""
@@ -97,16 +102,17 @@ def noise_from(facts: Mapping[str, Any]) -> Noise:
 
 
 def chosen_noise(campaign: Campaign, model: Model, estimate: Estimate) -> tuple[Noise | None, list[str]]:
-    """Noise from repeats where there are enough, else as a campaign, or each of its measurements, declares it.
+    """Noise from repeats where there are enough, else as a campaign declares it, or by what its measurements state.
 
-    A ratio of the two outside the chi-squared interval of 99 % of a variance is a warning. Returns `noise`: None where there
-    are neither.
+    Of expanded uncertainties of the measurements, 95 % of one coordinate, the root mean square counts. A ratio of the two
+    outside the chi-squared interval of 99 % of a variance is a warning. Returns `noise`: None where there are neither.
     """
-    repeats, usual = noise_from_repeats(model, estimate, campaign.measurements), _usual(campaign.measurements)
-    stated, declared = campaign.noise or {}, None
-    if usual or stated:
-        position, joints = usual or stated["position_m"], np.zeros(campaign.robot.joints) + stated.get("joint_rad", 0.0)
-        declared = Noise("declared", position, stated.get("orientation_rad", position), joints, usual_m=usual)
+    repeats, stated = noise_from_repeats(model, estimate, campaign.measurements), campaign.noise or {}
+    u95, declared = campaign.measurements.u95_m, None
+    if stated or u95 is not None:
+        position = stated["position_m"] if u95 is None else float(np.sqrt((u95**2).mean())) / _COVERAGE
+        joints = np.zeros(campaign.robot.joints) + stated.get("joint_rad", 0.0)
+        declared = Noise("declared", position, stated.get("orientation_rad", position), joints)
     if repeats is None:
         return declared, [] if declared else ["no repeats and no declared noise: nothing says how large the residual may be"]
     if declared is None:
@@ -119,11 +125,20 @@ def chosen_noise(campaign: Campaign, model: Model, estimate: Estimate) -> tuple[
     return repeats, [f"repeats show {ratio:.2f} times the declared noise of positions; the repeats are used"]
 
 
-def _usual(measurements: Measurements) -> float:
-    """Root mean square of the standard deviations that measurements state, m; 0 where they do not."""
-    if measurements.u95_m is None:
-        return 0.0
-    return float(np.sqrt((standard_uncertainty(measurements.u95_m) ** 2).mean()))
+def estimated_noise(case: Case) -> tuple[Noise, list[str]]:
+    """Noise from repeats or as declared, from the residual of the declared model where there is neither; and warnings."""
+    start = registered(case.model, case.observations)
+    noise, warnings = chosen_noise(case.campaign, case.model, start)
+    if noise is None:
+        assumed = Noise("residual", _ASSUMED, _ASSUMED, np.zeros(case.campaign.robot.joints))
+        # The widest prior leaves nearly what none would leave, without parameters that nothing determines.
+        model = with_size(case.model, SIZES[-1])
+        left = fit(model, case.observations, assumed, start).residual
+        typical = [max(float(np.sqrt((part**2).mean())), FINEST) for part in (left[:, :3], left[:, -3:])]
+        noise = replace(assumed, position_m=typical[0], orientation_rad=typical[1])
+        # What parameters have taken of it is given back.
+        noise = noise.scaled(most_probable(fit(model, case.observations, noise, start, settled=ON_THE_WAY))[1])
+    return noise, warnings
 
 
 def noise_from_repeats(model: Model, estimate: Estimate, measurements: Measurements) -> Noise | None:
@@ -144,7 +159,7 @@ def noise_from_repeats(model: Model, estimate: Estimate, measurements: Measureme
     if start.min() < FINEST:
         # The same number again and again is a sensor that stands still or digits that were cut off, not one without noise.
         return None
-    sensor = Noise("repeats", float(start[0]), float(start[-1]), np.zeros(joints), total, usual_m=_usual(measurements))
+    sensor = Noise("repeats", float(start[0]), float(start[-1]), np.zeros(joints), total)
     if total < FEWEST_FOR_JOINTS:
         return sensor
     both = np.log(start)
@@ -188,27 +203,6 @@ def hidden_repeatability(model: Model, estimate: Estimate, measurements: Measure
     return float(np.sqrt(mean)), 2.0 * mean**2 / float(weights @ (deviations**2 - mean) ** 2)
 
 
-def measurement_covariances(noise: Noise, jacobians: np.ndarray, rows: int, spread: np.ndarray | None = None) -> np.ndarray:
-    """Covariance of all measurements of one approach, ndarray (G, k * rows, k * rows).
-
-    `jacobians` (G, k, rows, n): of the k targets, with respect to the joints. `rows`: 3 for positions, 6 for poses. `spread`
-    (G, k): of `Noise.spread`.
-    """
-    groups, targets = jacobians.shape[:2]
-    stacked = jacobians.reshape(groups, targets * rows, -1) * noise.joint_rad
-    sensor = np.tile(noise.sensor_std(rows) ** 2, targets)
-    if spread is not None:
-        sensor = sensor * of_components(spread, rows).reshape(groups, -1) ** 2
-    covariance = stacked @ stacked.transpose(0, 2, 1)
-    covariance[:, np.arange(targets * rows), np.arange(targets * rows)] += sensor
-    return covariance
-
-
-def of_components(spread: np.ndarray, rows: int) -> np.ndarray:
-    """Spread (..., rows) of each component of observations from that of positions (...); orientations are alike."""
-    return np.where(np.arange(rows) < 3, spread[..., None], 1.0)
-
-
 @dataclass(frozen=True)
 class _Contrasts:
     """What orthonormal contrasts v (k * rows,) of repeats with k targets, G of them, say of the noise, Jacobians S beside them.
@@ -244,18 +238,15 @@ def _contrasts(model: Model, estimate: Estimate, measurements: Measurements) -> 
         return None
     at = replace(estimate, coefficients=(), shapes=())
     line = linearize(bare, at, some, conditions(bare, at, some.states))
-    # As if all positions were alike; repeats of a state are taken to be.
-    spread = np.ones(len(some)) if some.position_std is None else some.position_std / _usual(measurements)
-    scale, sensors, squares, found = of_components(spread, model.rows), model.rows // 3, np.zeros(model.rows // 3), []
+    sensors, squares, found = model.rows // 3, np.zeros(model.rows // 3), []
     targets_of = np.bincount(some.state)[some.state]
     for members in groups_by_size(np.unique(repeated[chosen], return_inverse=True)[1][some.state]):
         for count in np.unique(targets_of[members[:, 0]]):
             mine = members[targets_of[members[:, 0]] == count].reshape(-1, members.shape[1] // count, count)
             groups, repeats = mine.shape[:2]
-            each = scale[mine[:, 0]].reshape(groups, count, sensors, 3)
             vectors = helmert(repeats) @ line.residual[mine].reshape(groups, repeats, -1)
-            vectors = vectors.reshape(groups, repeats - 1, count, sensors, 3) / each[:, None]
-            jacobian = line.joint_jacobian[mine[:, 0]].reshape(*each.shape, -1) / each[..., None]
+            vectors = vectors.reshape(groups, repeats - 1, count, sensors, 3)
+            jacobian = line.joint_jacobian[mine[:, 0]].reshape(groups, count, sensors, 3, -1)
             along = np.einsum("gtsxn,grtsx->grsn", jacobian, vectors)
             gram = np.einsum("gtsxn,gtsxm->gsnm", jacobian, jacobian)
             squares += (vectors**2).sum(axis=(0, 1, 2, 4))
@@ -287,3 +278,66 @@ def _negative_log_likelihood(logs: np.ndarray, contrasts: _Contrasts) -> tuple[f
     slopes = contrasts.count + precision * (explained.sum(axis=0) - contrasts.squares)
     variance = np.diagonal(gram, axis1=1, axis2=2) - (gram * (gram @ left)).sum(axis=2)
     return total, np.concatenate([slopes, deviation**2 * (variance - rest**2).sum(axis=0)])
+
+
+def fit_declared(model: Model, observations: Observations, noise: Noise) -> Fit:
+    """Fit a declared model, its geometry under priors of the most probable size; without geometry as `least_squares.fit`."""
+    if not declared_geometry(model):
+        return fit(model, observations, noise)
+    wide = fit(with_size(model, SIZES[-1]), sample_of(observations, STARTED_FROM), noise, settled=ON_THE_WAY)
+    return fit(with_size(model, most_probable(wide)[0]), observations, noise, wide.estimate, reweighted=True)
+
+
+def declared_geometry(model: Model) -> set[str]:
+    """Names of declared effects whose size is estimated: those whose parameters have no prior of their own, but for springs."""
+    return {
+        effect.effect
+        for effect in model.effects
+        if effect.family != "declared" and all(p.prior_std is None or p.sized for p in effect.parameters)
+    }
+
+
+def with_size(model: Model, size: float) -> Model:
+    """A declared model with priors of a size, in plausible sizes, on its geometry."""
+    sized = declared_geometry(model)
+    effects = [
+        with_prior(effect, [size * p.plausible for p in effect.parameters]) if effect.effect in sized else effect
+        for effect in model.effects
+    ]
+    return replace(model, effects=tuple(effects))
+
+
+def with_prior(candidate: Candidate, deviations: Sequence[float] | np.ndarray) -> Candidate:
+    """A candidate with normal priors about zero whose standard deviations were estimated."""
+    pairs = zip(candidate.parameters, deviations, strict=True)
+    return replace(candidate, parameters=tuple(replace(p, prior_std=float(std), sized=True) for p, std in pairs))
+
+
+def most_probable(wide: Fit) -> tuple[float, float]:
+    """Size of declared geometry, in plausible sizes, and noise over the noise taken that make the measurements most probable.
+
+    In closed form from a fit under the widest prior: given frames and targets the geometry is linear, and the principal axes of
+    its covariance in units of the prior are independent. The noise is no less than the noise taken.
+    """
+    mine = np.flatnonzero(np.array([parameter.sized for _, parameter in wide.parameters], bool) & ~wide.held)
+    prior = wide.prior_std[mine]
+    left, axes = np.linalg.eigh(wide.covariance[np.ix_(mine, mine)] / np.outer(prior, prior))
+    left = np.clip(left, _ROUNDING, 1.0)
+    shift, seen = axes.T @ (parameter_values(wide.model, wide.estimate)[mine] / prior), 1.0 / left - 1.0
+    # Squares of the whitened residual were all of it zero, beside frames and targets.
+    squares = (wide.whitened(wide.residual) ** 2).sum() + ((seen + 2.0) * shift**2).sum()
+    freedom = max(wide.weights.sum() * wide.residual.shape[1] - (~wide.held).sum() + len(mine), 1.0)
+    variance = _FACTORS[:, None, None] ** 2
+    wider = ((SIZES / SIZES[-1]) ** 2)[:, None]
+    explained = ((shift / left) ** 2 * wider / (variance + seen * wider)).sum(axis=2)
+    volume = np.log1p(wider * seen / variance).sum(axis=2)
+    variance = variance[..., 0]
+    evidence = -0.5 * (freedom * np.log(variance) + (squares - explained) / variance + volume)
+    factor, size = np.unravel_index(np.argmax(evidence), evidence.shape)
+    return float(SIZES[size]), float(_FACTORS[factor])
+
+
+def effective_parameters(fitted: Fit) -> float:
+    """Free parameters, with a prior the share that it leaves open: trace of a ridge's hat matrix (Hastie et al., 3.4.1)."""
+    free = ~fitted.held
+    return float(free.sum() - (np.diag(fitted.covariance)[free] / fitted.prior_std[free] ** 2).sum())

@@ -6,17 +6,14 @@ states in which they were taken; what the data do not identify is held at its va
 
 from __future__ import annotations
 
-from copy import copy
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg.lapack import dpotrf
 
-from elastocal.effects.conditions import at_states
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.model import conditions, displaced_coordinates, residuals
-from elastocal.fitting.noise import measurement_covariances, of_components
+from elastocal.fitting.model import conditions, displaced_coordinates, residuals, sprung
 from elastocal.fitting.observations import groups_by_size, parts_of
 
 if TYPE_CHECKING:
@@ -28,6 +25,9 @@ if TYPE_CHECKING:
 
 # Correlation beyond which a parameter is not identifiable because of a shape.
 _BOUND_TO_SHAPE = 0.5
+# States beyond which conditions are not kept from step to step, and with a fit, but found again: they take some ten kilobytes
+# each, and there is one fit after another.
+_MOST_STATES, _MOST_STATES_OF_A_FIT = 20_000, 2_000
 # Columns for each coordinate from which on products by factors cost less than those of the columns written out.
 _COLUMNS_A_COORDINATE = 4
 
@@ -135,6 +135,18 @@ class Whitening:
         return Whitening(tuple(blocks))
 
 
+def measurement_covariances(noise: Noise, jacobians: np.ndarray, rows: int) -> np.ndarray:
+    """Covariance of all measurements of one approach, ndarray (G, k * rows, k * rows).
+
+    `jacobians` (G, k, rows, n): of the k targets, with respect to the joints. `rows`: 3 for positions, 6 for poses.
+    """
+    groups, targets = jacobians.shape[:2]
+    stacked = jacobians.reshape(groups, targets * rows, -1) * noise.joint_rad
+    covariance = stacked @ stacked.transpose(0, 2, 1)
+    covariance[:, np.arange(targets * rows), np.arange(targets * rows)] += np.tile(noise.sensor_std(rows) ** 2, targets)
+    return covariance
+
+
 def whitening(observations: Observations, jacobian: np.ndarray | None, noise: Noise) -> Whitening:
     """Whitening of averaged observations.
 
@@ -142,12 +154,10 @@ def whitening(observations: Observations, jacobian: np.ndarray | None, noise: No
 
     `jacobian` (M, rows, n): with respect to the joints; where they do not err it is not looked at. `noise`: of one measurement.
     """
-    rows, spread, repeats = observations.rows, noise.spread(observations), observations.states.repeats[observations.state]
+    rows, repeats = observations.rows, observations.states.repeats[observations.state]
     if not noise.pose_rad and not noise.joint_rad.any():
-        std = np.tile(noise.sensor_std(rows), (len(observations), 1))
-        if spread is not None:
-            std *= of_components(spread, rows)
-        return Whitening(((np.arange(len(std))[:, None], (np.sqrt(repeats)[:, None] / std)[..., None] * np.eye(rows)),))
+        each = (np.sqrt(repeats)[:, None] / noise.sensor_std(rows))[..., None] * np.eye(rows)
+        return Whitening(((np.arange(len(each))[:, None], each),))
     assert jacobian is not None
     blocks = []
     for members in groups_by_size(observations.cluster if noise.pose_rad else observations.state):
@@ -155,8 +165,7 @@ def whitening(observations: Observations, jacobian: np.ndarray | None, noise: No
         state = np.repeat(observations.state[members], rows, axis=1)
         alike = (state[:, :, None] == state[:, None, :]) / np.repeat(repeats[members], rows, axis=1)[:, None, :]
         common = noise.pose_rad**2 * (stacked @ stacked.transpose(0, 2, 1))
-        each = None if spread is None else spread[members]
-        covariance = alike * measurement_covariances(noise, jacobian[members], rows, each) + common
+        covariance = alike * measurement_covariances(noise, jacobian[members], rows) + common
         blocks.append((members, np.linalg.inv(np.linalg.cholesky(covariance))))
     return Whitening(tuple(blocks))
 
@@ -165,63 +174,58 @@ def whitening(observations: Observations, jacobian: np.ndarray | None, noise: No
 class _Part:
     """Some observations beside a model.
 
-    `states`, `seen`: which. `around`: of their states; None where these are too many to keep it: then `coordinates`, at which
-    loads are taken: which are displaced (C',), and to where (S, C'). `line`: at the present estimate, where it is kept.
-    `jacobian` (M', rows, n): with respect to the joints, by which `whitener` was found.
+    `states`, `seen`: which. `around`: of their states, where conditions are kept: then `line` is at the present estimate, and
+    `jacobian` (M', rows, n), with respect to the joints, is that by which `whitener` was found. Else `coordinates` (S, C):
+    where the robot has yielded to, by which loads are taken.
     """
 
     states: slice
     seen: slice
     observations: Observations
     around: Conditions | None = None
-    coordinates: tuple[np.ndarray, np.ndarray] | None = None
     line: Linearization | None = None
     jacobian: np.ndarray | None = None
+    coordinates: np.ndarray | None = None
     whitener: Whitening = Whitening(())
 
 
 class Parts:
-    """Measurements beside a model, whole or in parts of whole poses: what a step needs of them adds up over the parts.
+    """Measurements beside a model, in parts of whole poses: what a step needs of them adds up over the parts.
 
-    Whitening in parts is that of the last step; where the noise has no part of the joints it is always the same. `around`: of
-    all states; None where these are too many to keep it. `plausible` (P,): plausible size of each parameter.
+    Of very many states nothing is kept from step to step but the whitening of the last step and where the robot yielded to.
+    `estimate`: at which loads are first taken. `plausible` (P,): plausible size of each parameter.
     """
 
     def __init__(
-        self, model: Model, observations: Observations, noise: Noise, around: Conditions | None, plausible: np.ndarray
+        self, model: Model, observations: Observations, noise: Noise, estimate: Estimate, plausible: np.ndarray
     ) -> None:
         self.model, self.observations, self.noise, self.plausible = model, observations, noise, plausible
         self.parts = [_Part(*edges) for edges in parts_of(observations, len(plausible))]
-        self.whole = len(self.parts) == 1 and around is not None
-        if around is not None:
-            for part in self.parts:
-                part.around = around if self.whole else at_states(around, part.states)
+        self.kept = len(observations.states) <= _MOST_STATES
+        for part in self.parts if self.kept else ():
+            part.around = conditions(model, estimate, part.observations.states)
         # What is whitened over several states has no factors any more, one of which belongs to the state.
         self.factors = not noise.pose_rad or observations.cluster.max() + 1 == len(observations.states)
 
-    def copy(self) -> Parts:
-        """The same, which goes its own way from here."""
-        other = copy(self)
-        other.parts = [copy(part) for part in self.parts]
-        return other
-
     def linearize(self, estimate: Estimate) -> None:
         """Go to an estimate."""
-        self.estimate = estimate
-        if self.whole:
-            self.parts[0].line = linearize(self.model, estimate, self.observations, self._around(self.parts[0], estimate))
-            self.residual = self.parts[0].line.residual
-        else:
-            self.residual = self._residual(estimate)
+        self.estimate, found = estimate, []
+        for part in self.parts:
+            if part.around is not None:
+                part.line = linearize(self.model, estimate, part.observations, part.around)
+            found.append(part.line.residual if part.line else self._residual_of(part, estimate))
+        self.residual = np.concatenate(found)
 
     def whiten(self) -> None:
         """Take loads and whitening at the present estimate."""
         self.origin = self.estimate
         for part in self.parts:
-            first, joints = not part.whitener.blocks, self.noise.pose_rad or self.noise.joint_rad.any()
-            if part.line is not None or (first and joints):
+            if part.line is not None:
+                part.around, part.jacobian = part.line.conditions, part.line.joint_jacobian
+                part.whitener = whitening(part.observations, part.jacobian, self.noise)
+            elif not part.whitener.blocks and (self.noise.pose_rad or self.noise.joint_rad.any()):
                 self._linearized(part)
-            elif first:
+            elif not part.whitener.blocks:
                 part.whitener = whitening(part.observations, None, self.noise)
 
     def normal_equations(self, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -233,7 +237,9 @@ class Parts:
             right = part.whitener.apply(line.residual * mine[:, None])
             turned = part.whitener.after(_of_rotation_vectors(line.residual) * mine[:, None, None])
             if self.factors and size > _COLUMNS_A_COORDINATE * len(line.columns.spans):
-                _add_products(gram, along, line, turned, right)
+                columns = replace(line.columns, jacobian=turned.apply(line.columns.jacobian))
+                gram += columns.gram()
+                along += columns.times(right[..., None])[:, 0]
             else:
                 left = turned.apply(line.sensitivities).reshape(right.size, size)
                 gram += left.T @ left
@@ -256,65 +262,47 @@ class Parts:
             residual = (vectors @ turn[session].transpose(0, 2, 1)).reshape(residual.shape)
         return float((self._whitened(residual * np.sqrt(weights)[:, None]) ** 2).sum())
 
-    def whitener(self) -> Whitening:
-        """Of all observations."""
-        pairs = [(members + part.seen.start, factor) for part in self.parts for members, factor in part.whitener.blocks]
-        return Whitening(tuple(pairs))
+    def ended(self, estimate: Estimate) -> tuple[Whitening, np.ndarray, np.ndarray | None, Conditions | None]:
+        """What is kept of a fit at its last estimate, of all observations, under the loads where its last step led.
 
-    def jacobian(self) -> np.ndarray | None:
-        """Of all observations with respect to the joints, ndarray (M, rows, n); None where it was not kept."""
-        found = [part.jacobian for part in self.parts if part.jacobian is not None]
-        return np.concatenate(found) if found else None
+        Whitening; residual (M, rows); Jacobian with respect to the joints (M, rows, n), None where there are too many to keep
+        it; conditions, None where there are.
+        """
+        for part in self.parts:
+            if part.line is not None:
+                part.around = sprung(self.model, estimate, part.line.conditions)
+        blocks = [(members + part.seen.start, factor) for part in self.parts for members, factor in part.whitener.blocks]
+        kept = [part.jacobian for part in self.parts if part.jacobian is not None]
+        around = (
+            self.parts[0].around if len(self.observations.states) <= _MOST_STATES_OF_A_FIT and len(self.parts) == 1 else None
+        )
+        return Whitening(tuple(blocks)), self._residual(estimate), np.concatenate(kept) if kept else None, around
 
     def _residual(self, estimate: Estimate) -> np.ndarray:
-        return np.concatenate([residuals(self.model, estimate, p.observations, self._around(p, estimate)) for p in self.parts])
+        return np.concatenate([self._residual_of(part, estimate) for part in self.parts])
+
+    def _residual_of(self, part: _Part, estimate: Estimate) -> np.ndarray:
+        return residuals(self.model, estimate, part.observations, self._around(part, estimate))
 
     def _whitened(self, residual: np.ndarray) -> np.ndarray:
         return np.concatenate([part.whitener.apply(residual[part.seen]) for part in self.parts])
 
     def _around(self, part: _Part, estimate: Estimate) -> Conditions:
-        """Conditions as they are kept; or at the coordinates that are, or found, which are then kept."""
+        """Conditions as they are kept; else at the coordinates that are, which are found at first."""
         if part.around is not None:
             return part.around
-        states = part.observations.states
+        around = conditions(self.model, estimate, part.observations.states, part.coordinates)
         if part.coordinates is None:
-            around = conditions(self.model, estimate, states)
-            self._keep_coordinates(part, estimate, around)
-            return around
-        coordinates = np.zeros((len(states), self.model.sites.chain.coordinates))
-        coordinates[:, part.coordinates[0]] = part.coordinates[1]
-        return conditions(self.model, estimate, states, coordinates)
-
-    def _keep_coordinates(self, part: _Part, estimate: Estimate, around: Conditions) -> None:
-        displaced = displaced_coordinates(self.model, estimate, around)
-        moved = np.flatnonzero(displaced.any(axis=0))
-        part.coordinates = moved, displaced[:, moved]
+            part.coordinates = displaced_coordinates(self.model, estimate, around)
+        return around
 
     def _linearized(self, part: _Part) -> Linearization:
-        """At the present estimate, by which whitening and loads are then taken; a Jacobian is kept where conditions are."""
-        line = part.line
-        if line is None:
-            around = self._around(part, self.estimate)
-            line = linearize(self.model, self.estimate, part.observations, around)
-            if part.around is None:
-                self._keep_coordinates(part, self.estimate, around)
+        """At the present estimate, by which whitening and loads are then taken, where lines are not kept."""
+        around = self._around(part, self.estimate)
+        line = linearize(self.model, self.estimate, part.observations, around)
+        part.coordinates = displaced_coordinates(self.model, self.estimate, around)
         part.whitener = whitening(part.observations, line.joint_jacobian, self.noise)
-        if part.around is not None:
-            part.around, part.jacobian = line.conditions, line.joint_jacobian
         return line
-
-
-def _add_products(gram: np.ndarray, along: np.ndarray, line: Linearization, turned: Whitening, right: np.ndarray) -> None:
-    """Add the products of the whitened sensitivities with each other and with the whitened residual, by their factors."""
-    columns, at = replace(line.columns, jacobian=turned.apply(line.coordinate_jacobian)), line.of_targets
-    beside = np.concatenate([turned.apply(line.target_columns), right[..., None]], axis=2)
-    cross, own = columns.times(beside), np.tensordot(beside, beside, ((0, 1), (0, 1)))
-    gram += columns.gram()
-    gram[:, at] += cross[:, :-1]
-    gram[at] += cross[:, :-1].T
-    gram[np.ix_(at, at)] += own[:-1, :-1]
-    along += cross[:, -1]
-    along[at] += own[:-1, -1]
 
 
 def _of_rotation_vectors(residual: np.ndarray) -> np.ndarray:

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
 # Measurements this many times as far from the middle of their repeats as half of all are not noise: eight standard deviations.
 _WILD = 12.0
-# Half width of the interval that holds 95 % of a normal distribution, in standard deviations (JCGM 100:2008, section 6).
-_COVERAGE = 1.959964
 # Values of sensitivities that are held at once, of which there are five copies: observations beyond come in parts of so many,
 # which stay in the processor's cache. What a linearisation makes beside parameters is as 60 of them.
 _MOST_HELD, _MOST_AT_ONCE, _BESIDE = 4_000_000, 4000, 60
@@ -54,8 +52,7 @@ class Observations:
     """One averaged reading of one target in one state; M of them, in the order of the states.
 
     `state`, `target` (M,): index of the state and of the target. `position` (M, 3): m, in the frame of the session. `rotation`
-    (M, 3, 3): measured orientation, where poses are measured. `position_std` (M,): stated standard deviation of one measurement
-    of one coordinate of the position, m; None where it is not stated.
+    (M, 3, 3): measured orientation, where poses are measured.
     """
 
     states: States
@@ -63,7 +60,6 @@ class Observations:
     target: np.ndarray
     position: np.ndarray
     rotation: np.ndarray | None
-    position_std: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.state)
@@ -183,9 +179,7 @@ def _observations(measurements: Measurements, key: np.ndarray) -> Observations:
             # Of rotations close to each other, the mean turn from the first: a step towards the Riemannian mean (Moakher 2002).
             mean = Rotation.from_rotvec(_means((each * mean[pair_of].inv()).as_rotvec(), pair_of)) * mean
         rotation = mean.as_matrix()
-    # Of repeats that are averaged the mean square, as if they were alike.
-    spread = None if measurements.u95_m is None else np.sqrt(_means(standard_uncertainty(measurements.u95_m) ** 2, pair_of))
-    return Observations(states, state, target, _means(measurements.position, pair_of), rotation, spread)
+    return Observations(states, state, target, _means(measurements.position, pair_of), rotation)
 
 
 def _means(values: np.ndarray, group: np.ndarray) -> np.ndarray:
@@ -193,11 +187,6 @@ def _means(values: np.ndarray, group: np.ndarray) -> np.ndarray:
     total = np.zeros((len(count), *values.shape[1:]))
     np.add.at(total, group, values)
     return total / count.reshape(-1, *[1] * (values.ndim - 1))
-
-
-def standard_uncertainty(u95: np.ndarray) -> np.ndarray:
-    """Standard deviations of one coordinate, from expanded uncertainties of 95 %."""
-    return u95 / _COVERAGE
 
 
 def select_states(observations: Observations, kept: np.ndarray) -> Observations:

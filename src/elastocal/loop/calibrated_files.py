@@ -127,7 +127,7 @@ def certificate(
     robot, states, poses = calibrated.robot, found.case.observations.states, campaign_poses(calibrated)
     prediction = predict_errors(calibrated, *poses)
     accuracy, worst = prediction.accuracy(REGION), int(np.argmax(prediction.error_m))
-    decision = predicted_conformity(prediction.rms_m, accuracy.poses, tolerance_m, accepted_risk)
+    decision = predicted_conformity(prediction.rms_m, tolerance_m, accepted_risk)
     missing = shortfalls(heldout["configurations"], states, robot)
     if not accuracy.fitted:
         missing = ["nothing fitted: no error of 0 is predicted of a robot of which nothing was fitted", *missing]

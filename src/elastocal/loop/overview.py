@@ -21,7 +21,7 @@ from elastocal.diagnosis.misplaced import misplaced
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.model import case_from, joint_compliances
-from elastocal.fitting.tolerances import effective_parameters
+from elastocal.fitting.noise import effective_parameters
 from elastocal.loop.loading import load_campaign
 from elastocal.validation.placing import repeat_warnings
 

@@ -126,11 +126,7 @@ def _chosen(
     count = min(_FOLDS, configuration.max() + 1)
     shuffled = np.random.default_rng(seed).permutation(configuration.max() + 1)[configuration] % count
     fold = blocks_of_poses(states.joint_angles, pose, count) if blocks else shuffled
-    without = np.empty((count, len(observations), 3))
-    for number, refit in enumerate(refits(fitted, observations, fold[pose])):
-        mine = refit.within[observations.state]
-        without[number, ~mine] = position_residuals(model, refit.estimate, refit.rest)
-        without[number, mine] = position_residuals(model, refit.there, refit.left_out)
+    without = np.stack([position_residuals(model, other, observations) for other in refits(fitted, observations, fold[pose])])
     whole = position_residuals(model, fitted.estimate, observations)
     return tuned(names, inputs, configuration[each], fold[each], whole, without, seed)
 

@@ -50,18 +50,14 @@ _LENGTH = 2.0
 class Repeatable:
     """What left-out configurations say of a model's remainder.
 
-    `statistic`: how many standard deviations better than by chance they are predicted, by the best of a few regressions.
-    `p_value`: of the same best by chance. `remains`: whether that is at most `level`. `rms_m`, `rms_std_error_m`: of each
-    position what is predictable, m.
+    `p_value`: that chance alone has them predicted so well, by the best of a few regressions. `remains`: whether that is at
+    most `LEVEL`. `rms_m`, `rms_std_error_m`: of each position what is predictable, m.
     """
 
-    statistic: float
     p_value: float
     remains: bool
-    level: float
     rms_m: float
     rms_std_error_m: float
-    configurations: int
 
 
 def repeatable_part(fitted: Fit, observations: Observations, seed: int) -> Repeatable | None:
@@ -114,7 +110,7 @@ def repeatable_part(fitted: Fit, observations: Observations, seed: int) -> Repea
     scores = (scores - scores[:, 1:].mean(axis=1, keepdims=True)) / scores[:, 1:].std(axis=1, keepdims=True)
     best, (_, of_residual, of_itself) = scores.max(axis=0), judged[np.argmax(scores[:, 0])]
     p_value, gain = float((best >= best[0]).mean()), gain_of(of_residual, of_itself, len(some), _FOLDS)
-    return Repeatable(float(best[0]), p_value, p_value <= LEVEL, LEVEL, gain["rms_m"], gain["rms_std_error_m"], count)
+    return Repeatable(p_value, p_value <= LEVEL, gain["rms_m"], gain["rms_std_error_m"])
 
 
 def _kinds(inputs: Inputs, most: int, draws: np.random.Generator) -> list[Callable[[Inputs], np.ndarray]]:

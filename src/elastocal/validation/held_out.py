@@ -18,7 +18,6 @@ from elastocal.campaigns.holdout import configurations
 from elastocal.fitting.least_squares import ON_THE_WAY, fit, registered, robustly, sizes_of
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import conditions, nonlinear_parameters, of_placement, parameter_values, residuals, stepped
-from elastocal.fitting.noise import of_components
 from elastocal.fitting.normal_equations import solve_normal
 from elastocal.fitting.observations import parts_of, select_states, state_clusters
 from elastocal.validation.placing import placed_estimate
@@ -173,9 +172,8 @@ def noise_floor(fitted: Fit, observations: Observations, model: Model, estimate:
     if noise.source == "residual":
         return float("nan")
     for _, _, part in parts_of(observations, len(fitted.held)):
-        line, spread = linearize(model, estimate, part, conditions(model, estimate, part.states)), noise.spread(part)
-        sensor = noise.sensor_std(3) * (1.0 if spread is None else of_components(spread, 3))
-        variance = sensor**2 + ((line.joint_jacobian[:, :3] * noise.joint_rad) ** 2).sum(axis=2)
+        line = linearize(model, estimate, part, conditions(model, estimate, part.states))
+        variance = noise.position_m**2 + ((line.joint_jacobian[:, :3] * noise.joint_rad) ** 2).sum(axis=2)
         total += (variance.sum(axis=1) / part.states.repeats[part.state]).sum()
     return float(np.sqrt(total / len(observations)))
 
@@ -193,50 +191,24 @@ def errors_by_range(errors: Mapping[str, Errors], outside: np.ndarray) -> dict[s
     return found
 
 
-@dataclass(frozen=True)
-class Refit:
-    """A model fitted without one part of some observations.
-
-    `within` (S,) of bool: states of the part left out. `estimate`: fitted to the rest. `there`: the same for the part left out.
-    """
-
-    within: np.ndarray
-    rest: Observations
-    left_out: Observations
-    estimate: Estimate
-    there: Estimate
-
-
-def refits(fitted: Fit, observations: Observations, part: np.ndarray) -> Iterator[Refit]:
+def refits(fitted: Fit, observations: Observations, part: np.ndarray) -> Iterator[Estimate]:
     """Fit a model without each part of the observations in turn, as a fit from the nominal robot would with the same shapes.
 
-    A session that is left out has its frame fitted to itself, see `placing.placed_estimate`.
-
-    `observations`: which it was fitted to, or some of them. `part` (S,) of int: of each state, by whole poses.
+    `observations`: which it was fitted to, or some of them. `part` (S,) of int: of each state, by whole poses. Yields the fit
+    to the rest, for all observations: a session that was left out has its frame fitted to itself, see `placed_estimate`.
     """
     model, noise = fitted.model, fitted.noise
     if len(observations) < len(fitted.weights):
         fitted = fit(model, observations, noise, fitted.estimate, reweighted=True, settled=ON_THE_WAY)
-    found, owners = fitted.estimate, [owner for owner, _ in fitted.parameters]
+    found, placements = fitted.estimate, of_placement(owner for owner, _ in fitted.parameters)
     for number, (step, held) in zip(np.unique(part), _steps_without(fitted, observations, part), strict=True):
-        within = part == number
-        rest, left_out = select_states(observations, ~within), select_states(observations, within)
-        seen = np.isin(found.sessions, rest.states.session)
-        kept = ~np.isin(owners, [f"frame {session}" for session in np.array(found.sessions)[~seen]])
-        refit = None
+        rest, refit = select_states(observations, part != number), None
         # Where the rest does not say where a frame or a target is, the nominal robot does.
-        if not (held & of_placement(owners) & kept).any():
-            start = replace(
-                found,
-                sessions=tuple(np.array(found.sessions)[seen].tolist()),
-                frame_rotation=found.frame_rotation[seen],
-                frame_position=found.frame_position[seen],
-            )
-            start = stepped(model, start, step[kept])
-            refit = robustly(model, rest, noise, start, held[kept], reweighted=True, settled=_PROVEN)
+        if not held[placements].any():
+            refit = robustly(model, rest, noise, stepped(model, found, step), held, reweighted=True, settled=_PROVEN)
         if refit is None or not refit.converged:
             refit = fit(model, rest, noise, replace(registered(model, rest), shapes=found.shapes))
-        yield Refit(within, rest, left_out, refit.estimate, placed_estimate(refit, left_out))
+        yield placed_estimate(refit, observations)
 
 
 def _steps_without(fitted: Fit, observations: Observations, part: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import blas
+from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.holdout import beyond_range, find_repeated
 from elastocal.counting import counted
@@ -55,7 +56,10 @@ def placed_estimate(fitted: Fit, observations: Observations) -> Estimate:
     unseen = ~np.isin(observations.states.session, found.sessions)
     if not unseen.any():
         return found
-    there = fit_frames(fitted, fitted.model, select_states(observations, unseen), own_targets=False)
+    turns = Rotation.from_matrix(found.target_rotation).as_rotvec()
+    places = zip(fitted.model.targets, found.target_offset, turns, strict=True)
+    known = [replace(target, offset_m=tuple(at), rotation=tuple(turn)) for target, at, turn in places]
+    there = fit_frames(fitted, replace(fitted.model, targets=tuple(known)), select_states(observations, unseen))
     sessions = np.array([*found.sessions, *there.sessions])
     order = np.argsort(sessions)
     return replace(

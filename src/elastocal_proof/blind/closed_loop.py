@@ -28,8 +28,8 @@ from elastocal.effects.catalogue import declared_candidates
 from elastocal.effects.catalogue import effects as catalogue
 from elastocal.exchange.target_path import OK
 from elastocal.fitting.model import declared_model
+from elastocal.fitting.noise import fit_declared
 from elastocal.fitting.observations import select_states
-from elastocal.fitting.tolerances import fit_declared
 from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.io.origin import provenance
 from elastocal.io.storage import write_table
@@ -264,7 +264,7 @@ def stated_accuracy(robot_file: Path, effect: str, seed: int, frame: str) -> lis
         mine = good & np.isin(wanted.part, members)
         prediction = predict_errors(calibrated, targets.joint_angles[mine], wanted.wrench[mine])
         stated, distance = prediction.accuracy(part), np.linalg.norm(off[mine], axis=1)
-        decided = predicted_conformity(prediction.rms_m, stated.poses, tolerance, _RISK)
+        decided = predicted_conformity(prediction.rms_m, tolerance, _RISK)
         rows.append(
             {"robot": robot_file.stem, "effect": effect, "seed": seed, "frame": frame, "part": part}
             | {"verdict": made.found.document["verdict"], "poses": stated.poses}

@@ -29,8 +29,7 @@ from elastocal.diagnosis.refit import fit_with_sizes
 from elastocal.diagnosis.search import initial_screening
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.model import Case
-from elastocal.fitting.noise import noise_from
-from elastocal.fitting.tolerances import fit_declared
+from elastocal.fitting.noise import fit_declared, noise_from
 from elastocal.io.json_files import read_json, write_json
 from elastocal.loop.whole import cases_in
 from elastocal.validation.placing import outside_poses

@@ -17,7 +17,7 @@ from elastocal.diagnosis.settings import Settings
 from elastocal.errors import InputError
 from elastocal.fitting.least_squares import Fit
 from elastocal.fitting.model import Case, case_from
-from elastocal.fitting.tolerances import estimated_noise, fit_declared
+from elastocal.fitting.noise import estimated_noise, fit_declared
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.origin import provenance
 from elastocal.io.storage import read_table, write_table
