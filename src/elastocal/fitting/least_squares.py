@@ -68,8 +68,7 @@ class Fit:
     (Tierney and Kadane, J. Am. Stat. Assoc. 81, 1986). Zero where held. `weights` (M,): robust weight of each observation.
     `residual` (M, rows): m and rad, base axes. `joint_jacobian` (M, rows, n): of each target with respect to the joints; None
     where there are too many to keep it. `conditions`: of the states fitted; None where these are too many to keep it.
-    `converged`: whether the last step was below a thousandth of a standard error in every parameter, so that the estimate is a
-    minimum.
+    `converged`: whether the last step was as small as was asked for, in standard errors, in every parameter.
     """
 
     model: Model
