@@ -11,6 +11,7 @@ from synthetic import measurements_of
 
 from elastocal.fitting.observations import (
     averaged,
+    measured_in,
     state_clusters,
     without_outlying_repeats,
 )
@@ -69,6 +70,18 @@ def test_averages_are_those_of_each_session_pose_load_side_and_target_by_hand(se
     again = averaged(taken.select(np.argsort(taken.row)))
     for name, value in vars(found.states).items():
         np.testing.assert_allclose(value, getattr(again.states, name), rtol=0, atol=1e-14)
+
+
+def test_measurements_of_the_same_state_and_target_are_found():
+    single = full_measurements(2)
+    averages = averaged(single)
+    chosen = np.arange(len(averages)) % 3 == 0
+    of_state = list(zip(averages.states.session, averages.states.pose, averages.states.load, strict=True))
+    keys = [(*of_state[state], target) for state, target in zip(averages.state, averages.target, strict=True)]
+    wanted = {key for key, mine in zip(keys, chosen, strict=True) if mine}
+    rows = zip(single.session, single.pose, single.load, single.target, strict=True)
+    assert measured_in(single, averages, chosen).tolist() == [key in wanted for key in rows]
+    assert measured_in(averages, averages, chosen).tolist() == chosen.tolist()
 
 
 def repeated(repeats, poses=30, seed=0, targets=2, single=0):

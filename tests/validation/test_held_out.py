@@ -99,13 +99,14 @@ def test_one_pose_has_no_interval():
     assert np.isnan(reductions[1].low)
 
 
-@pytest.mark.parametrize("poses", [2, 3, 5])
-def test_few_poses_have_intervals_of_student(poses):
+@pytest.mark.parametrize("poses", [2, 3, 5, 6])
+def test_few_poses_have_intervals_of_student_and_six_are_drawn(poses):
     cluster = np.repeat(np.arange(poses), 3)
     distance = 1.0 + np.random.default_rng(poses).random(3 * poses)
     found = intervals([Errors(distance, cluster)], 50, np.random.default_rng(8))[0][0]
     value, error = jackknifed(np.bincount(cluster, distance), np.bincount(cluster))
-    np.testing.assert_allclose(np.log(found["mean_m"]), value + error * student.ppf([0.025, 0.975], poses - 1))
+    of_student = value + error * student.ppf([0.025, 0.975], poses - 1)
+    assert np.allclose(np.log(found["mean_m"]), of_student) == (poses < 6)
 
 
 @pytest.mark.parametrize(("rows", "repeats"), [(3, 3), (6, 1)])
@@ -267,6 +268,15 @@ def test_errors_are_those_of_a_fit_to_the_rest(fanuc):
         expected, mask = position_errors(fitted.model, refit.estimate, left).distance, part[seen.state] == number
         # A ten thousandth of what the rest leaves unsure of the prediction, and that is less than the noise.
         np.testing.assert_allclose(found[mask], expected, atol=1e-4 * fitted.noise.position_m)
+
+
+def test_refits_to_some_observations_are_those_of_a_fit_to_them(fanuc):
+    campaign = planted(fanuc, {"joint_offset@3": [1e-3]}, poses=20)
+    seen, fitted = campaign.observations, campaign.declared
+    some, part = select_states(seen, seen.states.pose < 12), np.arange(12).repeat(2) // 4
+    found = left_out_errors(fitted, some, part)
+    expected = left_out_errors(fit(fitted.model, some, fitted.noise), some, part)
+    np.testing.assert_allclose(found, expected, atol=1e-3 * fitted.noise.position_m)
 
 
 def test_a_session_left_out_is_placed_by_itself(fanuc):

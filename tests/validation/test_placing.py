@@ -15,7 +15,14 @@ from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import select_states
 from elastocal.validation import placing
 from elastocal.validation.held_out import position_errors
-from elastocal.validation.placing import beyond_campaign, beyond_loads, outside_poses, placed_estimate, predictive_variances
+from elastocal.validation.placing import (
+    beyond_campaign,
+    beyond_loads,
+    carried_over,
+    outside_poses,
+    placed_estimate,
+    predictive_variances,
+)
 
 FOUND = ("joint_offset@2", "joint_offset@3", "payload", "base_compliance")
 
@@ -46,9 +53,9 @@ def test_a_session_that_the_fit_has_not_seen_gets_a_frame_of_its_own_and_nothing
     assert position_errors(model, placed_estimate(fitted, off), off).distance.min() < 8e-4
 
 
-def fitted_part(robot, seed, fitted, unseen):
+def fitted_part(robot, seed, fitted, unseen, **model):
     """A fit of four effects to some poses, and observations of these and of others."""
-    campaign = planted(robot, {}, seed=seed, poses=fitted + unseen)
+    campaign = planted(robot, {}, seed=seed, poses=fitted + unseen, **model)
     known = campaign.observations.states.pose < fitted
     own, other = (select_states(campaign.observations, mask) for mask in (known, ~known))
     added = [campaign.candidates[key] for key in FOUND]
@@ -56,8 +63,9 @@ def fitted_part(robot, seed, fitted, unseen):
     return fit(declared.model.with_effects(added), own, declared.noise, declared.estimate.with_effects(added)), own, other
 
 
-def test_variances_are_those_without_the_measurements_of_the_pose(fanuc):
-    fitted, own, other = fitted_part(fanuc, 1, 9, 4)
+@pytest.mark.parametrize("rows", [3, 6])
+def test_variances_are_those_without_the_measurements_of_the_pose(rows, fanuc):
+    fitted, own, other = fitted_part(fanuc, 1, 9, 4, rows=rows)
     found, there = predictive_variances(fitted, own, fitted.model, fitted.estimate, other)
     line = linearize(fitted.model, fitted.estimate, own, fitted.conditions)
     white, prior = fitted.whitened(line.sensitivities), [p.plausible**-2.0 for _, p in fitted.parameters]
@@ -80,6 +88,16 @@ def test_a_sample_says_nearly_how_surely_very_many_poses_are_predicted(fanuc, mo
     assert len(some) == 30 and there == pytest.approx(variance, rel=0.5)
     assert np.median(there / variance) == pytest.approx(1.0, abs=0.2)
     assert np.median(some) == pytest.approx(np.median(own_variance), rel=0.3)
+
+
+def test_what_goes_with_the_setup_or_was_not_recorded_is_not_carried_to_another_campaign(fanuc):
+    campaign, keys = planted(fanuc, {}), ("joint_offset@3", "setup_step", "payload", "temperature_gradient@1[temperature]")
+    added, declared = [campaign.candidates[key] for key in keys], campaign.declared
+    model, estimate = declared.model.with_effects(added), declared.estimate.with_effects(added)
+    states = replace(campaign.observations.states, temperature_c=None)
+    there = carried_over(replace(declared, model=model, estimate=estimate), declared.model, states)
+    assert there.model.effects == (*declared.model.effects, added[0], added[2])
+    assert [len(each) for each in there.estimate.coefficients] == [len(effect.parameters) for effect in there.model.effects]
 
 
 def outside(fitted, own, other, **changes):
