@@ -91,7 +91,8 @@ def corrected(
     outside = beyond_regressed(every.states, there.states.joint_angles, there.states.wrench)[there.state]
     mean, std, predictor = np.zeros((len(there), 3)), None, None
     if chosen["regression"]:
-        predictor, asked = predictor_of(chosen, fitted.model, fitted.estimate, every), inputs_of(model, estimate, there)
+        predictor = predictor_of(chosen, fitted.model, fitted.estimate, every)
+        asked = inputs_of(model, estimate, there, REGRESSIONS[chosen["regression"]].by_jacobian)
         mean, std = np.where(outside[:, None] & within_range, 0.0, predictor.mean(asked)), predictor.std(asked)
     if not same_campaign(case, held_out):
         session = np.searchsorted(estimate.sessions, there.states.session[there.state])
@@ -133,8 +134,8 @@ def _chosen(
 
 def predictor_of(chosen: Mapping[str, Any], model: Model, estimate: Estimate, observations: Observations) -> Predictor:
     """`fitted_again`, to what a model leaves of its training poses."""
-    some = sample_of(observations, _MOST_TO_FIT)
-    return fitted_again(chosen, inputs_of(model, estimate, some), position_residuals(model, estimate, some))
+    some, by_jacobian = sample_of(observations, _MOST_TO_FIT), REGRESSIONS[chosen["regression"]].by_jacobian
+    return fitted_again(chosen, inputs_of(model, estimate, some, by_jacobian), position_residuals(model, estimate, some))
 
 
 def fitted_again(chosen: Mapping[str, Any], inputs: Inputs, residual: np.ndarray) -> Predictor:
@@ -149,25 +150,30 @@ def fitted_again(chosen: Mapping[str, Any], inputs: Inputs, residual: np.ndarray
     return Predictor(lambda there: chosen["left_out"]["factor"] * found.mean(there), std)
 
 
-def geometric_inputs_of(model: Model, estimate: Estimate, observations: Observations) -> Inputs:
-    """Inputs of a regression, from the nominal chain and the places of the targets alone; `estimate` says where these sit."""
+def geometric_inputs_of(model: Model, estimate: Estimate, observations: Observations, by_jacobian: bool = True) -> Inputs:
+    """Inputs of a regression, from the nominal chain and the places of the targets alone; `estimate` says where these sit.
+
+    `by_jacobian`: whether it looks at the Jacobian, which else has no columns.
+    """
     states, chain, seen = observations.states, model.sites.chain, observations.state
-    coordinates = chain.at(states.joint_angles)[seen]
-    jacobian = position_jacobians(chain, coordinates, target_points(model, estimate), observations.target)
     others = np.hstack([states.wrench[seen], estimate.target_offset[observations.target]])
+    jacobian = np.empty((len(observations), 3, 0))
+    if by_jacobian:
+        coordinates = chain.at(states.joint_angles)[seen]
+        jacobian = position_jacobians(chain, coordinates, target_points(model, estimate), observations.target)
     return Inputs(states.joint_angles[seen], others, jacobian)
 
 
-def inputs_of(model: Model, estimate: Estimate, observations: Observations) -> Inputs:
+def inputs_of(model: Model, estimate: Estimate, observations: Observations, by_jacobian: bool = True) -> Inputs:
     """Inputs of a regression on what a model leaves: `geometric_inputs_of`, and what the model's effects do.
 
     The latter stands beside the Jacobian: an effect that was adopted wrongly has taken its part of an error that no effect is,
     and a regression that cannot give it back has the rest of the error and the effect to make up for.
     """
-    inputs = geometric_inputs_of(model, estimate, observations)
+    inputs = geometric_inputs_of(model, estimate, observations, by_jacobian)
     every = zip(model.effects, estimate.shapes, strict=True)
     found = [(effect, shapes) for effect, shapes in every if effect.effect in effects() and is_commanded(effect)]
-    if not found:
+    if not found or not by_jacobian:
         return inputs
     sizes = np.array([parameter.plausible for effect, _ in found for parameter in effect.parameters])
     around, laws = conditions(model, estimate, observations.states), [(effect.displacement, shapes) for effect, shapes in found]

@@ -85,11 +85,13 @@ class Regression:
     """An entry of the catalogue.
 
     `words`: as people call it. `settings`: among which poses that a fit has not seen choose; one where it chooses itself.
+    `by_jacobian`: whether it looks at that, which takes most of the memory.
     """
 
     words: str
     fitted: Callable[[Inputs, np.ndarray, Sequence[Setting], int], Iterator[Predictor]]
     settings: Sequence[Setting] = ({},)
+    by_jacobian: bool = False
 
 
 def ridge_harmonics(inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], seed: int) -> Iterator[Predictor]:
@@ -246,8 +248,9 @@ REGRESSIONS = {
         "ridge regression on harmonics of the joint angles",
         ridge_harmonics,
         tuple({"orders": n, "penalty": float(each)} for n in (1, 2, 6, 12, 36) for each in np.logspace(-5.0, 3.0, 9)),
+        by_jacobian=True,
     ),
-    "two_joints": Regression("ridge regression on functions of two joints' angles", two_joints),
+    "two_joints": Regression("ridge regression on functions of two joints' angles", two_joints, by_jacobian=True),
 }
 
 
