@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _WILD = 12.0
 # Values of sensitivities that are held at once, of which there are five copies: observations beyond come in parts of so many,
 # which stay in the processor's cache. What a linearisation makes beside parameters is as 60 of them.
-_MOST_HELD, _MOST_AT_ONCE, _BESIDE = 4_000_000, 4000, 60
+_MOST_HELD, _MOST_AT_ONCE, _BESIDE = 2_000_000, 4000, 60
 
 
 @dataclass(frozen=True)
