@@ -22,7 +22,7 @@ from elastocal.diagnosis.evidence import Grid
 from elastocal.diagnosis.linearize import Linearized, linearized
 from elastocal.diagnosis.statistics import WhiteRows
 from elastocal.fitting.least_squares import ON_THE_WAY, evaluated, fit
-from elastocal.fitting.linearization import Linearization, linearize
+from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import conditions, parameters, residuals
 from elastocal.fitting.noise import Noise, estimated_noise, fit_declared
 from elastocal.fitting.normal_equations import measurement_covariances
@@ -41,7 +41,6 @@ if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
     from elastocal.diagnosis.settings import Settings
     from elastocal.fitting.least_squares import Fit
-    from elastocal.fitting.linearization import Linearization
     from elastocal.fitting.model import Case, Estimate, Model
     from elastocal.fitting.noise import Noise
 
@@ -91,18 +90,22 @@ class _Beside:
 
     `residual` (N, rows). `far` (N,): whole distance in standard deviations of the sensor. `sample`, `closely` (N,): poses
     spread over those kept; these, and what is as far off as a quarter of all. `parts`: which of the latter; their
-    linearisation; variance (m, rows, rows) of each, and that of a radian in each joint. `noise`: of one row.
+    sensitivities, None where so many rows were fitted that no parameter is unsure; variance (m, rows, rows) of each, and that
+    of a radian in each joint. `noise`: of one row.
     """
 
     residual: np.ndarray
     far: np.ndarray
     sample: np.ndarray
     closely: np.ndarray
-    parts: list[tuple[slice, Linearization, np.ndarray, np.ndarray]]
+    parts: list[tuple[slice, np.ndarray | None, np.ndarray, np.ndarray]]
     noise: Noise
 
     @classmethod
-    def of(cls, model: Model, estimate: Estimate, measurements: Measurements, noise: Noise, kept: np.ndarray) -> _Beside:
+    def of(
+        cls, model: Model, estimate: Estimate, measurements: Measurements, noise: Noise, kept: np.ndarray, unsure: bool = False
+    ) -> _Beside:
+        """Of rows that are ``kept``, (N,) of bool; ``unsure``: whether parameters are so, however many these rows are."""
         single, sample = single_observations(measurements), kept.copy()
         sample[kept] = spread_poses(select_states(single, kept), _MOST)
         near, residual = spread_poses(single, _MOST), np.empty((len(single), model.rows))
@@ -110,12 +113,12 @@ class _Beside:
             residual[seen] = residuals(model, estimate, part, conditions(model, estimate, part.states))
         far = np.linalg.norm(residual / np.repeat([noise.position_m, noise.orientation_rad], 3)[: model.rows], axis=1)
         closely = near | sample | (far > np.quantile(far[near], _SCALE_QUANTILES[-1]))
-        some, parts = select_states(single, closely), []
+        some, parts, unsure = select_states(single, closely), [], unsure or sample.sum() == kept.sum()
         for _, seen, part in parts_of(some, len(parameters(model, estimate))):
             line = linearize(model, estimate, part, conditions(model, estimate, part.states))
             jacobian = line.joint_jacobian
             own = measurement_covariances(noise, jacobian[:, None], model.rows)
-            parts.append((seen, line, own, jacobian @ jacobian.transpose(0, 2, 1)))
+            parts.append((seen, line.sensitivities if unsure else None, own, jacobian @ jacobian.transpose(0, 2, 1)))
         return cls(residual, far, sample, closely, parts, noise)
 
     def yardstick(self, fitted: Fit, kept: np.ndarray) -> Yardstick:
@@ -128,8 +131,9 @@ class _Beside:
             covariance, white = None, self._white(share * fitted.noise.pose_rad)
             if not negligible:
                 information = np.diag((sizes / fitted.prior_std[free]) ** 2)
-                for (seen, line, _, _), each in zip(self.parts, white, strict=True):
-                    seen_by = (each @ (line.sensitivities[..., free] * sizes))[mine[seen]].reshape(-1, len(sizes))
+                for (seen, by, _, _), each in zip(self.parts, white, strict=True):
+                    assert by is not None
+                    seen_by = (each @ (by[..., free] * sizes))[mine[seen]].reshape(-1, len(sizes))
                     information += seen_by.T @ seen_by
                 covariance = np.zeros((len(free), len(free)))
                 covariance[np.ix_(free, free)] = np.linalg.pinv(information, hermitian=True) * np.outer(sizes, sizes)
@@ -154,12 +158,12 @@ class _Beside:
         return [np.linalg.inv(np.linalg.cholesky(own + pose_rad**2 * common)) for _, _, own, common in self.parts]
 
     def _distances(self, white: list[np.ndarray], covariance: np.ndarray | None, fitted: np.ndarray) -> np.ndarray:
-        found = np.empty(len(fitted))
-        for (seen, line, _, _), each in zip(self.parts, white, strict=True):
-            off = each @ line.residual[..., None]
+        found, residual = np.empty(len(fitted)), self.residual[self.closely]
+        for (seen, by, _, _), each in zip(self.parts, white, strict=True):
+            off = each @ residual[seen, :, None]
             matrix = np.tile(np.eye(each.shape[1]), (len(each), 1, 1))
             if covariance is not None:
-                rows = each @ line.sensitivities
+                rows = each @ by
                 share = (rows.reshape(-1, len(covariance)) @ covariance).reshape(rows.shape) @ rows.transpose(0, 2, 1)
                 matrix += np.where(fitted[seen], -1.0, 1.0)[:, None, None] * share
                 own = fitted[seen] & (np.trace(share, axis1=1, axis2=2) > 1.0 - _LEAST_OWN)
@@ -229,7 +233,7 @@ def held_out_gross_errors(
     if model is not fitted.model or estimate is not fitted.estimate:
         yardstick = replace(yardstick, covariance=None)
     every = np.ones(len(measurements), bool)
-    rows = _Beside.of(model, estimate, measurements, yardstick.noise, every)
+    rows = _Beside.of(model, estimate, measurements, yardstick.noise, every, yardstick.covariance is not None)
     distance, gross = beyond_chance(rows.distances(yardstick, ~every), model.rows, every, settings)
     least = settings.extrapolated_error
     if outside.sum() >= _FEWEST_TO_COMPARE:
