@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.constants import g as standard_gravity
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from elastocal.diagnosis.refit import mean_square_left
 from elastocal.diagnosis.statistics import normal_equations
@@ -167,7 +167,7 @@ def resolved(separation: np.ndarray | float) -> np.ndarray:
     """Probability that the right one of two hypotheses gets odds of 19:1 from even ones: the log Bayes factor is normal with
     this variance and half of it as its mean, where both predict as surely."""
     size = np.maximum(separation, 1e-12)
-    return np.asarray(norm.cdf((0.5 * size - np.log(_SURE_ODDS)) / np.sqrt(size)))
+    return np.asarray(ndtr((0.5 * size - np.log(_SURE_ODDS)) / np.sqrt(size)))
 
 
 def propose(diagnosis: Diagnosis, stream: np.random.Generator, poses: int = 10) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
