@@ -20,6 +20,7 @@ from elastocal.validation.placing import (
     beyond_loads,
     carried_over,
     outside_poses,
+    placed,
     placed_estimate,
     predictive_variances,
 )
@@ -98,6 +99,18 @@ def test_what_goes_with_the_setup_or_was_not_recorded_is_not_carried_to_another_
     there = carried_over(replace(declared, model=model, estimate=estimate), declared.model, states)
     assert there.model.effects == (*declared.model.effects, added[0], added[2])
     assert [len(each) for each in there.estimate.coefficients] == [len(effect.parameters) for effect in there.model.effects]
+
+
+def test_another_campaign_has_its_own_frame_and_targets_and_the_effects_of_the_fit(fanuc):
+    campaign = planted(fanuc, {"joint_offset@3": [1e-3]}, fitted_frames=True)
+    fitted, shift = campaign.declared, np.array([0.0, 0.2, 0.0])
+    moved = replace(campaign.observations, position=campaign.observations.position + shift)
+    case, part = (SimpleNamespace(campaign=SimpleNamespace(name=n), model=fitted.model, observations=moved) for n in "cd")
+    assert placed(fitted, case, case)[1] is fitted.estimate
+    model, estimate = placed(fitted, case, part)
+    assert model.effects == fitted.model.effects and model.nominal_compliance is fitted.model.nominal_compliance
+    np.testing.assert_allclose(estimate.frame_position - fitted.estimate.frame_position, shift[None], atol=1e-6)
+    np.testing.assert_array_equal(estimate.coefficients[0], fitted.estimate.coefficients[0])
 
 
 def outside(fitted, own, other, **changes):
