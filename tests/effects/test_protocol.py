@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from elastocal.effects.protocol import Candidate, Parameter, Shape, at_shapes, effect_of, require_unique
+from elastocal.effects.protocol import Candidate, Parameter, Shape, effect_of, require_unique
 
 TRIED = Shape("when", "1", 0.5, 0.0, 1.0, tried=11), Shape("lag", "s", 3600.0, 900.0, 36000.0)
 
@@ -51,12 +51,6 @@ def test_key_and_location_of_a_candidate_are_its_effect_joints_and_detail(joints
     law = Candidate("law", "any", joints, detail, (Parameter("a", "rad", 1.0),), dict, location_name=location_name)
     assert (law.key, law.location) == (key, location)
     assert effect_of(law.key) == "law"
-
-
-def test_a_candidate_at_two_values_of_a_shape_has_two_names_however_close_they_are():
-    close = 1 / 12, float(np.nextafter(1 / 12, 1))
-    names = {at_shapes("setup_step", [value]) for value in (*close, np.float64(0.5))}
-    assert len(names) == 3 and "setup_step 0.5" in names and at_shapes("payload", ()) == "payload"
 
 
 def test_two_candidates_of_one_name_are_refused():

@@ -155,11 +155,6 @@ def moved_and_turned(shift: float, turn: float, per: str = "") -> tuple[Paramete
     return tuple(Parameter(f"{letter}{axis}", unit + per, size) for letter, unit, size in sizes for axis in "xyz")
 
 
-def at_shapes(key: str, shapes: Iterable[float]) -> str:
-    """Unique name of a candidate at values of its shapes: with all the digits of each."""
-    return key + "".join(f" {float(shape)!r}" for shape in shapes)
-
-
 def require_unique(names: Sequence[str]) -> None:
     """Refuse two candidates of one name, a ValueError: in tables nothing would distinguish them."""
     twice = [name for name, count in Counter(names).items() if count > 1]
