@@ -35,7 +35,7 @@ ROOMS = {
     "src/elastocal_proof/league": 410,
     "src/elastocal_proof/plant": 1720,
     "src/elastocal_proof/report": 100,
-    "tests": 22220,
+    "tests": 22230,
     "workflow": 2650,
 }
 

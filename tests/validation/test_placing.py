@@ -23,6 +23,7 @@ from elastocal.validation.placing import (
     placed,
     placed_estimate,
     predictive_variances,
+    repeat_warnings,
 )
 
 FOUND = ("joint_offset@2", "joint_offset@3", "payload", "base_compliance")
@@ -167,3 +168,12 @@ def test_poses_forces_and_moments_beyond_those_of_a_campaign_are_marked(fanuc):
     assert beyond_campaign(states, angles, wrench).tolist() == [True, True, True, False]
     assert beyond_loads(states, np.tile([0.0, 1.5 * force, 0, 0, 0, 2.1 * moment], (1, 1)), 2.0).all()
     assert not beyond_loads(states, np.tile([0.0, 1.5 * force, 0, 0, 0, 1.9 * moment], (1, 1)), 2.0).any()
+
+
+@pytest.mark.parametrize(("seed", "poses", "words"), [(1, 8, "all 8 validation poses repeat"), (2, 8, ""), (3, 10, "8 of 10")])
+def test_poses_that_repeat_fitted_configurations_are_told(seed, poses, words):
+    fitted, states = made_states(6, 8, seed=1), made_states(6, poses, seed=seed)
+    if poses > 8:
+        states.joint_angles[:8] = fitted.joint_angles
+    warnings = repeat_warnings(fitted, states)
+    assert [each[: len(words)] for each in warnings] == ([words] if words else [])
