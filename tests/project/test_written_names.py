@@ -21,7 +21,7 @@ from elastocal.application.calibrated import nominal_forward
 from elastocal.command.main import app
 from elastocal.errors import InputError
 from elastocal.figures import style
-from elastocal.io import json_files
+from elastocal.io import atomic_writes, json_files
 from elastocal.report import typesetting
 
 pytestmark = pytest.mark.slow
@@ -171,6 +171,7 @@ def test_a_command_that_is_killed_leaves_the_old_files_or_none(checkout, names_w
         monkeypatch.setattr(style, "save", lambda *_: os._exit(9))
         monkeypatch.setattr(typesetting, "compile_document", lambda *_: os._exit(9))
         monkeypatch.setattr(json_files, "write_json", lambda *_: os._exit(9))
+        monkeypatch.setattr(atomic_writes, "write_text", lambda path, text: (path.write_text(text), os._exit(9)))
         run(*words)
         os._exit(0)
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 9
