@@ -184,12 +184,13 @@ class Linearization:
     """A model about an estimate, for M observations.
 
     `residual` (M, rows): measured less predicted, base axes, m and rad. `columns`: sensitivities to the P `parameters`; to them
-    the place of a target that is fitted is another few coordinates, which move no other target. `conditions`: where the robot
-    has yielded to, by this estimate.
+    the place of a target that is fitted is another few coordinates, which move no other target. `coordinates` (S, C) of the
+    sites, `conditions`: where the robot has yielded to, by this estimate.
     """
 
     residual: np.ndarray
     columns: Factored
+    coordinates: np.ndarray
     conditions: Conditions
 
     @property
@@ -242,7 +243,7 @@ def linearize(model: Model, estimate: Estimate, observations: Observations, cond
         laws += _spring_laws(effect, model, estimate, around) if effect.effect in SPRINGS else laws_of(effect, shapes, around)
         laws += _shape_laws(effect, values, shapes, around)
     columns = Factored.of(laws, np.moveaxis(jacobian, -1, 0), observations.state, len(observations.states))
-    return Linearization(residual, columns, replace(around, motion=moved))
+    return Linearization(residual, columns, coordinates, replace(around, motion=moved))
 
 
 def effect_columns(

@@ -298,9 +298,8 @@ class Parts:
 
     def _linearized(self, part: _Part) -> Linearization:
         """At the present estimate, by which whitening and loads are then taken, where lines are not kept."""
-        around = self._around(part, self.estimate)
-        line = linearize(self.model, self.estimate, part.observations, around)
-        part.coordinates = displaced_coordinates(self.model, self.estimate, around)
+        line = linearize(self.model, self.estimate, part.observations, self._around(part, self.estimate))
+        part.coordinates = line.coordinates
         part.whitener = whitening(part.observations, line.joint_jacobian, self.noise)
         return line
 
