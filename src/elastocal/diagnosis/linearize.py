@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.special import chdtri
 
-from elastocal.diagnosis.evidence import condition, log_sum_exp
+from elastocal.diagnosis.evidence import Blocks, log_sum_exp
 from elastocal.diagnosis.hypotheses import Law, Unit, laws_of, units_of
 from elastocal.diagnosis.search import Problem, pose_errors_within_reach
 from elastocal.diagnosis.statistics import Products, Statistics, WhiteRows, products_of, statistics_of
@@ -204,9 +204,8 @@ def smallest_shown(statistics: Statistics, units: Sequence[Unit], settings: Sett
     largest is too small to be seen.
     """
     critical, largest = chdtri(1, settings.alarm_level / max(len(units), 1)), np.zeros(len(units))
-    blocks = condition(statistics.at(slice(1)), np.zeros(0, int), np.zeros(0), np.zeros(1)).blocks_of(units, range(len(units)))
-    for members, values, _, _ in blocks:
-        largest[members] = values[0].max(axis=1)
+    for block in Blocks.of(statistics.at(slice(1)), units):
+        largest[block.numbers] = block.axes[0][0].max(axis=1)
     return np.searchsorted(np.array(settings.scales) ** 2, critical / np.maximum(largest, 1e-9 * critical))
 
 
