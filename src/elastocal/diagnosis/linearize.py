@@ -191,7 +191,8 @@ def linearized(
     there = fitted.model.offered(observations.states)
     why = {candidate.key: lacking(candidate, there, observations.states.joint_angles) for candidate in candidates}
     tried = {c.key: (c, shapes_tried(c, fitted)) for c in candidates if not why[c.key]}
-    against = laws_of(around, settings.other_features)
+    # Beside no candidate nothing competes.
+    against = laws_of(around, settings.other_features) if candidates else []
     missing = {key: reason for key, reason in why.items() if reason}
     return Linearized(fitted, observations, settings, around, tried, missing, frozenset(why), against, most_pose_error_rad)
 
@@ -276,11 +277,13 @@ def with_probable_centres(part: Kept, settings: Settings) -> Kept:
     stated = with_stated_centres(part.declared.model)
     if stated is part.declared.model:
         return part
-    line = linearized(part.declared, part.searched, list(part.case.candidates.values()), settings)
+    line = linearized(part.declared, part.searched, (), settings)
     lines = [line, line.alike(about=replace(line.about, model=stated))]
     wide, narrow = (_log_evidence(each, products_of(each._fitted[0], *each.priors)) for each in lines)
     # A prior that is better without any mechanism is not worse with one, for a mechanism explains what it leaves.
     if wide > narrow:
+        every = linearized(part.declared, part.searched, list(part.case.candidates.values()), settings)
+        lines = [each.alike(tried=every.tried, against=every.against) for each in lines]
         wide, narrow = (_log_evidence(each, each.products, each.problem) for each in lines)
         if wide > narrow:
             return part
