@@ -89,11 +89,14 @@ class Conditions:
 
         Yields (number of the coordinates, S).
         """
+        falling = self._falling[:, coordinates]
         for body, mass in enumerate(self.sites.masses, self.sites.joints + 2):
             rotation = self.motion.rotation[body]
             centre = self.motion.position[body] + np.tensordot(mass.centre_m, rotation, (0, 1))
-            for kilograms, first in ((1.0, centre), *((0.0, axis) for axis in rotation.swapaxes(0, 1))):
-                yield self._weighing(body, kilograms, first, coordinates)
+            on_each = np.einsum("iks,nis->nks", falling[1:], np.concatenate([centre[None], rotation.swapaxes(0, 1)]))
+            on_each[0] += falling[0]
+            on_each[:, self.motion.place[coordinates] >= self.sites.followed[body].after] = 0.0
+            yield from on_each
 
     @cached_property
     def _falling(self) -> np.ndarray:
