@@ -301,17 +301,16 @@ class Joint:
         """What the u units of one width d say at every size, the others at theirs: numbers; log density (1 + S, T, u), for
         size zero first; their coefficients, as `_turned_back` takes them; variance (S, T, u) of the noise."""
         widths, sizes = np.diff(self.starts), np.concatenate([[0.0], self.grid.scales**2])[:, None, None, None]
-        for width in np.unique(widths):
+        for width in set(widths.tolist()):
             numbers = np.flatnonzero(widths == width)
             mine, scales = self.starts[numbers][:, None] + np.arange(width), self.scales[numbers][:, None]
             # With the others integrated out: the precision is I + s^2 G.
-            precision = np.linalg.inv(self.covariance[:, mine[:, :, None], mine[:, None, :]])
-            mean = self.mean[:, mine]
-            along = (precision @ mean[..., None])[..., 0] / scales
-            squares = self.squares[:, None] + (mean * along).sum(axis=-1) * scales[:, 0]
-            log_det = self.log_det[:, None] - np.linalg.slogdet(precision)[1]
-            values, vectors = np.linalg.eigh((precision - np.eye(width)) / scales[..., None] ** 2)
-            turned, widened = (vectors.swapaxes(-1, -2) @ along[..., None])[..., 0], 1.0 + sizes * np.clip(values, 0.0, None)
+            left_over, vectors = np.linalg.eigh(self.covariance[:, mine[:, :, None], mine[:, None, :]])
+            mean = (vectors.swapaxes(-1, -2) @ self.mean[:, mine, None])[..., 0]
+            squares = self.squares[:, None] + (mean**2 / left_over).sum(axis=-1)
+            log_det = self.log_det[:, None] + np.log(left_over).sum(axis=-1)
+            values, turned = np.clip(1.0 / left_over - 1.0, 0.0, None) / scales**2, mean / (left_over * scales)
+            widened = 1.0 + sizes * values
             left = squares - (sizes * turned**2 / widened).sum(axis=-1)
             density = self.base[:, None] - 0.5 * (log_det + np.log(widened).sum(axis=-1)) + log_likelihood(left, self.freedom)
             density += (self.sign_factors.sum(axis=0) - self.sign_factors[numbers]).T

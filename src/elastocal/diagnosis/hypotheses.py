@@ -125,8 +125,7 @@ class Prior:
 def prior_of(units: Sequence[Unit], settings: Settings) -> Prior:
     """Prior of all models that units can form."""
     special, found = {"link_weight": settings.gravity_probability, OTHER: settings.other_probability}, dict[str, np.ndarray]()
-    for mechanism in dict.fromkeys(unit.mechanism for unit in units):
-        locations = len({unit.place for unit in units if unit.mechanism == mechanism})
+    for mechanism, locations in Counter(mechanism for mechanism, *_ in {unit.place for unit in units}).items():
         numbers = np.arange(1, locations + 1)
         geometric = numbers * np.log(settings.further_location)
         sets = gammaln(locations + 1) - gammaln(numbers + 1) - gammaln(locations - numbers + 1)

@@ -180,6 +180,7 @@ class _Searcher:
         self.problem, self.grid = problem, problem.grid
         self.statistics, self.log_pose, self.blocks = problem.statistics, problem.log_pose, problem.blocks
         self.weights = np.array([self.grid.of(unit) for unit in problem.units]).reshape(-1, len(self.grid.scales))
+        self.first = [problem.prior.added(unit, 0) for unit in problem.units]
         numbers: dict[object, int] = {}
         self.places = np.array([numbers.setdefault(unit.place, len(numbers)) for unit in problem.units], int)
         self.empty = self.evaluated((), ())
@@ -225,7 +226,8 @@ class _Searcher:
         prior, mechanisms = self.problem.prior, Counter(units[n].mechanism for n in model)
         best = self.grid.scales[found.argmax(axis=1)].tolist()
         for number in open_units.tolist():
-            odds = gained[number] + prior.added(units[number], mechanisms[units[number].mechanism])
+            count = mechanisms.get(units[number].mechanism)
+            odds = gained[number] + (prior.added(units[number], count) if count else self.first[number])
             place = bisect(model, number)
             key = (*model[:place], number, *model[place:])
             if odds > self.met.get(key, -np.inf):

@@ -190,9 +190,10 @@ class Statistics:
 
     def between(self, left: np.ndarray, right: np.ndarray | None = None) -> np.ndarray:
         """W'MW of some columns (..., d) with others (..., e), or with all, ndarray (T, ..., d, e)."""
-        others = self.taken if right is None else self.taken[:, right]
+        taken = self.taken[:, left]
+        others = self.taken if right is None else taken if right is left else self.taken[:, right]
         found = self.gram[:, left] if right is None else self.gram[:, left[..., None], right[..., None, :]]
-        return found - self.taken[:, left] @ others.swapaxes(-1, -2)
+        return found - taken @ others.swapaxes(-1, -2)
 
 
 def statistics_of(products: Products, pose_error_rad: np.ndarray) -> Statistics:
