@@ -92,10 +92,10 @@ class Linearized:
     @property
     def priors(self) -> tuple[np.ndarray, np.ndarray]:
         """Standard deviation of the prior of each declared parameter, wide where it has none, and its present value, (P,)."""
-        kept = [(n, p) for n, (owner, p) in enumerate(self.about.parameters) if owner not in self.candidates]
-        deviation = np.array([_WIDE * p.plausible if p.prior_std is None else p.prior_std for _, p in kept])
-        present = [self._values[n] if p.prior_std is not None else 0.0 for n, p in kept]
-        return deviation, np.array(present)
+        pairs = zip(self.about.parameters, self._values, strict=True)
+        kept = [(p, value) for (owner, p), value in pairs if owner not in self.candidates]
+        deviation = np.array([_WIDE * p.plausible if p.prior_std is None else p.prior_std for p, _ in kept])
+        return deviation, np.array([value if p.prior_std is not None else 0.0 for p, value in kept])
 
     @property
     def _values(self) -> np.ndarray:
@@ -236,7 +236,7 @@ def looked_at_closely(line: Linearized, alone: np.ndarray) -> Linearized:
     `alone` (number of units,): log Bayes factor of each unit alone. Returns itself where no shape matters.
     """
     units, tried = line.problem.units, dict(line.tried)
-    odds = alone + [line.problem.prior.log_odds_of([unit]) for unit in units]
+    odds = alone + line.problem.started.first
     near = (odds > odds.max() - _NEAR_THE_BEST) & (alone > _WORTH_A_LOOK) if len(units) else []
     for unit in (units[number] for number in np.argsort(-odds) if near[number]):
         if unit.shapes and unit.candidate and tried[unit.candidate.key] is line.tried[unit.candidate.key]:

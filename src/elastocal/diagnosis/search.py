@@ -142,9 +142,8 @@ def solve_positive(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 def initial_screening(problem: Problem) -> tuple[Model, np.ndarray]:
     """The declared model alone, and each unit alone against it. Returns `log_bayes_factors` (number of units,)."""
-    met, prior = problem.started.met, problem.prior
-    single = [met[(number,)] - prior.log_odds_of([unit]) for number, unit in enumerate(problem.units)]
-    return problem.started.measured[()], np.array(single)
+    met = [problem.started.met[number,] for number in range(len(problem.units))]
+    return problem.started.measured[()], np.array(met) - problem.started.first
 
 
 def posterior(problem: Problem, known: Collection[str] = ()) -> Posterior:
@@ -180,7 +179,7 @@ class _Searcher:
         self.problem, self.grid = problem, problem.grid
         self.statistics, self.log_pose, self.blocks = problem.statistics, problem.log_pose, problem.blocks
         self.weights = np.array([self.grid.of(unit) for unit in problem.units]).reshape(-1, len(self.grid.scales))
-        self.first = [problem.prior.added(unit, 0) for unit in problem.units]
+        self.first = np.array([problem.prior.added(unit, 0) for unit in problem.units])
         numbers: dict[object, int] = {}
         self.places = np.array([numbers.setdefault(unit.place, len(numbers)) for unit in problem.units], int)
         self.empty = self.evaluated((), ())
@@ -223,11 +222,11 @@ class _Searcher:
             self.empty = self.evaluated((), self.empty.scales)
         # What the sizes already in the model are worth as they are, against their average: the same for all extensions.
         gained = (total + (self.met[model] - log_sum_exp(before))).tolist()
-        prior, mechanisms = self.problem.prior, Counter(units[n].mechanism for n in model)
+        prior, mechanisms, first = self.problem.prior, Counter(units[n].mechanism for n in model), self.first.tolist()
         best = self.grid.scales[found.argmax(axis=1)].tolist()
         for number in open_units.tolist():
             count = mechanisms.get(units[number].mechanism)
-            odds = gained[number] + (prior.added(units[number], count) if count else self.first[number])
+            odds = gained[number] + (prior.added(units[number], count) if count else first[number])
             place = bisect(model, number)
             key = (*model[:place], number, *model[place:])
             if odds > self.met.get(key, -np.inf):
@@ -358,7 +357,7 @@ def alarm_of(problem: Problem, products: Products, pose_error_rad: float, stream
 def _alternatives(problem: Problem) -> tuple[list[Unit], np.ndarray]:
     """Every unit, and every mechanism with one law at all its locations in one size; with their log prior odds."""
     prior = problem.prior
-    alternatives, log_priors = list(problem.units), [prior.log_odds_of([unit]) for unit in problem.units]
+    alternatives, log_priors = list(problem.units), problem.started.first.tolist()
     laws: dict[tuple[str, str, tuple[float, ...]], list[Unit]] = {}
     for unit in problem.units:
         if unit.candidate:

@@ -210,15 +210,12 @@ def linearize(model: Model, estimate: Estimate, observations: Observations, cond
     count, rows, chain, points = len(observations), model.rows, model.sites.chain, target_points(model, estimate)
     placed = [(index, part) for index, parts in model.fitted_parts for part in range(parts.start, parts.stop, 3)]
     moved = motion(chain, coordinates, (*model.sites.followed, *points))
-    position, rotation = np.empty((count, 3)), np.empty((count, 3, 3))
+    number, state = len(model.sites.followed) + observations.target, observations.state
+    position, rotation = moved.position[number, :, state], moved.rotation[number, :, :, state]
     # Component first, so that every effect's arithmetic runs along the observations.
     jacobian = np.zeros((rows, chain.coordinates + 3 * len(placed), count))
-    for index, point in enumerate(points):
-        seen = np.flatnonzero(observations.target == index)
-        state, number = observations.state[seen], len(model.sites.followed) + index
-        at = moved.position[number][:, state]
-        position[seen], rotation[seen] = at.T, np.moveaxis(moved.rotation[number][..., state], -1, 0)
-        jacobian[:, : chain.coordinates, seen] = moved.jacobian(point.after, at, rows, state)
+    after = np.array([point.after for point in points])[observations.target]
+    jacobian[:, : chain.coordinates] = moved.jacobian(after, position.T, rows, state)
     residual = off_measured(estimate, observations, position, rotation @ estimate.target_rotation[observations.target])
     laws: list[Mapping[int, np.ndarray]] = []
     for session in estimate.sessions if model.fitted_frames else ():

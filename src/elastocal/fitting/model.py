@@ -162,14 +162,14 @@ def limits(model: Model, estimate: Estimate) -> np.ndarray:
 
 def nonlinear_parameters(model: Model, estimate: Estimate) -> np.ndarray:
     """Which of the `parameters` are shapes, which alone have limits, ndarray of bool (P,)."""
-    return np.isfinite(limits(model, estimate)).all(axis=1)
+    shapes = [shape for effect in model.effects for shape in (False,) * len(effect.parameters) + (True,) * len(effect.shapes)]
+    return np.array([False] * (len(parameters(model, estimate)) - len(shapes)) + shapes, bool)
 
 
 def parameter_values(model: Model, estimate: Estimate) -> np.ndarray:
     """Present values of the `parameters`, ndarray (P,); frames and targets are fitted by steps and count as zero."""
-    placed = of_placement(owner for owner, _ in parameters(model, estimate))
     effects = [part for pair in zip(estimate.coefficients, estimate.shapes, strict=True) for part in pair]
-    return np.concatenate([np.zeros(placed.sum()), *effects])
+    return np.concatenate([np.zeros(len(parameters(model, estimate)) - sum(map(len, effects))), *effects])
 
 
 def stepped(model: Model, estimate: Estimate, step: np.ndarray) -> Estimate:

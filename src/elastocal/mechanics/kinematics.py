@@ -161,8 +161,10 @@ class Motion:
     twist: np.ndarray
     place: np.ndarray
 
-    def jacobian(self, after: int, position: np.ndarray, rows: int = 6, chosen: slice | np.ndarray = slice(None)) -> np.ndarray:
-        """Geometric Jacobian of points behind so many transforms of the chain, (rows, C, S').
+    def jacobian(
+        self, after: np.ndarray, position: np.ndarray, rows: int = 6, chosen: slice | np.ndarray = slice(None)
+    ) -> np.ndarray:
+        """Geometric Jacobian of points, each behind so many transforms of the chain, (S',), ndarray (rows, C, S').
 
         `position` (3, S'): where the points are, m. `rows`: linear velocities alone, or also angular ones. `chosen` (S',) of
         int: configuration of each.
@@ -172,7 +174,9 @@ class Motion:
         cross(angular, position, moved[:3])
         moved[:3] += twist[:3]
         moved[3:] = angular[: rows - 3]
-        moved[:, self.place >= after] = 0.0
+        still = self.place[:, None] >= after
+        if still.any():
+            moved[:, still] = 0.0
         return moved
 
     def generalized_forces(self, after: int, wrench: np.ndarray, coordinates: slice = slice(None)) -> np.ndarray:
@@ -239,9 +243,7 @@ def rotation_vectors(rotation: np.ndarray) -> np.ndarray:
     return np.moveaxis(skew * scale, 0, -1)
 
 
-def _blocks(
-    chain: Chain, coordinates: np.ndarray, until: int, size: int = BLOCK
-) -> Iterator[tuple[slice, list[Frame]]]:
+def _blocks(chain: Chain, coordinates: np.ndarray, until: int, size: int = BLOCK) -> Iterator[tuple[slice, list[Frame]]]:
     """Frames of `_walk` for coordinates (..., C), a block of configurations after the other."""
     components = np.moveaxis(np.asarray(coordinates, float), -1, 0).reshape(np.shape(coordinates)[-1], -1)
     for start in range(0, components.shape[1], size):
