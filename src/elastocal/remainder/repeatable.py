@@ -138,12 +138,15 @@ def _left_out(gram: np.ndarray, right: np.ndarray) -> Iterator[tuple[np.ndarray,
     `gram` (K, D, D). `right` (K, N, D): products of functions with N sets of residuals. Yields (N,) for each penalty, and the
     coefficients (K, D) of the first set.
     """
-    rest = [(*np.linalg.eigh(gram.sum(axis=0) - mine), right.sum(axis=0) - own) for mine, own in zip(gram, right, strict=True)]
+    rest = []
+    for mine, own in zip(gram, right, strict=True):
+        values, vectors = np.linalg.eigh(gram.sum(axis=0) - mine)
+        rest.append((np.maximum(values, 0.0), values.mean(), vectors, (right.sum(axis=0) - own) @ vectors, own @ vectors))
     for penalty in _PENALTIES:
         (along, square), coefficients = np.zeros((2, right.shape[1])), []
-        for (values, vectors, others), own in zip(rest, right, strict=True):
-            shrunk = others @ vectors / (np.maximum(values, 0.0) + penalty * values.mean())
-            along += ((own @ vectors) * shrunk).sum(axis=1)
-            square += (np.maximum(values, 0.0) * shrunk**2).sum(axis=1)
+        for values, mean, vectors, others, own in rest:
+            shrunk = others / (values + penalty * mean)
+            along += (own * shrunk).sum(axis=1)
+            square += (values * shrunk**2).sum(axis=1)
             coefficients.append(vectors @ shrunk[0])
         yield along / np.sqrt(square), np.stack(coefficients)
