@@ -38,9 +38,8 @@ if TYPE_CHECKING:
 
     Solved = tuple[np.ndarray, np.ndarray, np.ndarray]
 
-# Of more observations than this a sample tells where a fit starts, in so many rounds.
-_MOST_REGISTERED, _ROUNDS = 5_000, 200
-_SETTLED_M = 1e-9
+# Rounds by which frames and targets are registered at most, and the move that ends them.
+_ROUNDS, _SETTLED_M = 200, 1e-9
 _STEPS = 30
 # A step that does not help is halved so often at most: one of a 64th that does not help points the wrong way, or along a kink.
 _HALVINGS = 6
@@ -295,7 +294,7 @@ def registered(model: Model, observations: Observations) -> Estimate:
 
     Returns with all effects at zero, except that joint compliances start at their nominal values.
     """
-    observations = sample_of(observations, _MOST_REGISTERED)
+    observations = sample_of(observations, STARTED_FROM)
     return registered_to(model, observations, *nominal_poses(model, observations))
 
 
