@@ -48,6 +48,9 @@ SETTLED, ON_THE_WAY = 1e-3, 0.1
 # A fit to more observations that does not come of a fit starts from the fit to so many of them: they show the size of some
 # fifty parameters as well as any number.
 STARTED_FROM = 2_000
+# Standard errors: a step that moves no parameter farther, and no shape, leaves its Gram matrix to the next one: standard errors
+# by it are as sure as an estimate is within `SETTLED`.
+_NEAR = 0.3
 # Loads are those of the step before: of a step so much is still to come, at most, by deflection over reach.
 _LAGGING = 1e-2
 # Share of the slope by which a step must lower the objective (Armijo); a parabola gives a half.
@@ -216,7 +219,7 @@ def robustly(
 
     measurements, weights = Parts(model, observations, noise, estimate, plausible), np.ones(len(observations))
     measurements.linearize(estimate)
-    scale, last, stuck = 1.0, np.zeros(len(plausible)), False
+    scale, last, stuck, known = 1.0, np.zeros(len(plausible)), False, None
     for number in range(_STEPS):
         # Loads where the robot yielded to in the last step: a fixed point that the steps bring about.
         measurements.whiten()
@@ -224,10 +227,13 @@ def robustly(
             distance = measurements.distance()
             scale = max(np.median(distance) / typical, 1.0)
             weights = corner / np.maximum(distance / scale, corner)
-        gram, along = measurements.normal_equations(weights)
+        gram, along = measurements.normal_equations(weights, known)
         present = parameter_values(model, estimate)
-        step, covariance, held = solved(gram, along, present, frozen)
-        deviation = np.sqrt(np.diag(covariance))
+        if known is None:
+            step, covariance, held = solved(gram, along, present, frozen)
+            deviation = np.sqrt(np.diag(covariance))
+        else:
+            step = covariance @ (along / plausible - penalty * present)
         # Standard errors of the errors that are there, which the noise may be less than.
         small = settled * (scale * deviation) + (deviation == 0)
         # A small step under the loads of before a large one says nothing of what these loads still bring about.
@@ -261,6 +267,8 @@ def robustly(
                     measurements.linearize(estimate)
                     after = objective(estimate, measurements.squares(weights))
             if after <= before - least:
+                near = np.abs(step) <= np.where(nonlinear & ~held, 0.0, _NEAR * scale * deviation + (deviation == 0))
+                known = gram if (number or reweighted) and not halving and near.all() else None
                 stuck = False
                 break
         else:
@@ -270,7 +278,7 @@ def robustly(
             # of now.
             if stuck:
                 break
-            stuck = True
+            stuck, known = True, None
     return Fit(model, estimate, noise, held, covariance, weights, *measurements.ended(estimate), converged)
 
 

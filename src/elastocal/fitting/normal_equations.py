@@ -126,6 +126,11 @@ class Whitening:
             whitened[members] = (factor @ stacked).reshape(*members.shape, *values.shape[1:])
         return whitened
 
+    @property
+    def transposed(self) -> Whitening:
+        """What carries whitened values back, as products with whitened sensitivities do."""
+        return Whitening(tuple((members, factor.swapaxes(1, 2)) for members, factor in self.blocks))
+
     def after(self, maps: np.ndarray) -> Whitening:
         """What whitens values to each of whose observations a matrix is applied first, ndarray (M, rows, rows)."""
         blocks = []
@@ -228,23 +233,24 @@ class Parts:
             elif not part.whitener.blocks:
                 part.whitener = whitening(part.observations, None, self.noise)
 
-    def normal_equations(self, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Gram matrix of the weighted, whitened sensitivities in plausible sizes, and their products with the residual."""
+    def normal_equations(self, weights: np.ndarray, known: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Gram matrix of the weighted, whitened sensitivities in plausible sizes, and their products with the residual.
+
+        `known`: Gram matrix of a step before, if it is to be taken as it was.
+        """
         size = len(self.plausible)
         gram, along, root = np.zeros((size, size)), np.zeros(size), np.sqrt(weights)
         for part in self.parts:
             line, mine = part.line or self._linearized(part), root[part.seen]
-            right = part.whitener.apply(line.residual * mine[:, None])
             turned = part.whitener.after(_of_rotation_vectors(line.residual) * mine[:, None, None])
-            if self.factors and size > _COLUMNS_A_COORDINATE * len(line.columns.spans):
-                columns = replace(line.columns, jacobian=turned.apply(line.columns.jacobian))
-                gram += columns.gram()
-                along += columns.times(right[..., None])[:, 0]
-            else:
+            right = turned.transposed.apply(part.whitener.apply(line.residual * mine[:, None]))
+            along += line.columns.times(right[..., None])[:, 0]
+            if known is None and self.factors and size > _COLUMNS_A_COORDINATE * len(line.columns.spans):
+                gram += replace(line.columns, jacobian=turned.apply(line.columns.jacobian)).gram()
+            elif known is None:
                 left = turned.apply(line.sensitivities).reshape(right.size, size)
                 gram += left.T @ left
-                along += left.T @ right.reshape(-1)
-        return gram * np.outer(self.plausible, self.plausible), along * self.plausible
+        return gram * np.outer(self.plausible, self.plausible) if known is None else known, along * self.plausible
 
     def distance(self) -> np.ndarray:
         """Whitened distance of each observation from the prediction, ndarray (M,)."""
