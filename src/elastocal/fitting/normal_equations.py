@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg.lapack import dpotrf
+from scipy.linalg.lapack import dpotrf, dpotri
 
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import conditions, displaced_coordinates, residuals, sprung
@@ -54,39 +54,41 @@ def solve_normal(
     """
     gram = gram + np.diag(np.broadcast_to(penalty, len(plausible)) * plausible**2)
     along = along - plausible * np.broadcast_to(penalty * present, len(plausible))
-    held = ~identifiable(gram, *(np.broadcast_to(flags, len(plausible)) for flags in (frozen, nonlinear)))
-    free = np.flatnonzero(~held)
-    step, covariance = np.zeros(len(plausible)), np.zeros((len(plausible),) * 2)
-    if len(free):
-        inverse = np.linalg.inv(np.linalg.cholesky(gram[np.ix_(free, free)]))
-        step[free] = plausible[free] * (inverse.T @ (inverse @ along[free]))
-        covariance[np.ix_(free, free)] = np.outer(plausible[free], plausible[free]) * (inverse.T @ inverse)
-    return step, covariance, held
+    known, inverse = identifiable(gram, *(np.broadcast_to(flags, len(plausible)) for flags in (frozen, nonlinear)))
+    return plausible * (inverse @ along), inverse * np.outer(plausible, plausible), ~known
 
 
-def identifiable(gram: np.ndarray, frozen: np.ndarray, nonlinear: np.ndarray) -> np.ndarray:
+def identifiable(gram: np.ndarray, frozen: np.ndarray, nonlinear: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Which parameters the data distinguish from zero at their plausible size: first given those before them, then given all.
 
     Forward selection in the order given, by the pivots of a Cholesky decomposition, then backward elimination.
 
     `gram` (P, P): information on the parameters, each in units of its plausible size. `frozen` (P,) of bool: left out from the
     start. `nonlinear` (P,) of bool: shapes: given up before a parameter that they are bound to, as that of their law is where
-    it is nearly a straight line. Returns (P,) of bool.
+    it is nearly a straight line. Returns (P,) of bool, and the covariance of these (P, P), zero of all others.
     """
-    kept = np.flatnonzero(~frozen).tolist()
+    kept, found = np.flatnonzero(~frozen), np.zeros_like(gram)
     while (first := _first_without_information(gram[np.ix_(kept, kept)])) is not None:
-        kept.pop(first)
+        kept = np.delete(kept, first)
     # Parameters that came later may have taken from what identified their predecessors.
-    while kept:
-        covariance = np.linalg.inv(gram[np.ix_(kept, kept)])
+    while len(kept):
+        covariance = positive_inverse(gram[np.ix_(kept, kept)])
         deviation = np.sqrt(np.diag(covariance))
         worst = int(np.argmax(deviation))
         if deviation[worst] <= 1.0:
+            found[np.ix_(kept, kept)] = covariance
             break
         correlation = np.where(nonlinear[kept], np.abs(covariance[worst]) / (deviation[worst] * deviation), 0.0)
         shape = int(np.argmax(correlation))
-        kept.pop(shape if correlation[shape] > _BOUND_TO_SHAPE else worst)
-    return np.isin(np.arange(len(gram)), kept)
+        kept = np.delete(kept, shape if correlation[shape] > _BOUND_TO_SHAPE else worst)
+    return np.isin(np.arange(len(gram)), kept), found
+
+
+def positive_inverse(matrix: np.ndarray) -> np.ndarray:
+    """Inverse of a symmetric positive matrix, by Cholesky's factor."""
+    lower = dpotri(dpotrf(matrix, lower=1)[0], lower=1)[0]
+    # LAPACK leaves the other triangle as it was.
+    return np.tril(lower) + np.tril(lower, -1).T
 
 
 def _first_without_information(gram: np.ndarray) -> int | None:
