@@ -147,7 +147,7 @@ def test_moments_have_the_noise_that_a_model_leaves_where_that_is_more_than_was_
     one, scale = statistics_of(rows.products, [0.3]), 0.3
     joint = Joint(one, UNITS[:1], Grid(np.array([scale]), np.zeros(1)), np.zeros(1), np.zeros(1, int))
     ((_, variance),) = joint.moments()
-    inner = one.gram[0][:2, :2] + np.eye(2) / scale**2
+    inner = one.between(np.arange(2), np.arange(2))[0] + np.eye(2) / scale**2
     left = one.squares[0] - one.along[0, :2] @ np.linalg.solve(inner, one.along[0, :2])
     assert left > 2.0 * one.freedom
     np.testing.assert_allclose(variance, left / one.freedom * np.diag(np.linalg.inv(inner)))

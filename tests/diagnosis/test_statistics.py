@@ -30,15 +30,20 @@ def dense(rows, tau):
     )
 
 
-@pytest.mark.parametrize("at_once", [1, 40, 10**6])
+@pytest.mark.parametrize(("at_once", "columns_a_row"), [(1, 4), (40, 4), (40, 0), (10**6, 0)])
 @pytest.mark.parametrize("case", CASES)
-def test_statistics_are_those_of_dense_generalized_least_squares(case, at_once, monkeypatch):
-    """However many poses are looked at in one go."""
+def test_statistics_are_those_of_dense_generalized_least_squares(case, at_once, columns_a_row, monkeypatch):
+    """However many poses are looked at in one go, and whether what they take is kept beside the products."""
     monkeypatch.setattr(statistics, "_AT_ONCE", at_once)
+    monkeypatch.setattr(statistics, "_COLUMNS_A_ROW", columns_a_row)
     rows = made_rows(1, **CASES[case])
     found = statistics_of(rows.products, TAU)
     gram, along, squares, logs = (np.array(part) for part in zip(*(dense(rows, tau) for tau in TAU), strict=True))
-    np.testing.assert_allclose(found.gram, gram, rtol=1e-9, atol=1e-9 * np.abs(gram).max())
+    every = np.arange(gram.shape[1])
+    assert len(found.gram) == (len(TAU) if columns_a_row else 1)
+    for between in (found.between(every), found.between(every, every), found.at([1, 3]).between(every[:2], every)):
+        expected = gram if len(between) == len(gram) else gram[[1, 3], :2]
+        np.testing.assert_allclose(between, expected, rtol=1e-9, atol=1e-9 * np.abs(gram).max())
     np.testing.assert_allclose(found.along, along, rtol=1e-9, atol=1e-9 * np.abs(along).max())
     np.testing.assert_allclose(found.squares, squares, rtol=1e-9)
     # Up to a constant that does not depend on tau.

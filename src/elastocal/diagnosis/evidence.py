@@ -17,7 +17,7 @@ such coefficients as if they were independent.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -95,88 +95,75 @@ def log_likelihood(squares: np.ndarray, freedom: int) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Conditioned:
-    """Statistics given that some columns are in the model with given sizes.
+class Blocks:
+    """Units of one width d: their `numbers` (U,), `columns` (U, d), and W'MW of the columns of each, `gram` (T, U, d, d)."""
 
-    `free` (T, K, K): W'MW without them. `cross` (T, D, K): its rows of these columns, divided by the Cholesky factor of I +
-    D^1/2 G D^1/2. `along` (T, K), `squares` (T,). `log_occam` (T,): -1/2 ln |I + D^1/2 G D^1/2| of these columns, with what tau
-    contributes alone and its prior.
-    """
+    numbers: np.ndarray
+    columns: np.ndarray
+    gram: np.ndarray
 
-    free: np.ndarray
-    cross: np.ndarray
-    along: np.ndarray
-    squares: np.ndarray
-    log_occam: np.ndarray
-
-    def blocks_of(
-        self, units: Sequence[Unit], chosen: Sequence[int]
-    ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
-        """Decompose W'MW given these columns, of which only the blocks of some units are made: G_uu = V diag(values) V'.
-
-        For each width d of U of the units yields their numbers (U,), values (T, U, d), V (T, U, d, d) and columns (U, d).
-        """
-        numbers, width = np.asarray(chosen, int), np.array([len(units[number].columns) for number in chosen], int)
+    @classmethod
+    def of(cls, statistics: Statistics, units: Sequence[Unit]) -> list[Blocks]:
+        """Units in the order of their widths."""
+        width, found = np.array([len(unit.columns) for unit in units], int), []
         for size in np.unique(width):
-            members = numbers[width == size]
-            at = np.array([units[number].columns for number in members])
-            part = self.free[:, at[:, :, None], at[:, None, :]]
-            if self.cross.shape[1]:
-                mine = self.cross[:, :, at].transpose(0, 2, 1, 3)
-                part -= mine.transpose(0, 1, 3, 2) @ mine
-            values, vectors = np.linalg.eigh(part) if size > 1 else (part[..., 0], np.ones_like(part))
-            yield members, np.clip(values, 0.0, None), vectors, at
+            numbers = np.flatnonzero(width == size)
+            columns = np.array([units[number].columns for number in numbers.tolist()])
+            found.append(cls(numbers, columns, statistics.between(columns, columns)))
+        return found
+
+    def at(self, chosen: np.ndarray | slice) -> Blocks:
+        """The same at some of the sizes of the pose error only."""
+        return Blocks(self.numbers, self.columns, self.gram[chosen])
+
+    @property
+    def axes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Principal axes of the blocks, V diag(values) V': values (T, U, d), V (T, U, d, d)."""
+        values, vectors = np.linalg.eigh(self.gram) if self.gram.shape[-1] > 1 else (self.gram[..., 0], np.ones_like(self.gram))
+        return np.clip(values, 0.0, None), vectors
 
 
-def _with_priors(gram: np.ndarray, columns: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+def _with_priors(statistics: Statistics, columns: np.ndarray, deviations: np.ndarray) -> np.ndarray:
     """I + D^1/2 G D^1/2 of some columns, ndarray (T, D, D)."""
-    inner = gram[:, columns[:, None], columns]
+    inner = statistics.between(columns, columns)
     inner *= deviations[:, None]
     inner *= deviations
     inner[:, np.arange(len(columns)), np.arange(len(columns))] += 1.0
     return inner
 
 
-def condition(statistics: Statistics, columns: np.ndarray, deviations: np.ndarray, log_pose: np.ndarray) -> Conditioned:
-    """Take columns into the model.
-
-    `columns` (D,) of int. `deviations` (D,): prior standard deviation of each, in plausible sizes. `log_pose` (T,).
-    """
-    start = statistics.log_likelihood + log_pose
-    gram = statistics.gram
-    if not len(columns):
-        return Conditioned(gram, gram[:, :0], statistics.along, statistics.squares, start)
-    factor = np.linalg.cholesky(_with_priors(gram, columns, deviations))
-    right = deviations[:, None] * np.concatenate([gram[:, columns], statistics.along[:, columns, None]], axis=2)
-    both = np.array([solve_triangular(*pair, lower=True, check_finite=False) for pair in zip(factor, right, strict=True)])
-    cross, fitted = both[..., :-1], both[..., -1]
-    return Conditioned(
-        gram,
-        cross,
-        statistics.along - (fitted[:, None] @ cross)[:, 0],
-        statistics.squares - (fitted**2).sum(axis=1),
-        start - np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1),
-    )
-
-
 def added_evidence(
-    conditioned: Conditioned, units: Sequence[Unit], chosen: Sequence[int], grid: Grid, freedom: int
-) -> np.ndarray:
-    """Log evidence of a model with each of the chosen units added, at every size of that unit.
+    statistics: Statistics, base: np.ndarray, given: tuple[np.ndarray, np.ndarray], blocks: Sequence[Blocks], grid: Grid
+) -> tuple[np.ndarray, np.ndarray]:
+    """Log evidence of a model, and of the same with each single unit added, at every size of that unit.
 
-    `conditioned`: by what the model has already. Returns (T, number of units, S): -inf for units that are not chosen.
+    `base` (T,): what each tau contributes alone, with its prior. `given` (D,): columns of the model, and the prior standard
+    deviation of each, in plausible sizes. `blocks`: of all units. Returns (T,); (T, number of units, S), not weighted by size.
     """
-    found = np.full((len(conditioned.squares), len(units), len(grid.scales)), -np.inf)
+    columns, deviations = given
+    factor = np.linalg.cholesky(_with_priors(statistics, columns, deviations))
+    # Rows of W'MW of these columns, and of W'My, divided by the factor: what they take from all others.
+    right = deviations[:, None] * np.concatenate([statistics.between(columns), statistics.along[:, columns, None]], axis=2)
+    if len(columns):
+        pairs = zip(factor, right, strict=True)
+        right = np.array([solve_triangular(*pair, lower=True, check_finite=False) for pair in pairs])
+    cross, fitted = right[..., :-1], right[..., -1]
+    along_all = statistics.along - (fitted[:, None] @ cross)[:, 0]
+    squares = statistics.squares - (fitted**2).sum(axis=1)
+    log_occam = base - np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
+    found = np.empty((len(base), sum(len(each.numbers) for each in blocks), len(grid.scales)))
     variances = grid.scales**2
-    for members, values, vectors, columns in conditioned.blocks_of(units, chosen):
-        along = conditioned.along[:, columns]
-        turned = (vectors.swapaxes(-1, -2) @ along[..., None])[..., 0] ** 2
+    for each in blocks:
+        mine = cross[:, :, each.columns].transpose(0, 2, 1, 3)
+        left = replace(each, gram=each.gram - mine.swapaxes(-1, -2) @ mine) if len(columns) else each
+        values, vectors = left.axes
+        turned = (vectors.swapaxes(-1, -2) @ along_all[:, each.columns, None])[..., 0] ** 2
         widened = 1.0 + values[..., None] * variances
         gains = (turned[..., None] * (variances / widened)).sum(axis=2)
         occam = -0.5 * np.log(widened).sum(axis=2)
-        likelihood = log_likelihood(conditioned.squares[:, None, None] - gains, freedom)
-        found[:, members] = conditioned.log_occam[:, None, None] + occam + likelihood
-    return found + np.array([grid.of(unit) for unit in units])
+        likelihood = log_likelihood(squares[:, None, None] - gains, statistics.freedom)
+        found[:, each.numbers] = log_occam[:, None, None] + occam + likelihood
+    return log_occam + log_likelihood(squares, statistics.freedom), found
 
 
 @dataclass(frozen=True)
@@ -278,7 +265,7 @@ class Joint:
         signs = np.concatenate([np.zeros(0, int), *(unit.signs for unit in units)])
         self.starts = np.concatenate([[0], np.cumsum([len(unit.columns) for unit in units], dtype=int)])
         deviations = np.repeat(self.scales, np.diff(self.starts))
-        self.covariance, self.log_det = _inverses(_with_priors(statistics.gram, columns, deviations))
+        self.covariance, self.log_det = _inverses(_with_priors(statistics, columns, deviations))
         along = deviations * statistics.along[:, columns]
         self.mean = (self.covariance @ along[..., None])[..., 0]
         self.squares = statistics.squares - (along * self.mean).sum(axis=1)

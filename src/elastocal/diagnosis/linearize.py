@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.special import chdtri
 
-from elastocal.diagnosis.evidence import condition, log_sum_exp
+from elastocal.diagnosis.evidence import Blocks, log_sum_exp
 from elastocal.diagnosis.hypotheses import Law, Unit, laws_of, units_of
 from elastocal.diagnosis.search import Problem, pose_errors_within_reach
 from elastocal.diagnosis.statistics import Products, Statistics, WhiteRows, products_of, statistics_of
@@ -191,7 +191,8 @@ def linearized(
     there = fitted.model.offered(observations.states)
     why = {candidate.key: lacking(candidate, there, observations.states.joint_angles) for candidate in candidates}
     tried = {c.key: (c, shapes_tried(c, fitted)) for c in candidates if not why[c.key]}
-    against = laws_of(around, settings.other_features)
+    # Beside no candidate nothing competes.
+    against = laws_of(around, settings.other_features) if candidates else []
     missing = {key: reason for key, reason in why.items() if reason}
     return Linearized(fitted, observations, settings, around, tried, missing, frozenset(why), against, most_pose_error_rad)
 
@@ -204,9 +205,8 @@ def smallest_shown(statistics: Statistics, units: Sequence[Unit], settings: Sett
     largest is too small to be seen.
     """
     critical, largest = chdtri(1, settings.alarm_level / max(len(units), 1)), np.zeros(len(units))
-    blocks = condition(statistics.at(slice(1)), np.zeros(0, int), np.zeros(0), np.zeros(1)).blocks_of(units, range(len(units)))
-    for members, values, _, _ in blocks:
-        largest[members] = values[0].max(axis=1)
+    for block in Blocks.of(statistics.at(slice(1)), units):
+        largest[block.numbers] = block.axes[0][0].max(axis=1)
     return np.searchsorted(np.array(settings.scales) ** 2, critical / np.maximum(largest, 1e-9 * critical))
 
 
@@ -277,11 +277,13 @@ def with_probable_centres(part: Kept, settings: Settings) -> Kept:
     stated = with_stated_centres(part.declared.model)
     if stated is part.declared.model:
         return part
-    line = linearized(part.declared, part.searched, list(part.case.candidates.values()), settings)
+    line = linearized(part.declared, part.searched, (), settings)
     lines = [line, line.alike(about=replace(line.about, model=stated))]
     wide, narrow = (_log_evidence(each, products_of(each._fitted[0], *each.priors)) for each in lines)
     # A prior that is better without any mechanism is not worse with one, for a mechanism explains what it leaves.
     if wide > narrow:
+        every = linearized(part.declared, part.searched, list(part.case.candidates.values()), settings)
+        lines = [each.alike(tried=every.tried, against=every.against) for each in lines]
         wide, narrow = (_log_evidence(each, each.products, each.problem) for each in lines)
         if wide > narrow:
             return part

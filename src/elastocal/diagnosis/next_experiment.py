@@ -104,15 +104,15 @@ def posteriors_of(
     At the pose error of the first one, in units of `factor` times the noise taken. Half-normal priors count as normal ones.
     """
     count, found = linearized.products.declared, []
-    declared, taken = np.arange(count), np.append(np.arange(count), count + columns)
-    total = normal_equations(linearized.products, models[0].pose_error_rad) / factor**2
+    declared = np.arange(count)
+    total = normal_equations(linearized.products, models[0].pose_error_rad, columns) / factor**2
     for model in models:
         mine, deviations = linearized.problem.columns_of(model.units, model.scales)
         at = np.append(declared, count + np.searchsorted(columns, mine))
-        precision = total[np.ix_(taken[at], taken[at])] + np.diag(np.append(0.0 * declared, (factor * deviations) ** -2))
-        covariance = np.zeros((len(taken), len(taken)))
+        precision = total[np.ix_(at, at)] + np.diag(np.append(0.0 * declared, (factor * deviations) ** -2))
+        covariance = np.zeros((len(total) - 1, len(total) - 1))
         covariance[np.ix_(at, at)] = np.linalg.inv(precision)
-        found.append((covariance @ total[taken, -1], covariance))
+        found.append((covariance @ total[:-1, -1], covariance))
     return found
 
 

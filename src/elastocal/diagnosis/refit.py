@@ -129,7 +129,6 @@ def averaged(linearized: Linearized, posterior: Posterior, best: Model, owners: 
     """
     likely, problem = _likely(posterior, best), linearized.problem
     sizes = {model.pose_error_rad for model, _ in likely}
-    equations = {tau: normal_equations(linearized.products, tau) for tau in sizes}
     # Sizes of the pose error that the best model makes likely, and those of the models that count.
     some, base = problem.statistics, problem.statistics.log_likelihood + problem.log_pose
     if best.units:
@@ -137,10 +136,7 @@ def averaged(linearized: Linearized, posterior: Posterior, best: Model, owners: 
         of_models = np.isin(some.pose_error_rad, list(sizes))
         kept = np.flatnonzero((density > density.max() + UNLIKELY) | of_models)
         some, base = some.at(kept), base[kept]
-    each = [
-        (p, _moments(linearized, model, equations[model.pose_error_rad], owners, _joint(problem, model, some, base)))
-        for model, p in likely
-    ]
+    each = [(p, _moments(linearized, model, owners, _joint(problem, model, some, base))) for model, p in likely]
     exact = next(found for (model, _), (_, found) in zip(likely, each, strict=True) if model is best)
     shift: dict[tuple[str, str], float] = {}
     std_error: dict[tuple[str, str], float] = {}
@@ -230,18 +226,17 @@ def _predicted(problem: Problem, model: Model) -> np.ndarray:
 
 
 def _moments(
-    linearized: Linearized, model: Model, equations: np.ndarray, owners: Sequence[tuple[str, str]], joint: Joint
+    linearized: Linearized, model: Model, owners: Sequence[tuple[str, str]], joint: Joint
 ) -> dict[tuple[str, str], tuple[float, float]]:
     """Mean and variance of every parameter of one model, by owner and name; declared ones up to a constant in the mean."""
     products, problem = linearized.products, linearized.problem
     declared, (columns, deviations) = products.declared, problem.columns_of(model.units, model.scales)
-    chosen = np.concatenate([np.arange(declared), declared + columns])
-    information = equations[np.ix_(chosen, chosen)].copy()
-    places = np.arange(declared, len(chosen))
+    equations = normal_equations(products, model.pose_error_rad, columns)
+    information, places = equations[:-1, :-1], np.arange(declared, len(equations) - 1)
     information[places, places] += deviations**-2.0
     # Declared parameters from the orthonormal basis, less what the candidates' columns have in it.
     back = products.into_basis @ np.concatenate([np.eye(declared), -products.projected[:, columns]], axis=1)
-    solved = solve_positive(information, np.column_stack([back.T, equations[chosen, -1]]))
+    solved = solve_positive(information, np.column_stack([back.T, equations[:-1, -1]]))
     variance = max(mean_square_left(problem, model), 1.0) * (back * solved[:, :-1].T).sum(axis=1)
     found = dict(zip(owners, zip(back @ solved[:, -1], variance, strict=True), strict=True))
     for number, (value, spread) in zip(model.units, joint.moments(), strict=True):

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from bisect import bisect
 from collections import Counter
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from heapq import nlargest
@@ -25,10 +26,10 @@ import numpy as np
 from scipy.linalg import lapack
 
 from elastocal.diagnosis.evidence import (
+    Blocks,
     Evaluated,
     Grid,
     added_evidence,
-    condition,
     evaluate,
     log_likelihood,
     log_sum_exp,
@@ -51,6 +52,8 @@ UNLIKELY, _TELLING_UNITS = -9.0, 10
 # Sizes with less than this under the best model met so far are left out from there on: what comes near to that model differs
 # from it by a few units, which over a hundred orders of magnitude do not hang on.
 _OUT_OF_QUESTION = -300.0
+# Terms of Bayes factors that are in a cache at once.
+_AT_ONCE = 10_000
 # Steps of the grid of the pose error to either side that measurements simulated with one size can make likely.
 _REACH = 2
 # Bayes factor over the number of draws, the measurements' own included, beyond which none is made. The mean of one is that over
@@ -76,6 +79,11 @@ class Problem:
         """Sizes of a unit."""
         return Grid.of_settings(self.settings)
 
+    @cached_property
+    def blocks(self) -> list[Blocks]:
+        """Of all units."""
+        return Blocks.of(self.statistics, self.units)
+
     @property
     def log_pose(self) -> np.ndarray:
         """Logarithm of the prior weight of each size of the pose error, ndarray (T,)."""
@@ -95,7 +103,8 @@ class Problem:
         """Columns of a model (D,), their most probable coefficients at its sizes, and the place of its pose error."""
         columns, deviations = self.columns_of(model.units, model.scales)
         place = self.statistics.nearest(model.pose_error_rad)
-        inner = deviations[:, None] * self.statistics.gram[place][np.ix_(columns, columns)] * deviations + np.eye(len(columns))
+        gram = self.statistics.at(slice(place, place + 1)).between(columns, columns)[0]
+        inner = deviations[:, None] * gram * deviations + np.eye(len(columns))
         along = deviations * self.statistics.along[place, columns]
         return columns, deviations * solve_positive(inner, along), place
 
@@ -140,7 +149,7 @@ def initial_screening(problem: Problem) -> tuple[Model, np.ndarray]:
 
 def posterior(problem: Problem, known: Collection[str] = ()) -> Posterior:
     """Search the models. `known`: keys of the candidates of a good model, from which the search starts, too."""
-    searcher, units = _Searcher(problem), problem.units
+    searcher, units = problem.started.again(), problem.units
     # Each mechanism at all its locations, and the model that is known, each with the best variant at each place.
     mechanisms = dict.fromkeys(unit.mechanism for unit in units if unit.mechanism != OTHER)
     starts = [searcher.best_variants(n for n, unit in enumerate(units) if unit.mechanism == name) for name in mechanisms]
@@ -168,15 +177,24 @@ class _Searcher:
     """Models met so far with their approximate log odds, and the sizes at which they were met."""
 
     def __init__(self, problem: Problem) -> None:
-        self.problem = problem
-        self.statistics, self.log_pose, self.grid = problem.statistics, problem.log_pose, problem.grid
+        self.problem, self.grid = problem, problem.grid
+        self.statistics, self.log_pose, self.blocks = problem.statistics, problem.log_pose, problem.blocks
+        self.weights = np.array([self.grid.of(unit) for unit in problem.units]).reshape(-1, len(self.grid.scales))
+        numbers: dict[object, int] = {}
+        self.places = np.array([numbers.setdefault(unit.place, len(numbers)) for unit in problem.units], int)
         self.empty = self.evaluated((), ())
         self.met: dict[tuple[int, ...], float] = {(): 0.0}
-        self.sizes: dict[tuple[int, ...], np.ndarray] = {(): self.empty.scales}
+        self.sizes: dict[tuple[int, ...], tuple[float, ...]] = {(): ()}
         self.measured: dict[tuple[int, ...], Model] = {}
         self.extended: set[tuple[int, ...]] = set()
         self.extend(())
         self.measure(())
+
+    def again(self) -> _Searcher:
+        """One that goes on from here, and leaves this one as it is."""
+        found = copy(self)
+        vars(found).update({name: each.copy() for name, each in vars(self).items() if isinstance(each, dict | set)})
+        return found
 
     def evaluated(self, model: tuple[int, ...], start: Iterable[float]) -> Evaluated:
         """Evidence of a model in full."""
@@ -187,47 +205,46 @@ class _Searcher:
         if len(model) >= self.problem.settings.largest_model:
             return
         self.extended.add(model)
-        units = self.problem.units
-        taken = {units[number].place for number in model}
-        open_units = [n for n, unit in enumerate(units) if unit.place not in taken]
-        if not open_units:
+        units, sizes = self.problem.units, self.sizes[model]
+        open_units = np.flatnonzero(~np.isin(self.places, self.places[list(model)]))
+        if not len(open_units):
             return
-        sizes = self.sizes[model]
-        conditioned = condition(self.statistics, *self.problem.columns_of(model, sizes), self.log_pose)
-        by_pose_error = added_evidence(conditioned, units, open_units, self.grid, self.statistics.freedom)
+        base, given = self.statistics.log_likelihood + self.log_pose, self.problem.columns_of(model, sizes)
+        before, by_pose_error = added_evidence(self.statistics, base, given, self.blocks, self.grid)
+        by_pose_error += self.weights
         found = log_sum_exp(by_pose_error, axis=0)
         total = log_sum_exp(found, axis=1)
-        # What the sizes already in the model are worth as they are, against their average: the same for all extensions.
-        alone = log_sum_exp(conditioned.log_occam + log_likelihood(conditioned.squares, self.statistics.freedom))
         if not model:
             # Without the sizes of the pose error that neither "nothing" nor any good single unit makes likely.
             weights = log_sum_exp(by_pose_error[:, np.argsort(-total)[:_TELLING_UNITS]], axis=2)
             weights = np.column_stack([weights - log_sum_exp(weights, axis=0), self.empty.log_pose])
             self.keep_pose_errors(np.flatnonzero((weights > UNLIKELY).any(axis=1)))
             self.empty = self.evaluated((), self.empty.scales)
-        prior, here = self.problem.prior, self.met[model]
-        mechanisms = Counter(units[n].mechanism for n in model)
-        best, gained = self.grid.scales[found.argmax(axis=1)], (total + (here - alone)).tolist()
-        for number in open_units:
+        # What the sizes already in the model are worth as they are, against their average: the same for all extensions.
+        gained = (total + (self.met[model] - log_sum_exp(before))).tolist()
+        prior, mechanisms = self.problem.prior, Counter(units[n].mechanism for n in model)
+        best = self.grid.scales[found.argmax(axis=1)].tolist()
+        for number in open_units.tolist():
             odds = gained[number] + prior.added(units[number], mechanisms[units[number].mechanism])
             place = bisect(model, number)
             key = (*model[:place], number, *model[place:])
             if odds > self.met.get(key, -np.inf):
                 self.met[key] = odds
-                self.sizes[key] = np.concatenate([sizes[:place], best[number : number + 1], sizes[place:]])
+                self.sizes[key] = (*sizes[:place], best[number], *sizes[place:])
 
     def keep_pose_errors(self, kept: np.ndarray) -> None:
         """Go on with some of the sizes of the pose error alone; their statistics are copied where there are others."""
         if len(kept) < len(self.log_pose):
             self.statistics, self.log_pose = self.statistics.at(kept), self.log_pose[kept]
+            self.blocks = [each.at(kept) for each in self.blocks]
 
     def measure(self, model: tuple[int, ...]) -> Model:
         """Meet a model as it is, in full, and what it would be without each of its units."""
-        found = self.evaluated(model, self.sizes.get(model, np.full(len(model), self.problem.settings.scale_center)))
+        found = self.evaluated(model, self.sizes.get(model, (self.problem.settings.scale_center,) * len(model)))
         units, prior = self.problem.units, self.problem.prior
         whole, counts = prior.log_odds_of(units[n] for n in model), Counter(units[n].mechanism for n in model)
         odds = found.log_evidence - self.empty.log_evidence + whole
-        self.met[model], self.sizes[model] = odds, found.scales
+        self.met[model], self.sizes[model] = odds, tuple(found.scales.tolist())
         pose_error_rad = float(self.statistics.pose_error_rad[np.argmax(found.log_pose)])
         self.measured[model] = Model(model, odds, found.scales, pose_error_rad)
         if odds == max(self.met.values()):
@@ -237,7 +254,7 @@ class _Searcher:
             if smaller not in self.met:
                 left = found.without[place] - self.empty.log_evidence
                 self.met[smaller] = left + whole - prior.added(units[number], counts[units[number].mechanism] - 1)
-                self.sizes[smaller] = np.delete(found.scales, place)
+                self.sizes[smaller] = self.sizes[model][:place] + self.sizes[model][place + 1 :]
         return self.measured[model]
 
     def best_variants(self, numbers: Iterable[int]) -> tuple[int, ...]:
@@ -302,42 +319,41 @@ def alarm_of(problem: Problem, products: Products, pose_error_rad: float, stream
     # Sizes that draws of the fitted one can make likely: its own, and some to either side.
     place = statistics.nearest(pose_error_rad)
     chosen = slice(max(place - _REACH, 0), place + _REACH + 1)
-    statistics, log_pose = statistics.at(chosen), problem.log_pose[chosen]
-    own = statistics.along[..., None], statistics.squares[:, None]
-    statistic = float(_average_bayes_factors(problem, statistics, log_pose, *own)[0])
-    reached = 0
+    statistics, base = statistics.at(chosen), (statistics.log_likelihood + problem.log_pose)[chosen]
+    tested, log_priors = _alternatives(problem)
+    blocks = [(each, *each.axes) for each in Blocks.of(statistics, tested)]
+
+    def average_bayes_factors(along: np.ndarray, squares: np.ndarray) -> np.ndarray:
+        """Logarithms of N sets of measurements, ndarray (N,). `along` (T, K, N), `squares` (T, N)."""
+        nothing = log_sum_exp(base[:, None] + log_likelihood(squares, statistics.freedom), axis=0)
+        total, variances = np.full(len(nothing), -np.inf), problem.grid.scales**2
+        step = max(_AT_ONCE // (squares.size * len(variances)), 1)
+        for block, values, vectors in blocks:
+            for start in range(0, len(block.numbers), step):
+                some = slice(start, start + step)
+                units = [tested[number] for number in block.numbers[some].tolist()]
+                # A step below the sizes of the posterior.
+                firsts = [max(unit.smallest - 1, 0) for unit in units]
+                sizes = slice(min(firsts), None)
+                weights = [problem.grid.between(first, unit.largest)[sizes] for first, unit in zip(firsts, units, strict=True)]
+                widened = 1.0 + variances[sizes, None] * values[:, some, None]
+                turned = (vectors[:, some].swapaxes(-1, -2) @ along[:, block.columns[some]]) ** 2
+                left = squares[:, None, None] - (variances[sizes, None] / widened) @ turned
+                known = base[:, None, None] - 0.5 * np.log(widened).sum(axis=3) + np.array(weights)
+                known += log_priors[block.numbers[some], None]
+                terms = log_likelihood(left, statistics.freedom) + known[..., None]
+                total = np.logaddexp(total, log_sum_exp(terms, axis=(0, 1, 2)))
+        return total - nothing
+
+    statistic, reached = float(average_bayes_factors(statistics.along[..., None], statistics.squares[:, None])[0]), 0
     if statistic <= np.log(_BEYOND_DRAWS * (1 + settings.alarm_draws)):
         drawn = null_draws(products, pose_error_rad, statistics.pose_error_rad, settings.alarm_draws, stream)
-        reached = int((_average_bayes_factors(problem, statistics, log_pose, *drawn) >= statistic).sum())
+        reached = int((average_bayes_factors(*drawn) >= statistic).sum())
     p_value = (1 + reached) / (1 + settings.alarm_draws)
     return Alarm(p_value, statistic, p_value <= settings.alarm_level)
 
 
-def _average_bayes_factors(
-    problem: Problem, statistics: Statistics, log_pose: np.ndarray, along: np.ndarray, squares: np.ndarray
-) -> np.ndarray:
-    """Log of the average Bayes factor for N sets of measurements, ndarray (N,). `along` (T, K, N), `squares` (T, N)."""
-    grid, given_nothing = problem.grid, condition(statistics, np.zeros(0, int), np.zeros(0), log_pose)
-    start = given_nothing.log_occam[:, None]
-    nothing = log_sum_exp(start + log_likelihood(squares, statistics.freedom), axis=0)
-    tested, log_priors = _alternatives(problem)
-    total = np.full(len(nothing), -np.inf)
-    for members, values, vectors, columns in given_nothing.blocks_of(tested, range(len(tested))):
-        for place, number in enumerate(members):
-            turned = (vectors[:, place].transpose(0, 2, 1) @ along[:, columns[place]]) ** 2
-            unit = tested[number]
-            first = max(unit.smallest - 1, 0)
-            variances = grid.scales[first:, None] ** 2
-            weights = grid.between(first, unit.largest)[first:]
-            widened = 1.0 + variances * values[:, None, place]
-            left = squares[:, None] - (variances / widened) @ turned
-            known = weights + start - 0.5 * np.log(widened).sum(axis=2)
-            terms = log_likelihood(left, statistics.freedom) + known[..., None]
-            total = np.logaddexp(total, log_priors[number] + log_sum_exp(terms, axis=(0, 1)))
-    return total - nothing
-
-
-def _alternatives(problem: Problem) -> tuple[list[Unit], list[float]]:
+def _alternatives(problem: Problem) -> tuple[list[Unit], np.ndarray]:
     """Every unit, and every mechanism with one law at all its locations in one size; with their log prior odds."""
     prior = problem.prior
     alternatives, log_priors = list(problem.units), [prior.log_odds_of([unit]) for unit in problem.units]
@@ -350,4 +366,4 @@ def _alternatives(problem: Problem) -> tuple[list[Unit], list[float]]:
             columns, smallest = np.concatenate([unit.columns for unit in units]), min(unit.smallest for unit in units)
             alternatives.append(replace(units[0], columns=columns, smallest=smallest))
             log_priors.append(prior.log_odds_of(units) - (len(units) - 1) * units[0].log_prior)
-    return alternatives, log_priors
+    return alternatives, np.array(log_priors)

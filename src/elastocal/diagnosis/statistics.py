@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 _AT_ONCE = 1_000_000
 # Of a square from which another one was taken, less than this share is rounding.
 _INSIDE = 1e-12
+# Columns for each row that a pose error takes from their products, from which on these cost less as they are.
+_COLUMNS_A_ROW = 4
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,8 @@ class Products:
     `beside` (M, rows, P + 1): declared columns of the rows made orthonormal, and the residual. `declared`: P. `gram` (P + K + 1
     square): Z'Z of Z = [X W y], with the priors' rows. `freedom`: numbers measured less what the declared model fits.
     `into_basis` (P, P): turns declared columns into orthonormal ones. `projected` (P, K + 1): what these have in the others.
-    `inside` (K,) of bool: columns of which these leave nothing. `met`: by sizes of the pose error, factors of what is left.
+    `inside` (K,) of bool: columns of which these leave nothing. `met`: by sizes of the pose error, factors of what is left, and
+    what is left of all other columns and the residual, as of `Statistics`.
     """
 
     rows: WhiteRows
@@ -73,7 +76,7 @@ class Products:
     into_basis: np.ndarray
     projected: np.ndarray
     inside: np.ndarray
-    met: dict[float, tuple[np.ndarray, np.ndarray, np.ndarray]] = field(default_factory=dict, repr=False)
+    met: dict[float, tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = field(default_factory=dict, repr=False)
 
     @property
     def without_candidates(self) -> Products:
@@ -88,15 +91,19 @@ class Products:
         """Without what grows with the measurements; normal equations at other sizes than those met are lost with it."""
         return replace(self, rows=self.rows.at(np.zeros(len(self.beside), bool)), beside=self.beside[:0])
 
+    @property
+    def axes(self) -> int:
+        """Of each pose: as many as joints, or as numbers that are measured in any pose, if these are fewer."""
+        rows = self.rows
+        return min(rows.jacobian.shape[2], int(np.bincount(rows.pose).max()) * rows.jacobian.shape[1])
+
     def by_pose(self) -> Iterator[tuple[np.ndarray, WhiteRows, np.ndarray, np.ndarray]]:
         """B_p (G, a, P + K + 1) along principal axes of C_p, and its eigenvalues (G, a), of some poses at a time.
 
-        With which of all rows are theirs, and these, their Jacobian along the same axes: as many as joints, or as numbers that
-        are measured in any pose, if these are fewer.
+        With which of all rows are theirs, and these, their Jacobian along the same axes.
         """
-        rows, count = self.rows, self.declared
+        rows, count, axes = self.rows, self.declared, self.axes
         width, poses = self.gram.shape[0], int(rows.pose.max()) + 1
-        axes = min(rows.jacobian.shape[2], int(np.bincount(rows.pose).max()) * rows.jacobian.shape[1])
         step = max(_AT_ONCE // (width * axes), 1)
         for start in range(0, poses, step):
             seen = (rows.pose >= start) & (rows.pose < start + step)
@@ -156,12 +163,15 @@ def products_of(rows: WhiteRows, prior_std: np.ndarray, present: np.ndarray) -> 
 class Statistics:
     """Sufficient statistics at T sizes of the pose error, for K columns.
 
-    `pose_error_rad` (T,): tau. `gram` (T, K, K): W'MW. `along` (T, K): W'My. `squares` (T,): y'My. `log_likelihood` (T,): what
-    tau contributes alone: -1/2 ln |Sigma| - 1/2 ln |X'Sigma^-1 X|. `freedom`: rows less what the declared model fits.
+    `pose_error_rad` (T,): tau. `gram` (T or 1, K, K), `taken` (T, K, R): W'MW is the one less the product of the other with
+    itself. Of few poses the one is of no pose error, for all tau; of many R is 0. `along` (T, K): W'My. `squares` (T,): y'My.
+    `log_likelihood` (T,): what tau contributes alone: -1/2 ln |Sigma| - 1/2 ln |X'Sigma^-1 X|. `freedom`: rows less what the
+    declared model fits.
     """
 
     pose_error_rad: np.ndarray
     gram: np.ndarray
+    taken: np.ndarray
     along: np.ndarray
     squares: np.ndarray
     log_likelihood: np.ndarray
@@ -171,46 +181,64 @@ class Statistics:
         """The same at some of the sizes of the pose error only; those beside each other are not copied."""
         if not isinstance(chosen, slice) and len(chosen) and np.ptp(chosen) == len(chosen) - 1:
             chosen = slice(int(chosen[0]), int(chosen[-1]) + 1)
-        some = {name: values[chosen] for name, values in vars(self).items() if name != "freedom"}
-        return Statistics(**some, freedom=self.freedom)
+        of_each = {name: each for name, each in vars(self).items() if name != "freedom" and len(each) == len(self.squares)}
+        return replace(self, **{name: each[chosen] for name, each in of_each.items()})
 
     def nearest(self, pose_error_rad: float) -> int:
         """Place of the size of the pose error that is nearest to one."""
         return int(np.argmin(np.abs(self.pose_error_rad - pose_error_rad)))
+
+    def between(self, left: np.ndarray, right: np.ndarray | None = None) -> np.ndarray:
+        """W'MW of some columns (..., d) with others (..., e), or with all, ndarray (T, ..., d, e)."""
+        others = self.taken if right is None else self.taken[:, right]
+        found = self.gram[:, left] if right is None else self.gram[:, left[..., None], right[..., None, :]]
+        return found - self.taken[:, left] @ others.swapaxes(-1, -2)
 
 
 def statistics_of(products: Products, pose_error_rad: np.ndarray) -> Statistics:
     """Sufficient statistics at some sizes of the pose error (T,)."""
     count, sizes = products.declared, np.asarray(pose_error_rad)
     # Without a pose error declared columns are orthonormal, and the others have nothing in them.
-    above = np.tile(products.gram[:count], (len(sizes), 1, 1))
-    rest = np.tile(products.gram[count:, count:], (len(sizes), 1, 1))
-    log_dets = np.zeros(len(sizes))
-    for _, _, rows, values in products.by_pose() if sizes.any() else ():
-        for number in np.flatnonzero(sizes):
+    above, rest = np.tile(products.gram[:count], (len(sizes), 1, 1)), products.gram[None, count:, count:]
+    rows = (int(products.rows.pose.max()) + 1) * products.axes
+    few = (rows + count) * _COLUMNS_A_ROW < rest.shape[1]
+    rest = rest if few else np.tile(rest, (len(sizes), 1, 1))
+    taken, start, log_dets = np.zeros((len(sizes), rest.shape[1], few * (rows + count))), 0, np.zeros(len(sizes))
+    for _, _, found, values in products.by_pose() if sizes.any() else ():
+        part = slice(start, start := start + values.size)
+        for number in np.flatnonzero(sizes).tolist():
             tau = sizes[number]
-            taken = (rows * (tau / np.sqrt(1.0 + tau**2 * values))[..., None]).reshape(-1, rows.shape[2])
-            above[number] -= taken[:, :count].T @ taken
-            beside = np.ascontiguousarray(taken[:, count:])
-            rest[number] -= beside.T @ beside
+            each = (found * (tau / np.sqrt(1.0 + tau**2 * values))[..., None]).reshape(-1, found.shape[2])
+            above[number] -= each[:, :count].T @ each
+            beside = np.ascontiguousarray(each[:, count:])
+            if few:
+                taken[number, :, part] = beside.T
+            else:
+                rest[number] -= beside.T @ beside
             log_dets[number] += np.log1p(tau**2 * values).sum()
     factors = np.linalg.cholesky(above[:, :, :count])
-    for tau, total, factor, beside in zip(sizes, rest, factors, above[:, :, count:], strict=True):
-        taken = solve_triangular(factor, beside, lower=True) if tau else beside
+    for number, tau in enumerate(sizes):
+        fitted = above[number, :, count:]
         if tau:
-            total -= taken.T @ taken
-        products.met[float(tau)] = factor, taken, total
+            fitted = solve_triangular(factors[number], fitted, lower=True)
+            if few:
+                taken[number, :, start:] = fitted.T
+            else:
+                rest[number] -= fitted.T @ fitted
+        products.met[float(tau)] = factors[number], fitted, rest[0 if few else number], taken[number]
     logs = -0.5 * log_dets - np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
-    return Statistics(sizes, rest[:, :-1, :-1], rest[:, :-1, -1], rest[:, -1, -1], logs, products.freedom)
+    last = rest[:, -1] - (taken @ taken[:, -1, :, None])[..., 0]
+    return Statistics(sizes, rest[:, :-1, :-1], taken[:, :-1], last[:, :-1], last[:, -1], logs, products.freedom)
 
 
-def normal_equations(products: Products, tau: float) -> np.ndarray:
-    """Z'Sigma(tau)^-1 Z, ndarray (P + K + 1, P + K + 1)."""
+def normal_equations(products: Products, tau: float, columns: np.ndarray) -> np.ndarray:
+    """Z'Sigma(tau)^-1 Z of declared columns, some of the others (D,) and the residual, ndarray (P + D + 1, P + D + 1)."""
     if tau not in products.met:
         statistics_of(products, np.array([tau]))
-    factor, taken, rest = products.met[tau]
-    across = factor @ taken
-    return np.block([[factor @ factor.T, across], [across.T, rest + taken.T @ taken]])
+    some, (factor, fitted, rest, taken) = np.append(columns, -1), products.met[tau]
+    fitted, taken = fitted[:, some], taken[some]
+    across = factor @ fitted
+    return np.block([[factor @ factor.T, across], [across.T, rest[np.ix_(some, some)] - taken @ taken.T + fitted.T @ fitted]])
 
 
 def null_draws(
