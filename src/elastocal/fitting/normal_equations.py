@@ -232,7 +232,7 @@ class Parts:
         """Gram matrix of the weighted, whitened sensitivities in plausible sizes, and their products with the residual."""
         size = len(self.plausible)
         gram, along, root = np.zeros((size, size)), np.zeros(size), np.sqrt(weights)
-        for part in self.parts:
+        for part in self.parts if size else ():
             line, mine = part.line or self._linearized(part), root[part.seen]
             right = part.whitener.apply(line.residual * mine[:, None])
             turned = part.whitener.after(_of_rotation_vectors(line.residual) * mine[:, None, None])
