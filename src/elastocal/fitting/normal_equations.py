@@ -242,7 +242,7 @@ class Parts:
         """
         size = len(self.plausible)
         gram, along, root = np.zeros((size, size)), np.zeros(size), np.sqrt(weights)
-        for part in self.parts:
+        for part in self.parts if size else ():
             line, mine = part.line or self._linearized(part), root[part.seen]
             turned = part.whitener.after(_of_rotation_vectors(line.residual) * mine[:, None, None])
             right = turned.transposed.apply(part.whitener.apply(line.residual * mine[:, None]))

@@ -192,7 +192,8 @@ def motion(chain: Chain, coordinates: np.ndarray, points: Sequence[MeasuringPoin
     `coordinates` (S, C): rad and m.
     """
     moving = sorted((t.coordinate, place) for place, t in enumerate(chain.transforms) if t.coordinate is not None)
-    position, rotation, twist = _room(coordinates, (len(points), 3), (len(points), 3, 3), (6, len(moving)))
+    shapes = (len(points), 3), (len(points), 3, 3), (6, len(moving))
+    position, rotation, twist = (np.empty((*shape, len(coordinates))) for shape in shapes)
     for part, frames in _blocks(chain, coordinates, len(chain.transforms)):
         _store_poses(frames, points, position[..., part], rotation[..., part])
         for coordinate, place in moving:

@@ -16,7 +16,7 @@ from scipy.special import stdtrit
 
 from elastocal.campaigns.holdout import configurations
 from elastocal.fitting.least_squares import ON_THE_WAY, fit, registered, robustly, sizes_of
-from elastocal.fitting.linearization import linearize
+from elastocal.fitting.linearization import by_coordinates
 from elastocal.fitting.model import conditions, nonlinear_parameters, of_placement, parameter_values, residuals, stepped
 from elastocal.fitting.normal_equations import solve_normal
 from elastocal.fitting.observations import parts_of, select_states, state_clusters
@@ -172,8 +172,10 @@ def noise_floor(fitted: Fit, observations: Observations, model: Model, estimate:
     if noise.source == "residual":
         return float("nan")
     for _, _, part in parts_of(observations, len(fitted.held)):
-        line = linearize(model, estimate, part, conditions(model, estimate, part.states))
-        variance = noise.position_m**2 + ((line.joint_jacobian[:, :3] * noise.joint_rad) ** 2).sum(axis=2)
+        variance = np.full((len(part), 3), noise.position_m**2)
+        if noise.joint_rad.any():
+            line = by_coordinates(model, estimate, part, conditions(model, estimate, part.states))
+            variance += ((line.joint_jacobian[:, :3] * noise.joint_rad) ** 2).sum(axis=2)
         total += (variance.sum(axis=1) / part.states.repeats[part.state]).sum()
     return float(np.sqrt(total / len(observations)))
 
