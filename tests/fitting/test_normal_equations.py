@@ -186,8 +186,13 @@ def test_products_by_factors_are_those_of_the_columns_written_out(fanuc, offset,
         measurements.linearize(estimate)
         measurements.whiten()
         found.append(measurements.normal_equations(weights))
-    for by_factors, written_out in zip(*found, strict=True):
-        np.testing.assert_allclose(by_factors, written_out, rtol=1e-9, atol=1e-9 * np.abs(written_out).max())
+    (gram, along), (written_out, _) = found
+    np.testing.assert_allclose(gram, written_out, rtol=1e-9, atol=1e-9 * np.abs(written_out).max())
+    # Products with the residual are half of what the squares fall by with each parameter.
+    steps = 1e-4 * np.diag(plausible / np.sqrt(np.diag(gram)))
+    ends = [[measurements.squares(weights, stepped(model, estimate, way * step)) for way in (-1, 1)] for step in steps]
+    slopes = -np.diff(ends, axis=1)[:, 0] / 4e-4 * np.sqrt(np.diag(gram))
+    np.testing.assert_allclose(slopes, along, atol=1e-5 * np.abs(along).max())
 
 
 @pytest.mark.parametrize("at_once", [None, 7])
