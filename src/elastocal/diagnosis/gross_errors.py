@@ -14,13 +14,12 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.linalg import lapack, solve_triangular
+from scipy.linalg import solve_triangular
 from scipy.special import chdtri, fdtri, gammaincinv
 
 from elastocal.counting import counted
 from elastocal.diagnosis.evidence import Grid
 from elastocal.diagnosis.linearize import Linearized, linearized
-from elastocal.diagnosis.statistics import WhiteRows
 from elastocal.fitting.least_squares import ON_THE_WAY, evaluated, fit
 from elastocal.fitting.linearization import by_coordinates, linearize
 from elastocal.fitting.model import conditions, parameters, residuals
@@ -40,6 +39,7 @@ from elastocal.fitting.observations import (
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
     from elastocal.diagnosis.settings import Settings
+    from elastocal.diagnosis.statistics import Products
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Case, Estimate, Model
     from elastocal.fitting.noise import Noise
@@ -372,34 +372,35 @@ def improbable(line: Linearized) -> np.ndarray:
     """Which observations all candidates together do not explain, ndarray of bool (M,).
 
     The whitened residual has the covariance I + X D X' + W S W', with X the declared sensitivities, D their priors, W those of
-    all candidates, S their mean square sizes. The worst are taken out until what is left agrees; then those that it predicts
+    all candidates, S their mean square size. The worst are taken out until what is left agrees; then those that it predicts
     come back.
     """
-    rows, settings = line.rows, line.settings
+    products, settings = line.products, line.settings
+    rows, count = products.rows, products.declared
     observed, own = rows.residual.shape
-    kept = np.ones(observed, bool)
-    grid = Grid.of_settings(settings)
-    sizes = np.sqrt(np.exp(grid.log_weights) @ grid.scales**2)
-    declared = (rows.declared * line.priors[0]).reshape(rows.residual.size, -1)
-    columns = (sizes * rows.candidates.dense()).reshape(rows.residual.size, -1)
-    covariance, residual = np.eye(len(columns)) + columns @ columns.T, rows.residual.ravel()
-    precision, limit = _precision(covariance, declared), most_by_chance(observed, own, settings)
+    grid, kept, residual = Grid.of_settings(settings), np.ones(observed, bool), rows.residual.ravel()
+    size, limit = np.sqrt(np.exp(grid.log_weights) @ grid.scales**2), most_by_chance(observed, own, settings)
+    basis, candidates = (part.reshape(len(residual), -1) for part in (products.beside[..., :-1], rows.candidates.dense()))
+    candidates -= basis @ products.projected[:, :-1]
+    whole = _Precision((), np.tile(np.eye(own), (observed, 1, 1)), residual, residual).less(basis, np.eye(count))
+    whole = whole.less(size * candidates, np.eye(candidates.shape[1]) + size**2 * products.gram[count:-1, count:-1])
+    some = whole
     while kept.mean() > 1.0 - settings.gross_error_share:
-        distance = _deletion_distances(precision, residual, kept, own)
+        distance = some.distances(kept)
         worst = int(np.argmax(distance))
         if distance[worst] <= limit:
             break
         kept[worst] = False
-        precision = _without(precision, np.arange(worst * own, (worst + 1) * own))
+        some = some.without(np.arange(worst * own, (worst + 1) * own))
     if not kept.all():
-        covariance = covariance + _pose_error(rows, line.pose_errors_rad, covariance, declared, np.repeat(kept, own))
-    whole = _precision(covariance, declared)
+        whole = _with_pose_error(whole, some, products, line.pose_errors_rad)
     while not kept.all():
         out = np.flatnonzero(np.repeat(~kept, own))
-        distance = _deletion_distances(_without(whole, out), residual, kept, own)
-        variance = np.linalg.inv(whole[np.ix_(out, out)])
-        rest = (variance @ (whole @ residual)[out]).reshape(-1, own, 1)
-        distance[~kept] = np.sqrt((rest * np.linalg.solve(_blocks(variance, own), rest)).sum(axis=(1, 2)))
+        some = whole.without(out)
+        distance, variance = some.distances(kept), np.linalg.inv(whole.between(out)[out])
+        rest = (variance @ whole.along[out]).reshape(-1, own, 1)
+        blocks = variance.reshape(len(rest), own, len(rest), own)[np.arange(len(rest)), :, np.arange(len(rest))]
+        distance[~kept] = np.sqrt((rest * np.linalg.solve(blocks, rest)).sum(axis=(1, 2)))
         back = ~kept & ~beyond_chance(distance, own, kept, settings)[1]
         if not back.any():
             break
@@ -407,62 +408,62 @@ def improbable(line: Linearized) -> np.ndarray:
     return ~kept
 
 
-def _precision(covariance: np.ndarray, declared: np.ndarray) -> np.ndarray:
-    """Inverse of a covariance to which that of declared columns of unit size is added (Woodbury's identity)."""
-    root = np.linalg.cholesky(covariance)
-    basis, _ = _declared_basis(root, declared)
-    inverse = lapack.dpotri(root, lower=1)[0]
-    inverse = np.tril(inverse) + np.tril(inverse, -1).T
-    beside = solve_triangular(root, basis, lower=True, trans="T")
-    return inverse - beside @ beside.T
+@dataclass(frozen=True)
+class _Precision:
+    """Inverse covariance I - F F' of the n numbers of M observations: what is added to a covariance, or is taken out of the
+    observations, adds some columns to F (Woodbury's identity).
+
+    `factors` (n, ...): F, some columns after the other. `blocks` (M, own, own): on the diagonal, of each observation.
+    `residual`, `along` (n,): what the inverse is times the residual. Zero of observations that are taken out.
+    """
+
+    factors: tuple[np.ndarray, ...]
+    blocks: np.ndarray
+    residual: np.ndarray
+    along: np.ndarray
+
+    def less(self, left: np.ndarray, inner: np.ndarray) -> _Precision:
+        """This less left inner^-1 left', `left` (n, q), `inner` (q, q)."""
+        factor = solve_triangular(np.linalg.cholesky(inner), left.T, lower=True).T
+        each = factor.reshape(*self.blocks.shape[:2], -1)
+        blocks, along = self.blocks - each @ each.swapaxes(1, 2), self.along - factor @ (factor.T @ self.residual)
+        return replace(self, factors=(*self.factors, factor), blocks=blocks, along=along)
+
+    def between(self, some: np.ndarray) -> np.ndarray:
+        """Some columns, ndarray (n, q)."""
+        found = -sum(factor @ factor[some].T for factor in self.factors)
+        found[some, np.arange(len(some))] += 1.0
+        return found
+
+    def without(self, out: np.ndarray) -> _Precision:
+        """Of the numbers without some."""
+        columns = self.between(out)
+        return self.less(columns, columns[out])
+
+    def distances(self, kept: np.ndarray) -> np.ndarray:
+        """Length of the deletion residual of each observation that is kept, 0 of others, (M,)."""
+        blocks = np.where(kept[:, None, None], self.blocks, np.eye(self.blocks.shape[1]))
+        along = self.along.reshape(*self.blocks.shape[:2], 1)
+        squares = (along * np.linalg.solve(blocks, along)).sum(axis=(1, 2))
+        return np.where(kept, np.sqrt(np.maximum(squares, 0.0)), 0.0)
 
 
-def _log_likelihood(covariance: np.ndarray, declared: np.ndarray, residual: np.ndarray) -> float:
-    """Logarithm of the density of a residual of zero mean under that sum, but for a constant."""
-    root = np.linalg.cholesky(covariance)
-    basis, log_size = _declared_basis(root, declared)
-    white = solve_triangular(root, residual, lower=True)
-    squares = white @ white - ((basis.T @ white) ** 2).sum()
-    return float(-0.5 * squares - np.log(np.diag(root)).sum() - log_size)
+def _with_pose_error(whole: _Precision, some: _Precision, products: Products, pose_errors_rad: np.ndarray) -> _Precision:
+    """The inverse covariance with an error common to a pose, of the size that makes some of the numbers most probable.
 
-
-def _declared_basis(root: np.ndarray, declared: np.ndarray) -> tuple[np.ndarray, float]:
-    """Whitened declared columns beside their priors, made orthonormal, (n, P) without the latter; half the log determinant."""
-    white = solve_triangular(root, declared, lower=True)
-    basis, triangle = np.linalg.qr(np.concatenate([white, np.eye(declared.shape[1])]))
-    return basis[: len(declared)], float(np.log(np.abs(np.diag(triangle))).sum())
-
-
-def _without(precision: np.ndarray, out: np.ndarray) -> np.ndarray:
-    """The inverse covariance of the rows without some, in whose place it is zero."""
-    left = precision - precision[:, out] @ np.linalg.solve(precision[np.ix_(out, out)], precision[out])
-    left[out], left[:, out] = 0.0, 0.0
-    return left
-
-
-def _pose_error(
-    rows: WhiteRows, pose_errors_rad: np.ndarray, covariance: np.ndarray, declared: np.ndarray, known: np.ndarray
-) -> np.ndarray:
-    """Covariance of the error common to a pose, at the size that makes the rows known most probable."""
-    residual, own = rows.residual.ravel()[known], rows.residual.shape[1]
-    jacobian, pose = rows.jacobian.reshape(len(known), -1), np.repeat(rows.pose, own)
-    common = (jacobian @ jacobian.T) * (pose[:, None] == pose)
+    `some`: the same without those that are taken out.
+    """
+    rows = products.rows
+    jacobian = np.zeros((*rows.residual.shape, int(rows.pose.max()) + 1, products.axes))
+    for seen, part, _, _ in products.by_pose():
+        jacobian[np.flatnonzero(seen), :, rows.pose[seen]] = part.jacobian
+    jacobian = jacobian.reshape(len(whole.residual), -1)
+    of_whole = jacobian - sum(factor @ (factor.T @ jacobian) for factor in whole.factors)
+    of_some = of_whole - sum(factor @ (factor.T @ jacobian) for factor in some.factors[len(whole.factors) :])
+    inner, along, unit = jacobian.T @ of_some, jacobian.T @ some.along, np.eye(jacobian.shape[1])
     best = (-np.inf, 0.0)
-    for tau in pose_errors_rad:
-        likely = _log_likelihood((covariance + tau**2 * common)[np.ix_(known, known)], declared[known], residual)
-        best = max(best, (likely, float(tau)))
-    return best[1] ** 2 * common
-
-
-def _deletion_distances(precision: np.ndarray, residual: np.ndarray, kept: np.ndarray, own: int) -> np.ndarray:
-    """Length of the deletion residual of each observation that is kept, 0 of others, (M,)."""
-    blocks = np.where(kept[:, None, None], _blocks(precision, own), np.eye(own))
-    along = (precision @ residual).reshape(-1, own, 1)
-    squares = (along * np.linalg.solve(blocks, along)).sum(axis=(1, 2))
-    return np.where(kept, np.sqrt(np.maximum(squares, 0.0)), 0.0)
-
-
-def _blocks(matrix: np.ndarray, own: int) -> np.ndarray:
-    """Blocks on the diagonal, ndarray (M, own, own)."""
-    every = np.arange(len(matrix) // own)
-    return matrix.reshape(len(every), own, len(every), own)[every, :, every]
+    for tau in pose_errors_rad.tolist():
+        root = np.linalg.cholesky(unit + tau**2 * inner)
+        gained = 0.5 * (tau * solve_triangular(root, along, lower=True)) ** 2
+        best = max(best, (float(gained.sum() - np.log(np.diag(root)).sum()), tau))
+    return whole.less(best[1] * of_whole, unit + best[1] ** 2 * jacobian.T @ of_whole)

@@ -41,8 +41,6 @@ if TYPE_CHECKING:
 
     Laws = Sequence[Mapping[int, np.ndarray]]
 
-# Entries of a coordinate that make a product of their own worth its call.
-_MANY_ENTRIES = 16
 # Numbers of products by state that are in memory at once.
 _AT_ONCE = 1_500_000
 # Relative step of the central difference in a shape parameter; of the forward difference in what loads the springs, in
@@ -124,25 +122,17 @@ class Factored:
 
     def gram(self) -> np.ndarray:
         """Products of the columns with each other, ndarray (K, K)."""
+        place = np.repeat(np.arange(len(self.spans)), [span.stop - span.start for _, span in self.spans])
         entries = np.zeros((len(self.values),) * 2)
         for states, products in self._products():
-            entries += self._gram_of_entries(self.values[:, states], np.ascontiguousarray(products.transpose(1, 2, 0)))
+            values, pairs = self.values[:, states], np.ascontiguousarray(products.transpose(1, 2, 0))
+            for number, (_, span) in enumerate(self.spans):
+                # With coordinates from this one on, for the others are alike.
+                rest = slice(span.start, None)
+                entries[span, rest] += values[span] @ (values[rest] * pairs[number][place[rest]]).T
+        for _, span in self.spans:
+            entries[span.stop :, span] = entries[span, span.stop :].T
         return self._fold @ (self._fold @ entries).T
-
-    def _gram_of_entries(self, values: np.ndarray, pairs: np.ndarray) -> np.ndarray:
-        spans, found = self.spans, np.empty((len(values), len(values)))
-        place = np.repeat(np.arange(len(spans)), [span.stop - span.start for _, span in spans])
-        large = sum(span.stop - span.start >= _MANY_ENTRIES for _, span in spans)
-        for number, (_, span) in enumerate(spans):
-            # Coordinates from this one on, for the others are alike: those of many entries one by one, those of few together.
-            for other in range(number, large):
-                beside = spans[other][1]
-                np.matmul(values[span] * pairs[number, other], values[beside].T, out=found[span, beside])
-            first = max(number, large)
-            rest = slice(spans[first][1].start if first < len(spans) else len(values), None)
-            found[span, rest] = values[span] @ (values[rest] * pairs[number][place[rest]]).T
-            found[span.start :, span] = found[span, span.start :].T
-        return found
 
     def times(self, right: np.ndarray) -> np.ndarray:
         """Products of the columns with other rows (M, rows, q), ndarray (K, q)."""

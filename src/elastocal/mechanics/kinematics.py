@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 # So many configurations at a time keep all intermediate arrays in a second-level cache.
 BLOCK = 8192
-_BASE = np.zeros((3, 1))
 
 
 def _walk(chain: Chain, coordinates: np.ndarray, until: int) -> list[Frame]:
@@ -192,12 +191,22 @@ def motion(chain: Chain, coordinates: np.ndarray, points: Sequence[MeasuringPoin
     `coordinates` (S, C): rad and m.
     """
     moving = sorted((t.coordinate, place) for place, t in enumerate(chain.transforms) if t.coordinate is not None)
-    shapes = (len(points), 3), (len(points), 3, 3), (6, len(moving))
-    position, rotation, twist = (np.empty((*shape, len(coordinates))) for shape in shapes)
-    for part, frames in _blocks(chain, coordinates, len(chain.transforms)):
+    position, rotation, twist = _room(coordinates, (len(points), 3), (len(points), 3, 3), (6, len(moving)))
+    for part, frames in _blocks(chain, coordinates, len(chain.transforms), BLOCK // 8):
         _store_poses(frames, points, position[..., part], rotation[..., part])
+        linear, angular = twist[:3, :, part], twist[3:, :, part]
+        origins, slides = np.zeros_like(angular), []
         for coordinate, place in moving:
-            _store_twist(chain.transforms[place], frames[place], _BASE, twist[:, coordinate, part])
+            transform, (axes, origin) = chain.transforms[place], frames[place]
+            axis = axes[transform.axis] if transform.sign > 0 else -axes[transform.axis]
+            if transform.kind == "T":
+                slides.append((coordinate, axis))
+            else:
+                angular[:, coordinate], origins[:, coordinate] = axis, origin
+        # Of all turns at once.
+        cross(origins, angular, linear)
+        for coordinate, axis in slides:
+            linear[:, coordinate] = axis
     return Motion(position, rotation, twist, np.array([place for _, place in moving], int))
 
 
@@ -230,11 +239,11 @@ def rotation_vectors(rotation: np.ndarray) -> np.ndarray:
     return np.moveaxis(skew * scale, 0, -1)
 
 
-def _blocks(chain: Chain, coordinates: np.ndarray, until: int) -> Iterator[tuple[slice, list[Frame]]]:
+def _blocks(chain: Chain, coordinates: np.ndarray, until: int, size: int = BLOCK) -> Iterator[tuple[slice, list[Frame]]]:
     """Frames of `_walk` for coordinates (..., C), a block of configurations after the other."""
     components = np.moveaxis(np.asarray(coordinates, float), -1, 0).reshape(np.shape(coordinates)[-1], -1)
-    for start in range(0, components.shape[1], BLOCK):
-        part = slice(start, start + BLOCK)
+    for start in range(0, components.shape[1], size):
+        part = slice(start, start + size)
         yield part, _walk(chain, components[:, part], until)
 
 
