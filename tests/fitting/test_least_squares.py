@@ -25,8 +25,9 @@ from support import chain_of
 from synthetic import NOISE, made_estimate, made_model, made_states, seen_exactly, with_noise
 
 from elastocal.campaigns.campaign import Target
-from elastocal.fitting.least_squares import fit, fit_frames, registered, sizes_of
+from elastocal.fitting.least_squares import SETTLED, fit, fit_frames, registered, sizes_of
 from elastocal.fitting.noise import Noise
+from elastocal.fitting.normal_equations import Parts
 
 
 @pytest.mark.parametrize("rows", [3, 6])
@@ -209,13 +210,31 @@ def test_weights_fall_with_the_distance_by_the_scale_of_the_errors_that_are_ther
     expected = np.minimum(1.0, np.sqrt(chi2.ppf(0.99, rows) / rows) * scale / far)
     assert found.converged and (expected < 1).sum() >= 3
     np.testing.assert_allclose(found.weights, expected, rtol=2e-3)
-    # The estimate solves the equations of these weights, its covariance is their inverse.
+    # The estimate solves the equations of these weights; its covariance is their inverse, or that of a small step before.
     weighted = left.reshape(-1, 3) * np.repeat(found.weights, 3)[:, None] / (1e-4 * taken) ** 2
     precision = weighted.T @ left.reshape(-1, 3) + np.diag([0.0, WEAK[1] ** -2, 0.0])
     values = np.linalg.solve(precision, weighted.T @ off.ravel())
     deviation = np.sqrt(np.diag(np.linalg.inv(precision)))
     np.testing.assert_allclose(found.estimate.coefficients[0] / deviation, values / deviation, rtol=0, atol=5e-3 * scale)
-    np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), deviation, rtol=1e-6)
+    np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), deviation, rtol=SETTLED)
+
+
+def test_a_small_step_leaves_its_gram_matrix_to_the_next_one_and_the_fit_ends_where_it_would(monkeypatch):
+    model, seen, *_ = with_outliers(6)
+    taken_anew, usual, found = [], Parts.normal_equations, []
+
+    def counted(self, weights, known=None):
+        taken_anew[-1] += known is None
+        return usual(self, weights, known)
+
+    monkeypatch.setattr(Parts, "normal_equations", counted)
+    for near in (0.3, 0.0):
+        monkeypatch.setattr("elastocal.fitting.least_squares._NEAR", near)
+        taken_anew.append(0)
+        found.append(fit(model, seen, SENSOR))
+    assert taken_anew[0] < taken_anew[1]
+    (values,), (others,) = (each.estimate.coefficients for each in found)
+    assert np.abs(values - others).max() < 2 * SETTLED * np.sqrt(np.diag(found[1].covariance)).max()
 
 
 @pytest.mark.parametrize("settled", [1e-3, 0.1])

@@ -57,7 +57,7 @@ def test_a_shape_is_given_up_for_another_from_a_correlation_of_a_half_on(correla
     shared = sign * correlation * 1.05 * 0.5
     gram = informed([1.05**2, shared], [shared, 0.5**2])
     assert 1 / np.sqrt(gram[0, 0]) < 1.0
-    np.testing.assert_array_equal(identifiable(gram, np.zeros(2, bool), np.array([False, True])), kept)
+    np.testing.assert_array_equal(identifiable(gram, np.zeros(2, bool), np.array([False, True]))[0], kept)
 
 
 @pytest.mark.parametrize(("error", "kept"), [(0.999, True), (1.001, False)])
@@ -65,7 +65,7 @@ def test_a_shape_is_given_up_for_another_from_a_correlation_of_a_half_on(correla
 def test_a_standard_error_of_the_plausible_size_is_the_largest_that_is_estimated(error, kept, beside):
     """Alone as beside another parameter that is known better."""
     gram = informed([0.01, 0.1 * error * beside], [0.1 * error * beside, error**2])
-    np.testing.assert_array_equal(identifiable(gram, np.zeros(2, bool), np.zeros(2, bool)), [True, kept])
+    np.testing.assert_array_equal(identifiable(gram, np.zeros(2, bool), np.zeros(2, bool))[0], [True, kept])
 
 
 @pytest.mark.parametrize(
@@ -95,7 +95,7 @@ def test_what_the_frame_or_the_target_makes_as_well_is_held_and_named(fanuc, key
 def test_a_prior_of_the_plausible_size_alone_identifies_nothing_however_it_rounds(off):
     gram = np.diag([50.0, 1.0 + off * np.finfo(float).eps, 3.0])
     none = np.zeros(3, bool)
-    np.testing.assert_array_equal(identifiable(gram, none, none), [True, False, True])
+    np.testing.assert_array_equal(identifiable(gram, none, none)[0], [True, False, True])
 
 
 def test_kept_are_those_of_one_pivot_after_the_other_where_ranks_are_deficient():
@@ -110,7 +110,7 @@ def test_kept_are_those_of_one_pivot_after_the_other_where_ranks_are_deficient()
             if rest > max(1.0, 1e-11 * gram[number, number]):
                 kept.append(number)
         none = np.zeros(size, bool)
-        found = np.flatnonzero(identifiable(gram, none, none)).tolist()
+        found = np.flatnonzero(identifiable(gram, none, none)[0]).tolist()
         # Those that come later may take what told their predecessors.
         assert set(found) <= set(kept)
         if (np.diag(np.linalg.inv(gram[np.ix_(kept, kept)])) <= 1.0).all():
@@ -186,8 +186,13 @@ def test_products_by_factors_are_those_of_the_columns_written_out(fanuc, offset,
         measurements.linearize(estimate)
         measurements.whiten()
         found.append(measurements.normal_equations(weights))
-    for by_factors, written_out in zip(*found, strict=True):
-        np.testing.assert_allclose(by_factors, written_out, rtol=1e-9, atol=1e-9 * np.abs(written_out).max())
+    (gram, along), (written_out, _) = found
+    np.testing.assert_allclose(gram, written_out, rtol=1e-9, atol=1e-9 * np.abs(written_out).max())
+    # Products with the residual are half of what the squares fall by with each parameter.
+    steps = 1e-4 * np.diag(plausible / np.sqrt(np.diag(gram)))
+    ends = [[measurements.squares(weights, stepped(model, estimate, way * step)) for way in (-1, 1)] for step in steps]
+    slopes = -np.diff(ends, axis=1)[:, 0] / 4e-4 * np.sqrt(np.diag(gram))
+    np.testing.assert_allclose(slopes, along, atol=1e-5 * np.abs(along).max())
 
 
 @pytest.mark.parametrize("at_once", [None, 7])

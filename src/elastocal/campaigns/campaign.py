@@ -71,7 +71,9 @@ class Measurements:
         return len(self.pose)
 
     def select(self, mask_or_index: np.ndarray) -> Measurements:
-        """The measurements of a mask (N,) or of an index array (M,), in its order."""
+        """The measurements of a mask (N,) or of an index array (M,), in its order; these themselves where a mask has all."""
+        if mask_or_index.dtype == bool and mask_or_index.all():
+            return self
         arrays = {field.name: getattr(self, field.name) for field in fields(self)}
         chosen: dict[str, Any] = {name: None if array is None else array[mask_or_index] for name, array in arrays.items()}
         return Measurements(**chosen)

@@ -114,15 +114,13 @@ def number_alike(points: np.ndarray, within: float) -> np.ndarray:
     # What is farther from all others is not asked for its neighbours, and the neighbours of all are never held at once.
     nearest, _ = tree.query(different, k=[2], p=np.inf, distance_upper_bound=np.nextafter(within, 1.0))
     alone = np.isinf(np.ravel(nearest))
-    found, count = np.full(len(different), -1), 0
-    for leader in range(len(different)):
-        if found[leader] < 0:
-            found[leader] = count
-            if not alone[leader]:
-                near = np.array(tree.query_ball_point(different[leader], within, p=np.inf))
-                found[near[found[near] < 0]] = count
-            count += 1
-    return found[np.argsort(order)][same]
+    every = np.arange(len(different))
+    leader = every.copy()
+    for place in np.flatnonzero(~alone):
+        if leader[place] == place:
+            near = np.array(tree.query_ball_point(different[place], within, p=np.inf))
+            leader[near[(near > place) & (leader[near] == near)]] = place
+    return (np.cumsum(leader == every) - 1)[leader][np.argsort(order)][same]
 
 
 def blocks_of_poses(joint_angles: np.ndarray, pose: np.ndarray, count: int) -> np.ndarray:

@@ -125,7 +125,9 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
             break
         tell(f"{counted((~part.kept).sum(), 'gross error')} in {counted(len(good), 'row')}: once more without")
         if noise_facts(part.noise) == noise_facts(last.noise):
-            again = fit(found.fitted.model, part.searched, about.noise, about.estimate, True, ON_THE_WAY)
+            again = about
+            if (part.kept != remaining).any():
+                again = fit(about.model, part.searched, about.noise, about.estimate, True, ON_THE_WAY)
             moved = np.subtract(*(parameter_values(each.model, each.estimate) for each in (again, found.fitted)))
             if (np.abs(moved) <= _HARDLY * np.sqrt(np.diag(found.fitted.covariance))).all():
                 # Rows of so little weight that the search would find the same.

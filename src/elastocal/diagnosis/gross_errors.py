@@ -21,7 +21,7 @@ from elastocal.counting import counted
 from elastocal.diagnosis.evidence import Grid
 from elastocal.diagnosis.linearize import Linearized, linearized
 from elastocal.fitting.least_squares import ON_THE_WAY, evaluated, fit
-from elastocal.fitting.linearization import linearize
+from elastocal.fitting.linearization import by_coordinates, linearize
 from elastocal.fitting.model import conditions, parameters, residuals
 from elastocal.fitting.noise import Noise, estimated_noise, fit_declared
 from elastocal.fitting.normal_equations import measurement_covariances
@@ -103,9 +103,15 @@ class _Beside:
 
     @classmethod
     def of(
-        cls, model: Model, estimate: Estimate, measurements: Measurements, noise: Noise, kept: np.ndarray, unsure: bool = False
+        cls,
+        model: Model,
+        estimate: Estimate,
+        measurements: Measurements,
+        noise: Noise,
+        kept: np.ndarray,
+        unsure: bool | None = None,
     ) -> _Beside:
-        """Of rows that are ``kept``, (N,) of bool; ``unsure``: whether parameters are so, however many these rows are."""
+        """Of rows that are ``kept``, (N,) of bool; ``unsure``: whether parameters are so, without it if they are few."""
         single, sample = single_observations(measurements), kept.copy()
         sample[kept] = spread_poses(select_states(single, kept), _MOST)
         near, residual = spread_poses(single, _MOST), np.empty((len(single), model.rows))
@@ -113,18 +119,19 @@ class _Beside:
             residual[seen] = residuals(model, estimate, part, conditions(model, estimate, part.states))
         far = np.linalg.norm(residual / np.repeat([noise.position_m, noise.orientation_rad], 3)[: model.rows], axis=1)
         closely = near | sample | (far > np.quantile(far[near], _SCALE_QUANTILES[-1]))
-        some, parts, unsure = select_states(single, closely), [], unsure or sample.sum() == kept.sum()
+        some, parts = select_states(single, closely), []
+        unsure = sample.sum() == kept.sum() if unsure is None else unsure
         for _, seen, part in parts_of(some, len(parameters(model, estimate))):
-            line = linearize(model, estimate, part, conditions(model, estimate, part.states))
+            line = (linearize if unsure else by_coordinates)(model, estimate, part, conditions(model, estimate, part.states))
             jacobian = line.joint_jacobian
             own = measurement_covariances(noise, jacobian[:, None], model.rows)
             parts.append((seen, line.sensitivities if unsure else None, own, jacobian @ jacobian.transpose(0, 2, 1)))
         return cls(residual, far, sample, closely, parts, noise)
 
-    def yardstick(self, fitted: Fit, kept: np.ndarray) -> Yardstick:
-        """As `yardstick_of`, by the rows that were fitted, (N,) of bool."""
+    def yardstick(self, fitted: Fit) -> Yardstick:
+        """As `yardstick_of`, by the sample."""
         free, mine, rows = ~fitted.held, self.sample[self.closely], fitted.model.rows
-        negligible = self.sample.sum() < kept.sum() or not free.any()
+        negligible = any(by is None for _, by, _, _ in self.parts) or not free.any()
         sizes = np.array([p.plausible for _, p in fitted.parameters])[free]
         best = (np.inf, Yardstick(self.noise, None))
         for share in _POSE_SHARES if fitted.noise.pose_rad else (0.0,):
@@ -180,8 +187,9 @@ def yardstick_of(fitted: Fit, noise: Noise, measurements: Measurements) -> Yards
     (an S-estimate; Davies, Annals of Statistics 1987): the rest may be that of the very errors that are looked for, or of a law
     that is not linear.
     """
-    every = np.ones(len(measurements), bool)
-    return _Beside.of(fitted.model, fitted.estimate, measurements, noise, every).yardstick(fitted, every)
+    near = spread_poses(single_observations(measurements), _MOST)
+    some = measurements.select(near)
+    return _Beside.of(fitted.model, fitted.estimate, some, noise, near[near], bool(near.all())).yardstick(fitted)
 
 
 def beyond_chance(distance: np.ndarray, rows: int, kept: np.ndarray, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
@@ -216,7 +224,7 @@ def most_by_chance(count: int, rows: int, settings: Settings, freedom: float = n
 def gross_errors(fitted: Fit, noise: Noise, measurements: Measurements, kept: np.ndarray, settings: Settings) -> Deviations:
     """Judge the rows of a campaign by a fit to those that are ``kept``, (N,), and the noise declared or shown by repeats."""
     rows = _Beside.of(fitted.model, fitted.estimate, measurements, noise, kept)
-    distance = rows.distances(rows.yardstick(fitted, kept), kept)
+    distance = rows.distances(rows.yardstick(fitted), kept)
     return Deviations(rows.residual, *beyond_chance(distance, fitted.model.rows, kept, settings))
 
 

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.mechanics.kinematics import Motion, motion
+from elastocal.mechanics.kinematics import Motion, cross, motion
 from elastocal.mechanics.sites import Sites
 
 if TYPE_CHECKING:
@@ -77,46 +78,48 @@ class Conditions:
         sites, corrections = self.sites, self.mass_corrections.reshape(-1, MASS_PARAMETERS)
         masses = np.array([mass.mass_kg for mass in sites.masses]) + corrections[:, 0]
         along = masses[:, None] * [mass.centre_m for mass in sites.masses] + corrections[:, 1:]
-        bodies = slice(sites.joints + 2, len(sites.followed))
+        bodies, (_, count, states) = slice(sites.joints + 2, len(sites.followed)), self.motion.twist.shape
         position, rotation = self.motion.position[bodies], self.motion.rotation[bodies]
         first = masses[:, None, None] * position + sum(along[:, j, None, None] * rotation[:, :, j] for j in range(3))
-        carried = np.concatenate([np.broadcast_to(masses[:, None, None], first[:, :1].shape), first], axis=1)
-        behind = (self.motion.place[:, None] < [body.after for body in sites.followed[bodies]]).astype(float)
-        return np.einsum("iks,iks->sk", self._falling, behind @ carried.swapaxes(0, 1))
+        behind = self.motion.place[:, None] < [body.after for body in sites.followed[bodies]]
+        # Neighbours carry the same masses.
+        edges = np.flatnonzero((behind[1:] != behind[:-1]).any(axis=1)) + 1
+        found = np.empty((count, states))
+        for start, end in pairwise([0, *edges.tolist(), count]):
+            carried = behind[start]
+            falling = self._falling(float(masses[carried].sum()), first[carried].sum(axis=0))
+            np.einsum("iks,is->ks", self.motion.twist[:, start:end], falling, out=found[start:end])
+        return found.T
 
-    def gravity_of_corrections(self, coordinates: Coordinates) -> Iterator[np.ndarray]:
+    def gravity_of_corrections(self, coordinates: Coordinates) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """By how much `gravity` on some coordinates grows with each of the `mass_corrections`, per unit.
 
-        Yields (number of the coordinates, S).
+        Yields for each mass which of the coordinates it loads, ndarray of bool (K,), and (4, number of these, S).
         """
-        falling = self._falling[:, coordinates]
+        place, twist = self.motion.place[coordinates], self.motion.twist[:, coordinates]
         for body, mass in enumerate(self.sites.masses, self.sites.joints + 2):
-            rotation = self.motion.rotation[body]
+            rotation, loaded = self.motion.rotation[body], place < self.sites.followed[body].after
             centre = self.motion.position[body] + np.tensordot(mass.centre_m, rotation, (0, 1))
-            on_each = np.einsum("iks,nis->nks", falling[1:], np.concatenate([centre[None], rotation.swapaxes(0, 1)]))
-            on_each[0] += falling[0]
-            on_each[:, self.motion.place[coordinates] >= self.sites.followed[body].after] = 0.0
-            yield from on_each
+            each = (1.0, centre), *((0.0, axis) for axis in rotation.swapaxes(0, 1))
+            falling = np.stack([self._falling(kilograms, first) for kilograms, first in each])
+            behind = twist if loaded.all() else twist[:, loaded]
+            forces = np.einsum("iks,pis->pks", behind[3:], falling[:, 3:])
+            forces[0] += np.tensordot(self.sites.gravity_m_s2, behind[:3], 1)
+            yield loaded, forces
 
-    @cached_property
-    def _falling(self) -> np.ndarray:
-        """Generalized force of gravity on each coordinate by a kilogram behind it at the base's origin, and per metre.
-
-        ndarray (4, C, S): g . (v + a x r) = g . v + a . (r x g).
-        """
-        of_twist, gravity = np.zeros((4, 6)), np.array(self.sites.gravity_m_s2)
-        of_twist[0, :3], of_twist[1:, 3:] = gravity, np.cross(np.eye(3), gravity)
-        return np.tensordot(of_twist, self.motion.twist, 1)
+    def _falling(self, mass: float, first: np.ndarray) -> np.ndarray:
+        """Wrench of gravity on a mass and its first moment about the base's origin (3, S), ndarray (6, S)."""
+        wrench, gravity = np.empty((6, first.shape[1])), np.array(self.sites.gravity_m_s2)[:, None]
+        wrench[:3] = mass * gravity
+        cross(first, gravity, wrench[3:])
+        return wrench
 
     def _weighing(self, followed: int, mass: float, first: np.ndarray, coordinates: Coordinates) -> np.ndarray:
         """Force on some coordinates of a mass and its first moment about the base's origin (3, S), ndarray (., S).
 
         `followed`: which of the points that `motion` follows they go with.
         """
-        falling = self._falling[:, coordinates]
-        on_each = np.einsum("iks,is->ks", falling[1:], first) + mass * falling[0]
-        on_each[self.motion.place[coordinates] >= self.sites.followed[followed].after] = 0.0
-        return on_each
+        return self.motion.generalized_forces(self.sites.followed[followed].after, self._falling(mass, first), coordinates)
 
     @cached_property
     def usual_gravity(self) -> np.ndarray:
@@ -129,14 +132,18 @@ class Conditions:
     @cached_property
     def total(self) -> np.ndarray:
         """External load and weight of the declared masses, or of usual ones, on every coordinate of the sites, (S, C)."""
-        if self.sites.usual_weight:
-            return self.load + self.usual_gravity
-        return self.load + self.gravity if self.sites.masses else self.load
+        if not (self.sites.usual_weight or self.sites.masses):
+            return self.load
+        weight = self.usual_gravity if self.sites.usual_weight else self.gravity
+        return self.load + weight if self.wrench.any() else weight
 
     @cached_property
     def mass_torques(self) -> np.ndarray:
         """Torque on each joint per unit of each of the `mass_corrections`, ndarray (4 m, S, n)."""
-        return np.array(list(self.gravity_of_corrections(slice(self.sites.joints)))).swapaxes(1, 2)
+        found = np.zeros((len(self.sites.masses), MASS_PARAMETERS, self.sites.joints, len(self.wrench)))
+        for each, (loaded, forces) in zip(found, self.gravity_of_corrections(slice(self.sites.joints)), strict=True):
+            each[:, loaded] = forces
+        return found.reshape(-1, *found.shape[2:]).swapaxes(1, 2)
 
     def weight(self, link: int, axis: int | None = None) -> np.ndarray:
         """Torque on each joint of a kilogram at the far end of a link, or of a kilogram metre along an axis there, (S, n)."""
@@ -206,7 +213,7 @@ def with_springs(conditions: Conditions, compliance: np.ndarray, mass_correction
         return conditions
     changed = replace(conditions, compliance=compliance, mass_corrections=mass_corrections)
     # What is known of the loads stays so: they do not depend on the springs but by way of the motion.
-    for name in ("load", "gravity", "total", "mass_torques", "_falling"):
+    for name in ("load", "gravity", "total", "mass_torques"):
         if name in vars(conditions) and (same or name not in ("gravity", "total")):
             vars(changed)[name] = vars(conditions)[name]
     return changed

@@ -94,7 +94,7 @@ def link_elasticity(own: Effect, sites: Sites, links: tuple[int, ...], detail: s
         load = around.total.T
         for link, (bending, torsion) in zip(links, compliances(float(taper)), strict=True):
             coordinates = sites.link_end[link]
-            wrench = load[list(coordinates)]
+            wrench = load[coordinates[0] : coordinates[-1] + 1]
             bent |= zip(coordinates, bending @ wrench, strict=True)
             twisted |= zip(coordinates[3:], torsion @ wrench[3:], strict=True)
         return [bent, twisted]

@@ -38,9 +38,8 @@ if TYPE_CHECKING:
 
     Solved = tuple[np.ndarray, np.ndarray, np.ndarray]
 
-# Of more observations than this a sample tells where a fit starts, in so many rounds.
-_MOST_REGISTERED, _ROUNDS = 5_000, 200
-_SETTLED_M = 1e-9
+# Rounds by which frames and targets are registered at most, and the move that ends them.
+_ROUNDS, _SETTLED_M = 200, 1e-9
 _STEPS = 30
 # A step that does not help is halved so often at most: one of a 64th that does not help points the wrong way, or along a kink.
 _HALVINGS = 6
@@ -49,6 +48,11 @@ SETTLED, ON_THE_WAY = 1e-3, 0.1
 # A fit to more observations that does not come of a fit starts from the fit to so many of them: they show the size of some
 # fifty parameters as well as any number.
 STARTED_FROM = 2_000
+# Standard errors: a step that moves no parameter farther, and no shape, leaves its Gram matrix to the next one: standard errors
+# by it are as sure as an estimate is within `SETTLED`.
+_NEAR = 0.3
+# A step by all of so many observations takes seconds: the last of some that a fit to all takes follow a fit to so many.
+_LONG, _STEPPING_STONE = 100_000, 20_000
 # Loads are those of the step before: of a step so much is still to come, at most, by deflection over reach.
 _LAGGING = 1e-2
 # Share of the slope by which a step must lower the objective (Armijo); a parabola gives a half.
@@ -138,10 +142,11 @@ def fit(
     `start`: of this model; by `registered` without. `reweighted`: whether the start comes of a fit: outliers lose weight from
     the first step on. `settled`: largest step that remains, in standard errors.
     """
-    few = observations if reweighted else sample_of(observations, STARTED_FROM)
-    if len(few) < len(observations):
-        # Where all the measurements lead is close to where some of them do.
-        start, reweighted = fit(model, few, noise, start, settled=ON_THE_WAY).estimate, True
+    for most in ([] if reweighted else [STARTED_FROM]) + ([_STEPPING_STONE] if len(observations) > _LONG else []):
+        few = sample_of(observations, most)
+        if len(few) < len(observations):
+            # Where all the measurements lead is close to where some of them do.
+            start, reweighted = fit(model, few, noise, start, reweighted, ON_THE_WAY).estimate, True
     start = registered(model, observations) if start is None else start
     return robustly(model, observations, noise, start, reweighted=reweighted, settled=settled)
 
@@ -217,7 +222,7 @@ def robustly(
 
     measurements, weights = Parts(model, observations, noise, estimate, plausible), np.ones(len(observations))
     measurements.linearize(estimate)
-    scale, last, stuck = 1.0, np.zeros(len(plausible)), False
+    scale, last, stuck, known = 1.0, np.zeros(len(plausible)), False, None
     for number in range(_STEPS):
         # Loads where the robot yielded to in the last step: a fixed point that the steps bring about.
         measurements.whiten()
@@ -225,10 +230,13 @@ def robustly(
             distance = measurements.distance()
             scale = max(np.median(distance) / typical, 1.0)
             weights = corner / np.maximum(distance / scale, corner)
-        gram, along = measurements.normal_equations(weights)
+        gram, along = measurements.normal_equations(weights, known)
         present = parameter_values(model, estimate)
-        step, covariance, held = solved(gram, along, present, frozen)
-        deviation = np.sqrt(np.diag(covariance))
+        if known is None:
+            step, covariance, held = solved(gram, along, present, frozen)
+            deviation = np.sqrt(np.diag(covariance))
+        else:
+            step = covariance @ (along / plausible - penalty * present)
         # Standard errors of the errors that are there, which the noise may be less than.
         small = settled * (scale * deviation) + (deviation == 0)
         # A small step under the loads of before a large one says nothing of what these loads still bring about.
@@ -262,6 +270,8 @@ def robustly(
                     measurements.linearize(estimate)
                     after = objective(estimate, measurements.squares(weights))
             if after <= before - least:
+                near = np.abs(step) <= np.where(nonlinear & ~held, 0.0, _NEAR * scale * deviation + (deviation == 0))
+                known = gram if (number or reweighted) and not halving and near.all() else None
                 stuck = False
                 break
         else:
@@ -271,7 +281,7 @@ def robustly(
             # of now.
             if stuck:
                 break
-            stuck = True
+            stuck, known = True, None
     return Fit(model, estimate, noise, held, covariance, weights, *measurements.ended(estimate), converged)
 
 
@@ -295,7 +305,7 @@ def registered(model: Model, observations: Observations) -> Estimate:
 
     Returns with all effects at zero, except that joint compliances start at their nominal values.
     """
-    observations = sample_of(observations, _MOST_REGISTERED)
+    observations = sample_of(observations, STARTED_FROM)
     return registered_to(model, observations, *nominal_poses(model, observations))
 
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.sparse import csr_array
 
-from elastocal.effects.conditions import Conditions, with_springs, with_total
+from elastocal.effects.conditions import MASS_PARAMETERS, Conditions, with_springs, with_total
 from elastocal.fitting.model import (
     SPRINGS,
     displaced_by,
@@ -205,6 +205,21 @@ def linearize(model: Model, estimate: Estimate, observations: Observations, cond
     Sensitivities are analytic, but for shapes (central differences) and for what springs do by way of other effects (forward
     differences).
     """
+    around, states = sprung(model, estimate, conditions), observations.states
+    found, laws = by_coordinates(model, estimate, observations, around), []
+    for session in estimate.sessions if model.fitted_frames else ():
+        in_session = (states.session == session).astype(float)
+        laws += [{coordinate: in_session} for coordinate in model.sites.base]
+    placed = range(model.sites.chain.coordinates, found.columns.jacobian.shape[2])
+    laws += [{coordinate: np.ones(len(states))} for coordinate in placed]
+    for effect, values, shapes in zip(model.effects, estimate.coefficients, estimate.shapes, strict=True):
+        laws += _spring_laws(effect, model, estimate, around) if effect.effect in SPRINGS else laws_of(effect, shapes, around)
+        laws += _shape_laws(effect, values, shapes, around)
+    return replace(found, columns=Factored.of(laws, found.columns.jacobian, observations.state, len(states)))
+
+
+def by_coordinates(model: Model, estimate: Estimate, observations: Observations, conditions: Conditions) -> Linearization:
+    """The same without sensitivities to parameters: no columns beside the Jacobian."""
     around = sprung(model, estimate, conditions)
     coordinates = displaced_coordinates(model, estimate, around)
     count, rows, chain, points = len(observations), model.rows, model.sites.chain, target_points(model, estimate)
@@ -217,19 +232,11 @@ def linearize(model: Model, estimate: Estimate, observations: Observations, cond
     after = np.array([point.after for point in points])[observations.target]
     jacobian[:, : chain.coordinates] = moved.jacobian(after, position.T, rows, state)
     residual = off_measured(estimate, observations, position, rotation @ estimate.target_rotation[observations.target])
-    laws: list[Mapping[int, np.ndarray]] = []
-    for session in estimate.sessions if model.fitted_frames else ():
-        in_session = (observations.states.session == session).astype(float)
-        laws += [{coordinate: in_session} for coordinate in model.sites.base]
     # A target's shift along the axes of its measuring point and, for poses, its turn about them, where it is seen.
     for first, (index, part) in zip(range(chain.coordinates, jacobian.shape[1], 3), placed, strict=True):
         seen = np.flatnonzero(observations.target == index)
         jacobian[part : part + 3, first : first + 3, seen] = rotation[seen].transpose(1, 2, 0)
-        laws += [{coordinate: np.ones(len(observations.states))} for coordinate in range(first, first + 3)]
-    for effect, values, shapes in zip(model.effects, estimate.coefficients, estimate.shapes, strict=True):
-        laws += _spring_laws(effect, model, estimate, around) if effect.effect in SPRINGS else laws_of(effect, shapes, around)
-        laws += _shape_laws(effect, values, shapes, around)
-    columns = Factored.of(laws, np.moveaxis(jacobian, -1, 0), observations.state, len(observations.states))
+    columns = Factored.of([], np.moveaxis(jacobian, -1, 0), observations.state, len(observations.states))
     return Linearization(residual, columns, coordinates, replace(around, motion=moved))
 
 
@@ -274,27 +281,37 @@ def _spring_laws(spring: Candidate, model: Model, estimate: Estimate, around: Co
     ]
     if not others:
         return laws
-    present = displaced_by(others, around)
-    coordinates = sorted(present)
+    present = [displaced_by([other], around) for other in others]
+    coordinates = sorted({coordinate for each in present for coordinate in each})
     steps = np.array([_SPRING_STEP * parameter.plausible for parameter in spring.parameters])
     if springs:
         values, corrections = joint_compliances(model, estimate), mass_corrections(model, estimate)
-        sprung: Iterator[Conditions] = (with_springs(around, values + row, corrections) for row in np.diag(steps))
+        every = set(coordinates)
+        changes: Iterable[tuple[set[int], Conditions]] = (
+            (every, with_springs(around, values + row, corrections)) for row in np.diag(steps)
+        )
     else:
-        sprung = _with_each_correction(around, coordinates, steps)
-    for law, step, changed in zip(laws, steps, sprung, strict=True):
-        moved = displaced_by(others, changed)
-        for coordinate in coordinates:
-            change = (moved[coordinate] - present[coordinate]) / step
-            if change.any():
-                law[coordinate] = law.get(coordinate, 0.0) + change
+        changes = _with_each_correction(around, coordinates, steps)
+    for law, step, (loaded, changed) in zip(laws, steps, changes, strict=True):
+        for other, before in zip(others, present, strict=True):
+            moved = {} if loaded.isdisjoint(before) else displaced_by([other], changed)
+            for coordinate, by in moved.items():
+                change = (by - before[coordinate]) / step
+                if change.any():
+                    law[coordinate] = law.get(coordinate, 0.0) + change
     return laws
 
 
-def _with_each_correction(around: Conditions, coordinates: list[int], steps: np.ndarray) -> Iterator[Conditions]:
-    """Conditions with one error of a mass after the other changed by a step, as loads on some coordinates have it."""
-    total = around.total.T.copy()
-    present = total[coordinates]
-    for step, per_unit in zip(steps, around.gravity_of_corrections(coordinates), strict=True):
-        total[coordinates] = present + step * per_unit
-        yield with_total(around, total.T)
+def _with_each_correction(
+    around: Conditions, coordinates: list[int], steps: np.ndarray
+) -> Iterator[tuple[set[int], Conditions]]:
+    """Conditions with one error of a mass after the other changed by a step, as loads on some coordinates have it; and which of
+    these it loads."""
+    present, every = around.total.T, np.array(coordinates, int)
+    total, sizes = present.copy(), steps.reshape(-1, MASS_PARAMETERS)
+    for of_mass, (loaded, forces) in zip(sizes, around.gravity_of_corrections(every), strict=True):
+        mine = every[loaded]
+        for step, per_unit in zip(of_mass, forces, strict=True):
+            total[mine] = present[mine] + step * per_unit
+            yield set(mine.tolist()), with_total(around, total.T)
+        total[mine] = present[mine]

@@ -242,7 +242,9 @@ def displaced_coordinates(model: Model, estimate: Estimate, conditions: Conditio
     Springs yield to the total load, the external one and the weight that the robot file declares.
     """
     around = sprung(model, estimate, conditions)
-    displaced = model.sites.chain.at(around.joint_angles)
+    # Component first, as kinematics look at them.
+    displaced = np.zeros((model.sites.chain.coordinates, len(around.joint_angles))).T
+    displaced[:, : model.sites.joints] = around.joint_angles
     displaced[:, : model.sites.joints] += around.total[:, : model.sites.joints] * around.compliance
     effects = zip(model.effects, estimate.coefficients, estimate.shapes, strict=True)
     for coordinate, by in displaced_by((each for each in effects if each[0].effect not in SPRINGS), around).items():
@@ -256,7 +258,8 @@ def displaced_by(effects: Iterable[tuple[Candidate, np.ndarray, Iterable[float]]
     for effect, values, shapes in effects:
         for value, law in zip(values, laws_of(effect, shapes, around), strict=True):
             for coordinate, per_unit in law.items():
-                displaced[coordinate] = displaced.get(coordinate, 0.0) + value * per_unit
+                by = value * per_unit
+                displaced[coordinate] = np.add(displaced[coordinate], by, out=by) if coordinate in displaced else by
     return displaced
 
 

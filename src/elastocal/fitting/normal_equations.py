@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg.lapack import dpotrf
+from scipy.linalg.lapack import dpotrf, dpotri
 
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import conditions, displaced_coordinates, residuals, sprung
@@ -54,39 +54,41 @@ def solve_normal(
     """
     gram = gram + np.diag(np.broadcast_to(penalty, len(plausible)) * plausible**2)
     along = along - plausible * np.broadcast_to(penalty * present, len(plausible))
-    held = ~identifiable(gram, *(np.broadcast_to(flags, len(plausible)) for flags in (frozen, nonlinear)))
-    free = np.flatnonzero(~held)
-    step, covariance = np.zeros(len(plausible)), np.zeros((len(plausible),) * 2)
-    if len(free):
-        inverse = np.linalg.inv(np.linalg.cholesky(gram[np.ix_(free, free)]))
-        step[free] = plausible[free] * (inverse.T @ (inverse @ along[free]))
-        covariance[np.ix_(free, free)] = np.outer(plausible[free], plausible[free]) * (inverse.T @ inverse)
-    return step, covariance, held
+    known, inverse = identifiable(gram, *(np.broadcast_to(flags, len(plausible)) for flags in (frozen, nonlinear)))
+    return plausible * (inverse @ along), inverse * np.outer(plausible, plausible), ~known
 
 
-def identifiable(gram: np.ndarray, frozen: np.ndarray, nonlinear: np.ndarray) -> np.ndarray:
+def identifiable(gram: np.ndarray, frozen: np.ndarray, nonlinear: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Which parameters the data distinguish from zero at their plausible size: first given those before them, then given all.
 
     Forward selection in the order given, by the pivots of a Cholesky decomposition, then backward elimination.
 
     `gram` (P, P): information on the parameters, each in units of its plausible size. `frozen` (P,) of bool: left out from the
     start. `nonlinear` (P,) of bool: shapes: given up before a parameter that they are bound to, as that of their law is where
-    it is nearly a straight line. Returns (P,) of bool.
+    it is nearly a straight line. Returns (P,) of bool, and the covariance of these (P, P), zero of all others.
     """
-    kept = np.flatnonzero(~frozen).tolist()
+    kept, found = np.flatnonzero(~frozen), np.zeros_like(gram)
     while (first := _first_without_information(gram[np.ix_(kept, kept)])) is not None:
-        kept.pop(first)
+        kept = np.delete(kept, first)
     # Parameters that came later may have taken from what identified their predecessors.
-    while kept:
-        covariance = np.linalg.inv(gram[np.ix_(kept, kept)])
+    while len(kept):
+        covariance = positive_inverse(gram[np.ix_(kept, kept)])
         deviation = np.sqrt(np.diag(covariance))
         worst = int(np.argmax(deviation))
         if deviation[worst] <= 1.0:
+            found[np.ix_(kept, kept)] = covariance
             break
         correlation = np.where(nonlinear[kept], np.abs(covariance[worst]) / (deviation[worst] * deviation), 0.0)
         shape = int(np.argmax(correlation))
-        kept.pop(shape if correlation[shape] > _BOUND_TO_SHAPE else worst)
-    return np.isin(np.arange(len(gram)), kept)
+        kept = np.delete(kept, shape if correlation[shape] > _BOUND_TO_SHAPE else worst)
+    return np.isin(np.arange(len(gram)), kept), found
+
+
+def positive_inverse(matrix: np.ndarray) -> np.ndarray:
+    """Inverse of a symmetric positive matrix, by Cholesky's factor."""
+    lower = dpotri(dpotrf(matrix, lower=1)[0], lower=1)[0]
+    # LAPACK leaves the other triangle as it was.
+    return np.tril(lower) + np.tril(lower, -1).T
 
 
 def _first_without_information(gram: np.ndarray) -> int | None:
@@ -125,6 +127,11 @@ class Whitening:
             stacked = values[members].reshape(*factor.shape[:2], -1)
             whitened[members] = (factor @ stacked).reshape(*members.shape, *values.shape[1:])
         return whitened
+
+    @property
+    def transposed(self) -> Whitening:
+        """What carries whitened values back, as products with whitened sensitivities do."""
+        return Whitening(tuple((members, factor.swapaxes(1, 2)) for members, factor in self.blocks))
 
     def after(self, maps: np.ndarray) -> Whitening:
         """What whitens values to each of whose observations a matrix is applied first, ndarray (M, rows, rows)."""
@@ -228,23 +235,24 @@ class Parts:
             elif not part.whitener.blocks:
                 part.whitener = whitening(part.observations, None, self.noise)
 
-    def normal_equations(self, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Gram matrix of the weighted, whitened sensitivities in plausible sizes, and their products with the residual."""
+    def normal_equations(self, weights: np.ndarray, known: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Gram matrix of the weighted, whitened sensitivities in plausible sizes, and their products with the residual.
+
+        `known`: Gram matrix of a step before, if it is to be taken as it was.
+        """
         size = len(self.plausible)
         gram, along, root = np.zeros((size, size)), np.zeros(size), np.sqrt(weights)
-        for part in self.parts:
+        for part in self.parts if size else ():
             line, mine = part.line or self._linearized(part), root[part.seen]
-            right = part.whitener.apply(line.residual * mine[:, None])
             turned = part.whitener.after(_of_rotation_vectors(line.residual) * mine[:, None, None])
-            if self.factors and size > _COLUMNS_A_COORDINATE * len(line.columns.spans):
-                columns = replace(line.columns, jacobian=turned.apply(line.columns.jacobian))
-                gram += columns.gram()
-                along += columns.times(right[..., None])[:, 0]
-            else:
+            right = turned.transposed.apply(part.whitener.apply(line.residual * mine[:, None]))
+            along += line.columns.times(right[..., None])[:, 0]
+            if known is None and self.factors and size > _COLUMNS_A_COORDINATE * len(line.columns.spans):
+                gram += replace(line.columns, jacobian=turned.apply(line.columns.jacobian)).gram()
+            elif known is None:
                 left = turned.apply(line.sensitivities).reshape(right.size, size)
                 gram += left.T @ left
-                along += left.T @ right.reshape(-1)
-        return gram * np.outer(self.plausible, self.plausible), along * self.plausible
+        return gram * np.outer(self.plausible, self.plausible) if known is None else known, along * self.plausible
 
     def distance(self) -> np.ndarray:
         """Whitened distance of each observation from the prediction, ndarray (M,)."""

@@ -7,7 +7,7 @@ draws; it yields a predictor for each setting in turn.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
@@ -41,7 +41,7 @@ _JITTER = 1e-8
 _STILL = 1e-10
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Inputs:
     """What a regression may know of an observation; arrays of M.
 
@@ -94,39 +94,76 @@ class Regression:
     by_jacobian: bool = False
 
 
+@dataclass(frozen=True)
+class _Geometry:
+    """The part of geometry in ridge regressions on it and other columns: along its principal axes, which all of them share.
+
+    `squares` (G,): eigenvalues of its Gram matrix. `axes` (G, G). `along` (G,): products with the residual along these.
+    """
+
+    squares: np.ndarray
+    axes: np.ndarray
+    along: np.ndarray
+
+    @classmethod
+    def of(cls, gram: np.ndarray, right: np.ndarray) -> _Geometry:
+        """By its Gram matrix and its products with the residual."""
+        squares, axes = np.linalg.eigh(gram)
+        return cls(np.maximum(squares, 0.0), axes, axes.T @ right)
+
+    def mean_square(self, gram: np.ndarray) -> float:
+        """Of all columns, those with a Gram matrix (D, D) beside it."""
+        return max((self.squares.sum() + np.trace(gram)) / (len(self.squares) + len(gram)), np.finfo(float).tiny)
+
+    def ridge(
+        self, mixed: np.ndarray, gram: np.ndarray, right: np.ndarray, penalty: float
+    ) -> tuple[np.ndarray, np.ndarray, float, float]:
+        """Coefficients of geometry and others, the squares that they explain, and ln |I + G / penalty| of all columns.
+
+        `mixed` (G, D): products of its principal axes with the others. `right` (D,): of these with the residual.
+        """
+        shrunk = mixed / (self.squares + penalty)[:, None]
+        lower, found, _ = lapack.dposv(
+            gram - shrunk.T @ mixed + penalty * np.eye(len(gram)), right - shrunk.T @ self.along, lower=1
+        )
+        own = self.along / (self.squares + penalty) - shrunk @ found
+        volume = np.log1p(self.squares / penalty).sum() + np.log(np.diag(lower) ** 2 / penalty).sum()
+        return self.axes @ own, found, self.along @ own + right @ found, volume
+
+
 def ridge_harmonics(inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], seed: int) -> Iterator[Predictor]:
     """Harmonics of each joint's angle as deviations of that joint, beside geometry, by ridge regression.
 
     What gears, encoders and runout can do to a joint, without saying what: a Fourier series of every joint carried to the
     target by the Jacobian, and constant displacements of base and links, which resemble each other; all coefficients with one
-    penalty [1], in mean squares of a column. One decomposition serves all penalties.
+    penalty [1], in mean squares of a column.
 
     [1] Hoerl, A. E. and Kennard, R. W., Ridge regression: biased estimation for nonorthogonal problems, Technometrics 12, 1970.
     """
 
-    def columns(some: Inputs, orders: int) -> np.ndarray:
+    # The same poses are predicted with one penalty after the other.
+    @lru_cache(maxsize=2)
+    def columns(every: Inputs, first: int, orders: int) -> np.ndarray:
+        some = every.select(slice(first, first + _AT_ONCE))
         return np.concatenate([some.jacobian, by_harmonics(some, orders)], axis=2)
 
-    @cache
-    def decomposed(size: int) -> tuple[np.ndarray, np.ndarray]:
-        return np.linalg.eigh(gram[:size, :size])
-
-    most, joints = max(setting["orders"] for setting in settings), inputs.joint_angles.shape[1]
-    size = inputs.jacobian.shape[2] + 2 * most * joints
+    most, joints, split = max(setting["orders"] for setting in settings), inputs.joint_angles.shape[1], inputs.jacobian.shape[2]
+    size = split + 2 * most * joints
     gram, right = np.zeros((size, size)), np.zeros(size)
     for part in _parts(inputs):
-        rows = columns(inputs.select(part), most).reshape(-1, size)
+        rows = columns(inputs, part.start, most).reshape(-1, size)
         gram += rows.T @ rows
         right += rows.T @ residual[part].ravel()
+    geometry = _Geometry.of(gram[:split, :split], right[:split])
+    mixed, own, along = geometry.axes.T @ gram[:split, split:], gram[split:, split:], right[split:]
     for setting in settings:
         # Orders come first among the harmonics, so that fewer of them are the first columns.
-        size = inputs.jacobian.shape[2] + 2 * setting["orders"] * joints
-        values, vectors = decomposed(size)
-        shrunk = np.maximum(values, 0.0) + setting["penalty"] * max(values.mean(), np.finfo(float).tiny)
-        found = vectors @ (vectors.T @ right[:size] / shrunk)
+        size = 2 * setting["orders"] * joints
+        penalty = setting["penalty"] * geometry.mean_square(own[:size, :size])
+        found = np.concatenate(geometry.ridge(mixed[:, :size], own[:size, :size], along[:size], penalty)[:2])
 
         def mean(there: Inputs, coefficients: np.ndarray = found, orders: int = setting["orders"]) -> np.ndarray:
-            return _stacked(columns(there.select(part), orders) @ coefficients for part in _parts(there))
+            return _stacked(columns(there, part.start, orders) @ coefficients for part in _parts(there))
 
         yield Predictor(mean)
 
@@ -142,20 +179,17 @@ def two_joints(inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting]
     def functions(some: Inputs, pair: tuple[int, int]) -> np.ndarray:
         return of_two(some, pair, np.arange(some.joint_angles.shape[1]))
 
-    target, geometry, most = residual.ravel(), inputs.jacobian.reshape(residual.size, -1), -np.inf
-    common, along = geometry.T @ geometry, geometry.T @ target
+    target, jacobian, most = residual.ravel(), inputs.jacobian.reshape(residual.size, -1), -np.inf
+    geometry = _Geometry.of(jacobian.T @ jacobian, jacobian.T @ target)
     for pair in combinations(range(inputs.joint_angles.shape[1]), 2):
         rows = functions(inputs, pair).reshape(residual.size, -1)
-        mixed, right = geometry.T @ rows, np.concatenate([along, rows.T @ target])
-        gram = np.block([[common, mixed], [mixed.T, rows.T @ rows]])
-        for penalty in _PENALTIES * max(np.diag(gram).mean(), np.finfo(float).tiny):
-            lower, found, _ = lapack.dposv(gram + penalty * np.eye(len(right)), right, lower=1)
-            left = max(target @ target - right @ found, np.finfo(float).tiny)
-            probable = -residual.size * np.log(left) - np.log(np.diag(lower) ** 2 / penalty).sum()
-            if probable > most:
-                most, best, coefficients = probable, pair, found
-    split = inputs.jacobian.shape[2]
-    yield Predictor(lambda there: there.jacobian @ coefficients[:split] + functions(there, best) @ coefficients[split:])
+        mixed, gram, right = geometry.axes.T @ (jacobian.T @ rows), rows.T @ rows, rows.T @ target
+        for penalty in _PENALTIES * geometry.mean_square(gram):
+            of_geometry, found, explained, volume = geometry.ridge(mixed, gram, right, penalty)
+            left = max(target @ target - explained, np.finfo(float).tiny)
+            if (probable := -residual.size * np.log(left) - volume) > most:
+                most, best, coefficients = probable, pair, (of_geometry, found)
+    yield Predictor(lambda there: there.jacobian @ coefficients[0] + functions(there, best) @ coefficients[1])
 
 
 def extra_trees(inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], seed: int) -> Iterator[Predictor]:
@@ -256,8 +290,8 @@ REGRESSIONS = {
 
 def by_harmonics(inputs: Inputs, orders: int) -> np.ndarray:
     """Displacement of the target by one radian of each harmonic, (M, 3, 2 n orders), lower orders first."""
-    phase = np.arange(1, orders + 1)[:, None] * inputs.joint_angles[:, None, :]
-    harmonics = np.stack([np.sin(phase), np.cos(phase)], axis=2)
+    waves = np.cumprod(np.repeat(np.exp(1j * inputs.joint_angles)[:, None], orders, axis=1), axis=1)
+    harmonics = np.stack([waves.imag, waves.real], axis=2)
     along = inputs.jacobian[:, :, None, None, : inputs.joint_angles.shape[1]]
     return (along * harmonics[:, None]).reshape(len(inputs), 3, -1)
 
@@ -284,8 +318,9 @@ def _matern(some: np.ndarray, others: np.ndarray) -> tuple[np.ndarray, np.ndarra
     """Matérn's correlation of order 5/2, and the slope by which it falls with half of a squared distance: ndarray (N, M)."""
     square = (some**2).sum(axis=1)[:, None] + (others**2).sum(axis=1) - 2.0 * some @ others.T
     root = np.sqrt(np.maximum(5.0 * square, 0.0))
-    slope = (1.0 + root) * np.exp(-root)
-    return slope + root**2 / 3.0 * np.exp(-root), 5.0 / 3.0 * slope
+    falling = np.exp(-root)
+    slope = (1.0 + root) * falling
+    return slope + root**2 / 3.0 * falling, 5.0 / 3.0 * slope
 
 
 def _surprise(logarithms: np.ndarray, inputs: np.ndarray, standard: np.ndarray) -> tuple[float, np.ndarray]:

@@ -1,9 +1,9 @@
 """Errors on poses that no step has seen: before and after, with intervals over poses; and those on poses left out of a fit.
 
-One Gauss-Newton step from the fit to all observations, by their normal equations less those of a part, leads to the fit without
-it (Cook and Weisberg, Residuals and Influence in Regression, 2.2, 1982). What a parameter was is not carried over where only
-that part identifies it: it goes back to where a fit starts, to its prior. Where the errors of a few poses decide, the step is
-taken as it is; where a refit is asked for, exact residuals and their gradient after the step prove it, or lead on from there.
+One Gauss-Newton step from the fit to all observations leads to the fit without a part (Cook and Weisberg, Residuals and
+Influence in Regression, 2.2, 1982). Where the errors of a few poses decide, it is taken as it is, in closed form; where a refit
+is asked for, exact residuals after the step prove it, or lead on from there. What a parameter was is not carried over where
+only that part identifies it: it goes back to where a fit starts, to its prior.
 """
 
 from __future__ import annotations
@@ -15,10 +15,9 @@ import numpy as np
 from scipy.special import stdtrit
 
 from elastocal.campaigns.holdout import configurations
-from elastocal.fitting.least_squares import ON_THE_WAY, fit, registered, robustly, sizes_of
-from elastocal.fitting.linearization import linearize
-from elastocal.fitting.model import conditions, nonlinear_parameters, of_placement, parameter_values, residuals, stepped
-from elastocal.fitting.normal_equations import solve_normal
+from elastocal.fitting.least_squares import ON_THE_WAY, fit, registered
+from elastocal.fitting.linearization import by_coordinates
+from elastocal.fitting.model import conditions, residuals
 from elastocal.fitting.observations import parts_of, select_states, state_clusters
 from elastocal.validation.placing import placed_estimate
 
@@ -41,10 +40,6 @@ _FEWEST_TO_DRAW, _MOST_TO_DRAW = 6, 300
 _DEGREES_AT_LEAST = 2
 # Standard errors of a logarithm below this are rounding.
 _ROUNDING = 1e-12
-# A step without a part is proven where the exact equations after it ask for a step below this in every parameter, in standard
-# errors, which is taken too. What is left is a share of that, from the weights of outliers and the curvature: no error of
-# prediction moves by a hundredth of its standard error.
-_PROVEN = 0.01
 # What a pose alone determines, such as the frame of a session of one pose, is no error of it: shares below are rounding.
 _SHARE = 1e-9
 
@@ -172,8 +167,10 @@ def noise_floor(fitted: Fit, observations: Observations, model: Model, estimate:
     if noise.source == "residual":
         return float("nan")
     for _, _, part in parts_of(observations, len(fitted.held)):
-        line = linearize(model, estimate, part, conditions(model, estimate, part.states))
-        variance = noise.position_m**2 + ((line.joint_jacobian[:, :3] * noise.joint_rad) ** 2).sum(axis=2)
+        variance = np.full((len(part), 3), noise.position_m**2)
+        if noise.joint_rad.any():
+            line = by_coordinates(model, estimate, part, conditions(model, estimate, part.states))
+            variance += ((line.joint_jacobian[:, :3] * noise.joint_rad) ** 2).sum(axis=2)
         total += (variance.sum(axis=1) / part.states.repeats[part.state]).sum()
     return float(np.sqrt(total / len(observations)))
 
@@ -200,46 +197,13 @@ def refits(fitted: Fit, observations: Observations, part: np.ndarray) -> Iterato
     model, noise = fitted.model, fitted.noise
     if len(observations) < len(fitted.weights):
         fitted = fit(model, observations, noise, fitted.estimate, reweighted=True, settled=ON_THE_WAY)
-    found, placements = fitted.estimate, of_placement(owner for owner, _ in fitted.parameters)
-    for number, (step, held) in zip(np.unique(part), _steps_without(fitted, observations, part), strict=True):
-        rest, refit = select_states(observations, part != number), None
-        # Where the rest does not say where a frame or a target is, the nominal robot does.
-        if not held[placements].any():
-            refit = robustly(model, rest, noise, stepped(model, found, step), held, reweighted=True, settled=_PROVEN)
-        if refit is None or not refit.converged:
-            refit = fit(model, rest, noise, replace(registered(model, rest), shapes=found.shapes))
+    for number in np.unique(part):
+        rest = select_states(observations, part != number)
+        refit = fit(model, rest, noise, fitted.estimate, reweighted=True)
+        # What only that part identifies is where the nominal robot has it.
+        if (refit.held & ~fitted.held).any() or not refit.converged:
+            refit = fit(model, rest, noise, replace(registered(model, rest), shapes=fitted.estimate.shapes))
         yield placed_estimate(refit, observations)
-
-
-def _steps_without(fitted: Fit, observations: Observations, part: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Step (P,) of all parameters that leads to the fit without each part, and which (P,) the rest does not identify.
-
-    `observations`: which it was fitted to. `part` (S,) of int.
-    """
-    model, estimate = fitted.model, fitted.estimate
-    nonlinear, present = nonlinear_parameters(model, estimate), parameter_values(model, estimate)
-    # As in a fit from there.
-    nominal = replace(estimate, coefficients=model.nominal_coefficients)
-    start, plausible = parameter_values(model, nominal), sizes_of(model, nominal)
-    of_each = np.unique(part, return_inverse=True)[1][observations.state]
-    count, size = of_each.max() + 1, len(plausible)
-    grams, alongs = np.zeros((count, size, size)), np.zeros((count, size))
-    off = fitted.whitened(fitted.residual)
-    for seen, _, white in fitted.sensitivities(observations):
-        for number in np.unique(of_each[seen]):
-            mine = of_each[seen] == number
-            rows = white[mine].reshape(mine.sum() * white.shape[1], size) * plausible
-            grams[number] += rows.T @ rows
-            alongs[number] += rows.T @ off[seen][mine].ravel()
-    gram, along, penalty = grams.sum(axis=0), alongs.sum(axis=0), fitted.prior_std**-2
-    for mine, my_along in zip(grams, alongs, strict=True):
-        rest, right = gram - mine, along - my_along
-        step, _, held = solve_normal(rest, right, plausible, False, penalty, present, nonlinear)
-        back = np.where(held, start - present, 0.0)
-        if back.any():
-            right = right - rest @ (back / plausible)
-            step = solve_normal(rest, right, plausible, held, penalty, present, nonlinear)[0] + back
-        yield step, held
 
 
 def left_out_squares(fitted: Fit, observations: Observations) -> np.ndarray:
