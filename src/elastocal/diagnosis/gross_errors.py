@@ -21,7 +21,7 @@ from elastocal.counting import counted
 from elastocal.diagnosis.evidence import Grid
 from elastocal.diagnosis.linearize import Linearized, linearized
 from elastocal.diagnosis.statistics import WhiteRows
-from elastocal.fitting.least_squares import ON_THE_WAY, evaluated, fit
+from elastocal.fitting.least_squares import LONG, ON_THE_WAY, evaluated, fit
 from elastocal.fitting.linearization import by_coordinates, linearize
 from elastocal.fitting.model import conditions, parameters, residuals
 from elastocal.fitting.noise import Noise, estimated_noise, fit_declared
@@ -54,6 +54,8 @@ _POSE_SHARES = (0.0, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)
 _MOST = 4_000
 # Extrapolated rows of which the usual error is known.
 _FEWEST_TO_COMPARE = 5
+# Standard errors of the last step by all measurements of a long campaign: what it leaves is a tenth of it, or less.
+_LAST_STEP = 1.0
 # Gross errors that have a sentence each among the warnings; the table of residuals has all.
 _MOST_NAMED = 10
 
@@ -309,7 +311,8 @@ class Kept:
         """
         every = self.case.observations
         if self.searched is not every:
-            return fit(found.model, every, found.noise, found.estimate, reweighted=True, settled=ON_THE_WAY)
+            settled = ON_THE_WAY if len(every) <= LONG else _LAST_STEP
+            return fit(found.model, every, found.noise, found.estimate, reweighted=True, settled=settled)
         return found if found is self.declared else fit(found.model, every, found.noise, found.estimate, reweighted=True)
 
 

@@ -173,9 +173,10 @@ class Factored:
     def dense(self) -> np.ndarray:
         """The columns themselves, ndarray (M, rows, K); the observations of each lie side by side."""
         jacobian = self.jacobian.transpose(2, 1, 0)
-        found = np.zeros((self.columns, jacobian.shape[1], len(self.state)))
+        found, made = (np.zeros((columns, jacobian.shape[1], len(self.state))) for columns in (self.columns, 1))
+        single = np.array_equal(self.state, np.arange(self.values.shape[1]))
         for coordinate, column, values in zip(self.coordinate, self.column, self.values, strict=True):
-            found[column] += jacobian[coordinate] * values[self.state]
+            found[column] += np.multiply(jacobian[coordinate], values if single else values[self.state], out=made[0])
         return found.transpose(2, 1, 0)
 
 
@@ -239,8 +240,12 @@ def by_coordinates(model: Model, estimate: Estimate, observations: Observations,
     # Component first, so that every effect's arithmetic runs along the observations.
     jacobian = np.zeros((rows, chain.coordinates + 3 * len(placed), count))
     for index, point in enumerate(points):
-        seen = np.flatnonzero(observations.target == index)
-        state, number = observations.state[seen], len(model.sites.followed) + index
+        seen: np.ndarray | slice = np.flatnonzero(observations.target == index)
+        state: np.ndarray | slice = observations.state[seen]
+        if np.array_equal(state, np.arange(len(coordinates))) and len(state) == count:
+            # Each state by itself: nothing to gather.
+            seen = state = slice(None)
+        number = len(model.sites.followed) + index
         at = moved.position[number][:, state]
         position[seen], rotation[seen] = at.T, np.moveaxis(moved.rotation[number][..., state], -1, 0)
         jacobian[:, : chain.coordinates, seen] = moved.jacobian(point.after, at, rows, state)
@@ -309,9 +314,10 @@ def _spring_laws(spring: Candidate, model: Model, estimate: Estimate, around: Co
         for other, before in zip(others, present, strict=True):
             moved = {} if loaded.isdisjoint(before) else displaced_by([other], changed)
             for coordinate, by in moved.items():
-                change = (by - before[coordinate]) / step
-                if change.any():
-                    law[coordinate] = law.get(coordinate, 0.0) + change
+                by -= before[coordinate]
+                if by.any():
+                    by /= step
+                    law[coordinate] = np.add(law[coordinate], by, out=by) if coordinate in law else by
     return laws
 
 
