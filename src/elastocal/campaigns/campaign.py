@@ -212,7 +212,10 @@ def groups_of(keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     `keys` (N, k). Returns `first` (G,) of int: first row of each group; groups in lexicographic order; `group` (N,) of int: of
     each row.
     """
-    order = np.lexsort(keys.T[::-1])
+    order = np.argsort(keys[:, 0], kind="stable")
+    if not np.diff(keys[order, 0]).all():
+        # The first column does not tell all rows apart.
+        order = np.lexsort(keys.T[::-1])
     rising = keys[order]
     new = np.concatenate([np.ones(min(len(keys), 1), bool), (rising[1:] != rising[:-1]).any(axis=1)])
     group = np.empty(len(keys), int)

@@ -67,7 +67,7 @@ def held_out_mask(holdout: Mapping[str, Any], measurements: Measurements, report
     if "fraction" in holdout:
         draws = np.random.Generator(np.random.PCG64(holdout.get("seed", 1)))
         chosen = np.isin(configuration, draws.permutation(count)[: round(holdout["fraction"] * count)])
-    fitted, tested = (len(np.unique(configuration[part])) for part in (~chosen, chosen))
+    fitted, tested = (np.count_nonzero(np.bincount(configuration[part])) for part in (~chosen, chosen))
     fewest = 0 if "campaign" in holdout else FEWEST_HELD_OUT_POSES
     if fitted < FEWEST_TRAINING_POSES or tested < fewest:
         found = f"{counted(fitted, 'configuration')} to fit and {tested} held out"
