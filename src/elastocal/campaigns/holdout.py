@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from elastocal.campaigns.campaign import DOCUMENT, Campaign, Measurements, groups_of
+from elastocal.campaigns.campaign import DOCUMENT, Campaign, Measurements, groups_of, means_of
 from elastocal.campaigns.measurements import is_file_in
 from elastocal.counting import counted
 from elastocal.errors import InputError
@@ -98,7 +98,7 @@ def configurations(joint_angles: np.ndarray, pose: np.ndarray) -> np.ndarray:
     controller's servo error can differ: the leader algorithm (Hartigan, Clustering Algorithms, 1975). Poses along a path, each
     near the next, are several configurations.
     """
-    return number_alike(_means(joint_angles, pose), SAME_POSE_RAD)
+    return number_alike(means_of(joint_angles, pose), SAME_POSE_RAD)
 
 
 def number_alike(points: np.ndarray, within: float) -> np.ndarray:
@@ -138,7 +138,7 @@ def blocks_of_poses(joint_angles: np.ndarray, pose: np.ndarray, count: int) -> n
     [2] Boley, D., Principal direction divisive partitioning, Data Mining and Knowledge Discovery 2, 1998.
     """
     configuration = configurations(joint_angles, pose)
-    angles = _means(_means(joint_angles, pose), configuration)
+    angles = means_of(means_of(joint_angles, pose), configuration)
     circle = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     circle = circle - circle.mean(axis=0)
     spread = np.sqrt((circle**2).mean(axis=0).sum(axis=-1))
@@ -164,12 +164,6 @@ def blocks_of_poses(joint_angles: np.ndarray, pose: np.ndarray, count: int) -> n
                 break
         waiting += [(members[order[:cut]], first, lower), (members[order[cut:]], first + lower, parts - lower)]
     return found[configuration]
-
-
-def _means(joint_angles: np.ndarray, group: np.ndarray) -> np.ndarray:
-    mean = np.zeros((group.max() + 1, joint_angles.shape[1]))
-    np.add.at(mean, group, joint_angles)
-    return mean / np.bincount(group)[:, None]
 
 
 def beyond_range(fitted_angles: np.ndarray, joint_angles: np.ndarray) -> np.ndarray:

@@ -105,15 +105,9 @@ class _Beside:
 
     @classmethod
     def of(
-        cls,
-        model: Model,
-        estimate: Estimate,
-        measurements: Measurements,
-        noise: Noise,
-        kept: np.ndarray,
-        unsure: bool | None = None,
+        cls, model: Model, estimate: Estimate, measurements: Measurements, noise: Noise, kept: np.ndarray, unsure: bool
     ) -> _Beside:
-        """Of rows that are ``kept``, (N,) of bool; ``unsure``: whether parameters are so, without it if they are few."""
+        """Of rows that are ``kept``, (N,) of bool; ``unsure``: whether parameters are so."""
         single, sample = single_observations(measurements), kept.copy()
         sample[kept] = spread_poses(select_states(single, kept), _MOST)
         near, residual = spread_poses(single, _MOST), np.empty((len(single), model.rows))
@@ -122,7 +116,6 @@ class _Beside:
         far = np.linalg.norm(residual / np.repeat([noise.position_m, noise.orientation_rad], 3)[: model.rows], axis=1)
         closely = near | sample | (far > np.quantile(far[near], _SCALE_QUANTILES[-1]))
         some, parts = select_states(single, closely), []
-        unsure = sample.sum() == kept.sum() if unsure is None else unsure
         for _, seen, part in parts_of(some, len(parameters(model, estimate))):
             line = (linearize if unsure else by_coordinates)(model, estimate, part, conditions(model, estimate, part.states))
             jacobian = line.joint_jacobian
@@ -190,8 +183,8 @@ def yardstick_of(fitted: Fit, noise: Noise, measurements: Measurements) -> Yards
     that is not linear.
     """
     near = spread_poses(single_observations(measurements), _MOST)
-    some = measurements.select(near)
-    return _Beside.of(fitted.model, fitted.estimate, some, noise, near[near], bool(near.all())).yardstick(fitted)
+    some, few = measurements.select(near), len(measurements) <= _MOST
+    return _Beside.of(fitted.model, fitted.estimate, some, noise, near[near], few).yardstick(fitted)
 
 
 def beyond_chance(distance: np.ndarray, rows: int, kept: np.ndarray, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
@@ -225,7 +218,7 @@ def most_by_chance(count: int, rows: int, settings: Settings, freedom: float = n
 
 def gross_errors(fitted: Fit, noise: Noise, measurements: Measurements, kept: np.ndarray, settings: Settings) -> Deviations:
     """Judge the rows of a campaign by a fit to those that are ``kept``, (N,), and the noise declared or shown by repeats."""
-    rows = _Beside.of(fitted.model, fitted.estimate, measurements, noise, kept)
+    rows = _Beside.of(fitted.model, fitted.estimate, measurements, noise, kept, kept.sum() <= _MOST)
     distance = rows.distances(rows.yardstick(fitted), kept)
     return Deviations(rows.residual, *beyond_chance(distance, fitted.model.rows, kept, settings))
 

@@ -17,13 +17,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.sparse import csr_array
 
-from elastocal.effects.conditions import MASS_PARAMETERS, Conditions, at_states, with_springs, with_total
+from elastocal.effects.conditions import MASS_PARAMETERS, Conditions, with_springs, with_total
 from elastocal.fitting.model import (
     SPRINGS,
     displaced_by,
     displaced_coordinates,
     joint_compliances,
     laws_of,
+    mass_corrections,
     off_measured,
     sprung,
     target_points,
@@ -47,8 +48,6 @@ _AT_ONCE = 1_500_000
 # Relative step of the central difference in a shape parameter; of the forward difference in what loads the springs, in
 # plausible sizes: laws of gears bend little over that.
 _SHAPE_STEP, _SPRING_STEP = 1e-4, 1e-4
-# Share of displacements by which a law that is linear in the loads is off by rounding.
-_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -241,12 +240,10 @@ def by_coordinates(model: Model, estimate: Estimate, observations: Observations,
     # Component first, so that every effect's arithmetic runs along the observations.
     jacobian = np.zeros((rows, chain.coordinates + 3 * len(placed), count))
     for index, point in enumerate(points):
-        seen: np.ndarray | slice = np.flatnonzero(observations.target == index)
-        state: np.ndarray | slice = observations.state[seen]
-        if np.array_equal(state, np.arange(len(coordinates))) and len(state) == count:
-            # Each state by itself: nothing to gather.
-            seen = state = slice(None)
-        number = len(model.sites.followed) + index
+        seen = np.flatnonzero(observations.target == index)
+        # Where each state is seen once there is nothing to gather.
+        once = np.array_equal(seen, observations.state) and len(seen) == len(coordinates)
+        state, number = slice(None) if once else observations.state[seen], len(model.sites.followed) + index
         at = moved.position[number][:, state]
         position[seen], rotation[seen] = at.T, np.moveaxis(moved.rotation[number][..., state], -1, 0)
         jacobian[:, : chain.coordinates, seen] = moved.jacobian(point.after, at, rows, state)
@@ -300,55 +297,34 @@ def _spring_laws(spring: Candidate, model: Model, estimate: Estimate, around: Co
     ]
     if not others:
         return laws
+    present, place = [displaced_by([other], around) for other in others], around.motion.place
+    coordinates = sorted({coordinate for each in present for coordinate in each}, key=lambda coordinate: place[coordinate])
     steps = np.array([_SPRING_STEP * parameter.plausible for parameter in spring.parameters])
-    if not springs:
-        _add_loads_of_masses(laws, others, around, steps.reshape(-1, MASS_PARAMETERS))
-        return laws
-    present, values = displaced_by(others, around), joint_compliances(model, estimate)
-    for law, row in zip(laws, np.diag(steps), strict=True):
-        moved = displaced_by(others, with_springs(around, values + row, around.mass_corrections))
-        _add(law, moved, [(by - present[coordinate]) / row.sum() for coordinate, by in moved.items()])
+    if springs:
+        every, values, corrections = {*coordinates}, joint_compliances(model, estimate), mass_corrections(model, estimate)
+        sprung: Iterable[Any] = ((every, with_springs(around, values + row, corrections)) for row in np.diag(steps))
+    else:
+        sprung = _with_each_correction(around, coordinates, steps)
+    for law, step, (loaded, changed) in zip(laws, steps, sprung, strict=True):
+        for other, before in zip(others, present, strict=True):
+            moved = {} if loaded.isdisjoint(before) else displaced_by([other], changed)
+            for coordinate, by in moved.items():
+                by -= before[coordinate]
+                if by.any():
+                    by /= step
+                    law[coordinate] = np.add(law[coordinate], by, out=by) if coordinate in law else by
     return laws
 
 
-def _add(law: dict[int, np.ndarray], coordinates: Iterable[int], more: Iterable[np.ndarray]) -> None:
-    """Add to a law displacements (S,) of some coordinates, as far as they are any."""
-    for coordinate, by in zip(coordinates, more, strict=True):
-        if by.any():
-            law[coordinate] = law[coordinate] + by if coordinate in law else by
-
-
-def _add_loads_of_masses(
-    laws: Sequence[dict[int, np.ndarray]], others: Sequence[Any], around: Conditions, steps: np.ndarray
-) -> None:
-    """Add to laws of errors of masses what other effects do under these loads; `steps` (m, 4)."""
-    each = [(other, list(before := displaced_by([other], around)), np.array([*before.values()])) for other in others]
-    maps, total = [_linear_map(*mine, around) for mine in each], around.total.T.copy()
-    every = sorted({coordinate for _, mine, _ in each for coordinate in mine}, key=lambda c: around.motion.place[c])
-    places = [np.array([every.index(coordinate) for coordinate in mine], int) for _, mine, _ in each]
-    for number, forces in enumerate(around.gravity_of_corrections(every)):
-        mass_laws = laws[MASS_PARAMETERS * number : MASS_PARAMETERS * (number + 1)]
-        for (other, mine, before), linear, place in zip(each, maps, places, strict=True):
-            loaded = place < forces.shape[1]
-            acting = forces[:, place[loaded]]
-            for law, step, load in zip(mass_laws, steps[number], acting, strict=True) if loaded.any() else ():
-                if linear is not None:
-                    _add(law, mine, linear[:, loaded] @ load)
-                    continue
-                total[np.array(mine)[loaded]] += step * load
-                moved = displaced_by([other], with_total(around, total.T))
-                total[mine] = around.total.T[mine]
-                _add(law, mine, (np.array([moved[coordinate] for coordinate in mine]) - before) / step)
-
-
-def _linear_map(other: Any, mine: list[int], before: np.ndarray, around: Conditions) -> np.ndarray | None:
-    """Matrix (K, K) that turns loads on coordinates into their displacements (K, S), if an effect does so in every state."""
-    count = len(mine)
-    if count > len(around.joint_angles):
-        return None
-    unit = np.zeros((count, len(around.total.T)))
-    unit[np.arange(count), mine] = 1.0
-    made = displaced_by([other], with_total(at_states(around, slice(count)), unit))
-    found = np.array([made[coordinate] for coordinate in mine])
-    off = np.abs(found @ around.total.T[mine] - before).max()
-    return found if off <= _ROUNDING * np.abs(before).max() else None
+def _with_each_correction(
+    around: Conditions, coordinates: list[int], steps: np.ndarray
+) -> Iterator[tuple[set[int], Conditions]]:
+    """Conditions with one error of a mass after the other changed by a step, and which of the coordinates this loads."""
+    present, total = around.total.T, around.total.T.copy()
+    of_masses = steps.reshape(-1, MASS_PARAMETERS)
+    for sizes, forces in zip(of_masses, around.gravity_of_corrections(coordinates), strict=True):
+        loaded = coordinates[: forces.shape[1]]
+        for step, per_unit in zip(sizes, forces, strict=True):
+            total[loaded] = present[loaded] + step * per_unit
+            yield {*loaded}, with_total(around, total.T)
+        total[loaded] = present[loaded]
