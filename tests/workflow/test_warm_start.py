@@ -6,10 +6,9 @@ from types import SimpleNamespace
 
 import psutil
 import pytest
+import warm_start
 from snakemake.benchmark import BenchmarkRecord
 from snakemake.script import PythonScript
-
-import warm_start
 
 
 @pytest.fixture
