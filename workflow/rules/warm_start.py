@@ -31,18 +31,13 @@ def start_warm() -> None:
     from snakemake.benchmark import benchmarked
     from snakemake.script import PythonScript
 
-    # On Linux alone one can wait for processes and requests at once.
-    if not hasattr(os, "pidfd_open"):
-        return
     requests, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     command = [sys.executable, "-P", __file__, str(theirs.fileno())]
     server = subprocess.Popen(command, env=os.environ | SETTINGS, pass_fds=[theirs.fileno()])
     theirs.close()
-
-    @atexit.register
-    def end() -> None:
-        requests.close()
-        server.wait()
+    # The last one first.
+    atexit.register(server.wait)
+    atexit.register(requests.close)
 
     def execute_script(script, name, edit=False):
         read, write = os.pipe()
