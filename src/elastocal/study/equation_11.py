@@ -142,10 +142,9 @@ def prefix_triangles(equations: Iterable[np.ndarray], shape: tuple[int, ...]) ->
 def _equations(stage: Stage, measurements: Mapping[str, Measurements]) -> Iterator[np.ndarray]:
     """Equations of a stage, configuration by configuration; columns: joints identified, joints fixed, measured deflection."""
     order, points = [*stage.identified, *stage.fixed], [measurements[name] for name in stage.points]
-    for configuration in range(points[0].regressor.shape[2]):
-        matrix = np.concatenate([each.regressor[:, order, configuration] for each in points])
-        measured = np.concatenate([each.deflection[:, None, configuration] for each in points])
-        yield np.concatenate([matrix, measured], axis=1)
+    for k in range(points[0].regressor.shape[2]):
+        rows = [np.concatenate([each.regressor[:, order, k], each.deflection[:, None, k]], axis=1) for each in points]
+        yield np.concatenate(rows)
 
 
 def _solve(triangles: np.ndarray, right: np.ndarray) -> np.ndarray:
