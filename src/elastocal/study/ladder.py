@@ -130,7 +130,7 @@ def ladder(parts: list[Products], joints: int, links: int) -> Ladder:
     order = np.zeros((sets, 0), int)
     scaled = _scaled(whole.gram, whole.along)
     others = [_scaled(whole.gram - part.gram, whole.along - part.along) for part in parts]
-    scores, fits = [_cross_validate(parts, others, columns)], [_fit(*scaled, columns)]
+    scores, fits = [_cross_validate(parts, others, columns)], [_fit(columns, *scaled)]
     for _ in range(links):
         added = [joints + elements * left[:, [place]] + np.arange(elements) for place in range(left.shape[1])]
         tried = [np.concatenate([columns, of_link], axis=1) for of_link in added]
@@ -140,13 +140,13 @@ def ladder(parts: list[Products], joints: int, links: int) -> Ladder:
         columns = np.stack(tried)[best, each]
         left = left[np.arange(left.shape[1]) != best[:, None]].reshape(sets, -1)
         scores.append(found[each, best])
-        fits.append(_fit(*scaled, columns))
+        fits.append(_fit(columns, *scaled))
     return Ladder(order, np.stack(scores, axis=1), np.stack(fits, axis=1))
 
 
 def _cross_validate(parts: list[Products], others: list[tuple[np.ndarray, ...]], columns: np.ndarray) -> np.ndarray:
     """Sum of squares left in each fold by the fit to the others, (sets,)."""
-    return np.sum([part.squared_error(_fit(*rest, columns)) for part, rest in zip(parts, others, strict=True)], axis=0)
+    return np.sum([part.squared_error(_fit(columns, *rest)) for part, rest in zip(parts, others, strict=True)], axis=0)
 
 
 def _scaled(gram: np.ndarray, along: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -155,7 +155,7 @@ def _scaled(gram: np.ndarray, along: np.ndarray) -> tuple[np.ndarray, ...]:
     return gram / (scale[:, :, None] * scale[:, None, :]) + _RIDGE * np.eye(gram.shape[-1]), along / scale, scale
 
 
-def _fit(gram: np.ndarray, along: np.ndarray, scale: np.ndarray, columns: np.ndarray) -> np.ndarray:
+def _fit(columns: np.ndarray, gram: np.ndarray, along: np.ndarray, scale: np.ndarray) -> np.ndarray:
     """Least squares with some columns of each data set, zero for the others, (sets, K); the rest from `_scaled`."""
     each, found = np.arange(len(columns))[:, None], np.zeros_like(along)
     chosen = gram[each[..., None], columns[:, :, None], columns[:, None, :]]
