@@ -100,11 +100,11 @@ class Conditions:
         for body, mass in enumerate(self.sites.masses, self.sites.joints + 2):
             rotation, loaded = self.motion.rotation[body], place < self.sites.followed[body].after
             centre = self.motion.position[body] + np.tensordot(mass.centre_m, rotation, (0, 1))
-            each = (1.0, centre), *((0.0, axis) for axis in rotation.swapaxes(0, 1))
-            falling = np.stack([self._falling(kilograms, first) for kilograms, first in each])
+            moments, gravity = np.empty((3, MASS_PARAMETERS, rotation.shape[2])), np.array(self.sites.gravity_m_s2)
+            cross(np.concatenate([centre[:, None], rotation], axis=1), gravity[:, None, None], moments)
             behind = twist if loaded.all() else twist[:, loaded]
-            forces = np.einsum("iks,pis->pks", behind[3:], falling[:, 3:])
-            forces[0] += np.tensordot(self.sites.gravity_m_s2, behind[:3], 1)
+            forces = np.einsum("iks,ips->pks", behind[3:], moments)
+            forces[0] += np.tensordot(gravity, behind[:3], 1)
             yield loaded, forces
 
     def _falling(self, mass: float, first: np.ndarray) -> np.ndarray:
