@@ -97,12 +97,14 @@ class Conditions:
         Yields for each mass (4, K', S), of the first of the coordinates, which it loads.
         """
         place, twist = self.motion.place[coordinates], self.motion.twist[:, coordinates]
-        by_kilogram = np.tensordot(self.sites.gravity_m_s2, twist[:3], 1)
+        gravity = np.array(self.sites.gravity_m_s2)
+        by_kilogram = np.tensordot(gravity, twist[:3], 1)
         for body, mass in enumerate(self.sites.masses, self.sites.joints + 2):
             rotation, loaded = self.motion.rotation[body], np.searchsorted(place, self.sites.followed[body].after)
             centre = self.motion.position[body] + np.tensordot(mass.centre_m, rotation, (0, 1))
-            falling = np.stack([self._falling(0.0, first)[3:] for first in (centre, *rotation.swapaxes(0, 1))])
-            forces = np.einsum("iks,pis->pks", twist[3:, :loaded], falling)
+            moments = np.empty((3, MASS_PARAMETERS, rotation.shape[2]))
+            cross(np.concatenate([centre[:, None], rotation], axis=1), gravity[:, None, None], moments)
+            forces = np.einsum("iks,ips->pks", twist[3:, :loaded], moments)
             forces[0] += by_kilogram[:loaded]
             yield forces
 

@@ -226,14 +226,17 @@ def by_coordinates(model: Model, estimate: Estimate, observations: Observations,
     count, rows, chain, points = len(observations), model.rows, model.sites.chain, target_points(model, estimate)
     placed = [(index, part) for index, parts in model.fitted_parts for part in range(parts.start, parts.stop, 3)]
     moved = motion(chain, coordinates, (*model.sites.followed, *points))
-    number, state = len(model.sites.followed) + observations.target, observations.state
-    position, rotation = moved.position[number, :, state], moved.rotation[number, :, :, state]
+    position, rotation = np.empty((count, 3)), np.empty((count, 3, 3))
     # Component first, so that every effect's arithmetic runs along the observations.
     jacobian = np.zeros((rows, chain.coordinates + 3 * len(placed), count))
-    after = np.array([point.after for point in points])[observations.target]
-    # Where each state is seen once there is nothing to gather.
-    chosen = slice(None) if np.array_equal(state, np.arange(len(coordinates))) else state
-    jacobian[:, : chain.coordinates] = moved.jacobian(after, position.T, rows, chosen)
+    for index, point in enumerate(points):
+        seen = np.flatnonzero(observations.target == index)
+        # Where each state is seen once there is nothing to gather.
+        once = np.array_equal(seen, observations.state) and len(seen) == len(coordinates)
+        state, number = slice(None) if once else observations.state[seen], len(model.sites.followed) + index
+        at = moved.position[number][:, state]
+        position[seen], rotation[seen] = at.T, np.moveaxis(moved.rotation[number][..., state], -1, 0)
+        jacobian[:, : chain.coordinates, seen] = moved.jacobian(point.after, at, rows, state)
     residual = off_measured(estimate, observations, position, rotation @ estimate.target_rotation[observations.target])
     # A target's shift along the axes of its measuring point and, for poses, its turn about them, where it is seen.
     for first, (index, part) in zip(range(chain.coordinates, jacobian.shape[1], 3), placed, strict=True):

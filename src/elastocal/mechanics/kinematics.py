@@ -162,10 +162,8 @@ class Motion:
     twist: np.ndarray
     place: np.ndarray
 
-    def jacobian(
-        self, after: np.ndarray, position: np.ndarray, rows: int = 6, chosen: slice | np.ndarray = slice(None)
-    ) -> np.ndarray:
-        """Geometric Jacobian of points, each behind so many transforms of the chain, (S',), ndarray (rows, C, S').
+    def jacobian(self, after: int, position: np.ndarray, rows: int = 6, chosen: slice | np.ndarray = slice(None)) -> np.ndarray:
+        """Geometric Jacobian of points behind so many transforms of the chain, (rows, C, S').
 
         `position` (3, S'): where the points are, m. `rows`: linear velocities alone, or also angular ones. `chosen` (S',) of
         int: configuration of each.
@@ -175,9 +173,7 @@ class Motion:
         cross(angular, position, moved[:3])
         moved[:3] += twist[:3]
         moved[3:] = angular[: rows - 3]
-        still = self.place[:, None] >= after
-        if still.any():
-            moved[:, still] = 0.0
+        moved[:, self.place >= after] = 0.0
         return moved
 
     def generalized_forces(self, after: int, wrench: np.ndarray, coordinates: slice = slice(None)) -> np.ndarray:
