@@ -319,8 +319,6 @@ class Case:
 
     def select(self, kept: np.ndarray) -> Case:
         """The same without some of the measurements; ndarray of bool (N,)."""
-        if kept.all():
-            return self
         some = replace(self.campaign, measurements=self.campaign.measurements.select(kept))
         return replace(self, campaign=some, observations=averaged(without_outlying_repeats(some.measurements)))
 
