@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -71,9 +72,7 @@ class Measurements:
         return len(self.pose)
 
     def select(self, mask_or_index: np.ndarray) -> Measurements:
-        """The measurements of a mask (N,) or of an index array (M,), in its order; these themselves where a mask has all."""
-        if mask_or_index.dtype == bool and mask_or_index.all():
-            return self
+        """The measurements of a mask (N,) or of an index array (M,), in its order."""
         arrays = vars(self).items()
         chosen: dict[str, Any] = {name: None if array is None else array[mask_or_index] for name, array in arrays}
         return Measurements(**chosen)
@@ -213,9 +212,7 @@ def groups_of(keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     each row.
     """
     order = np.argsort(keys[:, 0], kind="stable")
-    if not np.diff(keys[order, 0]).all():
-        # The first column does not tell all rows apart.
-        order = np.lexsort(keys.T[::-1])
+    order = order if np.diff(keys[order, 0]).all() else np.lexsort(keys.T[::-1])
     rising = keys[order]
     new = np.concatenate([np.ones(min(len(keys), 1), bool), (rising[1:] != rising[:-1]).any(axis=1)])
     group = np.empty(len(keys), int)
@@ -225,11 +222,6 @@ def groups_of(keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def means_of(values: np.ndarray, group: np.ndarray) -> np.ndarray:
     """Mean of the values (N, ...) of each group (N,), 0 .. G-1, ndarray (G, ...)."""
-    count = np.bincount(group)
-    total = np.zeros((len(count), *values.shape[1:]))
-    if len(count) == len(values):
-        # Each alone: adding one by one takes ten times as long.
-        total[group] = values
-    else:
-        np.add.at(total, group, values)
-    return total / count.reshape(-1, *[1] * (values.ndim - 1))
+    columns = values.reshape(len(values), math.prod(values.shape[1:])).T
+    total = np.column_stack([np.bincount(group, column) for column in columns])
+    return (total / np.bincount(group)[:, None]).reshape(-1, *values.shape[1:])

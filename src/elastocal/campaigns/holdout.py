@@ -67,7 +67,7 @@ def held_out_mask(holdout: Mapping[str, Any], measurements: Measurements, report
     if "fraction" in holdout:
         draws = np.random.Generator(np.random.PCG64(holdout.get("seed", 1)))
         chosen = np.isin(configuration, draws.permutation(count)[: round(holdout["fraction"] * count)])
-    fitted, tested = (np.count_nonzero(np.bincount(configuration[part])) for part in (~chosen, chosen))
+    fitted, tested = (int(np.count_nonzero(np.bincount(configuration[part]))) for part in (~chosen, chosen))
     fewest = 0 if "campaign" in holdout else FEWEST_HELD_OUT_POSES
     if fitted < FEWEST_TRAINING_POSES or tested < fewest:
         found = f"{counted(fitted, 'configuration')} to fit and {tested} held out"
@@ -113,14 +113,12 @@ def number_alike(points: np.ndarray, within: float) -> np.ndarray:
     tree = cKDTree(different)
     # What is farther from all others is not asked for its neighbours, and the neighbours of all are never held at once.
     nearest, _ = tree.query(different, k=[2], p=np.inf, distance_upper_bound=np.nextafter(within, 1.0))
-    alone = np.isinf(np.ravel(nearest))
-    every = np.arange(len(different))
-    leader = every.copy()
-    for place in np.flatnonzero(~alone):
+    leader = np.arange(len(different))
+    for place in np.flatnonzero(np.isfinite(nearest)):
         if leader[place] == place:
             near = np.array(tree.query_ball_point(different[place], within, p=np.inf))
             leader[near[(near > place) & (leader[near] == near)]] = place
-    return (np.cumsum(leader == every) - 1)[leader][np.argsort(order)][same]
+    return (np.cumsum(leader == np.arange(len(leader))) - 1)[leader][np.argsort(order)][same]
 
 
 def blocks_of_poses(joint_angles: np.ndarray, pose: np.ndarray, count: int) -> np.ndarray:

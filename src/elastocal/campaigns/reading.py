@@ -177,13 +177,12 @@ def find_degrees(reported: np.ndarray, robot: Robot) -> np.ndarray:
     `reported` (N, n): joint angles as the controller reports them. Returns (N, n) of bool.
     """
     low, high = robot.joint_limits.T
-    farthest = max(FARTHEST_RAD, np.abs(robot.joint_limits).max())
 
     def off(reported: np.ndarray) -> np.ndarray:
         angles = robot.model_angles(reported)
         return np.asarray(np.maximum(low - angles, angles - high))
 
-    found = np.abs(reported) > farthest
+    found = np.abs(reported) > max(FARTHEST_RAD, np.abs(robot.joint_limits).max())
     some = (off(reported) > _BEYOND_LIMITS_RAD).any(axis=1)
     # An angle that its opposite would bring inside the limits has rather a wrong sign, which is for the diagnosis to trace.
     beyond = np.minimum(off(reported[some]), off(-reported[some])) > _BEYOND_LIMITS_RAD

@@ -313,7 +313,7 @@ def fitted_to(case: Case, kept: np.ndarray, settings: Settings, last: Kept | Non
     """The part of a case that is kept, or the last one where that is the same."""
     if last is not None and (kept == last.kept).all():
         return last
-    part = case.select(kept)
+    part = case if kept.all() else case.select(kept)
     noise, warnings = estimated_noise(part)
     searched = searched_of(case, part, settings)
     return Kept(part, kept, noise, warnings, fit_declared(part.model, searched, noise), searched)

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
     from elastocal.fitting.observations import States
 
-    Coordinates = slice | list[int] | np.ndarray
-
 # For each mass that the robot file declares: of the mass itself, and of its first moments along the axes of its frame.
 MASS_PARAMETERS = 4
 
@@ -86,12 +84,11 @@ class Conditions:
         edges = np.flatnonzero((behind[1:] != behind[:-1]).any(axis=1)) + 1
         found = np.empty((count, states))
         for start, end in pairwise([0, *edges.tolist(), count]):
-            carried = behind[start]
-            falling = self._falling(float(masses[carried].sum()), first[carried].sum(axis=0))
+            falling = self._falling(float(masses[behind[start]].sum()), first[behind[start]].sum(axis=0))
             np.einsum("iks,is->ks", self.motion.twist[:, start:end], falling, out=found[start:end])
         return found.T
 
-    def gravity_of_corrections(self, coordinates: Coordinates) -> Iterator[np.ndarray]:
+    def gravity_of_corrections(self, coordinates: slice | list[int]) -> Iterator[np.ndarray]:
         """By how much `gravity` on some coordinates, in the order of the chain, grows with the `mass_corrections`, per unit.
 
         Yields for each mass (4, K', S), of the first of the coordinates, which it loads.
@@ -115,28 +112,22 @@ class Conditions:
         cross(first, gravity, wrench[3:])
         return wrench
 
-    def _weighing(self, followed: int, mass: float, first: np.ndarray, coordinates: Coordinates) -> np.ndarray:
-        """Force on some coordinates of a mass and its first moment about the base's origin (3, S), ndarray (., S).
-
-        `followed`: which of the points that `motion` follows they go with.
-        """
-        return self.motion.generalized_forces(self.sites.followed[followed].after, self._falling(mass, first), coordinates)
-
     @cached_property
     def usual_gravity(self) -> np.ndarray:
         """Generalized force of the usual masses on every coordinate beyond the joints, whose sag has its own law; (S, C)."""
-        every, ends = slice(None), enumerate(self.sites.usual_masses, 1)
-        found = np.sum([self._weighing(end, mass, mass * self.motion.position[end], every) for end, mass in ends], axis=0)
+        found = np.zeros((self.motion.place.size, len(self.wrench)))
+        for end, mass in enumerate(self.sites.usual_masses, 1):
+            falling = self._falling(mass, mass * self.motion.position[end])
+            found += self.motion.generalized_forces(self.sites.followed[end].after, falling)
         found[: self.sites.joints] = 0.0
         return found.T
 
     @cached_property
     def total(self) -> np.ndarray:
         """External load and weight of the declared masses, or of usual ones, on every coordinate of the sites, (S, C)."""
-        if not (self.sites.usual_weight or self.sites.masses):
-            return self.load
-        weight = self.usual_gravity if self.sites.usual_weight else self.gravity
-        return self.load + weight if self.wrench.any() else weight
+        weight = self.usual_gravity if self.sites.usual_weight else self.gravity if self.sites.masses else 0.0
+        # Without a wrench, weight alone.
+        return np.asarray(weight) if np.ndim(weight) and not self.wrench.any() else self.load + weight
 
     @cached_property
     def mass_torques(self) -> np.ndarray:
@@ -150,7 +141,8 @@ class Conditions:
         """Torque on each joint of a kilogram at the far end of a link, or of a kilogram metre along an axis there, (S, n)."""
         end = 1 + link
         first = self.motion.position[end] if axis is None else self.motion.rotation[end, :, axis]
-        return self._weighing(end, float(axis is None), first, slice(self.sites.joints)).T
+        falling = self._falling(float(axis is None), first)
+        return self.motion.generalized_forces(self.sites.followed[end].after, falling, slice(self.sites.joints)).T
 
 
 def progress_of(states: States, row_span: tuple[int, int] | None = None) -> np.ndarray:

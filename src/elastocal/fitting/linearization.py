@@ -306,13 +306,10 @@ def _spring_laws(spring: Candidate, model: Model, estimate: Estimate, around: Co
     return laws
 
 
-def _with_each_correction(
-    around: Conditions, coordinates: list[int], steps: np.ndarray
-) -> Iterator[tuple[set[int], Conditions]]:
-    """Conditions with one error of a mass after the other changed by a step, and which of the coordinates this loads."""
+def _with_each_correction(around: Conditions, coordinates: list[int], steps: np.ndarray) -> Iterator[Any]:
+    """Conditions with one error of a mass after the other changed by a step, behind the set of coordinates that this loads."""
     present, total = around.total.T, around.total.T.copy()
-    of_masses = steps.reshape(-1, MASS_PARAMETERS)
-    for sizes, forces in zip(of_masses, around.gravity_of_corrections(coordinates), strict=True):
+    for sizes, forces in zip(steps.reshape(-1, MASS_PARAMETERS), around.gravity_of_corrections(coordinates), strict=True):
         loaded = coordinates[: forces.shape[1]]
         for step, per_unit in zip(sizes, forces, strict=True):
             total[loaded] = present[loaded] + step * per_unit

@@ -244,8 +244,7 @@ def displaced_coordinates(model: Model, estimate: Estimate, conditions: Conditio
     around = sprung(model, estimate, conditions)
     # Component first, as kinematics look at them.
     displaced = np.zeros((model.sites.chain.coordinates, len(around.joint_angles))).T
-    displaced[:, : model.sites.joints] = around.joint_angles
-    displaced[:, : model.sites.joints] += around.total[:, : model.sites.joints] * around.compliance
+    displaced[:, : model.sites.joints] = around.joint_angles + around.total[:, : model.sites.joints] * around.compliance
     effects = zip(model.effects, estimate.coefficients, estimate.shapes, strict=True)
     for coordinate, by in displaced_by((each for each in effects if each[0].effect not in SPRINGS), around).items():
         displaced[:, coordinate] += by

@@ -160,7 +160,7 @@ def _observations(measurements: Measurements, key: np.ndarray) -> Observations:
     np.minimum.at(repeats, state, np.bincount(pair_of))
     np.minimum.at(row, state_of, measurements.row)
     there = {name: values for name, values in vars(measurements).items() if values is not None}
-    shared = {name: there[name][first] for name in ("session", "pose", "load", "approach") if name in there}
+    shared: dict[str, Any] = {name: there[name][first] for name in ("session", "pose", "load", "approach") if name in there}
     mean_of = ("joint_angles", "wrench", "time_s", "temperature_c")
     shared |= {name: means_of(there[name], state_of) for name in mean_of if name in there}
     states = States(**shared, repeats=repeats, row=row)
