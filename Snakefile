@@ -41,6 +41,10 @@ onstart:
     limit = workflow.scheduling_settings.max_jobs_per_timespan
     if limit is not None and limit.max_jobs >= 100 * limit.timespan:
         workflow.scheduler.job_rate_limiter = None
+    remember_checksums()
+    # Not of jobs that another machine runs; on Linux alone a process can wait for others and for requests at once.
+    if workflow.local_exec and hasattr(os, "pidfd_open"):
+        start_warm()
 
 
 onsuccess:

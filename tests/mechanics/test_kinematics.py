@@ -102,9 +102,9 @@ def test_motion_gives_the_jacobian_of_every_point_and_the_forces_of_every_wrench
         position, rotation, jacobian = poses_and_jacobians(chain, angles, point)
         np.testing.assert_allclose(moved.position[number].T, position, rtol=0, atol=ROUNDING)
         np.testing.assert_allclose(np.moveaxis(moved.rotation[number], -1, 0), rotation, rtol=0, atol=ROUNDING)
-        found = moved.jacobian(point.after, moved.position[number])
+        found = moved.jacobian(np.full(len(moved.position[number][0]), point.after), moved.position[number])
         np.testing.assert_allclose(np.moveaxis(found, -1, 0), jacobian, rtol=0, atol=ROUNDING)
-        some = moved.jacobian(point.after, moved.position[number][:, [4, 1, 1]], 3, np.array([4, 1, 1]))
+        some = moved.jacobian(np.full(3, point.after), moved.position[number][:, [4, 1, 1]], 3, np.array([4, 1, 1]))
         np.testing.assert_allclose(np.moveaxis(some, -1, 0), jacobian[[4, 1, 1], :3], rtol=0, atol=ROUNDING)
         moment = wrench[:, 3:] + np.cross(position, wrench[:, :3])
         acting = np.concatenate([wrench[:, :3], moment], axis=1).T

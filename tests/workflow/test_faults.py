@@ -61,7 +61,7 @@ def test_spoilt_data_end_the_job_that_reads_them_and_deleted_ones_are_made_again
     _edit_one_value(finished_paper.path(MEASURED))
     ended = finished_paper.snakemake("-j1", IDENTIFIED)
     assert ended.returncode != 0
-    (line,) = finished_paper.path("results/logs/identify/kuka/200um/6DoF.log").read_text(encoding="utf-8").splitlines()
+    (line,) = finished_paper.path("results/logs/identify/kuka/200/6DoF.log").read_text(encoding="utf-8").splitlines()
     assert line.startswith(f"{MEASURED}: found other contents than were written; allowed: the file as the pipeline wrote it")
     assert ended.stderr.splitlines()[-1] == line and "Traceback" not in ended.stderr
     assert finished_paper.files(IDENTIFIED, "results/identified/**/*.partial") == []

@@ -6,7 +6,7 @@ from collections import Counter
 from study_folder import PAPER
 
 IDENTIFIED = "results/identified/kuka/200um/6DoF.parquet"
-LOG = "results/logs/identify/kuka/200um/6DoF.log"
+LOG = "results/logs/identify/kuka/200/6DoF.log"
 
 
 def test_a_job_is_one_line_without_lists_of_files(finished_paper):

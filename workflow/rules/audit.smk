@@ -20,14 +20,9 @@ rule audit_files:
     input:
         files=audited,
         reference=f"{CONFIG}/paper/reference.csv",
-        sources=sources("audit_files.py"),
     output:
         table="reports/audit.csv",
         page=shown("reports/audit.html", "audit", "Audit", shows="The audit", kind="report"),
-    log:
-        "results/logs/audit_files.log",
-    benchmark:
-        "results/timings/audit_files.tsv"
     params:
         robots=STUDY.robots,
         strategies=STUDY.strategies,
@@ -45,13 +40,8 @@ rule judge_audit:
     input:
         table=rules.audit_files.output.table,
         page=rules.audit_files.output.page,
-        sources=sources("judge_audit.py"),
     output:
         verdict="reports/audit.txt",
-    log:
-        "results/logs/judge_audit.log",
-    benchmark:
-        "results/timings/judge_audit.tsv"
     script:
         "../scripts/judge_audit.py"
 

@@ -20,14 +20,9 @@ BLIND_ROBOTS = list(dict.fromkeys(robot for part in BLIND_SIZE["parts"] for robo
 rule make_cases:
     input:
         robots=expand(f"{CONFIG}/robots/{{robot}}.yaml", robot=BLIND_ROBOTS),
-        sources=sources("elastocal_proof.blind.cases.make_cases"),
     output:
         blind=directory("data/blind/{block}"),
         sealed=directory("data/sealed/{block}"),
-    log:
-        "results/logs/make_cases/{block}.log",
-    benchmark:
-        "results/timings/make_cases/{block}.tsv"
     params:
         step="elastocal_proof.blind.cases.make_cases",
         plan=CASES,
@@ -41,13 +36,8 @@ rule make_cases:
 rule seal_cases:
     input:
         sealed=expand(rules.make_cases.output.sealed, block=BLIND),
-        sources=sources("elastocal_proof.blind.folders.seal_cases"),
     output:
         manifest="reports/blind/manifest.sha256",
-    log:
-        "results/logs/seal_cases.log",
-    benchmark:
-        "results/timings/seal_cases.tsv"
     params:
         step="elastocal_proof.blind.folders.seal_cases",
     script:
@@ -58,13 +48,8 @@ rule diagnose_cases:
     input:
         blind=rules.make_cases.output.blind,
         manifest=rules.seal_cases.output.manifest,
-        sources=sources("elastocal_proof.blind.verdicts.diagnose_cases"),
     output:
         verdicts="results/blind/{block}.json",
-    log:
-        "results/logs/diagnose_cases/{block}.log",
-    benchmark:
-        "results/timings/diagnose_cases/{block}.tsv"
     params:
         step="elastocal_proof.blind.verdicts.diagnose_cases",
         seed=config["seed"],
@@ -79,13 +64,8 @@ rule oracle_cases:
         sealed=rules.make_cases.output.sealed,
         manifest=rules.seal_cases.output.manifest,
         verdicts=rules.diagnose_cases.output.verdicts,
-        sources=sources("elastocal_proof.blind.oracle.oracle_cases"),
     output:
         oracle="results/blind/oracle/{block}.json",
-    log:
-        "results/logs/oracle_cases/{block}.log",
-    benchmark:
-        "results/timings/oracle_cases/{block}.tsv"
     params:
         step="elastocal_proof.blind.oracle.oracle_cases",
         plan=CASES,
@@ -101,7 +81,6 @@ rule score_cases:
         manifest=rules.seal_cases.output.manifest,
         verdicts=expand(rules.diagnose_cases.output.verdicts, block=BLIND),
         oracles=expand(rules.oracle_cases.output.oracle, block=BLIND),
-        sources=sources("elastocal_proof.blind.summary.score_cases"),
     output:
         cases="reports/blind/cases.csv",
         intervals="reports/blind/intervals.csv",
@@ -112,10 +91,6 @@ rule score_cases:
             "reports/blind/rates.csv", "blind_power", "Blind proof", shows="Rates by group, truth and size", kind="table"
         ),
         reliability="reports/blind/reliability.csv",
-    log:
-        "results/logs/score_cases.log",
-    benchmark:
-        "results/timings/score_cases.tsv"
     params:
         step="elastocal_proof.blind.summary.score_cases",
         plan=PLAN,
@@ -129,7 +104,6 @@ rule draw_blind:
         summary=rules.score_cases.output.summary,
         reliability=rules.score_cases.output.reliability,
         rates=rules.score_cases.output.rates,
-        sources=sources("elastocal_proof.figures.blind.draw_blind"),
     output:
         targets=shown(
             "reports/blind/figures/targets.png", "blind_targets", "Blind proof", shows="Figures against targets", kind="figure"
@@ -147,10 +121,6 @@ rule draw_blind:
         targets_pdf="reports/blind/figures/targets.pdf",
         reliability_pdf="reports/blind/figures/reliability.pdf",
         power_pdf="reports/blind/figures/power.pdf",
-    log:
-        "results/logs/draw_blind.log",
-    benchmark:
-        "results/timings/draw_blind.tsv"
     params:
         step="elastocal_proof.figures.blind.draw_blind",
     script:
@@ -162,13 +132,8 @@ rule write_blind_page:
         summary=rules.score_cases.output.summary,
         cases=rules.score_cases.output.cases,
         robots=rules.make_cases.input.robots,
-        sources=sources("elastocal_proof.report.blind_page.write_blind_page"),
     output:
         page="reports/blind/targets.md",
-    log:
-        "results/logs/write_blind_page.log",
-    benchmark:
-        "results/timings/write_blind_page.tsv"
     params:
         step="elastocal_proof.report.blind_page.write_blind_page",
         plan=PLAN,
@@ -186,10 +151,6 @@ rule blind_pictures:
     output:
         page="docs/blind_tables.md",
         figures=expand("docs/blind_{figure}.png", figure=["targets", "reliability", "power"]),
-    log:
-        "results/logs/blind_pictures.log",
-    benchmark:
-        "results/timings/blind_pictures.tsv"
     shell:
         "(cp {input.page} {output.page}; for one in {input.figures}; do cp $one docs/blind_$(basename $one); done) 2> {log}"
 

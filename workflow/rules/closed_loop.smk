@@ -10,13 +10,8 @@ CLOSED_LOOP = config["closed_loop"]
 rule close_loop:
     input:
         robot=f"{CONFIG}/robots/{{robot}}.yaml",
-        sources=sources("elastocal_proof.blind.closed_loop.close_loop"),
     output:
         moved="results/closed_loop/{robot}.parquet",
-    log:
-        "results/logs/close_loop/{robot}.log",
-    benchmark:
-        "results/timings/close_loop/{robot}.tsv"
     params:
         step="elastocal_proof.blind.closed_loop.close_loop",
         each=CLOSED_LOOP["each"],
@@ -30,7 +25,6 @@ rule summarize_closed_loop:
     input:
         moved=expand(rules.close_loop.output.moved, robot=CLOSED_LOOP["robots"]),
         robots=expand(f"{CONFIG}/robots/{{robot}}.yaml", robot=CLOSED_LOOP["robots"]),
-        sources=sources("elastocal_proof.blind.closed_loop.summarize_closed_loop"),
     output:
         errors="reports/closed_loop/cases.csv",
         summary=shown(
@@ -41,10 +35,6 @@ rule summarize_closed_loop:
             kind="table",
         ),
         goals="reports/closed_loop/goals.csv",
-    log:
-        "results/logs/summarize_closed_loop.log",
-    benchmark:
-        "results/timings/summarize_closed_loop.tsv"
     params:
         step="elastocal_proof.blind.closed_loop.summarize_closed_loop",
         robots=CLOSED_LOOP["robots"],
@@ -57,7 +47,6 @@ rule draw_closed_loop:
     input:
         summary=rules.summarize_closed_loop.output.summary,
         robots=rules.summarize_closed_loop.input.robots,
-        sources=sources("elastocal_proof.figures.blind.draw_closed_loop"),
     output:
         figure="reports/closed_loop/closed_loop.pdf",
         picture=shown(
@@ -67,10 +56,6 @@ rule draw_closed_loop:
             shows="Errors after correction",
             kind="figure",
         ),
-    log:
-        "results/logs/draw_closed_loop.log",
-    benchmark:
-        "results/timings/draw_closed_loop.tsv"
     params:
         step="elastocal_proof.figures.blind.draw_closed_loop",
     script:
@@ -80,13 +65,8 @@ rule draw_closed_loop:
 rule state_accuracy:
     input:
         robot=f"{CONFIG}/robots/{{robot}}.yaml",
-        sources=sources("elastocal_proof.blind.closed_loop.state_accuracy"),
     output:
         stated="results/closed_loop/stated/{robot}_{frame}.csv",
-    log:
-        "results/logs/state_accuracy/{robot}_{frame}.log",
-    benchmark:
-        "results/timings/state_accuracy/{robot}_{frame}.tsv"
     wildcard_constraints:
         frame="base|tracker",
     params:
@@ -100,14 +80,9 @@ rule state_accuracy:
 rule tabulate_coverage:
     input:
         stated=expand(rules.state_accuracy.output.stated, robot=CLOSED_LOOP["robots"], frame=["base", "tracker"]),
-        sources=sources("elastocal_proof.blind.closed_loop.tabulate_coverage"),
     output:
         cases="reports/closed_loop/stated.csv",
         coverage="reports/closed_loop/coverage.csv",
-    log:
-        "results/logs/tabulate_coverage.log",
-    benchmark:
-        "results/timings/tabulate_coverage.tsv"
     params:
         step="elastocal_proof.blind.closed_loop.tabulate_coverage",
     script:

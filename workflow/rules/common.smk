@@ -2,6 +2,7 @@
 
 import gc
 import hashlib
+import os
 import re
 import sys
 from functools import cache
@@ -9,6 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import elastocal
+from snakemake.io import _IOFile
 from snakemake.iocontainers import Wildcards
 
 from elastocal.campaigns.importers import campaign_sources, importer, named_league, user_campaign
@@ -25,6 +27,7 @@ sys.path.insert(0, str(ROOT / "workflow" / "rules"))
 from commit import commit_of
 from import_closure import closure
 from one_run import begin
+from warm_start import start_warm
 
 # In a checkout the package stands beside the rules; a wheel puts them apart.
 PACKAGES = ROOT / "src" if (ROOT / "src").is_dir() else Path(elastocal.__file__).parents[1]
@@ -160,6 +163,20 @@ def digest_of(files):
 
 
 checksum_once = cache(checksum)
+
+
+def remember_checksums():
+    """Snakemake digests all inputs of a job that has ended once for each of its outputs: of a file that stays, once is enough."""
+    digest, known = _IOFile.checksum, {}
+
+    async def checksum(file, *asked, **settings):
+        status = os.stat(file) if os.path.exists(file) else None
+        key = (str(file), status and (status.st_ino, status.st_mtime_ns, status.st_size), asked, *settings.items())
+        if key not in known:
+            known[key] = await digest(file, *asked, **settings)
+        return known[key]
+
+    _IOFile.checksum = checksum
 
 
 def complete_rules():

@@ -12,12 +12,7 @@ SCHEME_ROBOTS |= {"figure3": (EXTENDED or REDUCED)[-1]}
 STIFFNESS_PANELS = dict(zip("ab", REDUCED, strict=False))
 DEVIATION_PANELS = dict(zip("cd", REDUCED, strict=False))
 PAPER_FIGURES = [*SCHEME_ROBOTS, "figure4", *(f"figure5{panel}" for panel in (STIFFNESS_PANELS | DEVIATION_PANELS))]
-FIGURES = [
-    *PAPER_FIGURES,
-    "scores_against_paper",
-    "ladder",
-    "designs",
-]
+FIGURES = [*PAPER_FIGURES, "scores_against_paper", "ladder", "designs"]
 
 # Each other figure: its function, file, caption, category, what it shows, tables, settings.
 DRAWN = {

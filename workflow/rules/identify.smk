@@ -29,10 +29,6 @@ rule identify:
         identified="results/identified/{robot}/{noise}um/{strategy}.parquet",
         metrics="results/metrics/{robot}/{noise}um/{strategy}.parquet",
         replicates="results/replicates/{robot}/{noise}um/{strategy}.parquet",
-    log:
-        "results/logs/identify/{robot}/{noise}um/{strategy}.log",
-    benchmark:
-        "results/timings/identify/{robot}/{noise}um/{strategy}.tsv"
     params:
         step="elastocal.study.evaluation.identify",
         robot=robot_document,

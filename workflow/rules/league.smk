@@ -16,15 +16,10 @@ wildcard_constraints:
 rule deal_league_folds:
     input:
         files=lambda wildcards: files_of_campaign(wildcards.data),
-        sources=sources("elastocal_proof.league.methods.deal_league_folds"),
     output:
         descriptions="results/league/{data}/campaign.json",
         measurements="results/league/{data}/measurements.parquet",
         folds="results/league/{data}/folds.parquet",
-    log:
-        "results/logs/deal_league_folds/{data}.log",
-    benchmark:
-        "results/timings/deal_league_folds/{data}.tsv"
     params:
         step="elastocal_proof.league.methods.deal_league_folds",
         folder="data/campaigns/{data}",
@@ -40,14 +35,9 @@ rule diagnose_league_folds:
         descriptions=rules.deal_league_folds.output.descriptions,
         measurements=rules.deal_league_folds.output.measurements,
         folds=rules.deal_league_folds.output.folds,
-        sources=sources("elastocal_proof.league.methods.diagnose_league_folds"),
     output:
         facts="results/league/{data}/{split}/diagnoses.json",
         mechanisms="results/league/{data}/{split}/mechanisms.parquet",
-    log:
-        "results/logs/diagnose_league_folds/{data}/{split}.log",
-    benchmark:
-        "results/timings/diagnose_league_folds/{data}/{split}.tsv"
     params:
         step="elastocal_proof.league.methods.diagnose_league_folds",
         seed=config["seed"],
@@ -61,13 +51,8 @@ rule enter_league:
         measurements=league_files("measurements"),
         folds=league_files("folds"),
         facts=diagnosed_facts,
-        sources=sources("elastocal_proof.league.methods.enter_league"),
     output:
         entries="results/league/{data}/{split}/{method}.parquet",
-    log:
-        "results/logs/enter_league/{data}/{split}/{method}.log",
-    benchmark:
-        "results/timings/enter_league/{data}/{split}/{method}.tsv"
     params:
         step="elastocal_proof.league.methods.enter_league",
         method=lambda wildcards: LEAGUE["methods"][wildcards.method],
@@ -82,7 +67,6 @@ rule tabulate_league:
         mechanisms=lambda wildcards: of_rounds(
             rules.diagnose_league_folds.output.mechanisms, [key for key in rounds_of(wildcards.league) if key[1] == "random"]
         ),
-        sources=sources("elastocal_proof.figures.league.tabulate_league"),
     output:
         league=shown("reports/league/{league}/league.csv", "league", "League", shows="Errors of all methods", kind="table"),
         mechanisms="reports/league/{league}/mechanisms.csv",
@@ -95,10 +79,6 @@ rule tabulate_league:
         mechanisms_png=shown(
             "reports/league/{league}/mechanisms.png", "league_mechanisms", "League", shows="Mechanisms found", kind="figure"
         ),
-    log:
-        "results/logs/tabulate_league/{league}.log",
-    benchmark:
-        "results/timings/tabulate_league/{league}.tsv"
     params:
         step="elastocal_proof.figures.league.tabulate_league",
         entered=lambda wildcards: entry_keys(wildcards.league),
@@ -133,10 +113,6 @@ rule league_pictures:
         league="docs/league.png",
         mechanisms="docs/mechanisms.png",
         page="docs/league_tables.md",
-    log:
-        "results/logs/league_pictures.log",
-    benchmark:
-        "results/timings/league_pictures.tsv"
     params:
         head="# Tables of the league\n\nWritten by `snakemake -j2 league`; [what they mean](league.md).\n\n"
         "![RMS errors of all methods over that of geometry](league.png)\n\n",

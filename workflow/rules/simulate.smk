@@ -6,8 +6,6 @@ the configurations that judge, and {noise}um/measured.parquet.
 
 
 rule draw_experiments:
-    input:
-        sources=sources("elastocal.study.simulation.draw_experiments"),
     output:
         experiments="data/simulated/{robot}{test}/experiments.parquet",
     log:
@@ -31,7 +29,6 @@ rule draw_experiments:
 rule simulate:
     input:
         experiments=rules.draw_experiments.output.experiments,
-        sources=sources("elastocal.study.simulation.simulate"),
     output:
         ideal="data/simulated/{robot}{test}/ideal.parquet",
     log:
@@ -51,13 +48,8 @@ rule simulate:
 rule measure:
     input:
         ideal="data/simulated/{robot}/ideal.parquet",
-        sources=sources("elastocal.study.simulation.measure"),
     output:
         measured="data/simulated/{robot}/{noise}um/measured.parquet",
-    log:
-        "results/logs/measure/{robot}/{noise}um.log",
-    benchmark:
-        "results/timings/measure/{robot}/{noise}um.tsv"
     params:
         step="elastocal.study.simulation.measure",
         seed=config["seed"],

@@ -2,16 +2,14 @@
 
 from job import Job, origin_of, run
 
-from elastocal.figures.schemes import kinematic_scheme, spring_scheme
+from elastocal.figures import schemes
 from elastocal.figures.style import save
 from elastocal.mechanics.robot_file import robot_from_document
-
-SCHEMES = {"kinematic_scheme": kinematic_scheme, "spring_scheme": spring_scheme}
 
 
 def draw_scheme(job: Job) -> None:
     robot = robot_from_document(job.params.robot)
-    save(SCHEMES[job.params.scheme](robot), job.output.pdf, job.output.png, origin_of(job))
+    save(getattr(schemes, job.params.scheme)(robot), job.output.pdf, job.output.png, origin_of(job))
 
 
 run(draw_scheme, snakemake)

@@ -1,5 +1,7 @@
 """A figure of the study: the function of `figures.study` that the rule names, of tables and settings by their names."""
 
+from functools import partial
+
 from job import Job, origin_of, run
 
 import pandas as pd
@@ -11,18 +13,11 @@ from elastocal.study.evaluation import metrics
 from elastocal.study.jobs import read_reference
 
 # By the name of an input; others are tables for people.
-READ = {
-    "metrics": lambda files: read_long(files, metrics),
-    "printed": read_reference,
-}
-
-
-def read_table(path: str) -> pd.DataFrame:
-    return pd.read_csv(path, dtype={"table": str})
+READ = {"metrics": partial(read_long, schema=metrics), "printed": read_reference}
 
 
 def draw_study(job: Job) -> None:
-    tables = {name: READ.get(name, read_table)(job.input[name]) for name in job.params.tables}
+    tables = {name: READ.get(name, partial(pd.read_csv, dtype={"table": str}))(job.input[name]) for name in job.params.tables}
     figure = getattr(study, job.params.figure)(**tables, **job.params.settings)
     save(figure, job.output.pdf, job.output.png, origin_of(job))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -74,8 +74,8 @@ class Measurements:
         """The measurements of a mask (N,) or of an index array (M,), in its order; these themselves where a mask has all."""
         if mask_or_index.dtype == bool and mask_or_index.all():
             return self
-        arrays = {field.name: getattr(self, field.name) for field in fields(self)}
-        chosen: dict[str, Any] = {name: None if array is None else array[mask_or_index] for name, array in arrays.items()}
+        arrays = vars(self).items()
+        chosen: dict[str, Any] = {name: None if array is None else array[mask_or_index] for name, array in arrays}
         return Measurements(**chosen)
 
 
@@ -212,9 +212,24 @@ def groups_of(keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     `keys` (N, k). Returns `first` (G,) of int: first row of each group; groups in lexicographic order; `group` (N,) of int: of
     each row.
     """
-    order = np.lexsort(keys.T[::-1])
+    order = np.argsort(keys[:, 0], kind="stable")
+    if not np.diff(keys[order, 0]).all():
+        # The first column does not tell all rows apart.
+        order = np.lexsort(keys.T[::-1])
     rising = keys[order]
     new = np.concatenate([np.ones(min(len(keys), 1), bool), (rising[1:] != rising[:-1]).any(axis=1)])
     group = np.empty(len(keys), int)
     group[order] = np.cumsum(new) - 1
     return order[new], group
+
+
+def means_of(values: np.ndarray, group: np.ndarray) -> np.ndarray:
+    """Mean of the values (N, ...) of each group (N,), 0 .. G-1, ndarray (G, ...)."""
+    count = np.bincount(group)
+    total = np.zeros((len(count), *values.shape[1:]))
+    if len(count) == len(values):
+        # Each alone: adding one by one takes ten times as long.
+        total[group] = values
+    else:
+        np.add.at(total, group, values)
+    return total / count.reshape(-1, *[1] * (values.ndim - 1))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from elastocal.campaigns.campaign import DOCUMENT, Campaign, Measurements, groups_of
+from elastocal.campaigns.campaign import DOCUMENT, Campaign, Measurements, groups_of, means_of
 from elastocal.campaigns.measurements import is_file_in
 from elastocal.counting import counted
 from elastocal.errors import InputError
@@ -67,7 +67,7 @@ def held_out_mask(holdout: Mapping[str, Any], measurements: Measurements, report
     if "fraction" in holdout:
         draws = np.random.Generator(np.random.PCG64(holdout.get("seed", 1)))
         chosen = np.isin(configuration, draws.permutation(count)[: round(holdout["fraction"] * count)])
-    fitted, tested = (len(np.unique(configuration[part])) for part in (~chosen, chosen))
+    fitted, tested = (np.count_nonzero(np.bincount(configuration[part])) for part in (~chosen, chosen))
     fewest = 0 if "campaign" in holdout else FEWEST_HELD_OUT_POSES
     if fitted < FEWEST_TRAINING_POSES or tested < fewest:
         found = f"{counted(fitted, 'configuration')} to fit and {tested} held out"
@@ -98,7 +98,7 @@ def configurations(joint_angles: np.ndarray, pose: np.ndarray) -> np.ndarray:
     controller's servo error can differ: the leader algorithm (Hartigan, Clustering Algorithms, 1975). Poses along a path, each
     near the next, are several configurations.
     """
-    return number_alike(_means(joint_angles, pose), SAME_POSE_RAD)
+    return number_alike(means_of(joint_angles, pose), SAME_POSE_RAD)
 
 
 def number_alike(points: np.ndarray, within: float) -> np.ndarray:
@@ -138,7 +138,7 @@ def blocks_of_poses(joint_angles: np.ndarray, pose: np.ndarray, count: int) -> n
     [2] Boley, D., Principal direction divisive partitioning, Data Mining and Knowledge Discovery 2, 1998.
     """
     configuration = configurations(joint_angles, pose)
-    angles = _means(_means(joint_angles, pose), configuration)
+    angles = means_of(means_of(joint_angles, pose), configuration)
     circle = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     circle = circle - circle.mean(axis=0)
     spread = np.sqrt((circle**2).mean(axis=0).sum(axis=-1))
@@ -164,12 +164,6 @@ def blocks_of_poses(joint_angles: np.ndarray, pose: np.ndarray, count: int) -> n
                 break
         waiting += [(members[order[:cut]], first, lower), (members[order[cut:]], first + lower, parts - lower)]
     return found[configuration]
-
-
-def _means(joint_angles: np.ndarray, group: np.ndarray) -> np.ndarray:
-    mean = np.zeros((group.max() + 1, joint_angles.shape[1]))
-    np.add.at(mean, group, joint_angles)
-    return mean / np.bincount(group)[:, None]
 
 
 def beyond_range(fitted_angles: np.ndarray, joint_angles: np.ndarray) -> np.ndarray:

@@ -183,9 +183,12 @@ def find_degrees(reported: np.ndarray, robot: Robot) -> np.ndarray:
         angles = robot.model_angles(reported)
         return np.asarray(np.maximum(low - angles, angles - high))
 
+    found = np.abs(reported) > farthest
+    some = (off(reported) > _BEYOND_LIMITS_RAD).any(axis=1)
     # An angle that its opposite would bring inside the limits has rather a wrong sign, which is for the diagnosis to trace.
-    beyond = np.minimum(off(reported), off(-reported)) > _BEYOND_LIMITS_RAD
-    return np.asarray((np.abs(reported) > farthest) | (beyond & (off(np.radians(reported)) <= 0)))
+    beyond = np.minimum(off(reported[some]), off(-reported[some])) > _BEYOND_LIMITS_RAD
+    found[some] |= beyond & (off(np.radians(reported[some])) <= 0)
+    return found
 
 
 def _check_measurements(measurements: Measurements, table: Cells, robot: Robot, targets: Sequence[Target], source: str) -> None:

@@ -20,7 +20,7 @@ from scipy.special import chdtri, fdtri, gammaincinv
 from elastocal.counting import counted
 from elastocal.diagnosis.evidence import Grid
 from elastocal.diagnosis.linearize import Linearized, linearized
-from elastocal.fitting.least_squares import ON_THE_WAY, evaluated, fit
+from elastocal.fitting.least_squares import LONG, ON_THE_WAY, evaluated, fit
 from elastocal.fitting.linearization import by_coordinates, linearize
 from elastocal.fitting.model import conditions, parameters, residuals
 from elastocal.fitting.noise import Noise, estimated_noise, fit_declared
@@ -54,6 +54,8 @@ _POSE_SHARES = (0.0, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)
 _MOST = 4_000
 # Extrapolated rows of which the usual error is known.
 _FEWEST_TO_COMPARE = 5
+# Standard errors of the last step by all measurements of a long campaign: what it leaves is a tenth of it, or less.
+_LAST_STEP = 1.0
 # Gross errors that have a sentence each among the warnings; the table of residuals has all.
 _MOST_NAMED = 10
 
@@ -103,15 +105,9 @@ class _Beside:
 
     @classmethod
     def of(
-        cls,
-        model: Model,
-        estimate: Estimate,
-        measurements: Measurements,
-        noise: Noise,
-        kept: np.ndarray,
-        unsure: bool | None = None,
+        cls, model: Model, estimate: Estimate, measurements: Measurements, noise: Noise, kept: np.ndarray, unsure: bool
     ) -> _Beside:
-        """Of rows that are ``kept``, (N,) of bool; ``unsure``: whether parameters are so, without it if they are few."""
+        """Of rows that are ``kept``, (N,) of bool; ``unsure``: whether parameters are so."""
         single, sample = single_observations(measurements), kept.copy()
         sample[kept] = spread_poses(select_states(single, kept), _MOST)
         near, residual = spread_poses(single, _MOST), np.empty((len(single), model.rows))
@@ -120,7 +116,6 @@ class _Beside:
         far = np.linalg.norm(residual / np.repeat([noise.position_m, noise.orientation_rad], 3)[: model.rows], axis=1)
         closely = near | sample | (far > np.quantile(far[near], _SCALE_QUANTILES[-1]))
         some, parts = select_states(single, closely), []
-        unsure = sample.sum() == kept.sum() if unsure is None else unsure
         for _, seen, part in parts_of(some, len(parameters(model, estimate))):
             line = (linearize if unsure else by_coordinates)(model, estimate, part, conditions(model, estimate, part.states))
             jacobian = line.joint_jacobian
@@ -188,8 +183,8 @@ def yardstick_of(fitted: Fit, noise: Noise, measurements: Measurements) -> Yards
     that is not linear.
     """
     near = spread_poses(single_observations(measurements), _MOST)
-    some = measurements.select(near)
-    return _Beside.of(fitted.model, fitted.estimate, some, noise, near[near], bool(near.all())).yardstick(fitted)
+    some, few = measurements.select(near), len(measurements) <= _MOST
+    return _Beside.of(fitted.model, fitted.estimate, some, noise, near[near], few).yardstick(fitted)
 
 
 def beyond_chance(distance: np.ndarray, rows: int, kept: np.ndarray, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
@@ -223,7 +218,7 @@ def most_by_chance(count: int, rows: int, settings: Settings, freedom: float = n
 
 def gross_errors(fitted: Fit, noise: Noise, measurements: Measurements, kept: np.ndarray, settings: Settings) -> Deviations:
     """Judge the rows of a campaign by a fit to those that are ``kept``, (N,), and the noise declared or shown by repeats."""
-    rows = _Beside.of(fitted.model, fitted.estimate, measurements, noise, kept)
+    rows = _Beside.of(fitted.model, fitted.estimate, measurements, noise, kept, kept.sum() <= _MOST)
     distance = rows.distances(rows.yardstick(fitted), kept)
     return Deviations(rows.residual, *beyond_chance(distance, fitted.model.rows, kept, settings))
 
@@ -309,7 +304,8 @@ class Kept:
         """
         every = self.case.observations
         if self.searched is not every:
-            return fit(found.model, every, found.noise, found.estimate, reweighted=True, settled=ON_THE_WAY)
+            settled = ON_THE_WAY if len(every) <= LONG else _LAST_STEP
+            return fit(found.model, every, found.noise, found.estimate, reweighted=True, settled=settled)
         return found if found is self.declared else fit(found.model, every, found.noise, found.estimate, reweighted=True)
 
 

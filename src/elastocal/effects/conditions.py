@@ -91,21 +91,21 @@ class Conditions:
             np.einsum("iks,is->ks", self.motion.twist[:, start:end], falling, out=found[start:end])
         return found.T
 
-    def gravity_of_corrections(self, coordinates: Coordinates) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """By how much `gravity` on some coordinates grows with each of the `mass_corrections`, per unit.
+    def gravity_of_corrections(self, coordinates: Coordinates) -> Iterator[np.ndarray]:
+        """By how much `gravity` on some coordinates, in the order of the chain, grows with the `mass_corrections`, per unit.
 
-        Yields for each mass which of the coordinates it loads, ndarray of bool (K,), and (4, number of these, S).
+        Yields for each mass (4, K', S), of the first of the coordinates, which it loads.
         """
         place, twist = self.motion.place[coordinates], self.motion.twist[:, coordinates]
+        by_kilogram = np.tensordot(self.sites.gravity_m_s2, twist[:3], 1)
         for body, mass in enumerate(self.sites.masses, self.sites.joints + 2):
-            rotation, loaded = self.motion.rotation[body], place < self.sites.followed[body].after
+            rotation, loaded = self.motion.rotation[body], np.searchsorted(place, self.sites.followed[body].after)
             centre = self.motion.position[body] + np.tensordot(mass.centre_m, rotation, (0, 1))
-            moments, gravity = np.empty((3, MASS_PARAMETERS, rotation.shape[2])), np.array(self.sites.gravity_m_s2)
-            cross(np.concatenate([centre[:, None], rotation], axis=1), gravity[:, None, None], moments)
-            behind = twist if loaded.all() else twist[:, loaded]
-            forces = np.einsum("iks,ips->pks", behind[3:], moments)
-            forces[0] += np.tensordot(gravity, behind[:3], 1)
-            yield loaded, forces
+            moments = np.empty((3, MASS_PARAMETERS, rotation.shape[2]))
+            cross(np.concatenate([centre[:, None], rotation], axis=1), np.reshape(self.sites.gravity_m_s2, (3, 1, 1)), moments)
+            forces = np.einsum("iks,ips->pks", twist[3:, :loaded], moments)
+            forces[0] += by_kilogram[:loaded]
+            yield forces
 
     def _falling(self, mass: float, first: np.ndarray) -> np.ndarray:
         """Wrench of gravity on a mass and its first moment about the base's origin (3, S), ndarray (6, S)."""
@@ -141,8 +141,8 @@ class Conditions:
     def mass_torques(self) -> np.ndarray:
         """Torque on each joint per unit of each of the `mass_corrections`, ndarray (4 m, S, n)."""
         found = np.zeros((len(self.sites.masses), MASS_PARAMETERS, self.sites.joints, len(self.wrench)))
-        for each, (loaded, forces) in zip(found, self.gravity_of_corrections(slice(self.sites.joints)), strict=True):
-            each[:, loaded] = forces
+        for each, forces in zip(found, self.gravity_of_corrections(slice(self.sites.joints)), strict=True):
+            each[:, : forces.shape[1]] = forces
         return found.reshape(-1, *found.shape[2:]).swapaxes(1, 2)
 
     def weight(self, link: int, axis: int | None = None) -> np.ndarray:

@@ -52,7 +52,7 @@ STARTED_FROM = 2_000
 # by it are as sure as an estimate is within `SETTLED`.
 _NEAR = 0.3
 # A step by all of so many observations takes seconds: the last of some that a fit to all takes follow a fit to so many.
-_LONG, _STEPPING_STONE = 100_000, 20_000
+LONG, _STEPPING_STONE = 100_000, 20_000
 # Loads are those of the step before: of a step so much is still to come, at most, by deflection over reach.
 _LAGGING = 1e-2
 # Share of the slope by which a step must lower the objective (Armijo); a parabola gives a half.
@@ -142,7 +142,7 @@ def fit(
     `start`: of this model; by `registered` without. `reweighted`: whether the start comes of a fit: outliers lose weight from
     the first step on. `settled`: largest step that remains, in standard errors.
     """
-    for most in ([] if reweighted else [STARTED_FROM]) + ([_STEPPING_STONE] if len(observations) > _LONG else []):
+    for most in ([] if reweighted else [STARTED_FROM]) + ([_STEPPING_STONE] if len(observations) > LONG else []):
         few = sample_of(observations, most)
         if len(few) < len(observations):
             # Where all the measurements lead is close to where some of them do.

@@ -12,7 +12,7 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -163,9 +163,10 @@ class Factored:
     def dense(self) -> np.ndarray:
         """The columns themselves, ndarray (M, rows, K); the observations of each lie side by side."""
         jacobian = self.jacobian.transpose(2, 1, 0)
-        found = np.zeros((self.columns, jacobian.shape[1], len(self.state)))
+        found, made = (np.zeros((columns, jacobian.shape[1], len(self.state))) for columns in (self.columns, 1))
+        single = np.array_equal(self.state, np.arange(self.values.shape[1]))
         for coordinate, column, values in zip(self.coordinate, self.column, self.values, strict=True):
-            found[column] += jacobian[coordinate] * values[self.state]
+            found[column] += np.multiply(jacobian[coordinate], values if single else values[self.state], out=made[0])
         return found.transpose(2, 1, 0)
 
 
@@ -225,15 +226,14 @@ def by_coordinates(model: Model, estimate: Estimate, observations: Observations,
     count, rows, chain, points = len(observations), model.rows, model.sites.chain, target_points(model, estimate)
     placed = [(index, part) for index, parts in model.fitted_parts for part in range(parts.start, parts.stop, 3)]
     moved = motion(chain, coordinates, (*model.sites.followed, *points))
-    position, rotation = np.empty((count, 3)), np.empty((count, 3, 3))
+    number, state = len(model.sites.followed) + observations.target, observations.state
+    position, rotation = moved.position[number, :, state], moved.rotation[number, :, :, state]
     # Component first, so that every effect's arithmetic runs along the observations.
     jacobian = np.zeros((rows, chain.coordinates + 3 * len(placed), count))
-    for index, point in enumerate(points):
-        seen = np.flatnonzero(observations.target == index)
-        state, number = observations.state[seen], len(model.sites.followed) + index
-        at = moved.position[number][:, state]
-        position[seen], rotation[seen] = at.T, np.moveaxis(moved.rotation[number][..., state], -1, 0)
-        jacobian[:, : chain.coordinates, seen] = moved.jacobian(point.after, at, rows, state)
+    after = np.array([point.after for point in points])[observations.target]
+    # Where each state is seen once there is nothing to gather.
+    chosen = slice(None) if np.array_equal(state, np.arange(len(coordinates))) else state
+    jacobian[:, : chain.coordinates] = moved.jacobian(after, position.T, rows, chosen)
     residual = off_measured(estimate, observations, position, rotation @ estimate.target_rotation[observations.target])
     # A target's shift along the axes of its measuring point and, for poses, its turn about them, where it is seen.
     for first, (index, part) in zip(range(chain.coordinates, jacobian.shape[1], 3), placed, strict=True):
@@ -284,37 +284,34 @@ def _spring_laws(spring: Candidate, model: Model, estimate: Estimate, around: Co
     ]
     if not others:
         return laws
-    present = [displaced_by([other], around) for other in others]
-    coordinates = sorted({coordinate for each in present for coordinate in each})
+    present, place = [displaced_by([other], around) for other in others], around.motion.place
+    coordinates = sorted({coordinate for each in present for coordinate in each}, key=lambda coordinate: place[coordinate])
     steps = np.array([_SPRING_STEP * parameter.plausible for parameter in spring.parameters])
     if springs:
-        values, corrections = joint_compliances(model, estimate), mass_corrections(model, estimate)
-        every = set(coordinates)
-        changes: Iterable[tuple[set[int], Conditions]] = (
-            (every, with_springs(around, values + row, corrections)) for row in np.diag(steps)
-        )
+        every, values, corrections = {*coordinates}, joint_compliances(model, estimate), mass_corrections(model, estimate)
+        sprung: Iterable[Any] = ((every, with_springs(around, values + row, corrections)) for row in np.diag(steps))
     else:
-        changes = _with_each_correction(around, coordinates, steps)
-    for law, step, (loaded, changed) in zip(laws, steps, changes, strict=True):
+        sprung = _with_each_correction(around, coordinates, steps)
+    for law, step, (loaded, changed) in zip(laws, steps, sprung, strict=True):
         for other, before in zip(others, present, strict=True):
             moved = {} if loaded.isdisjoint(before) else displaced_by([other], changed)
             for coordinate, by in moved.items():
-                change = (by - before[coordinate]) / step
-                if change.any():
-                    law[coordinate] = law.get(coordinate, 0.0) + change
+                by -= before[coordinate]
+                if by.any():
+                    by /= step
+                    law[coordinate] = np.add(law[coordinate], by, out=by) if coordinate in law else by
     return laws
 
 
 def _with_each_correction(
     around: Conditions, coordinates: list[int], steps: np.ndarray
 ) -> Iterator[tuple[set[int], Conditions]]:
-    """Conditions with one error of a mass after the other changed by a step, as loads on some coordinates have it; and which of
-    these it loads."""
-    present, every = around.total.T, np.array(coordinates, int)
-    total, sizes = present.copy(), steps.reshape(-1, MASS_PARAMETERS)
-    for of_mass, (loaded, forces) in zip(sizes, around.gravity_of_corrections(every), strict=True):
-        mine = every[loaded]
-        for step, per_unit in zip(of_mass, forces, strict=True):
-            total[mine] = present[mine] + step * per_unit
-            yield set(mine.tolist()), with_total(around, total.T)
-        total[mine] = present[mine]
+    """Conditions with one error of a mass after the other changed by a step, and which of the coordinates this loads."""
+    present, total = around.total.T, around.total.T.copy()
+    of_masses = steps.reshape(-1, MASS_PARAMETERS)
+    for sizes, forces in zip(of_masses, around.gravity_of_corrections(coordinates), strict=True):
+        loaded = coordinates[: forces.shape[1]]
+        for step, per_unit in zip(sizes, forces, strict=True):
+            total[loaded] = present[loaded] + step * per_unit
+            yield {*loaded}, with_total(around, total.T)
+        total[loaded] = present[loaded]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.campaigns.campaign import groups_of
+from elastocal.campaigns.campaign import groups_of, means_of
 
 if TYPE_CHECKING:
     from typing import Any
@@ -156,45 +156,23 @@ def _observations(measurements: Measurements, key: np.ndarray) -> Observations:
     pairs = np.column_stack([state_of, measurements.target])
     first_pair, pair_of = groups_of(pairs)
     state, target = pairs[first_pair].T
-
-    def of_states(values: np.ndarray | None) -> np.ndarray | None:
-        return None if values is None else _means(values, state_of)
-
     repeats, row = np.full(len(first), len(measurements)), measurements.row[first].copy()
     np.minimum.at(repeats, state, np.bincount(pair_of))
     np.minimum.at(row, state_of, measurements.row)
-    states = States(
-        measurements.session[first],
-        measurements.pose[first],
-        measurements.load[first],
-        _means(measurements.joint_angles, state_of),
-        _means(measurements.wrench, state_of),
-        repeats,
-        None if measurements.approach is None else measurements.approach[first],
-        of_states(measurements.time_s),
-        of_states(measurements.temperature_c),
-        row,
-    )
+    there = {name: values for name, values in vars(measurements).items() if values is not None}
+    shared = {name: there[name][first] for name in ("session", "pose", "load", "approach") if name in there}
+    mean_of = ("joint_angles", "wrench", "time_s", "temperature_c")
+    shared |= {name: means_of(there[name], state_of) for name in mean_of if name in there}
+    states = States(**shared, repeats=repeats, row=row)
     rotation = None
     if measurements.rotation_vector is not None:
         each = Rotation.from_rotvec(measurements.rotation_vector)
         mean = each[first_pair]
         if len(first_pair) < len(measurements):
             # Of rotations close to each other, the mean turn from the first: a step towards the Riemannian mean (Moakher 2002).
-            mean = Rotation.from_rotvec(_means((each * mean[pair_of].inv()).as_rotvec(), pair_of)) * mean
+            mean = Rotation.from_rotvec(means_of((each * mean[pair_of].inv()).as_rotvec(), pair_of)) * mean
         rotation = mean.as_matrix()
-    return Observations(states, state, target, _means(measurements.position, pair_of), rotation)
-
-
-def _means(values: np.ndarray, group: np.ndarray) -> np.ndarray:
-    count = np.bincount(group)
-    total = np.zeros((len(count), *values.shape[1:]))
-    if len(count) == len(values):
-        # Each alone: adding one by one takes ten times as long.
-        total[group] = values
-        return total
-    np.add.at(total, group, values)
-    return total / count.reshape(-1, *[1] * (values.ndim - 1))
+    return Observations(states, state, target, means_of(measurements.position, pair_of), rotation)
 
 
 def select_states(observations: Observations, kept: np.ndarray) -> Observations:

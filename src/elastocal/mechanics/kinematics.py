@@ -126,8 +126,9 @@ def poses_and_jacobians(
         _store_poses(frames, [point], position[..., part], rotation[..., part])
         for number, transform in enumerate(chain.transforms[: point.after]):
             if transform.coordinate is not None:
-                target = None if _passes(chain.transforms[number : point.after], point) else position[0, :, part]
-                _store_twist(transform, frames[number], target, jacobian[:, transform.coordinate, part])
+                passes = _passes(chain.transforms[number : point.after], point)
+                arm = None if passes else frames[number][1] - position[0, :, part]
+                _store_twist(transform, frames[number], arm, jacobian[:, transform.coordinate, part])
     pose = _batch_first(position[0], coordinates), _batch_first(rotation[0], coordinates)
     return *pose, _batch_first(jacobian, coordinates)
 
@@ -161,8 +162,10 @@ class Motion:
     twist: np.ndarray
     place: np.ndarray
 
-    def jacobian(self, after: int, position: np.ndarray, rows: int = 6, chosen: slice | np.ndarray = slice(None)) -> np.ndarray:
-        """Geometric Jacobian of points behind so many transforms of the chain, (rows, C, S').
+    def jacobian(
+        self, after: np.ndarray, position: np.ndarray, rows: int = 6, chosen: slice | np.ndarray = slice(None)
+    ) -> np.ndarray:
+        """Geometric Jacobian of points, each behind so many transforms of the chain, (S',), ndarray (rows, C, S').
 
         `position` (3, S'): where the points are, m. `rows`: linear velocities alone, or also angular ones. `chosen` (S',) of
         int: configuration of each.
@@ -172,7 +175,9 @@ class Motion:
         cross(angular, position, moved[:3])
         moved[:3] += twist[:3]
         moved[3:] = angular[: rows - 3]
-        moved[:, self.place >= after] = 0.0
+        still = self.place[:, None] >= after
+        if still.any():
+            moved[:, still] = 0.0
         return moved
 
     def generalized_forces(self, after: int, wrench: np.ndarray, coordinates: slice = slice(None)) -> np.ndarray:
@@ -278,16 +283,16 @@ def _passes(transforms: Sequence[Transform], point: MeasuringPoint) -> bool:
     return not any(aside) and all(transform.axis == axis for transform in transforms)
 
 
-def _store_twist(transform: Transform, frame: Frame, target: np.ndarray | None, twist: np.ndarray) -> None:
-    """Twist (6, S) at a target, which is None where a turn leaves it in its place."""
+def _store_twist(transform: Transform, frame: Frame, arm: np.ndarray | None, twist: np.ndarray) -> None:
+    """Twist (6, S) of a target, which an `arm` (3, S) leads from to the axis; None where a turn leaves it in its place."""
     (linear, angular), axis = (twist[:3], twist[3:]), frame[0][transform.axis]
     if transform.kind == "T":
         linear[:], angular[:] = axis, 0.0
-    elif target is None:
+    elif arm is None:
         linear[:], angular[:] = 0.0, axis
     else:
         angular[:] = axis
-        cross(axis, target - frame[1], linear)
+        cross(arm, axis, linear)
     if transform.sign < 0:
         twist *= -1.0
 

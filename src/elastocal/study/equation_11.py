@@ -75,8 +75,8 @@ def estimate_compliance(
     triangles = []
     for stage in strategy.stages:
         pivots = len(stage.identified)
-        start = np.zeros((pivots, pivots + len(stage.fixed) + 1, sets))
-        triangle = prefix_triangles(_equations(stage, measurements), start)
+        shape = configurations, pivots, pivots + len(stage.fixed) + 1, sets
+        triangle = prefix_triangles(_equations(stage, measurements), shape)
         right = triangle[:, :, -1] - np.einsum("kpfs,kfs->kps", triangle[:, :, pivots:-1], compliance[:, list(stage.fixed)])
         compliance[:, list(stage.identified)] = _solve(triangle[:, :, :pivots], right[:, :, None])[:, :, 0]
         triangles.append(triangle)
@@ -109,12 +109,12 @@ def undetermined(strategy: Strategy, rows: int, triangles: Iterable[np.ndarray])
     return found
 
 
-def prefix_triangles(equations: Iterable[np.ndarray], start: np.ndarray) -> np.ndarray:
+def prefix_triangles(equations: Iterable[np.ndarray], shape: tuple[int, ...]) -> np.ndarray:
     """Triangular factor of the equations of the first k configurations, for every k.
 
     `equations`: of one configuration after the other, (rows, columns, sets) each, overwritten: unknowns first, right-hand side
-    last. `start` (pivots, columns, sets): the triangle before any of them. Returns (configurations, pivots, columns, sets): the
-    rows of R and, in the columns that are no pivots, Q^T times them.
+    last. Returns an array of the given shape (configurations, pivots, columns, sets): the rows of R and, in the columns that
+    are no pivots, Q^T times them.
 
     Sequential accumulation [1]: the factor of k configurations on top of the rows of the next one is again reduced to a
     triangle, by Householder reflections of all data sets at once. numpy's stacked QR calls LAPACK for each small matrix and
@@ -122,8 +122,9 @@ def prefix_triangles(equations: Iterable[np.ndarray], start: np.ndarray) -> np.n
 
     [1] Lawson, C. L. and Hanson, R. J., Solving Least Squares Problems, Prentice-Hall, 1974.
     """
-    triangle, found = start.copy(), []
-    for rows in equations:
+    found, before = np.empty(shape), np.zeros(shape[1:])
+    for triangle, rows in zip(found, equations, strict=True):
+        triangle[:] = before
         for pivot in range(len(triangle)):
             head, below = triangle[pivot, pivot], rows[:, pivot]
             products = np.einsum("rs,rcs->cs", below, rows[:, pivot:])
@@ -134,17 +135,16 @@ def prefix_triangles(equations: Iterable[np.ndarray], start: np.ndarray) -> np.n
             along = (first * triangle[pivot, pivot:] + products) / scale
             triangle[pivot, pivot:] -= first * along
             rows[:, pivot + 1 :] -= below[:, None] * along[1:]
-        found.append(triangle.copy())
-    return np.array(found)
+        before = triangle
+    return found
 
 
 def _equations(stage: Stage, measurements: Mapping[str, Measurements]) -> Iterator[np.ndarray]:
     """Equations of a stage, configuration by configuration; columns: joints identified, joints fixed, measured deflection."""
     order, points = [*stage.identified, *stage.fixed], [measurements[name] for name in stage.points]
-    for configuration in range(points[0].regressor.shape[2]):
-        matrix = np.concatenate([each.regressor[:, order, configuration] for each in points])
-        measured = np.concatenate([each.deflection[:, None, configuration] for each in points])
-        yield np.concatenate([matrix, measured], axis=1)
+    for k in range(points[0].regressor.shape[2]):
+        rows = [np.concatenate([each.regressor[:, order, k], each.deflection[:, None, k]], axis=1) for each in points]
+        yield np.concatenate(rows)
 
 
 def _solve(triangles: np.ndarray, right: np.ndarray) -> np.ndarray:

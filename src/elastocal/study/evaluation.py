@@ -295,10 +295,9 @@ def identify(job: Job) -> None:
     of_tests = to_weights(read_table(job.input.weights, WEIGHTS, counts, members=TESTS))
     judge = make_judge(robot, to_experiments(tested), to_deflections(ideal), asked.wrench_at)
     averages = average(zip(estimated, weights, strict=True), judge, asked.average, of_tests)
-    tables = [make(averages, judge.reference, strategy.fixed_joints) for make in (metrics_table, replicates_table)]
-    scores = (job.output.metrics, metrics(n)), (job.output.replicates, REPLICATES)
-    for (path, schema), found in zip(scores, tables, strict=True):
-        write_table(path, schema, [found], origin(job))
+    scored = averages, judge.reference, strategy.fixed_joints
+    write_table(job.output.metrics, metrics(n), [metrics_table(*scored)], origin(job))
+    write_table(job.output.replicates, REPLICATES, [replicates_table(*scored)], origin(job))
 
 
 def repeat_studies(job: Job) -> None:

@@ -128,37 +128,38 @@ def ladder(parts: list[Products], joints: int, links: int) -> Ladder:
     columns = np.broadcast_to(np.arange(joints), (sets, joints))
     left = np.broadcast_to(np.arange(links), (sets, links))
     order = np.zeros((sets, 0), int)
-    scores, fits = [_cross_validate(parts, whole, columns)], [_fit(whole, columns)]
+    scaled = _scaled(whole.gram, whole.along)
+    others = [_scaled(whole.gram - part.gram, whole.along - part.along) for part in parts]
+    scores, fits = [_cross_validate(parts, others, columns)], [_fit(columns, *scaled)]
     for _ in range(links):
         added = [joints + elements * left[:, [place]] + np.arange(elements) for place in range(left.shape[1])]
         tried = [np.concatenate([columns, of_link], axis=1) for of_link in added]
-        found = np.stack([_cross_validate(parts, whole, some) for some in tried], axis=1)
+        found = np.stack([_cross_validate(parts, others, some) for some in tried], axis=1)
         best = np.argmin(found, axis=1)
         order = np.concatenate([order, left[each, best][:, None]], axis=1)
         columns = np.stack(tried)[best, each]
         left = left[np.arange(left.shape[1]) != best[:, None]].reshape(sets, -1)
         scores.append(found[each, best])
-        fits.append(_fit(whole, columns))
+        fits.append(_fit(columns, *scaled))
     return Ladder(order, np.stack(scores, axis=1), np.stack(fits, axis=1))
 
 
-def _cross_validate(parts: list[Products], whole: Products, columns: np.ndarray) -> np.ndarray:
+def _cross_validate(parts: list[Products], others: list[tuple[np.ndarray, ...]], columns: np.ndarray) -> np.ndarray:
     """Sum of squares left in each fold by the fit to the others, (sets,)."""
-    total = np.zeros(len(columns))
-    for part in parts:
-        rest = Products(whole.gram - part.gram, whole.along - part.along, whole.squares - part.squares)
-        total += part.squared_error(_fit(rest, columns))
-    return total
+    return np.sum([part.squared_error(_fit(columns, *rest)) for part, rest in zip(parts, others, strict=True)], axis=0)
 
 
-def _fit(products: Products, columns: np.ndarray) -> np.ndarray:
-    """Least squares with some columns of each data set, zero for the others, (sets, K)."""
-    each = np.arange(len(columns))[:, None]
-    gram = products.gram[each[..., None], columns[:, :, None], columns[:, None, :]]
+def _scaled(gram: np.ndarray, along: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Normal equations with columns of length 1, and these lengths (sets, K)."""
     scale = np.sqrt(np.diagonal(gram, axis1=1, axis2=2))
-    scaled = gram / (scale[:, :, None] * scale[:, None, :]) + _RIDGE * np.eye(columns.shape[1])
-    found = np.zeros_like(products.along)
-    found[each, columns] = np.linalg.solve(scaled, (products.along[each, columns] / scale)[..., None])[..., 0] / scale
+    return gram / (scale[:, :, None] * scale[:, None, :]) + _RIDGE * np.eye(gram.shape[-1]), along / scale, scale
+
+
+def _fit(columns: np.ndarray, gram: np.ndarray, along: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """Least squares with some columns of each data set, zero for the others, (sets, K); the rest from `_scaled`."""
+    each, found = np.arange(len(columns))[:, None], np.zeros_like(along)
+    chosen = gram[each[..., None], columns[:, :, None], columns[:, None, :]]
+    found[each, columns] = np.linalg.solve(chosen, along[each, columns][..., None])[..., 0] / scale[each, columns]
     return found
 
 
