@@ -70,8 +70,8 @@ def declared_weight(sites: Sites) -> Candidate:
 
 def _by_joint(turns: np.ndarray) -> Displacements:
     """Turns of the joints by each parameter, ndarray (P, S, n), without those joints that it does not turn."""
-    moved = turns.any(axis=1)
-    return [{joint: each[:, joint] for joint in np.flatnonzero(mine).tolist()} for each, mine in zip(turns, moved, strict=True)]
+    moved = np.asarray(turns.any(axis=1)).tolist()
+    return [{n: each[:, n] for n, turned in enumerate(mine) if turned} for each, mine in zip(turns, moved, strict=True)]
 
 
 def _sagging(around: Conditions, places: Iterable[tuple[int, int | None]]) -> Displacements:
