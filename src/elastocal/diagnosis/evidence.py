@@ -114,9 +114,11 @@ class Blocks:
 
     def at(self, chosen: np.ndarray | slice) -> Blocks:
         """The same at some of the sizes of the pose error only."""
-        return Blocks(self.numbers, self.columns, self.gram[chosen])
+        found = Blocks(self.numbers, self.columns, self.gram[chosen])
+        vars(found)["axes"] = tuple(part[chosen] for part in self.axes)
+        return found
 
-    @property
+    @cached_property
     def axes(self) -> tuple[np.ndarray, np.ndarray]:
         """Principal axes of the blocks, V diag(values) V': values (T, U, d), V (T, U, d, d)."""
         values, vectors = np.linalg.eigh(self.gram) if self.gram.shape[-1] > 1 else (self.gram[..., 0], np.ones_like(self.gram))

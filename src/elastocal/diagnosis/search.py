@@ -322,14 +322,16 @@ def alarm_of(problem: Problem, products: Products, pose_error_rad: float, stream
     chosen = slice(max(place - _REACH, 0), place + _REACH + 1)
     statistics, base = statistics.at(chosen), (statistics.log_likelihood + problem.log_pose)[chosen]
     tested, log_priors = _alternatives(problem)
-    blocks = [(each, *each.axes) for each in Blocks.of(statistics, tested)]
+    of_others = Blocks.of(statistics, tested[len(problem.units) :])
+    blocks = [each.at(chosen) for each in problem.blocks]
+    blocks += [replace(each, numbers=each.numbers + len(problem.units)) for each in of_others]
 
     def average_bayes_factors(along: np.ndarray, squares: np.ndarray) -> np.ndarray:
         """Logarithms of N sets of measurements, ndarray (N,). `along` (T, K, N), `squares` (T, N)."""
         nothing = log_sum_exp(base[:, None] + log_likelihood(squares, statistics.freedom), axis=0)
         total, variances = np.full(len(nothing), -np.inf), problem.grid.scales**2
         step = max(_AT_ONCE // (squares.size * len(variances)), 1)
-        for block, values, vectors in blocks:
+        for block, (values, vectors) in ((block, block.axes) for block in blocks):
             for start in range(0, len(block.numbers), step):
                 some = slice(start, start + step)
                 units = [tested[number] for number in block.numbers[some].tolist()]
