@@ -8,23 +8,22 @@ from pathlib import Path
 from common import Row
 from copies import copy_study, snakemake
 
-CELL = "kuka/200um"
+CELL, TIMED = "kuka/200um", "kuka/200"
 STRATEGY = "3+6DoF-comb"
 # What a job makes, and where Snakemake notes its seconds.
 STEPS = {
     "draw_experiments": ("data/simulated/kuka/experiments.parquet", "kuka"),
     "simulate": ("data/simulated/kuka/ideal.parquet", "kuka"),
-    "measure": (f"data/simulated/{CELL}/measured.parquet", CELL),
-    "identify": (f"results/identified/{CELL}/{STRATEGY}.parquet", f"{CELL}/{STRATEGY}"),
+    "measure": (f"data/simulated/{CELL}/measured.parquet", TIMED),
+    "identify": (f"results/identified/{CELL}/{STRATEGY}.parquet", f"{TIMED}/{STRATEGY}"),
     "draw_weights": ("results/weights/kuka.parquet", "kuka"),
 }
 TIME_TARGET, MEMORY_TARGET, MEMORY_LIMIT_GB = 11, 1.15, 1.5
 # Snakemake samples memory twice a second and misses peaks: each job notes its own when it ends (Linux).
 NOTE_PEAK = """
 
-@__import__("atexit").register
-def note_peak():
-    job = sys.modules["__main__"].snakemake
+def run(step, job, *checked, run=run):
+    run(step, job, *checked)
     status = dict(line.split(":", 1) for line in open("/proc/self/status", encoding="utf-8"))
     with open(job.output[0] + ".peak_kB", "w", encoding="utf-8") as file:
         file.write(status["VmHWM"].split()[0])

@@ -10,6 +10,8 @@ from scipy.stats import binom, chi2
 
 from elastocal.diagnosis.gross_errors import beyond_chance, entries_of, first_kept, fitted_to, gross_errors
 from elastocal.diagnosis.settings import Settings
+from elastocal.fitting.least_squares import fit
+from elastocal.fitting.model import parameter_values
 from elastocal.loop.whole import cases_in
 
 SETTINGS = Settings()
@@ -72,6 +74,20 @@ def test_a_search_looks_at_the_same_poses_whatever_rows_are_left_out_or_come_bac
     for out in (whole.states.pose[:1], whole.states.pose[-2:], np.setdiff1d(pose, whole.states.pose)):
         some = fitted_to(case, ~np.isin(pose, out), settings).searched
         np.testing.assert_array_equal(some.position, whole.position[~np.isin(whole.states.pose, out)[whole.state]])
+
+
+def test_the_last_step_to_all_of_a_long_campaign_leaves_a_tenth_of_a_standard_error_at_most(cases, monkeypatch):
+    part = fitted_to(cases[0], cases[0].campaign.measurements.pose >= 0, replace(SETTINGS, searched_observations=24))
+    usual = part.to_all(part.declared)
+    for module in ("fitting.least_squares", "diagnosis.gross_errors"):
+        monkeypatch.setattr(f"elastocal.{module}.LONG", 30)
+    monkeypatch.setattr("elastocal.fitting.least_squares._STEPPING_STONE", 36)
+    long = part.to_all(part.declared)
+    off, exact = (
+        parameter_values(each.model, each.estimate) for each in (long, fit(usual.model, part.case.observations, usual.noise))
+    )
+    assert (off != parameter_values(usual.model, usual.estimate)).any()
+    assert (np.abs(off - exact) <= 0.1 * np.sqrt(np.diag(usual.covariance))).all()
 
 
 @pytest.fixture

@@ -25,6 +25,7 @@ from support import chain_of
 from synthetic import NOISE, made_estimate, made_model, made_states, seen_exactly, with_noise
 
 from elastocal.campaigns.campaign import Target
+from elastocal.fitting import least_squares
 from elastocal.fitting.least_squares import SETTLED, fit, fit_frames, registered, sizes_of
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.normal_equations import Parts
@@ -118,12 +119,21 @@ def test_what_has_a_prior_or_starts_larger_is_as_large_as_these_say_however_smal
     np.testing.assert_array_equal(sizes_of(model, start), expected)
 
 
-def test_a_fit_to_more_than_it_starts_from_is_that_to_all_of_them(monkeypatch):
+@pytest.mark.parametrize("long", [30, 60])
+def test_a_fit_to_more_than_it_starts_from_is_that_to_all_of_them(long, monkeypatch):
+    """From a few of them alone, or by way of some."""
     noise = GANTRY_NOISES["joints"]
     model, seen, left, right, sigma = linear_problem(noise, 60)
     expected, covariance = generalized_least_squares(left, right, sigma, PRIORS)
-    monkeypatch.setattr("elastocal.fitting.least_squares.STARTED_FROM", 20)
+    for name, count in (("STARTED_FROM", 20), ("LONG", long), ("_STEPPING_STONE", 40)):
+        monkeypatch.setattr(f"elastocal.fitting.least_squares.{name}", count)
+    fitted_to, usual = [], least_squares.robustly
+    monkeypatch.setattr(
+        least_squares, "robustly", lambda *given, **how: fitted_to.append(len(given[1])) or usual(*given, **how)
+    )
     found = fit(model, seen, noise)
+    # Whole poses.
+    assert fitted_to == [18, *([37] if long < 60 else []), 60]
     deviation = np.sqrt(np.diag(covariance))
     assert found.converged and len(found.residual) == 60
     np.testing.assert_allclose(found.estimate.coefficients[0] / deviation, expected / deviation, rtol=0, atol=1e-5)

@@ -20,6 +20,7 @@ from scipy.special import chdtri, fdtri, gammaincinv
 from elastocal.counting import counted
 from elastocal.diagnosis.evidence import Grid
 from elastocal.diagnosis.linearize import Linearized, linearized
+from elastocal.effects.conditions import at_states
 from elastocal.fitting.least_squares import LONG, ON_THE_WAY, evaluated, fit
 from elastocal.fitting.linearization import by_coordinates, linearize
 from elastocal.fitting.model import conditions, parameters, residuals
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
     from elastocal.diagnosis.settings import Settings
     from elastocal.diagnosis.statistics import Products
+    from elastocal.effects.conditions import Conditions
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Case, Estimate, Model
     from elastocal.fitting.noise import Noise
@@ -111,13 +113,21 @@ class _Beside:
         single, sample = single_observations(measurements), kept.copy()
         sample[kept] = spread_poses(select_states(single, kept), _MOST)
         near, residual = spread_poses(single, _MOST), np.empty((len(single), model.rows))
-        for _, seen, part in parts_of(single, 0):
-            residual[seen] = residuals(model, estimate, part, conditions(model, estimate, part.states))
+        whole = conditions(model, estimate, single.states) if near.all() else None
+
+        def around(part: Observations, states: slice) -> Conditions:
+            """Conditions, found once where all rows are looked at closely."""
+            if whole is None:
+                return conditions(model, estimate, part.states)
+            return whole if len(part) == len(single) else at_states(whole, states)
+
+        for states, seen, part in parts_of(single, 0):
+            residual[seen] = residuals(model, estimate, part, around(part, states))
         far = np.linalg.norm(residual / np.repeat([noise.position_m, noise.orientation_rad], 3)[: model.rows], axis=1)
         closely = near | sample | (far > np.quantile(far[near], _SCALE_QUANTILES[-1]))
         some, parts = select_states(single, closely), []
-        for _, seen, part in parts_of(some, len(parameters(model, estimate))):
-            line = (linearize if unsure else by_coordinates)(model, estimate, part, conditions(model, estimate, part.states))
+        for states, seen, part in parts_of(some, len(parameters(model, estimate))):
+            line = (linearize if unsure else by_coordinates)(model, estimate, part, around(part, states))
             jacobian = line.joint_jacobian
             own = measurement_covariances(noise, jacobian[:, None], model.rows)
             parts.append((seen, line.sensitivities if unsure else None, own, jacobian @ jacobian.transpose(0, 2, 1)))
