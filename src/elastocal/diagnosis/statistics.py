@@ -119,7 +119,8 @@ class Products:
                 together = turned.transpose(0, 2, 1) @ beside[members].reshape(flat)
                 found[mine, :, :count], found[mine, :, -1] = together[..., :-1], together[..., -1]
             found[..., count:-1] = part.candidates.times_by_pose(jacobian, part.pose)
-            found[..., count:] -= found[..., :count] @ self.projected
+            every = found.reshape(-1, width)
+            every[:, count:] -= every[:, :count] @ self.projected
             found[..., count:-1][..., self.inside] = 0.0
             yield seen, replace(part, jacobian=jacobian), found, np.maximum(values, 0.0)
 
