@@ -18,8 +18,8 @@ SECURITY = (ROOT / "SECURITY.md").read_text(encoding="utf-8")
 # Where a run begins, of what a wheel has too.
 RUN = [*ROOT.glob("src/**/*.py"), *ROOT.glob("workflow/rules/*.py"), *ROOT.glob("workflow/scripts/*.py")]
 AUDIT = [path for path in RUN if "audit" in path.parts]
-# Of the pipeline itself, and what pandas writes Markdown by.
-IMPORTED_BY_OTHERS = {"snakemake", "tabulate"}
+# What pandas writes Markdown by.
+IMPORTED_BY_OTHERS = {"tabulate"}
 # It is where its package's own list of modules does not have it.
 DISTRIBUTIONS = packages_distributions() | {"pinocchio": ["pin"]}
 
