@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     # The three axes of a frame and its origin in base axes: each (3, S), or (3, 1) before any coordinate has moved it.
     Frame = tuple[list[np.ndarray], np.ndarray]
 
-# So many configurations at a time keep all intermediate arrays in a second-level cache.
-BLOCK = 8192
+# So many configurations at a time keep all intermediate arrays in a second-level cache; so many of their twists, too.
+BLOCK, _TWISTS = 8192, 16_384
 
 
 def _walk(chain: Chain, coordinates: np.ndarray, until: int) -> list[Frame]:
@@ -192,22 +192,24 @@ def motion(chain: Chain, coordinates: np.ndarray, points: Sequence[MeasuringPoin
     `coordinates` (S, C): rad and m.
     """
     moving = sorted((t.coordinate, place) for place, t in enumerate(chain.transforms) if t.coordinate is not None)
-    position, rotation, twist = _room(coordinates, (len(points), 3), (len(points), 3, 3), (6, len(moving)))
-    for part, frames in _blocks(chain, coordinates, len(chain.transforms), BLOCK // 8):
+    shapes = (len(points), 3), (len(points), 3, 3), (6, len(moving))
+    position, rotation, twist = (np.empty((*shape, len(coordinates))) for shape in shapes)
+    # Frames of all transforms take more than those up to a point.
+    for part, frames in _blocks(chain, coordinates, len(chain.transforms), BLOCK // 2):
         _store_poses(frames, points, position[..., part], rotation[..., part])
-        linear, angular = twist[:3, :, part], twist[3:, :, part]
-        origins, slides = np.zeros_like(angular), []
-        for coordinate, place in moving:
-            transform, (axes, origin) = chain.transforms[place], frames[place]
-            axis = axes[transform.axis] if transform.sign > 0 else -axes[transform.axis]
-            if transform.kind == "T":
-                slides.append((coordinate, axis))
-            else:
-                angular[:, coordinate], origins[:, coordinate] = axis, origin
-        # Of all turns at once.
-        cross(origins, angular, linear)
-        for coordinate, axis in slides:
-            linear[:, coordinate] = axis
+        # Those of many coordinates at once where there are few configurations.
+        step = max(_TWISTS // max(len(coordinates[part]), 1), 1)
+        for start in range(0, len(moving), step):
+            linear, angular = twist[:3, start : start + step, part], twist[3:, start : start + step, part]
+            origins, slides = np.empty(angular.shape), []
+            for number, (_, place) in enumerate(moving[start : start + step]):
+                transform, (axes, origins[:, number]) = chain.transforms[place], frames[place]
+                axis = axes[transform.axis] if transform.sign > 0 else -axes[transform.axis]
+                angular[:, number] = 0.0 if transform.kind == "T" else axis
+                slides += [(number, axis)] if transform.kind == "T" else []
+            cross(origins, angular, linear)
+            for number, axis in slides:
+                linear[:, number] = axis
     return Motion(position, rotation, twist, np.array([place for _, place in moving], int))
 
 
