@@ -21,7 +21,6 @@ from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import blas
 
 from elastocal.campaigns.holdout import SAME_POSE_RAD, configurations
 from elastocal.fitting.least_squares import ON_THE_WAY, fit
@@ -79,14 +78,12 @@ def repeatable_part(fitted: Fit, observations: Observations, seed: int) -> Repea
     # Of each kind of functions the products with residuals by configurations, with themselves and with sensitivities by folds.
     sums = [[np.zeros(s) for s in ((count, n), (_FOLDS, n, n), (_FOLDS, n, parameters))] for n in sizes]
     followed, leverage = np.zeros((count, parameters)), np.zeros(count)
-    free, root = np.flatnonzero(~fitted.held), np.zeros_like(fitted.covariance)
-    root[np.ix_(free, free)] = np.linalg.cholesky(fitted.covariance[np.ix_(free, free)])
     white_residual, weight = fitted.whitened(fitted.residual), np.sqrt(fitted.weights)[:, None, None]
     for seen, plain, white in fitted.sensitivities(some):
         mine, w, there = group[seen], weight[seen], inputs.select(seen)
         np.add.at(followed, mine, np.einsum("mrp,mr->mp", white, white_residual[seen]))
         flat = white.reshape(len(white) * white.shape[1], parameters)
-        spread = (blas.dtrmm(1.0, root, flat.T, lower=1, trans_a=1) ** 2).sum(axis=0)
+        spread = ((flat @ fitted.covariance) * flat).sum(axis=1)
         np.add.at(leverage, mine, spread.reshape(white.shape[:2]).mean(axis=1))
         parts = [fold[mine] == k for k in range(_FOLDS)]
         slopes = [(w[part] * plain[part, :3]).reshape(3 * part.sum(), parameters) for part in parts]
