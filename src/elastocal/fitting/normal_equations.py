@@ -72,7 +72,7 @@ def identifiable(gram: np.ndarray, frozen: np.ndarray, nonlinear: np.ndarray) ->
         kept = np.delete(kept, first)
     # Parameters that came later may have taken from what identified their predecessors.
     while len(kept):
-        covariance = positive_inverse(gram[np.ix_(kept, kept)])
+        covariance = inverse_by_factor(dpotrf(gram[np.ix_(kept, kept)], lower=1)[0])
         deviation = np.sqrt(np.diag(covariance))
         worst = int(np.argmax(deviation))
         if deviation[worst] <= 1.0:
@@ -84,11 +84,11 @@ def identifiable(gram: np.ndarray, frozen: np.ndarray, nonlinear: np.ndarray) ->
     return np.isin(np.arange(len(gram)), kept), found
 
 
-def positive_inverse(matrix: np.ndarray) -> np.ndarray:
-    """Inverse of a symmetric positive matrix, by Cholesky's factor."""
-    lower = dpotri(dpotrf(matrix, lower=1)[0], lower=1)[0]
+def inverse_by_factor(lower: np.ndarray) -> np.ndarray:
+    """Inverse of a symmetric positive matrix, of which this is Cholesky's factor."""
+    inverse = dpotri(lower, lower=1)[0]
     # LAPACK leaves the other triangle as it was.
-    return np.tril(lower) + np.tril(lower, -1).T
+    return np.tril(inverse) + np.tril(inverse, -1).T
 
 
 def _first_without_information(gram: np.ndarray) -> int | None:

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.linalg import lapack
 
+from elastocal.fitting.normal_equations import inverse_by_factor
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
@@ -341,11 +343,7 @@ def _surprise(logarithms: np.ndarray, inputs: np.ndarray, standard: np.ndarray) 
         return np.inf, np.zeros(len(logarithms))
     along = lapack.dpotrs(lower, standard, lower=1)[0]
     value = 0.5 * (standard * along).sum() + axes * (np.log(np.diag(lower)).sum() + 0.5 * count * np.log(2.0 * np.pi))
-    inverse = lapack.dpotri(lower, lower=1, overwrite_c=1)[0]
-    # LAPACK leaves the other triangle as it was.
-    inverse = np.tril(inverse)
-    inverse += np.tril(inverse, -1).T
-    inverse *= -axes
+    inverse = -axes * inverse_by_factor(lower)
     inverse += along @ along.T
     of_noise, of_variance = noise * np.trace(inverse), variance * np.vdot(inverse.T, correlation)
     slope *= inverse
