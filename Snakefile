@@ -56,7 +56,11 @@ onsuccess:
 rule paper:
     input:
         rules.compile_paper.output.report,
-        expand("reports/tables/table{number}.{format}", number=[1, 2, 3, 4], format=["csv", "md", "tex"]),
+        expand(
+            "reports/tables/table{number}.{format}",
+            number=[1, 2, 3, 4],
+            format=["csv", "md", "tex"],
+        ),
         expand("reports/figures/{figure}.{format}", figure=PAPER_FIGURES, format=["pdf", "png"]),
         lambda wildcards: files_behind(rules.paper.input),
 
@@ -68,7 +72,13 @@ rule study:
         rules.compile_report.output.report,
         expand(
             "reports/tables/{table}.csv",
-            table=["comparison", "joint_test", "extended", "strategies_over_studies", "break_even"],
+            table=[
+                "comparison",
+                "joint_test",
+                "extended",
+                "strategies_over_studies",
+                "break_even",
+            ],
         ),
         expand("reports/tables/{table}.csv", table=["ladder", "simulated_designs"]),
         rules.tabulate_budget.output,

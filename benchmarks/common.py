@@ -1,4 +1,5 @@
-"""What the benchmarks share: a row of the report, interleaved timing, and the robots and strategies of the repository."""
+"""What the benchmarks share: a row of the report, interleaved timing, and the robots
+and strategies of the repository."""
 
 import resource
 import time
@@ -15,7 +16,8 @@ from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.strategies import Strategy, strategy_from_document
 
 ROOT = Path(__file__).resolve().parents[1]
-# Seconds of `_yardstick` where limits in seconds are stated: two idle cores of an AMD EPYC; CPU time, the least of 40.
+# Seconds of `_yardstick` where limits in seconds are stated: two idle cores of an AMD
+# EPYC; CPU time, the least of 40.
 YARDSTICK_S = 0.14
 Found = TypeVar("Found")
 
@@ -24,8 +26,9 @@ Found = TypeVar("Found")
 class Row:
     """One line of reports/benchmarks.csv.
 
-    `benchmark`: its first word is the module that measures it. `ours_s`, `theirs_s`: seconds; none where the benchmark does not
-    compare times. `target`: what the ratio should be; empty for a row that informs only. `how`: one sentence.
+    `benchmark`: its first word is the module that measures it. `ours_s`, `theirs_s`:
+    seconds; none where the benchmark does not compare times. `target`: what the ratio
+    should be; empty for a row that informs only. `how`: one sentence.
     """
 
     benchmark: str
@@ -37,16 +40,30 @@ class Row:
     how: str
 
     @classmethod
-    def of_limit(cls, benchmark: str, seconds: float, allowed_s: float, how: str) -> "Row":
+    def of_limit(
+        cls, benchmark: str, seconds: float, allowed_s: float, how: str
+    ) -> "Row":
         """Seconds against those that are allowed on this machine."""
-        return cls(benchmark, seconds, allowed_s, seconds / allowed_s, "<= 1", seconds <= allowed_s, how)
+        return cls(
+            benchmark,
+            seconds,
+            allowed_s,
+            seconds / allowed_s,
+            "<= 1",
+            seconds <= allowed_s,
+            how,
+        )
 
 
-def interleaved(functions: Mapping[str, Callable[[], Any]], repetitions: int) -> list[list[float]]:
-    """CPU seconds of several functions without arguments, by the names to print, their processes included; a list for each.
+def interleaved(
+    functions: Mapping[str, Callable[[], Any]], repetitions: int
+) -> list[list[float]]:
+    """CPU seconds of several functions without arguments, by the names to print, their
+    processes included; a list for each.
 
-    They are called in turn so that a busy spell of the machine hits all of them. Other processes only ever add to them: the
-    least of a few is the function's own (documentation of `timeit`).
+    They are called in turn so that a busy spell of the machine hits all of them. Other
+    processes only ever add to them: the least of a few is the function's own
+    (documentation of `timeit`).
     """
     seconds: list[list[float]] = [[] for _ in functions]
     for repetition in range(1, repetitions + 1):
@@ -54,21 +71,29 @@ def interleaved(functions: Mapping[str, Callable[[], Any]], repetitions: int) ->
             start = _cpu_seconds()
             function()
             taken.append(_cpu_seconds() - start)
-        last = ", ".join(f"{name} {taken[-1]:.3f} s" for name, taken in zip(functions, seconds, strict=True))
+        last = ", ".join(
+            f"{name} {taken[-1]:.3f} s"
+            for name, taken in zip(functions, seconds, strict=True)
+        )
         print(f"  {repetition}/{repetitions}: {last}", flush=True)
     return seconds
 
 
 def _cpu_seconds() -> float:
     """Of this process and those that it has ended."""
-    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    used = [
+        resource.getrusage(who)
+        for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    ]
     return sum(each.ru_utime + each.ru_stime for each in used)
 
 
 def beside_yardstick(function: Callable[[], Found]) -> tuple[Found, float]:
-    """What a function returns, and how many times as long this machine takes as the one for which limits in seconds are stated.
+    """What a function returns, and how many times as long this machine takes as the one
+    for which limits in seconds are stated.
 
-    A fixed piece of work just before and just after says so: a machine that is slow, or busy, is allowed more.
+    A fixed piece of work just before and just after says so: a machine that is slow, or
+    busy, is allowed more.
     """
     before = _yardstick()
     found = function()
@@ -76,7 +101,8 @@ def beside_yardstick(function: Callable[[], Found]) -> tuple[Found, float]:
 
 
 def _yardstick() -> float:
-    """Seconds of least-squares problems of the engine's size, the mean of three rounds."""
+    """Seconds of least-squares problems of the engine's size, the mean of three
+    rounds."""
     rounds = 3
     matrix = np.random.default_rng(1).standard_normal((200, 40))
     start = time.perf_counter()
@@ -93,4 +119,6 @@ def load_robot(name: str) -> Robot:
 
 def load_strategy(name: str) -> Strategy:
     """Strategy of config/strategies."""
-    return strategy_from_document(read_document(ROOT / "config" / "strategies" / f"{name}.yaml"))
+    return strategy_from_document(
+        read_document(ROOT / "config" / "strategies" / f"{name}.yaml")
+    )

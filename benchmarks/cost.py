@@ -1,7 +1,8 @@
-"""What a data set of the study and a case of the blind proof cost, and what many of them would: the tables of docs/cluster.md.
+"""What a data set of the study and a case of the blind proof cost, and what many of
+them would: the tables of docs/cluster.md.
 
-Usage: python benchmarks/cost.py SMALL LARGE BLIND --data-sets FEW MORE, with folders of finished runs: the study with few data
-sets, with more, and the quick blind proof.
+Usage: python benchmarks/cost.py SMALL LARGE BLIND --data-sets FEW MORE, with folders of
+finished runs: the study with few data sets, with more, and the quick blind proof.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ JOB_MINUTES = 30
 
 @dataclass(frozen=True)
 class Cost:
-    """Of a finished run: CPU seconds as Snakemake measured them, bytes that it holds, largest memory of a job, MB."""
+    """Of a finished run: CPU seconds as Snakemake measured them, bytes that it holds,
+    largest memory of a job, MB."""
 
     cpu_s: float
     stored_mb: float
@@ -26,8 +28,17 @@ class Cost:
 
 def cost(folder: Path) -> Cost:
     """Cost of a finished run."""
-    jobs = [row for path in (folder / "results/timings").rglob("*.tsv") for row in csv.DictReader(path.open(), delimiter="\t")]
-    files = [path for name in ("data", "results", "reports") for path in (folder / name).rglob("*") if path.is_file()]
+    jobs = [
+        row
+        for path in (folder / "results/timings").rglob("*.tsv")
+        for row in csv.DictReader(path.open(), delimiter="\t")
+    ]
+    files = [
+        path
+        for name in ("data", "results", "reports")
+        for path in (folder / name).rglob("*")
+        if path.is_file()
+    ]
     return Cost(
         sum(_number(row["cpu_time"]) for row in jobs),
         sum(path.stat().st_size for path in files) / 1e6,
@@ -60,9 +71,17 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     for name in ("small", "large", "blind"):
         parser.add_argument(name, type=Path)
-    parser.add_argument("--data-sets", type=int, nargs=2, required=True, help="of the small and of the large study")
+    parser.add_argument(
+        "--data-sets",
+        type=int,
+        nargs=2,
+        required=True,
+        help="of the small and of the large study",
+    )
     given = parser.parse_args()
-    small, large, blind = cost(given.small), cost(given.large), cost(given.blind)
+    small = cost(given.small)
+    large = cost(given.large)
+    blind = cost(given.blind)
     more = given.data_sets[1] - given.data_sets[0]
     cases = sum(path.is_dir() for path in given.blind.glob("data/blind/*/*"))
     head = (
@@ -77,6 +96,24 @@ if __name__ == "__main__":
         "largest job, MB",
     )
     print("| " + " | ".join(head) + " |\n|" + "---|" * len(head))
-    print(plan("data set", (large.cpu_s - small.cpu_s) / more, (large.stored_mb - small.stored_mb) / more, 1e6, large.peak_mb))
-    print(plan("blind case", blind.cpu_s / cases, blind.stored_mb / cases, 1e5, blind.peak_mb))
-    print(f"\nfrom {given.data_sets[0]} and {given.data_sets[1]} data sets, {cases} cases")
+    print(
+        plan(
+            "data set",
+            (large.cpu_s - small.cpu_s) / more,
+            (large.stored_mb - small.stored_mb) / more,
+            1e6,
+            large.peak_mb,
+        )
+    )
+    print(
+        plan(
+            "blind case",
+            blind.cpu_s / cases,
+            blind.stored_mb / cases,
+            1e5,
+            blind.peak_mb,
+        )
+    )
+    print(
+        f"\nfrom {given.data_sets[0]} and {given.data_sets[1]} data sets, {cases} cases"
+    )

@@ -1,8 +1,9 @@
-"""The diagnosing engine: a fit against one dense least-squares problem of its size, a case of the blind proof, growth with
-rows, and campaigns of thousands and a million measurements.
+"""The diagnosing engine: a fit against one dense least-squares problem of its size, a
+case of the blind proof, growth with rows, and campaigns of thousands and a million
+measurements.
 
-A case and a large campaign are diagnosed and judged by a process of their own, from folder to verdict, which notes its peak
-memory at the end (Linux).
+A case and a large campaign are diagnosed and judged by a process of their own, from
+folder to verdict, which notes its peak memory at the end (Linux).
 """
 
 import json
@@ -34,7 +35,8 @@ from elastocal_proof.plant.physical_robot import specimen
 
 ROBOTS = ROOT / "config" / "robots"
 SEED = 2026
-# Laws that do not depend on the estimate, as most of a measured robot's, of which a fit has many.
+# Laws that do not depend on the estimate, as most of a measured robot's, of which a fit
+# has many.
 FITTED = ("joint_offset", "transmission_harmonic", "bearing_runout", "link_weight")
 LARGE = Design(
     held_out=0,
@@ -45,8 +47,13 @@ LARGE = Design(
     covariates=("time",),
     declared=("joint_offset", "link_geometry"),
 )
-FIT_TARGET, GROWTH_TARGET = 8.0, 1.2
-CASE_S, SERIES_A_S, SERIES_A_GB, MILLION_S, MILLION_GB = 0.85, 45.0, 0.7, 120.0, 2.0
+FIT_TARGET = 8.0
+GROWTH_TARGET = 1.2
+CASE_S = 0.85
+SERIES_A_S = 45.0
+SERIES_A_GB = 0.7
+MILLION_S = 120.0
+MILLION_GB = 2.0
 SCRIPT = """
 import json, resource, sys, time
 from elastocal.diagnosis.diagnose import diagnose
@@ -68,7 +75,8 @@ print(json.dumps({"seconds": seconds, "peak_gb": peak, "measurements": len(train
 
 @dataclass(frozen=True)
 class Setting:
-    """Measurements of a fit, repetitions, cases, rows of UR10 Series A (None: all), of two campaigns and of a large one."""
+    """Measurements of a fit, repetitions, cases, rows of UR10 Series A (None: all), of
+    two campaigns and of a large one."""
 
     fitted: int
     repetitions: int
@@ -78,9 +86,10 @@ class Setting:
     million: int
 
 
-# The median of a dozen cases lies between two groups of them and jumps by a tenth from run to run. The small setting measures
-# one campaign for all.
-FULL, SMALL = Setting(6000, 3, 48, None, (20_000, 80_000), 1_000_000), Setting(1000, 1, 1, 60, (1000, 30_000), 1000)
+# The median of a dozen cases lies between two groups of them and jumps by a tenth from
+# run to run. The small setting measures one campaign for all.
+FULL = Setting(6000, 3, 48, None, (20_000, 80_000), 1_000_000)
+SMALL = Setting(1000, 1, 1, 60, (1000, 30_000), 1000)
 
 
 def rows(work: Path, setting: Setting) -> Iterator[Row]:
@@ -92,29 +101,54 @@ def rows(work: Path, setting: Setting) -> Iterator[Row]:
     yield _case(work, setting.cases)
     few, many = (_run([_large(work, measurements)]) for measurements in setting.growth)
     (small,), (large,) = few["seconds"], many["seconds"]
-    exponent = float(np.log(large / small) / np.log(many["measurements"] / few["measurements"]))
+    exponent = float(
+        np.log(large / small) / np.log(many["measurements"] / few["measurements"])
+    )
     how = f"exponent of the CPU time in the rows: {many['measurements']} against {few['measurements']}, from file to verdict"
-    yield Row("engine growth", large, small, exponent, f"<= {GROWTH_TARGET}", exponent <= GROWTH_TARGET, how)
+    yield Row(
+        "engine growth",
+        large,
+        small,
+        exponent,
+        f"<= {GROWTH_TARGET}",
+        exponent <= GROWTH_TARGET,
+        how,
+    )
     if os.environ.get(FOLDER_VARIABLE):
         series = importer("ur10_ipa", "config", "the benchmark")
         source = Path(os.environ[FOLDER_VARIABLE], series.files["ur10_ipa_a"].local)
         header, *lines = source.read_text(encoding="utf-8").splitlines(keepends=True)
         kept = lines[: setting.series_a]
         (work / "series_a.csv").write_text("".join([header, *kept]), encoding="utf-8")
-        series.write_campaign([work / "series_a.csv"], work / "series_a", "config/robots", "ur10_series_a")
+        series.write_campaign(
+            [work / "series_a.csv"], work / "series_a", "config/robots", "ur10_series_a"
+        )
         how = f"UR10 Series A, {len(kept):,} poses, from its folder to its verdict, one thread as in a job of the workflow"
-        yield from _limits("engine ur10_series_a", work / "series_a", SERIES_A_S, SERIES_A_GB, how)
+        yield from _limits(
+            "engine ur10_series_a", work / "series_a", SERIES_A_S, SERIES_A_GB, how
+        )
     how = f"{setting.million:,} measurements, each a pose of its own, from file to verdict, one thread as in a job"
-    yield from _limits("engine million", _large(work, setting.million), MILLION_S, MILLION_GB, how)
+    yield from _limits(
+        "engine million", _large(work, setting.million), MILLION_S, MILLION_GB, how
+    )
 
 
 def _fit(work: Path, measurements: int, repetitions: int) -> Row:
-    """A robust fit of many effects, to its end, against one dense least-squares problem of as many rows and columns."""
+    """A robust fit of many effects, to its end, against one dense least-squares problem
+    of as many rows and columns."""
     case, _ = cases_in(_large(work, measurements), ROBOTS)
-    effects = tuple(each for each in case.candidates.values() if each.effect in FITTED and not each.shapes)
+    effects = tuple(
+        each
+        for each in case.candidates.values()
+        if each.effect in FITTED and not each.shapes
+    )
     model = replace(case.model, effects=(*case.model.effects, *effects))
-    noise, start = estimated_noise(case)[0], registered(model, case.observations)
-    size = case.observations.rows * len(case.observations), len(parameters(model, start))
+    noise = estimated_noise(case)[0]
+    start = registered(model, case.observations)
+    size = (
+        case.observations.rows * len(case.observations),
+        len(parameters(model, start)),
+    )
     matrix = np.random.default_rng(1).standard_normal(size)
     functions: dict[str, Callable[[], Any]] = {
         "fit": lambda: fit(model, case.observations, noise, start),
@@ -122,38 +156,74 @@ def _fit(work: Path, measurements: int, repetitions: int) -> Row:
     }
     ours, theirs = map(min, interleaved(functions, repetitions))
     how = f"a robust fit against one numpy.linalg.lstsq of {size[0]} rows and {size[1]} parameters, least of {repetitions}"
-    return Row("engine fit", ours, theirs, ours / theirs, f"<= {FIT_TARGET:g}", ours / theirs <= FIT_TARGET, how)
+    return Row(
+        "engine fit",
+        ours,
+        theirs,
+        ours / theirs,
+        f"<= {FIT_TARGET:g}",
+        ours / theirs <= FIT_TARGET,
+        how,
+    )
 
 
 def _case(work: Path, cases: int) -> Row:
     # Development cases: those of the proof stay unseen.
-    some = cases_of(read_document(ROOT / "config" / "blind.yaml"), "development", SEED)[:cases]
+    some = cases_of(read_document(ROOT / "config" / "blind.yaml"), "development", SEED)[
+        :cases
+    ]
     for case in some:
         make_case(case, work / "blind", work / "sealed", ROBOTS)
     # The first pays for the imports.
-    run, slower = beside_yardstick(lambda: _run([work / "blind" / case.name for case in (some[0], *some)]))
+    run, slower = beside_yardstick(
+        lambda: _run([work / "blind" / case.name for case in (some[0], *some)])
+    )
     how = f"median of {cases} cases of the development set, diagnosed and judged in one process, one thread"
     return Row.of_limit("engine case", median(run["seconds"][1:]), CASE_S * slower, how)
 
 
-def _limits(name: str, folder: Path, allowed_s: float, allowed_gb: float, how: str) -> Iterator[Row]:
+def _limits(
+    name: str, folder: Path, allowed_s: float, allowed_gb: float, how: str
+) -> Iterator[Row]:
     run, slower = beside_yardstick(lambda: _run([folder]))
     (seconds,), peak = run["seconds"], run["peak_gb"]
     yield Row.of_limit(f"{name} time", seconds, allowed_s * slower, how)
     memory = f"peak of {peak:.2f} GB against {allowed_gb:g} GB: {how}"
-    yield Row(f"{name} memory", None, None, peak / allowed_gb, "<= 1", peak <= allowed_gb, memory)
+    yield Row(
+        f"{name} memory",
+        None,
+        None,
+        peak / allowed_gb,
+        "<= 1",
+        peak <= allowed_gb,
+        memory,
+    )
 
 
 def _large(work: Path, measurements: int) -> Path:
-    """A campaign of a robot without loads, each measurement a pose of its own, one reflector on the flange."""
+    """A campaign of a robot without loads, each measurement a pose of its own, one
+    reflector on the flange."""
     folder = work / f"large{measurements}"
     if not folder.is_dir():
         file = ROBOTS / "fanuc.yaml"
         arm = arm_from_file(file)
-        robot = with_defects(specimen(arm, 4), [Defect("transmission_harmonic", (2,), 1e-4, 1)])
-        document = campaign_document("large", arm, LARGE) | {"compliance": "nominal", "holdout": {"fraction": 0.3, "seed": 1}}
-        table = measured_table(robot, LARGE, schedule_of(arm, replace(LARGE, poses=measurements), 4))
-        write_campaign(folder, document | {"noise": {"position_m": robot.tracker.sigma_m}}, table, arm.joints, "parquet")
+        robot = with_defects(
+            specimen(arm, 4), [Defect("transmission_harmonic", (2,), 1e-4, 1)]
+        )
+        document = campaign_document("large", arm, LARGE) | {
+            "compliance": "nominal",
+            "holdout": {"fraction": 0.3, "seed": 1},
+        }
+        table = measured_table(
+            robot, LARGE, schedule_of(arm, replace(LARGE, poses=measurements), 4)
+        )
+        write_campaign(
+            folder,
+            document | {"noise": {"position_m": robot.tracker.sigma_m}},
+            table,
+            arm.joints,
+            "parquet",
+        )
         write_robot(folder, file, robot, arm.masses)
     return folder
 
@@ -162,5 +232,11 @@ def _run(folders: Sequence[Path]) -> dict[str, Any]:
     """What a process of its own prints last."""
     names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
     command = [sys.executable, "-c", SCRIPT, str(ROBOTS), *map(str, folders)]
-    done = subprocess.run(command, env=os.environ | dict.fromkeys(names, "1"), check=True, capture_output=True, text=True)
+    done = subprocess.run(
+        command,
+        env=os.environ | dict.fromkeys(names, "1"),
+        check=True,
+        capture_output=True,
+        text=True,
+    )
     return json.loads(done.stdout.splitlines()[-1])

@@ -8,7 +8,12 @@ import numpy as np
 from common import Row, interleaved, load_robot, load_strategy
 
 from elastocal.mechanics.robot import Robot
-from elastocal.study.equation_11 import Measurements, estimate_compliance, regressors_of, stacked
+from elastocal.study.equation_11 import (
+    Measurements,
+    estimate_compliance,
+    regressors_of,
+    stacked,
+)
 from elastocal.study.simulation import (
     Loading,
     blocks_of_sets,
@@ -19,7 +24,12 @@ from elastocal.study.simulation import (
 from elastocal.study.strategies import Strategy
 
 ROWS = 6
-LOADING = Loading(force_N=1000.0, offset_m=(0.0, 0.5, 0.0), offset_frame="base", joint_range="full_turn")
+LOADING = Loading(
+    force_N=1000.0,
+    offset_m=(0.0, 0.5, 0.0),
+    offset_frame="base",
+    joint_range="full_turn",
+)
 NOISE = 200e-6
 TARGET = 20
 TOLERANCE = 1e-9
@@ -34,20 +44,30 @@ class Setting:
     repetitions: int
 
 
-FULL, SMALL = Setting(1000, 100, 3), Setting(4, 10, 1)
+FULL = Setting(1000, 100, 3)
+SMALL = Setting(4, 10, 1)
 
 
 def rows(work: Path, setting: Setting) -> list[Row]:
     """The row of the report; `work` is not used."""
-    sets, configurations, repetitions = setting.sets, setting.configurations, setting.repetitions
-    robot, strategy = load_robot("kuka"), load_strategy("6DoF")
+    sets = setting.sets
+    configurations = setting.configurations
+    repetitions = setting.repetitions
+    robot = load_robot("kuka")
+    strategy = load_strategy("6DoF")
     joints = robot.joints
-    blocks = [_measurements(robot, strategy, block, configurations) for block in blocks_of_sets(sets)]
+    blocks = [
+        _measurements(robot, strategy, block, configurations)
+        for block in blocks_of_sets(sets)
+    ]
     systems = [_systems(measurements["6DoF"]) for measurements in blocks]
     order = list(strategy.stages[0].identified)
 
     def ours() -> list[np.ndarray]:
-        return [estimate_compliance(strategy, measurements, joints)[0] for measurements in blocks]
+        return [
+            estimate_compliance(strategy, measurements, joints)[0]
+            for measurements in blocks
+        ]
 
     def loop() -> np.ndarray:
         found = np.empty((sets, configurations, joints))
@@ -56,37 +76,70 @@ def rows(work: Path, setting: Setting) -> list[Row]:
             for matrix, deflection in zip(matrices, deflections, strict=True):
                 for length in range(1, configurations + 1):
                     end = ROWS * length
-                    found[number, length - 1] = np.linalg.lstsq(matrix[:end], deflection[:end])[0]
+                    found[number, length - 1] = np.linalg.lstsq(
+                        matrix[:end], deflection[:end]
+                    )[0]
                 number += 1
         return found
 
     _assert_equal(np.concatenate(ours(), axis=2).transpose(2, 0, 1)[..., order], loop())
-    alone, theirs = map(min, interleaved({"elastocal": ours, "numpy.linalg.lstsq": loop}, repetitions))
+    alone, theirs = map(
+        min, interleaved({"elastocal": ours, "numpy.linalg.lstsq": loop}, repetitions)
+    )
     against = f"a loop of numpy.linalg.lstsq over {sets} data sets and {configurations} prefixes, 6DoF on kuka"
     how = f"estimate_compliance against {against}, minimum of {repetitions}, equal to {TOLERANCE:g}"
-    return [Row("identification", alone, theirs, theirs / alone, f">= {TARGET}", theirs / alone >= TARGET, how)]
+    return [
+        Row(
+            "identification",
+            alone,
+            theirs,
+            theirs / alone,
+            f">= {TARGET}",
+            theirs / alone >= TARGET,
+            how,
+        )
+    ]
 
 
-def _measurements(robot: Robot, strategy: Strategy, sets: Sequence[int], configurations: int) -> dict[str, Measurements]:
+def _measurements(
+    robot: Robot, strategy: Strategy, sets: Sequence[int], configurations: int
+) -> dict[str, Measurements]:
     experiments = random_experiments(
-        robot.chain, robot.joint_limits, 1, "kuka", LOADING, "identification", sets, configurations
+        robot.chain,
+        robot.joint_limits,
+        1,
+        "kuka",
+        LOADING,
+        "identification",
+        sets,
+        configurations,
     )
     point = robot.chain.end_effector
     noise = NOISE * measurement_noise(1, "kuka", point.name, sets, configurations)
     measured = true_deflections(robot, experiments, point, "end_effector") + noise
-    matrices = regressors_of(experiments, robot.chain, strategy.points, ROWS, "end_effector")
+    matrices = regressors_of(
+        experiments, robot.chain, strategy.points, ROWS, "end_effector"
+    )
     return {point.name: stacked(matrices[point.name], measured)}
 
 
 def _systems(measurements: Measurements) -> tuple[np.ndarray, np.ndarray]:
-    """Matrix and right-hand side of each data set, contiguous, so that the loop has nothing to do but to solve."""
+    """Matrix and right-hand side of each data set, contiguous, so that the loop has
+    nothing to do but to solve."""
     _, joints, _, sets = measurements.regressor.shape
-    matrices = np.ascontiguousarray(measurements.regressor.transpose(3, 2, 0, 1)).reshape(sets, -1, joints)
-    return matrices, np.ascontiguousarray(measurements.deflection.transpose(2, 1, 0)).reshape(sets, -1)
+    matrices = np.ascontiguousarray(
+        measurements.regressor.transpose(3, 2, 0, 1)
+    ).reshape(sets, -1, joints)
+    return matrices, np.ascontiguousarray(
+        measurements.deflection.transpose(2, 1, 0)
+    ).reshape(sets, -1)
 
 
 def _assert_equal(ours: np.ndarray, theirs: np.ndarray) -> None:
-    """No estimate differs by more than the tolerance times the largest compliance of the same data set and prefix."""
+    """No estimate differs by more than the tolerance times the largest compliance of
+    the same data set and prefix."""
     difference = np.abs(ours - theirs) / np.abs(theirs).max(axis=2, keepdims=True)
     if not difference.max() <= TOLERANCE:
-        raise AssertionError(f"estimates differ by {difference.max():.2g} of the largest compliance")
+        raise AssertionError(
+            f"estimates differ by {difference.max():.2g} of the largest compliance"
+        )

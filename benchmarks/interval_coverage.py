@@ -1,6 +1,8 @@
-"""How often 95 % intervals of held-out errors contain the true value: `python benchmarks/interval_coverage.py`, two minutes.
+"""How often 95 % intervals of held-out errors contain the true value: `python
+benchmarks/interval_coverage.py`, two minutes.
 
-Prints the table of docs/held_out_intervals.md; `--draw PAGE` draws the table of that page beside it instead.
+Prints the table of docs/held_out_intervals.md; `--draw PAGE` draws the table of that
+page beside it instead.
 """
 
 import argparse
@@ -15,7 +17,8 @@ from scipy.stats import bootstrap
 from elastocal.figures.style import PALETTE, panels, styled
 from elastocal.validation.held_out import Errors, intervals
 
-POSES, REPLICATES = (9, 18, 36), 999
+POSES = (9, 18, 36)
+REPLICATES = 999
 FIGURES = ("mean_m", "rms_m", "reduction", "reduction of none")
 METHODS = ("percentile", "BCa", "ours")
 
@@ -29,70 +32,122 @@ def main() -> None:
     if given.draw:
         return draw(given.draw)
     campaigns = given.campaigns
-    print("| errors | poses |" + "|".join(f" {name.removesuffix('_m')} " for name in FIGURES) + "|")
+    print(
+        "| errors | poses |"
+        + "|".join(f" {name.removesuffix('_m')} " for name in FIGURES)
+        + "|"
+    )
     print("|---" * (2 + len(FIGURES)) + "|")
     for kind in KINDS:
         truth = true_figures(kind)
         for poses in POSES:
             held = covered(kind, poses, campaigns, truth)
-            cells = [" / ".join(f"{100 * held[name, method]:.0f}" for method in METHODS) for name in FIGURES]
+            cells = [
+                " / ".join(f"{100 * held[name, method]:.0f}" for method in METHODS)
+                for name in FIGURES
+            ]
             print(f"| {kind} | {poses} | " + " | ".join(cells) + " |", flush=True)
 
 
 @styled
 def draw(page: Path) -> None:
-    """Draw how often the intervals of the RMS error contain the true value, by the table of a page, as a picture beside it."""
-    lines = [line.strip("| \n").split(" | ") for line in page.read_text(encoding="utf-8").splitlines() if " / " in line]
+    """Draw how often the intervals of the RMS error contain the true value, by the
+    table of a page, as a picture beside it."""
+    lines = [
+        line.strip("| \n").split(" | ")
+        for line in page.read_text(encoding="utf-8").splitlines()
+        if " / " in line
+    ]
     figure, axes = panels(1, len(KINDS), 58, sharey=True)
     for axis, kind in zip(axes[0], KINDS, strict=True):
         rows = [line for line in lines if line[0] == kind]
-        values = np.array([[float(cell) for cell in row[2 + FIGURES.index("rms_m")].split(" / ")] for row in rows])
+        values = np.array(
+            [
+                [float(cell) for cell in row[2 + FIGURES.index("rms_m")].split(" / ")]
+                for row in rows
+            ]
+        )
         for column, method in enumerate(METHODS):
             name = "in use" if method == "ours" else method
-            axis.plot([int(row[1]) for row in rows], values[:, column], "o-", color=PALETTE[2 - column], ms=4, label=name)
+            axis.plot(
+                [int(row[1]) for row in rows],
+                values[:, column],
+                "o-",
+                color=PALETTE[2 - column],
+                ms=4,
+                label=name,
+            )
         axis.axhline(95, color="black", lw=0.8, ls=":")
         axis.set(title=kind, xlabel="held-out poses", xticks=POSES)
     axes[0, 0].set_ylabel("intervals with the true value (%)")
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    figure.legend(
+        *axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3
+    )
     figure.savefig(page.with_suffix(".png"), metadata={"Software": None}, dpi=150)
 
 
-def covered(kind: str, poses: int, campaigns: int, truth: Mapping[str, float]) -> dict[tuple[str, str], float]:
+def covered(
+    kind: str, poses: int, campaigns: int, truth: Mapping[str, float]
+) -> dict[tuple[str, str], float]:
     """Shares of campaigns whose intervals contain the true value."""
-    rng, hits = np.random.default_rng(7), {}
+    rng = np.random.default_rng(7)
+    hits = {}
     for before, after, false in campaigns_of(kind, campaigns, poses, (8, poses)):
-        found = {method: by_scipy(before, after, false, method, rng) for method in METHODS[:2]}
+        found = {
+            method: by_scipy(before, after, false, method, rng)
+            for method in METHODS[:2]
+        }
         limits, reductions = intervals([before, after], REPLICATES, rng)
         of_none = intervals([after, false], REPLICATES, rng)[1][1]
         ours = {name: limits[1][name] for name in FIGURES[:2]}
-        ours |= {"reduction": (reductions[1].low, reductions[1].high), "reduction of none": (of_none.low, of_none.high)}
+        ours |= {
+            "reduction": (reductions[1].low, reductions[1].high),
+            "reduction of none": (of_none.low, of_none.high),
+        }
         for method, of_method in (found | {"ours": ours}).items():
             for name, (low, high) in of_method.items():
-                hits[name, method] = hits.get((name, method), 0) + (low <= truth[name] <= high)
+                hits[name, method] = hits.get((name, method), 0) + (
+                    low <= truth[name] <= high
+                )
     return {key: count / campaigns for key, count in hits.items()}
 
 
-def by_scipy(before: Errors, after: Errors, false: Errors, method: str, rng: np.random.Generator) -> dict[str, np.ndarray]:
+def by_scipy(
+    before: Errors, after: Errors, false: Errors, method: str, rng: np.random.Generator
+) -> dict[str, np.ndarray]:
     """The same intervals by `scipy.stats.bootstrap` over poses."""
     cluster = after.cluster
     counts = np.bincount(cluster)
     sums = np.bincount(cluster, after.distance)
-    squares = [np.bincount(cluster, errors.distance**2) for errors in (before, after, false)]
+    squares = [
+        np.bincount(cluster, errors.distance**2) for errors in (before, after, false)
+    ]
 
     def ratio(top: np.ndarray, bottom: np.ndarray, axis: int = -1) -> np.ndarray:
         return top.sum(axis=axis) / bottom.sum(axis=axis)
 
-    def interval(samples: tuple[np.ndarray, ...], statistic: Callable[..., np.ndarray]) -> np.ndarray:
+    def interval(
+        samples: tuple[np.ndarray, ...], statistic: Callable[..., np.ndarray]
+    ) -> np.ndarray:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            found = bootstrap(samples, statistic, paired=True, vectorized=True, n_resamples=REPLICATES, method=method, rng=rng)
+            found = bootstrap(
+                samples,
+                statistic,
+                paired=True,
+                vectorized=True,
+                n_resamples=REPLICATES,
+                method=method,
+                rng=rng,
+            )
         return np.array([found.confidence_interval.low, found.confidence_interval.high])
 
     return {
         "mean_m": interval((sums, counts), ratio),
         "rms_m": np.sqrt(interval((squares[1], counts), ratio)),
         "reduction": 1 - np.sqrt(interval((squares[1], squares[0]), ratio))[::-1],
-        "reduction of none": 1 - np.sqrt(interval((squares[2], squares[1]), ratio))[::-1],
+        "reduction of none": 1
+        - np.sqrt(interval((squares[2], squares[1]), ratio))[::-1],
     }
 
 

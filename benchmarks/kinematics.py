@@ -1,4 +1,5 @@
-"""Jacobians of 100,000 configurations against a Python loop over pinocchio, one thread each."""
+"""Jacobians of 100,000 configurations against a Python loop over pinocchio, one thread
+each."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,7 +24,8 @@ class Setting:
     repetitions: int
 
 
-FULL, SMALL = Setting(100_000, 9), Setting(100, 1)
+FULL = Setting(100_000, 9)
+SMALL = Setting(100, 1)
 
 
 def rows(work: Path, setting: Setting) -> list[Row]:
@@ -32,37 +34,71 @@ def rows(work: Path, setting: Setting) -> list[Row]:
 
 
 def pinocchio_model(chain: Chain) -> tuple[pin.Model, int]:
-    """Model of a chain whose joints turn in the positive sense, and the index of its end-effector frame."""
+    """Model of a chain whose joints turn in the positive sense, and the index of its
+    end-effector frame."""
     joints = (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ)
-    model, parent, placement = pin.Model(), 0, pin.SE3.Identity()
+    model = pin.Model()
+    parent = 0
+    placement = pin.SE3.Identity()
     for transform in chain.transforms:
         step = transform.constant * np.eye(3)[transform.axis]
-        placement = placement * (pin.SE3(np.eye(3), step) if transform.kind == "T" else pin.SE3(pin.exp3(step), np.zeros(3)))
+        placement = placement * (
+            pin.SE3(np.eye(3), step)
+            if transform.kind == "T"
+            else pin.SE3(pin.exp3(step), np.zeros(3))
+        )
         if transform.coordinate is not None:
             if (transform.kind, transform.sign) != ("R", 1.0):
-                raise ValueError(f"{transform}: not a joint that turns in the positive sense")
-            parent = model.addJoint(parent, joints[transform.axis](), placement, f"q{transform.coordinate + 1}")
+                raise ValueError(
+                    f"{transform}: not a joint that turns in the positive sense"
+                )
+            parent = model.addJoint(
+                parent,
+                joints[transform.axis](),
+                placement,
+                f"q{transform.coordinate + 1}",
+            )
             placement = pin.SE3.Identity()
-    return model, model.addFrame(pin.Frame("end-effector", parent, placement, pin.FrameType.OP_FRAME))
+    return model, model.addFrame(
+        pin.Frame("end-effector", parent, placement, pin.FrameType.OP_FRAME)
+    )
 
 
 def _row(name: str, setting: Setting) -> Row:
     chain = load_robot(name).chain
-    angles = np.random.default_rng(1).uniform(-np.pi, np.pi, (setting.configurations, chain.coordinates))
+    angles = np.random.default_rng(1).uniform(
+        -np.pi, np.pi, (setting.configurations, chain.coordinates)
+    )
     model, frame = pinocchio_model(chain)
-    data, aligned = model.createData(), pin.LOCAL_WORLD_ALIGNED
+    data = model.createData()
+    aligned = pin.LOCAL_WORLD_ALIGNED
 
     def loop() -> None:
         for q in angles:
             pin.computeFrameJacobian(model, data, q, frame, aligned)
 
-    expected = np.stack([pin.computeFrameJacobian(model, data, q, frame, aligned) for q in angles])
+    expected = np.stack(
+        [pin.computeFrameJacobian(model, data, q, frame, aligned) for q in angles]
+    )
     found = poses_and_jacobians(chain, angles, chain.end_effector)[2]
     np.testing.assert_allclose(found, expected, rtol=0, atol=TOLERANCE)
-    functions = {f"elastocal on {name}": lambda: poses_and_jacobians(chain, angles, chain.end_effector), "pinocchio": loop}
+    functions = {
+        f"elastocal on {name}": lambda: poses_and_jacobians(
+            chain, angles, chain.end_effector
+        ),
+        "pinocchio": loop,
+    }
     ours, theirs = map(min, interleaved(functions, setting.repetitions))
     how = (
         f"poses_and_jacobians on {setting.configurations} random configurations against pin.computeFrameJacobian in a Python "
         f"loop, one thread, least of {setting.repetitions}, Jacobians equal to {TOLERANCE:g}"
     )
-    return Row(f"kinematics {name}", ours, theirs, theirs / ours, f">= {TARGET}", theirs / ours >= TARGET, how)
+    return Row(
+        f"kinematics {name}",
+        ours,
+        theirs,
+        theirs / ours,
+        f">= {TARGET}",
+        theirs / ours >= TARGET,
+        how,
+    )

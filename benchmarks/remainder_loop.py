@@ -1,9 +1,12 @@
-"""The loop closed on a robot whose smooth error no catalogue has: how near the correction comes to chance alone.
+"""The loop closed on a robot whose smooth error no catalogue has: how near the
+correction comes to chance alone.
 
-A simulated KUKA: joint offsets; a deviation of joint 2 or 3 by two joints' angles at once; a tracker of 50 µm; 20 µrad of error
-in each joint at each approach. It is measured, diagnosed, commanded to other poses by physics alone and as delivered, and
-measured again. `python benchmarks/remainder_loop.py POSES CAMPAIGNS SIZE` (rad) prints a row for each campaign, and fails where
-the RMS of all as delivered is more than `GOAL` times what chance leaves of a robot whose error is known.
+A simulated KUKA: joint offsets; a deviation of joint 2 or 3 by two joints' angles at
+once; a tracker of 50 µm; 20 µrad of error in each joint at each approach. It is
+measured, diagnosed, commanded to other poses by physics alone and as delivered, and
+measured again. `python benchmarks/remainder_loop.py POSES CAMPAIGNS SIZE` (rad) prints
+a row for each campaign, and fails where the RMS of all as delivered is more than `GOAL`
+times what chance leaves of a robot whose error is known.
 """
 
 import argparse
@@ -11,7 +14,14 @@ import sys
 import time
 
 import numpy as np
-from remainder_rates import HELD_OUT, JOINT_RAD, NOISE_M, OFFSET_RAD, ROBOTS, measured_cases
+from remainder_rates import (
+    HELD_OUT,
+    JOINT_RAD,
+    NOISE_M,
+    OFFSET_RAD,
+    ROBOTS,
+    measured_cases,
+)
 
 from elastocal.application.calibrated import CalibratedRobot, nominal_forward
 from elastocal.application.compensation import find_joint_targets
@@ -28,9 +38,13 @@ GOAL = 1.3
 
 
 def closed(poses: int, size: float, seed: int) -> dict[str, float]:
-    """RMS errors of one robot, m: uncorrected, by physics, as delivered, and by chance alone."""
-    robot, draws = read_robot(ROBOTS / "kuka.yaml"), np.random.default_rng(seed)
-    offsets, two, moved = draws.normal(0.0, OFFSET_RAD, 6), draws.choice(5, 2, replace=False), draws.choice([1, 2])
+    """RMS errors of one robot, m: uncorrected, by physics, as delivered, and by chance
+    alone."""
+    robot = read_robot(ROBOTS / "kuka.yaml")
+    draws = np.random.default_rng(seed)
+    offsets = draws.normal(0.0, OFFSET_RAD, 6)
+    two = draws.choice(5, 2, replace=False)
+    moved = draws.choice([1, 2])
     phases = draws.uniform(0.0, 2.0 * np.pi, 2)
 
     def off(angles: np.ndarray, chance_rad: float = JOINT_RAD) -> np.ndarray:
@@ -40,12 +54,16 @@ def closed(poses: int, size: float, seed: int) -> dict[str, float]:
         return found
 
     def surveyed(count: int, part: int) -> tuple[dict[str, np.ndarray], np.ndarray]:
-        plan = Plan(("6DoF",), count, 100.0, (0,), (0.0, 0.0, 0.0), 1, 0, NOISE_M, NOISE_M)
+        plan = Plan(
+            ("6DoF",), count, 100.0, (0,), (0.0, 0.0, 0.0), 1, 0, NOISE_M, NOISE_M
+        )
         table = draw_measurements(robot, plan, 1000 * seed + part, "loop")
         return table, np.column_stack([table[f"q{joint}"] for joint in range(1, 7)])
 
     table, angles = surveyed(poses + HELD_OUT, 0)
-    table |= {f"q{joint}": column for joint, column in enumerate((angles - off(angles)).T, 1)}
+    table |= {
+        f"q{joint}": column for joint, column in enumerate((angles - off(angles)).T, 1)
+    }
     case, held_out = measured_cases("loop", table, poses)
     found = diagnose(case, Settings(), seed)
     verdict = judge(found, held_out, seed)
@@ -53,25 +71,43 @@ def closed(poses: int, size: float, seed: int) -> dict[str, float]:
     position, rotation = nominal_forward(robot, wanted)
 
     def missed(calibrated: CalibratedRobot, commands: np.ndarray) -> float:
-        """In the frame of the correction, of poses that are measured at some commands."""
+        """In the frame of the correction, of poses that are measured at some
+        commands."""
         true = robot.model_angles(commands)
         reached, _ = nominal_forward(robot, robot.reported_angles(true + off(true)))
-        field = (reached + draws.normal(0.0, NOISE_M, reached.shape) - position)[..., None]
-        left = subtract_placement(calibrated.scope, position, rotation, np.concatenate([field, 0 * field], axis=1))
+        field = (reached + draws.normal(0.0, NOISE_M, reached.shape) - position)[
+            ..., None
+        ]
+        left = subtract_placement(
+            calibrated.scope,
+            position,
+            rotation,
+            np.concatenate([field, 0 * field], axis=1),
+        )
         return root_mean_square(left[:, :3, 0])
 
     corrected = {
-        name: calibrated_by(found, verdict.held_out, verdict.delivered, physics_only=name == "physics")
+        name: calibrated_by(
+            found, verdict.held_out, verdict.delivered, physics_only=name == "physics"
+        )
         for name in ("physics", "delivered")
     }
     unloaded = np.zeros((len(wanted), 6))
-    targets = {name: find_joint_targets(each, position, rotation, unloaded, wanted) for name, each in corrected.items()}
+    targets = {
+        name: find_joint_targets(each, position, rotation, unloaded, wanted)
+        for name, each in corrected.items()
+    }
     good = np.all([each.status == OK for each in targets.values()], axis=0)
-    position, rotation, wanted = position[good], rotation[good], wanted[good]
+    position = position[good]
+    rotation = rotation[good]
+    wanted = wanted[good]
     known = robot.model_angles(wanted)
     for _ in range(4):
         known = robot.model_angles(wanted) - off(known, 0.0)
-    errors = {name: missed(corrected[name], each.joint_angles[good]) for name, each in targets.items()}
+    errors = {
+        name: missed(corrected[name], each.joint_angles[good])
+        for name, each in targets.items()
+    }
     ends = {
         name: missed(corrected["delivered"], each)
         for name, each in (("before", wanted), ("chance", robot.reported_angles(known)))
@@ -94,7 +130,10 @@ if __name__ == "__main__":
         start = time.process_time()
         rows.append(closed(asked.poses, asked.size, seed))
         print(words(rows[-1]), f"{time.process_time() - start:.1f} s CPU", flush=True)
-    whole = {name: float(np.sqrt(np.mean([row[name] ** 2 for row in rows]))) for name in rows[0]}
+    whole = {
+        name: float(np.sqrt(np.mean([row[name] ** 2 for row in rows])))
+        for name in rows[0]
+    }
     ratio = whole["delivered"] / whole["chance"]
     print("all:", words(whole), f"delivered {ratio:.2f} times chance")
     sys.exit(ratio > GOAL)

@@ -1,8 +1,11 @@
-"""How often a regression on the remainder is used, what it gains, and how often something repeatable is said to remain.
+"""How often a regression on the remainder is used, what it gains, and how often
+something repeatable is said to remain.
 
-Simulated campaigns of the KUKA: all of its geometry declared, one target of unknown place, a tracker of 50 µm, 20 µrad of pose
-error in each joint; and a deviation of joint 2 or 3 by two joints' angles at once, which no catalogue has.
-`python benchmarks/remainder_rates.py POSES CAMPAIGNS SIZE...` prints a row for each size in rad; `--check` of the test alone.
+Simulated campaigns of the KUKA: all of its geometry declared, one target of unknown
+place, a tracker of 50 µm, 20 µrad of pose error in each joint; and a deviation of joint
+2 or 3 by two joints' angles at once, which no catalogue has. `python
+benchmarks/remainder_rates.py POSES CAMPAIGNS SIZE...` prints a row for each size in
+rad; `--check` of the test alone.
 """
 
 import argparse
@@ -26,13 +29,18 @@ from elastocal.remainder.repeatable import repeatable_part
 from elastocal.validation.held_out import position_residuals
 from elastocal.validation.placing import placed
 
-NOISE_M, JOINT_RAD, OFFSET_RAD, HELD_OUT = 5e-5, 2e-5, 2e-4, 150
+NOISE_M = 5e-5
+JOINT_RAD = 2e-5
+OFFSET_RAD = 2e-4
+HELD_OUT = 150
 NOISE = Noise("declared", NOISE_M, NOISE_M, np.full(6, JOINT_RAD))
 LEVELS = (0.01, 0.05)
 ROBOTS = ROOT / "config" / "robots"
 
 
-def measured_cases(name: str, table: dict[str, np.ndarray], poses: int) -> tuple[Case, Case]:
+def measured_cases(
+    name: str, table: dict[str, np.ndarray], poses: int
+) -> tuple[Case, Case]:
     """Cases to fit and to judge, of the measurements of a campaign; `poses`: to fit."""
     document = {
         "campaign": name,
@@ -52,22 +60,40 @@ def measured_cases(name: str, table: dict[str, np.ndarray], poses: int) -> tuple
 
 def exact_cases(poses: int) -> tuple[Case, Case]:
     """Cases whose measurements are exact."""
-    survey = Survey(("6DoF",), poses + HELD_OUT, 100.0, (0,), (0.0, 0.0, 0.0), 1, 0, 1e-9, 1e-9)
-    return measured_cases("rates", draw_measurements(read_robot(ROBOTS / "kuka.yaml"), survey, 1, "rates"), poses)
+    survey = Survey(
+        ("6DoF",), poses + HELD_OUT, 100.0, (0,), (0.0, 0.0, 0.0), 1, 0, 1e-9, 1e-9
+    )
+    return measured_cases(
+        "rates",
+        draw_measurements(read_robot(ROBOTS / "kuka.yaml"), survey, 1, "rates"),
+        poses,
+    )
 
 
 def drawn(case: Case, seed: int, part: int, size: float) -> tuple[Case, np.ndarray]:
-    """A case with errors, and what no model could predict of it, (M, 3), m. `part`: of one robot, that of the seed."""
-    fitted, robot = fit_declared(case.model, case.observations, NOISE), np.random.default_rng(seed)
+    """A case with errors, and what no model could predict of it, (M, 3), m. `part`: of
+    one robot, that of the seed."""
+    fitted = fit_declared(case.model, case.observations, NOISE)
+    robot = np.random.default_rng(seed)
     inputs = inputs_of(fitted.model, fitted.estimate, case.observations)
-    offsets, joints, moved = robot.normal(0.0, OFFSET_RAD, 6), robot.choice(5, 2, replace=False), robot.choice([1, 2])
+    offsets = robot.normal(0.0, OFFSET_RAD, 6)
+    joints = robot.choice(5, 2, replace=False)
+    moved = robot.choice([1, 2])
     waves = np.sin(inputs.joint_angles[:, joints] + robot.uniform(0.0, 2.0 * np.pi, 2))
     deviation = 2.0 * size * waves.prod(axis=1)[:, None] * inputs.jacobian[:, :, moved]
     draws = np.random.default_rng([seed, part])
     along = inputs.jacobian[:, :, :6]
-    chance = draws.normal(0.0, NOISE_M, deviation.shape) + (along @ draws.normal(0.0, JOINT_RAD, (len(along), 6, 1)))[..., 0]
+    chance = (
+        draws.normal(0.0, NOISE_M, deviation.shape)
+        + (along @ draws.normal(0.0, JOINT_RAD, (len(along), 6, 1)))[..., 0]
+    )
     seen = case.observations
-    return replace(case, observations=replace(seen, position=seen.position + deviation + along @ offsets + chance)), chance
+    return replace(
+        case,
+        observations=replace(
+            seen, position=seen.position + deviation + along @ offsets + chance
+        ),
+    ), chance
 
 
 def rms(squares: list[np.ndarray]) -> float:
@@ -83,24 +109,48 @@ if __name__ == "__main__":
     asked = parser.parse_args()
     exact = exact_cases(asked.poses)
     for size in asked.sizes:
-        start, p_values, used, worse, errors = time.process_time(), [], 0, 0, []
+        start = time.process_time()
+        p_values = []
+        used = 0
+        worse = 0
+        errors = []
         for seed in range(asked.campaigns):
-            (case, _), (held_out, chance) = (drawn(each, seed, part, size) for part, each in enumerate(exact))
+            (case, _), (held_out, chance) = (
+                drawn(each, seed, part, size) for part, each in enumerate(exact)
+            )
             fitted = fit_declared(case.model, case.observations, NOISE)
             p_values.append(repeatable_part(fitted, case.observations, seed).p_value)
             if asked.check:
                 continue
-            alone = position_residuals(*placed(fitted, case, held_out), held_out.observations)
-            found = corrected(fitted, case, held_out, "auto", blocks=False, within_range=True, seed=seed)
+            alone = position_residuals(
+                *placed(fitted, case, held_out), held_out.observations
+            )
+            found = corrected(
+                fitted,
+                case,
+                held_out,
+                "auto",
+                blocks=False,
+                within_range=True,
+                seed=seed,
+            )
             squares = [(off**2).sum(axis=1) for off in (alone, found.residual, chance)]
             off = squares[1] - squares[0]
             used += found.predictor is not None
             worse += off.mean() > off.std(ddof=1) / np.sqrt(len(off)) > 0.0
             errors.append([each.mean() for each in squares])
-        rates = ", ".join(f"p <= {level}: {np.mean(np.array(p_values) <= level):.3f}" for level in LEVELS)
+        rates = ", ".join(
+            f"p <= {level}: {np.mean(np.array(p_values) <= level):.3f}"
+            for level in LEVELS
+        )
         row = f"{asked.poses} poses, {1e3 * size:g} mrad, {asked.campaigns} campaigns; something remains, {rates}"
         if errors:
-            physics, with_it, floor = (rms(column) for column in zip(*errors, strict=True))
+            physics, with_it, floor = (
+                rms(column) for column in zip(*errors, strict=True)
+            )
             row += f"; used {used}, worse by more than a standard error {worse}; held-out RMS of physics {physics:.0f} µm, "
             row += f"with the regression {with_it:.0f}, of chance alone {floor:.0f}"
-        print(f"{row}; {(time.process_time() - start) / asked.campaigns:.2f} s CPU each", flush=True)
+        print(
+            f"{row}; {(time.process_time() - start) / asked.campaigns:.2f} s CPU each",
+            flush=True,
+        )

@@ -14,7 +14,8 @@ TARGET = 3
 def rows(work: Path, setting: Setting) -> list[Row]:
     """Row of the report.
 
-    `work`: temporary folder; the study that the benchmark of that name left there serves here too.
+    `work`: temporary folder; the study that the benchmark of that name left there
+    serves here too.
     """
     folder = work / "study"
     if not folder.is_dir():
@@ -26,7 +27,15 @@ def rows(work: Path, setting: Setting) -> list[Row]:
 
     functions = {"rerun": again, "--version": lambda: snakemake(folder, "--version")}
     ours, theirs = map(min, interleaved(functions, setting.repetitions))
-    how = (
-        f"snakemake {' '.join(setting.jobs)} with everything made, against snakemake --version, least of {setting.repetitions}"
-    )
-    return [Row("rerun", ours, theirs, ours / theirs, f"<= {TARGET}", ours / theirs <= TARGET, how)]
+    how = f"snakemake {' '.join(setting.jobs)} with everything made, against snakemake --version, least of {setting.repetitions}"
+    return [
+        Row(
+            "rerun",
+            ours,
+            theirs,
+            ours / theirs,
+            f"<= {TARGET}",
+            ours / theirs <= TARGET,
+            how,
+        )
+    ]

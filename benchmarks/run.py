@@ -1,4 +1,5 @@
-"""All benchmarks, or those named: `python benchmarks/run.py [--small] [--only NAME ...]` writes reports/benchmarks.csv."""
+"""All benchmarks, or those named: `python benchmarks/run.py [--small] [--only NAME
+...]` writes reports/benchmarks.csv."""
 
 import argparse
 import csv
@@ -22,8 +23,19 @@ REPORT = Path(__file__).resolve().parents[1] / "reports" / "benchmarks.csv"
 def main() -> None:
     """Run the benchmarks; the exit status says whether every target holds."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--only", nargs="+", choices=NAMES, default=NAMES, metavar="NAME", help=", ".join(NAMES))
-    parser.add_argument("--small", action="store_true", help="seconds instead of minutes: that all run, no target, no report")
+    parser.add_argument(
+        "--only",
+        nargs="+",
+        choices=NAMES,
+        default=NAMES,
+        metavar="NAME",
+        help=", ".join(NAMES),
+    )
+    parser.add_argument(
+        "--small",
+        action="store_true",
+        help="seconds instead of minutes: that all run, no target, no report",
+    )
     given = parser.parse_args()
     names = [name for name in NAMES if name in given.only]
     # Before numpy is imported, so that it too takes one thread.
@@ -35,11 +47,16 @@ def main() -> None:
         for name in names:
             print(name, flush=True)
             module = importlib.import_module(name)
-            for row in module.rows(Path(work), module.SMALL if given.small else module.FULL):
-                line = _line(replace(row, target="", holds=None) if given.small else row)
+            for row in module.rows(
+                Path(work), module.SMALL if given.small else module.FULL
+            ):
+                line = _line(
+                    replace(row, target="", holds=None) if given.small else row
+                )
                 table[row.benchmark] = line
                 print(
-                    f"  {row.benchmark}: ratio {line['ratio']}, target {line['target'] or 'none'} {line['holds']}", flush=True
+                    f"  {row.benchmark}: ratio {line['ratio']}, target {line['target'] or 'none'} {line['holds']}",
+                    flush=True,
                 )
             _write(table.values(), report)
     sys.exit(any(line["holds"] == "no" for line in table.values()))
@@ -52,7 +69,9 @@ def _line(row: "Row") -> dict[str, str]:
         value = getattr(row, field.name)
         if isinstance(value, float):
             value = f"{value:.4g}"
-        line[field.name] = "" if value is None else {True: "yes", False: "no"}.get(value, value)
+        line[field.name] = (
+            "" if value is None else {True: "yes", False: "no"}.get(value, value)
+        )
     return line
 
 
@@ -61,7 +80,11 @@ def _kept(names: Collection[str], report: Path) -> list[dict[str, str]]:
     if not report.is_file():
         return []
     with open(report, encoding="utf-8", newline="") as file:
-        return [line for line in csv.DictReader(file) if line["benchmark"].split()[0] not in names]
+        return [
+            line
+            for line in csv.DictReader(file)
+            if line["benchmark"].split()[0] not in names
+        ]
 
 
 def _write(lines: Iterable[dict[str, str]], report: Path) -> None:

@@ -1,4 +1,5 @@
-"""The clean study by Snakemake against the same jobs one after the other in one process, CPU against CPU."""
+"""The clean study by Snakemake against the same jobs one after the other in one
+process, CPU against CPU."""
 
 import shutil
 import subprocess
@@ -23,8 +24,18 @@ class Setting:
 
 FULL = Setting(("-j2", "study"), 7)
 # From seeds to a table, in three jobs.
-SMALL = Setting(("-j2", "reports/tables/table1.csv", "data/simulated/kuka/ideal.parquet", "--config", "data_sets=10"), 1)
-# Of results/: what Snakemake and `job.run`, which no reduced script calls, note on a job.
+SMALL = Setting(
+    (
+        "-j2",
+        "reports/tables/table1.csv",
+        "data/simulated/kuka/ideal.parquet",
+        "--config",
+        "data_sets=10",
+    ),
+    1,
+)
+# Of results/: what Snakemake and `job.run`, which no reduced script calls, note on a
+# job.
 NOTES = ("logs", "timings", "records")
 # Every recorded job in the order in which they ended, in this one process.
 ONE_PROCESS = """
@@ -47,12 +58,27 @@ def rows(work: Path, setting: Setting) -> list[Row]:
     recorded = copy_study(work / "recorded")
     reduce_to_records(recorded)
     snakemake(recorded, *setting.jobs)
-    functions = {"study": lambda: finished_study(work, setting), "one process": lambda: _in_one_process(recorded)}
+    functions = {
+        "study": lambda: finished_study(work, setting),
+        "one process": lambda: _in_one_process(recorded),
+    }
     (ours,), (alone,) = interleaved(functions, 1)
     if missing := _made(work / "study") ^ _made(recorded):
-        raise AssertionError(f"one of the two did not make {', '.join(sorted(missing))}")
+        raise AssertionError(
+            f"one of the two did not make {', '.join(sorted(missing))}"
+        )
     how = f"snakemake {' '.join(setting.jobs)} on a clean copy against the same scripts one after the other in one process, CPU"
-    return [Row("study", ours, alone, ours / alone, f"<= {TARGET:g}", ours / alone <= TARGET, how)]
+    return [
+        Row(
+            "study",
+            ours,
+            alone,
+            ours / alone,
+            f"<= {TARGET:g}",
+            ours / alone <= TARGET,
+            how,
+        )
+    ]
 
 
 def finished_study(work: Path, setting: Setting) -> Path:
@@ -64,11 +90,28 @@ def finished_study(work: Path, setting: Setting) -> Path:
 
 def _in_one_process(recorded: Path) -> None:
     """Do all jobs that a copy has recorded, with the scripts of the repository."""
-    shutil.copytree(ROOT / "workflow" / "scripts", recorded / "workflow" / "scripts", dirs_exist_ok=True)
-    subprocess.run([sys.executable, "-c", ONE_PROCESS], cwd=recorded, check=True, stderr=subprocess.DEVNULL)
+    shutil.copytree(
+        ROOT / "workflow" / "scripts",
+        recorded / "workflow" / "scripts",
+        dirs_exist_ok=True,
+    )
+    subprocess.run(
+        [sys.executable, "-c", ONE_PROCESS],
+        cwd=recorded,
+        check=True,
+        stderr=subprocess.DEVNULL,
+    )
 
 
 def _made(folder: Path) -> set[str]:
     """Files that jobs made, without what is noted on each job beside them."""
-    files = (path.relative_to(folder) for part in ("data", "results", "reports") for path in (folder / part).rglob("*.*"))
-    return {path.as_posix() for path in files if path.parts[1] not in NOTES and (folder / path).is_file()}
+    files = (
+        path.relative_to(folder)
+        for part in ("data", "results", "reports")
+        for path in (folder / part).rglob("*.*")
+    )
+    return {
+        path.as_posix()
+        for path in files
+        if path.parts[1] not in NOTES and (folder / path).is_file()
+    }

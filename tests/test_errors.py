@@ -5,20 +5,38 @@ from pathlib import Path
 
 import pytest
 
-from elastocal.errors import LONGEST_MESSAGE, InputError, closest_first, escaped, fault_of_machine, steering
+from elastocal.errors import (
+    LONGEST_MESSAGE,
+    InputError,
+    closest_first,
+    escaped,
+    fault_of_machine,
+    steering,
+)
 
 
 @pytest.mark.parametrize(
     ("parts", "message"),
     [
-        (("robot.yaml", "masses[2]", "-3 kg", "a mass"), "robot.yaml: masses[2]: found -3 kg; allowed: a mass"),
-        ((Path("a.csv"), "q1\n", "two\r\nlines,\ta tab\n\n", "1\nline"), "a.csv: q1: found two lines, a tab; allowed: 1 line"),
+        (
+            ("robot.yaml", "masses[2]", "-3 kg", "a mass"),
+            "robot.yaml: masses[2]: found -3 kg; allowed: a mass",
+        ),
+        (
+            (Path("a.csv"), "q1\n", "two\r\nlines,\ta tab\n\n", "1\nline"),
+            "a.csv: q1: found two lines, a tab; allowed: 1 line",
+        ),
     ],
 )
-def test_the_message_is_one_line_of_place_what_was_found_and_what_is_allowed_and_keeps_its_parts(parts, message):
+def test_the_message_is_one_line_of_place_what_was_found_and_what_is_allowed_and_keeps_its_parts(
+    parts, message
+):
     error = InputError(*parts)
     assert str(error) == message
-    assert (error.source, error.key, error.found, error.allowed) == (str(parts[0]), *parts[1:])
+    assert (error.source, error.key, error.found, error.allowed) == (
+        str(parts[0]),
+        *parts[1:],
+    )
 
 
 def test_the_closest_of_the_names_that_are_allowed_comes_first_whatever_its_case():
@@ -38,15 +56,22 @@ def test_the_message_stays_short_whatever_stands_in_it(part):
 
 def test_what_would_steer_a_terminal_is_escaped():
     message = str(InputError("a\x1b.yaml", "\ud800", "\x1b[2Jµ", "\x07"))
-    assert message == r"a\x1b.yaml: \ud800: found \x1b[2J\xb5".replace(r"\xb5", "µ") + r"; allowed: \x07"
+    assert (
+        message
+        == r"a\x1b.yaml: \ud800: found \x1b[2J\xb5".replace(r"\xb5", "µ")
+        + r"; allowed: \x07"
+    )
 
 
 @pytest.mark.parametrize(
-    ("text", "character"), [("a\x1bb", "\x1b"), ("a\u202eb", "\u202e"), ("a\nb", "\n"), ("KR\u00a0270 é", "")]
+    ("text", "character"),
+    [("a\x1bb", "\x1b"), ("a\u202eb", "\u202e"), ("a\nb", "\n"), ("KR\u00a0270 é", "")],
 )
 def test_the_first_character_that_would_steer_is_found(text, character):
     assert steering(text) == character
-    assert escaped(text) == (text.replace(character, ascii(character)[1:-1]) if character else text)
+    assert escaped(text) == (
+        text.replace(character, ascii(character)[1:-1]) if character else text
+    )
 
 
 @pytest.mark.parametrize(
@@ -56,11 +81,19 @@ def test_the_first_character_that_would_steer_is_found(text, character):
             OSError(errno.ENOSPC, "No space left on device", "a"),
             "a: found No space left on device; allowed: a file or folder that is there, on a disk with space",
         ),
-        (MemoryError(), "memory: found none left; allowed: a smaller file, more memory"),
-        (OSError(errno.ENOMEM, "Cannot allocate memory"), "memory: found none left"),
-        (ImportError("No module named 'x'"), "Python: found No module named 'x'; allowed: an environment"),
         (
-            PermissionError(13, "Permission denied", "a/go.csv.0123456789abcdef.partial/go.csv"),
+            MemoryError(),
+            "memory: found none left; allowed: a smaller file, more memory",
+        ),
+        (OSError(errno.ENOMEM, "Cannot allocate memory"), "memory: found none left"),
+        (
+            ImportError("No module named 'x'"),
+            "Python: found No module named 'x'; allowed: an environment",
+        ),
+        (
+            PermissionError(
+                13, "Permission denied", "a/go.csv.0123456789abcdef.partial/go.csv"
+            ),
             "a/go.csv: found Permission denied",
         ),
     ],

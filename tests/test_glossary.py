@@ -1,4 +1,5 @@
-"""Code, messages, reports and pages use the words of the field; a word of the private dialect of earlier versions fails."""
+"""Code, messages, reports and pages use the words of the field; a word of the private
+dialect of earlier versions fails."""
 
 import re
 from pathlib import Path
@@ -7,7 +8,14 @@ import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 SEARCHED = (
-    *("README.md", "Snakefile", "config.yaml", "data/README.md", "results/README.md", "reports/README.md"),
+    *(
+        "README.md",
+        "Snakefile",
+        "config.yaml",
+        "data/README.md",
+        "results/README.md",
+        "reports/README.md",
+    ),
     *("config", "docs", "workflow", "src", "benchmarks"),
 )
 KINDS = {".py", ".smk", ".typ", ".txt", ".yaml", ".md", ""}
@@ -33,7 +41,8 @@ GLOSSARY = {
     r"what (is|was|were) said|said (for|of) what|name (is )?said|said (alone|then)|worth what they say": (
         "verdict, reported, stated, calibrated"
     ),
-    # Rows and columns that the pipeline writes keep their names: hypotheses that hold the truth, class with the truth.
+    # Rows and columns that the pipeline writes keep their names: hypotheses that hold
+    # the truth, class with the truth.
     r"(?<!hypotheses that )holds? the truth|(of|by|given|give|above|below|and|where) (the|its|their) truths?": "ground truth",
     r"(a|every|sealed) truth|truth document": "ground truth; the true value, where it is a number",
 }
@@ -44,15 +53,33 @@ IDENTIFIERS = r"\w*_(said|told)\w*|(said|told|unsaid|saying) \|?= .*|(said|told|
 @pytest.fixture(scope="module")
 def texts():
     """Each file's text by its name."""
-    paths = [path for name in SEARCHED for path in (sorted((REPOSITORY / name).rglob("*")) or [REPOSITORY / name])]
-    return {path: path.read_text(encoding="utf-8") for path in paths if path.is_file() and path.suffix in KINDS}
+    paths = [
+        path
+        for name in SEARCHED
+        for path in (sorted((REPOSITORY / name).rglob("*")) or [REPOSITORY / name])
+    ]
+    return {
+        path: path.read_text(encoding="utf-8")
+        for path in paths
+        if path.is_file() and path.suffix in KINDS
+    }
 
 
 def found(pattern, texts):
-    """Lines in which it stands; the name of a random stream cannot change without changing its numbers."""
+    """Lines in which it stands; the name of a random stream cannot change without
+    changing its numbers."""
     pattern = re.compile(rf"(?<![A-Za-z])(?:{pattern})(?![A-Za-z])")
-    lines = [(path, line) for path, text in texts.items() if pattern.search(text) for line in text.splitlines()]
-    return [f"{path}: {line.strip()[:100]}" for path, line in lines if pattern.search(line) and "stream(" not in line]
+    lines = [
+        (path, line)
+        for path, text in texts.items()
+        if pattern.search(text)
+        for line in text.splitlines()
+    ]
+    return [
+        f"{path}: {line.strip()[:100]}"
+        for path, line in lines
+        if pattern.search(line) and "stream(" not in line
+    ]
 
 
 @pytest.mark.parametrize("banned", GLOSSARY)
@@ -61,4 +88,6 @@ def test_no_word_of_the_private_dialect_comes_back(banned, texts):
 
 
 def test_no_variable_is_named_after_the_act_of_saying(texts):
-    assert found(IDENTIFIERS, texts) == [], "say what it is, such as 'verdict', 'stated', 'outcome', 'declared'"
+    assert found(IDENTIFIERS, texts) == [], (
+        "say what it is, such as 'verdict', 'stated', 'outcome', 'declared'"
+    )

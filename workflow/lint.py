@@ -1,5 +1,6 @@
-"""What no linter of Python looks at: Snakemake's own lint, but for findings that are allowed, and the lines of each room.
-Usage: python workflow/lint.py, from the top of the repository.
+"""What no linter of Python looks at: Snakemake's own lint, but for findings that are
+allowed, and the lines of each room. Usage: python workflow/lint.py, from the top of the
+repository.
 """
 
 import re
@@ -11,7 +12,8 @@ from pathlib import Path
 ALLOWED = {
     "Specify a conda environment or container for each rule.": "one pinned environment serves all: requirements/run.lock",
 }
-# Most lines of Python of each room. Who needs more changes this table in the same commit and says why; rooms are to shrink.
+# Most lines of Python of each room. Who needs more changes this table in the same
+# commit and says why; rooms are to shrink.
 ROOMS = {
     "src/elastocal/application": 1810,
     "src/elastocal/campaigns": 1600,
@@ -47,16 +49,22 @@ def rooms_too_large() -> list[str]:
         files = [file for kind in ("*.py", "*.smk") for file in Path(room).rglob(kind)]
         lines = sum(file.read_text(encoding="utf-8").count("\n") for file in files)
         if lines > most:
-            found.append(f"{room}: found {lines} lines; allowed: {most} (ROOMS of workflow/lint.py)")
+            found.append(
+                f"{room}: found {lines} lines; allowed: {most} (ROOMS of workflow/lint.py)"
+            )
     return found
 
 
 if __name__ == "__main__":
-    done = subprocess.run([sys.executable, "-m", "snakemake", "--lint"], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-m", "snakemake", "--lint"], capture_output=True, text=True
+    )
     report = done.stdout + done.stderr
     findings = re.findall(r"^ +\* (.*):$", report, flags=re.MULTILINE)
     if set(findings) - set(ALLOWED) or (done.returncode and not findings):
         sys.exit(report)
     if large := rooms_too_large():
         sys.exit("\n".join(large))
-    print(f"snakemake --lint: clean, but for {len(findings)} allowed findings; {len(ROOMS)} rooms within their lines")
+    print(
+        f"snakemake --lint: clean, but for {len(findings)} allowed findings; {len(ROOMS)} rooms within their lines"
+    )

@@ -1,7 +1,9 @@
-"""Put the source of the site together: the repository's own pages, and pages made of the code, its schemas and docstrings.
+"""Put the source of the site together: the repository's own pages, and pages made of
+the code, its schemas and docstrings.
 
-Usage: python docs/site/assemble.py FOLDER, from the top of the repository, with the figures of `snakemake signatures` there.
-A page that did not change keeps its date, so that Sphinx reads again only what did.
+Usage: python docs/site/assemble.py FOLDER, from the top of the repository, with the
+figures of `snakemake signatures` there. A page that did not change keeps its date, so
+that Sphinx reads again only what did.
 """
 
 from __future__ import annotations
@@ -20,7 +22,15 @@ import interpretations
 REPOSITORY = Path(__file__).resolve().parents[2]
 SIGNATURES = REPOSITORY / "reports" / "figures" / "signatures"
 # Pages that are read where the repository is hosted as well.
-PAGES = ("*.md", "docs/**/*.md", "config/*.md", "data/**/*.md", "results/*.md", "reports/*.md", "benchmarks/*.md")
+PAGES = (
+    "*.md",
+    "docs/**/*.md",
+    "config/*.md",
+    "data/**/*.md",
+    "results/*.md",
+    "reports/*.md",
+    "benchmarks/*.md",
+)
 # Of the site alone.
 NO_PAGES = ("docs/site/index.md",)
 # In Markdown and in HTML.
@@ -29,14 +39,23 @@ LINK = re.compile(r"\]\(([^)#\s]+)")
 
 def repository_pages() -> list[Path]:
     """Every page of the repository, relative to its top."""
-    found = {path.relative_to(REPOSITORY) for pattern in PAGES for path in REPOSITORY.glob(pattern)}
+    found = {
+        path.relative_to(REPOSITORY)
+        for pattern in PAGES
+        for path in REPOSITORY.glob(pattern)
+    }
     return sorted(path for path in found if path.as_posix() not in NO_PAGES)
 
 
 def linked_files(page: Path) -> set[Path]:
-    """Files of the repository to which one of its pages links, relative to its top; pictures too."""
+    """Files of the repository to which one of its pages links, relative to its top;
+    pictures too."""
     text = (REPOSITORY / page).read_text(encoding="utf-8")
-    paths = {(REPOSITORY / page.parent / link).resolve() for link in LINK.findall(text) if "://" not in link}
+    paths = {
+        (REPOSITORY / page.parent / link).resolve()
+        for link in LINK.findall(text)
+        if "://" not in link
+    }
     return {path.relative_to(REPOSITORY) for path in paths if path.is_file()}
 
 
@@ -46,25 +65,40 @@ def made_pages() -> dict[str, str]:
         "reference/effects.rst": catalogue.page(),
         "reference/commands.md": commands.page(),
         "reference/interpretations.md": interpretations.page(),
-        **{f"reference/files/{name}": text for name, text in file_formats.pages().items()},
+        **{
+            f"reference/files/{name}": text
+            for name, text in file_formats.pages().items()
+        },
         "reference/interface.rst": interface.page(),
     }
 
 
 def assemble(folder: Path) -> None:
-    """Make the source of the site in a folder; a page that did not change keeps its date."""
+    """Make the source of the site in a folder; a page that did not change keeps its
+    date."""
     pages = repository_pages()
-    files = {Path("docs/site/index.md"): Path("index.md"), **{page: page for page in pages}}
+    files = {
+        Path("docs/site/index.md"): Path("index.md"),
+        **{page: page for page in pages},
+    }
     files |= {file: file for page in pages for file in linked_files(page)}
-    files |= {path.relative_to(REPOSITORY): Path("signatures") / path.name for path in sorted(SIGNATURES.glob("*.svg"))}
+    files |= {
+        path.relative_to(REPOSITORY): Path("signatures") / path.name
+        for path in sorted(SIGNATURES.glob("*.svg"))
+    }
     texts = made_pages()
     wanted = {folder / place for place in (*files.values(), *map(Path, texts))}
-    for old in [path for path in folder.rglob("*") if not path.is_dir() and path not in wanted]:
+    for old in [
+        path for path in folder.rglob("*") if not path.is_dir() and path not in wanted
+    ]:
         old.unlink()
     for file, place in files.items():
         target = folder / place
         target.parent.mkdir(parents=True, exist_ok=True)
-        if not target.exists() or target.read_bytes() != (REPOSITORY / file).read_bytes():
+        if (
+            not target.exists()
+            or target.read_bytes() != (REPOSITORY / file).read_bytes()
+        ):
             shutil.copyfile(REPOSITORY / file, target)
     for name, text in texts.items():
         target = folder / name

@@ -1,4 +1,5 @@
-"""The page of the catalogue of effects: physics and formula of each from its docstring, its figure and its parameters."""
+"""The page of the catalogue of effects: physics and formula of each from its docstring,
+its figure and its parameters."""
 
 from __future__ import annotations
 
@@ -51,8 +52,12 @@ FAMILIES = {
     "drift": "Drift: by time, temperature or the order of measurements",
 }
 # That of the figures, see workflow/rules/signatures.smk.
-ROBOT = read_robot(Path(__file__).resolve().parents[2] / "config" / "robots" / "gp180.yaml")
-FORMULAS = yaml.safe_load(Path(__file__).with_name("effect_formulas.yaml").read_text(encoding="utf-8"))
+ROBOT = read_robot(
+    Path(__file__).resolve().parents[2] / "config" / "robots" / "gp180.yaml"
+)
+FORMULAS = yaml.safe_load(
+    Path(__file__).with_name("effect_formulas.yaml").read_text(encoding="utf-8")
+)
 NEEDS = {
     "load": "a load, or the weight of the arm",
     "load on the joints": "a load on the joints, or declared masses",
@@ -76,17 +81,22 @@ def page() -> str:
     parts = [HEAD, _thumbnails(listed)]
     for family, words in FAMILIES.items():
         parts.append(_headed(words, "-"))
-        parts += [_section(effect) for effect in listed.values() if family == effect.family]
+        parts += [
+            _section(effect) for effect in listed.values() if family == effect.family
+        ]
     return "".join(parts)
 
 
 def _thumbnails(listed: Mapping[str, Effect]) -> str:
-    """A grid of the effects' figures, each with a line below it that leads to its section."""
+    """A grid of the effects' figures, each with a line below it that leads to its
+    section."""
     figures = []
     for name, effect in listed.items():
         # Sphinx makes such an anchor of the label of an effect.
         options = f"   :alt: {effect.words}\n   :target: #{name.replace('_', '-')}\n"
-        figures.append(f".. figure:: /signatures/{name}.svg\n{options}\n   {effect.words}\n\n")
+        figures.append(
+            f".. figure:: /signatures/{name}.svg\n{options}\n   {effect.words}\n\n"
+        )
     body = "".join(figures).replace("\n", "\n   ").rstrip()
     return f".. container:: gallery\n\n   {body}\n\n"
 
@@ -99,7 +109,9 @@ def _section(effect: Effect) -> str:
     title = f"{effect.words[0].upper()}{effect.words[1:]} (``{effect.name}``)"
     text = with_plain_references(effect.doc)
     moves = (
-        "Moves the robot, so that tasks feel it." if effect.moves_robot else "In the measurements alone: tasks do not feel it."
+        "Moves the robot, so that tasks feel it."
+        if effect.moves_robot
+        else "In the measurements alone: tasks do not feel it."
     )
     picture = f".. image:: /signatures/{effect.name}.svg\n   :alt: What {effect.words} does to a measured point\n\n"
     summary, _, rest = text.strip().partition("\n\n")
@@ -112,7 +124,8 @@ def _section(effect: Effect) -> str:
 
 
 def _table(effect: Effect) -> str:
-    candidate, count = signature(effect.name, ROBOT).candidate, len(list_candidates(effect.name, ROBOT))
+    candidate = signature(effect.name, ROBOT).candidate
+    count = len(list_candidates(effect.name, ROBOT))
     rows = [
         "".join(
             (
@@ -124,13 +137,22 @@ def _table(effect: Effect) -> str:
         )
         for parameter in candidate.parameters
     ]
-    lines = [f"Where it can act on the arm shown: {count} candidates; shown is ``{candidate.key}``."]
+    lines = [
+        f"Where it can act on the arm shown: {count} candidates; shown is ``{candidate.key}``."
+    ]
     # A load on the joints is a load.
-    if needs := sorted(candidate.needs - ({"load"} if "load on the joints" in candidate.needs else set())):
-        lines.append(f"It can be found only with {' and '.join(NEEDS[need] for need in needs)}.")
+    if needs := sorted(
+        candidate.needs
+        - ({"load"} if "load on the joints" in candidate.needs else set())
+    ):
+        lines.append(
+            f"It can be found only with {' and '.join(NEEDS[need] for need in needs)}."
+        )
     for shape in candidate.shapes:
         unit = "" if shape.unit == "1" else f" {shape.unit}"
-        lines.append(f"Not linear in ``{shape.name}``, between {shape.lowest:.3g} and {shape.highest:.3g}{unit}.")
+        lines.append(
+            f"Not linear in ``{shape.name}``, between {shape.lowest:.3g} and {shape.highest:.3g}{unit}."
+        )
     head = ".. list-table::\n   :header-rows: 1\n\n   * - parameter\n     - unit\n     - plausible size\n     - sign\n"
     return f"{' '.join(lines)}\n\n{head}{''.join(rows)}"
 

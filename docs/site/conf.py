@@ -1,4 +1,5 @@
-"""Configuration of Sphinx, which makes the site from the pages that assemble.py puts together."""
+"""Configuration of Sphinx, which makes the site from the pages that assemble.py puts
+together."""
 
 import sys
 from pathlib import Path
@@ -20,7 +21,8 @@ highlight_language = "text"
 # Names in docstrings stand between single backticks.
 default_role = "code"
 
-# Words of docstrings, such as the type of a parameter, that more than one class of the package has for a name.
+# Words of docstrings, such as the type of a parameter, that more than one class of the
+# package has for a name.
 suppress_warnings = ["ref.python"]
 
 autodoc_default_options = {"members": True}
@@ -38,9 +40,11 @@ html_math_renderer = "mathml"
 html_static_path = ["static"]
 html_css_files = ["site.css"]
 html_copy_source = False
-# A browser lets no page that is opened as a file read others: results of a search are titles.
+# A browser lets no page that is opened as a file read others: results of a search are
+# titles.
 html_show_search_summary = False
-# The search finds names; an index of all of them took as long as the rest of the reference.
+# The search finds names; an index of all of them took as long as the rest of the
+# reference.
 html_use_index = False
 html_domain_indices = False
 html_show_sphinx = False

@@ -1,4 +1,5 @@
-"""Pages of the file formats: what people write, of the JSON Schemas; what the pipeline writes, of the schemas of its tables."""
+"""Pages of the file formats: what people write, of the JSON Schemas; what the pipeline
+writes, of the schemas of its tables."""
 
 from __future__ import annotations
 
@@ -53,30 +54,49 @@ Made of the schemas by which files are checked when they are read and written. M
 
 def pages() -> dict[str, str]:
     """Text of each page by its name."""
-    found = {f"{name}.md": _document(name, words) for name, words in DOCUMENTS.items()} | {"tables.md": _tables()}
-    return {"index.md": HEAD + "".join(f"{name.removesuffix('.md')}\n" for name in found) + "```\n", **found}
+    found = {
+        f"{name}.md": _document(name, words) for name, words in DOCUMENTS.items()
+    } | {"tables.md": _tables()}
+    return {
+        "index.md": HEAD
+        + "".join(f"{name.removesuffix('.md')}\n" for name in found)
+        + "```\n",
+        **found,
+    }
 
 
 def _document(name: str, words: str) -> str:
-    text = resources.files("elastocal.schemas").joinpath(f"{name}.yaml").read_text(encoding="utf-8")
+    text = (
+        resources.files("elastocal.schemas")
+        .joinpath(f"{name}.yaml")
+        .read_text(encoding="utf-8")
+    )
     schema = yaml.safe_load(text)
-    title, _, listed = "".join(Parser(examples_as_yaml=True).parse_schema(schema)).partition("\n")
+    title, _, listed = "".join(
+        Parser(examples_as_yaml=True).parse_schema(schema)
+    ).partition("\n")
     # Of keys that allow only some values the library does not say which are required.
     required = ", ".join(f"`{key}`" for key in schema.get("required", ())) or "none"
     intro = f"{words} Keys that must be there: {required}. Other keys than these are refused."
     listed = _TO_KEY.sub(r"\1", _TRIED_ELSEWHERE.sub("", listed))
-    keys = _EXAMPLE.sub(_plain_example, _PRINTABLE.sub("Printable characters on one line", listed))
+    keys = _EXAMPLE.sub(
+        _plain_example, _PRINTABLE.sub("Printable characters on one line", listed)
+    )
     return f"{title}\n\n{intro}\n{keys}"
 
 
 def _plain_example(match: re.Match[str]) -> str:
     blanks = match[1]
-    text = yaml.safe_dump(yaml.safe_load(dedent(match[2])), allow_unicode=True, sort_keys=False).removesuffix("...\n")
+    text = yaml.safe_dump(
+        yaml.safe_load(dedent(match[2])), allow_unicode=True, sort_keys=False
+    ).removesuffix("...\n")
     return indent(f"```yaml\n{text}```", blanks)
 
 
 def _tables() -> str:
-    parts = [f"# Tables\n\nParquet files, column by column; those that go with the robot are shown for {JOINTS} joints.\n"]
+    parts = [
+        f"# Tables\n\nParquet files, column by column; those that go with the robot are shown for {JOINTS} joints.\n"
+    ]
     for module, words in TABLES.items():
         parts.append(f"\n## {words.partition(':')[0]}\n\n{words.partition(': ')[2]}\n")
         parts += [_table(schema) for schema in table_schemas(module)]
@@ -84,17 +104,31 @@ def _tables() -> str:
 
 
 def table_schemas(module: str) -> list[TableSchema]:
-    """Every schema of a module, or of those of a package, with those that go with the number of joints."""
+    """Every schema of a module, or of those of a package, with those that go with the
+    number of joints."""
     package = import_module(module)
     if hasattr(package, "__path__"):
-        names = sorted(each.name for each in iter_modules(package.__path__, f"{module}."))
-        return [*{schema.name: schema for name in names for schema in table_schemas(name)}.values()]
+        names = sorted(
+            each.name for each in iter_modules(package.__path__, f"{module}.")
+        )
+        return [
+            *{
+                schema.name: schema for name in names for schema in table_schemas(name)
+            }.values()
+        ]
     found = []
     for name, thing in vars(package).items():
         if isinstance(thing, TableSchema):
             found.append(thing)
-        elif isfunction(thing) and thing.__module__ == module and not name.startswith("_"):
-            made_of = list(signature(thing).parameters), thing.__annotations__.get("return")
+        elif (
+            isfunction(thing)
+            and thing.__module__ == module
+            and not name.startswith("_")
+        ):
+            made_of = (
+                list(signature(thing).parameters),
+                thing.__annotations__.get("return"),
+            )
             if made_of in ((["joints"], TableSchema), (["joints"], "TableSchema")):
                 found.append(thing(JOINTS))
     return found

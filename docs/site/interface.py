@@ -1,4 +1,5 @@
-"""The page of the programming interface: what people import, by what they want to do, made of the docstrings."""
+"""The page of the programming interface: what people import, by what they want to do,
+made of the docstrings."""
 
 from __future__ import annotations
 
@@ -13,14 +14,22 @@ is internal and may change; its docstrings are in the source.
 """
 # Modules, each with the names that are shown.
 INTERFACE = {
-    "Read a robot and a campaign": {"elastocal.campaigns.reading": ("read_robot", "read_campaign")},
+    "Read a robot and a campaign": {
+        "elastocal.campaigns.reading": ("read_robot", "read_campaign")
+    },
     "Move a robot": {
         "elastocal.mechanics.kinematics": ("poses", "poses_and_jacobians"),
         "elastocal.mechanics.elastostatics": ("generalized_forces",),
     },
-    "Simulate a campaign": {"elastocal.campaigns.simulation": ("Plan", "draw_measurements")},
+    "Simulate a campaign": {
+        "elastocal.campaigns.simulation": ("Plan", "draw_measurements")
+    },
     "Plan measurements": {
-        "elastocal.application.planning.plan": ("Survey", "find_allowed_candidates", "choose_plan"),
+        "elastocal.application.planning.plan": (
+            "Survey",
+            "find_allowed_candidates",
+            "choose_plan",
+        ),
     },
     "Diagnose": {
         "elastocal.diagnosis.diagnose": ("diagnose",),
@@ -28,12 +37,20 @@ INTERFACE = {
         "elastocal.effects.catalogue": ("effects",),
     },
     "Use a calibrated robot": {
-        "elastocal.application.calibrated": ("calibrate_by_fit", "forward", "pose_sensitivities"),
+        "elastocal.application.calibrated": (
+            "calibrate_by_fit",
+            "forward",
+            "pose_sensitivities",
+        ),
         "elastocal.application.accuracy": ("predict_errors",),
         "elastocal.application.compensation": ("find_joint_targets",),
     },
-    "Judge predictions": {"elastocal.validation.held_out": ("position_errors", "intervals")},
-    "Identify compliances as in the study": {"elastocal.study.equation_11": ("estimate_compliance", "undetermined")},
+    "Judge predictions": {
+        "elastocal.validation.held_out": ("position_errors", "intervals")
+    },
+    "Identify compliances as in the study": {
+        "elastocal.study.equation_11": ("estimate_compliance", "undetermined")
+    },
 }
 
 
@@ -44,6 +61,10 @@ def page() -> str:
         parts.append(f"{title}\n{'-' * len(title)}\n\n")
         for module, names in modules.items():
             for name in names:
-                kind = "autoclass" if isinstance(getattr(import_module(module), name), type) else "autofunction"
+                kind = (
+                    "autoclass"
+                    if isinstance(getattr(import_module(module), name), type)
+                    else "autofunction"
+                )
                 parts.append(f".. {kind}:: {module}.{name}\n\n")
     return "".join(parts)

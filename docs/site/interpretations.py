@@ -1,4 +1,5 @@
-"""The page of what the paper leaves open: the table of the report, and the switches of the configuration."""
+"""The page of what the paper leaves open: the table of the report, and the switches of
+the configuration."""
 
 from __future__ import annotations
 
@@ -23,19 +24,33 @@ or both are given.
 
 def page() -> str:
     """The page, in Markdown."""
-    text = resources.files("elastocal.schemas").joinpath("config.yaml").read_text(encoding="utf-8")
+    text = (
+        resources.files("elastocal.schemas")
+        .joinpath("config.yaml")
+        .read_text(encoding="utf-8")
+    )
     switches = yaml.safe_load(text)["properties"]["interpretations"]["properties"]
     with open(TABLE, encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     return HEAD + "".join(
-        f"| {row['number']} | {row['open']} | {row['interpretation']} | {_switch(row['number'], switches)} |\n" for row in rows
+        f"| {row['number']} | {row['open']} | {row['interpretation']} | {_switch(row['number'], switches)} |\n"
+        for row in rows
     )
 
 
 def _switch(number: str, switches: dict[str, dict]) -> str:
     """Keys whose description begins with the number, with what they allow."""
-    found = {key: words for key, words in switches.items() if words["description"].startswith(f"{number}:")}
+    found = {
+        key: words
+        for key, words in switches.items()
+        if words["description"].startswith(f"{number}:")
+    }
     return "; ".join(
-        f"`{key}`: " + (", ".join(f"`{value}`" for value in words["enum"]) if "enum" in words else words["description"][4:])
+        f"`{key}`: "
+        + (
+            ", ".join(f"`{value}`" for value in words["enum"])
+            if "enum" in words
+            else words["description"][4:]
+        )
         for key, words in found.items()
     )

@@ -1,7 +1,9 @@
-"""Elastostatic calibration of serial robots: the science, importable without the pipeline that runs it.
+"""Elastostatic calibration of serial robots: the science, importable without the
+pipeline that runs it.
 
-Its rooms stand in `[tool.importlinter]` of pyproject.toml, from the ground up; docs/architecture.md says what each is for.
-What proves it is a package of its own, `elastocal_proof`, which `elastocal demo` alone imports.
+Its rooms stand in `[tool.importlinter]` of pyproject.toml, from the ground up;
+docs/architecture.md says what each is for. What proves it is a package of its own,
+`elastocal_proof`, which `elastocal demo` alone imports.
 """
 
 __version__ = "0.1.0"

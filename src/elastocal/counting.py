@@ -15,7 +15,9 @@ def counted(number: int, one: str, many: str | None = None) -> str:
 
 def first_names(names: Sequence[str], most: int) -> str:
     """The first of some names, and how many more there are: a, b and 3 more."""
-    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+    return ", ".join(names[:most]) + (
+        f" and {len(names) - most} more" if len(names) > most else ""
+    )
 
 
 def plural(one: str, number: int, many: str | None = None) -> str:

@@ -15,25 +15,39 @@ if TYPE_CHECKING:
 
 # A terminal shows a message as a whole: files may hold values of any length.
 LONGEST_MESSAGE = 500
-# Tables hold names, and spreadsheets open tables; those of some countries take the wide signs too.
+# Tables hold names, and spreadsheets open tables; those of some countries take the wide
+# signs too.
 _FORMULA = tuple("=+-@＝＋－＠")
-_LONGEST_SOURCE, _LONGEST_KEY, _LONGEST_FOUND = 160, 100, 120
+_LONGEST_SOURCE = 160
+_LONGEST_KEY = 100
+_LONGEST_FOUND = 120
 
 
 class InputError(ValueError):
-    """Something that a user gave cannot be used; the message is one line of `LONGEST_MESSAGE` characters at most.
+    """Something that a user gave cannot be used; the message is one line of
+    `LONGEST_MESSAGE` characters at most.
 
-    `source`: the file, or the name of the thing, that holds the fault. `key`: the key, row or column inside it; empty where the
-    whole file is meant. `found`: what stands there. `allowed`: what may stand there.
+    `source`: the file, or the name of the thing, that holds the fault. `key`: the key,
+    row or column inside it; empty where the whole file is meant. `found`: what stands
+    there. `allowed`: what may stand there.
     """
 
     def __init__(self, source: str | Path, key: str, found: str, allowed: str) -> None:
-        self.source, self.key, self.found, self.allowed = str(source), key, found, allowed
+        self.source = str(source)
+        self.key = key
+        self.found = found
+        self.allowed = allowed
         name = printable(self.source)
-        where = name if len(name) <= _LONGEST_SOURCE else f"…{name[1 - _LONGEST_SOURCE :]}"
+        where = (
+            name if len(name) <= _LONGEST_SOURCE else f"…{name[1 - _LONGEST_SOURCE :]}"
+        )
         where += f": {_shortened(printable(key), _LONGEST_KEY)}" if key else ""
-        message = f"{where}: found {_shortened(printable(found), _LONGEST_FOUND)}; allowed: "
-        super().__init__(message + _shortened(printable(allowed), LONGEST_MESSAGE - len(message)))
+        message = (
+            f"{where}: found {_shortened(printable(found), _LONGEST_FOUND)}; allowed: "
+        )
+        super().__init__(
+            message + _shortened(printable(allowed), LONGEST_MESSAGE - len(message))
+        )
 
 
 def closest_first(name: str, known: Collection[str]) -> str:
@@ -43,7 +57,8 @@ def closest_first(name: str, known: Collection[str]) -> str:
 
 
 def closest(name: str, known: Collection[str]) -> str:
-    """The closest of some names as a question, whatever the case of its letters; empty where none is close."""
+    """The closest of some names as a question, whatever the case of its letters; empty
+    where none is close."""
     lower = {other.lower(): other for other in known}
     close = difflib.get_close_matches(str(name).lower(), lower, n=1)
     return f"{lower[close[0]]!r}?" if close else ""
@@ -55,21 +70,45 @@ def printable(text: str) -> str:
 
 
 def escaped(text: str) -> str:
-    """A text with what `steering` finds as escapes: what a file holds must not steer a terminal."""
-    return text if text.isprintable() else "".join(ascii(c)[1:-1] if steering(c) else c for c in text)
+    """A text with what `steering` finds as escapes: what a file holds must not steer a
+    terminal."""
+    return (
+        text
+        if text.isprintable()
+        else "".join(ascii(c)[1:-1] if steering(c) else c for c in text)
+    )
 
 
 def steering(text: str) -> str:
-    """The first control character of a text, or mark that turns the order of letters or is not seen; empty where none is."""
-    return "" if text.isprintable() else next((c for c in text if not (c.isprintable() or unicodedata.category(c) == "Zs")), "")
+    """The first control character of a text, or mark that turns the order of letters or
+    is not seen; empty where none is."""
+    return (
+        ""
+        if text.isprintable()
+        else next(
+            (
+                c
+                for c in text
+                if not (c.isprintable() or unicodedata.category(c) == "Zs")
+            ),
+            "",
+        )
+    )
 
 
 def text_fault(text: str) -> tuple[str, str] | None:
-    """What is wrong with a name or text that reports, tables and terminals show, and what is allowed; None where nothing is."""
+    """What is wrong with a name or text that reports, tables and terminals show, and
+    what is allowed; None where nothing is."""
     if character := steering(text):
-        return f"the character {character!a} in {text!r}", "printable characters on one line"
+        return (
+            f"the character {character!a} in {text!r}",
+            "printable characters on one line",
+        )
     if text.startswith(_FORMULA):
-        return repr(text), f"a text that does not begin with {text[0]}, which a spreadsheet takes for a formula"
+        return (
+            repr(text),
+            f"a text that does not begin with {text[0]}, which a spreadsheet takes for a formula",
+        )
     return None
 
 
@@ -79,19 +118,39 @@ _NO_MEMORY = ("failed to map segment", "annot allocate memory")
 _USABLE = "a file or folder that is there, on a disk with space, where this user may read and write"
 
 
-def fault_of_machine(error: OSError | MemoryError | ImportError, place: str = "disk") -> InputError:
-    """A full disk, a folder that cannot be written to, memory that is used up and the like; at `place` where it has no name."""
-    if isinstance(error, MemoryError) or any(words in str(error) for words in _NO_MEMORY):
-        return InputError("memory", "", "none left", "a smaller file, more memory, or fewer jobs at a time (-j1)")
+def fault_of_machine(
+    error: OSError | MemoryError | ImportError, place: str = "disk"
+) -> InputError:
+    """A full disk, a folder that cannot be written to, memory that is used up and the
+    like; at `place` where it has no name."""
+    if isinstance(error, MemoryError) or any(
+        words in str(error) for words in _NO_MEMORY
+    ):
+        return InputError(
+            "memory",
+            "",
+            "none left",
+            "a smaller file, more memory, or fewer jobs at a time (-j1)",
+        )
     if isinstance(error, ImportError):
-        return InputError("Python", "", str(error), "an environment with every package of this version")
+        return InputError(
+            "Python",
+            "",
+            str(error),
+            "an environment with every package of this version",
+        )
     # What was asked for, not the name beside it under which it is written.
-    return InputError(_PARTIAL.sub("", str(error.filename or place)), "", reason_of(error), _USABLE)
+    return InputError(
+        _PARTIAL.sub("", str(error.filename or place)), "", reason_of(error), _USABLE
+    )
 
 
 def reason_of(error: OSError) -> str:
-    """What was found where something could not be read or written, in words that fit a sentence."""
-    return "no such file" if error.errno == errno.ENOENT else error.strerror or str(error)
+    """What was found where something could not be read or written, in words that fit a
+    sentence."""
+    return (
+        "no such file" if error.errno == errno.ENOENT else error.strerror or str(error)
+    )
 
 
 def _shortened(text: str, longest: int) -> str:

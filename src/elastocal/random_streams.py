@@ -1,7 +1,8 @@
 """Random numbers that depend on what they are for and on nothing else.
 
-Every stream is named by (seed, robot, purpose, data set): the first two make the key of a Philox counter generator, the others
-its position. How many sets are drawn, in which order, by how many cores or in which blocks cannot change a number.
+Every stream is named by (seed, robot, purpose, data set): the first two make the key of
+a Philox counter generator, the others its position. How many sets are drawn, in which
+order, by how many cores or in which blocks cannot change a number.
 """
 
 from __future__ import annotations
@@ -26,18 +27,23 @@ def stream(seed: int, robot: str, purpose: str, data_set: int) -> np.random.Gene
 
 
 def draw(
-    seed: int, robot: str, purpose: str, data_sets: Iterable[int], sampler: Callable[[np.random.Generator], np.ndarray]
+    seed: int,
+    robot: str,
+    purpose: str,
+    data_sets: Iterable[int],
+    sampler: Callable[[np.random.Generator], np.ndarray],
 ) -> np.ndarray:
     """One array for each data set, stacked.
 
-    `seed`, `robot`, `purpose`: as in `stream`. `sampler`: takes a Generator, returns an array of fixed shape. Returns (sets,
-    ...).
+    `seed`, `robot`, `purpose`: as in `stream`. `sampler`: takes a Generator, returns an
+    array of fixed shape. Returns (sets, ...).
     """
     generator = stream(seed, robot, purpose, 0)
     start = generator.bit_generator.state
     drawn = []
     for data_set in data_sets:
-        # One generator is set to the start of each stream: to make one for each takes longer than most draws.
+        # One generator is set to the start of each stream: to make one for each takes
+        # longer than most draws.
         start["state"]["counter"][2] = data_set
         generator.bit_generator.state = start
         drawn.append(sampler(generator))
@@ -47,5 +53,7 @@ def draw(
 @lru_cache
 def _names(seed: int, robot: str, purpose: str) -> tuple[np.ndarray, int]:
     """Key and position of the streams of one purpose."""
-    key = np.frombuffer(hashlib.sha256(f"{seed}/{robot}".encode()).digest()[:16], np.uint64)
+    key = np.frombuffer(
+        hashlib.sha256(f"{seed}/{robot}".encode()).digest()[:16], np.uint64
+    )
     return key, int.from_bytes(hashlib.sha256(purpose.encode()).digest()[:8], "little")

@@ -1,4 +1,5 @@
-"""Corrected targets put back into the forward model, and what is said of those that cannot be corrected."""
+"""Corrected targets put back into the forward model, and what is said of those that
+cannot be corrected."""
 
 from dataclasses import replace
 
@@ -20,21 +21,29 @@ from elastocal.application.compensation import (
 )
 from elastocal.mechanics.kinematics import jacobians, pose_differences
 
-EFFECTS = (*(key for key in USUAL if "weight" not in key), "transmission_harmonic@1[orders 1-2]")
+EFFECTS = (
+    *(key for key in USUAL if "weight" not in key),
+    "transmission_harmonic@1[orders 1-2]",
+)
 # From the middle of the limits to a posture that is not singular.
 BENT = np.array([0.0, 0.2, 0.1, 0.3, 0.7, 0.0])
 
 
 def make_robot(name, *keys):
     robot = made_calibrated(analysed(name), *keys)
-    return replace(robot, noise=replace(robot.noise, joint_rad=np.full(robot.robot.joints, 1e-5)))
+    return replace(
+        robot, noise=replace(robot.noise, joint_rad=np.full(robot.robot.joints, 1e-5))
+    )
 
 
 def draw_states(calibrated, count, force=100.0):
     """Reported angles within the limits, and a force and a moment for each."""
-    robot, draws = calibrated.robot, np.random.default_rng(2)
+    robot = calibrated.robot
+    draws = np.random.default_rng(2)
     low, high = robot.joint_limits.T
-    angles = low + (high - low) * (0.5 + 0.8 * (draws.random((count, robot.joints)) - 0.5))
+    angles = low + (high - low) * (
+        0.5 + 0.8 * (draws.random((count, robot.joints)) - 0.5)
+    )
     wrench = draws.standard_normal((count, 6)) * ([force] * 3 + [0.3 * force] * 3)
     return robot.reported_angles(angles), wrench
 
@@ -55,14 +64,22 @@ def test_corrected_targets_bring_the_robot_to_the_wanted_poses(name):
     found = find_joint_targets(robot, position, rotation, wrench, angles)
     good = found.status == OK
     assert good.mean() > 0.9
-    off = pose_differences(position, rotation, *settle(robot, found.joint_angles, wrench))[good]
+    off = pose_differences(
+        position, rotation, *settle(robot, found.joint_angles, wrench)
+    )[good]
     assert np.abs(off).max() < 2e-9
     np.testing.assert_allclose(found.error_after[good], off, atol=2e-9)
     assert np.sqrt((found.error_before[good, :3] ** 2).sum(axis=1).mean()) > 1e-4
     # Each joint repeats to 10 µrad: seen through the Jacobian of where it stands.
-    jacobian = jacobians(robot.robot.chain, robot.robot.model_angles(found.joint_angles), robot.robot.chain.end_effector)
+    jacobian = jacobians(
+        robot.robot.chain,
+        robot.robot.model_angles(found.joint_angles),
+        robot.robot.chain.end_effector,
+    )
     stated = predict_errors(robot, found.joint_angles, wrench, draws=0).repeated_m
-    np.testing.assert_allclose(stated, 1e-5 * np.sqrt((jacobian[:, :3] ** 2).sum(axis=(1, 2))), rtol=1e-9)
+    np.testing.assert_allclose(
+        stated, 1e-5 * np.sqrt((jacobian[:, :3] ** 2).sum(axis=(1, 2))), rtol=1e-9
+    )
 
 
 def test_what_cannot_be_corrected_is_named():
@@ -75,7 +92,9 @@ def test_what_cannot_be_corrected_is_named():
     reported = robot.robot.reported_angles(angles)
     position, rotation = nominal_forward(robot.robot, reported)
     position[3] *= 5.0
-    found = find_joint_targets(robot, position, rotation, np.zeros((len(position), 6)), reported)
+    found = find_joint_targets(
+        robot, position, rotation, np.zeros((len(position), 6)), reported
+    )
     assert found.status.tolist() == [OK, OUTSIDE_LIMITS, SINGULAR, UNREACHABLE]
     assert np.isfinite(found.joint_angles).all()
 
@@ -90,16 +109,32 @@ def test_a_stated_posture_and_its_turn_are_kept_or_refused(name):
     angles[:, 0] = np.radians(np.linspace(-180.6, -168.6, 7))
     angles = robot.robot.reported_angles(angles)
     position, rotation = nominal_forward(robot.robot, angles)
-    found = find_joint_targets(robot, position, rotation, np.zeros((len(position), 6)), np.repeat(angles[:1], 7, axis=0))
-    assert (found.status == OK).all() and np.abs(found.joint_angles - angles).max() < 0.02
-    turned, straight = angles.copy(), np.zeros_like(angles)
+    found = find_joint_targets(
+        robot,
+        position,
+        rotation,
+        np.zeros((len(position), 6)),
+        np.repeat(angles[:1], 7, axis=0),
+    )
+    assert (found.status == OK).all() and np.abs(
+        found.joint_angles - angles
+    ).max() < 0.02
+    turned = angles.copy()
+    straight = np.zeros_like(angles)
     turned[:, 0] += 2 * np.pi
-    found = find_joint_targets(robot, position, rotation, np.zeros((len(position), 6)), turned)
+    found = find_joint_targets(
+        robot, position, rotation, np.zeros((len(position), 6)), turned
+    )
     kept = found.status == OK
     assert kept.any() and np.abs(found.joint_angles - turned)[kept].max() < 0.02
     assert set(found.status[~kept]) <= {OUTSIDE_LIMITS}
-    found = find_joint_targets(robot, position, rotation, np.zeros((len(position), 6)), straight)
-    assert set(found.status) <= {OTHER_POSTURE, UNREACHABLE, OUTSIDE_LIMITS} and OTHER_POSTURE in found.status
+    found = find_joint_targets(
+        robot, position, rotation, np.zeros((len(position), 6)), straight
+    )
+    assert (
+        set(found.status) <= {OTHER_POSTURE, UNREACHABLE, OUTSIDE_LIMITS}
+        and OTHER_POSTURE in found.status
+    )
 
 
 def test_a_posture_behind_a_singular_one_is_another_however_near():
@@ -111,7 +146,10 @@ def test_a_posture_behind_a_singular_one_is_another_however_near():
     stated = angles.copy()
     stated[:, 4] = np.radians([15.0, -1.0])
     found = find_joint_targets(
-        robot, *nominal_forward(robot.robot, reported), np.zeros((len(reported), 6)), robot.robot.reported_angles(stated)
+        robot,
+        *nominal_forward(robot.robot, reported),
+        np.zeros((len(reported), 6)),
+        robot.robot.reported_angles(stated),
     )
     assert found.status.tolist() == [OK, OTHER_POSTURE]
 
@@ -119,15 +157,27 @@ def test_a_posture_behind_a_singular_one_is_another_however_near():
 @pytest.mark.parametrize("name", ["kuka", "iiwa14"])
 def test_random_paths_never_swing(name):
     """Limits of 170 to 350 degrees either way: no step above the rule."""
-    draws, whole = np.random.default_rng(5), 0
+    draws = np.random.default_rng(5)
+    whole = 0
     for _ in range(5):
         robot = make_robot(name)
         half = np.radians(draws.uniform(170.0, 350.0, robot.robot.joints))
-        robot = replace(robot, robot=replace(robot.robot, joint_limits=np.stack([-half, half], axis=1)))
-        walk = draws.uniform(-half, half) + np.cumsum(draws.normal(0.0, 0.06, (10, len(half))), axis=0)
-        position, rotation = nominal_forward(robot.robot, robot.robot.reported_angles(walk.clip(-half, half)))
-        found = find_joint_targets(robot, position, rotation, np.zeros((len(position), 6)))
+        robot = replace(
+            robot,
+            robot=replace(robot.robot, joint_limits=np.stack([-half, half], axis=1)),
+        )
+        walk = draws.uniform(-half, half) + np.cumsum(
+            draws.normal(0.0, 0.06, (10, len(half))), axis=0
+        )
+        position, rotation = nominal_forward(
+            robot.robot, robot.robot.reported_angles(walk.clip(-half, half))
+        )
+        found = find_joint_targets(
+            robot, position, rotation, np.zeros((len(position), 6))
+        )
         good = found.status == OK
         whole += good.all()
-        assert not large_steps(robot.robot, position[good], rotation[good], found.joint_angles[good])
+        assert not large_steps(
+            robot.robot, position[good], rotation[good], found.joint_angles[good]
+        )
     assert whole >= 4

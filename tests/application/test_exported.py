@@ -15,7 +15,14 @@ from elastocal.effects.catalogue import candidates_on
 from elastocal.mechanics.robot_file import document_of, robot_from_document
 from elastocal.mechanics.sites import sites_of
 
-GEOMETRY = ("joint_offset@2", "joint_offset@4", "link_geometry@1", "link_geometry@2", "link_geometry@3", "link_geometry@4")
+GEOMETRY = (
+    "joint_offset@2",
+    "joint_offset@4",
+    "link_geometry@1",
+    "link_geometry@2",
+    "link_geometry@3",
+    "link_geometry@4",
+)
 
 
 def draw_states(robot, count=20):
@@ -27,31 +34,48 @@ def draw_states(robot, count=20):
 
 
 def read_file_model(robot):
-    """The calibrated robot that a robot file alone describes: its springs, its weight, no effect."""
+    """The calibrated robot that a robot file alone describes: its springs, its weight,
+    no effect."""
     model = plain_model(robot)
-    values = [robot.compliance if e.effect == "joint_compliance" else np.zeros(len(e.parameters)) for e in model.effects]
+    values = [
+        robot.compliance
+        if e.effect == "joint_compliance"
+        else np.zeros(len(e.parameters))
+        for e in model.effects
+    ]
     count = sum(len(value) for value in values)
     noise = made_calibrated(robot).noise
-    return calibrate_by_model(robot, model, plain_estimate(model, values), np.zeros((count, count)), noise)
+    return calibrate_by_model(
+        robot, model, plain_estimate(model, values), np.zeros((count, count)), noise
+    )
 
 
 @pytest.mark.parametrize(
     ("name", "more"),
     [
-        *((name, ()) for name in ("gp180", "iiwa14", "fanuc_static", "fanuc_cpa", "ur10", "abb")),
+        *(
+            (name, ())
+            for name in ("gp180", "iiwa14", "fanuc_static", "fanuc_cpa", "ur10", "abb")
+        ),
         *(("fanuc_cpa", (f"transmission_ratio@{joint}",)) for joint in (1, 3)),
     ],
 )
 def test_poses_of_a_robot_file_under_load_are_those_of_the_calibrated_robot(name, more):
     robot = analysed(name)
     known = candidates_on(sites_of(robot))
-    calibrated = made_calibrated(robot, *(key for key in (*GEOMETRY, "link_geometry@6", *more) if key in known), size=1.0)
+    calibrated = made_calibrated(
+        robot,
+        *(key for key in (*GEOMETRY, "link_geometry@6", *more) if key in known),
+        size=1.0,
+    )
     found = fold_effects(calibrated)
     assert found.left_out == ()
     angles, wrench = draw_states(robot)
     through_file = robot_from_document(document_of(found.robot))
     for mine, theirs in zip(
-        forward(read_file_model(through_file), angles, wrench), forward(calibrated, angles, wrench), strict=True
+        forward(read_file_model(through_file), angles, wrench),
+        forward(calibrated, angles, wrench),
+        strict=True,
     ):
         np.testing.assert_allclose(mine, theirs, atol=1e-9)
 
@@ -63,7 +87,10 @@ def test_what_a_robot_file_cannot_say_is_left_out_and_changes_nothing_else():
     assert [calibrated.model.effects[number].key for number in found.left_out] == keys
     angles, wrench = draw_states(calibrated.robot)
     bare = without(calibrated, set(found.left_out))
-    ends = [forward(each, angles, wrench)[0] for each in (read_file_model(found.robot), bare, calibrated)]
+    ends = [
+        forward(each, angles, wrench)[0]
+        for each in (read_file_model(found.robot), bare, calibrated)
+    ]
     np.testing.assert_allclose(ends[0], ends[1], atol=1e-9)
     off = find_left_out_m(calibrated, angles, wrench)
     np.testing.assert_allclose(off, np.linalg.norm(ends[2] - ends[1], axis=1))

@@ -8,7 +8,12 @@ from made_audits import made_run
 @pytest.fixture(scope="session")
 def diagnosed(tmp_path_factory):
     """A campaign of springs at two points; tests put back what they alter."""
-    return diagnosed_campaign(tmp_path_factory.mktemp("diagnosed"), "kuka", covariates=(), points=("3DoF", "6DoF"))
+    return diagnosed_campaign(
+        tmp_path_factory.mktemp("diagnosed"),
+        "kuka",
+        covariates=(),
+        points=("3DoF", "6DoF"),
+    )
 
 
 @pytest.fixture

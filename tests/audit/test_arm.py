@@ -13,7 +13,11 @@ from elastocal_proof.audit.arm import Arm, cantilever
 BEAM = {
     "chain": "Rz(q1) Tx(2.0) [tip]",
     "compliance_urad_per_Nm": [1e-6],
-    "links": {"youngs_modulus_GPa": 70, "shear_modulus_GPa": 26, "tubes": [{"outer_diameter_m": 0.2, "wall_m": 0.02}]},
+    "links": {
+        "youngs_modulus_GPa": 70,
+        "shear_modulus_GPa": 26,
+        "tubes": [{"outer_diameter_m": 0.2, "wall_m": 0.02}],
+    },
 }
 WRENCH = np.array([100.0, -200.0, 300.0, 40.0, 50.0, -60.0])
 
@@ -21,27 +25,42 @@ WRENCH = np.array([100.0, -200.0, 300.0, 40.0, 50.0, -60.0])
 @pytest.mark.parametrize("chain", [TURNED, TRACK])
 def test_the_package_has_the_same_regressor(chain):
     joints = 4
-    limits, compliance = [[-180.0, 180.0]] * joints, [0.5 + j for j in range(joints)]
-    document = {"name": "arm", "chain": chain, "joint_limits_deg": limits, "compliance_urad_per_Nm": compliance}
-    arm, robot = Arm(document), robot_from_document(document)
+    limits = [[-180.0, 180.0]] * joints
+    compliance = [0.5 + j for j in range(joints)]
+    document = {
+        "name": "arm",
+        "chain": chain,
+        "joint_limits_deg": limits,
+        "compliance_urad_per_Nm": compliance,
+    }
+    arm = Arm(document)
+    robot = robot_from_document(document)
     angles = np.random.default_rng(2).uniform(-1, 1, arm.joints)
     torques = joint_torques(robot.chain, angles, WRENCH, robot.chain.end_effector)
     for point in arm.points:
-        expected = regressor(jacobians(robot.chain, angles, robot.chain.point(point)), torques)
-        np.testing.assert_allclose(arm.regressor(angles, WRENCH, point), expected, atol=1e-9)
+        expected = regressor(
+            jacobians(robot.chain, angles, robot.chain.point(point)), torques
+        )
+        np.testing.assert_allclose(
+            arm.regressor(angles, WRENCH, point), expected, atol=1e-9
+        )
         assert np.abs(expected).max() > 1
 
 
 def test_a_target_beside_its_point_moves_with_it():
     arm = Arm({"chain": "Rz(q1) Tx(2.0) [tip]"}, {"t": ("tip", [0.0, 0.5, 0.0])})
-    np.testing.assert_allclose(arm.pose(np.array([np.pi / 2]), "t")[0], [-0.5, 2.0, 0.0], atol=1e-15)
+    np.testing.assert_allclose(
+        arm.pose(np.array([np.pi / 2]), "t")[0], [-0.5, 2.0, 0.0], atol=1e-15
+    )
     np.testing.assert_allclose(arm.jacobian(np.zeros(1), "t")[:2, 0], [-0.5, 2.0])
     np.testing.assert_allclose(arm.jacobian(np.zeros(1))[:2, 0], [0.0, 2.0])
 
 
 def test_a_tube_bends_by_the_textbook():
-    """F L^3 / 3 E I at its tip, which turns by F L^2 / 2 E I; along itself it gives by F L / E A."""
-    springs, second = Arm(BEAM).springs[1:, 1:], np.pi * (0.2**4 - 0.16**4) / 64
+    """F L^3 / 3 E I at its tip, which turns by F L^2 / 2 E I; along itself it gives by
+    F L / E A."""
+    springs = Arm(BEAM).springs[1:, 1:]
+    second = np.pi * (0.2**4 - 0.16**4) / 64
     assert springs[2, 2] == pytest.approx(8 / (3 * 70e9 * second))
     assert springs[4, 2] == pytest.approx(-4 / (2 * 70e9 * second))
     assert springs[0, 0] == pytest.approx(2 / (70e9 * np.pi * (0.1**2 - 0.08**2)))
@@ -49,16 +68,29 @@ def test_a_tube_bends_by_the_textbook():
 
 
 def test_a_tapered_link_shifts_and_twists_as_the_uniform_one_and_turns_by_the_integral_of_its_compliance():
-    taper, uniform, found = 0.4, *(cantilever(np.array([2.0, 0, 0]), 1e-6, 2e-6, taper) for taper in (0.0, 0.4))
-    assert found[2, 2] == pytest.approx(uniform[2, 2]) and found[3, 3] == pytest.approx(uniform[3, 3])
+    taper, uniform, found = (
+        0.4,
+        *(cantilever(np.array([2.0, 0, 0]), 1e-6, 2e-6, taper) for taper in (0.0, 0.4)),
+    )
+    assert found[2, 2] == pytest.approx(uniform[2, 2]) and found[3, 3] == pytest.approx(
+        uniform[3, 3]
+    )
     # Of (1 - s)^2 / (1 - t s)^3 and of 1 / (1 - t s)^3 from 0 to 1.
     shifting = quad(lambda s: (1 - s) ** 2 / (1 - taper * s) ** 3, 0, 1)[0]
-    assert found[5, 5] == pytest.approx(2e-6 * ((1 - taper) ** -2 - 1) / (2 * taper) / (3 * shifting))
+    assert found[5, 5] == pytest.approx(
+        2e-6 * ((1 - taper) ** -2 - 1) / (2 * taper) / (3 * shifting)
+    )
 
 
 def test_a_joint_yields_to_the_load_where_it_has_turned_to():
     arm = Arm({"chain": "Rz(q1) Tx(2.0) [tip]"})
-    coordinates, forces = arm.loaded(np.array([[1e-4]]), np.zeros(1), np.array([0, 1000.0, 0, 0, 0, 0]), 6)
+    coordinates, forces = arm.loaded(
+        np.array([[1e-4]]), np.zeros(1), np.array([0, 1000.0, 0, 0, 0, 0]), 6
+    )
     np.testing.assert_allclose(coordinates, 1e-4 * forces, rtol=1e-6)
-    # The lever is shorter there than at the commanded pose, where the torque is force times length.
-    assert forces[0] == pytest.approx(2000 * np.cos(coordinates[0]), rel=1e-3) and forces[0] < 1990
+    # The lever is shorter there than at the commanded pose, where the torque is force
+    # times length.
+    assert (
+        forces[0] == pytest.approx(2000 * np.cos(coordinates[0]), rel=1e-3)
+        and forces[0] < 1990
+    )

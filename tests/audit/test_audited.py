@@ -8,29 +8,47 @@ from elastocal.random_streams import stream
 from elastocal_proof.audit.audited import compare, numbers, require, require_each_once
 
 
-@pytest.mark.parametrize("name", [(1, "kuka", "identification/force", 0), (7, "fanuc", "noise/6DoF/again", 999)])
+@pytest.mark.parametrize(
+    "name",
+    [(1, "kuka", "identification/force", 0), (7, "fanuc", "noise/6DoF/again", 999)],
+)
 def test_numbers_are_those_of_the_pipeline(name):
     assert (numbers(*name).random(5) == stream(*name).random(5)).all()
 
 
 def test_a_sample_is_drawn_by_the_name_of_the_file(run):
     picked = run.pick("a", 1000)
-    assert len({*picked}) == 20 and (picked == run.pick("a", 1000)).all() and (picked != run.pick("b", 1000)).any()
+    assert (
+        len({*picked}) == 20
+        and (picked == run.pick("a", 1000)).all()
+        and (picked != run.pick("b", 1000)).any()
+    )
     assert run.pick("a", 3).tolist() == [0, 1, 2]
 
 
-@pytest.mark.parametrize(("found", "holds"), [(1.0 + 0.9e-9, True), (1.0 + 1.1e-9, False), (np.nan, False), (np.inf, False)])
+@pytest.mark.parametrize(
+    ("found", "holds"),
+    [(1.0 + 0.9e-9, True), (1.0 + 1.1e-9, False), (np.nan, False), (np.inf, False)],
+)
 def test_a_difference_is_measured_by_the_largest_expected_value(found, holds):
     told = compare("c", "b", [found, 0.5], [1.0, 0.5])
     assert told.holds is holds and (told.note == "") is holds
     # Equal values hold even where nothing is allowed.
-    assert compare("c", "b", [found, np.nan, np.inf], [found, np.nan, np.inf], 0.0).holds
+    assert compare(
+        "c", "b", [found, np.nan, np.inf], [found, np.nan, np.inf], 0.0
+    ).holds
 
 
 def test_a_note_says_why_a_check_does_not_hold_and_rows_are_numbered_by_all_combinations():
-    assert compare("c", "b", [1.0, 2.5], [1.0, 2.0]).note == "value 1: found 2.5, expected 2"
+    assert (
+        compare("c", "b", [1.0, 2.5], [1.0, 2.0]).note
+        == "value 1: found 2.5, expected 2"
+    )
     assert "found 1 values, expected 2" in compare("c", "b", [1.0], [1.0, 2.0]).note
-    assert require("c", "b", True, "why").note == "" and require("c", "b", False, "why").note == "why"
+    assert (
+        require("c", "b", True, "why").note == ""
+        and require("c", "b", False, "why").note == "why"
+    )
     frame = pd.DataFrame({"a": [0, 0, 1, 1], "b": [1, 2, 1, 2]})
     assert require_each_once(frame, a=range(2), b=range(1, 3)).holds
     assert not require_each_once(frame.head(3), a=range(2), b=range(1, 3)).holds

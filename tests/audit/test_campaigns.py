@@ -1,4 +1,5 @@
-"""Simulated campaigns as they were drawn hold; a value altered, a pose that leaks and a broken seal are found."""
+"""Simulated campaigns as they were drawn hold; a value altered, a pose that leaks and a
+broken seal are found."""
 
 import hashlib
 import json
@@ -15,26 +16,54 @@ from elastocal_proof.audit.audited import Audited
 from elastocal_proof.audit.campaigns import seals, simulated, split
 
 PLAN = {
-    **{"points": ["hand"], "poses": 3, "force_N": 500, "ladder": [0, 1, -1], "offset_m": [0, 0.5, 0], "repeats": 2},
+    **{
+        "points": ["hand"],
+        "poses": 3,
+        "force_N": 500,
+        "ladder": [0, 1, -1],
+        "offset_m": [0, 0.5, 0],
+        "repeats": 2,
+    },
     **{"repeated_poses": 1, "noise_m": 6e-5, "noise_rad": 5e-5},
 }
-DRAWN, TRAINING = "data/campaigns/cell/measurements.parquet", "results/loop/cell/training.parquet"
+DRAWN = "data/campaigns/cell/measurements.parquet"
+TRAINING = "results/loop/cell/training.parquet"
 
 
 @pytest.fixture
 def drawn(tmp_path):
-    for folder in ("config/campaigns", "config/robots", "data/campaigns/cell", "results/loop/cell"):
+    for folder in (
+        "config/campaigns",
+        "config/robots",
+        "data/campaigns/cell",
+        "results/loop/cell",
+    ):
         (tmp_path / folder).mkdir(parents=True)
     source = {"source": "simulated", "robot": "two", "declared_robot": "two"} | PLAN
-    (tmp_path / "config/campaigns/cell.yaml").write_text(yaml.safe_dump(source), encoding="utf-8")
-    (tmp_path / "config/robots/two.yaml").write_text(yaml.safe_dump(ROBOT), encoding="utf-8")
-    plan = Plan(**{name: tuple(value) if isinstance(value, list) else value for name, value in PLAN.items()})
-    table = pd.DataFrame(draw_measurements(robot_from_document(ROBOT, "two"), plan, 1, "cell"))
+    (tmp_path / "config/campaigns/cell.yaml").write_text(
+        yaml.safe_dump(source), encoding="utf-8"
+    )
+    (tmp_path / "config/robots/two.yaml").write_text(
+        yaml.safe_dump(ROBOT), encoding="utf-8"
+    )
+    plan = Plan(
+        **{
+            name: tuple(value) if isinstance(value, list) else value
+            for name, value in PLAN.items()
+        }
+    )
+    table = pd.DataFrame(
+        draw_measurements(robot_from_document(ROBOT, "two"), plan, 1, "cell")
+    )
     table.to_parquet(tmp_path / DRAWN)
     table = table.assign(row=np.arange(1, len(table) + 1), session=0)
     table[table["pose"] < 2].to_parquet(tmp_path / TRAINING)
-    table[table["pose"] == 2].to_parquet(tmp_path / TRAINING.replace("training", "held_out"))
-    (tmp_path / "results/loop/cell/campaign.json").write_text(json.dumps({"held_out": None}), encoding="utf-8")
+    table[table["pose"] == 2].to_parquet(
+        tmp_path / TRAINING.replace("training", "held_out")
+    )
+    (tmp_path / "results/loop/cell/campaign.json").write_text(
+        json.dumps({"held_out": None}), encoding="utf-8"
+    )
     return Audited(tmp_path, CONFIGURATION, {}, {}, 4)
 
 
@@ -63,16 +92,24 @@ def test_a_value_altered_is_found(drawn, file, column, change, checked):
     with altered(drawn.folder, file, (column, 4), change):
         assert checked in found_in(drawn)
     # One that was measured is not.
-    (drawn.folder / "config/campaigns/cell.yaml").write_text("source: public\n", encoding="utf-8")
+    (drawn.folder / "config/campaigns/cell.yaml").write_text(
+        "source: public\n", encoding="utf-8"
+    )
     assert [*simulated(drawn, DRAWN, "cell")] == []
 
 
 def test_a_ground_truth_altered_after_its_seal_is_found(drawn):
-    sealed, manifest = drawn.folder / "data/sealed/some_1/case.json", drawn.folder / "reports/blind/manifest.sha256"
+    sealed = drawn.folder / "data/sealed/some_1/case.json"
+    manifest = drawn.folder / "reports/blind/manifest.sha256"
     sealed.parent.mkdir(parents=True)
     manifest.parent.mkdir(parents=True)
     sealed.write_bytes(b'{"size": 1.0}')
-    manifest.write_text(f"{hashlib.sha256(sealed.read_bytes()).hexdigest()}  case.json\n", encoding="utf-8")
+    manifest.write_text(
+        f"{hashlib.sha256(sealed.read_bytes()).hexdigest()}  case.json\n",
+        encoding="utf-8",
+    )
     assert failed(seals(drawn, "reports/blind/manifest.sha256")) == []
     sealed.write_bytes(b'{"size": 1.1}')
-    assert [finding.note for finding in seals(drawn, "reports/blind/manifest.sha256")] == ["case.json"]
+    assert [
+        finding.note for finding in seals(drawn, "reports/blind/manifest.sha256")
+    ] == ["case.json"]

@@ -1,4 +1,5 @@
-"""Fits of diagnosed campaigns hold; an estimate, a standard error, a correlation or a residual altered does not."""
+"""Fits of diagnosed campaigns hold; an estimate, a standard error, a correlation or a
+residual altered does not."""
 
 import numpy as np
 import pandas as pd
@@ -10,7 +11,8 @@ from support import TRACK, TURNED
 from elastocal_proof.audit.arm import Arm
 from elastocal_proof.audit.fits import model_of, stand
 
-STEPS, RESIDUALS = "results/loop/cell/steps.parquet", "reports/loop/cell/residuals.parquet"
+STEPS = "results/loop/cell/steps.parquet"
+RESIDUALS = "reports/loop/cell/residuals.parquet"
 WRENCH = np.array([100.0, -200.0, 300.0, 40.0, 50.0, -60.0])
 
 
@@ -19,7 +21,8 @@ def test_an_arm_stands_by_mujoco_where_it_stands_by_pinocchio(chain):
     """With springs in its links too."""
     arm = Arm({"chain": chain, "links": {}})
     draws = np.random.default_rng(1)
-    angles, half = draws.uniform(-1, 1, arm.joints), 1e-4 * draws.normal(size=(arm.coordinates, arm.coordinates))
+    angles = draws.uniform(-1, 1, arm.joints)
+    half = 1e-4 * draws.normal(size=(arm.coordinates, arm.coordinates))
     springs = half @ half.T
     for point in arm.points:
         expected = arm.pose(arm.loaded(springs, angles, WRENCH, 3)[0], point)[0]
@@ -29,13 +32,26 @@ def test_an_arm_stands_by_mujoco_where_it_stands_by_pinocchio(chain):
         assert np.abs(found[-1] - found[-2]).max() < 1e-12
 
 
-# Robot, effects and how it is measured; the second lacks what no model of the audit has, the third repeats.
+# Robot, effects and how it is measured; the second lacks what no model of the audit
+# has, the third repeats.
 HONEST = [
     ("kuka", ("joint_offset",), {"covariates": ()}),
-    pytest.param("fanuc", ("outside:foreign_angle_stiffness",), {"covariates": ()}, marks=pytest.mark.slow),
-    pytest.param("iiwa14", ("transmission_harmonic",), {"covariates": ()}, marks=pytest.mark.slow),
+    pytest.param(
+        "fanuc",
+        ("outside:foreign_angle_stiffness",),
+        {"covariates": ()},
+        marks=pytest.mark.slow,
+    ),
+    pytest.param(
+        "iiwa14", ("transmission_harmonic",), {"covariates": ()}, marks=pytest.mark.slow
+    ),
     pytest.param("abb", ("payload",), {"measured": "position"}, marks=pytest.mark.slow),
-    pytest.param("kuka", (), {"declared_noise": (2e-5, 2e-5), "repeats": 1, "repeated_poses": 0}, marks=pytest.mark.slow),
+    pytest.param(
+        "kuka",
+        (),
+        {"declared_noise": (2e-5, 2e-5), "repeats": 1, "repeated_poses": 0},
+        marks=pytest.mark.slow,
+    ),
 ]
 
 
@@ -49,13 +65,20 @@ def test_a_campaign_of_springs_holds(diagnosed):
     found = audit_of(diagnosed)
     assert failed(found) == []
     assert {finding.by for finding in found} >= {"MuJoCo", "statsmodels on pinocchio"}
-    assert {"residuals before", "residuals after"} <= {finding.checked.partition(",")[0] for finding in found}
+    assert {"residuals before", "residuals after"} <= {
+        finding.checked.partition(",")[0] for finding in found
+    }
 
 
 @pytest.mark.parametrize(
     ("file", "at", "change", "expected"),
     [
-        (STEPS, ("std_error", 0), lambda value: 0.5 * value, "standard errors of step 1 (declared)"),
+        (
+            STEPS,
+            ("std_error", 0),
+            lambda value: 0.5 * value,
+            "standard errors of step 1 (declared)",
+        ),
         (
             "results/loop/cell/diagnosis.json",
             ["covariance", 0, 0],
@@ -75,13 +98,22 @@ def test_a_figure_altered_is_found(diagnosed, file, at, change, expected):
 def test_an_estimate_off_by_a_hundredth_of_its_standard_error_is_found(diagnosed):
     more = 0.01 * pd.read_parquet(diagnosed / STEPS)["std_error"].iloc[1]
     with altered(diagnosed, STEPS, ("value", 1), lambda value: value + more):
-        assert "estimates of step 1 (declared) stand still, in standard errors" in failed(audit_of(diagnosed, STEPS))
+        assert (
+            "estimates of step 1 (declared) stand still, in standard errors"
+            in failed(audit_of(diagnosed, STEPS))
+        )
 
 
 @pytest.mark.parametrize(
     ("key", "other"),
-    [("frame", "tracker"), ("declared", ["joint_offset"]), ("targets", {"hand": {"point": "6DoF", "offset_m": "unknown"}})],
+    [
+        ("frame", "tracker"),
+        ("declared", ["joint_offset"]),
+        ("targets", {"hand": {"point": "6DoF", "offset_m": "unknown"}}),
+    ],
 )
 def test_what_is_not_written_down_here_is_left_out(diagnosed, key, other):
-    with altered(diagnosed, "results/loop/cell/campaign.json", ["campaign", key], lambda _: other):
+    with altered(
+        diagnosed, "results/loop/cell/campaign.json", ["campaign", key], lambda _: other
+    ):
         assert audit_of(diagnosed) == []

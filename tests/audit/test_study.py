@@ -1,18 +1,35 @@
-"""Simulated data and estimates as they were drawn hold; an error of each kind is found."""
+"""Simulated data and estimates as they were drawn hold; an error of each kind is
+found."""
 
 import numpy as np
 import pytest
 from made_audits import altered, failed
 
-from elastocal_proof.audit.study import estimates, experiments, ideal, measured, solve_staged
+from elastocal_proof.audit.study import (
+    estimates,
+    experiments,
+    ideal,
+    measured,
+    solve_staged,
+)
 
-EXPERIMENTS, IDEAL = "data/simulated/two/experiments.parquet", "data/simulated/two/ideal.parquet"
-MEASURED, IDENTIFIED = "data/simulated/two/100um/measured.parquet", "results/identified/two/100um/hand.parquet"
+EXPERIMENTS = "data/simulated/two/experiments.parquet"
+IDEAL = "data/simulated/two/ideal.parquet"
+MEASURED = "data/simulated/two/100um/measured.parquet"
+IDENTIFIED = "results/identified/two/100um/hand.parquet"
 
 
 def found_in(run):
-    run.table.cache_clear(), run.experiments.cache_clear(), run.deflections.cache_clear()
-    checks = [*experiments(run, EXPERIMENTS, "two"), *ideal(run, IDEAL, "two"), *measured(run, MEASURED, "two", "100")]
+    (
+        run.table.cache_clear(),
+        run.experiments.cache_clear(),
+        run.deflections.cache_clear(),
+    )
+    checks = [
+        *experiments(run, EXPERIMENTS, "two"),
+        *ideal(run, IDEAL, "two"),
+        *measured(run, MEASURED, "two", "100"),
+    ]
     return failed([*checks, *estimates(run, IDENTIFIED, "two", "hand", "100")])
 
 
@@ -21,14 +38,31 @@ def found_in(run):
     [
         (EXPERIMENTS, "q2", lambda v: v + 1e-6, "joint angles, data set 1"),
         (EXPERIMENTS, "fy", lambda v: -v, "wrenches, data set 1"),
-        (EXPERIMENTS, "data_set", lambda v: v - 1, "each data set and configuration once"),
+        (
+            EXPERIMENTS,
+            "data_set",
+            lambda v: v - 1,
+            "each data set and configuration once",
+        ),
         (IDEAL, "dz", lambda v: v + 1e-8, "deflection of hand, 20 rows"),
         (MEASURED, "rx", lambda v: v + 1e-8, "measured deflection of hand, data set 1"),
-        (IDENTIFIED, "compliance_1", lambda v: 1.0001 * v, "compliances of data set 1, length 3"),
-        (IDENTIFIED, "compliance_2", lambda v: np.nan, "compliances of data set 1, length 3"),
+        (
+            IDENTIFIED,
+            "compliance_1",
+            lambda v: 1.0001 * v,
+            "compliances of data set 1, length 3",
+        ),
+        (
+            IDENTIFIED,
+            "compliance_2",
+            lambda v: np.nan,
+            "compliances of data set 1, length 3",
+        ),
     ],
 )
-def test_data_and_estimates_as_they_were_made_hold_and_an_altered_value_is_found(run, file, column, change, expected):
+def test_data_and_estimates_as_they_were_made_hold_and_an_altered_value_is_found(
+    run, file, column, change, expected
+):
     assert found_in(run) == []
     with altered(run.folder, file, (column, 7), change):
         assert expected in found_in(run)
@@ -36,7 +70,12 @@ def test_data_and_estimates_as_they_were_made_hold_and_an_altered_value_is_found
 
 def test_errors_of_a_stage_reach_the_next_one():
     """c1 = y1 and c2 = y2 - c1, so that its variance is 2."""
-    stages = [{"points": ["a"], "joints": [1]}, {"points": ["b"], "joints": [2], "held": [1]}]
-    gain, _ = solve_staged(stages, {"a": np.array([[1.0, 0.0]]), "b": np.array([[1.0, 1.0]])}, 2)
+    stages = [
+        {"points": ["a"], "joints": [1]},
+        {"points": ["b"], "joints": [2], "held": [1]},
+    ]
+    gain, _ = solve_staged(
+        stages, {"a": np.array([[1.0, 0.0]]), "b": np.array([[1.0, 1.0]])}, 2
+    )
     np.testing.assert_allclose(gain @ [3.0, 5.0], [3.0, 2.0])
     np.testing.assert_allclose(gain @ gain.T, [[1, -1], [-1, 2]], atol=1e-12)

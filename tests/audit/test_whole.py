@@ -8,7 +8,14 @@ from elastocal.io.records import recorded
 from elastocal.io.storage import write_table
 from elastocal.study.simulation import INITIAL
 from elastocal_proof.audit.audited import Audited, Finding
-from elastocal_proof.audit.whole import CHECKS, as_table, audit, intact, page_of, provenance
+from elastocal_proof.audit.whole import (
+    CHECKS,
+    as_table,
+    audit,
+    intact,
+    page_of,
+    provenance,
+)
 
 FILE = "results/initial/two.parquet"
 
@@ -20,26 +27,44 @@ def folder(tmp_path):
 
 
 def write(folder, seed=1, robot="two"):
-    block = {"data_set": [0], "configurations": [5], "mean": [1e-3], "mean_square": [1e-6], "maximum": [1e-3]}
-    write_table(folder.folder / FILE, INITIAL, [block], written_by({"seed": seed}, robot=robot))
+    block = {
+        "data_set": [0],
+        "configurations": [5],
+        "mean": [1e-3],
+        "mean_square": [1e-6],
+        "maximum": [1e-3],
+    }
+    write_table(
+        folder.folder / FILE, INITIAL, [block], written_by({"seed": seed}, robot=robot)
+    )
     forge(folder.folder, FILE)
 
 
 def test_a_file_as_it_was_written_holds(folder):
     write(folder)
     found = audit(folder)
-    assert failed(found) == [] and len(found) == 5 and {each.file for each in found} == {FILE}
+    assert (
+        failed(found) == []
+        and len(found) == 5
+        and {each.file for each in found} == {FILE}
+    )
 
 
 @pytest.mark.parametrize(
-    ("change", "checked"), [({"seed": 2}, "made by what is configured"), ({"robot": "other"}, "made for where it lies")]
+    ("change", "checked"),
+    [
+        ({"seed": 2}, "made by what is configured"),
+        ({"robot": "other"}, "made for where it lies"),
+    ],
 )
 def test_a_file_of_another_run_or_robot_is_found(folder, change, checked):
     write(folder, **change)
     assert failed(provenance(folder, FILE)) == [checked]
 
 
-def test_an_altered_a_missing_and_an_unreadable_file_are_found_and_an_empty_folder_is_no_finished_run(folder):
+def test_an_altered_a_missing_and_an_unreadable_file_are_found_and_an_empty_folder_is_no_finished_run(
+    folder,
+):
     assert [finding.holds for finding in audit(folder)] == [False]
     write(folder)
     digest = recorded(folder.folder)[FILE]
@@ -52,21 +77,52 @@ def test_an_altered_a_missing_and_an_unreadable_file_are_found_and_an_empty_fold
     (folder.folder / FILE).write_bytes(b"no table")
     forge(folder.folder, FILE)
     found = audit(folder)
-    assert [finding.holds for finding in found] == [True, False] and "ArrowInvalid" in found[1].note
+    assert [finding.holds for finding in found] == [
+        True,
+        False,
+    ] and "ArrowInvalid" in found[1].note
 
 
-GOOD = Finding("compliances", "numpy on pinocchio", 4, 1e-5, file="results/identified/kuka/200um/6DoF.parquet")
-BAD = Finding("column <dev>", "pinocchio", 2, 7.0, "found 1, expected 2", "data/simulated/kuka/ideal.parquet")
-BYTES = Finding("bytes as its job wrote them", "hashlib, SHA-256", 1, 0.0, file="reports/figures/figure3.pdf")
+GOOD = Finding(
+    "compliances",
+    "numpy on pinocchio",
+    4,
+    1e-5,
+    file="results/identified/kuka/200um/6DoF.parquet",
+)
+BAD = Finding(
+    "column <dev>",
+    "pinocchio",
+    2,
+    7.0,
+    "found 1, expected 2",
+    "data/simulated/kuka/ideal.parquet",
+)
+BYTES = Finding(
+    "bytes as its job wrote them",
+    "hashlib, SHA-256",
+    1,
+    0.0,
+    file="reports/figures/figure3.pdf",
+)
 
 
 def test_the_page_says_first_whether_all_holds_and_what_was_not_worked_out_again():
-    again, apart = page_of(as_table([GOOD, BYTES]), {"seed": "1"}).split("What was not worked out again")
+    again, apart = page_of(as_table([GOOD, BYTES]), {"seed": "1"}).split(
+        "What was not worked out again"
+    )
     assert "All 2 checks hold." in again and "What does not hold" not in again
-    assert "results/identified/*/*um/*.parquet" in again and "In <strong>1 files</strong>" in again
+    assert (
+        "results/identified/*/*um/*.parquet" in again
+        and "In <strong>1 files</strong>" in again
+    )
     assert "reports/figures/*.pdf" in apart and "reports/figures/*.pdf" not in again
     assert all(check.__doc__ for _, check in CHECKS)
     # What does not hold is shown, and nothing of it is run.
     text = page_of(as_table([GOOD, BAD]), {})
-    assert "1 of 2 checks do not hold." in text and "column &lt;dev&gt;" in text and "http" not in text
+    assert (
+        "1 of 2 checks do not hold." in text
+        and "column &lt;dev&gt;" in text
+        and "http" not in text
+    )
     assert "What was not worked out again" not in text

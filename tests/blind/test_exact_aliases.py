@@ -1,4 +1,5 @@
-"""The aliases that the scores set aside are exact on the design of the blind cases, and no others are."""
+"""The aliases that the scores set aside are exact on the design of the blind cases, and
+no others are."""
 
 import numpy as np
 import pytest
@@ -15,17 +16,26 @@ from elastocal_proof.blind.scores import EXACT_ALIASES
 
 pytestmark = pytest.mark.slow
 
-_SINE, _ROUNDING = 1e-6, 1e-7
+_SINE = 1e-6
+_ROUNDING = 1e-7
 
 
 def directions(declared, observations, candidates):
-    """Orthonormal bases of what each candidate contributes beyond the declared model, whitened; without a column, nothing."""
-    line = linearize(declared.model, declared.estimate, observations, declared.conditions)
+    """Orthonormal bases of what each candidate contributes beyond the declared model,
+    whitened; without a column, nothing."""
+    line = linearize(
+        declared.model, declared.estimate, observations, declared.conditions
+    )
     left = declared.whitened(line.sensitivities).reshape(line.residual.size, -1)
     basis = np.linalg.qr(left / np.linalg.norm(left, axis=0))[0]
     found = []
     for candidate in candidates:
-        made = effect_columns([(candidate.displacement, ())], line.conditions, line.coordinate_jacobian, observations.state)
+        made = effect_columns(
+            [(candidate.displacement, ())],
+            line.conditions,
+            line.coordinate_jacobian,
+            observations.state,
+        )
         columns = declared.whitened(made).reshape(line.residual.size, -1)
         columns = columns / np.linalg.norm(columns, axis=0)
         for _ in range(2):
@@ -37,26 +47,48 @@ def directions(declared, observations, candidates):
 
 @pytest.fixture(scope="module", params=["fanuc", "abb"])
 def seen(request, tmp_path_factory):
-    """What every candidate makes of the measurements of a robot without an effect, off the declared model."""
+    """What every candidate makes of the measurements of a robot without an effect, off
+    the declared model."""
     folder = tmp_path_factory.mktemp(request.param)
-    # Of an arm whose file tells no weights: where it does, weights absorb some of what is compared here.
-    made = Case("aliases", "none", request.param, (), (), "weight_compensated", 314159, changes={"weighs": False})
+    # Of an arm whose file tells no weights: where it does, weights absorb some of what
+    # is compared here.
+    made = Case(
+        "aliases",
+        "none",
+        request.param,
+        (),
+        (),
+        "weight_compensated",
+        314159,
+        changes={"weighs": False},
+    )
     make_case(made, folder / "blind", folder / "sealed", ROBOTS)
-    descriptions, training, _ = load_campaign((folder / "blind" / made.name).as_posix(), ROBOTS.as_posix())
+    descriptions, training, _ = load_campaign(
+        (folder / "blind" / made.name).as_posix(), ROBOTS.as_posix()
+    )
     case = case_from(descriptions, columns_of(training))
     declared = fit(case.model, case.observations, estimated_noise(case)[0])
     candidates = [c for c in case.candidates.values() if not c.shapes]
     return directions(declared, case.observations, candidates)
 
 
-def test_effects_with_the_same_span_are_those_set_aside_and_compliances_take_up_a_wrong_force_scale(seen):
+def test_effects_with_the_same_span_are_those_set_aside_and_compliances_take_up_a_wrong_force_scale(
+    seen,
+):
     same = set()
     for one, columns in seen:
         for other, others in seen:
-            within = columns.shape[1] and np.linalg.norm(columns - others @ (others.T @ columns), 2) < _SINE
+            within = (
+                columns.shape[1]
+                and np.linalg.norm(columns - others @ (others.T @ columns), 2) < _SINE
+            )
             if one.effect != other.effect and within and columns.shape == others.shape:
                 same.add(((one.effect, one.joints), other.effect))
-    told = {(place, other) for place, other in EXACT_ALIASES.items() if place[0] not in ("force_scale", "link_weight")}
+    told = {
+        (place, other)
+        for place, other in EXACT_ALIASES.items()
+        if place[0] not in ("force_scale", "link_weight")
+    }
     assert same == told
     columns = [part for candidate, part in seen if candidate.effect == "force_scale"]
     assert columns and not sum(part.shape[1] for part in columns)

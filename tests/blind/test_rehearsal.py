@@ -1,4 +1,5 @@
-"""The robot that stands in for a real one: what it writes into a measurement sheet, and where it goes."""
+"""The robot that stands in for a real one: what it writes into a measurement sheet, and
+where it goes."""
 
 import numpy as np
 import pandas as pd
@@ -9,7 +10,13 @@ from scipy.spatial.transform import Rotation
 from elastocal.errors import InputError
 from elastocal.exchange.target_path import read_target_path
 from elastocal.mechanics.kinematics import poses
-from elastocal_proof.blind.rehearsal import fill_sheet, hidden_robot, measured_errors, reached, write_milling_path
+from elastocal_proof.blind.rehearsal import (
+    fill_sheet,
+    hidden_robot,
+    measured_errors,
+    reached,
+    write_milling_path,
+)
 
 UR10 = ROBOTS / "ur10.yaml"
 WRENCH = ["fx", "fy", "fz", "mx", "my", "mz"]
@@ -20,22 +27,41 @@ def robot():
     return hidden_robot(UR10, 4, ["joint_tilt"])[0]
 
 
-DOCUMENT = {"targets": {"T": {"point": "6DoF", "offset_m": (0.0, 0.0, 0.0)}}, "frame": "base", "measured": "pose"}
+DOCUMENT = {
+    "targets": {"T": {"point": "6DoF", "offset_m": (0.0, 0.0, 0.0)}},
+    "frame": "base",
+    "measured": "pose",
+}
 
 
-def test_a_sheet_is_filled_near_where_the_declared_robot_is_and_by_where_commands_reach(robot, tmp_path):
+def test_a_sheet_is_filled_near_where_the_declared_robot_is_and_by_where_commands_reach(
+    robot, tmp_path
+):
     angles = np.random.default_rng(1).uniform(-1, 1, (5, 6))
-    declared, path = analysed("ur10"), tmp_path / "sheet.csv"
-    joints = {f"q{j + 1}": angle for j, angle in enumerate(angles.T)} | dict.fromkeys(WRENCH, 0.0)
-    pd.DataFrame({"pose": range(5), "load": 0, "repeat": 0, "target": "T"} | joints).to_csv(path, index=False)
+    declared = analysed("ur10")
+    path = tmp_path / "sheet.csv"
+    joints = {f"q{j + 1}": angle for j, angle in enumerate(angles.T)} | dict.fromkeys(
+        WRENCH, 0.0
+    )
+    pd.DataFrame(
+        {"pose": range(5), "load": 0, "repeat": 0, "target": "T"} | joints
+    ).to_csv(path, index=False)
     assert fill_sheet(path, DOCUMENT, robot, 1) == 5
     filled = pd.read_csv(path)
-    position, rotation = poses(declared.chain, declared.model_angles(angles), declared.chain.end_effector)
+    position, rotation = poses(
+        declared.chain, declared.model_angles(angles), declared.chain.end_effector
+    )
     off = np.linalg.norm(filled[["x", "y", "z"]].to_numpy() - position, axis=1)
     assert off.min() > 1e-5 and off.max() < 0.02
-    turn = Rotation.from_rotvec(filled[["rx", "ry", "rz"]].to_numpy()) * Rotation.from_matrix(rotation).inv()
+    turn = (
+        Rotation.from_rotvec(filled[["rx", "ry", "rz"]].to_numpy())
+        * Rotation.from_matrix(rotation).inv()
+    )
     assert turn.magnitude().max() < 0.05
-    noise = filled[["x", "y", "z"]].to_numpy() - reached(robot, angles, np.zeros((5, 6)), 9)[0]
+    noise = (
+        filled[["x", "y", "z"]].to_numpy()
+        - reached(robot, angles, np.zeros((5, 6)), 9)[0]
+    )
     assert 1e-6 < np.abs(noise).max() < 5e-4
 
 
@@ -47,8 +73,11 @@ def test_the_hidden_effect_follows_from_the_seed_or_is_named(tmp_path):
         hidden_robot(UR10, 3, ["rust"])
 
 
-def test_uncorrected_and_corrected_targets_are_judged_at_the_wanted_poses(robot, tmp_path):
-    path, targets = tmp_path / "path.csv", tmp_path / "targets.csv"
+def test_uncorrected_and_corrected_targets_are_judged_at_the_wanted_poses(
+    robot, tmp_path
+):
+    path = tmp_path / "path.csv"
+    targets = tmp_path / "targets.csv"
     assert write_milling_path(path, analysed("ur10"), robot, 1) == 50
     wanted = read_target_path(path, 6)
     assert len(wanted) == 50 and wanted.wrench[:, 2].min() > 0

@@ -23,15 +23,25 @@ print(json.dumps({"opened": opened, "modules": modules, "verdicts": len(json.loa
 
 
 @pytest.mark.slow
-def test_diagnosing_opens_no_sealed_file_and_knows_no_plant(kuka, config_folder, tmp_path):
+def test_diagnosing_opens_no_sealed_file_and_knows_no_plant(
+    kuka, config_folder, tmp_path
+):
     table = made_table(kuka, "case_1", offset_of_joint_3=6e-4)
     made_folder(tmp_path / "blind" / "case_1", kuka, "case_1", table=table)
     (tmp_path / "sealed").mkdir()
     (tmp_path / "sealed" / "case_1.json").write_text("{}", encoding="utf-8")
-    places = [(tmp_path / "blind").as_posix(), (config_folder / "robots").as_posix(), (tmp_path / "verdicts.json").as_posix()]
-    done = subprocess.run([sys.executable, "-c", WATCHED, *places], capture_output=True, text=True)
+    places = [
+        (tmp_path / "blind").as_posix(),
+        (config_folder / "robots").as_posix(),
+        (tmp_path / "verdicts.json").as_posix(),
+    ]
+    done = subprocess.run(
+        [sys.executable, "-c", WATCHED, *places], capture_output=True, text=True
+    )
     assert not done.returncode, done.stderr
     told = json.loads(done.stdout)
-    assert told["verdicts"] == 1 and any(path.endswith("campaign.yaml") for path in told["opened"])
+    assert told["verdicts"] == 1 and any(
+        path.endswith("campaign.yaml") for path in told["opened"]
+    )
     assert not [path for path in told["opened"] if "sealed" in path]
     assert told["modules"] == []

@@ -8,7 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_cells import assert_same
 
-from elastocal.campaigns.campaign import columns_of, groups_of, measurements_from, residual_columns
+from elastocal.campaigns.campaign import (
+    columns_of,
+    groups_of,
+    measurements_from,
+    residual_columns,
+)
 
 PARTS = {
     "rotation_vector": ("rx", "ry", "rz"),
@@ -17,7 +22,24 @@ PARTS = {
     "temperature_c": ("temperature_c",),
     "u95_m": ("u95_m",),
 }
-PLAIN = ("session", "pose", "load", "repeat", "target", "row", "q1", "q2", "q3", "fx", "fy", "fz", "mx", "my", "mz", *"xyz")
+PLAIN = (
+    "session",
+    "pose",
+    "load",
+    "repeat",
+    "target",
+    "row",
+    "q1",
+    "q2",
+    "q3",
+    "fx",
+    "fy",
+    "fz",
+    "mx",
+    "my",
+    "mz",
+    *"xyz",
+)
 
 
 @pytest.fixture
@@ -32,7 +54,10 @@ def test_selected_measurements_come_in_the_order_of_the_index(measurements):
     chosen = measurements.select(np.array([5, 2]))
     assert len(chosen) == 2 and chosen.row.tolist() == [6, 3] and chosen.time_s is None
     np.testing.assert_array_equal(chosen.position, measurements.position[[5, 2]])
-    assert_same(measurements.select(measurements.load == 1), measurements.select(np.flatnonzero(measurements.load == 1)))
+    assert_same(
+        measurements.select(measurements.load == 1),
+        measurements.select(np.flatnonzero(measurements.load == 1)),
+    )
 
 
 def test_every_number_stands_in_the_column_of_its_name(cell, measurements):
@@ -44,33 +69,64 @@ def test_every_number_stands_in_the_column_of_its_name(cell, measurements):
 
 
 @pytest.mark.parametrize("part", PARTS)
-def test_what_was_not_measured_is_an_empty_column_and_is_absent_again(measurements, part):
+def test_what_was_not_measured_is_an_empty_column_and_is_absent_again(
+    measurements, part
+):
     columns = columns_of(replace(measurements, **{part: None}))
-    assert {name for name, values in columns.items() if np.isnan(values).any()} == set(PARTS[part])
-    assert [name for name, values in vars(measurements_from(columns)).items() if values is None] == [part]
+    assert {name for name, values in columns.items() if np.isnan(values).any()} == set(
+        PARTS[part]
+    )
+    assert [
+        name
+        for name, values in vars(measurements_from(columns)).items()
+        if values is None
+    ] == [part]
 
 
-def test_residuals_of_poses_stand_beside_the_measurements_in_the_positions_that_are_given(measurements):
+def test_residuals_of_poses_stand_beside_the_measurements_in_the_positions_that_are_given(
+    measurements,
+):
     some = measurements.select(np.array([3, 9]))
     before, after = (np.arange(12.0).reshape(2, 6) + start for start in (100.0, 200.0))
-    position, beyond = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]), np.array([False, True])
-    columns = residual_columns(some, False, False, beyond, position, {"before": before, "after": after[:, :3]})
+    position = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
+    beyond = np.array([False, True])
+    columns = residual_columns(
+        some, False, False, beyond, position, {"before": before, "after": after[:, :3]}
+    )
     for number, component in enumerate(("dx", "dy", "dz", "rx", "ry", "rz")):
         np.testing.assert_array_equal(columns[f"before_{component}"], before[:, number])
-        np.testing.assert_array_equal(columns[f"after_{component}"], after[:, number] if number < 3 else [np.nan] * 2)
+        np.testing.assert_array_equal(
+            columns[f"after_{component}"],
+            after[:, number] if number < 3 else [np.nan] * 2,
+        )
     np.testing.assert_array_equal([columns[axis] for axis in "xyz"], position.T)
     whole = columns_of(some)
-    assert all((columns[name] == whole[name]).all() for name in ("row", "q2", "mz", "time_s"))
+    assert all(
+        (columns[name] == whole[name]).all() for name in ("row", "q2", "mz", "time_s")
+    )
     assert columns["outside_range"].tolist() == [False, True]
-    own = {"held_out", "gross_error", "outside_range", *(name for name in columns if name.startswith(("before", "after")))}
+    own = {
+        "held_out",
+        "gross_error",
+        "outside_range",
+        *(name for name in columns if name.startswith(("before", "after"))),
+    }
     assert columns.keys() - own == {*PLAIN, "time_s"}
 
 
-@given(st.lists(st.tuples(st.integers(-2, 2), st.integers(-2, 2), st.integers(0, 1)), min_size=1, max_size=30))
+@given(
+    st.lists(
+        st.tuples(st.integers(-2, 2), st.integers(-2, 2), st.integers(0, 1)),
+        min_size=1,
+        max_size=30,
+    )
+)
 @settings(max_examples=30)
 def test_groups_are_those_of_numpy_unique(rows):
     keys = np.array(rows)
-    _, expected_first, expected = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    _, expected_first, expected = np.unique(
+        keys, axis=0, return_index=True, return_inverse=True
+    )
     first, group = groups_of(keys)
     np.testing.assert_array_equal(first, expected_first)
     np.testing.assert_array_equal(group, expected.ravel())

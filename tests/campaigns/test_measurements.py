@@ -1,4 +1,5 @@
-"""Files of measurements: both kinds hold the same, and every fault of a file, a column or a cell is refused in one line."""
+"""Files of measurements: both kinds hold the same, and every fault of a file, a column
+or a cell is refused in one line."""
 
 import struct
 from dataclasses import replace
@@ -14,15 +15,22 @@ from elastocal.campaigns import measurements as module
 from elastocal.campaigns.reading import read_campaign
 
 
-def test_a_spreadsheets_marks_blanks_and_lines_of_its_own_are_passed_over_and_counted(cell):
+def test_a_spreadsheets_marks_blanks_and_lines_of_its_own_are_passed_over_and_counted(
+    cell,
+):
     whole = cell.read().measurements
-    cell.table = {name: [str(each).replace(".", ",") for each in column] for name, column in cell.table.items()}
+    cell.table = {
+        name: [str(each).replace(".", ",") for each in column]
+        for name, column in cell.table.items()
+    }
     cell.write(separator=";")
     path = cell.folder / "measurements.csv"
     lines = path.read_text(encoding="utf-8").splitlines()
     lines.insert(3, "")
     lines.insert(5, ";" * lines[0].count(";"))
-    text = '\ufeff# tracker "A, 20 °C\n\n  # poses\n' + "\n".join(line.replace(";", "; ") for line in lines)
+    text = '\ufeff# tracker "A, 20 °C\n\n  # poses\n' + "\n".join(
+        line.replace(";", "; ") for line in lines
+    )
     path.write_text(text, encoding="utf-8")
     measurements = read_campaign(cell.folder, cell.robots).measurements
     assert measurements.row.tolist()[:5] == [1, 2, 4, 6, 7]
@@ -61,7 +69,12 @@ def test_faulty_cell_is_refused_by_row_and_column(cell, row, column, entry, word
 def test_faulty_cell_of_a_parquet_file_is_refused_alike(cell):
     cell.spoil(5, "x", None)
     cell.write("parquet")
-    with refused(cell.folder / "measurements.parquet", "row 5, column x", "found nothing", "a number"):
+    with refused(
+        cell.folder / "measurements.parquet",
+        "row 5, column x",
+        "found nothing",
+        "a number",
+    ):
         read_campaign(cell.folder, cell.robots)
 
 
@@ -73,18 +86,26 @@ def test_missing_column_is_refused(cell, missing):
 
 
 @pytest.mark.parametrize(
-    ("name", "hint"), [("Load", "'load'?"), ("temperature", "'temperature_c'?"), ("q4", "q3, u95_m, for 3 joints")]
+    ("name", "hint"),
+    [
+        ("Load", "'load'?"),
+        ("temperature", "'temperature_c'?"),
+        ("q4", "q3, u95_m, for 3 joints"),
+    ],
 )
 def test_unknown_column_is_refused_with_the_closest_known(cell, name, hint):
     old = {"Load": "load", "temperature": "temperature_c", "q4": "q3"}[name]
-    cell.table = {name if column == old else column: cells for column, cells in cell.table.items()}
+    cell.table = {
+        name if column == old else column: cells for column, cells in cell.table.items()
+    }
     with refused(cell.measurements, "header", f"unknown column {name!r}", hint):
         cell.read()
 
 
 def test_more_measurements_than_fit_into_memory_are_refused(cell, monkeypatch):
     cell.write("parquet")
-    rows, path = len(cell.table["pose"]), cell.folder / "measurements.parquet"
+    rows = len(cell.table["pose"])
+    path = cell.folder / "measurements.parquet"
     monkeypatch.setattr(module, "MOST_MEASUREMENTS", rows)
     assert len(read_campaign(cell.folder, cell.robots).measurements) == rows
     monkeypatch.setattr(module, "MOST_MEASUREMENTS", rows - 1)
@@ -114,7 +135,13 @@ def test_file_that_is_no_table_is_refused(cell, text, key, words):
 def test_one_altered_byte_of_parquet_with_checksums_is_found(cell):
     cell.write()
     path = cell.folder / "measurements.parquet"
-    pq.write_table(pa.table(cell.table), path, write_page_checksum=True, compression="none", use_dictionary=False)
+    pq.write_table(
+        pa.table(cell.table),
+        path,
+        write_page_checksum=True,
+        compression="none",
+        use_dictionary=False,
+    )
     (cell.folder / "measurements.csv").unlink()
     read_campaign(cell.folder, cell.robots)
     content = bytearray(path.read_bytes())
@@ -125,22 +152,31 @@ def test_one_altered_byte_of_parquet_with_checksums_is_found(cell):
         read_campaign(cell.folder, cell.robots)
 
 
-@pytest.mark.parametrize(("column", "entry", "found"), [("x", "1", "string"), ("x", True, "bool"), ("target", b"A", "binary")])
+@pytest.mark.parametrize(
+    ("column", "entry", "found"),
+    [("x", "1", "string"), ("x", True, "bool"), ("target", b"A", "binary")],
+)
 def test_a_column_of_parquet_holds_numbers_or_text(cell, column, entry, found):
     cell.table[column] = [entry] * len(cell.table[column])
     cell.write("parquet")
-    with refused(cell.folder / "measurements.parquet", f"column {column}", found, "numbers"):
+    with refused(
+        cell.folder / "measurements.parquet", f"column {column}", found, "numbers"
+    ):
         read_campaign(cell.folder, cell.robots)
 
 
 def test_one_file_of_measurements_must_be_there(cell):
     cell.write()
     cell.write("parquet")
-    with refused(cell.folder.as_posix(), "", "both measurements.csv and", "one of them"):
+    with refused(
+        cell.folder.as_posix(), "", "both measurements.csv and", "one of them"
+    ):
         read_campaign(cell.folder, cell.robots)
     for name in ("measurements.csv", "measurements.parquet"):
         (cell.folder / name).unlink()
-    with refused(cell.folder.as_posix(), "", "neither measurements.csv nor", "one of them"):
+    with refused(
+        cell.folder.as_posix(), "", "neither measurements.csv nor", "one of them"
+    ):
         read_campaign(cell.folder, cell.robots)
 
 
@@ -148,22 +184,29 @@ def test_a_sheet_may_be_ticked_and_have_degrees_that_agree(cell):
     cell.table["done"] = ["x"] * len(cell.table["pose"])
     cell.table["q2_deg"] = np.degrees(cell.table["q2"]).round(3)
     cell.write()
-    assert len(read_campaign(cell.folder, cell.robots).measurements) == len(cell.table["pose"])
+    assert len(read_campaign(cell.folder, cell.robots).measurements) == len(
+        cell.table["pose"]
+    )
     cell.table["q2_deg"][4] += 1.0
     cell.write()
     with refused(cell.measurements, "line 6, column q2_deg", "what is q2 in deg"):
         cell.read()
 
 
-def test_what_a_small_file_of_parquet_would_grow_to_is_refused_before_it_is_read(cell, monkeypatch):
+def test_what_a_small_file_of_parquet_would_grow_to_is_refused_before_it_is_read(
+    cell, monkeypatch
+):
     monkeypatch.setattr(pq, "read_table", None)
     cell.write("parquet")
-    path, table = cell.folder / "measurements.parquet", pa.table(cell.table)
+    path = cell.folder / "measurements.parquet"
+    table = pa.table(cell.table)
     empty = np.zeros(len(table), np.int32)
     pq.write_table(table.append_column("x", table["x"]), path)
     with refused(path.as_posix(), "header", "column 'x' twice", "each column once"):
         read_campaign(cell.folder, cell.robots)
-    lists = pa.ListArray.from_arrays(np.append(empty, np.int32(1000)), pa.array(np.zeros(1000, np.int8)))
+    lists = pa.ListArray.from_arrays(
+        np.append(empty, np.int32(1000)), pa.array(np.zeros(1000, np.int8))
+    )
     pq.write_table(table.set_column(table.column_names.index("x"), "x", lists), path)
     with refused(path.as_posix(), "column x", "list"):
         read_campaign(cell.folder, cell.robots)

@@ -1,4 +1,5 @@
-"""A campaign's folder: what it means, and that every fault of it is refused in one line."""
+"""A campaign's folder: what it means, and that every fault of it is refused in one
+line."""
 
 import os
 
@@ -14,33 +15,78 @@ from elastocal.campaigns.writing import write_campaign
 
 
 def test_campaign_is_read_as_written(cell):
-    stated = {"compliance": "identify", "declared": ["joint_offset"], "noise": {"position_m": 6e-5, "orientation_rad": 7e-5}}
+    stated = {
+        "compliance": "identify",
+        "declared": ["joint_offset"],
+        "noise": {"position_m": 6e-5, "orientation_rad": 7e-5},
+    }
     cell.document |= stated | {"holdout": {"fraction": 0.4, "seed": 5}}
-    campaign, table = cell.read(effects=["joint_offset"]), cell.table
-    assert (campaign.name, campaign.robot.name, campaign.measured, campaign.frame) == ("cell7", "three joints", "pose", "base")
-    assert campaign.targets == (Target("A", "elbow", (0.0, 0.0, 0.1)), Target("B", "hand", None))
-    assert (campaign.compliance, campaign.declared, campaign.noise) == ("identify", ("joint_offset",), stated["noise"])
+    campaign = cell.read(effects=["joint_offset"])
+    table = cell.table
+    assert (campaign.name, campaign.robot.name, campaign.measured, campaign.frame) == (
+        "cell7",
+        "three joints",
+        "pose",
+        "base",
+    )
+    assert campaign.targets == (
+        Target("A", "elbow", (0.0, 0.0, 0.1)),
+        Target("B", "hand", None),
+    )
+    assert (campaign.compliance, campaign.declared, campaign.noise) == (
+        "identify",
+        ("joint_offset",),
+        stated["noise"],
+    )
     assert campaign.holdout == {"fraction": 0.4, "seed": 5}
     measurements = campaign.measurements
     assert len(measurements) == POSES * LOADS * REPEATS * 2
-    assert [campaign.targets[index].name for index in measurements.target] == table["target"]
-    expected = {name: table[name] for name in ("pose", "load", "repeat", "time_s", "temperature_c")}
-    expected |= {"session": np.zeros(len(measurements)), "row": np.arange(1, len(measurements) + 1)}
-    groups = {"joint_angles": ("q1", "q2", "q3"), "wrench": WRENCH, "position": "xyz", "rotation_vector": ("rx", "ry", "rz")}
+    assert [campaign.targets[index].name for index in measurements.target] == table[
+        "target"
+    ]
+    expected = {
+        name: table[name]
+        for name in ("pose", "load", "repeat", "time_s", "temperature_c")
+    }
+    expected |= {
+        "session": np.zeros(len(measurements)),
+        "row": np.arange(1, len(measurements) + 1),
+    }
+    groups = {
+        "joint_angles": ("q1", "q2", "q3"),
+        "wrench": WRENCH,
+        "position": "xyz",
+        "rotation_vector": ("rx", "ry", "rz"),
+    }
     groups["approach"] = ("approach1", "approach2", "approach3")
-    expected |= {part: np.column_stack([table[name] for name in names]) for part, names in groups.items()}
+    expected |= {
+        part: np.column_stack([table[name] for name in names])
+        for part, names in groups.items()
+    }
     for part, values in expected.items():
         np.testing.assert_array_equal(getattr(measurements, part), values, err_msg=part)
 
 
 def test_a_mount_is_turned_as_stated_or_unknown_and_left_out_as_the_offset_is(cell):
-    targets = cell.document["targets"] = {name: dict(target) for name, target in DOCUMENT["targets"].items()}
+    targets = cell.document["targets"] = {
+        name: dict(target) for name, target in DOCUMENT["targets"].items()
+    }
     targets["A"]["rotation"] = [0, 0, 1.5]
-    assert [target.rotation for target in cell.read().targets] == [(0.0, 0.0, 1.5), None]
+    assert [target.rotation for target in cell.read().targets] == [
+        (0.0, 0.0, 1.5),
+        None,
+    ]
     targets["A"].pop("rotation")
     targets["B"]["rotation"] = [0, 1, 0]
-    assert [target.rotation for target in cell.read().targets] == [(0.0, 0.0, 0.0), (0.0, 1.0, 0.0)]
-    for wrong, words in (([0, 0, 92], "not degrees"), ([0, 0], "3 entries"), ("known", "unknown")):
+    assert [target.rotation for target in cell.read().targets] == [
+        (0.0, 0.0, 0.0),
+        (0.0, 1.0, 0.0),
+    ]
+    for wrong, words in (
+        ([0, 0, 92], "not degrees"),
+        ([0, 0], "3 entries"),
+        ("known", "unknown"),
+    ):
         targets["B"]["rotation"] = wrong
         with refused(cell.source, "targets.B.rotation", words):
             cell.read()
@@ -49,9 +95,18 @@ def test_a_mount_is_turned_as_stated_or_unknown_and_left_out_as_the_offset_is(ce
 def test_what_a_campaign_leaves_out_has_a_default(cell):
     cell.without("approach1", "approach2", "approach3", "time_s", "temperature_c")
     campaign = cell.read()
-    assert (campaign.compliance, campaign.declared, campaign.noise) == ("nominal", (), None)
+    assert (campaign.compliance, campaign.declared, campaign.noise) == (
+        "nominal",
+        (),
+        None,
+    )
     assert campaign.holdout == {"fraction": 0.3, "seed": 1}
-    assert campaign.measurements.approach is campaign.measurements.time_s is campaign.measurements.temperature_c is None
+    assert (
+        campaign.measurements.approach
+        is campaign.measurements.time_s
+        is campaign.measurements.temperature_c
+        is None
+    )
 
 
 def test_uncertainties_of_measurements_are_read_and_stand_alone(cell):
@@ -61,13 +116,16 @@ def test_uncertainties_of_measurements_are_read_and_stand_alone(cell):
     cell.document["noise"] = {"orientation_rad": 5e-5, "joint_rad": 1e-5}
     assert cell.read().noise == cell.document["noise"]
     cell.document["noise"] = {"position_m": 1e-4}
-    with refused(f"{cell.source}: noise.position_m", "noise.position_m", "u95_m", "one of them"):
+    with refused(
+        f"{cell.source}: noise.position_m", "noise.position_m", "u95_m", "one of them"
+    ):
         cell.read()
 
 
 def test_sense_of_approach_is_that_of_the_models_joints(cell):
     cell.arm["reported_joints"] = {"matrix": [[1, 0, 0], [0, -1, 0], [0, 1, 1]]}
-    second, third = np.array(cell.table["approach2"]), np.array(cell.table["approach3"])
+    second = np.array(cell.table["approach2"])
+    third = np.array(cell.table["approach3"])
     approach = cell.read().measurements.approach
     np.testing.assert_array_equal(approach[:, 1], -second)
     np.testing.assert_array_equal(approach[:, 2], np.where(second == third, second, 0))
@@ -75,13 +133,26 @@ def test_sense_of_approach_is_that_of_the_models_joints(cell):
 
 def other_campaign(cell, tmp_path, **changes):
     """Write a campaign beside the cell's, with targets of its own, and hold it out."""
-    table = cell.table | {"target": ["T"] * len(cell.table["pose"]), "repeat": list(range(len(cell.table["pose"])))}
-    document = cell.document | {"campaign": "other", "targets": {"T": DOCUMENT["targets"]["B"]}, "robot": "planar"} | changes
+    table = cell.table | {
+        "target": ["T"] * len(cell.table["pose"]),
+        "repeat": list(range(len(cell.table["pose"]))),
+    }
+    document = (
+        cell.document
+        | {
+            "campaign": "other",
+            "targets": {"T": DOCUMENT["targets"]["B"]},
+            "robot": "planar",
+        }
+        | changes
+    )
     write_campaign(tmp_path / "other", document, table, 3)
     cell.document["holdout"] = {"campaign": "../other"}
 
 
-def test_other_campaign_of_the_same_chain_is_the_test_of_all_measurements(cell, tmp_path):
+def test_other_campaign_of_the_same_chain_is_the_test_of_all_measurements(
+    cell, tmp_path
+):
     other_campaign(cell, tmp_path)
     campaign = cell.read()
     training, held_out = split(campaign)
@@ -99,23 +170,62 @@ def test_other_campaign_of_the_same_chain_is_the_test_of_all_measurements(cell, 
     ("changes", "key", "words"),
     [
         ({"robbot": "arm.yaml"}, "robbot", ["unknown key", "'robot'?"]),
-        ({"targets": {"A": {"point": "elbow"}}}, "targets.A.offset_m", ["nothing", "unknown: fitted"]),
-        ({"targets": {"A": {"point": "elbow", "offset_m": "unkown"}}}, "targets.A.offset_m", ["'unkown'", "allowed: unknown"]),
-        ({"targets": {"A": {"point": "elbw", "offset_m": "unknown"}}}, "targets.A.point", ["'elbw'", "'elbow'? (elbow, hand)"]),
-        ({"targets": {1: {"point": "elbow", "offset_m": "unknown"}}}, "targets", ["the name 1", "in quotes"]),
+        (
+            {"targets": {"A": {"point": "elbow"}}},
+            "targets.A.offset_m",
+            ["nothing", "unknown: fitted"],
+        ),
+        (
+            {"targets": {"A": {"point": "elbow", "offset_m": "unkown"}}},
+            "targets.A.offset_m",
+            ["'unkown'", "allowed: unknown"],
+        ),
+        (
+            {"targets": {"A": {"point": "elbw", "offset_m": "unknown"}}},
+            "targets.A.point",
+            ["'elbw'", "'elbow'? (elbow, hand)"],
+        ),
+        (
+            {"targets": {1: {"point": "elbow", "offset_m": "unknown"}}},
+            "targets",
+            ["the name 1", "in quotes"],
+        ),
         (
             {"targets": DOCUMENT["targets"] | {"C": DOCUMENT["targets"]["A"]}},
             "targets.C",
             ["no measurement", "measurements.csv"],
         ),
         ({"robot": "planer"}, "robot", ["'planer'", "'planar'? (planar)"]),
-        ({"declared": ["joint_ofset"]}, "declared[0]", ["'joint_ofset'", "'joint_offset'? (joint_offset, payload)"]),
+        (
+            {"declared": ["joint_ofset"]},
+            "declared[0]",
+            ["'joint_ofset'", "'joint_offset'? (joint_offset, payload)"],
+        ),
         ({"noise": {"orientation_rad": 1e-4}}, "noise", ["no position_m", "u95_m"]),
-        ({"noise": {"position_m": 1e-4, "joint_rad": [1e-5]}}, "noise.joint_rad", ["1 number", "or 3"]),
-        ({"noise": {"position_m": 1e-4, "joint_rad": [0, 2.0, 0]}}, "noise.joint_rad[1]", ["2.0", "0 to 0.1"]),
-        *(({"noise": {"position_m": value}}, "noise.position_m", ["laser", "0.1"]) for value in (0.2, 6e-12)),
-        ({"noise": {"position_m": 1e-4, "orientation_rad": 60}}, "noise.orientation_rad", ["resolves"]),
-        ({"targets": {"A": {"point": "elbow", "offset_m": [0, 0, 150]}}}, "targets.A.offset_m[2]", ["150", "reaches"]),
+        (
+            {"noise": {"position_m": 1e-4, "joint_rad": [1e-5]}},
+            "noise.joint_rad",
+            ["1 number", "or 3"],
+        ),
+        (
+            {"noise": {"position_m": 1e-4, "joint_rad": [0, 2.0, 0]}},
+            "noise.joint_rad[1]",
+            ["2.0", "0 to 0.1"],
+        ),
+        *(
+            ({"noise": {"position_m": value}}, "noise.position_m", ["laser", "0.1"])
+            for value in (0.2, 6e-12)
+        ),
+        (
+            {"noise": {"position_m": 1e-4, "orientation_rad": 60}},
+            "noise.orientation_rad",
+            ["resolves"],
+        ),
+        (
+            {"targets": {"A": {"point": "elbow", "offset_m": [0, 0, 150]}}},
+            "targets.A.offset_m[2]",
+            ["150", "reaches"],
+        ),
     ],
 )
 def test_faulty_document_is_refused_in_one_line(cell, changes, key, words):
@@ -133,9 +243,13 @@ def test_loads_on_compliances_that_nobody_states_nor_identifies_are_refused(cell
     assert not robot.compliance_known and (robot.compliance > 0).all()
 
 
-def test_without_loads_joints_of_unknown_compliance_are_rigid_and_masses_turn_nothing(cell):
+def test_without_loads_joints_of_unknown_compliance_are_rigid_and_masses_turn_nothing(
+    cell,
+):
     del cell.arm["compliance_urad_per_Nm"]
-    cell.arm["masses"] = [{"link": 2, "mass_kg": 10, "centre_m": [0.3, 0, 0], "relative_std": 0.2}]
+    cell.arm["masses"] = [
+        {"link": 2, "mass_kg": 10, "centre_m": [0.3, 0, 0], "relative_std": 0.2}
+    ]
     cell.keep(np.flatnonzero(np.equal(cell.table["load"], 0)))
     robot = cell.read().robot
     np.testing.assert_array_equal(robot.compliance, np.zeros(3))
@@ -144,7 +258,9 @@ def test_without_loads_joints_of_unknown_compliance_are_rigid_and_masses_turn_no
     assert cell.read().robot.masses and cell.read().robot.compliance_known
 
 
-@pytest.mark.parametrize("name", ["/etc/passwd", "../secret", "../../etc/passwd", "x" * 5000, "link.yaml"])
+@pytest.mark.parametrize(
+    "name", ["/etc/passwd", "../secret", "../../etc/passwd", "x" * 5000, "link.yaml"]
+)
 def test_no_file_outside_of_the_folder_is_read_for_a_robot_nor_shown(cell, name):
     """The folder of robots is not outside."""
     cell.write()
@@ -158,11 +274,16 @@ def test_no_file_outside_of_the_folder_is_read_for_a_robot_nor_shown(cell, name)
     cell.read()
 
 
-@pytest.mark.parametrize("file", ["campaign.yaml", "measurements.csv", "measurements.parquet"])
+@pytest.mark.parametrize(
+    "file", ["campaign.yaml", "measurements.csv", "measurements.parquet"]
+)
 @pytest.mark.parametrize("kind", ["link", "pipe", "folder", "link out"])
-def test_what_is_no_file_of_the_folder_is_called_what_it_is_without_a_look_at_it(cell, file, kind):
+def test_what_is_no_file_of_the_folder_is_called_what_it_is_without_a_look_at_it(
+    cell, file, kind
+):
     cell.write()
-    path, elsewhere = cell.folder / file, cell.folder.parent / "elsewhere"
+    path = cell.folder / file
+    elsewhere = cell.folder.parent / "elsewhere"
     path.unlink(missing_ok=True)
     if kind.startswith("link"):
         path.symlink_to(elsewhere)
@@ -170,7 +291,11 @@ def test_what_is_no_file_of_the_folder_is_called_what_it_is_without_a_look_at_it
         os.mkfifo(path) if kind == "pipe" else path.mkdir()
     if kind == "link out":
         elsewhere.write_text("{")
-    found = "a link out of the campaign's folder" if kind == "link out" else f"found a {kind} that leads to no file"
+    found = (
+        "a link out of the campaign's folder"
+        if kind == "link out"
+        else f"found a {kind} that leads to no file"
+    )
     for read in (read_campaign, campaign_files):
         with refused(path, "", found):
             read(cell.folder, cell.robots)
@@ -187,7 +312,9 @@ def test_what_is_no_file_of_the_folder_is_called_what_it_is_without_a_look_at_it
         (12, "rx", 45.0, ["a turn of", "not degrees"]),
     ],
 )
-def test_implausible_cell_is_refused_by_line_and_column(cell, row, column, entry, words):
+def test_implausible_cell_is_refused_by_line_and_column(
+    cell, row, column, entry, words
+):
     cell.spoil(row, column, entry)
     with refused(cell.measurements, f"line {row + 1}, column {column}", *words):
         cell.read()
@@ -199,13 +326,20 @@ def test_what_few_rows_alone_are_off_is_left_to_the_diagnosis(cell):
     assert cell.read().measurements.position[39, 1] == 812.4
     for row in range(1, 25):
         cell.spoil(row, "y", 812.4)
-    with refused(cell.measurements, "column y", "812.4", "metres, not millimetres", "reaches"):
+    with refused(
+        cell.measurements, "column y", "812.4", "metres, not millimetres", "reaches"
+    ):
         cell.read()
 
 
 def test_a_whole_file_in_degrees_and_the_same_measurement_twice_are_refused(cell):
     cell.spoil(7, "repeat", 0)
-    with refused(cell.measurements, "line 8", "pose 0, load 1, repeat 0, target A again", "first in line 6"):
+    with refused(
+        cell.measurements,
+        "line 8",
+        "pose 0, load 1, repeat 0, target A again",
+        "first in line 6",
+    ):
         cell.read()
     for name in ("q1", "q2", "q3"):
         cell.table[name] = [57.3 * number for number in cell.table[name]]
@@ -215,5 +349,7 @@ def test_a_whole_file_in_degrees_and_the_same_measurement_twice_are_refused(cell
 
 def test_load_without_columns_of_the_wrench_is_refused(cell):
     cell.without(*WRENCH)
-    with refused(cell.measurements, "line 6, column load", "found '1'", "no columns fx"):
+    with refused(
+        cell.measurements, "line 6, column load", "found '1'", "no columns fx"
+    ):
         cell.read()

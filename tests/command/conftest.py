@@ -23,7 +23,9 @@ def refusal():
 
     def line(*words):
         error = called(*words).exception
-        assert isinstance(error, InputError) and len(str(error).splitlines()) == 1, error
+        assert isinstance(error, InputError) and len(str(error).splitlines()) == 1, (
+            error
+        )
         return str(error)
 
     return line

@@ -1,4 +1,5 @@
-"""The demonstration runs the commands that it prints, in their order; test_afternoon.py goes the whole way with them."""
+"""The demonstration runs the commands that it prints, in their order; test_afternoon.py
+goes the whole way with them."""
 
 import shlex
 
@@ -11,9 +12,13 @@ ORDER = ["plan", "check", "diagnose", "correct", "certificate"]
 
 
 @pytest.mark.parametrize(("fails", "code"), [("certificate", 0), ("diagnose", 3)])
-def test_what_is_printed_is_what_is_run_until_a_step_fails(elastocal, monkeypatch, tmp_path, fails, code):
-    """With subcommands that only note what they were called with; a certificate may fail."""
-    called, whole = [], main.InOrder.main
+def test_what_is_printed_is_what_is_run_until_a_step_fails(
+    elastocal, monkeypatch, tmp_path, fails, code
+):
+    """With subcommands that only note what they were called with; a certificate may
+    fail."""
+    called = []
+    whole = main.InOrder.main
 
     def main_of_the_rest(self, args=None, **options):
         if options.get("standalone_mode", True):
@@ -23,13 +28,38 @@ def test_what_is_printed_is_what_is_run_until_a_step_fails(elastocal, monkeypatc
 
     monkeypatch.setattr(main.InOrder, "main", main_of_the_rest)
     monkeypatch.setattr(demo, "workplace", lambda: tmp_path)
-    missed = {name: np.full(3, off) for name, off in (("uncorrected", 2e-3), ("corrected", 1e-4), ("noise alone", 9e-5))}
-    for name, result in (("fill_sheet", 12), ("write_milling_path", 50), ("measured_errors", missed)):
-        monkeypatch.setattr(f"elastocal_proof.blind.rehearsal.{name}", lambda *_, result=result: result)
-    monkeypatch.setattr("elastocal.campaigns.reading.read_descriptions", lambda *_: ({}, ""))
+    missed = {
+        name: np.full(3, off)
+        for name, off in (
+            ("uncorrected", 2e-3),
+            ("corrected", 1e-4),
+            ("noise alone", 9e-5),
+        )
+    }
+    for name, result in (
+        ("fill_sheet", 12),
+        ("write_milling_path", 50),
+        ("measured_errors", missed),
+    ):
+        monkeypatch.setattr(
+            f"elastocal_proof.blind.rehearsal.{name}", lambda *_, result=result: result
+        )
+    monkeypatch.setattr(
+        "elastocal.campaigns.reading.read_descriptions", lambda *_: ({}, "")
+    )
     result = elastocal("demo", tmp_path / "cell")
-    assert result.exit_code == code and [words[0] for words in called] == ORDER[: ORDER.index(fails) + 1]
-    assert [shlex.split(line[2:])[1:] for line in result.stderr.splitlines() if line.startswith("$ elastocal")] == called
+    assert (
+        result.exit_code == code
+        and [words[0] for words in called] == ORDER[: ORDER.index(fails) + 1]
+    )
+    assert [
+        shlex.split(line[2:])[1:]
+        for line in result.stderr.splitlines()
+        if line.startswith("$ elastocal")
+    ] == called
     if not code:
-        assert "✓" in result.stderr and "2.00 mm RMS before, 0.100 mm after" in result.stderr
+        assert (
+            "✓" in result.stderr
+            and "2.00 mm RMS before, 0.100 mm after" in result.stderr
+        )
         assert "hidden in it: gear transmission error of joint" in result.stderr

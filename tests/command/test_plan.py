@@ -8,7 +8,16 @@ from analysed_robots import ROBOTS, analysed
 
 from elastocal.application.calibrated import nominal_forward
 
-PLAN = ("plan", ROBOTS / "ur10.yaml", "--candidates", 300, "--poses", 18, "--held-out", 4)
+PLAN = (
+    "plan",
+    ROBOTS / "ur10.yaml",
+    "--candidates",
+    300,
+    "--poses",
+    18,
+    "--held-out",
+    4,
+)
 
 
 @pytest.fixture
@@ -19,7 +28,11 @@ def planned(elastocal, tmp_path):
         result = elastocal(*PLAN, "--folder", tmp_path / "cell", *words)
         assert result.exit_code == 0, result.exception
         document = yaml.safe_load((tmp_path / "cell" / "campaign.yaml").read_text())
-        return result.stderr, document, pd.read_csv(tmp_path / "cell" / "measurements.csv")
+        return (
+            result.stderr,
+            document,
+            pd.read_csv(tmp_path / "cell" / "measurements.csv"),
+        )
 
     return run
 
@@ -27,22 +40,41 @@ def planned(elastocal, tmp_path):
 def heights(table):
     """Of the end effector over the base plane at each row of a plan, m."""
     robot = analysed("ur10")
-    return nominal_forward(robot, table[[f"q{joint}" for joint in range(1, 7)]].to_numpy())[0][:, 2]
+    return nominal_forward(
+        robot, table[[f"q{joint}" for joint in range(1, 7)]].to_numpy()
+    )[0][:, 2]
 
 
-def test_a_plan_is_a_folder_to_fill_in_with_its_pages(planned, elastocal, refusal, tmp_path):
-    words = ("--force", 80, "--pull", "--tracker", "3,1,1", "--box=-3,3,-3,3,-2,-0.5", "--base-known")
+def test_a_plan_is_a_folder_to_fill_in_with_its_pages(
+    planned, elastocal, refusal, tmp_path
+):
+    words = (
+        "--force",
+        80,
+        "--pull",
+        "--tracker",
+        "3,1,1",
+        "--box=-3,3,-3,3,-2,-0.5",
+        "--base-known",
+    )
     shown, document, sheet = planned(*words, "--target", "6DoF=0,0,0")
-    assert "18 poses to fit and 4 held out" in shown and "next: measure, fill in" in shown
+    assert (
+        "18 poses to fit and 4 held out" in shown and "next: measure, fill in" in shown
+    )
     assert {p.name for p in (tmp_path / "cell").iterdir()} == {
         *("campaign.yaml", "robot.yaml", "measurements.csv", "plan.pdf", "plan.png")
     }
-    assert document["holdout"] == {"poses": [19, 20, 21, 22]} and document["frame"] == "base"
+    assert (
+        document["holdout"] == {"poses": [19, 20, 21, 22]}
+        and document["frame"] == "base"
+    )
     assert set(sheet["load"]) == {0, 1, 2} and heights(sheet).min() > 0.0
     assert "found nothing" in refusal("check", tmp_path / "cell")
     assert "a folder that is there" in refusal(*PLAN, "--folder", tmp_path)
     # Once it is filled in it can be checked.
-    at = nominal_forward(analysed("ur10"), sheet[[f"q{joint}" for joint in range(1, 7)]].to_numpy())[0]
+    at = nominal_forward(
+        analysed("ur10"), sheet[[f"q{joint}" for joint in range(1, 7)]].to_numpy()
+    )[0]
     at += 3e-5 * np.random.default_rng(1).standard_normal(at.shape)
     filled = sheet.assign(done="x", **dict(zip("xyz", at.T, strict=True)))
     filled.to_csv(tmp_path / "cell" / "measurements.csv", index=False)
@@ -57,7 +89,17 @@ def test_a_plan_is_a_folder_to_fill_in_with_its_pages(planned, elastocal, refusa
         (["--noise", "0.03"], "--noise"),
         (["--target", "elbow"], "--target"),
         (["--target", "A:6DoF", "--target", "A:4DoF"], "'A' twice"),
-        (["--target", "6DoF=0.1,0,0", "--target", "6DoF=0,0.1,0", "--target", "6DoF"], "A:6DoF and B:6DoF"),
+        (
+            [
+                "--target",
+                "6DoF=0.1,0,0",
+                "--target",
+                "6DoF=0,0.1,0",
+                "--target",
+                "6DoF",
+            ],
+            "A:6DoF and B:6DoF",
+        ),
         (["--target", f"{'A' * 81}:6DoF"], "a name of 81"),
         (["--target", "=A:6DoF"], "--target"),
         (["--orientation-noise", "0.01deg"], "--measured pose"),
@@ -66,18 +108,38 @@ def test_a_plan_is_a_folder_to_fill_in_with_its_pages(planned, elastocal, refusa
         (["--floor", "9"], "--floor"),
     ],
 )
-def test_a_wrong_option_is_refused_by_its_name_and_nothing_is_written(refusal, tmp_path, words, message):
+def test_a_wrong_option_is_refused_by_its_name_and_nothing_is_written(
+    refusal, tmp_path, words, message
+):
     assert message in refusal(*PLAN, "--folder", tmp_path / "cell", *words)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_three_reflectors_on_one_flange_are_three_targets_of_a_probe(planned):
-    words = [word for name in "ABC" for word in ("--target", f"{name}:6DoF=0.{ord(name) - 64},0,0")]
-    shown, document, sheet = planned("--measured", "pose", *words, "--target", "6DoF", "--noise", "50um")
+    words = [
+        word
+        for name in "ABC"
+        for word in ("--target", f"{name}:6DoF=0.{ord(name) - 64},0,0")
+    ]
+    shown, document, sheet = planned(
+        "--measured", "pose", *words, "--target", "6DoF", "--noise", "50um"
+    )
     assert "50 µm, 87.3 µrad" in shown and "Leica" in shown
-    assert {name: target["offset_m"] for name, target in document["targets"].items()} == {
-        **{"A": [0.1, 0.0, 0.0], "B": [0.2, 0.0, 0.0], "C": [0.3, 0.0, 0.0], "6DoF": "unknown"}
+    assert {
+        name: target["offset_m"] for name, target in document["targets"].items()
+    } == {
+        **{
+            "A": [0.1, 0.0, 0.0],
+            "B": [0.2, 0.0, 0.0],
+            "C": [0.3, 0.0, 0.0],
+            "6DoF": "unknown",
+        }
     }
     assert document["measured"] == "pose"
-    assert document["noise"] == {"position_m": pytest.approx(50e-6), "orientation_rad": pytest.approx(np.radians(0.005))}
-    assert set(sheet["target"].value_counts()) == {len(sheet) // 4} and set(sheet["target"]) == {"A", "B", "C", "6DoF"}
+    assert document["noise"] == {
+        "position_m": pytest.approx(50e-6),
+        "orientation_rad": pytest.approx(np.radians(0.005)),
+    }
+    assert set(sheet["target"].value_counts()) == {len(sheet) // 4} and set(
+        sheet["target"]
+    ) == {"A", "B", "C", "6DoF"}

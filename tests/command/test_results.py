@@ -1,4 +1,5 @@
-"""What a diagnosed campaign leads to, as it is typed: corrected targets, certificates, and the calibrated robot as files.
+"""What a diagnosed campaign leads to, as it is typed: corrected targets, certificates,
+and the calibrated robot as files.
 
 Nothing is written where a pose cannot be reached.
 """
@@ -43,7 +44,11 @@ def columns_of(angles):
 
 @pytest.fixture
 def angles():
-    return analysed("kuka").joint_limits.mean(axis=1) + BENT + 0.2 * np.linspace(0, 1, 8)[:, None]
+    return (
+        analysed("kuka").joint_limits.mean(axis=1)
+        + BENT
+        + 0.2 * np.linspace(0, 1, 8)[:, None]
+    )
 
 
 @pytest.fixture
@@ -61,19 +66,28 @@ def words(in_checkout, path, output):
     return "correct", in_checkout / "made", path, "--output", output
 
 
-def test_the_regression_corrects_what_physics_does_not_have(elastocal, regressed_checkout, monkeypatch, tmp_path):
+def test_the_regression_corrects_what_physics_does_not_have(
+    elastocal, regressed_checkout, monkeypatch, tmp_path
+):
     """At poses between those of the campaign."""
     monkeypatch.chdir(regressed_checkout)
     found = load_diagnosed("smooth", ROBOTS, regressed_checkout)
-    robot, states = found.calibrated.robot, found.case.observations.states
-    commands = robot.reported_angles(0.5 * (states.joint_angles[1:61] + states.joint_angles[:60]))
+    robot = found.calibrated.robot
+    states = found.case.observations.states
+    commands = robot.reported_angles(
+        0.5 * (states.joint_angles[1:61] + states.joint_angles[:60])
+    )
     position, _ = nominal_forward(robot, commands)
     path = path_of(commands, tmp_path, **columns_of(commands))
-    result = elastocal("correct", "smooth", path, "--output", tmp_path / "t.csv", "--allow-large-steps")
+    result = elastocal(
+        "correct", "smooth", path, "--output", tmp_path / "t.csv", "--allow-large-steps"
+    )
     assert result.exit_code == 0 and "Gaussian process" in result.stderr
     there = pd.read_csv(tmp_path / "t.csv")[[f"q{j}" for j in range(1, 7)]].to_numpy()
     np.testing.assert_allclose(forward(found.calibrated, there)[0], position, atol=1e-8)
-    assert np.abs(forward(found.by_physics().calibrated, there)[0] - position).max() > 1e-5
+    assert (
+        np.abs(forward(found.by_physics().calibrated, there)[0] - position).max() > 1e-5
+    )
 
 
 def test_the_targets_bring_the_diagnosed_robot_to_the_wanted_poses_and_a_program_has_them(
@@ -82,25 +96,47 @@ def test_the_targets_bring_the_diagnosed_robot_to_the_wanted_poses_and_a_program
     result = elastocal(*words, "--format", "krl")
     assert result.exit_code == 0, result.stderr
     told = " ".join(result.stderr.split())
-    assert "8 targets corrected" in told and "targets.src goes to all of them: KUKA KRL, q1 as A1" in told
+    assert (
+        "8 targets corrected" in told
+        and "targets.src goes to all of them: KUKA KRL, q1 as A1" in told
+    )
     targets = pd.read_csv(output)
     commands = targets[[f"q{j}" for j in range(1, 7)]].to_numpy()
     robot = load_diagnosed(checkout / "made", ROBOTS, checkout).calibrated
     wanted, _ = nominal_forward(robot.robot, angles)
     np.testing.assert_allclose(forward(robot, commands)[0], wanted, atol=1e-7)
-    missed = np.linalg.norm(wanted - forward(robot, targets[[f"q{j}_uncorrected" for j in range(1, 7)]].to_numpy())[0], axis=1)
+    missed = np.linalg.norm(
+        wanted
+        - forward(
+            robot, targets[[f"q{j}_uncorrected" for j in range(1, 7)]].to_numpy()
+        )[0],
+        axis=1,
+    )
     np.testing.assert_allclose(targets["predicted_error_before_m"], missed, atol=1e-7)
     assert (targets["status"] == "ok").all() and (targets["predicted_std_m"] > 0).all()
     program = output.with_suffix(".src").read_text()
-    for stated in ("robot: KUKA KR 270 R2700 ultra", "campaign: made", f"date: {date.today()}", "tool: "):
+    for stated in (
+        "robot: KUKA KR 270 R2700 ultra",
+        "campaign: made",
+        f"date: {date.today()}",
+        "tool: ",
+    ):
         assert stated in program
     moves = [line[15:-1].split(", ") for line in program.splitlines() if "PTP" in line]
-    np.testing.assert_allclose(np.radians([[float(word.split()[1]) for word in move] for move in moves]), commands, atol=1e-8)
+    np.testing.assert_allclose(
+        np.radians([[float(word.split()[1]) for word in move] for move in moves]),
+        commands,
+        atol=1e-8,
+    )
 
 
-def test_a_pose_out_of_reach_is_named_and_nothing_is_written(refusal, words, path, output):
+def test_a_pose_out_of_reach_is_named_and_nothing_is_written(
+    refusal, words, path, output
+):
     beyond = [0.0, 0.0, 6.0, 0.0, 0.0, 0.0, 0.0, 0.0]
-    pd.read_csv(path).assign(x=lambda wanted: wanted["x"] + beyond).to_csv(path, index=False)
+    pd.read_csv(path).assign(x=lambda wanted: wanted["x"] + beyond).to_csv(
+        path, index=False
+    )
     assert "line 4 is unreachable" in refusal(*words) and not output.exists()
 
 
@@ -113,24 +149,34 @@ def test_a_pose_out_of_reach_is_named_and_nothing_is_written(refusal, words, pat
         (("--format", "krl", "--output", "my targets.csv"), "as the name of a program"),
     ],
 )
-def test_what_is_no_program_is_refused_before_any_work(refusal, words, tmp_path, more, message):
+def test_what_is_no_program_is_refused_before_any_work(
+    refusal, words, tmp_path, more, message
+):
     assert message in refusal(*words, *more)
-    assert [file.name for file in tmp_path.iterdir()] == ["path.csv"] and not Path("x.mod").exists()
+    assert [file.name for file in tmp_path.iterdir()] == ["path.csv"] and not Path(
+        "x.mod"
+    ).exists()
 
 
 def test_a_swing_is_named_by_its_line_and_no_program_is_written_unless_it_is_allowed(
     elastocal, refusal, words, path, output, angles
 ):
     turned = angles.copy()
-    turned[:4, 0], turned[4:, 0] = np.radians(178.0), np.radians(-178.0)
+    turned[:4, 0] = np.radians(178.0)
+    turned[4:, 0] = np.radians(-178.0)
     path_of(turned, path.parent, **columns_of(turned))
     line = refusal(*words, "--format", "krl")
-    assert "line 6: joint 1 turns by 356.0 degrees" in line and "--allow-large-steps" in line
+    assert (
+        "line 6: joint 1 turns by 356.0 degrees" in line
+        and "--allow-large-steps" in line
+    )
     assert not output.exists() and not output.with_suffix(".src").exists()
     result = elastocal(*words, "--format", "krl", "--allow-large-steps")
     assert result.exit_code == 0 and output.with_suffix(".src").exists()
     assert "! line 6: joint 1 turns by 356.0 degrees" in " ".join(result.stderr.split())
-    pd.read_csv(path).drop(columns=[f"q{joint}" for joint in range(1, 7)]).to_csv(path, index=False)
+    pd.read_csv(path).drop(columns=[f"q{joint}" for joint in range(1, 7)]).to_csv(
+        path, index=False
+    )
     assert elastocal(*words).exit_code == 0
     assert np.abs(np.diff(pd.read_csv(output)["q1"])).max() < 0.1
 
@@ -138,21 +184,29 @@ def test_a_swing_is_named_by_its_line_and_no_program_is_written_unless_it_is_all
 def test_targets_keep_their_loads_and_beyond_twice_the_measured_ones_have_no_bound(
     elastocal, words, checkout, path, output, angles
 ):
-    measured = load_diagnosed(checkout / "made", ROBOTS, checkout).case.observations.states.wrench
+    measured = load_diagnosed(
+        checkout / "made", ROBOTS, checkout
+    ).case.observations.states.wrench
     largest = np.linalg.norm(measured[:, :3], axis=1).max()
     loads = -largest * np.array([0.0, 1.0, 1.9, 1.99, 2.1, 3.0, 10.0, 100.0])
     path_of(angles, path.parent, fx=0.0, fy=0.0, fz=loads)
     result = elastocal(*words)
-    assert result.exit_code == 0 and "no bound is stated for 4 of 8 targets" in " ".join(result.stderr.split())
+    assert (
+        result.exit_code == 0
+        and "no bound is stated for 4 of 8 targets" in " ".join(result.stderr.split())
+    )
     targets = pd.read_csv(output)
     assert targets["predicted_bound_m"].isna().tolist() == [False] * 4 + [True] * 4
     assert (targets["status"][:4] == "ok").all()
-    assert (targets["status"][4:] == "no bound: loads beyond 2 times the measured ones").all()
+    assert (
+        targets["status"][4:] == "no bound: loads beyond 2 times the measured ones"
+    ).all()
     np.testing.assert_allclose(targets["fz"], loads)
     assert (targets[["fx", "mx", "my", "mz"]] == 0).all(axis=None)
 
 
-CERTIFICATE, VERDICT = Path("reports/loop/made/certificate.json"), Path("reports/loop/made/verdict.json")
+CERTIFICATE = Path("reports/loop/made/certificate.json")
+VERDICT = Path("reports/loop/made/verdict.json")
 
 
 def issue(elastocal, *words):
@@ -161,7 +215,9 @@ def issue(elastocal, *words):
     return result, json.loads(CERTIFICATE.read_text())
 
 
-def test_a_certificate_states_the_campaign_and_correct_its_targets(elastocal, refusal, words, output):
+def test_a_certificate_states_the_campaign_and_correct_its_targets(
+    elastocal, refusal, words, output
+):
     corrected = elastocal(*words).stderr
     assert "0.2mm" in refusal("certificate", "made", "--tolerance", "0.5")
     result, _ = issue(elastocal, "1um")
@@ -170,20 +226,37 @@ def test_a_certificate_states_the_campaign_and_correct_its_targets(elastocal, re
     assert result.exit_code == 0, result.output
     assert CERTIFICATE.with_suffix(".pdf").read_bytes().startswith(b"%PDF")
     assert document["conformity"]["tolerance_m"] == 5e-4
-    # The answer in three lines: the decision, over which poses and of which point, what is missing.
+    # The answer in three lines: the decision, over which poses and of which point, what
+    # is missing.
     lines = result.output.splitlines()
     assert document["conformity"]["decision"] in lines[0] and "0.500 mm" in lines[0]
-    assert "Nobody has measured" in lines[1] and document["point"] in lines[2] and lines[3].endswith(".pdf")
+    assert (
+        "Nobody has measured" in lines[1]
+        and document["point"] in lines[2]
+        and lines[3].endswith(".pdf")
+    )
     rows = error_rows(json.loads(VERDICT.read_text()))
     assert document["errors"] == rows and len(rows) == 2
-    assert document["budget"][0]["name"] == "uncorrected" and rows[1][1] == f"{1e3 * document['budget'][0]['rms_m']:.3f} mm"
+    assert (
+        document["budget"][0]["name"] == "uncorrected"
+        and rows[1][1] == f"{1e3 * document['budget'][0]['rms_m']:.3f} mm"
+    )
     table = pd.read_csv(output)
-    before, after = (1e3 * np.sqrt((table[f"predicted_error_{stage}_m"] ** 2).mean()) for stage in ("before", "after"))
-    assert f"uncorrected they would be missed by {before:.3f} mm RMS" in corrected and f": {after:.3f} mm (" in corrected
+    before, after = (
+        1e3 * np.sqrt((table[f"predicted_error_{stage}_m"] ** 2).mean())
+        for stage in ("before", "after")
+    )
+    assert (
+        f"uncorrected they would be missed by {before:.3f} mm RMS" in corrected
+        and f": {after:.3f} mm (" in corrected
+    )
 
 
-def test_the_robot_is_judged_as_it_is_corrected(elastocal, regressed_checkout, monkeypatch, tmp_path):
-    """What physics leaves fails where the regression on it passes; no file can hold it."""
+def test_the_robot_is_judged_as_it_is_corrected(
+    elastocal, regressed_checkout, monkeypatch, tmp_path
+):
+    """What physics leaves fails where the regression on it passes; no file can hold
+    it."""
     shutil.copytree(regressed_checkout, tmp_path / "top", symlinks=True)
     monkeypatch.chdir(tmp_path / "top")
     reports = Path("reports/loop/smooth")
@@ -193,11 +266,24 @@ def test_the_robot_is_judged_as_it_is_corrected(elastocal, regressed_checkout, m
     elastocal("certificate", "smooth", "--tolerance", f"{1e3 * sum(ends) / 2:.4f}mm")
     delivered = json.loads((reports / "certificate.json").read_text())
     assert delivered["conformity"]["decision"] == "pass"
-    left = ("uncertainty of the parameters", "repeatability", "form of the model", "not commanded", "left by the regression")
-    squares = sum(line["rms_m"] ** 2 for line in delivered["budget"] if line["name"] in left)
+    left = (
+        "uncertainty of the parameters",
+        "repeatability",
+        "form of the model",
+        "not commanded",
+        "left by the regression",
+    )
+    squares = sum(
+        line["rms_m"] ** 2 for line in delivered["budget"] if line["name"] in left
+    )
     assert squares == pytest.approx(delivered["accuracy"]["rms_m"] ** 2, rel=1e-9)
-    told = " ".join(elastocal("export", "smooth", "--output", tmp_path / "out").stderr.split())
-    lost = re.search(r"no file holds the Gaussian process .*?up to (\S+) mm at the measured poses \((\S+) mm RMS", told)
+    told = " ".join(
+        elastocal("export", "smooth", "--output", tmp_path / "out").stderr.split()
+    )
+    lost = re.search(
+        r"no file holds the Gaussian process .*?up to (\S+) mm at the measured poses \((\S+) mm RMS",
+        told,
+    )
     assert lost and 0.1 < float(lost[2]) < float(lost[1]) < 1.0
     assert f": {1e3 * verdict['physics']['accuracy']['rms_m']:.3f} mm (" in told
 
@@ -207,7 +293,8 @@ def test_what_is_misplaced_is_said_and_data_at_fault_get_no_certificate(
 ):
     shutil.copytree(checkout, tmp_path / "top", symlinks=True)
     monkeypatch.chdir(tmp_path / "top")
-    verdict, sentence = json.loads(VERDICT.read_text()), "reflector or tool sits 5.0 mm from where it is declared"
+    verdict = json.loads(VERDICT.read_text())
+    sentence = "reflector or tool sits 5.0 mm from where it is declared"
     VERDICT.write_text(json.dumps(verdict | {"misplaced": [{"sentence": sentence}]}))
     record_jobs("made", campaign_files("made", ROBOTS))
     for words in (
@@ -216,7 +303,12 @@ def test_what_is_misplaced_is_said_and_data_at_fault_get_no_certificate(
     ):
         assert f"! {sentence}" in elastocal(*words).stderr, words
     assert json.loads(CERTIFICATE.read_text())["misplaced"] == [{"sentence": sentence}]
-    VERDICT.write_text(json.dumps(verdict | {"effects": [{"family": "data", "name": "wrong_sign"}], "accuracy": None}))
+    VERDICT.write_text(
+        json.dumps(
+            verdict
+            | {"effects": [{"family": "data", "name": "wrong_sign"}], "accuracy": None}
+        )
+    )
     record_jobs("made", campaign_files("made", ROBOTS))
     assert "data at fault" in refusal("certificate", "made", "--tolerance", "0.5mm")
 
@@ -227,8 +319,11 @@ ANGLES = 0.5 * np.linspace(-1, 1, 6)[None]
 def test_the_robot_file_holds_what_was_found(in_checkout, elastocal, tmp_path):
     result = elastocal("export", "made", "--output", tmp_path / "out")
     assert result.exit_code == 0, result.output
-    robot, nominal = read_robot(tmp_path / "out" / "robot.yaml"), analysed("kuka")
-    assert abs(robot.reported_offset[2] - nominal.reported_offset[2]) == pytest.approx(3e-4, rel=0.2)
+    robot = read_robot(tmp_path / "out" / "robot.yaml")
+    nominal = analysed("kuka")
+    assert abs(robot.reported_offset[2] - nominal.reported_offset[2]) == pytest.approx(
+        3e-4, rel=0.2
+    )
     assert (robot.compliance != nominal.compliance).any()
     assert not (tmp_path / "out" / "robot.urdf").exists()
     assert "no file holds" not in result.stderr
@@ -236,13 +331,29 @@ def test_the_robot_file_holds_what_was_found(in_checkout, elastocal, tmp_path):
 
 def urdf_of(arm):
     """A robot as URDF, a joint for each of its transforms."""
-    parts, above = [link("base")], "base"
-    for number, each in enumerate(arm.chain.transforms[: arm.chain.end_effector.after], 1):
-        name = arm.chain.end_effector.name if number == arm.chain.end_effector.after else f"l{number}"
+    parts = [link("base")]
+    above = "base"
+    for number, each in enumerate(
+        arm.chain.transforms[: arm.chain.end_effector.after], 1
+    ):
+        name = (
+            arm.chain.end_effector.name
+            if number == arm.chain.end_effector.after
+            else f"l{number}"
+        )
         axis = np.eye(3)[each.axis]
-        place = {"xyz" if each.kind == "T" else "rpy": each.constant * axis} if each.coordinate is None else {}
+        place = (
+            {"xyz" if each.kind == "T" else "rpy": each.constant * axis}
+            if each.coordinate is None
+            else {}
+        )
         kind = "fixed" if place else "revolute"
-        parts += [link(name), joint(f"j{number}", above, name, kind, axis=(each.sign or 1) * axis, **place)]
+        parts += [
+            link(name),
+            joint(
+                f"j{number}", above, name, kind, axis=(each.sign or 1) * axis, **place
+            ),
+        ]
         above = name
     return made(*parts)
 
@@ -250,21 +361,44 @@ def urdf_of(arm):
 def test_the_users_urdf_comes_back_with_other_joint_origins_and_another_robots_is_refused(
     in_checkout, elastocal, refusal, tmp_path
 ):
-    mine, output = tmp_path / "mine.urdf", tmp_path / "out"
-    mine.write_text(urdf_of(analysed("kuka")).replace("<link ", "<!-- mine --><link ", 1))
+    mine = tmp_path / "mine.urdf"
+    output = tmp_path / "out"
+    mine.write_text(
+        urdf_of(analysed("kuka")).replace("<link ", "<!-- mine --><link ", 1)
+    )
     result = elastocal("export", "made", "--urdf", mine, "--output", output)
     assert result.exit_code == 0, result.output
     told = " ".join(result.stderr.split())
-    assert re.search(r"robot\.urdf: \d+ joint origins? changed, nothing else", told) and "cannot hold" not in told
+    assert (
+        re.search(r"robot\.urdf: \d+ joint origins? changed, nothing else", told)
+        and "cannot hold" not in told
+    )
     text = (output / "robot.urdf").read_text()
-    assert text.count('effort="1"') == 6 and "<!-- mine -->" in text and text != mine.read_text()
+    assert (
+        text.count('effort="1"') == 6
+        and "<!-- mine -->" in text
+        and text != mine.read_text()
+    )
     robot = read_robot(output / "robot.yaml")
-    back = robot_from_urdf(output / "robot.urdf", "base", robot.chain.end_effector.name).robot
+    back = robot_from_urdf(
+        output / "robot.urdf", "base", robot.chain.end_effector.name
+    ).robot
     wanted = poses(robot.chain, robot.model_angles(ANGLES), robot.chain.end_effector)[0]
-    np.testing.assert_allclose(poses(back.chain, ANGLES, back.chain.end_effector)[0], wanted, atol=1e-9)
-    for wrong, where in ((urdf_of(analysed("gp180")), "imported"), ("<robot/>", "no <link>")):
+    np.testing.assert_allclose(
+        poses(back.chain, ANGLES, back.chain.end_effector)[0], wanted, atol=1e-9
+    )
+    for wrong, where in (
+        (urdf_of(analysed("gp180")), "imported"),
+        ("<robot/>", "no <link>"),
+    ):
         other = tmp_path / "other.urdf"
         other.write_text(wrong)
-        assert where in refusal("export", "made", "--urdf", other, "--output", tmp_path / "none")
-    assert "would be replaced" in refusal("export", "made", "--urdf", output / "robot.urdf", "--output", output)
-    assert not (tmp_path / "none").exists() and (output / "robot.urdf").read_text() == text
+        assert where in refusal(
+            "export", "made", "--urdf", other, "--output", tmp_path / "none"
+        )
+    assert "would be replaced" in refusal(
+        "export", "made", "--urdf", output / "robot.urdf", "--output", output
+    )
+    assert (
+        not (tmp_path / "none").exists() and (output / "robot.urdf").read_text() == text
+    )

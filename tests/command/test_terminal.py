@@ -1,4 +1,5 @@
-"""Quantities need their unit; what is printed does not steer a terminal; where the pipeline and its results are."""
+"""Quantities need their unit; what is printed does not steer a terminal; where the
+pipeline and its results are."""
 
 import io
 from importlib import metadata
@@ -12,7 +13,15 @@ from support import refused
 
 from elastocal.campaigns.reading import campaign_files
 from elastocal.command import terminal as module
-from elastocal.command.terminal import angle_rad, diagnosed_campaign, length_m, pipeline, print_lines, robots, workplace
+from elastocal.command.terminal import (
+    angle_rad,
+    diagnosed_campaign,
+    length_m,
+    pipeline,
+    print_lines,
+    robots,
+    workplace,
+)
 from elastocal.errors import InputError
 from elastocal.io.origin import environment
 
@@ -20,15 +29,46 @@ from elastocal.io.origin import environment
 @pytest.mark.parametrize(
     ("read", "text", "value"),
     [
-        *((length_m, *pair) for pair in (("0.2mm", 2e-4), ("60um", 6e-5), ("60 µm", 6e-5), (".5mm", 5e-4), ("0.01m", 0.01))),
-        *((angle_rad, *pair) for pair in (("0.01deg", 1.745329e-4), ("0.1mrad", 1e-4), ("60 µrad", 6e-5), (".001rad", 1e-3))),
+        *(
+            (length_m, *pair)
+            for pair in (
+                ("0.2mm", 2e-4),
+                ("60um", 6e-5),
+                ("60 µm", 6e-5),
+                (".5mm", 5e-4),
+                ("0.01m", 0.01),
+            )
+        ),
+        *(
+            (angle_rad, *pair)
+            for pair in (
+                ("0.01deg", 1.745329e-4),
+                ("0.1mrad", 1e-4),
+                ("60 µrad", 6e-5),
+                (".001rad", 1e-3),
+            )
+        ),
     ],
 )
 def test_a_quantity_is_read_with_its_unit(read, text, value):
     assert read("--noise", text) == pytest.approx(value)
 
 
-@pytest.mark.parametrize("text", ["0.2", "0mm", "-1mm", "200mm", "mm", "1e3mm", "nan mm", "0.000000000001mm", "90deg", "1"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "0.2",
+        "0mm",
+        "-1mm",
+        "200mm",
+        "mm",
+        "1e3mm",
+        "nan mm",
+        "0.000000000001mm",
+        "90deg",
+        "1",
+    ],
+)
 def test_a_quantity_without_a_unit_or_of_no_sense_is_refused(text):
     for read in (length_m, angle_rad):
         with refused("--tolerance", "", "with its unit"):
@@ -41,10 +81,20 @@ def test_lines_are_printed_as_they_are_but_for_what_would_steer_a_terminal():
     assert console.file.getvalue() == "    [bold] a\\x1b[2Jb\\u202ec 4.00\u00a0mm\n"
 
 
-def test_an_installed_package_has_its_pipeline_and_the_results_are_in_the_working_directory(tmp_path, monkeypatch):
+def test_an_installed_package_has_its_pipeline_and_the_results_are_in_the_working_directory(
+    tmp_path, monkeypatch
+):
     """The package in a folder of no checkout, with the record of a wheel."""
-    monkeypatch.setattr(module, "__file__", str(tmp_path / "lib" / "elastocal" / "command" / "terminal.py"))
-    monkeypatch.setattr(metadata, "distribution", lambda name: PathDistribution(tmp_path / "lib" / f"{name}-1.dist-info"))
+    monkeypatch.setattr(
+        module,
+        "__file__",
+        str(tmp_path / "lib" / "elastocal" / "command" / "terminal.py"),
+    )
+    monkeypatch.setattr(
+        metadata,
+        "distribution",
+        lambda name: PathDistribution(tmp_path / "lib" / f"{name}-1.dist-info"),
+    )
     (tmp_path / "lib" / "elastocal-1.dist-info").mkdir(parents=True)
     record = "elastocal/__init__.py,,\n../share/elastocal/Snakefile,,\n"
     (tmp_path / "lib" / "elastocal-1.dist-info" / "RECORD").write_text(record)
@@ -59,19 +109,31 @@ def test_an_installed_package_has_its_pipeline_and_the_results_are_in_the_workin
         pipeline()
 
 
-def test_a_checkout_above_the_working_directory_is_found_before_that_of_the_package(tmp_path, monkeypatch):
+def test_a_checkout_above_the_working_directory_is_found_before_that_of_the_package(
+    tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     assert (pipeline() / "src" / "elastocal").is_dir() and workplace() == pipeline()
     for folder in ("config/robots", "campaigns/cell7"):
         (tmp_path / folder).mkdir(parents=True)
     (tmp_path / "Snakefile").write_text("")
     monkeypatch.chdir(tmp_path / "campaigns" / "cell7")
-    assert pipeline() == workplace() == tmp_path and robots() == tmp_path / "config" / "robots"
+    assert (
+        pipeline() == workplace() == tmp_path
+        and robots() == tmp_path / "config" / "robots"
+    )
 
 
 def test_results_of_another_environment_come_with_a_warning(in_checkout, capsys):
-    assert diagnosed_campaign(in_checkout / "made").name == "made" and not capsys.readouterr().err
-    record_jobs("made", campaign_files("made", ROBOTS), environment(".") | {"numpy": "1.0"})
+    assert (
+        diagnosed_campaign(in_checkout / "made").name == "made"
+        and not capsys.readouterr().err
+    )
+    record_jobs(
+        "made", campaign_files("made", ROBOTS), environment(".") | {"numpy": "1.0"}
+    )
     assert diagnosed_campaign(in_checkout / "made").name == "made"
     here = environment(".")["numpy"]
-    assert capsys.readouterr().err == (f"warning: {in_checkout}/made was diagnosed with numpy 1.0; here are numpy {here}\n")
+    assert capsys.readouterr().err == (
+        f"warning: {in_checkout}/made was diagnosed with numpy 1.0; here are numpy {here}\n"
+    )

@@ -1,10 +1,18 @@
-"""Faults are named where they are, and none where the model is right or only lacks something."""
+"""Faults are named where they are, and none where the model is right or only lacks
+something."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_campaigns import POINTS, Plan, made, with_geometric_errors, with_measured, with_other_compliances
+from made_campaigns import (
+    POINTS,
+    Plan,
+    made,
+    with_geometric_errors,
+    with_measured,
+    with_other_compliances,
+)
 from support import PinocchioPoint
 from synthetic import NOISE
 
@@ -42,13 +50,17 @@ def test_no_fault_is_found_where_the_model_is_right(fanuc, plan, seed):
 def test_no_fault_is_found_where_the_model_lacks_something(kuka, plan, seed):
     """Springs, zeros, a sag and lengths off, which is most at once."""
     offsets = np.random.default_rng(seed).normal(0.0, 3e-3, kuka.joints)
-    true_robot = with_geometric_errors(with_other_compliances(kuka, seed, 0.5), seed, 0.01)
+    true_robot = with_geometric_errors(
+        with_other_compliances(kuka, seed, 0.5), seed, 0.01
+    )
     assert faults(made(kuka, seed, PLANS[plan], true_robot, offsets, sag=3e-3)) == ()
 
 
 def test_a_wrong_sign_is_found_alone(fanuc):
     campaign = made(fanuc, 1, Plan(poses=20))
-    turned = with_measured(campaign, joint_angles=campaign.measurements.joint_angles * [1, 1, -1, 1, 1, 1])
+    turned = with_measured(
+        campaign, joint_angles=campaign.measurements.joint_angles * [1, 1, -1, 1, 1, 1]
+    )
     assert [fault.name for fault in faults(turned)] == ["wrong_sign"]
 
 
@@ -57,7 +69,10 @@ def twelve_poses(request, fanuc):
     return made(fanuc, 1, Plan(poses=12, tracker=request.param == "tracker"))
 
 
-@pytest.mark.parametrize(("kept", "words"), [((0, 0, 0), "x, y, z of"), ((1, 1, 0), "z of"), ((0, 1, 0), "x, z of")])
+@pytest.mark.parametrize(
+    ("kept", "words"),
+    [((0, 0, 0), "x, y, z of"), ((1, 1, 0), "z of"), ((0, 1, 0), "x, z of")],
+)
 @pytest.mark.parametrize(("value", "same"), [(0.0, "zero"), (1.5, "the same")])
 def test_positions_that_stand_still_are_named(twelve_poses, kept, words, value, same):
     still = np.where(kept, twelve_poses.measurements.position, value)
@@ -66,9 +81,13 @@ def test_positions_that_stand_still_are_named(twelve_poses, kept, words, value, 
     assert fault.detail.startswith(words) and f" {same} in all 12 poses" in fault.detail
 
 
-def test_angles_that_stand_still_while_the_measurements_move_are_named_unless_it_is_one_pose_read_again(twelve_poses):
+def test_angles_that_stand_still_while_the_measurements_move_are_named_unless_it_is_one_pose_read_again(
+    twelve_poses,
+):
     seen = twelve_poses.measurements
-    still = with_measured(twelve_poses, joint_angles=np.full_like(seen.joint_angles, 0.4))
+    still = with_measured(
+        twelve_poses, joint_angles=np.full_like(seen.joint_angles, 0.4)
+    )
     (fault,) = constant_columns(still)
     assert fault.detail.startswith("the joint angles are the same in all 12 poses")
     again = seen.position[: len(POINTS)][seen.target] + 1e-5 * seen.pose[:, None]
@@ -76,75 +95,147 @@ def test_angles_that_stand_still_while_the_measurements_move_are_named_unless_it
 
 
 def test_a_robot_that_moves_in_a_plane_may_have_a_constant_coordinate(fanuc):
-    campaign = made(fanuc, 1, Plan(poses=12, noise=0.0, loads=0), moving={1: 0, 2: 0, 3: 0, 4: 0, 5: 0})
-    assert np.ptp(campaign.measurements.position[campaign.measurements.target == 3, 2]) < 1e-9
+    campaign = made(
+        fanuc,
+        1,
+        Plan(poses=12, noise=0.0, loads=0),
+        moving={1: 0, 2: 0, 3: 0, 4: 0, 5: 0},
+    )
+    assert (
+        np.ptp(campaign.measurements.position[campaign.measurements.target == 3, 2])
+        < 1e-9
+    )
     assert constant_columns(campaign) == []
 
 
 @pytest.fixture(scope="module", params=["base", "tracker"])
 def campaign(request, fanuc):
-    return made(fanuc, 1, Plan(tracker=request.param == "tracker"), with_other_compliances(fanuc, 1, 0.3))
+    return made(
+        fanuc,
+        1,
+        Plan(tracker=request.param == "tracker"),
+        with_other_compliances(fanuc, 1, 0.3),
+    )
 
 
 def with_rows(campaign, source):
     seen = campaign.measurements
-    return with_measured(campaign, position=seen.position[source], rotation_vector=seen.rotation_vector[source])
+    return with_measured(
+        campaign,
+        position=seen.position[source],
+        rotation_vector=seen.rotation_vector[source],
+    )
 
 
-@pytest.mark.parametrize(("steps", "words"), [(1, "row further up"), (-1, "row further down")])
+@pytest.mark.parametrize(
+    ("steps", "words"), [(1, "row further up"), (-1, "row further down")]
+)
 def test_measured_columns_moved_by_one_row_are_named(campaign, steps, words):
-    (fault,) = faults(with_rows(campaign, np.roll(np.arange(len(campaign.measurements)), steps)))
+    (fault,) = faults(
+        with_rows(campaign, np.roll(np.arange(len(campaign.measurements)), steps))
+    )
     assert fault.name == "shuffled_rows" and words in fault.detail
 
 
 @pytest.mark.parametrize("tracker", [True, False])
-def test_measurements_of_another_robot_are_named_and_those_of_one_off_by_centimetres_are_not(fanuc, kuka, tracker):
+def test_measurements_of_another_robot_are_named_and_those_of_one_off_by_centimetres_are_not(
+    fanuc, kuka, tracker
+):
     campaign = made(fanuc, 1, Plan(poses=20, tracker=tracker))
     (fault,) = implausible_measurements(replace(campaign, robot=kuka))
     assert fault.name == "implausible_measurements"
     assert fault.parameters[0].value > 0.1 and "\n" not in fault.detail
-    off = made(fanuc, 1, Plan(poses=20, tracker=tracker), with_geometric_errors(fanuc, 1, 0.01), 5e-3, sag=5e-3)
+    off = made(
+        fanuc,
+        1,
+        Plan(poses=20, tracker=tracker),
+        with_geometric_errors(fanuc, 1, 0.01),
+        5e-3,
+        sag=5e-3,
+    )
     assert implausible_measurements(off) == []
 
 
 def warned(robot, factors=1.0, turned=1.0, known=True):
-    """Warnings of a fit of the compliances of a robot that are so many times those that its file states, or are usual."""
+    """Warnings of a fit of the compliances of a robot that are so many times those that
+    its file states, or are usual."""
     file = replace(robot, compliance_known=known)
-    campaign = made(file, 1, Plan(poses=12), replace(robot, compliance=robot.compliance * factors))
+    campaign = made(
+        file, 1, Plan(poses=12), replace(robot, compliance=robot.compliance * factors)
+    )
     campaign = with_measured(campaign, wrench=turned * campaign.measurements.wrench)
-    return compliance_warnings(fit(declared_model(campaign), averaged(campaign.measurements), NOISE))
+    return compliance_warnings(
+        fit(declared_model(campaign), averaged(campaign.measurements), NOISE)
+    )
 
 
 @pytest.mark.parametrize(
     ("factor", "known", "words"),
-    [(0.3, True, ""), (3.0, True, ""), (9.8, True, "nominal"), (0.1, True, "nominal"), (9.8, False, "")],
+    [
+        (0.3, True, ""),
+        (3.0, True, ""),
+        (9.8, True, "nominal"),
+        (0.1, True, "nominal"),
+        (9.8, False, ""),
+    ],
 )
-def test_a_compliance_that_no_robot_has_is_named_with_its_standard_error(fanuc, factor, known, words):
+def test_a_compliance_that_no_robot_has_is_named_with_its_standard_error(
+    fanuc, factor, known, words
+):
     found = warned(fanuc, [1, factor, 1, 1, 1, 1], known=known)
     assert len(found) == bool(words)
     for warning in found:
-        assert "joint 2 " in warning and "joint 3" not in warning and "±" in warning and words in warning
+        assert (
+            "joint 2 " in warning
+            and "joint 3" not in warning
+            and "±" in warning
+            and words in warning
+        )
 
 
-def test_loads_turned_round_are_seen_by_compliances_below_zero_and_joints_without_any_are_rigid(fanuc):
+def test_loads_turned_round_are_seen_by_compliances_below_zero_and_joints_without_any_are_rigid(
+    fanuc,
+):
     (warning,) = warned(fanuc, turned=-1.0, known=False)
-    assert all(f"joint {joint} -" in warning for joint in range(1, 7)) and "usual for such a robot" in warning
-    rigid = replace(made(replace(fanuc, compliance_known=False), 1), compliance="nominal")
-    (warning,) = compliance_warnings(fit(declared_model(rigid), averaged(rigid.measurements), NOISE))
+    assert (
+        all(f"joint {joint} -" in warning for joint in range(1, 7))
+        and "usual for such a robot" in warning
+    )
+    rigid = replace(
+        made(replace(fanuc, compliance_known=False), 1), compliance="nominal"
+    )
+    (warning,) = compliance_warnings(
+        fit(declared_model(rigid), averaged(rigid.measurements), NOISE)
+    )
     assert "taken as rigid" in warning
 
 
 @pytest.mark.parametrize("tracker", [True, False])
 @pytest.mark.parametrize(("decimals_deg", "decimals_mm"), [(12, 12), (4, 3), (3, 2)])
-def test_positions_of_the_files_own_kinematics_are_said_to_be_no_measurements(fanuc, tracker, decimals_deg, decimals_mm):
+def test_positions_of_the_files_own_kinematics_are_said_to_be_no_measurements(
+    fanuc, tracker, decimals_deg, decimals_mm
+):
     """Angles and positions rounded as a controller shows them."""
-    campaign = made(fanuc, 1, Plan(poses=14, loads=0, tracker=tracker, oriented=False, noise=0.0))
-    angles = np.radians(np.degrees(campaign.measurements.joint_angles).round(decimals_deg))
+    campaign = made(
+        fanuc, 1, Plan(poses=14, loads=0, tracker=tracker, oriented=False, noise=0.0)
+    )
+    angles = np.radians(
+        np.degrees(campaign.measurements.joint_angles).round(decimals_deg)
+    )
     position = (1e3 * campaign.measurements.position).round(decimals_mm) / 1e3
-    (sentence,) = controller_warnings(with_measured(campaign, joint_angles=angles, position=position))
+    (sentence,) = controller_warnings(
+        with_measured(campaign, joint_angles=angles, position=position)
+    )
     assert "no measurements" in sentence and "own kinematics" in sentence
-    measured = position + 6e-5 * np.random.default_rng(1).standard_normal(position.shape)
-    assert controller_warnings(with_measured(campaign, joint_angles=angles, position=measured)) == []
+    measured = position + 6e-5 * np.random.default_rng(1).standard_normal(
+        position.shape
+    )
+    assert (
+        controller_warnings(
+            with_measured(campaign, joint_angles=angles, position=measured)
+        )
+        == []
+    )
 
 
 EXACT = Plan(poses=6, loads=2, noise=0.0)
@@ -157,28 +248,42 @@ def exact(fanuc):
 
 
 def expected_parts(robot, seen, part):
-    """Deflection of each target by each joint at nominal compliance from forces or moments alone, ndarray (N, 3, n)."""
+    """Deflection of each target by each joint at nominal compliance from forces or
+    moments alone, ndarray (N, 3, n)."""
     end = PinocchioPoint(robot.chain, robot.chain.end_effector)
     points = [PinocchioPoint(robot.chain, robot.chain.point(name)) for name in POINTS]
     parts = []
-    for q, wrench, target in zip(seen.joint_angles, seen.wrench, seen.target, strict=True):
+    for q, wrench, target in zip(
+        seen.joint_angles, seen.wrench, seen.target, strict=True
+    ):
         torques = end.pose_and_jacobian(q)[2][part].T @ wrench[part]
-        parts.append(points[target].pose_and_jacobian(q)[2][:3] * torques * robot.compliance)
+        parts.append(
+            points[target].pose_and_jacobian(q)[2][:3] * torques * robot.compliance
+        )
     return np.array(parts)
 
 
 def less_group_means(values, *keys):
     group = np.unique(np.column_stack(keys), axis=0, return_inverse=True)[1].ravel()
-    return np.array([value - values[group == number].mean(axis=0) for value, number in zip(values, group, strict=True)])
+    return np.array(
+        [
+            value - values[group == number].mean(axis=0)
+            for value, number in zip(values, group, strict=True)
+        ]
+    )
 
 
-def test_deflections_are_those_of_each_joint_by_pinocchio_less_the_mean_of_target_and_pose(fanuc, exact):
+def test_deflections_are_those_of_each_joint_by_pinocchio_less_the_mean_of_target_and_pose(
+    fanuc, exact
+):
     seen = exact.measurements
     found, expected = deflections(exact)
     for by, part in ((0, slice(0, 3)), (1, slice(3, 6))):
         whole = expected_parts(fanuc, seen, part).sum(axis=2)
         reference = less_group_means(whole, seen.pose, seen.target)
-        np.testing.assert_allclose(expected[:, by].reshape(-1, 3), reference, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(
+            expected[:, by].reshape(-1, 3), reference, rtol=0, atol=1e-12
+        )
     # Second order in turns of some milliradians over metres.
     np.testing.assert_allclose(found, expected.sum(axis=1), rtol=0, atol=2e-4)
     assert np.abs(found).max() > 1e-3
@@ -190,24 +295,38 @@ def selected(campaign, kept):
 
 def test_joints_off_their_zeros_leave_no_trace_in_the_deflections(fanuc):
     plan = Plan(poses=40, loads=1, noise=0.0)
-    straight, off = (made(fanuc, 1, plan, true_offset=offset) for offset in (0.0, 2e-3 * np.array([1, -1, 1, -1, 1, -1])))
-    assert np.linalg.norm(off.measurements.position - straight.measurements.position, axis=1).max() > 3e-3
+    straight, off = (
+        made(fanuc, 1, plan, true_offset=offset)
+        for offset in (0.0, 2e-3 * np.array([1, -1, 1, -1, 1, -1]))
+    )
+    assert (
+        np.linalg.norm(
+            off.measurements.position - straight.measurements.position, axis=1
+        ).max()
+        > 3e-3
+    )
     (one, _), (other, _) = map(deflections, (straight, off))
     # What is left is of second order: two milliradians of every deflection.
     assert np.abs(other - one).max() < 0.02 * np.abs(one).max()
 
 
-def test_nothing_is_said_without_differing_loads_or_known_compliances_or_with_too_few_poses(exact):
+def test_nothing_is_said_without_differing_loads_or_known_compliances_or_with_too_few_poses(
+    exact,
+):
     seen = exact.measurements
     assert deflections(selected(exact, seen.load == 1)) is None
     assert deflections(with_measured(exact, wrench=0.0 * seen.wrench)) is None
-    assert deflections(replace(exact, robot=replace(exact.robot, compliance_known=False))) is None
+    assert (
+        deflections(replace(exact, robot=replace(exact.robot, compliance_known=False)))
+        is None
+    )
     assert deflections(selected(exact, seen.pose < 3)) is None
     assert deflections(selected(exact, seen.pose < 4)) is not None
 
 
 def made_deflections(sign=1.0, force=1.0, moment=1.0, ratios=1.0, noise=1e-2):
-    """Of joints that are so many times as soft as in the file, seen as loads in another unit make them seen."""
+    """Of joints that are so many times as soft as in the file, seen as loads in another
+    unit make them seen."""
     rng = np.random.default_rng(1)
     by_force, by_moment = 1e-3 * rng.standard_normal((2, 450, JOINTS))
     seen = sign * (force * by_force + moment * by_moment) @ (ratios * np.ones(JOINTS))
@@ -215,35 +334,58 @@ def made_deflections(sign=1.0, force=1.0, moment=1.0, ratios=1.0, noise=1e-2):
     return seen, np.stack([by_force.sum(axis=1), by_moment.sum(axis=1)], axis=1)
 
 
-KILOGRAM, POUND = 9.80665, 4.4482216152605
+KILOGRAM = 9.80665
+POUND = 4.4482216152605
 
 
 def told(faults):
-    """Sign, newtons and newton metres for each unit, and the words of each fault, of what is found."""
-    unit = [value.value for fault in faults if fault.name == "wrong_unit" for value in fault.parameters[:2]]
-    return (-1.0 if "wrong_sign" in [fault.name for fault in faults] else 1.0), *(unit or [1.0, 1.0])
+    """Sign, newtons and newton metres for each unit, and the words of each fault, of
+    what is found."""
+    unit = [
+        value.value
+        for fault in faults
+        if fault.name == "wrong_unit"
+        for value in fault.parameters[:2]
+    ]
+    return (-1.0 if "wrong_sign" in [fault.name for fault in faults] else 1.0), *(
+        unit or [1.0, 1.0]
+    )
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize(("force", "moment", "words"), UNITS)
-def test_every_unit_and_sign_is_found_by_what_it_makes_of_the_deflections(sign, force, moment, words):
+def test_every_unit_and_sign_is_found_by_what_it_makes_of_the_deflections(
+    sign, force, moment, words
+):
     seen, expected = made_deflections(sign, force, moment)
     found = wrong_loads(seen, expected)
     assert bool(found) == (sign < 0 or bool(words))
     assert told(found) == pytest.approx((sign, force, moment))
     for fault in found:
-        # Forces and moments deflect alike here, so that the slope is the mean of their factors.
+        # Forces and moments deflect alike here, so that the slope is the mean of their
+        # factors.
         slope = sign * (force + moment) / 2
-        assert fault.parameters[-1].value == pytest.approx(slope, rel=0.01 if force == moment else 0.1)
+        assert fault.parameters[-1].value == pytest.approx(
+            slope, rel=0.01 if force == moment else 0.1
+        )
         # Of what robots have in common, 1/1.7 to 1.7, the factor that leaves least.
         left = seen - np.linspace(1 / 1.7, 1.7, 2001)[:, None] * expected.sum(axis=1)
-        assert fault.evidence[0] == pytest.approx(np.sqrt((left**2).mean(axis=1)).min(), rel=0.02)
+        assert fault.evidence[0] == pytest.approx(
+            np.sqrt((left**2).mean(axis=1)).min(), rel=0.02
+        )
         assert fault.evidence[1] < 0.1 * fault.evidence[0]
 
 
 @pytest.mark.parametrize(
     "ratios",
-    [1.0, 0.5, 2.0, 3.0, 9.8 * np.array([1.0, 3.0, 0.4, 1.0, 2.5, 0.5]), 9.8 * np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0])],
+    [
+        1.0,
+        0.5,
+        2.0,
+        3.0,
+        9.8 * np.array([1.0, 3.0, 0.4, 1.0, 2.5, 0.5]),
+        9.8 * np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0]),
+    ],
     ids=str,
 )
 def test_no_unit_is_found_for_compliances_that_are_only_off(ratios):
@@ -254,19 +396,39 @@ def test_of_two_units_within_reach_the_one_by_which_compliances_are_nearest_nomi
     # 1.4 times pounds-force are 0.63 times kilogram-force, and 1.55 times 0.70.
     (fault,) = wrong_loads(*made_deflections(force=POUND, moment=POUND, ratios=1.4))
     assert fault.detail.startswith("the loads look like pounds-force")
-    assert [each.startswith("the loads look like kilogram-force") for each in fault.alternatives] == [True]
+    assert [
+        each.startswith("the loads look like kilogram-force")
+        for each in fault.alternatives
+    ] == [True]
     (fault,) = wrong_loads(*made_deflections(force=POUND, moment=POUND, ratios=1.55))
-    assert fault.detail.startswith("the loads look like kilogram-force") and fault.alternatives
+    assert (
+        fault.detail.startswith("the loads look like kilogram-force")
+        and fault.alternatives
+    )
     (fault,) = wrong_loads(*made_deflections(force=KILOGRAM, moment=KILOGRAM))
     assert not fault.alternatives
 
 
 @pytest.fixture(scope="module", params=["base", "tracker"])
 def loaded(request, fanuc):
-    return made(fanuc, 2, Plan(poses=20, tracker=request.param == "tracker"), with_other_compliances(fanuc, 1, 0.3))
+    return made(
+        fanuc,
+        2,
+        Plan(poses=20, tracker=request.param == "tracker"),
+        with_other_compliances(fanuc, 1, 0.3),
+    )
 
 
-@pytest.mark.parametrize("factor", [(KILOGRAM, KILOGRAM), (1e3, 1e3), (1e-3, 1e-3), (1 / POUND, 1 / POUND), (1.0, 1e-3)])
+@pytest.mark.parametrize(
+    "factor",
+    [
+        (KILOGRAM, KILOGRAM),
+        (1e3, 1e3),
+        (1e-3, 1e-3),
+        (1 / POUND, 1 / POUND),
+        (1.0, 1e-3),
+    ],
+)
 def test_loads_in_another_unit_are_named_with_its_factor(loaded, factor):
     written = loaded.measurements.wrench / np.repeat(factor, 3)
     (fault,) = wrong_loads(*deflections(with_measured(loaded, wrench=written)))
@@ -276,6 +438,8 @@ def test_loads_in_another_unit_are_named_with_its_factor(loaded, factor):
 
 
 def test_loads_turned_round_are_named(loaded):
-    (fault,) = wrong_loads(*deflections(with_measured(loaded, wrench=-loaded.measurements.wrench)))
+    (fault,) = wrong_loads(
+        *deflections(with_measured(loaded, wrench=-loaded.measurements.wrench))
+    )
     assert (fault.name, fault.joints) == ("wrong_sign", ()) and "loads" in fault.detail
     assert -2.0 < fault.parameters[0].value < -0.5

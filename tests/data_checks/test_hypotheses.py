@@ -1,4 +1,5 @@
-"""A sense, axis, unit, frame or target is named where reading it otherwise lets absurd measurements fit, and nowhere else."""
+"""A sense, axis, unit, frame or target is named where reading it otherwise lets absurd
+measurements fit, and nowhere else."""
 
 from dataclasses import replace
 
@@ -7,12 +8,19 @@ import pytest
 from made_campaigns import Plan, made, with_measured, with_other_compliances
 from scipy.spatial.transform import Rotation
 
-from elastocal.data_checks.hypotheses import discrete, fitted, other_interpretations, shifts
+from elastocal.data_checks.hypotheses import (
+    discrete,
+    fitted,
+    other_interpretations,
+    shifts,
+)
 from elastocal.mechanics.kinematics import poses
 
 
 def softer_by_chance(robot, tracker):
-    return made(robot, 1, Plan(poses=12, tracker=tracker), with_other_compliances(robot, 1, 0.3))
+    return made(
+        robot, 1, Plan(poses=12, tracker=tracker), with_other_compliances(robot, 1, 0.3)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +28,9 @@ def campaign(fanuc):
     return softer_by_chance(fanuc, tracker=False)
 
 
-@pytest.mark.parametrize(("joint", "tracker"), [(0, False), (2, False), (3, True), (5, False)])
+@pytest.mark.parametrize(
+    ("joint", "tracker"), [(0, False), (2, False), (3, True), (5, False)]
+)
 def test_a_joint_counted_the_other_way_round_is_named(fanuc, joint, tracker):
     campaign = softer_by_chance(fanuc, tracker)
     angles = campaign.measurements.joint_angles * (1.0 - 2.0 * np.eye(6)[joint])
@@ -32,12 +42,23 @@ def test_a_joint_counted_the_other_way_round_is_named(fanuc, joint, tracker):
 
 def test_loads_that_are_numbered_throughout_have_no_row_beside_them(campaign):
     seen = campaign.measurements
-    turned = with_measured(campaign, joint_angles=-seen.joint_angles, load=np.arange(len(seen)) + 1)
-    assert not [fault for fault in other_interpretations(turned) if fault.name == "shuffled_rows"]
+    turned = with_measured(
+        campaign, joint_angles=-seen.joint_angles, load=np.arange(len(seen)) + 1
+    )
+    assert not [
+        fault
+        for fault in other_interpretations(turned)
+        if fault.name == "shuffled_rows"
+    ]
 
 
-@pytest.mark.parametrize(("joint", "sign", "words"), [(2, 1.0, "taken from"), (2, -1.0, "added to"), (5, -1.0, "added to")])
-def test_a_joint_counted_from_its_neighbour_is_named_with_it(campaign, joint, sign, words):
+@pytest.mark.parametrize(
+    ("joint", "sign", "words"),
+    [(2, 1.0, "taken from"), (2, -1.0, "added to"), (5, -1.0, "added to")],
+)
+def test_a_joint_counted_from_its_neighbour_is_named_with_it(
+    campaign, joint, sign, words
+):
     angles = campaign.measurements.joint_angles.copy()
     angles[:, joint] += sign * angles[:, joint - 1]
     (fault,) = other_interpretations(with_measured(campaign, joint_angles=angles))
@@ -46,11 +67,18 @@ def test_a_joint_counted_from_its_neighbour_is_named_with_it(campaign, joint, si
 
 
 def test_the_sign_is_that_of_the_column_of_the_file(fanuc):
-    """Where the controller counts from elsewhere, turning the column is not turning the angle of the model."""
+    """Where the controller counts from elsewhere, turning the column is not turning the
+    angle of the model."""
     reported_matrix = np.diag([1.0, 1.0, -1.0, 1.0, 1.0, 1.0])
-    robot = replace(fanuc, reported_matrix=reported_matrix, reported_offset=np.radians([0, -40, 60, 0, 0, 0]))
+    robot = replace(
+        fanuc,
+        reported_matrix=reported_matrix,
+        reported_offset=np.radians([0, -40, 60, 0, 0, 0]),
+    )
     campaign = made(robot, 3, Plan(poses=14))
-    reported = (campaign.measurements.joint_angles - robot.reported_offset) @ reported_matrix
+    reported = (
+        campaign.measurements.joint_angles - robot.reported_offset
+    ) @ reported_matrix
     reported[:, 2] *= -1
     angles = reported @ reported_matrix + robot.reported_offset
     (fault,) = other_interpretations(with_measured(campaign, joint_angles=angles))
@@ -58,7 +86,9 @@ def test_the_sign_is_that_of_the_column_of_the_file(fanuc):
 
 
 def test_orientations_turned_round_are_named(campaign):
-    (fault,) = other_interpretations(with_measured(campaign, rotation_vector=-campaign.measurements.rotation_vector))
+    (fault,) = other_interpretations(
+        with_measured(campaign, rotation_vector=-campaign.measurements.rotation_vector)
+    )
     assert fault.joints == ()
     assert "rotation vectors" in fault.detail
 
@@ -72,7 +102,11 @@ def with_turned_mount(campaign, turn, moved_m=0.0):
     measured = Rotation.from_rotvec(campaign.measurements.rotation_vector)
     place = np.where(mine, measured.apply([0.0, 0.0, moved_m]), 0.0)
     vectors = np.where(mine, (measured * turn).as_rotvec(), measured.as_rotvec())
-    return with_measured(campaign, position=campaign.measurements.position + place, rotation_vector=vectors)
+    return with_measured(
+        campaign,
+        position=campaign.measurements.position + place,
+        rotation_vector=vectors,
+    )
 
 
 EXCHANGED = {
@@ -92,55 +126,92 @@ def test_exchanged_axes_of_positions_are_named(campaign, words):
 
 @pytest.mark.parametrize(("factor", "unit"), [(1000, "millimetres"), (0.1, "tenth")])
 def test_positions_in_another_unit_are_named(campaign, factor, unit):
-    (fault,) = other_interpretations(with_measured(campaign, position=factor * campaign.measurements.position))
+    (fault,) = other_interpretations(
+        with_measured(campaign, position=factor * campaign.measurements.position)
+    )
     assert fault.name == "wrong_unit" and unit in fault.detail
     assert f"fit {1 / factor:g} times" in fault.detail
 
 
-@pytest.mark.parametrize(("letters", "words"), [("XYZ", "moved x, y, z"), ("xyz", "roll, pitch, yaw")])
-def test_angles_in_the_columns_of_the_rotation_vector_are_named(campaign, letters, words):
-    angles = Rotation.from_rotvec(campaign.measurements.rotation_vector).as_euler(letters)
+@pytest.mark.parametrize(
+    ("letters", "words"), [("XYZ", "moved x, y, z"), ("xyz", "roll, pitch, yaw")]
+)
+def test_angles_in_the_columns_of_the_rotation_vector_are_named(
+    campaign, letters, words
+):
+    angles = Rotation.from_rotvec(campaign.measurements.rotation_vector).as_euler(
+        letters
+    )
     (fault,) = other_interpretations(with_measured(campaign, rotation_vector=angles))
     assert words in fault.detail
 
 
 def test_each_session_has_a_transform_of_its_own(fanuc):
     campaign = made(fanuc, 1, Plan(poses=14, oriented=False))
-    measurements, rotation = campaign.measurements, ELSEWHERE[0]
+    measurements = campaign.measurements
+    rotation = ELSEWHERE[0]
     session = (measurements.pose >= 10).astype(np.int32)
-    position = rotation.apply(measurements.position) + np.where(session[:, None], [0.0, 3.0, 0.0], [1.0, 0.0, 0.0])
-    (fault,) = other_interpretations(with_measured(campaign, session=session, position=position))
+    position = rotation.apply(measurements.position) + np.where(
+        session[:, None], [0.0, 3.0, 0.0], [1.0, 0.0, 0.0]
+    )
+    (fault,) = other_interpretations(
+        with_measured(campaign, session=session, position=position)
+    )
     # That of the session that stands farther off.
-    assert fault.name == "wrong_frame" and "would stand 3 m away, turned by 76.4°" in fault.detail
+    assert (
+        fault.name == "wrong_frame"
+        and "would stand 3 m away, turned by 76.4°" in fault.detail
+    )
 
 
 def of_the_end(campaign):
     """With the measurements of the last target alone."""
-    return replace(campaign, measurements=campaign.measurements.select(campaign.measurements.target == 3))
+    return replace(
+        campaign,
+        measurements=campaign.measurements.select(campaign.measurements.target == 3),
+    )
 
 
 def known_targets(fanuc, factor=1.0, which=slice(None)):
-    """A campaign whose targets sit 0.1 m or so off their points, written so many times as large."""
-    offsets = 0.1 * np.array([[1.0, 0.3, -0.5], [-0.4, 1.0, 0.2], [0.3, 0.4, 1.0], [1.0, -1.0, 0.5]])
-    points = tuple(replace(p, offset_m=tuple(o)) for p, o in zip(fanuc.chain.points, offsets, strict=True))
+    """A campaign whose targets sit 0.1 m or so off their points, written so many times
+    as large."""
+    offsets = 0.1 * np.array(
+        [[1.0, 0.3, -0.5], [-0.4, 1.0, 0.2], [0.3, 0.4, 1.0], [1.0, -1.0, 0.5]]
+    )
+    points = tuple(
+        replace(p, offset_m=tuple(o))
+        for p, o in zip(fanuc.chain.points, offsets, strict=True)
+    )
     chain = replace(fanuc.chain, points=points)
-    rng, plain = np.random.default_rng(4), made(fanuc, 1, Plan(poses=14))
+    rng = np.random.default_rng(4)
+    plain = made(fanuc, 1, Plan(poses=14))
     position = np.empty_like(plain.measurements.position)
     for number, point in enumerate(chain.points):
         mask = plain.measurements.target == number
         position[mask] = poses(chain, plain.measurements.joint_angles[mask], point)[0]
     written = offsets.copy()
     written[which] *= factor
-    targets = tuple(replace(t, offset_m=tuple(o)) for t, o in zip(plain.targets, written, strict=True))
-    seen = replace(plain.measurements, position=position + 6e-5 * rng.standard_normal(position.shape))
+    targets = tuple(
+        replace(t, offset_m=tuple(o))
+        for t, o in zip(plain.targets, written, strict=True)
+    )
+    seen = replace(
+        plain.measurements,
+        position=position + 6e-5 * rng.standard_normal(position.shape),
+    )
     return replace(plain, targets=targets, measurements=seen)
 
 
-@pytest.mark.parametrize(("which", "words"), [(slice(None), "T2DoF, T3DoF, T4DoF, T6DoF"), (slice(3, 4), "T6DoF")])
+@pytest.mark.parametrize(
+    ("which", "words"),
+    [(slice(None), "T2DoF, T3DoF, T4DoF, T6DoF"), (slice(3, 4), "T6DoF")],
+)
 def test_target_offsets_in_millimetres_are_named(fanuc, which, words):
     campaign = known_targets(fanuc, 1000.0, which)
     (fault,) = other_interpretations(campaign)
-    assert fault.name == "wrong_unit" and fault.detail.startswith(f"the target offset of {words} looks like millimetres")
+    assert fault.name == "wrong_unit" and fault.detail.startswith(
+        f"the target offset of {words} looks like millimetres"
+    )
 
 
 def test_a_target_that_sits_elsewhere_is_named_with_its_place(fanuc):
@@ -154,25 +225,43 @@ def test_a_target_that_sits_elsewhere_is_named_with_its_place(fanuc):
 
 
 @pytest.mark.parametrize(("error_m", "names"), [(0.025, []), (0.06, ["wrong_target"])])
-def test_a_last_link_that_is_a_little_longer_than_its_file_is_left_to_physics(fanuc, error_m, names):
-    last = replace(fanuc.chain.transforms[-1], constant=fanuc.chain.transforms[-1].constant + error_m)
-    longer = replace(fanuc, chain=replace(fanuc.chain, transforms=(*fanuc.chain.transforms[:-1], last)))
+def test_a_last_link_that_is_a_little_longer_than_its_file_is_left_to_physics(
+    fanuc, error_m, names
+):
+    last = replace(
+        fanuc.chain.transforms[-1],
+        constant=fanuc.chain.transforms[-1].constant + error_m,
+    )
+    longer = replace(
+        fanuc,
+        chain=replace(fanuc.chain, transforms=(*fanuc.chain.transforms[:-1], last)),
+    )
     campaign = made(fanuc, 1, Plan(poses=14, oriented=False), longer)
-    assert [fault.name for fault in other_interpretations(of_the_end(campaign))] == names
+    assert [
+        fault.name for fault in other_interpretations(of_the_end(campaign))
+    ] == names
 
 
-@pytest.mark.parametrize(("shift", "names"), [(0.0, []), (0.004, []), (0.03, []), (0.06, ["wrong_frame"])])
+@pytest.mark.parametrize(
+    ("shift", "names"), [(0.0, []), (0.004, []), (0.03, []), (0.06, ["wrong_frame"])]
+)
 def test_a_base_that_stands_a_little_off_is_left_to_physics(fanuc, shift, names):
     campaign = made(fanuc, 1, Plan(poses=14))
-    moved = with_measured(campaign, position=campaign.measurements.position + np.array([0.0, 0.0, shift]))
+    moved = with_measured(
+        campaign, position=campaign.measurements.position + np.array([0.0, 0.0, shift])
+    )
     assert [fault.name for fault in other_interpretations(moved)] == names
 
 
 def test_what_fits_as_well_is_listed_as_an_alternative(fanuc):
-    """In a frame that nobody knows, axes and rotation vectors exchanged together are mirrored in one way or another."""
+    """In a frame that nobody knows, axes and rotation vectors exchanged together are
+    mirrored in one way or another."""
     campaign = made(fanuc, 1, Plan(poses=14, tracker=True))
     seen = campaign.measurements
-    exchanged = {name: getattr(seen, name)[:, [1, 0, 2]] for name in ("position", "rotation_vector")}
+    exchanged = {
+        name: getattr(seen, name)[:, [1, 0, 2]]
+        for name in ("position", "rotation_vector")
+    }
     (fault,) = other_interpretations(with_measured(campaign, **exchanged))
     assert fault.name == "swapped_axes" and len(fault.alternatives) >= 3
     assert all("rotation vectors likewise" in words for words in fault.alternatives)
@@ -181,16 +270,29 @@ def test_what_fits_as_well_is_listed_as_an_alternative(fanuc):
 def test_measurements_of_nothing_are_mended_by_nothing(campaign):
     rng = np.random.default_rng(5)
     assert (
-        other_interpretations(with_measured(campaign, position=rng.normal(0.0, 1.0, campaign.measurements.position.shape)))
+        other_interpretations(
+            with_measured(
+                campaign,
+                position=rng.normal(0.0, 1.0, campaign.measurements.position.shape),
+            )
+        )
         == []
     )
 
 
-def test_a_robot_that_hardly_moves_is_not_fitted_by_gathering_measurements_in_one_place(fanuc):
+def test_a_robot_that_hardly_moves_is_not_fitted_by_gathering_measurements_in_one_place(
+    fanuc,
+):
     campaign = made(fanuc, 1, Plan(poses=8, loads=1, tracker=True, oriented=False))
     angles = 0.3 + 1e-3 * np.random.default_rng(2).normal(size=(8, 6))
-    position, pose = np.random.default_rng(3).normal(0.0, 1.0, (8, 3)), campaign.measurements.pose
-    assert other_interpretations(with_measured(campaign, joint_angles=angles[pose], position=position[pose])) == []
+    position = np.random.default_rng(3).normal(0.0, 1.0, (8, 3))
+    pose = campaign.measurements.pose
+    assert (
+        other_interpretations(
+            with_measured(campaign, joint_angles=angles[pose], position=position[pose])
+        )
+        == []
+    )
 
 
 @pytest.mark.parametrize(("degrees", "moved_m"), [(8, 0.0), (180, 0.05)])
@@ -198,16 +300,26 @@ def test_a_mount_that_is_turned_otherwise_is_named_with_the_remedy_and_fitted_on
     fanuc, degrees, moved_m
 ):
     campaign = made(fanuc, 1, Plan(poses=14))
-    turn = Rotation.from_rotvec([0.0, 0.6 * np.radians(degrees), 0.8 * np.radians(degrees)])
+    turn = Rotation.from_rotvec(
+        [0.0, 0.6 * np.radians(degrees), 0.8 * np.radians(degrees)]
+    )
     written = with_turned_mount(campaign, turn, moved_m)
     (fault,) = other_interpretations(written)
     assert fault.name == "wrong_target"
-    assert f"T6DoF would be turned by {degrees}" in fault.detail and "rotation: unknown" in fault.detail
+    assert (
+        f"T6DoF would be turned by {degrees}" in fault.detail
+        and "rotation: unknown" in fault.detail
+    )
     assert ("offset_m: unknown" in fault.detail) == bool(moved_m)
     if not moved_m:
         for right in (None, tuple(turn.as_rotvec())):
             mount = replace(campaign.targets[3], rotation=right)
-            assert other_interpretations(replace(written, targets=(*campaign.targets[:3], mount))) == []
+            assert (
+                other_interpretations(
+                    replace(written, targets=(*campaign.targets[:3], mount))
+                )
+                == []
+            )
 
 
 def test_what_is_simple_comes_first_and_no_each_is_there_twice(fanuc):
@@ -223,20 +335,36 @@ def test_what_is_simple_comes_first_and_no_each_is_there_twice(fanuc):
     ]
     for each in single:
         read = each.read(campaign)
-        assert read is not campaign and len(read.measurements) <= len(campaign.measurements)
+        assert read is not campaign and len(read.measurements) <= len(
+            campaign.measurements
+        )
 
 
-@pytest.mark.parametrize(("kind", "keys"), [("row of its target", ("target",)), ("pose", ("target", "load", "repeat"))])
+@pytest.mark.parametrize(
+    ("kind", "keys"),
+    [("row of its target", ("target",)), ("pose", ("target", "load", "repeat"))],
+)
 @pytest.mark.parametrize("steps", [1, -1])
-def test_measured_columns_of_each_target_or_pose_moved_by_one_are_named(fanuc, kind, keys, steps):
+def test_measured_columns_of_each_target_or_pose_moved_by_one_are_named(
+    fanuc, kind, keys, steps
+):
     campaign = made(fanuc, 1, Plan(poses=14, loads=1))
-    measurements, source = campaign.measurements, np.arange(14 * 8)
-    groups = np.unique(np.column_stack([getattr(measurements, key) for key in keys]), axis=0, return_inverse=True)[1].ravel()
+    measurements = campaign.measurements
+    source = np.arange(14 * 8)
+    groups = np.unique(
+        np.column_stack([getattr(measurements, key) for key in keys]),
+        axis=0,
+        return_inverse=True,
+    )[1].ravel()
     for group in range(groups.max() + 1):
         members = np.flatnonzero(groups == group)
         source[members] = np.roll(members, steps)
     turned = measurements.rotation_vector[source]
-    (fault,) = other_interpretations(with_measured(campaign, position=measurements.position[source], rotation_vector=turned))
+    (fault,) = other_interpretations(
+        with_measured(
+            campaign, position=measurements.position[source], rotation_vector=turned
+        )
+    )
     # Of two loads of a pose each second row is of the next pose: both words say so.
     assert fault.name == "shuffled_rows"
     assert fault.detail.endswith("up" if steps > 0 else "down")

@@ -1,4 +1,5 @@
-"""Measurements beside the nominal robot: frames and targets by the measurements that agree, and the sizes of distances."""
+"""Measurements beside the nominal robot: frames and targets by the measurements that
+agree, and the sizes of distances."""
 
 from dataclasses import replace
 
@@ -28,23 +29,35 @@ def test_measurements_of_the_nominal_robot_lie_where_it_puts_them(exact, place):
 
 def test_known_targets_are_predicted_by_pinocchio(fanuc):
     campaign = made(fanuc, 1, replace(EXACT, noise=1e-3))
-    moved = tuple(replace(target, offset_m=(0.1, -0.2, 0.05 * k)) for k, target in enumerate(campaign.targets))
+    moved = tuple(
+        replace(target, offset_m=(0.1, -0.2, 0.05 * k))
+        for k, target in enumerate(campaign.targets)
+    )
     campaign, seen = replace(campaign, targets=moved), campaign.measurements
     found = placed(campaign)
     for row in range(0, len(seen), 7):
         target = moved[seen.target[row]]
-        point = PinocchioPoint(fanuc.chain, replace(fanuc.chain.point(target.point), offset_m=target.offset_m))
+        point = PinocchioPoint(
+            fanuc.chain,
+            replace(fanuc.chain.point(target.point), offset_m=target.offset_m),
+        )
         position, rotation, _ = point.pose_and_jacobian(seen.joint_angles[row])
         np.testing.assert_allclose(found.predicted[row], position, rtol=0, atol=1e-12)
-        turn = Rotation.from_rotvec(seen.rotation_vector[row]) * Rotation.from_matrix(rotation).inv()
+        turn = (
+            Rotation.from_rotvec(seen.rotation_vector[row])
+            * Rotation.from_matrix(rotation).inv()
+        )
         assert found.turn[row] == pytest.approx(turn.magnitude(), abs=1e-9)
         # In the base frame measured positions stay as they are.
         np.testing.assert_array_equal(found.measured[0][row], seen.position[row])
 
 
-def test_one_measurement_in_four_far_off_moves_the_robust_fit_by_nothing_and_the_other_one_by_much(fanuc):
+def test_one_measurement_in_four_far_off_moves_the_robust_fit_by_nothing_and_the_other_one_by_much(
+    fanuc,
+):
     campaign = made(fanuc, 1, replace(EXACT, tracker=True, poses=16))
-    rng, position = np.random.default_rng(2), campaign.measurements.position.copy()
+    rng = np.random.default_rng(2)
+    position = campaign.measurements.position.copy()
     far = rng.random(len(position)) < 0.25
     position[far] += [0.3, 0.0, 0.0]
     campaign = with_measured(campaign, position=position)
@@ -54,20 +67,36 @@ def test_one_measurement_in_four_far_off_moves_the_robust_fit_by_nothing_and_the
     assert placed(campaign).distance[~far].min() > 0.01
 
 
-def test_the_robust_fit_of_normal_errors_is_the_fit_to_all_and_single_rows_are_no_misfit(fanuc):
+def test_the_robust_fit_of_normal_errors_is_the_fit_to_all_and_single_rows_are_no_misfit(
+    fanuc,
+):
     campaign = made(fanuc, 1, Plan(poses=12, loads=0, tracker=True))
-    np.testing.assert_array_equal(robustly_placed(campaign).estimate.frame_position, placed(campaign).estimate.frame_position)
+    np.testing.assert_array_equal(
+        robustly_placed(campaign).estimate.frame_position,
+        placed(campaign).estimate.frame_position,
+    )
     exact = made(fanuc, 1, EXACT)
     one = np.where(exact.measurements.pose[:, None] == 3, 0.3, 0.0)
-    assert placed(with_measured(exact, position=exact.measurements.position + one)).misfit.max() < 1e-6
+    assert (
+        placed(
+            with_measured(exact, position=exact.measurements.position + one)
+        ).misfit.max()
+        < 1e-6
+    )
 
 
-@pytest.mark.parametrize(("wanted", "poses"), [(4, [0, 4, 7, 11]), (2, [0, 11]), (50, list(range(12)))])
-def test_poses_are_spread_over_the_campaign_at_their_lowest_load_and_first_repeat(fanuc, wanted, poses):
+@pytest.mark.parametrize(
+    ("wanted", "poses"), [(4, [0, 4, 7, 11]), (2, [0, 11]), (50, list(range(12)))]
+)
+def test_poses_are_spread_over_the_campaign_at_their_lowest_load_and_first_repeat(
+    fanuc, wanted, poses
+):
     campaign = made(fanuc, 1, Plan(poses=12, loads=2, repeats=2))
     some = campaign.measurements.select(campaign.measurements.load > 0)
     order = np.random.default_rng(5).permutation(len(some))
-    found = spread(replace(campaign, measurements=some.select(order)), wanted).measurements
+    found = spread(
+        replace(campaign, measurements=some.select(order)), wanted
+    ).measurements
     for target in range(len(POINTS)):
         assert sorted(found.pose[found.target == target].tolist()) == poses
     assert (found.load == 1).all() and (found.repeat == 0).all()

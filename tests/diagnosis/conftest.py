@@ -10,7 +10,8 @@ from elastocal.loop.whole import cases_in
 
 @pytest.fixture(scope="session")
 def cases(kuka, config_folder, tmp_path_factory):
-    """Training and held-out part of a robot whose joint 3 stands 1 mrad beyond what it reports, which is not declared."""
+    """Training and held-out part of a robot whose joint 3 stands 1 mrad beyond what it
+    reports, which is not declared."""
     folder = tmp_path_factory.mktemp("cases") / "made"
     made_folder(folder, kuka, table=made_table(kuka, "made", offset_of_joint_3=1e-3))
     return cases_in(folder, config_folder / "robots")

@@ -1,4 +1,5 @@
-"""A campaign with a few bad rows: the verdict is that of the clean file, and the rows are named with their line."""
+"""A campaign with a few bad rows: the verdict is that of the clean file, and the rows
+are named with their line."""
 
 from dataclasses import replace
 
@@ -12,9 +13,11 @@ from elastocal.campaigns.writing import write_campaign
 from elastocal.exchange.measurement_table import ImportOptions, read_measurement_table
 from elastocal.loop.whole import cases_in, diagnosed
 
-NOISE_M, POSES = 5e-5, 60
+NOISE_M = 5e-5
+POSES = 60
 HELD_OUT = [5, 9, 14, 18, 23, 27, 31, 36, 40, 44, 47, 49, 52, 54, 56, 57, 59, 60]
-# Zero offsets of a mastering that went wrong, rad; that of the last joint moves no point on its axis.
+# Zero offsets of a mastering that went wrong, rad; that of the last joint moves no
+# point on its axis.
 OFFSETS = np.array([1.8, -2.1, 1.6, 2.4, -1.9, 0.0]) * 1e-3
 
 
@@ -40,13 +43,29 @@ def wrong_angle(table, row):
 
 
 def verdict_on(folder, damage=(), **changes):
-    """Verdict on 60 poses of a UR10, one row each, with some of them damaged: pairs of a function and its rows."""
-    robot, draws = analysed("ur10"), np.random.default_rng(33)
+    """Verdict on 60 poses of a UR10, one row each, with some of them damaged: pairs of
+    a function and its rows."""
+    robot = analysed("ur10")
+    draws = np.random.default_rng(33)
     shown = draws.uniform(-2.0, 2.0, (POSES, robot.joints))
-    at = nominal_forward(robot, robot.reported_angles(robot.model_angles(shown) + OFFSETS))[0]
-    table = {"pose": np.arange(1, POSES + 1), "load": np.zeros(POSES, int), "repeat": np.zeros(POSES, int)}
-    table |= {"target": np.full(POSES, "S")} | {f"q{joint}": angle.copy() for joint, angle in enumerate(shown.T, 1)}
-    table |= dict(zip("xyz", (at + NOISE_M * draws.standard_normal(at.shape)).T.copy(), strict=True))
+    at = nominal_forward(
+        robot, robot.reported_angles(robot.model_angles(shown) + OFFSETS)
+    )[0]
+    table = {
+        "pose": np.arange(1, POSES + 1),
+        "load": np.zeros(POSES, int),
+        "repeat": np.zeros(POSES, int),
+    }
+    table |= {"target": np.full(POSES, "S")} | {
+        f"q{joint}": angle.copy() for joint, angle in enumerate(shown.T, 1)
+    }
+    table |= dict(
+        zip(
+            "xyz",
+            (at + NOISE_M * draws.standard_normal(at.shape)).T.copy(),
+            strict=True,
+        )
+    )
     for spoil, *rows in damage:
         spoil(table, *rows)
     document = {
@@ -65,17 +84,23 @@ def verdict_on(folder, damage=(), **changes):
 
 
 def places(verdict):
-    return verdict["verdict"], {effect["name"]: effect["joints"] for effect in verdict["effects"]}
+    return verdict["verdict"], {
+        effect["name"]: effect["joints"] for effect in verdict["effects"]
+    }
 
 
 def named_rows(verdict):
-    return sorted(row for entry in verdict.get("gross_errors", []) for row in entry["rows"])
+    return sorted(
+        row for entry in verdict.get("gross_errors", []) for row in entry["rows"]
+    )
 
 
 @pytest.fixture(scope="module")
 def clean(tmp_path_factory):
     found = verdict_on(tmp_path_factory.mktemp("clean"))
-    assert [effect["name"] for effect in found["effects"]] == ["joint_offset"] and named_rows(found) == []
+    assert [effect["name"] for effect in found["effects"]] == [
+        "joint_offset"
+    ] and named_rows(found) == []
     return found
 
 
@@ -84,11 +109,16 @@ def clean(tmp_path_factory):
     [
         pytest.param(off_by(1e-3), 1e-3, marks=pytest.mark.slow),
         (off_by(0.1), 0.1),
-        *(pytest.param(damage, None, marks=pytest.mark.slow) for damage in (lost_beam, held_point, wrong_angle)),
+        *(
+            pytest.param(damage, None, marks=pytest.mark.slow)
+            for damage in (lost_beam, held_point, wrong_angle)
+        ),
     ],
     ids=["1 mm", "100 mm", "lost beam", "held point", "wrong angle"],
 )
-def test_one_bad_row_leaves_the_verdict_and_is_named_with_its_line_and_its_size(tmp_path, clean, damage, size_m):
+def test_one_bad_row_leaves_the_verdict_and_is_named_with_its_line_and_its_size(
+    tmp_path, clean, damage, size_m
+):
     found = verdict_on(tmp_path, [(damage, 8)])
     assert places(found) == places(clean)
     assert named_rows(found) == [8]
@@ -107,7 +137,9 @@ def test_a_bad_row_that_is_held_out_is_named_and_both_errors_are_given(tmp_path,
     assert named_rows(found) == [14] and found["gross_errors"][0]["held_out"]
     heldout = found["heldout"]
     assert heldout["after"]["rms_m"] < 1.1 * clean["heldout"]["after"]["rms_m"]
-    assert heldout["with_gross_errors"]["after"]["rms_m"] > 100 * heldout["after"]["rms_m"]
+    assert (
+        heldout["with_gross_errors"]["after"]["rms_m"] > 100 * heldout["after"]["rms_m"]
+    )
     assert any("line 15" in warning for warning in found["warnings"])
 
 
@@ -115,7 +147,8 @@ UNITS = {"q": "rad", "f": "N", "m": "Nm", "x": "m", "y": "m", "z": "m"}
 
 
 def imported(folder, table, lost):
-    """A campaign of a table without numbers of poses, as an importer makes it; rows that are lost read zeros throughout."""
+    """A campaign of a table without numbers of poses, as an importer makes it; rows
+    that are lost read zeros throughout."""
     names = [name for name in table if name[0] in UNITS]
     rows = np.column_stack([table[name] for name in names])
     rows[lost] = 0.0
@@ -123,21 +156,39 @@ def imported(folder, table, lost):
     heads = ",".join(f"{name} [{UNITS[name[0]]}]" for name in names)
     np.savetxt(folder / "table.csv", rows, "%.12g", ",", header=heads, comments="")
     robot = analysed("kuka")
-    found = read_measurement_table(folder / "table.csv", ImportOptions(target="6DoF"), robot)
+    found = read_measurement_table(
+        folder / "table.csv", ImportOptions(target="6DoF"), robot
+    )
     target = {"6DoF": {"point": "6DoF", "offset_m": [0, 0, 0]}}
-    return made_folder(folder, robot, table=found.table, targets=target, compliance="nominal")
+    return made_folder(
+        folder, robot, table=found.table, targets=target, compliance="nominal"
+    )
 
 
 def facts_of(verdict):
     """All that a row that is held out may not change."""
-    effects = [{key: entry[key] for key in ("name", "joints", "probability", "parameters")} for entry in verdict["effects"]]
-    return {key: verdict[key] for key in ("verdict", "probabilities", "kept", "misfit", "noise", "settings")} | {"e": effects}
+    effects = [
+        {key: entry[key] for key in ("name", "joints", "probability", "parameters")}
+        for entry in verdict["effects"]
+    ]
+    return {
+        key: verdict[key]
+        for key in ("verdict", "probabilities", "kept", "misfit", "noise", "settings")
+    } | {"e": effects}
 
 
 def assert_a_lost_held_out_row_changes_nothing(folder, number, whole):
     """Of 24 poses, of every second campaign under two loads, whose joint 3 is off."""
     forces = ((0.0, (0,)), (800.0, (0, 1)))[number % 2]
-    plan = replace(PLAN, points=("6DoF",), poses=24, force_N=forces[0], ladder=forces[1], repeats=1, repeated_poses=0)
+    plan = replace(
+        PLAN,
+        points=("6DoF",),
+        poses=24,
+        force_N=forces[0],
+        ladder=forces[1],
+        repeats=1,
+        repeated_poses=0,
+    )
     table = made_table(analysed("kuka"), "made", number, plan, 3e-4 * (number % 5))
     order = np.lexsort([table["load"], table["pose"]])
     table = {name: column[order] for name, column in table.items()}
@@ -145,21 +196,33 @@ def assert_a_lost_held_out_row_changes_nothing(folder, number, whole):
     rows = cases_in(clean, ROBOTS)[1].campaign.measurements.row
     lost = int(np.random.default_rng(number).choice(rows))
     damaged = imported(folder / "damaged", table, [lost - 1])
-    before, after = (cases_in(each, ROBOTS)[0].campaign.measurements for each in (clean, damaged))
+    before, after = (
+        cases_in(each, ROBOTS)[0].campaign.measurements for each in (clean, damaged)
+    )
     for name in ("position", "joint_angles", "wrench", "row"):
-        np.testing.assert_array_equal(getattr(before, name), getattr(after, name), err_msg=f"{number}: {name}")
+        np.testing.assert_array_equal(
+            getattr(before, name), getattr(after, name), err_msg=f"{number}: {name}"
+        )
     if whole:
         verdicts = [diagnosed(each, ROBOTS, 1) for each in (clean, damaged)]
         assert facts_of(verdicts[0]) == facts_of(verdicts[1]), number
-        assert named_rows(verdicts[1]) == sorted({*named_rows(verdicts[0]), lost}), number
+        assert named_rows(verdicts[1]) == sorted({*named_rows(verdicts[0]), lost}), (
+            number
+        )
 
 
-def test_a_lost_row_that_is_held_out_parts_no_pose_anew_and_changes_nothing_of_the_verdict(tmp_path):
+def test_a_lost_row_that_is_held_out_parts_no_pose_anew_and_changes_nothing_of_the_verdict(
+    tmp_path,
+):
     for number in range(20):
-        assert_a_lost_held_out_row_changes_nothing(tmp_path / str(number), number, number < 2)
+        assert_a_lost_held_out_row_changes_nothing(
+            tmp_path / str(number), number, number < 2
+        )
 
 
 @pytest.mark.slow
-def test_of_200_campaigns_none_says_anything_else_with_a_lost_row_that_is_held_out(tmp_path):
+def test_of_200_campaigns_none_says_anything_else_with_a_lost_row_that_is_held_out(
+    tmp_path,
+):
     for number in range(200):
         assert_a_lost_held_out_row_changes_nothing(tmp_path / str(number), number, True)

@@ -1,4 +1,5 @@
-"""That the rules come to the verdict of the one call, and what a diagnosis is written as."""
+"""That the rules come to the verdict of the one call, and what a diagnosis is written
+as."""
 
 import json
 from pathlib import Path
@@ -19,7 +20,8 @@ SEED = 1
 
 @pytest.fixture(scope="module")
 def both(kuka, tmp_path_factory):
-    """Joint 3 stands a milliradian beyond what it reports; or nothing is missing, so that the seed is seen in the alarm."""
+    """Joint 3 stands a milliradian beyond what it reports; or nothing is missing, so
+    that the seed is seen in the alarm."""
     found = {}
     for kind, offset in (("named", 1e-3), ("adequate", 0.0)):
         table = made_table(kuka, "made", plan=PLAN, offset_of_joint_3=offset)
@@ -27,7 +29,9 @@ def both(kuka, tmp_path_factory):
         verdict = as_json(diagnosed(folder.as_posix(), ROBOTS.as_posix(), SEED))
         assert verdict["verdict"] == kind
         found[kind] = folder, verdict
-    assert [effect["name"] for effect in found["named"][1]["effects"]] == ["joint_offset"]
+    assert [effect["name"] for effect in found["named"][1]["effects"]] == [
+        "joint_offset"
+    ]
     assert 0.02 < found["adequate"][1]["probabilities"]["alarm_p_value"] < 0.98
     return found
 
@@ -37,7 +41,8 @@ def as_json(document):
 
 
 def same(one, other, path="verdict"):
-    """Equal documents, numbers to what remains where a fit ends: a thousandth of a standard error."""
+    """Equal documents, numbers to what remains where a fit ends: a thousandth of a
+    standard error."""
     assert type(one) is type(other) or {type(one), type(other)} <= {int, float}, path
     if isinstance(one, dict):
         assert list(one) == list(other), path
@@ -54,7 +59,9 @@ def same(one, other, path="verdict"):
 
 
 @pytest.mark.parametrize("kind", ["named", "adequate"])
-def test_rules_come_to_the_same_verdict_with_their_tables_between_the_steps(kind, both, tmp_path):
+def test_rules_come_to_the_same_verdict_with_their_tables_between_the_steps(
+    kind, both, tmp_path
+):
     folder, expected = both[kind]
     run_loop(folder, ROBOTS, tmp_path, ANALYSIS)
     by_rules = json.loads(Path(Files(tmp_path).verdict).read_text(encoding="utf-8"))
@@ -64,7 +71,10 @@ def test_rules_come_to_the_same_verdict_with_their_tables_between_the_steps(kind
 
 
 def test_every_candidate_is_in_the_table_tested_or_with_a_reason(diagnosis):
-    table = {name: column.to_numpy() for name, column in pd.DataFrame(candidate_rows(diagnosis)).items()}
+    table = {
+        name: column.to_numpy()
+        for name, column in pd.DataFrame(candidate_rows(diagnosis)).items()
+    }
     assert set(table["candidate"]) == set(diagnosis.case.candidates)
     tested = np.isfinite(table["log_bayes_factor"])
     assert (tested == (table["note"] == "")).all() and tested.any() and not tested.all()

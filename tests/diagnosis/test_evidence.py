@@ -1,4 +1,5 @@
-"""Bayes factors: marginal likelihoods of all measurements, integrated by brute force."""
+"""Bayes factors: marginal likelihoods of all measurements, integrated by brute
+force."""
 
 from dataclasses import replace
 
@@ -24,9 +25,14 @@ TAU = np.array([0.0, 0.3, 0.9])
 SETTINGS = Settings()
 GRID = Grid.of_settings(SETTINGS)
 LOG_POSE = pose_weights(TAU, SETTINGS)
-# Residuals of a little less than the noise, so that its size is at its floor and everything is normal.
+# Residuals of a little less than the noise, so that its size is at its floor and
+# everything is normal.
 QUIET = 0.5
-UNITS = (made_unit("a", (1,), [0, 1]), made_unit("b", (1,), 2), made_unit("c", (1,), [3, 4, 5]))
+UNITS = (
+    made_unit("a", (1,), [0, 1]),
+    made_unit("b", (1,), 2),
+    made_unit("c", (1,), [3, 4, 5]),
+)
 
 
 def quiet(seed, signal=()):
@@ -39,7 +45,10 @@ def quiet(seed, signal=()):
 
 def log_density(rows, tau, deviations):
     """ln N(y; X mu, V(tau) + W D W'), scipy's, with nothing left out."""
-    covariance = rows.marginal_covariance(tau) + (rows.candidates * deviations**2) @ rows.candidates.T
+    covariance = (
+        rows.marginal_covariance(tau)
+        + (rows.candidates * deviations**2) @ rows.candidates.T
+    )
     return multivariate_normal(rows.expected, covariance).logpdf(rows.residual)
 
 
@@ -54,9 +63,16 @@ def brute_log_bayes_factor(rows, units, grid=GRID):
     """Sum over all combinations of sizes and of the pose error."""
     total = []
     for numbers in np.ndindex(*[len(grid.scales)] * len(units)):
-        weight, deviations = grid.log_weights[list(numbers)].sum(), deviations_of(units, grid.scales[list(numbers)])
-        total += [weight + pose + log_density(rows, tau, deviations) for tau, pose in zip(TAU, LOG_POSE, strict=True)]
-    nothing = [pose + log_density(rows, tau, np.zeros(6)) for tau, pose in zip(TAU, LOG_POSE, strict=True)]
+        weight = grid.log_weights[list(numbers)].sum()
+        deviations = deviations_of(units, grid.scales[list(numbers)])
+        total += [
+            weight + pose + log_density(rows, tau, deviations)
+            for tau, pose in zip(TAU, LOG_POSE, strict=True)
+        ]
+    nothing = [
+        pose + log_density(rows, tau, np.zeros(6))
+        for tau, pose in zip(TAU, LOG_POSE, strict=True)
+    ]
     return logsumexp(total) - logsumexp(nothing)
 
 
@@ -68,25 +84,38 @@ def evaluated(rows, units, start=None):
 
 def part_of_grid(kept):
     """A grid of some of the sizes alone."""
-    return Grid(GRID.scales[kept], GRID.log_weights[kept] - logsumexp(GRID.log_weights[kept]))
+    return Grid(
+        GRID.scales[kept], GRID.log_weights[kept] - logsumexp(GRID.log_weights[kept])
+    )
 
 
 def log_bayes_factor(rows, units):
     return evaluated(rows, units).log_evidence - evaluated(rows, ()).log_evidence
 
 
-SIGNALS = {"nothing": (), "a": (0.4, -0.3), "b": (0, 0, 0.5), "a little of all": (0.1, 0.1, -0.1, 0.1, 0.0, 0.1)}
+SIGNALS = {
+    "nothing": (),
+    "a": (0.4, -0.3),
+    "b": (0, 0, 0.5),
+    "a little of all": (0.1, 0.1, -0.1, 0.1, 0.0, 0.1),
+}
 
 
 @pytest.mark.parametrize("signal", SIGNALS)
 @pytest.mark.parametrize("chosen", [(0,), (1,), (2,), (0, 1), (0, 1, 2)])
 def test_evidence_is_that_of_all_combinations_of_sizes(signal, chosen):
-    """Exact of one unit; of several to 0.03 nats: their sizes are not quite independent given the measurements."""
-    rows, units = quiet(3, SIGNALS[signal]), [UNITS[number] for number in chosen]
+    """Exact of one unit; of several to 0.03 nats: their sizes are not quite independent
+    given the measurements."""
+    rows = quiet(3, SIGNALS[signal])
+    units = [UNITS[number] for number in chosen]
     statistics = statistics_of(rows.products, TAU)
-    assert (statistics.squares < statistics.freedom).all(), "the case must be quiet for the reference to be normal"
+    assert (statistics.squares < statistics.freedom).all(), (
+        "the case must be quiet for the reference to be normal"
+    )
     expected = brute_log_bayes_factor(rows, units)
-    assert log_bayes_factor(rows, units) == pytest.approx(expected, abs=1e-8 if len(chosen) == 1 else 0.03)
+    assert log_bayes_factor(rows, units) == pytest.approx(
+        expected, abs=1e-8 if len(chosen) == 1 else 0.03
+    )
 
 
 @pytest.mark.parametrize("squares", [10.0, 49.9, 50.1, 80.0, 400.0])
@@ -94,12 +123,15 @@ def test_the_size_of_the_noise_is_the_most_likely_one_of_at_least_one(squares):
     def negative(log_variance):
         return 25 * log_variance + 0.5 * squares / np.exp(log_variance)
 
-    best = minimize_scalar(negative, bounds=(0.0, 10.0), method="bounded", options={"xatol": 1e-10})
+    best = minimize_scalar(
+        negative, bounds=(0.0, 10.0), method="bounded", options={"xatol": 1e-10}
+    )
     assert log_likelihood(squares, 50) == pytest.approx(-best.fun, abs=1e-6)
 
 
 def half_normal_evidence(rows, tau, columns, signs, scale):
-    """Integral of the likelihood over half-normal coefficients, by quadrature, relative to that without them."""
+    """Integral of the likelihood over half-normal coefficients, by quadrature, relative
+    to that without them."""
     nothing = multivariate_normal(rows.expected, rows.marginal_covariance(tau))
     zero = nothing.logpdf(rows.residual)
 
@@ -110,31 +142,51 @@ def half_normal_evidence(rows, tau, columns, signs, scale):
 
     if len(columns) == 1:
         return np.log(quad(density, 0, 8 * scale, limit=200, epsabs=1e-12)[0])
-    return np.log(dblquad(density, 0, 6 * scale, 0, 6 * scale, epsabs=1e-9, epsrel=1e-6)[0])
+    return np.log(
+        dblquad(density, 0, 6 * scale, 0, 6 * scale, epsabs=1e-9, epsrel=1e-6)[0]
+    )
 
 
 @pytest.mark.parametrize(
     ("columns", "signs", "size", "within"),
-    [([2], [1], 0.3, 1e-5), ([2], [-1], 0.0, 1e-5), ([2], [1], -0.3, 1e-5), ([0, 1], [1, -1], 0.05, 0.05)],
+    [
+        ([2], [1], 0.3, 1e-5),
+        ([2], [-1], 0.0, 1e-5),
+        ([2], [1], -0.3, 1e-5),
+        ([0, 1], [1, -1], 0.05, 0.05),
+    ],
 )
-def test_half_normal_priors_are_exact_of_one_coefficient_and_taken_one_by_one_of_two(columns, signs, size, within):
-    """The probability of an orthant as the product of its sides: of two coefficients, correlated by 0.2, right to 0.05 nats."""
-    rows, scale = quiet(12, size * np.bincount(columns, signs, 6)), 0.3 if len(columns) == 1 else 0.1
+def test_half_normal_priors_are_exact_of_one_coefficient_and_taken_one_by_one_of_two(
+    columns, signs, size, within
+):
+    """The probability of an orthant as the product of its sides: of two coefficients,
+    correlated by 0.2, right to 0.05 nats."""
+    rows = quiet(12, size * np.bincount(columns, signs, 6))
+    scale = 0.3 if len(columns) == 1 else 0.1
     unit = replace(made_unit("b", (1,), columns), signs=np.array(signs))
-    one, grid = statistics_of(rows.products, [0.3]), Grid(np.array([scale]), np.zeros(1))
-    found = [evaluate(one, units, grid, np.zeros(1), [scale] * len(units)) for units in ([unit], [])]
+    one = statistics_of(rows.products, [0.3])
+    grid = Grid(np.array([scale]), np.zeros(1))
+    found = [
+        evaluate(one, units, grid, np.zeros(1), [scale] * len(units))
+        for units in ([unit], [])
+    ]
     expected = half_normal_evidence(rows, 0.3, columns, signs, scale)
-    assert found[0].log_evidence - found[1].log_evidence == pytest.approx(expected, abs=within)
+    assert found[0].log_evidence - found[1].log_evidence == pytest.approx(
+        expected, abs=within
+    )
 
 
 def test_evidence_is_averaged_over_the_sizes_that_a_unit_may_have():
-    """Of a small signal, for which the sizes left out are the likely ones: wherever the search for the sizes starts."""
+    """Of a small signal, for which the sizes left out are the likely ones: wherever the
+    search for the sizes starts."""
     rows = quiet(1, (0.02, -0.01))
     unit = replace(UNITS[0], smallest=3)
     expected = brute_log_bayes_factor(rows, [unit], part_of_grid(slice(3, None)))
     for start in SETTINGS.scales:
         found = evaluated(rows, [unit], [start])
-        assert found.log_evidence - evaluated(rows, ()).log_evidence == pytest.approx(expected, abs=1e-8)
+        assert found.log_evidence - evaluated(rows, ()).log_evidence == pytest.approx(
+            expected, abs=1e-8
+        )
         assert found.scales[0] >= GRID.scales[3]
     assert expected < brute_log_bayes_factor(rows, [unit]) - 1.0
     # Without it the model is the smaller one all the same.
@@ -144,10 +196,19 @@ def test_evidence_is_averaged_over_the_sizes_that_a_unit_may_have():
 def test_moments_have_the_noise_that_a_model_leaves_where_that_is_more_than_was_taken():
     rows = quiet(1, SIGNALS["b"])
     rows = replace(rows, residual=rows.expected + 9.0 * (rows.residual - rows.expected))
-    one, scale = statistics_of(rows.products, [0.3]), 0.3
-    joint = Joint(one, UNITS[:1], Grid(np.array([scale]), np.zeros(1)), np.zeros(1), np.zeros(1, int))
+    one = statistics_of(rows.products, [0.3])
+    scale = 0.3
+    joint = Joint(
+        one,
+        UNITS[:1],
+        Grid(np.array([scale]), np.zeros(1)),
+        np.zeros(1),
+        np.zeros(1, int),
+    )
     ((_, variance),) = joint.moments()
     inner = one.between(np.arange(2), np.arange(2))[0] + np.eye(2) / scale**2
     left = one.squares[0] - one.along[0, :2] @ np.linalg.solve(inner, one.along[0, :2])
     assert left > 2.0 * one.freedom
-    np.testing.assert_allclose(variance, left / one.freedom * np.diag(np.linalg.inv(inner)))
+    np.testing.assert_allclose(
+        variance, left / one.freedom * np.diag(np.linalg.inv(inner))
+    )

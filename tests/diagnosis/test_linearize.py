@@ -1,4 +1,5 @@
-"""From a fit to a linear problem: columns are changes of exact predictions, and coefficients count from zero."""
+"""From a fit to a linear problem: columns are changes of exact predictions, and
+coefficients count from zero."""
 
 from dataclasses import replace
 
@@ -23,7 +24,14 @@ from elastocal.fitting.model import Case, residuals
 from elastocal.mechanics.robot import Mass
 
 SETTINGS = Settings()
-KEYS = ("joint_offset@2", "joint_offset@3", "joint_tilt@2", "link_elasticity@3", "payload", "link_geometry@4")
+KEYS = (
+    "joint_offset@2",
+    "joint_offset@3",
+    "joint_tilt@2",
+    "link_elasticity@3",
+    "payload",
+    "link_geometry@4",
+)
 
 
 @pytest.fixture(scope="module")
@@ -47,13 +55,21 @@ def with_effect(campaign, key, values):
 
 
 def unit_of(found, key):
-    return next(unit for unit in found.problem.units if unit.candidate and unit.candidate.key == key)
+    return next(
+        unit
+        for unit in found.problem.units
+        if unit.candidate and unit.candidate.key == key
+    )
 
 
 @pytest.mark.parametrize("key", ["joint_offset@2", "joint_tilt@2", "link_elasticity@3"])
-def test_a_column_is_the_change_of_the_exact_prediction_at_the_plausible_size(campaign, key):
-    """By W'My: the change of W'My is what the column itself has along W, where measurements move by what the effect does."""
-    found, fitted = problem_of(campaign), campaign.declared
+def test_a_column_is_the_change_of_the_exact_prediction_at_the_plausible_size(
+    campaign, key
+):
+    """By W'My: the change of W'My is what the column itself has along W, where
+    measurements move by what the effect does."""
+    found = problem_of(campaign)
+    fitted = campaign.declared
     unit = unit_of(found, key)
     step = np.zeros(len(unit.columns))
     step[0] = 1e-3
@@ -61,56 +77,102 @@ def test_a_column_is_the_change_of_the_exact_prediction_at_the_plausible_size(ca
     off = residuals(model, moved, campaign.observations, fitted.conditions)
     # Robust weights of the fit stay as they are.
     pushed = replace(fitted, estimate=fitted.estimate)
-    observations = replace(campaign.observations, position=campaign.observations.position + (fitted.residual - off))
-    after = linearized(pushed, observations, [campaign.candidates[k] for k in KEYS], SETTINGS)
+    observations = replace(
+        campaign.observations,
+        position=campaign.observations.position + (fitted.residual - off),
+    )
+    after = linearized(
+        pushed, observations, [campaign.candidates[k] for k in KEYS], SETTINGS
+    )
     change = after.problem.statistics.along[0] - found.problem.statistics.along[0]
     expected = found.problem.statistics.gram[0][:, unit.columns] @ step
     np.testing.assert_allclose(change, expected, atol=2e-3 * np.abs(expected).max())
 
 
-def test_a_problem_about_a_model_with_an_effect_is_the_one_about_the_model_without(campaign):
-    """Coefficients count from zero, not from the fit: what the fit gives to a candidate is given back to the measurements."""
+def test_a_problem_about_a_model_with_an_effect_is_the_one_about_the_model_without(
+    campaign,
+):
+    """Coefficients count from zero, not from the fit: what the fit gives to a candidate
+    is given back to the measurements."""
     model, start = with_effect(campaign, "joint_offset@3", [0.0])
     noise = campaign.declared.noise
     fitted = fit(model, campaign.observations, noise, start)
     assert abs(fitted.values_of("joint_offset@3")[0][0]) > 4e-4
     keys = ("joint_offset@2", "joint_offset@3", "joint_offset@4")
-    one = problem_of(campaign, replace(campaign.declared, weights=fitted.weights), keys).problem.statistics
+    one = problem_of(
+        campaign, replace(campaign.declared, weights=fitted.weights), keys
+    ).problem.statistics
     other = problem_of(campaign, fitted, keys).problem.statistics
     np.testing.assert_allclose(other.gram[0][:3, :3], one.gram[0][:3, :3], rtol=1e-2)
     np.testing.assert_allclose(other.along[0][:3], one.along[0][:3], rtol=1e-2)
     assert one.along[0][1] / np.sqrt(one.gram[0][1, 1]) > 20
 
 
-def test_the_smallest_size_is_the_first_that_would_be_found_with_a_power_of_a_half(campaign):
-    """Non-centrality equal to the critical value of a chi-square of one degree of freedom, at each of the sizes."""
+def test_the_smallest_size_is_the_first_that_would_be_found_with_a_power_of_a_half(
+    campaign,
+):
+    """Non-centrality equal to the critical value of a chi-square of one degree of
+    freedom, at each of the sizes."""
     problem = problem_of(campaign).problem
-    gram, scales = problem.statistics.gram.copy(), SETTINGS.scales
+    gram = problem.statistics.gram.copy()
+    scales = SETTINGS.scales
     units = [unit for unit in problem.units if unit.candidate]
     critical = chi2.isf(SETTINGS.alarm_level / len(units), 1)
     assert ncx2.sf(critical, 1, critical) == pytest.approx(0.5, abs=0.01)
-    largest = np.linalg.eigvalsh(gram[0][np.ix_(units[0].columns, units[0].columns)])[-1]
+    largest = np.linalg.eigvalsh(gram[0][np.ix_(units[0].columns, units[0].columns)])[
+        -1
+    ]
     for place, scale in enumerate(scales):
         for factor, shown in ((1.01, place), (0.99, place + 1)):
-            scaled = replace(problem.statistics, gram=gram * factor * critical / largest / scale**2)
+            scaled = replace(
+                problem.statistics, gram=gram * factor * critical / largest / scale**2
+            )
             assert smallest_shown(scaled, units, SETTINGS)[0] == shown
 
 
-def test_the_shapes_of_the_best_candidates_are_looked_at_more_closely_about_the_best_value_of_each(campaign):
-    """Of laws with a shape that is tried at several values, at a single one, and without one."""
-    problem = problem_of(campaign, keys=("setup_step", "thermal_growth[time]", "link_elasticity@3", "joint_offset@3"))
-    sizes = {("setup_step", 5): 30.0, ("setup_step", 6): 25.0, ("thermal_growth[time]", 1): 28.0, ("joint_offset@3", 0): 29.0}
+def test_the_shapes_of_the_best_candidates_are_looked_at_more_closely_about_the_best_value_of_each(
+    campaign,
+):
+    """Of laws with a shape that is tried at several values, at a single one, and
+    without one."""
+    problem = problem_of(
+        campaign,
+        keys=(
+            "setup_step",
+            "thermal_growth[time]",
+            "link_elasticity@3",
+            "joint_offset@3",
+        ),
+    )
+    sizes = {
+        ("setup_step", 5): 30.0,
+        ("setup_step", 6): 25.0,
+        ("thermal_growth[time]", 1): 28.0,
+        ("joint_offset@3", 0): 29.0,
+    }
     alone = np.zeros(len(problem.problem.units))
     for (key, place), size in sizes.items():
-        numbers = [n for n, unit in enumerate(problem.problem.units) if unit.candidate and unit.candidate.key == key]
+        numbers = [
+            n
+            for n, unit in enumerate(problem.problem.units)
+            if unit.candidate and unit.candidate.key == key
+        ]
         alone[numbers[place]] = size
     tried = looked_at_closely(problem, alone).tried
-    found = {key: [value for (value,) in values] for key, (_, values) in tried.items() if values != problem.tried[key][1]}
+    found = {
+        key: [value for (value,) in values]
+        for key, (_, values) in tried.items()
+        if values != problem.tried[key][1]
+    }
     assert set(found) == {"setup_step", "thermal_growth[time]"}
     closer = np.linspace(5 / 12, 7 / 12, 9)[1:-1]
-    np.testing.assert_allclose(found["setup_step"], np.unique(np.round([*np.arange(1, 12) / 12, *closer], 12)))
+    np.testing.assert_allclose(
+        found["setup_step"], np.unique(np.round([*np.arange(1, 12) / 12, *closer], 12))
+    )
     lags = np.geomspace(900.0, 36000.0, 5)
-    np.testing.assert_allclose(found["thermal_growth[time]"], np.geomspace(lags[1], lags[3], 9))
+    np.testing.assert_allclose(
+        found["thermal_growth[time]"], np.geomspace(lags[1], lags[3], 9)
+    )
 
 
 MASSES = (
@@ -118,30 +180,64 @@ MASSES = (
     Mass(2, 190.0, (0.52, 0.05, 0.0), 0.1),
     Mass(3, 220.0, (0.35, -0.04, 0.2), 0.1),
 )
-TARGETS = (Target("elbow", "3DoF", (0.0, 0.1, 0.05)), Target("hand", "6DoF", (0.1, 0.05, 0.02)))
+TARGETS = (
+    Target("elbow", "3DoF", (0.0, 0.1, 0.05)),
+    Target("hand", "6DoF", (0.1, 0.05, 0.02)),
+)
 
 
 def kept(robot, off=0.0, payload_kg=0.0):
-    """Two loads a pose of a robot whose moments are off by `off` standard deviations of the wide prior."""
-    model = made_model(robot, TARGETS, fitted_frames=False, compliance=robot.compliance, identified=True)
+    """Two loads a pose of a robot whose moments are off by `off` standard deviations of
+    the wide prior."""
+    model = made_model(
+        robot,
+        TARGETS,
+        fitted_frames=False,
+        compliance=robot.compliance,
+        identified=True,
+    )
     candidates = candidates_on(model.sites)
     weight = model.effects[1]
     true = made_estimate(model, size=0.0).with_effects([candidates["payload[mass]"]])
-    moved = [off * p.prior_std * (-1) ** n * p.name.startswith("moment") for n, p in enumerate(weight.parameters)]
-    true = replace(true, coefficients=(robot.compliance, np.array(moved), np.array([payload_kg])))
+    moved = [
+        off * p.prior_std * (-1) ** n * p.name.startswith("moment")
+        for n, p in enumerate(weight.parameters)
+    ]
+    true = replace(
+        true, coefficients=(robot.compliance, np.array(moved), np.array([payload_kg]))
+    )
     states = two_loads_a_pose(6, 30, 5)
     seen = seen_exactly(model.with_effects([candidates["payload[mass]"]]), true, states)
     seen = with_noise(seen, np.random.default_rng(6))
     noise = replace(NOISE, joint_rad=np.zeros(6))
     declared = fit(model, seen, noise)
-    return Kept(Case(None, seen, model, candidates), np.ones(len(seen), bool), noise, [], declared, seen)
+    return Kept(
+        Case(None, seen, model, candidates),
+        np.ones(len(seen), bool),
+        noise,
+        [],
+        declared,
+        seen,
+    )
 
 
-@pytest.mark.parametrize(("off", "payload_kg", "stays_wide"), [(0.0, 0.0, False), (1.0, 0.0, True), (0.0, 20.0, False)])
-def test_the_prior_is_that_which_the_measurements_make_more_probable(fanuc, off, payload_kg, stays_wide):
+@pytest.mark.parametrize(
+    ("off", "payload_kg", "stays_wide"),
+    [(0.0, 0.0, False), (1.0, 0.0, True), (0.0, 20.0, False)],
+)
+def test_the_prior_is_that_which_the_measurements_make_more_probable(
+    fanuc, off, payload_kg, stays_wide
+):
     part = kept(replace(fanuc, masses=MASSES, payload_kg=165.0), off, payload_kg)
     found = with_probable_centres(part, Settings())
     assert (found is part) == stays_wide
-    deviations = [p.prior_std for effect in found.declared.model.effects[1:2] for p in effect.parameters]
-    assert deviations[1] == pytest.approx(28.0 * np.linalg.norm(MASSES[0].centre_m)) or stays_wide
+    deviations = [
+        p.prior_std
+        for effect in found.declared.model.effects[1:2]
+        for p in effect.parameters
+    ]
+    assert (
+        deviations[1] == pytest.approx(28.0 * np.linalg.norm(MASSES[0].centre_m))
+        or stays_wide
+    )
     assert found.case.model.effects[1] == found.declared.model.effects[1]

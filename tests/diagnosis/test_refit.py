@@ -1,4 +1,5 @@
-"""The exact fit of a selected model, and averages over models: those of dense Bayesian regressions, pooled."""
+"""The exact fit of a selected model, and averages over models: those of dense Bayesian
+regressions, pooled."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -29,13 +30,20 @@ SETTINGS = Settings()
 
 @pytest.fixture(scope="module")
 def found(kuka):
-    """A robot with an offset of joint 3, offsets of joint 2 declared, and what the search makes of it."""
-    campaign = planted(kuka, {"joint_offset@3": [5e-4], "joint_offset@2": [3e-4]}, seed=1)
+    """A robot with an offset of joint 3, offsets of joint 2 declared, and what the
+    search makes of it."""
+    campaign = planted(
+        kuka, {"joint_offset@3": [5e-4], "joint_offset@2": [3e-4]}, seed=1
+    )
     known = campaign.candidates["joint_offset@2"]
     model = campaign.declared.model.with_effects([known])
     start = campaign.declared.estimate.with_effects([known])
     declared = fit(model, campaign.observations, campaign.declared.noise, start)
-    candidates = [candidate for candidate in campaign.all_candidates if candidate.effect != "joint_offset"]
+    candidates = [
+        candidate
+        for candidate in campaign.all_candidates
+        if candidate.effect != "joint_offset"
+    ]
     candidates.append(replace(campaign.candidates["joint_offset@3"], effect="offset"))
     problem = linearized(declared, campaign.observations, candidates, SETTINGS)
     models = posterior(problem.problem)
@@ -45,19 +53,31 @@ def found(kuka):
 def test_priors_arrive_in_the_fit(found):
     campaign, declared, line, models = found
     best = models.models[0]
-    assert [line.problem.units[number].candidate.key for number in best.units] == ["offset@3"]
+    assert [line.problem.units[number].candidate.key for number in best.units] == [
+        "offset@3"
+    ]
     chosen = selected(line, best)
     (effect, shapes), *others = chosen
     assert not others and shapes.size == 0
     final = fit_with_sizes(declared, campaign.observations, declared.noise, chosen)
-    priors = {owner: parameter.prior_std for owner, parameter in final.parameters if "offset@" in owner}
+    priors = {
+        owner: parameter.prior_std
+        for owner, parameter in final.parameters
+        if "offset@" in owner
+    }
     plausible = effect.parameters[0].plausible
-    assert priors["joint_offset@2"] is None and priors["offset@3"] == pytest.approx(best.scales[0] * plausible, rel=1e-12)
+    assert priors["joint_offset@2"] is None and priors["offset@3"] == pytest.approx(
+        best.scales[0] * plausible, rel=1e-12
+    )
     assert best.scales[0] in SETTINGS.scales
     # And do what a prior does: information of the measurements and of the prior add up.
-    about = linearize(final.model, final.estimate, campaign.observations, final.conditions)
+    about = linearize(
+        final.model, final.estimate, campaign.observations, final.conditions
+    )
     left = final.whitened(about.sensitivities).reshape(-1, len(final.parameters))
-    precision = np.array([0.0 if p.prior_std is None else p.prior_std**-2 for _, p in final.parameters])
+    precision = np.array(
+        [0.0 if p.prior_std is None else p.prior_std**-2 for _, p in final.parameters]
+    )
     expected = np.linalg.inv(left.T @ left + np.diag(precision))
     np.testing.assert_allclose(np.diag(final.covariance), np.diag(expected), rtol=1e-2)
 
@@ -67,7 +87,10 @@ OWNERS = [("declared", str(number)) for number in range(4)]
 
 
 def candidate(key, count):
-    return SimpleNamespace(key=key, parameters=[SimpleNamespace(name=str(number)) for number in range(count)])
+    return SimpleNamespace(
+        key=key,
+        parameters=[SimpleNamespace(name=str(number)) for number in range(count)],
+    )
 
 
 UNITS = (
@@ -79,79 +102,129 @@ UNITS = (
 
 @pytest.fixture(scope="module")
 def made():
-    """Quiet rows with something of each unit in them, so that the size of the noise is at its floor, and their problem."""
+    """Quiet rows with something of each unit in them, so that the size of the noise is
+    at its floor, and their problem."""
     rows = made_rows(1, poses=12)
     noise = 0.5 * (rows.residual - rows.expected)
-    rows = replace(rows, residual=rows.expected + noise + rows.candidates @ [0.2, -0.1, 0.2, 0.1, 0.0, 0.0])
+    rows = replace(
+        rows,
+        residual=rows.expected
+        + noise
+        + rows.candidates @ [0.2, -0.1, 0.2, 0.1, 0.0, 0.0],
+    )
     problem, products = made_problem(rows, UNITS, tau=TAU)
     return rows, SimpleNamespace(problem=problem, products=products)
 
 
 def regression(rows, tau, columns, deviations):
-    """Mean and covariance of declared parameters, from their present values on, and of coefficients: Bayes' rule, dense."""
+    """Mean and covariance of declared parameters, from their present values on, and of
+    coefficients: Bayes' rule, dense."""
     left = np.column_stack([rows.declared, rows.candidates[:, columns]])
     prior = np.concatenate([rows.prior_std, deviations])
     center = np.concatenate([-rows.present, np.zeros(len(columns))])
     covariance = rows.covariance(tau) + (left * prior**2) @ left.T
     gain = (prior**2)[:, None] * np.linalg.solve(covariance, left).T
-    return center + gain @ (rows.residual - left @ center), np.diag(prior**2) - gain @ left * prior**2
+    return center + gain @ (rows.residual - left @ center), np.diag(
+        prior**2
+    ) - gain @ left * prior**2
 
 
 def test_moments_of_a_unit_are_averaged_over_its_sizes_and_the_pose_error(made):
     rows, line = made
-    problem, unit = line.problem, UNITS[0]
+    problem = line.problem
+    unit = UNITS[0]
     base = problem.statistics.log_likelihood + problem.log_pose
-    ((mean, variance),) = Joint(problem.statistics, [unit], problem.grid, base, np.array([2])).moments()
-    weights, means, variances = [], [], []
+    ((mean, variance),) = Joint(
+        problem.statistics, [unit], problem.grid, base, np.array([2])
+    ).moments()
+    weights = []
+    means = []
+    variances = []
     for tau, log_pose in zip(TAU, problem.log_pose, strict=True):
-        for scale, log_weight in zip(problem.grid.scales, problem.grid.log_weights, strict=True):
+        for scale, log_weight in zip(
+            problem.grid.scales, problem.grid.log_weights, strict=True
+        ):
             W = rows.candidates[:, unit.columns]
             covariance = rows.marginal_covariance(tau) + scale**2 * W @ W.T
             y = rows.residual - rows.expected
-            log_density = -0.5 * np.linalg.slogdet(covariance)[1] - 0.5 * y @ np.linalg.solve(covariance, y)
+            log_density = -0.5 * np.linalg.slogdet(covariance)[
+                1
+            ] - 0.5 * y @ np.linalg.solve(covariance, y)
             weights.append(log_density + log_pose + log_weight)
             found, spread = regression(rows, tau, unit.columns, np.full(2, scale))
             means.append(found[4:])
             variances.append(np.diag(spread)[4:])
     weights = np.exp(np.array(weights) - max(weights))
-    weights, means, variances = (weights / weights.sum())[:, None], np.array(means), np.array(variances)
+    weights = (weights / weights.sum())[:, None]
+    means = np.array(means)
+    variances = np.array(variances)
     expected = (weights * means).sum(axis=0)
     np.testing.assert_allclose(mean, expected, rtol=1e-8)
-    np.testing.assert_allclose(variance, (weights * (variances + (means - expected) ** 2)).sum(axis=0), rtol=1e-8)
+    np.testing.assert_allclose(
+        variance,
+        (weights * (variances + (means - expected) ** 2)).sum(axis=0),
+        rtol=1e-8,
+    )
 
 
 def posterior_of(*entries):
-    models = tuple(Model(units, 0.0, np.array(scales, float), tau) for units, scales, tau, _ in entries)
+    models = tuple(
+        Model(units, 0.0, np.array(scales, float), tau)
+        for units, scales, tau, _ in entries
+    )
     return Posterior(models, np.array([probability for *_, probability in entries]))
 
 
 def test_declared_parameters_are_averaged_over_all_models(made):
     rows, line = made
-    found = posterior_of(((0,), [0.3], 0.0, 0.6), ((), [], 0.3, 0.3), ((1, 2), [1.0, 0.1], 0.9, 0.1))
+    found = posterior_of(
+        ((0,), [0.3], 0.0, 0.6), ((), [], 0.3, 0.3), ((1, 2), [1.0, 0.1], 0.9, 0.1)
+    )
     result = averaged(line, found, found.models[0], OWNERS)
-    means, variances = [], []
+    means = []
+    variances = []
     for model in found.models:
-        columns = np.concatenate([np.zeros(0, int), *(UNITS[number].columns for number in model.units)])
-        deviations = np.repeat(model.scales, [len(UNITS[number].columns) for number in model.units])
+        columns = np.concatenate(
+            [np.zeros(0, int), *(UNITS[number].columns for number in model.units)]
+        )
+        deviations = np.repeat(
+            model.scales, [len(UNITS[number].columns) for number in model.units]
+        )
         mean, covariance = regression(rows, model.pose_error_rad, columns, deviations)
         means.append(mean[:4])
         variances.append(np.diag(covariance)[:4])
-    means, variances, weights = np.array(means), np.array(variances), found.probabilities[:, None]
+    means = np.array(means)
+    variances = np.array(variances)
+    weights = found.probabilities[:, None]
     center = (weights * means).sum(axis=0)
     expected = np.sqrt((weights * (variances + (means - center) ** 2)).sum(axis=0))
-    np.testing.assert_allclose([result.shift[owner] for owner in OWNERS], center - means[0], rtol=1e-6, atol=1e-9)
-    np.testing.assert_allclose([result.std_error[owner] for owner in OWNERS], expected, rtol=1e-6)
+    np.testing.assert_allclose(
+        [result.shift[owner] for owner in OWNERS],
+        center - means[0],
+        rtol=1e-6,
+        atol=1e-9,
+    )
+    np.testing.assert_allclose(
+        [result.std_error[owner] for owner in OWNERS], expected, rtol=1e-6
+    )
 
 
 def test_coefficients_are_averaged_over_the_models_that_have_them(made):
-    """An effect is as large as it is where it is there: models without it do not pull it to zero."""
+    """An effect is as large as it is where it is there: models without it do not pull
+    it to zero."""
     _, line = made
     best = ((0,), [0.3], 0.0, 0.5)
     alone = posterior_of(best)
     beside = posterior_of(best, ((), [], 0.0, 0.5))
-    mine, same = (averaged(line, found, found.models[0], OWNERS) for found in (alone, beside))
+    mine, same = (
+        averaged(line, found, found.models[0], OWNERS) for found in (alone, beside)
+    )
     for name in ("0", "1"):
-        assert same.shift["a", name] == pytest.approx(mine.shift["a", name]) == pytest.approx(0.0, abs=1e-12)
+        assert (
+            same.shift["a", name]
+            == pytest.approx(mine.shift["a", name])
+            == pytest.approx(0.0, abs=1e-12)
+        )
         assert same.std_error["a", name] == pytest.approx(mine.std_error["a", name])
     # Beside another unit it may be another size.
     both = posterior_of(best, ((0, 1), [0.3, 1.0], 0.0, 0.5))
@@ -159,71 +232,111 @@ def test_coefficients_are_averaged_over_the_models_that_have_them(made):
     assert abs(other.shift["a", "0"]) > 1e-3
     # What the most probable model does not have is not reported, nor is the competitor.
     assert {owner for owner, _ in other.shift} == {"declared", "a"}
-    assert {owner for owner, _ in averaged(line, both, both.models[1], OWNERS).shift} == {"declared", "a", "b"}
+    assert {
+        owner for owner, _ in averaged(line, both, both.models[1], OWNERS).shift
+    } == {"declared", "a", "b"}
 
 
 def most_probable(rows, problem, model):
-    """Coefficients of a model, dense: at its sizes, and at the pose error that is then most probable."""
-    columns = np.concatenate([np.zeros(0, int), *(problem.units[number].columns for number in model.units)])
-    deviations = np.repeat(model.scales, [len(problem.units[number].columns) for number in model.units])
-    W, y = rows.candidates[:, columns] * deviations, rows.residual - rows.expected
+    """Coefficients of a model, dense: at its sizes, and at the pose error that is then
+    most probable."""
+    columns = np.concatenate(
+        [np.zeros(0, int), *(problem.units[number].columns for number in model.units)]
+    )
+    deviations = np.repeat(
+        model.scales, [len(problem.units[number].columns) for number in model.units]
+    )
+    W = rows.candidates[:, columns] * deviations
+    y = rows.residual - rows.expected
     densities = []
     for tau, log_pose in zip(TAU, problem.log_pose, strict=True):
         covariance = rows.marginal_covariance(tau) + W @ W.T
-        densities.append(log_pose - 0.5 * np.linalg.slogdet(covariance)[1] - 0.5 * y @ np.linalg.solve(covariance, y))
+        densities.append(
+            log_pose
+            - 0.5 * np.linalg.slogdet(covariance)[1]
+            - 0.5 * y @ np.linalg.solve(covariance, y)
+        )
     found = np.zeros(rows.candidates.shape[1])
-    found[columns] = regression(rows, TAU[int(np.argmax(densities))], columns, deviations)[0][4:]
+    found[columns] = regression(
+        rows, TAU[int(np.argmax(densities))], columns, deviations
+    )[0][4:]
     return found
 
 
 def projected_gram(rows):
-    """Of the columns without what declared parameters can make of them, at no pose error, dense."""
-    return rows.candidates.T @ np.linalg.solve(rows.marginal_covariance(0.0), rows.candidates)
+    """Of the columns without what declared parameters can make of them, at no pose
+    error, dense."""
+    return rows.candidates.T @ np.linalg.solve(
+        rows.marginal_covariance(0.0), rows.candidates
+    )
 
 
 @pytest.mark.parametrize("beside", [(), (1,), (1, 2), (0, 1)])
 @pytest.mark.parametrize("best", [0.25, 0.45, 0.55, 0.9])
-def test_a_model_is_expected_to_help_where_the_expected_square_of_the_error_falls(made, best, beside):
+def test_a_model_is_expected_to_help_where_the_expected_square_of_the_error_falls(
+    made, best, beside
+):
     """What others predict as well helps, however improbable it is by itself."""
     rows, line = made
     problem = replace(line.problem, settings=replace(line.problem.settings, useful=0.0))
-    found, gram = posterior_of(((0,), [0.3], 0.0, best), (beside, [0.3] * len(beside), 0.0, 1 - best)), projected_gram(rows)
+    found = posterior_of(
+        ((0,), [0.3], 0.0, best), (beside, [0.3] * len(beside), 0.0, 1 - best)
+    )
+    gram = projected_gram(rows)
     mine, other = (most_probable(rows, problem, model) for model in found.models)
     squares = [
-        best * (mine - kept) @ gram @ (mine - kept) + (1 - best) * (other - kept) @ gram @ (other - kept) for kept in (mine, 0)
+        best * (mine - kept) @ gram @ (mine - kept)
+        + (1 - best) * (other - kept) @ gram @ (other - kept)
+        for kept in (mine, 0)
     ]
-    assert expected_to_help(problem, found, found.models[0]) == (squares[0] < squares[1])
+    assert expected_to_help(problem, found, found.models[0]) == (
+        squares[0] < squares[1]
+    )
 
 
-def test_squares_beyond_the_others_are_what_is_left_where_the_others_fit_them_with_their_priors(made):
-    """As the least penalised sum of squares, found by a search, and all of them where nothing else is in the model."""
+def test_squares_beyond_the_others_are_what_is_left_where_the_others_fit_them_with_their_priors(
+    made,
+):
+    """As the least penalised sum of squares, found by a search, and all of them where
+    nothing else is in the model."""
     rows, _ = made
     problem, _ = made_problem(rows, UNITS, tau=TAU)
     model = Model((0, 2), 0.0, np.array([0.3, 0.1]), 0.0)
-    coefficients, gram = most_probable(rows, problem, model), projected_gram(rows)
-    mine, others = UNITS[0].columns, UNITS[2].columns
+    coefficients = most_probable(rows, problem, model)
+    gram = projected_gram(rows)
+    mine = UNITS[0].columns
+    others = UNITS[2].columns
 
     def left(values):
         off = np.zeros(len(coefficients))
-        off[mine], off[others] = coefficients[mine], -values
+        off[mine] = coefficients[mine]
+        off[others] = -values
         return off @ gram @ off + (values**2).sum() / 0.1**2
 
     whole, beyond = squares_beyond(problem, model, {"a"})[0]
     assert whole == pytest.approx(squares_explained(problem, model)["a"], rel=1e-6)
     assert beyond == pytest.approx(minimize(left, np.zeros(len(others))).fun, rel=1e-6)
     assert 0.0 < beyond < whole
-    assert squares_beyond(problem, Model((0,), 0.0, np.array([0.3]), 0.0), {"a"})[0][1] == pytest.approx(
+    assert squares_beyond(problem, Model((0,), 0.0, np.array([0.3]), 0.0), {"a"})[0][
+        1
+    ] == pytest.approx(
         squares_explained(problem, Model((0,), 0.0, np.array([0.3]), 0.0))["a"]
     )
 
 
-def test_no_effect_is_fitted_under_a_wider_prior_than_it_had_before_the_measurements(found):
+def test_no_effect_is_fitted_under_a_wider_prior_than_it_had_before_the_measurements(
+    found,
+):
     _, _, line, models = found
     best = models.models[0]
     unit = line.problem.units[best.units[0]]
     before = line.problem.grid.root_mean_square(unit)
     sizes = [0.5 * before, before, SETTINGS.scales[-1]]
     assert before < SETTINGS.scales[-1]
-    chosen = [selected(line, replace(best, scales=np.array([size])))[0][0] for size in sizes]
-    deviations = [candidate.parameters[0].prior_std / unit.sizes[0] for candidate in chosen]
+    chosen = [
+        selected(line, replace(best, scales=np.array([size])))[0][0] for size in sizes
+    ]
+    deviations = [
+        candidate.parameters[0].prior_std / unit.sizes[0] for candidate in chosen
+    ]
     np.testing.assert_allclose(deviations, [0.5 * before, before, before], rtol=1e-12)

@@ -1,4 +1,5 @@
-"""The search, on problems small enough for all models to be enumerated, and the alarm: its statistic and its power."""
+"""The search, on problems small enough for all models to be enumerated, and the alarm:
+its statistic and its power."""
 
 from dataclasses import replace
 from itertools import combinations
@@ -14,7 +15,8 @@ from elastocal.diagnosis.search import alarm_of, posterior
 from elastocal.diagnosis.settings import Settings
 
 TAU = [0.0, 0.3, 0.9]
-# Two laws at one location, two mechanisms at three and two locations, and the competitor.
+# Two laws at one location, two mechanisms at three and two locations, and the
+# competitor.
 UNITS = (
     made_unit("offset", (1,), 0),
     made_unit("offset", (2,), 1),
@@ -35,12 +37,17 @@ SIGNALS = {
 
 def problem_of(signal, seed=0, settings=None):
     rows = made_rows(seed, poses=14, candidates=10)
-    moved = sum(size * rows.candidates[:, column] for column, size in SIGNALS[signal].items())
-    return made_problem(replace(rows, residual=rows.residual + moved), UNITS, settings, TAU)[0]
+    moved = sum(
+        size * rows.candidates[:, column] for column, size in SIGNALS[signal].items()
+    )
+    return made_problem(
+        replace(rows, residual=rows.residual + moved), UNITS, settings, TAU
+    )[0]
 
 
 def cancelling(size, units):
-    """The problem of a campaign with so much of three columns that nearly cancel: no single one of them shows.
+    """The problem of a campaign with so much of three columns that nearly cancel: no
+    single one of them shows.
 
     A search of it extends but the best model once.
     """
@@ -48,7 +55,11 @@ def cancelling(size, units):
     common = 30 * np.random.default_rng(4).standard_normal(len(rows.pose))
     candidates = rows.candidates.copy()
     candidates[:, :3] += np.outer(common, [1, 1, -2])
-    rows = replace(rows, candidates=candidates, residual=rows.residual + size * candidates[:, :3].sum(axis=1))
+    rows = replace(
+        rows,
+        candidates=candidates,
+        residual=rows.residual + size * candidates[:, :3].sum(axis=1),
+    )
     return made_problem(rows, units, replace(Settings(), beam=1, patience=1), TAU)[0]
 
 
@@ -60,7 +71,13 @@ def enumerated(problem):
             units = [problem.units[number] for number in model]
             if len({unit.place for unit in units}) < size:
                 continue
-            found = evaluate(problem.statistics, units, problem.grid, problem.log_pose, np.full(size, 0.1))
+            found = evaluate(
+                problem.statistics,
+                units,
+                problem.grid,
+                problem.log_pose,
+                np.full(size, 0.1),
+            )
             odds[model] = found.log_evidence + problem.prior.log_odds_of(units)
     values = np.array(list(odds.values()))
     return dict(zip(odds, np.exp(values - log_sum_exp(values)), strict=True))
@@ -69,27 +86,48 @@ def enumerated(problem):
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("signal", SIGNALS)
 def test_posterior_is_that_of_all_models(signal, seed):
-    """To 0.02 in every probability, and models that were not met hold less than 2 % together."""
+    """To 0.02 in every probability, and models that were not met hold less than 2 %
+    together."""
     problem = problem_of(signal, seed)
-    expected, found = enumerated(problem), posterior(problem)
+    expected = enumerated(problem)
+    found = posterior(problem)
     assert found.probabilities.sum() == pytest.approx(1.0)
-    mine = dict(zip((model.units for model in found.models), found.probabilities, strict=True))
+    mine = dict(
+        zip((model.units for model in found.models), found.probabilities, strict=True)
+    )
     assert len(mine) == len(found.models)
-    assert all(abs(mine.get(model, 0.0) - probability) < 0.02 for model, probability in expected.items())
-    assert sum(probability for model, probability in expected.items() if model not in mine) < 0.02
+    assert all(
+        abs(mine.get(model, 0.0) - probability) < 0.02
+        for model, probability in expected.items()
+    )
+    assert (
+        sum(probability for model, probability in expected.items() if model not in mine)
+        < 0.02
+    )
     assert set(mine) <= set(expected)
 
 
 def test_laws_of_the_competitor_at_one_location_join_in_one_model():
-    rows, laws = made_rows(poses=14), (made_unit(OTHER, (1,), [0, 1]), made_unit(OTHER, (1,), [2, 3], law=NEIGHBOURS))
-    rows = replace(rows, residual=rows.residual + 0.8 * rows.candidates[:, :4].sum(axis=1))
+    rows = made_rows(poses=14)
+    laws = (
+        made_unit(OTHER, (1,), [0, 1]),
+        made_unit(OTHER, (1,), [2, 3], law=NEIGHBOURS),
+    )
+    rows = replace(
+        rows, residual=rows.residual + 0.8 * rows.candidates[:, :4].sum(axis=1)
+    )
     assert posterior(made_problem(rows, laws, tau=TAU)[0]).models[0].units == (0, 1)
 
 
 def test_a_search_that_knows_a_good_model_finds_it_whatever_leads_there():
     """Of mechanisms at one location each: no single one of them shows, nor any two."""
-    units = [made_unit(name, (1,), column, candidate=SimpleNamespace(key=name)) for column, name in enumerate("abc")]
-    problem = cancelling(1.5, [*units, made_unit("d", (1,), 3), made_unit("e", (1,), 4)])
+    units = [
+        made_unit(name, (1,), column, candidate=SimpleNamespace(key=name))
+        for column, name in enumerate("abc")
+    ]
+    problem = cancelling(
+        1.5, [*units, made_unit("d", (1,), 3), made_unit("e", (1,), 4)]
+    )
     best = max(posterior(problem, keys).models[0].log_odds for keys in ((), ("a",)))
     # What is known and not tested is no matter.
     found = posterior(problem, {"a", "b", "c", "gone"})
@@ -106,13 +144,22 @@ ALARM_UNITS = (
 
 def signalled(size):
     rows = made_rows(5, candidates=8)
-    return made_problem(replace(rows, residual=rows.residual + size * rows.candidates[:, 2:4] @ [1.0, 1.0]), ALARM_UNITS)
+    return made_problem(
+        replace(
+            rows, residual=rows.residual + size * rows.candidates[:, 2:4] @ [1.0, 1.0]
+        ),
+        ALARM_UNITS,
+    )
 
 
 def test_statistic_rises_and_p_value_falls_with_the_size_of_what_is_missing():
     sizes = [0.0, 0.3, 0.6, 1.2, 2.4]
-    found = [alarm_of(*signalled(size), 0.0, np.random.default_rng(6)) for size in sizes]
-    assert (np.diff([one.statistic for one in found[1:]]) > 0).all() and found[-1].statistic > found[0].statistic
+    found = [
+        alarm_of(*signalled(size), 0.0, np.random.default_rng(6)) for size in sizes
+    ]
+    assert (np.diff([one.statistic for one in found[1:]]) > 0).all() and found[
+        -1
+    ].statistic > found[0].statistic
     assert (np.diff([one.p_value for one in found[1:]]) <= 0).all()
     assert found[-1].raised and found[-1].p_value == 1 / 500
     assert not found[0].raised
@@ -120,44 +167,84 @@ def test_statistic_rises_and_p_value_falls_with_the_size_of_what_is_missing():
 
 @pytest.mark.parametrize("smallest", [0, 2])
 def test_statistic_is_the_log_of_the_prior_weighted_bayes_factors(smallest):
-    """Of all models of one unit, each averaged over its sizes and pose errors; signs of physics do not count.
+    """Of all models of one unit, each averaged over its sizes and pose errors; signs of
+    physics do not count.
 
     Sizes begin a step below the smallest.
     """
     problem, products = signalled(0.3)
-    problem = replace(problem, units=(*problem.units[:2], replace(problem.units[2], smallest=smallest), *problem.units[3:]))
+    problem = replace(
+        problem,
+        units=(
+            *problem.units[:2],
+            replace(problem.units[2], smallest=smallest),
+            *problem.units[3:],
+        ),
+    )
     found = alarm_of(problem, products, 0.0, np.random.default_rng(7))
-    # The sizes of the pose error that draws at zero can make likely: zero and the two next.
+    # The sizes of the pose error that draws at zero can make likely: zero and the two
+    # next.
     some = problem.statistics.at(np.arange(3))
     log_pose = problem.log_pose[:3]
     unsigned = [
-        replace(unit, signs=np.zeros(len(unit.columns), int), smallest=max(unit.smallest - 1, 0)) for unit in problem.units
+        replace(
+            unit,
+            signs=np.zeros(len(unit.columns), int),
+            smallest=max(unit.smallest - 1, 0),
+        )
+        for unit in problem.units
     ]
     nothing = evaluate(some, [], problem.grid, log_pose, []).log_evidence
     total = [
-        evaluate(some, [unit], problem.grid, log_pose, [0.1]).log_evidence - nothing + problem.prior.log_odds_of([unit])
+        evaluate(some, [unit], problem.grid, log_pose, [0.1]).log_evidence
+        - nothing
+        + problem.prior.log_odds_of([unit])
         for unit in unsigned
     ]
     assert found.statistic == pytest.approx(log_sum_exp(np.array(total)), abs=1e-6)
 
 
 def test_a_mechanism_counts_at_all_its_locations_at_once_too():
-    """With one law at each; of two laws each, and only of those that are at every location once."""
-    candidates = {detail: SimpleNamespace(detail=detail) for detail in ("", "two slopes")}
+    """With one law at each; of two laws each, and only of those that are at every
+    location once."""
+    candidates = {
+        detail: SimpleNamespace(detail=detail) for detail in ("", "two slopes")
+    }
     units = (
-        made_unit("stiffening", (1,), 0, candidate=candidates[""], smallest=1, log_prior=np.log(0.5)),
-        made_unit("stiffening", (2,), [1, 2], candidate=candidates[""], log_prior=np.log(0.5)),
+        made_unit(
+            "stiffening",
+            (1,),
+            0,
+            candidate=candidates[""],
+            smallest=1,
+            log_prior=np.log(0.5),
+        ),
+        made_unit(
+            "stiffening", (2,), [1, 2], candidate=candidates[""], log_prior=np.log(0.5)
+        ),
         made_unit("stiffening", (1,), 3, candidate=candidates["two slopes"]),
         made_unit("payload", (), 4, candidate=candidates[""]),
     )
     problem, products = made_problem(made_rows(5, candidates=8), units)
     found = alarm_of(problem, products, 0.0, np.random.default_rng(7))
-    some, log_pose, grid = problem.statistics.at(np.arange(3)), problem.log_pose[:3], problem.grid
-    whole = replace(units[0], columns=np.arange(3), signs=np.zeros(3, int), sizes=np.ones(3), smallest=0)
-    tested = [(replace(unit, smallest=max(unit.smallest - 1, 0)), [unit]) for unit in units] + [(whole, list(units[:2]))]
+    some = problem.statistics.at(np.arange(3))
+    log_pose = problem.log_pose[:3]
+    grid = problem.grid
+    whole = replace(
+        units[0],
+        columns=np.arange(3),
+        signs=np.zeros(3, int),
+        sizes=np.ones(3),
+        smallest=0,
+    )
+    tested = [
+        (replace(unit, smallest=max(unit.smallest - 1, 0)), [unit]) for unit in units
+    ] + [(whole, list(units[:2]))]
     nothing = evaluate(some, [], grid, log_pose, []).log_evidence
     total = [
-        evaluate(some, [unit], grid, log_pose, [0.1]).log_evidence - nothing + problem.prior.log_odds_of(members)
+        evaluate(some, [unit], grid, log_pose, [0.1]).log_evidence
+        - nothing
+        + problem.prior.log_odds_of(members)
         for unit, members in tested
     ]
     # One choice among the variants, not one at each location.

@@ -12,6 +12,8 @@ def test_document_has_every_setting_with_its_value_and_a_reason():
     assert list(document) == [entry.name for entry in fields(Settings)]
     assert document["alarm_level"]["value"] == 0.1
     for name, entry in document.items():
-        assert set(entry) == {"value", "reason"} and len(entry["reason"].split()) > 3, name
+        assert set(entry) == {"value", "reason"} and len(entry["reason"].split()) > 3, (
+            name
+        )
         value = getattr(settings, name)
         assert entry["value"] == (list(value) if isinstance(value, tuple) else value)

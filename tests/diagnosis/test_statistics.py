@@ -1,4 +1,5 @@
-"""Sufficient statistics: dense generalized least squares with the covariance written out, and measurements drawn one by one."""
+"""Sufficient statistics: dense generalized least squares with the covariance written
+out, and measurements drawn one by one."""
 
 from dataclasses import replace
 
@@ -19,9 +20,11 @@ CASES = {
 
 
 def dense(rows, tau):
-    """W'MW, W'My, y'My and -1/2 ln |V|, with the declared parameters integrated over their prior: V = Sigma + X P X'."""
+    """W'MW, W'My, y'My and -1/2 ln |V|, with the declared parameters integrated over
+    their prior: V = Sigma + X P X'."""
     marginal = rows.marginal_covariance(tau)
-    y, inverse = rows.residual - rows.expected, np.linalg.inv(marginal)
+    y = rows.residual - rows.expected
+    inverse = np.linalg.inv(marginal)
     return (
         rows.candidates.T @ inverse @ rows.candidates,
         rows.candidates.T @ inverse @ y,
@@ -30,24 +33,41 @@ def dense(rows, tau):
     )
 
 
-@pytest.mark.parametrize(("at_once", "columns_a_row"), [(1, 4), (40, 4), (40, 0), (10**6, 0)])
+@pytest.mark.parametrize(
+    ("at_once", "columns_a_row"), [(1, 4), (40, 4), (40, 0), (10**6, 0)]
+)
 @pytest.mark.parametrize("case", CASES)
-def test_statistics_are_those_of_dense_generalized_least_squares(case, at_once, columns_a_row, monkeypatch):
-    """However many poses are looked at in one go, and whether what they take is kept beside the products."""
+def test_statistics_are_those_of_dense_generalized_least_squares(
+    case, at_once, columns_a_row, monkeypatch
+):
+    """However many poses are looked at in one go, and whether what they take is kept
+    beside the products."""
     monkeypatch.setattr(statistics, "_AT_ONCE", at_once)
     monkeypatch.setattr(statistics, "_COLUMNS_A_ROW", columns_a_row)
     rows = made_rows(1, **CASES[case])
     found = statistics_of(rows.products, TAU)
-    gram, along, squares, logs = (np.array(part) for part in zip(*(dense(rows, tau) for tau in TAU), strict=True))
+    gram, along, squares, logs = (
+        np.array(part) for part in zip(*(dense(rows, tau) for tau in TAU), strict=True)
+    )
     every = np.arange(gram.shape[1])
     assert len(found.gram) == (len(TAU) if columns_a_row else 1)
-    for between in (found.between(every), found.between(every, every), found.at([1, 3]).between(every[:2], every)):
+    for between in (
+        found.between(every),
+        found.between(every, every),
+        found.at([1, 3]).between(every[:2], every),
+    ):
         expected = gram if len(between) == len(gram) else gram[[1, 3], :2]
-        np.testing.assert_allclose(between, expected, rtol=1e-9, atol=1e-9 * np.abs(gram).max())
-    np.testing.assert_allclose(found.along, along, rtol=1e-9, atol=1e-9 * np.abs(along).max())
+        np.testing.assert_allclose(
+            between, expected, rtol=1e-9, atol=1e-9 * np.abs(gram).max()
+        )
+    np.testing.assert_allclose(
+        found.along, along, rtol=1e-9, atol=1e-9 * np.abs(along).max()
+    )
     np.testing.assert_allclose(found.squares, squares, rtol=1e-9)
     # Up to a constant that does not depend on tau.
-    np.testing.assert_allclose(np.diff(found.log_likelihood), np.diff(logs), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(
+        np.diff(found.log_likelihood), np.diff(logs), rtol=1e-9, atol=1e-9
+    )
 
 
 def _orthonormal(columns):
@@ -62,7 +82,8 @@ def _orthonormal(columns):
 
 
 def test_badly_scaled_and_nearly_collinear_columns_cost_no_precision():
-    """Declared columns of sizes from 1e-8 to 1e6, two of them alike to 1e-6, and candidates that they nearly are."""
+    """Declared columns of sizes from 1e-8 to 1e6, two of them alike to 1e-6, and
+    candidates that they nearly are."""
     rng = np.random.default_rng(4)
     rows = made_rows(4, declared=4, candidates=3)
     X = rows.declared.copy()
@@ -75,46 +96,73 @@ def test_badly_scaled_and_nearly_collinear_columns_cost_no_precision():
         candidates=X @ rng.standard_normal((4, 3)) + 1e-3 * own,
     )
     found = statistics_of(rows.products, [0.0])
-    augmented = np.concatenate([rows.declared, np.diag(1 / rows.prior_std)]).astype(np.longdouble)
+    augmented = np.concatenate([rows.declared, np.diag(1 / rows.prior_std)]).astype(
+        np.longdouble
+    )
     basis = _orthonormal(augmented / np.linalg.norm(augmented.astype(float), axis=0))
     rest = np.zeros((len(augmented), 4), np.longdouble)
-    rest[: len(X), :3], rest[: len(X), 3], rest[len(X) :, 3] = rows.candidates, rows.residual, -rows.present / rows.prior_std
+    rest[: len(X), :3] = rows.candidates
+    rest[: len(X), 3] = rows.residual
+    rest[len(X) :, 3] = -rows.present / rows.prior_std
     for _ in range(2):
         rest = rest - basis @ (basis.T @ rest)
     exact = (rest.T @ rest).astype(float)
-    # Forming the normal equations would leave 1e-4 of it: the square of one over the collinearity times the rounding.
-    np.testing.assert_allclose(found.gram[0], exact[:3, :3], rtol=1e-7, atol=1e-7 * np.abs(exact[:3, :3]).max())
-    np.testing.assert_allclose(found.along[0], exact[:3, 3], rtol=1e-7, atol=1e-7 * np.abs(exact[:3, 3]).max())
+    # Forming the normal equations would leave 1e-4 of it: the square of one over the
+    # collinearity times the rounding.
+    np.testing.assert_allclose(
+        found.gram[0], exact[:3, :3], rtol=1e-7, atol=1e-7 * np.abs(exact[:3, :3]).max()
+    )
+    np.testing.assert_allclose(
+        found.along[0], exact[:3, 3], rtol=1e-7, atol=1e-7 * np.abs(exact[:3, 3]).max()
+    )
     np.testing.assert_allclose(found.squares[0], exact[3, 3], rtol=1e-9)
 
 
-# Moments are compared at 5 standard errors: each test fails by chance once in some ten thousand seeds, and sees with a power of
-# 0.9 what moves a moment by 6.3 of them, which is 14 % of a variance.
-DRAWS, BEYOND = 4000, 5.0
+# Moments are compared at 5 standard errors: each test fails by chance once in some ten
+# thousand seeds, and sees with a power of 0.9 what moves a moment by 6.3 of them, which
+# is 14 % of a variance.
+DRAWS = 4000
+BEYOND = 5.0
 
 
 @pytest.mark.parametrize("at_once", [40, 10**6])
 @pytest.mark.parametrize("tau", [0.0, 0.6])
 @pytest.mark.parametrize("case", ["poses of unequal size", "priors that matter"])
-def test_null_draws_have_the_moments_of_simulated_measurements(case, tau, at_once, monkeypatch):
-    """W'My has covariance W'M Sigma M'W; y'My has mean tr(M Sigma) and variance 2 tr(M Sigma M Sigma)."""
+def test_null_draws_have_the_moments_of_simulated_measurements(
+    case, tau, at_once, monkeypatch
+):
+    """W'My has covariance W'M Sigma M'W; y'My has mean tr(M Sigma) and variance 2 tr(M
+    Sigma M Sigma)."""
     monkeypatch.setattr(statistics, "_AT_ONCE", at_once)
     rows = made_rows(9, **CASES[case])
-    along, squares = null_draws(rows.products, tau, TAU, DRAWS, np.random.default_rng(10))
+    along, squares = null_draws(
+        rows.products, tau, TAU, DRAWS, np.random.default_rng(10)
+    )
     covariance = rows.covariance(tau)
     for number, size in enumerate(TAU):
         M = np.linalg.inv(rows.marginal_covariance(size))
         expected = rows.candidates.T @ M @ covariance @ M @ rows.candidates
         deviation = np.sqrt(np.diag(expected))
         found = along[number] @ along[number].T / DRAWS / np.outer(deviation, deviation)
-        assert (np.abs(found - expected / np.outer(deviation, deviation)) < BEYOND * np.sqrt(2 / DRAWS)).all()
-        assert (np.abs(along[number].mean(axis=1)) < BEYOND * deviation / np.sqrt(DRAWS)).all()
+        assert (
+            np.abs(found - expected / np.outer(deviation, deviation))
+            < BEYOND * np.sqrt(2 / DRAWS)
+        ).all()
+        assert (
+            np.abs(along[number].mean(axis=1)) < BEYOND * deviation / np.sqrt(DRAWS)
+        ).all()
         spread = M @ covariance
-        mean, variance = np.trace(spread), 2 * np.trace(spread @ spread)
+        mean = np.trace(spread)
+        variance = 2 * np.trace(spread @ spread)
         assert abs(squares[number].mean() - mean) < BEYOND * np.sqrt(variance / DRAWS)
         # Fourth cumulant of a quadratic form: 48 tr (M Sigma)^4.
         fourth = 2 + 48 * np.trace(spread @ spread @ spread @ spread) / variance**2
-        assert abs(squares[number].var() - variance) < BEYOND * variance * np.sqrt(fourth / DRAWS)
-        # Odd moments of normal measurements vanish: no correlation of a linear with a quadratic form.
-        mixed = (along[number] / deviation[:, None] * (squares[number] - mean)).mean(axis=1) / np.sqrt(variance)
+        assert abs(squares[number].var() - variance) < BEYOND * variance * np.sqrt(
+            fourth / DRAWS
+        )
+        # Odd moments of normal measurements vanish: no correlation of a linear with a
+        # quadratic form.
+        mixed = (along[number] / deviation[:, None] * (squares[number] - mean)).mean(
+            axis=1
+        ) / np.sqrt(variance)
         assert (np.abs(mixed) < BEYOND * np.sqrt(3 / DRAWS)).all()

@@ -1,4 +1,5 @@
-"""From made posteriors to each of the six verdicts, and what was found in the words and numbers of verdict.json."""
+"""From made posteriors to each of the six verdicts, and what was found in the words and
+numbers of verdict.json."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -35,7 +36,8 @@ from elastocal.fitting.model import joint_compliances, predict
 
 SETTINGS = Settings()
 
-OF_THE_ROBOT, OF_THE_SETUP = SimpleNamespace(family="geometry"), SimpleNamespace(family="drift")
+OF_THE_ROBOT = SimpleNamespace(family="geometry")
+OF_THE_SETUP = SimpleNamespace(family="drift")
 UNITS = (
     made_unit("offset", (2,), 0, candidate=OF_THE_ROBOT),
     made_unit("offset", (3,), 1, candidate=OF_THE_ROBOT),
@@ -47,15 +49,25 @@ UNITS = (
 OFFSET_2, OFFSET_3, PAYLOAD, TILT, OTHER_1, OTHER_2 = range(6)
 ROWS = made_rows()
 # An offset of joint 3 and a smooth error of joint 2, each of its plausible size.
-PROBLEM = made_problem(replace(ROWS, residual=ROWS.expected + ROWS.candidates[:, [OFFSET_3, OTHER_2]].sum(axis=1)), UNITS)[0]
-RAISED, SILENT = Alarm(0.002, 9.0, True), Alarm(0.4, -1.0, False)
+PROBLEM = made_problem(
+    replace(
+        ROWS,
+        residual=ROWS.expected + ROWS.candidates[:, [OFFSET_3, OTHER_2]].sum(axis=1),
+    ),
+    UNITS,
+)[0]
+RAISED = Alarm(0.002, 9.0, True)
+SILENT = Alarm(0.4, -1.0, False)
 
 
 def made_posterior(*pairs):
     """Of models with their probabilities; "nothing" has what is left."""
     left = 1.0 - sum(probability for _, probability in pairs)
     listed = sorted([*pairs, ((), left)], key=lambda pair: -pair[1])
-    models = tuple(Model(tuple(sorted(units)), float(np.log(p + 1e-12)), np.ones(len(units)), 0.0) for units, p in listed)
+    models = tuple(
+        Model(tuple(sorted(units)), float(np.log(p + 1e-12)), np.ones(len(units)), 0.0)
+        for units, p in listed
+    )
     return Posterior(models, np.array([probability for _, probability in listed]))
 
 
@@ -63,22 +75,66 @@ def conclusion(*pairs, alarm=RAISED):
     return concluded(PROBLEM, made_posterior(*pairs), alarm)
 
 
-# Verdict, best hypothesis, what is meant instead, probability of what is left open; models by the numbers of their units, with
-# theirs.
-SURE, BOTH = {"offset": ()}, ("offset", "payload")
+# Verdict, best hypothesis, what is meant instead, probability of what is left open;
+# models by the numbers of their units, with theirs.
+SURE = {"offset": ()}
+BOTH = ("offset", "payload")
 VERDICTS = {
-    "adequate without an alarm, whatever the posterior prefers": (ADEQUATE, (), {}, 0.1, {"0": 0.9}),
-    "named with enough of the probability": (NAMED, ("offset",), SURE, 0.85, {"0": 0.6, "1": 0.25, "2": 0.1}),
-    # A name needs the probability that is asked for, of which "nothing" has its part, too.
-    "the alarm decides that something is missing": (CLASS, ("offset",), SURE, 0.12, {"0": 0.12, "2": 0.02}),
+    "adequate without an alarm, whatever the posterior prefers": (
+        ADEQUATE,
+        (),
+        {},
+        0.1,
+        {"0": 0.9},
+    ),
+    "named with enough of the probability": (
+        NAMED,
+        ("offset",),
+        SURE,
+        0.85,
+        {"0": 0.6, "1": 0.25, "2": 0.1},
+    ),
+    # A name needs the probability that is asked for, of which "nothing" has its part,
+    # too.
+    "the alarm decides that something is missing": (
+        CLASS,
+        ("offset",),
+        SURE,
+        0.12,
+        {"0": 0.12, "2": 0.02},
+    ),
     "a class of those worth a line": (
         *(CLASS, ("offset",), {"offset": ("payload", "tilt")}, 0.99),
         {"0": 0.5, "2": 0.3, "3": 0.19, "32": 0.001},
     ),
-    "a related mechanism beside it": (CLASS, ("offset", OTHER), {"offset": (OTHER,)}, 1.0, {"15": 0.9, "1": 0.1}),
-    "a related mechanism instead of it alone": (CLASS, ("offset",), {"offset": (OTHER,)}, 1.0, {"1": 0.55, "15": 0.45}),
-    "several, each with what is meant instead": (SEVERAL, BOTH, SURE | {"payload": ("tilt",)}, 0.99, {"02": 0.7, "03": 0.29}),
-    "unexplained by the competitor alone": (UNEXPLAINED, (OTHER,), {}, 0.7, {"4": 0.4, "45": 0.3, "0": 0.3}),
+    "a related mechanism beside it": (
+        CLASS,
+        ("offset", OTHER),
+        {"offset": (OTHER,)},
+        1.0,
+        {"15": 0.9, "1": 0.1},
+    ),
+    "a related mechanism instead of it alone": (
+        CLASS,
+        ("offset",),
+        {"offset": (OTHER,)},
+        1.0,
+        {"1": 0.55, "15": 0.45},
+    ),
+    "several, each with what is meant instead": (
+        SEVERAL,
+        BOTH,
+        SURE | {"payload": ("tilt",)},
+        0.99,
+        {"02": 0.7, "03": 0.29},
+    ),
+    "unexplained by the competitor alone": (
+        UNEXPLAINED,
+        (OTHER,),
+        {},
+        0.7,
+        {"4": 0.4, "45": 0.3, "0": 0.3},
+    ),
     "unexplained where nothing is better": (UNEXPLAINED, (), {}, 0.99, {"0": 0.01}),
 }
 
@@ -89,7 +145,9 @@ def test_the_verdict_is_that_of_least_loss_once_an_alarm_is_raised(case):
     models = [(tuple(map(int, units)), share) for units, share in named.items()]
     found = conclusion(*models, alarm=SILENT if verdict == ADEQUATE else RAISED)
     assert (found.verdict, found.best.mechanisms) == (verdict, best)
-    assert {name: tuple(there) for name, there in found.alternatives.items()} == alternatives
+    assert {
+        name: tuple(there) for name, there in found.alternatives.items()
+    } == alternatives
     # Without which no headline says how sure it is.
     assert found.probability == pytest.approx(probability)
     inclusion = {}
@@ -97,18 +155,35 @@ def test_the_verdict_is_that_of_least_loss_once_an_alarm_is_raised(case):
         for name in {UNITS[number].mechanism for number in units}:
             inclusion[name] = inclusion.get(name, 0.0) + probability
     assert found.mechanisms == pytest.approx(inclusion)
-    assert list(found.mechanisms.values()) == sorted(found.mechanisms.values(), reverse=True)
+    assert list(found.mechanisms.values()) == sorted(
+        found.mechanisms.values(), reverse=True
+    )
 
 
 @pytest.mark.parametrize(
-    ("sizes", "mechanisms"), [((1.0, 0.03), ("offset",)), ((1.0, 1.0), ("offset", OTHER)), ((0.03, 1.0), (OTHER,))]
+    ("sizes", "mechanisms"),
+    [
+        ((1.0, 0.03), ("offset",)),
+        ((1.0, 1.0), ("offset", OTHER)),
+        ((0.03, 1.0), (OTHER,)),
+    ],
 )
-def test_of_a_law_and_a_smooth_error_that_which_adds_little_is_a_part_of_the_other(sizes, mechanisms):
-    """Little is what laws are allowed to be off: of squares, that part which the other cannot make, whatever its size."""
-    posterior = Posterior((Model((OFFSET_3, OTHER_2), 1.0, np.array(sizes), 0.0),), np.ones(1))
-    (law, law_alone), (unknown, unknown_alone) = squares_beyond(PROBLEM, posterior.models[0], {"offset"})
+def test_of_a_law_and_a_smooth_error_that_which_adds_little_is_a_part_of_the_other(
+    sizes, mechanisms
+):
+    """Little is what laws are allowed to be off: of squares, that part which the other
+    cannot make, whatever its size."""
+    posterior = Posterior(
+        (Model((OFFSET_3, OTHER_2), 1.0, np.array(sizes), 0.0),), np.ones(1)
+    )
+    (law, law_alone), (unknown, unknown_alone) = squares_beyond(
+        PROBLEM, posterior.models[0], {"offset"}
+    )
     small = SETTINGS.law_tolerance**2
-    assert (unknown_alone < small * law, law_alone < small * unknown) == (OTHER not in mechanisms, "offset" not in mechanisms)
+    assert (unknown_alone < small * law, law_alone < small * unknown) == (
+        OTHER not in mechanisms,
+        "offset" not in mechanisms,
+    )
     assert hypotheses_of(PROBLEM, posterior)[0].mechanisms == mechanisms
 
 
@@ -120,17 +195,35 @@ def test_nothing_is_testable_where_only_the_competitor_is_left():
 
 
 def test_a_set_up_that_holds_still_is_no_test_of_the_robot():
-    """A step between set-ups can be tested on a single pose: without one, nothing was tested; with one, it has a name."""
-    problem = replace(PROBLEM, units=(made_unit("setup_step", (), 0, candidate=OF_THE_SETUP), *UNITS[OTHER_1:]))
-    assert concluded(problem, made_posterior(((0,), 0.1)), SILENT).verdict == NOT_TESTABLE
+    """A step between set-ups can be tested on a single pose: without one, nothing was
+    tested; with one, it has a name."""
+    problem = replace(
+        PROBLEM,
+        units=(
+            made_unit("setup_step", (), 0, candidate=OF_THE_SETUP),
+            *UNITS[OTHER_1:],
+        ),
+    )
+    assert (
+        concluded(problem, made_posterior(((0,), 0.1)), SILENT).verdict == NOT_TESTABLE
+    )
     found = concluded(problem, made_posterior(((0,), 0.9)), RAISED)
     assert found.verdict == NAMED and found.best.mechanisms == ("setup_step",)
 
 
 def test_hypotheses_gather_locations_laws_and_sum_to_one():
-    posterior = made_posterior(((OFFSET_2,), 0.3), ((OFFSET_3,), 0.3), ((OFFSET_2, OFFSET_3), 0.1), ((OTHER_1, OTHER_2), 0.1))
+    posterior = made_posterior(
+        ((OFFSET_2,), 0.3),
+        ((OFFSET_3,), 0.3),
+        ((OFFSET_2, OFFSET_3), 0.1),
+        ((OTHER_1, OTHER_2), 0.1),
+    )
     found = hypotheses_of(PROBLEM, posterior)
-    assert [(h.mechanisms, pytest.approx(h.probability)) for h in found] == [(("offset",), 0.7), ((), 0.2), ((OTHER,), 0.1)]
+    assert [(h.mechanisms, pytest.approx(h.probability)) for h in found] == [
+        (("offset",), 0.7),
+        ((), 0.2),
+        ((OTHER,), 0.1),
+    ]
     # The most probable of its models stands for each.
     assert [h.model for h in found] == [0, 2, 4]
     where = location_probabilities(PROBLEM, posterior, "offset")
@@ -144,13 +237,26 @@ def fitted(kuka):
 
 def test_a_mechanism_whose_size_is_wrong_is_stated_with_something_related():
     best = Hypothesis(("joint_offset",), 0.99, 0)
-    sure = Conclusion("named", (best,), best, {"joint_offset": ()}, {"joint_offset": 0.99}, 0.99)
+    sure = Conclusion(
+        "named", (best,), best, {"joint_offset": ()}, {"joint_offset": 0.99}, 0.99
+    )
     doubted = with_related(sure, {"joint_offset"})
-    assert (doubted.verdict, doubted.alternatives) == ("class", {"joint_offset": (OTHER,)})
-    assert with_related(doubted, {"joint_offset"}) == doubted and with_related(sure, set()) == sure
-    both = replace(sure, verdict="several", alternatives={"joint_offset": (), "payload": ()})
+    assert (doubted.verdict, doubted.alternatives) == (
+        "class",
+        {"joint_offset": (OTHER,)},
+    )
+    assert (
+        with_related(doubted, {"joint_offset"}) == doubted
+        and with_related(sure, set()) == sure
+    )
+    both = replace(
+        sure, verdict="several", alternatives={"joint_offset": (), "payload": ()}
+    )
     found = with_related(both, {"payload"})
-    assert (found.verdict, found.alternatives) == ("several", {"joint_offset": (), "payload": (OTHER,)})
+    assert (found.verdict, found.alternatives) == (
+        "several",
+        {"joint_offset": (), "payload": (OTHER,)},
+    )
 
 
 def with_noise(fitted, **changes):
@@ -159,7 +265,8 @@ def with_noise(fitted, **changes):
 
 @pytest.mark.parametrize(("factor", "count"), [(4.9, 0), (5.1, 1), (270.0, 1)])
 def test_scatter_far_beyond_the_noise_measured_is_one(fitted, factor, count):
-    left, repeats = with_noise(fitted, position_m=factor * fitted.noise.position_m), replace(fitted.noise, source="repeats")
+    left = with_noise(fitted, position_m=factor * fitted.noise.position_m)
+    repeats = replace(fitted.noise, source="repeats")
     found = contradictions(left, repeats, SETTINGS)
     assert len(found) == count
     assert all("scatter about the model" in sentence for sentence in found)
@@ -168,13 +275,19 @@ def test_scatter_far_beyond_the_noise_measured_is_one(fitted, factor, count):
 
 @pytest.mark.parametrize(("pose_rad", "count"), [(4e-4, 0), (1e-3, 1)])
 def test_an_error_of_a_pose_beyond_that_of_drives_is_one(fitted, pose_rad, count):
-    found = contradictions(with_noise(fitted, pose_rad=pose_rad), fitted.noise, SETTINGS)
+    found = contradictions(
+        with_noise(fitted, pose_rad=pose_rad), fitted.noise, SETTINGS
+    )
     assert len(found) == count
     assert all("1000 µrad" in sentence for sentence in found)
 
 
 @pytest.mark.parametrize(
-    ("errors", "named"), [(2.5, []), (4.5, ["the compliance of joint 3 is negative by 4.5 standard errors"])]
+    ("errors", "named"),
+    [
+        (2.5, []),
+        (4.5, ["the compliance of joint 3 is negative by 4.5 standard errors"]),
+    ],
 )
 def test_a_compliance_that_is_negative_beyond_chance_is_one(fitted, errors, named):
     mine = np.array([owner == "joint_compliance" for owner, _ in fitted.parameters])
@@ -182,7 +295,9 @@ def test_a_compliance_that_is_negative_beyond_chance_is_one(fitted, errors, name
     values[2] = -errors * np.sqrt(np.diag(fitted.covariance))[mine][2]
     coefficients = tuple(
         values if effect.effect == "joint_compliance" else each
-        for effect, each in zip(fitted.model.effects, fitted.estimate.coefficients, strict=True)
+        for effect, each in zip(
+            fitted.model.effects, fitted.estimate.coefficients, strict=True
+        )
     )
     off = replace(fitted, estimate=replace(fitted.estimate, coefficients=coefficients))
     assert contradictions(off, fitted.noise, SETTINGS) == named
@@ -196,9 +311,15 @@ def campaign(kuka):
 @pytest.fixture(scope="module")
 def found(campaign):
     """A fit of some effects that the robot does not have."""
-    effects = [campaign.candidates[key] for key in ("joint_tilt@2", "payload", "joint_offset@3", "base_compliance")]
-    model, start = campaign.declared.model.with_effects(effects), campaign.declared.estimate.with_effects(effects)
-    count = len(campaign.declared.parameters) + sum(len(effect.parameters) for effect in effects)
+    effects = [
+        campaign.candidates[key]
+        for key in ("joint_tilt@2", "payload", "joint_offset@3", "base_compliance")
+    ]
+    model = campaign.declared.model.with_effects(effects)
+    start = campaign.declared.estimate.with_effects(effects)
+    count = len(campaign.declared.parameters) + sum(
+        len(effect.parameters) for effect in effects
+    )
     stated = {"covariance": 1e-24 * np.eye(count), "held": np.zeros(count, bool)}
     fitted = replace(campaign.declared, model=model, estimate=start, **stated)
     return fitted, [{"members": [effect.key]} for effect in effects]
@@ -209,14 +330,19 @@ def effect_of(fitted, key):
 
 
 def with_value(fitted, key, value, error):
-    """The same fit with the first parameter of an effect at a value of a given standard error."""
+    """The same fit with the first parameter of an effect at a value of a given standard
+    error."""
     number = [effect.key for effect in fitted.model.effects].index(key)
     values = [part.copy() for part in fitted.estimate.coefficients]
     values[number][0] = value
     place = [owner for owner, _ in fitted.parameters].index(key)
     covariance = fitted.covariance.copy()
     covariance[place, place] = error**2
-    return replace(fitted, estimate=replace(fitted.estimate, coefficients=tuple(values)), covariance=covariance)
+    return replace(
+        fitted,
+        estimate=replace(fitted.estimate, coefficients=tuple(values)),
+        covariance=covariance,
+    )
 
 
 def test_parameters_have_their_values_errors_and_priors(found):
@@ -233,19 +359,34 @@ def test_parameters_have_their_values_errors_and_priors(found):
         "held": False,
         "identifiable": True,
     }
-    # What other models say moves the value and widens its error, and it may be the prior alone that says it.
+    # What other models say moves the value and widens its error, and it may be the
+    # prior alone that says it.
     name = ("joint_offset@3", "offset")
-    (entry,) = parameter_entries(effect, fitted, Averaged({name: 1e-5}, {name: 4e-5}, frozenset([name])))
-    assert entry["value"] == pytest.approx(3.1e-4) and entry["std_error"] == 4e-5 and not entry["identifiable"]
+    (entry,) = parameter_entries(
+        effect, fitted, Averaged({name: 1e-5}, {name: 4e-5}, frozenset([name]))
+    )
+    assert (
+        entry["value"] == pytest.approx(3.1e-4)
+        and entry["std_error"] == 4e-5
+        and not entry["identifiable"]
+    )
 
 
 def declared_springs(fitted, compliance):
     """The same fit of a campaign that takes the compliances from the robot file."""
-    kept = [n for n, effect in enumerate(fitted.model.effects) if effect.effect != "joint_compliance"]
+    kept = [
+        n
+        for n, effect in enumerate(fitted.model.effects)
+        if effect.effect != "joint_compliance"
+    ]
     free = np.array([owner != "joint_compliance" for owner, _ in fitted.parameters])
     return replace(
         fitted,
-        model=replace(fitted.model, effects=tuple(fitted.model.effects[n] for n in kept), nominal_compliance=compliance),
+        model=replace(
+            fitted.model,
+            effects=tuple(fitted.model.effects[n] for n in kept),
+            nominal_compliance=compliance,
+        ),
         estimate=replace(
             fitted.estimate,
             coefficients=tuple(fitted.estimate.coefficients[n] for n in kept),
@@ -265,8 +406,13 @@ def test_no_mass_is_told_where_the_compliances_are_not_identified(found):
     # Weight cannot turn the first joint, however soft it is.
     first, *others = parameter_entries(payload, taken, Averaged({}, {}))
     assert first["name"] == "payload compliance_of_joint_2_times_mass"
-    assert (first["value"], first["std_error"]) == pytest.approx((8e-6 * 24.4, 8e-6 * 0.9))
-    assert [entry["unit"] for entry in (first, *others)] == ["rad kg/(N m)", *["rad kg m/(N m)"] * 3]
+    assert (first["value"], first["std_error"]) == pytest.approx(
+        (8e-6 * 24.4, 8e-6 * 0.9)
+    )
+    assert [entry["unit"] for entry in (first, *others)] == [
+        "rad kg/(N m)",
+        *["rad kg m/(N m)"] * 3,
+    ]
 
 
 def test_sag_is_how_far_the_weight_moves_a_target_at_most(found, campaign, kuka):
@@ -279,25 +425,57 @@ def test_sag_is_how_far_the_weight_moves_a_target_at_most(found, campaign, kuka)
     # Predictions with and without the mass, by the exact kinematics.
     around = taken.conditions
     light = with_value(taken, "payload", 0.0, 1.0)
-    positions = [predict(each.model, each.estimate, campaign.observations, around)[0] for each in (taken, light)]
+    positions = [
+        predict(each.model, each.estimate, campaign.observations, around)[0]
+        for each in (taken, light)
+    ]
     largest = np.linalg.norm(positions[0] - positions[1], axis=1).max()
     assert entry["unit"] == "m" and entry["value"] == pytest.approx(largest, rel=0.02)
     assert entry["std_error"] == pytest.approx(entry["value"] / 20.0, rel=1e-3)
-    assert sag_entries("joint_tilt", [effect_of(fitted, "joint_tilt@2")], taken, campaign.observations) == []
+    assert (
+        sag_entries(
+            "joint_tilt",
+            [effect_of(fitted, "joint_tilt@2")],
+            taken,
+            campaign.observations,
+        )
+        == []
+    )
 
 
 def test_the_wrong_sign_is_named(found):
     fitted, entries = found
     (warning,) = implausible(with_value(fitted, "joint_tilt@2", -1e-7, 1e-8), entries)
-    assert warning.startswith("joint_tilt@2: tilt_about_") and "by its physics positive" in warning
+    assert (
+        warning.startswith("joint_tilt@2: tilt_about_")
+        and "by its physics positive" in warning
+    )
 
 
 def test_a_size_beyond_what_such_an_effect_reaches_is_named(found):
     fitted, entries = found
     plausible = effect_of(fitted, "joint_offset@3").parameters[0].plausible
     for sign in (1, -1):
-        (warning,) = implausible(with_value(fitted, "joint_offset@3", 3.5 * sign * plausible, 0.1 * plausible), entries)
-        assert warning.startswith("joint_offset@3: offset is") and "3 times what such an effect reaches" in warning
-        large = with_value(fitted, "joint_offset@3", 3.5 * sign * plausible, 0.1 * plausible)
-        assert oversized(large, {"joint_offset", "payload"}) == {"joint_offset"} and not oversized(large, {"payload"})
-    assert implausible(with_value(fitted, "joint_offset@3", 3.1 * plausible, 0.1 * plausible), entries) == []
+        (warning,) = implausible(
+            with_value(
+                fitted, "joint_offset@3", 3.5 * sign * plausible, 0.1 * plausible
+            ),
+            entries,
+        )
+        assert (
+            warning.startswith("joint_offset@3: offset is")
+            and "3 times what such an effect reaches" in warning
+        )
+        large = with_value(
+            fitted, "joint_offset@3", 3.5 * sign * plausible, 0.1 * plausible
+        )
+        assert oversized(large, {"joint_offset", "payload"}) == {
+            "joint_offset"
+        } and not oversized(large, {"payload"})
+    assert (
+        implausible(
+            with_value(fitted, "joint_offset@3", 3.1 * plausible, 0.1 * plausible),
+            entries,
+        )
+        == []
+    )

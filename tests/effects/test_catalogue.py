@@ -1,4 +1,5 @@
-"""The catalogue as a whole: what is in it, on any chain, and that a function in a module is all that a new effect takes."""
+"""The catalogue as a whole: what is in it, on any chain, and that a function in a
+module is all that a new effect takes."""
 
 import sys
 from dataclasses import replace
@@ -40,51 +41,98 @@ TABLE = {
     "load": "force_misalignment, force_bias, application_point, force_scale",
     "drift": "thermal_growth, temperature_gradient, frame_drift, setup_step",
 }
-FAMILIES = {name: family for family, names in TABLE.items() for name in names.split(", ")}
+FAMILIES = {
+    name: family for family, names in TABLE.items() for name in names.split(", ")
+}
 CHAINS = ["fanuc", "fixed rotations", *ODD_CHAINS]
 UNITS = {
     *("rad", "m", "N", "kg", "kg m", "1", "rad/rad", "m/m", "1/K", "m/h", "rad/h"),
-    *("rad/(N m)", "m/N", "rad/(N m)^3", "1/(N m^2)", "rad kg/(N m)", "rad kg m/(N m)", "1/m", "1/(K m)"),
+    *(
+        "rad/(N m)",
+        "m/N",
+        "rad/(N m)^3",
+        "1/(N m^2)",
+        "rad kg/(N m)",
+        "rad kg m/(N m)",
+        "1/m",
+        "1/(K m)",
+    ),
 }
-# What one parameter of plausible size may do to a robot of this size under some kilonewton: more is no small deviation.
-LEAST_M, LARGEST_M = 1e-7, 2e-2
+# What one parameter of plausible size may do to a robot of this size under some
+# kilonewton: more is no small deviation.
+LEAST_M = 1e-7
+LARGEST_M = 2e-2
 
 
 @pytest.fixture(params=CHAINS)
 def chain(request, fanuc):
-    return fanuc.chain if request.param == "fanuc" else chain_of((OTHER_CHAINS | ODD_CHAINS)[request.param])
+    return (
+        fanuc.chain
+        if request.param == "fanuc"
+        else chain_of((OTHER_CHAINS | ODD_CHAINS)[request.param])
+    )
 
 
-def test_laws_that_are_fixed_are_the_same_under_other_loads_and_springs_and_at_other_places(chain):
+def test_laws_that_are_fixed_are_the_same_under_other_loads_and_springs_and_at_other_places(
+    chain,
+):
     joints = equipped(chain).joints
-    states, elsewhere = made_states(joints, 5, seed=1), made_states(joints, 5, seed=2)
+    states = made_states(joints, 5, seed=1)
+    elsewhere = made_states(joints, 5, seed=2)
     one = conditions_on(chain, states)
-    other = replace(conditions_on(chain, elsewhere, 2 * one.compliance), joint_angles=one.joint_angles)
-    fixed = [candidate for candidate in candidates_on(one.sites).values() if candidate.fixed]
-    assert {candidate.effect for candidate in fixed} >= {"transmission_harmonic", "bearing_runout", "link_geometry"}
+    other = replace(
+        conditions_on(chain, elsewhere, 2 * one.compliance),
+        joint_angles=one.joint_angles,
+    )
+    fixed = [
+        candidate for candidate in candidates_on(one.sites).values() if candidate.fixed
+    ]
+    assert {candidate.effect for candidate in fixed} >= {
+        "transmission_harmonic",
+        "bearing_runout",
+        "link_geometry",
+    }
     for candidate in fixed:
-        for law, again in zip(candidate.displacement(one), candidate.displacement(other), strict=True):
-            assert law.keys() == again.keys() and all((law[at] == again[at]).all() for at in law), candidate.key
+        for law, again in zip(
+            candidate.displacement(one), candidate.displacement(other), strict=True
+        ):
+            assert law.keys() == again.keys() and all(
+                (law[at] == again[at]).all() for at in law
+            ), candidate.key
 
 
 def test_names_and_families_are_those_of_the_design():
-    assert {name: effect.family for name, effect in catalogue.effects().items()} == FAMILIES
+    assert {
+        name: effect.family for name, effect in catalogue.effects().items()
+    } == FAMILIES
 
 
 def test_places_and_parameters_on_the_fanuc_are_those_of_the_list(fanuc):
     """Where a law is meant to have others, change `catalogue_on_fanuc.yaml` with it."""
-    listed = yaml.safe_load(Path(__file__).with_name("catalogue_on_fanuc.yaml").read_text(encoding="utf-8"))
+    listed = yaml.safe_load(
+        Path(__file__).with_name("catalogue_on_fanuc.yaml").read_text(encoding="utf-8")
+    )
     found = candidates_on(equipped(fanuc.chain))
-    assert {key: [parameter.name for parameter in candidate.parameters] for key, candidate in found.items()} == listed
+    assert {
+        key: [parameter.name for parameter in candidate.parameters]
+        for key, candidate in found.items()
+    } == listed
     assert list(found) == list(listed)
 
 
-def test_every_effect_says_whether_it_moves_the_robot_or_only_what_was_measured_of_it(fanuc):
-    """A correction must not move the robot by an error of the tracker, its targets, the force sensor or the set-up."""
+def test_every_effect_says_whether_it_moves_the_robot_or_only_what_was_measured_of_it(
+    fanuc,
+):
+    """A correction must not move the robot by an error of the tracker, its targets, the
+    force sensor or the set-up."""
     sites = equipped(fanuc.chain)
     for name, effect in catalogue.effects().items():
-        instruments = effect.family == "load" or any(candidate.of_setup for candidate in effect.candidates(sites))
-        assert effect.moves_robot is not (instruments or name in ("nest_eccentricity", "tracker_scale")), name
+        instruments = effect.family == "load" or any(
+            candidate.of_setup for candidate in effect.candidates(sites)
+        )
+        assert effect.moves_robot is not (
+            instruments or name in ("nest_eccentricity", "tracker_scale")
+        ), name
 
 
 def test_parameters_have_units_names_and_positive_plausible_sizes(chain):
@@ -96,27 +144,43 @@ def test_parameters_have_units_names_and_positive_plausible_sizes(chain):
             assert 0 < parameter.plausible < np.inf
         for shape in candidate.shapes:
             # A geometric series of values never comes to zero, evenly spaced ones may.
-            assert shape.unit and (shape.lowest >= 0 if shape.tried else shape.lowest > 0)
+            assert shape.unit and (
+                shape.lowest >= 0 if shape.tried else shape.lowest > 0
+            )
             assert shape.lowest < shape.start < shape.highest
-            assert shape.unit != "s" or (shape.lowest, shape.start, shape.highest) == (900, 3600, 36000)
+            assert shape.unit != "s" or (shape.lowest, shape.start, shape.highest) == (
+                900,
+                3600,
+                36000,
+            )
         # Or measurements at too few angles would pass for a test of it.
         assert not candidate.distinct_angles or candidate.joints or candidate.turning
 
 
 def test_nest_is_no_candidate_where_the_last_joint_does_not_turn():
-    """A reflector that a slide carries keeps its side to the tracker: there is no angle that it could circle with."""
-    scara, turning = "Rz(q1) Tx(0.4) Rz(q2) Tx(0.3) Tz(-q3) [end]", "Rz(q1) Tx(0.4) Tz(-q2) Tx(0.3) Rz(q3) [end]"
-    offered = ["nest_eccentricity" in candidates_on(equipped(chain_of(text))) for text in (scara, turning)]
+    """A reflector that a slide carries keeps its side to the tracker: there is no angle
+    that it could circle with."""
+    scara = "Rz(q1) Tx(0.4) Rz(q2) Tx(0.3) Tz(-q3) [end]"
+    turning = "Rz(q1) Tx(0.4) Tz(-q2) Tx(0.3) Rz(q3) [end]"
+    offered = [
+        "nest_eccentricity" in candidates_on(equipped(chain_of(text)))
+        for text in (scara, turning)
+    ]
     assert offered == [False, True]
 
 
 def test_plausible_sizes_move_the_end_by_what_a_deviation_can(fanuc):
     around = conditions_on(fanuc.chain, made_states(6, 30, seed=1), fanuc.compliance)
-    model, states = made_model(fanuc.chain), made_states(6, 30, seed=1)
+    model = made_model(fanuc.chain)
+    states = made_states(6, 30, seed=1)
     estimate = made_estimate(model)
-    jacobian = linearize(model, estimate, seen_exactly(model, estimate, states), around).coordinate_jacobian
+    jacobian = linearize(
+        model, estimate, seen_exactly(model, estimate, states), around
+    ).coordinate_jacobian
     for candidate in candidates_on(around.sites).values():
-        made = displacements(candidate, around, *[shape.start for shape in candidate.shapes])
+        made = displacements(
+            candidate, around, *[shape.start for shape in candidate.shapes]
+        )
         size = np.array([parameter.plausible for parameter in candidate.parameters])
         moved = np.einsum("src,dsc->dsr", jacobian, made) * size[:, None, None]
         largest = np.linalg.norm(moved, axis=-1).max()
@@ -125,11 +189,17 @@ def test_plausible_sizes_move_the_end_by_what_a_deviation_can(fanuc):
 
 @pytest.mark.parametrize("chain", ["fixed rotations", *ODD_CHAINS], indirect=True)
 def test_sensitivities_of_every_candidate_are_central_differences(chain):
-    targets = Target("A", chain.end_effector.name, None), Target("B", chain.points[0].name, (0.1, -0.2, 0.05))
+    targets = (
+        Target("A", chain.end_effector.name, None),
+        Target("B", chain.points[0].name, (0.1, -0.2, 0.05)),
+    )
     bare = made_model(chain, targets, rows=6)
-    states, rng = made_states(chain.coordinates, 4, seed=2), np.random.default_rng(0)
+    states = made_states(chain.coordinates, 4, seed=2)
+    rng = np.random.default_rng(0)
     for candidate in candidates_on(bare.sites).values():
-        model = made_model(chain, targets[1:], 6, fitted_frames=False, effects=(candidate,))
+        model = made_model(
+            chain, targets[1:], 6, fitted_frames=False, effects=(candidate,)
+        )
         if candidate.effect in ("joint_offset", "payload", "lost_motion"):
             model = made_model(chain, targets, 6, effects=(candidate,))
         estimate = made_estimate(model, seed=3)
@@ -137,11 +207,15 @@ def test_sensitivities_of_every_candidate_are_central_differences(chain):
         seen = seen_exactly(model, estimate, states)
         steps = np.diag(small_steps(model, estimate))
         # Of a long law, steps of all parameters at once.
-        steps = steps if len(steps) < 6 else rng.standard_normal((2, len(steps))) @ steps
+        steps = (
+            steps if len(steps) < 6 else rng.standard_normal((2, len(steps))) @ steps
+        )
         expected = slopes(model, estimate, seen, around, steps)
         found = linearize(model, estimate, seen, around).sensitivities @ steps.T
         scale = np.maximum(np.abs(expected).max(axis=(0, 1)), 1e-300)
-        np.testing.assert_allclose(found / scale, expected / scale, rtol=0, atol=1e-5, err_msg=candidate.key)
+        np.testing.assert_allclose(
+            found / scale, expected / scale, rtol=0, atol=1e-5, err_msg=candidate.key
+        )
 
 
 def test_effects_that_need_a_load_do_nothing_without_and_the_others_do_something(chain):
@@ -149,15 +223,24 @@ def test_effects_that_need_a_load_do_nothing_without_and_the_others_do_something
     states.wrench[:] = 0.0
     around = conditions_on(chain, states)
     for candidate in candidates_on(around.sites).values():
-        made = displacements(candidate, around, *[shape.start for shape in candidate.shapes])
-        # What hangs on the flange weighs there always, and is told from the arm's own weight where loads or masses are known.
-        assert made.any() != ("load" in candidate.needs and candidate.effect != "payload"), candidate.key
+        made = displacements(
+            candidate, around, *[shape.start for shape in candidate.shapes]
+        )
+        # What hangs on the flange weighs there always, and is told from the arm's own
+        # weight where loads or masses are known.
+        assert made.any() != (
+            "load" in candidate.needs and candidate.effect != "payload"
+        ), candidate.key
 
 
 def test_needs_are_those_covariates_that_the_displacement_reads(fanuc):
     around = conditions_on(fanuc.chain, made_states(6, 5, seed=8))
     for candidate in candidates_on(around.sites).values():
-        for name, attribute in (("approach", "approach"), ("time", "time_s"), ("temperature", "temperature_c")):
+        for name, attribute in (
+            ("approach", "approach"),
+            ("time", "time_s"),
+            ("temperature", "temperature_c"),
+        ):
             without = replace(around, **{attribute: None})
             start = [shape.start for shape in candidate.shapes]
             if name in candidate.needs:
@@ -168,7 +251,8 @@ def test_needs_are_those_covariates_that_the_displacement_reads(fanuc):
 
 
 def test_laws_go_with_the_loads_of_no_other_coordinates_than_they_displace(chain):
-    """What errors of masses do by way of an effect is asked for on these coordinates alone."""
+    """What errors of masses do by way of an effect is asked for on these coordinates
+    alone."""
     around = conditions_on(chain, made_states(chain.coordinates, 6, seed=12))
     for candidate in candidates_on(around.sites).values():
         start = [shape.start for shape in candidate.shapes]
@@ -177,7 +261,9 @@ def test_laws_go_with_the_loads_of_no_other_coordinates_than_they_displace(chain
         elsewhere = 2.0 * around.total + 1.0
         elsewhere[:, displaced] = around.total[:, displaced]
         again = displacements(candidate, with_total(around, elsewhere), *start)
-        np.testing.assert_array_equal(again, displacements(candidate, around, *start), err_msg=candidate.key)
+        np.testing.assert_array_equal(
+            again, displacements(candidate, around, *start), err_msg=candidate.key
+        )
 
 
 NEW = '''
@@ -197,7 +283,9 @@ def sinking_foot(own, sites):
 @pytest.fixture
 def one_more_module(tmp_path, monkeypatch):
     (tmp_path / "anything.py").write_text(NEW)
-    monkeypatch.setattr(elastocal.effects, "__path__", [*elastocal.effects.__path__, str(tmp_path)])
+    monkeypatch.setattr(
+        elastocal.effects, "__path__", [*elastocal.effects.__path__, str(tmp_path)]
+    )
     catalogue.effects.cache_clear()
     yield
     catalogue.effects.cache_clear()
@@ -207,15 +295,24 @@ def one_more_module(tmp_path, monkeypatch):
 
 def test_adding_an_effect_is_adding_one_module(fanuc, one_more_module):
     assert set(catalogue.effects()) == {*FAMILIES, "sinking_foot"}
-    model = made_model(fanuc.chain, (Target("A", "6DoF", (0, 0, 0)),), fitted_frames=False)
+    model = made_model(
+        fanuc.chain, (Target("A", "6DoF", (0, 0, 0)),), fitted_frames=False
+    )
     candidate = candidates_on(model.sites)["sinking_foot"]
     assert declared_candidates(["sinking_foot"], model.sites)[0].key == "sinking_foot"
-    sunk, states = model.with_effects((candidate,)), made_states(6, 3)
+    sunk = model.with_effects((candidate,))
+    states = made_states(6, 3)
     states.wrench[:] = 0
     estimate = made_estimate(model).with_effects((candidate,))
     estimate.coefficients[0][:] = 0.02
-    expected = poses(fanuc.chain, states.joint_angles, fanuc.chain.end_effector)[0] - [0, 0, 0.02]
-    np.testing.assert_allclose(seen_exactly(sunk, estimate, states).position, expected, atol=1e-14)
+    expected = poses(fanuc.chain, states.joint_angles, fanuc.chain.end_effector)[0] - [
+        0,
+        0,
+        0.02,
+    ]
+    np.testing.assert_allclose(
+        seen_exactly(sunk, estimate, states).position, expected, atol=1e-14
+    )
 
 
 def test_effect_that_the_catalogue_does_not_have_is_refused(fanuc):

@@ -1,4 +1,5 @@
-"""What the states of a campaign have that effects may need, and how far it had come in each."""
+"""What the states of a campaign have that effects may need, and how far it had come in
+each."""
 
 from dataclasses import replace
 
@@ -21,9 +22,12 @@ def test_progress_counts_rows_of_the_campaign_or_else_poses():
     np.testing.assert_array_equal(progress_of(without, (1, 21)), np.ones(5))
 
 
-@pytest.mark.parametrize(("column", "name"), [("time_s", "time"), ("temperature_c", "temperature")])
+@pytest.mark.parametrize(
+    ("column", "name"), [("time_s", "time"), ("temperature_c", "temperature")]
+)
 def test_time_and_temperature_are_there_where_they_change(kuka, column, name):
-    sites, states = sites_of(kuka), made_states(6, 5, seed=1)
+    sites = sites_of(kuka)
+    states = made_states(6, 5, seed=1)
     assert name in offered(sites, replace(states, **{column: np.arange(5.0)}))
     assert name not in offered(sites, replace(states, **{column: np.full(5, 20.0)}))
     assert name not in offered(sites, replace(states, **{column: None}))

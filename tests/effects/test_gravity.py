@@ -1,4 +1,5 @@
-"""Weights, declared or not: torques by pinocchio, slopes by central differences, fits with wrong masses, a compensator."""
+"""Weights, declared or not: torques by pinocchio, slopes by central differences, fits
+with wrong masses, a compensator."""
 
 from dataclasses import replace
 
@@ -32,33 +33,48 @@ TILTED = (3.0, -4.0, -8.0)
 
 
 def weighed(robot):
-    """The robot with a mass on each link and the column, its centres off the links' lines."""
+    """The robot with a mass on each link and the column, its centres off the links'
+    lines."""
     rng = np.random.default_rng(1)
-    masses = [Mass(link, 10.0 + link, tuple(rng.uniform(-0.3, 0.3, 3)), 0.1) for link in range(robot.joints + 1)]
+    masses = [
+        Mass(link, 10.0 + link, tuple(rng.uniform(-0.3, 0.3, 3)), 0.1)
+        for link in range(robot.joints + 1)
+    ]
     return replace(robot, masses=tuple(masses), gravity_m_s2=TILTED)
 
 
 def gravity_by_pinocchio(chain, after, mass, centre, gravity, coordinates):
-    """Generalized force of a mass behind so many transforms, on every coordinate of the chain, ndarray (S, C)."""
+    """Generalized force of a mass behind so many transforms, on every coordinate of the
+    chain, ndarray (S, C)."""
     # Pinocchio has joints only up to the mass; those behind it bear nothing of it.
-    one = PinocchioPoint(chain, replace(chain.end_effector, after=after, offset_m=tuple(centre)))
+    one = PinocchioPoint(
+        chain, replace(chain.end_effector, after=after, offset_m=tuple(centre))
+    )
     frame = one.model.frames[one.frame]
     inertia = pin.Inertia(mass, frame.placement.translation, np.zeros((3, 3)))
     one.model.appendBodyToJoint(frame.parentJoint, inertia, pin.SE3.Identity())
     one.model.gravity.linear = np.array(gravity)
-    data, found = one.model.createData(), np.zeros((len(coordinates), chain.coordinates))
+    data = one.model.createData()
+    found = np.zeros((len(coordinates), chain.coordinates))
     for index, q in enumerate(coordinates):
-        found[index, one.order] = -pin.computeGeneralizedGravity(one.model, data, q[one.order])
+        found[index, one.order] = -pin.computeGeneralizedGravity(
+            one.model, data, q[one.order]
+        )
     return found
 
 
 @pytest.mark.parametrize("name", ["fanuc", "fixed rotations", "track"])
-def test_gravity_on_every_coordinate_where_the_robot_has_yielded_is_that_of_pinocchio(name, fanuc):
-    robot = weighed(fanuc if name == "fanuc" else robot_of((OTHER_CHAINS | ODD_CHAINS)[name]))
+def test_gravity_on_every_coordinate_where_the_robot_has_yielded_is_that_of_pinocchio(
+    name, fanuc
+):
+    robot = weighed(
+        fanuc if name == "fanuc" else robot_of((OTHER_CHAINS | ODD_CHAINS)[name])
+    )
     sites = sites_of(robot)
     base = candidates_on(sites)["base_compliance"]
     model = made_model(robot, effects=(base,))
-    estimate, states = made_estimate(model, seed=2, size=1.0), made_states(robot.joints, 3, seed=3, force=300.0)
+    estimate = made_estimate(model, seed=2, size=1.0)
+    states = made_states(robot.joints, 3, seed=3, force=300.0)
     around = conditions(model, estimate, states)
     at = displaced_coordinates(model, estimate, around)
     corrections = around.mass_corrections.reshape(-1, 4)
@@ -69,47 +85,102 @@ def test_gravity_on_every_coordinate_where_the_robot_has_yielded_is_that_of_pino
         centre = np.array(mass.centre_m) + correction[1:] / total
         # Whatever tilts its joint, or the foot, carries it.
         carrying = sites.tilt[mass.link - 1] if mass.link else sites.base
-        after = 1 + max(place for place, t in enumerate(sites.chain.transforms) if t.coordinate in carrying)
-        expected = expected + gravity_by_pinocchio(sites.chain, after, total, centre, TILTED, at)
-    np.testing.assert_allclose(around.gravity, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+        after = 1 + max(
+            place
+            for place, t in enumerate(sites.chain.transforms)
+            if t.coordinate in carrying
+        )
+        expected = expected + gravity_by_pinocchio(
+            sites.chain, after, total, centre, TILTED, at
+        )
+    np.testing.assert_allclose(
+        around.gravity, expected, rtol=0, atol=1e-6 * np.abs(expected).max()
+    )
     np.testing.assert_array_equal(around.total, around.load + around.gravity)
 
 
 @pytest.mark.parametrize("identified", [True, False], ids=["identified", "nominal"])
-def test_masses_and_compliances_have_exact_sensitivities_with_all_that_they_load(fanuc, identified):
+def test_masses_and_compliances_have_exact_sensitivities_with_all_that_they_load(
+    fanuc, identified
+):
     robot = weighed(fanuc)
     known = candidates_on(sites_of(robot))
-    keys = ("stiffening@2", "lost_motion@3", "base_compliance", "joint_tilt@2", "payload", "force_misalignment[flange axes]")
-    model = made_model(robot, rows=6, compliance=fanuc.compliance, identified=identified, effects=[known[key] for key in keys])
-    estimate, states = made_estimate(model, seed=4), made_states(6, 8, seed=5)
+    keys = (
+        "stiffening@2",
+        "lost_motion@3",
+        "base_compliance",
+        "joint_tilt@2",
+        "payload",
+        "force_misalignment[flange axes]",
+    )
+    model = made_model(
+        robot,
+        rows=6,
+        compliance=fanuc.compliance,
+        identified=identified,
+        effects=[known[key] for key in keys],
+    )
+    estimate = made_estimate(model, seed=4)
+    states = made_states(6, 8, seed=5)
     if identified:
-        estimate = replace(estimate, coefficients=(fanuc.compliance, *estimate.coefficients[1:]))
+        estimate = replace(
+            estimate, coefficients=(fanuc.compliance, *estimate.coefficients[1:])
+        )
     seen = seen_exactly(model, estimate, states)
     around = conditions(model, estimate, states)
     listed = parameters(model, estimate)
-    sizes = [1e-3 * (fanuc.compliance.max() if owner == "joint_compliance" else p.plausible) for owner, p in listed]
-    springs = [i for i, (owner, _) in enumerate(listed) if owner in ("joint_compliance", "declared_weight")]
+    sizes = [
+        1e-3 * (fanuc.compliance.max() if owner == "joint_compliance" else p.plausible)
+        for owner, p in listed
+    ]
+    springs = [
+        i
+        for i, (owner, _) in enumerate(listed)
+        if owner in ("joint_compliance", "declared_weight")
+    ]
     steps = np.diag(sizes)[springs]
     expected = slopes(model, estimate, seen, around, steps)
     found = linearize(model, estimate, seen, around).sensitivities @ steps.T
     largest = np.abs(expected).max(axis=(0, 1))
-    np.testing.assert_allclose(found / largest.max(), expected / largest.max(), rtol=0, atol=1e-6)
+    np.testing.assert_allclose(
+        found / largest.max(), expected / largest.max(), rtol=0, atol=1e-6
+    )
     moving = largest > 0
     assert moving.sum() >= 6 * identified + 20
-    np.testing.assert_allclose(found[..., moving] / largest[moving], expected[..., moving] / largest[moving], rtol=0, atol=2e-4)
+    np.testing.assert_allclose(
+        found[..., moving] / largest[moving],
+        expected[..., moving] / largest[moving],
+        rtol=0,
+        atol=2e-4,
+    )
 
 
 def test_priors_are_those_of_the_robot_file(fanuc):
-    robot = replace(fanuc, masses=(Mass(2, 200.0, (0.3, 0.0, 0.4), 0.1), Mass(3, 50.0, (0.0, 0.0, 0.01), 0.2)))
+    robot = replace(
+        fanuc,
+        masses=(
+            Mass(2, 200.0, (0.3, 0.0, 0.4), 0.1),
+            Mass(3, 50.0, (0.0, 0.0, 0.01), 0.2),
+        ),
+    )
     found = declared_weight(sites_of(robot)).parameters
-    # A centre is off by its relative error times its distance from the joint, and lies anywhere in the girth of its link.
+    # A centre is off by its relative error times its distance from the joint, and lies
+    # anywhere in the girth of its link.
     width = 0.1 * np.linalg.norm(sites_of(robot).link_vectors_m, axis=1).sum()
     assert 0.3 < width < 0.7
-    first, second = np.hypot(20.0 * 0.5, 200.0 * width / 12**0.5), np.hypot(10.0 * 0.1, 50.0 * width / 12**0.5)
-    assert [p.prior_std for p in found] == pytest.approx([20.0, *[first] * 3, 10.0, *[second] * 3])
-    assert [p.name for p in found[:2]] == ["mass_error_of_link_2", "moment_error_x_of_link_2"]
+    first = np.hypot(20.0 * 0.5, 200.0 * width / 12**0.5)
+    second = np.hypot(10.0 * 0.1, 50.0 * width / 12**0.5)
+    assert [p.prior_std for p in found] == pytest.approx(
+        [20.0, *[first] * 3, 10.0, *[second] * 3]
+    )
+    assert [p.name for p in found[:2]] == [
+        "mass_error_of_link_2",
+        "moment_error_x_of_link_2",
+    ]
     # As the file states it, a centre on its axis as if it were 0.1 m from there.
-    assert [p.plausible for p in found] == pytest.approx([20.0, *[20.0 * 0.5] * 3, 10.0, *[10.0 * 0.1] * 3])
+    assert [p.plausible for p in found] == pytest.approx(
+        [20.0, *[20.0 * 0.5] * 3, 10.0, *[10.0 * 0.1] * 3]
+    )
 
 
 @pytest.mark.parametrize(
@@ -123,38 +194,67 @@ def test_priors_are_those_of_the_robot_file(fanuc):
         ({}, 0.15 * 8.0 * 3.107**3),
     ],
 )
-def test_plausible_payload_is_a_share_of_what_the_robot_carries_as_far_as_that_is_known(fanuc, known, expected):
-    masses = tuple(Mass(2 + link, mass, (0.0, 0.0, 0.0), 0.1) for link, mass in enumerate(known.get("masses", ())))
-    sites = replace(sites_of(replace(fanuc, payload_kg=None)), masses=masses, payload_kg=known.get("payload_kg"))
+def test_plausible_payload_is_a_share_of_what_the_robot_carries_as_far_as_that_is_known(
+    fanuc, known, expected
+):
+    masses = tuple(
+        Mass(2 + link, mass, (0.0, 0.0, 0.0), 0.1)
+        for link, mass in enumerate(known.get("masses", ()))
+    )
+    sites = replace(
+        sites_of(replace(fanuc, payload_kg=None)),
+        masses=masses,
+        payload_kg=known.get("payload_kg"),
+    )
     tool, alone = (c for c in candidates_on(sites).values() if c.effect == "payload")
-    assert [p.plausible for p in tool.parameters] == pytest.approx([expected, *[0.2 * expected] * 3])
+    assert [p.plausible for p in tool.parameters] == pytest.approx(
+        [expected, *[0.2 * expected] * 3]
+    )
     assert [p.plausible for p in alone.parameters] == pytest.approx([expected])
 
 
 @pytest.mark.parametrize("share", [0.0, 0.005, 0.05])
-def test_moments_that_are_a_hundredth_off_still_have_a_place_that_turns_with_the_flange_and_others_have_none(share):
+def test_moments_that_are_a_hundredth_off_still_have_a_place_that_turns_with_the_flange_and_others_have_none(
+    share,
+):
     """Forces anywhere with the flange anywhere."""
     rng = np.random.default_rng(0)
-    force, rotation = 300.0 * rng.standard_normal((8, 3)), Rotation.random(8, rng=rng).as_matrix()
-    moment, noise = np.cross(rotation @ PLACE, force), rng.standard_normal((8, 3))
+    force = 300.0 * rng.standard_normal((8, 3))
+    rotation = Rotation.random(8, rng=rng).as_matrix()
+    moment = np.cross(rotation @ PLACE, force)
+    noise = rng.standard_normal((8, 3))
     moment = moment + share * noise * np.linalg.norm(moment) / np.linalg.norm(noise)
     lever = lever_of_pull(np.concatenate([force, moment], axis=1), rotation)
-    np.testing.assert_allclose(lever, 0 * force if share > 0.01 else rotation @ PLACE, atol=4 * share + 1e-9)
+    np.testing.assert_allclose(
+        lever, 0 * force if share > 0.01 else rotation @ PLACE, atol=4 * share + 1e-9
+    )
 
 
 def test_a_bias_is_there_wherever_something_is_recorded_be_it_a_moment_alone(fanuc):
     states = made_states(6, 3, seed=4)
-    states.wrench[:] = [[300.0, 20.0, 10.0, 1.0, 2.0, 3.0], [0, 0, 0, 0, 5.0, 0], [0] * 6]
+    states.wrench[:] = [
+        [300.0, 20.0, 10.0, 1.0, 2.0, 3.0],
+        [0, 0, 0, 0, 5.0, 0],
+        [0] * 6,
+    ]
     around = conditions_on(fanuc.chain, states)
-    made = displacements(candidate_on(fanuc.chain, "force_bias[base axes]"), around)[..., :6]
+    made = displacements(candidate_on(fanuc.chain, "force_bias[base axes]"), around)[
+        ..., :6
+    ]
     for axis, turned in enumerate(made):
         force = np.eye(6)[[axis, axis]]
-        expected = around.load_by(np.concatenate([force, 0 * force[:1]]))[:, :6] * around.compliance
+        expected = (
+            around.load_by(np.concatenate([force, 0 * force[:1]]))[:, :6]
+            * around.compliance
+        )
         np.testing.assert_allclose(turned, expected, rtol=1e-12)
 
 
-def test_structure_bears_the_usual_weight_where_neither_masses_nor_loads_are_known(fanuc):
-    """Half of each link at either end, six times the rated load in all: slopes of its potential energy."""
+def test_structure_bears_the_usual_weight_where_neither_masses_nor_loads_are_known(
+    fanuc,
+):
+    """Half of each link at either end, six times the rated load in all: slopes of its
+    potential energy."""
     states = made_states(6, 4, seed=7)
     states.wrench[:] = 0.0
     sites = replace(sites_of(replace(fanuc, payload_kg=100.0)), usual_weight=True)
@@ -163,8 +263,12 @@ def test_structure_bears_the_usual_weight_where_neither_masses_nor_loads_are_kno
     assert offered(sites, states) & {"load", "load on the joints"} == {"load"}
 
     def energy(coordinates):
-        ends = motion(sites.chain, coordinates, sites.followed).position[1 : sites.joints + 2]
-        return -np.einsum("k,kis,i->s", sites.usual_masses, ends, np.array(sites.gravity_m_s2))
+        ends = motion(sites.chain, coordinates, sites.followed).position[
+            1 : sites.joints + 2
+        ]
+        return -np.einsum(
+            "k,kis,i->s", sites.usual_masses, ends, np.array(sites.gravity_m_s2)
+        )
 
     commanded = np.zeros((4, sites.chain.coordinates))
     commanded[:, :6] = states.joint_angles

@@ -1,29 +1,46 @@
-"""Shapes of laws: the values that a search tries. Candidates: their names and places."""
+"""Shapes of laws: the values that a search tries. Candidates: their names and
+places."""
 
 import numpy as np
 import pytest
 
-from elastocal.effects.protocol import Candidate, Parameter, Shape, effect_of, require_unique
+from elastocal.effects.protocol import (
+    Candidate,
+    Parameter,
+    Shape,
+    effect_of,
+    require_unique,
+)
 
-TRIED = Shape("when", "1", 0.5, 0.0, 1.0, tried=11), Shape("lag", "s", 3600.0, 900.0, 36000.0)
+TRIED = (
+    Shape("when", "1", 0.5, 0.0, 1.0, tried=11),
+    Shape("lag", "s", 3600.0, 900.0, 36000.0),
+)
 
 
 @pytest.mark.parametrize("shape", TRIED, ids=lambda shape: shape.name)
 @pytest.mark.parametrize("count", [1, 2, 5])
 def test_shapes_share_their_range_by_which_of_them_is_nearest(shape, count):
-    """On the scale on which they are spread: counted over a fine grid, whatever their order."""
+    """On the scale on which they are spread: counted over a fine grid, whatever their
+    order."""
     scale = (lambda value: value) if shape.tried else np.log
     every = np.linspace(scale(shape.lowest), scale(shape.highest), 100_001)
     values = np.random.default_rng(count).uniform(shape.lowest, shape.highest, count)
     nearest = np.argmin(np.abs(every[:, None] - scale(values)), axis=1)
     found = shape.shares(values)
-    np.testing.assert_allclose(found, np.bincount(nearest, minlength=count) / len(every), atol=2e-5)
+    np.testing.assert_allclose(
+        found, np.bincount(nearest, minlength=count) / len(every), atol=2e-5
+    )
     assert found.sum() == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("shape", TRIED, ids=lambda shape: shape.name)
-def test_shapes_between_two_are_inside_and_evenly_spread_with_the_middle_among_them(shape):
-    found = shape.between(0.2, 0.8, 7) if shape.tried else shape.between(1000.0, 4000.0, 7)
+def test_shapes_between_two_are_inside_and_evenly_spread_with_the_middle_among_them(
+    shape,
+):
+    found = (
+        shape.between(0.2, 0.8, 7) if shape.tried else shape.between(1000.0, 4000.0, 7)
+    )
     steps = np.diff(found) if shape.tried else np.diff(np.log(found))
     ends = (0.2, 0.8, 0.5) if shape.tried else (1000.0, 4000.0, 2000.0)
     assert len(found) == 7 and ends[0] < found[0] and found[-1] < ends[1]
@@ -32,8 +49,11 @@ def test_shapes_between_two_are_inside_and_evenly_spread_with_the_middle_among_t
 
 
 @pytest.mark.parametrize("few", [1, 2, 3, 7])
-def test_a_few_values_of_a_shape_grow_by_one_factor_from_the_lowest_and_on_to_the_highest(few):
-    """900 s to 36000 s is a factor of 40: a few values part it in so many and one more equal factors, without the ends."""
+def test_a_few_values_of_a_shape_grow_by_one_factor_from_the_lowest_and_on_to_the_highest(
+    few,
+):
+    """900 s to 36000 s is a factor of 40: a few values part it in so many and one more
+    equal factors, without the ends."""
     expected = 900.0 * 40.0 ** (np.arange(1, few + 1) / (few + 1))
     np.testing.assert_allclose(TRIED[1].values(few), expected, rtol=1e-12)
 
@@ -43,12 +63,28 @@ def test_a_few_values_of_a_shape_grow_by_one_factor_from_the_lowest_and_on_to_th
     [
         ((), "", "", "law", ()),
         ((2,), "", "", "law@2", (2,)),
-        ((1, 3), "one section", "one section", "law@1+3[one section]", (1, 3, "one section")),
+        (
+            (1, 3),
+            "one section",
+            "one section",
+            "law@1+3[one section]",
+            (1, 3, "one section"),
+        ),
         ((), "column", "column", "law[column]", ("column",)),
     ],
 )
-def test_key_and_location_of_a_candidate_are_its_effect_joints_and_detail(joints, detail, location_name, key, location):
-    law = Candidate("law", "any", joints, detail, (Parameter("a", "rad", 1.0),), dict, location_name=location_name)
+def test_key_and_location_of_a_candidate_are_its_effect_joints_and_detail(
+    joints, detail, location_name, key, location
+):
+    law = Candidate(
+        "law",
+        "any",
+        joints,
+        detail,
+        (Parameter("a", "rad", 1.0),),
+        dict,
+        location_name=location_name,
+    )
     assert (law.key, law.location) == (key, location)
     assert effect_of(law.key) == "law"
 

@@ -1,4 +1,5 @@
-"""Sizes of effects: complete, in the documentation as in the code, in units of the arm; levers and weights by hand."""
+"""Sizes of effects: complete, in the documentation as in the code, in units of the arm;
+levers and weights by hand."""
 
 import re
 from dataclasses import replace
@@ -16,13 +17,21 @@ from elastocal.mechanics.sites import sites_of
 
 METHOD = Path(__file__).parents[2] / "docs" / "method.md"
 # Sized by what they do to the arm, or to the wrist alone.
-ELASTIC = {"base_compliance", "compensator_stiffness", "cross_compliance", "flange_flexibility", "joint_dependent_stiffness"}
+ELASTIC = {
+    "base_compliance",
+    "compensator_stiffness",
+    "cross_compliance",
+    "flange_flexibility",
+    "joint_dependent_stiffness",
+}
 ELASTIC |= {"joint_tilt", "link_elasticity", "stiffening"}
 
 
 def plausible(robot):
     return {
-        (key, p.name): p.plausible for key, candidate in candidates_on(sites_of(robot)).items() for p in candidate.parameters
+        (key, p.name): p.plausible
+        for key, candidate in candidates_on(sites_of(robot)).items()
+        for p in candidate.parameters
     }
 
 
@@ -32,18 +41,27 @@ def test_documentation_prints_the_table():
         for name, effect in effects().items()
         for s in effect.sizes.values()
     ]
-    (table,) = re.findall(r"<details>.*?</details>", METHOD.read_text(encoding="utf-8"), re.DOTALL)
-    assert [line for line in lines if line not in table] == [] and table.count("\n| ") == len(lines) + 1
+    (table,) = re.findall(
+        r"<details>.*?</details>", METHOD.read_text(encoding="utf-8"), re.DOTALL
+    )
+    assert [line for line in lines if line not in table] == [] and table.count(
+        "\n| "
+    ) == len(lines) + 1
 
 
 def test_what_yields_is_sized_by_the_compliance_of_the_arm_and_nothing_else_is(fanuc):
     soft = replace(fanuc, compliance=100.0 * fanuc.compliance)
-    stiff_sizes, soft_sizes = plausible(fanuc), plausible(soft)
+    stiff_sizes = plausible(fanuc)
+    soft_sizes = plausible(soft)
     by_weight = {"compensator_torque", "link_weight"}
     for (key, name), size in stiff_sizes.items():
         effect = key.split("@")[0].split("[")[0]
-        yields = effect in ELASTIC or (effect in by_weight and ("compliance" in name or "q" in name))
-        assert soft_sizes[key, name] / size == pytest.approx(100.0 if yields else 1.0), (key, name)
+        yields = effect in ELASTIC or (
+            effect in by_weight and ("compliance" in name or "q" in name)
+        )
+        assert soft_sizes[key, name] / size == pytest.approx(
+            100.0 if yields else 1.0
+        ), (key, name)
 
 
 def test_rigid_joints_are_sized_as_those_of_an_arm_of_this_load_and_reach(fanuc):
@@ -55,21 +73,39 @@ def test_rigid_joints_are_sized_as_those_of_an_arm_of_this_load_and_reach(fanuc)
 
 def test_parameters_have_the_sign_of_the_size(fanuc):
     own = effects()
-    (tilt,) = own["joint_tilt"].parameters("tilt", ["t"], "rad/(N m)", sites_of(fanuc), 0, over=4.0)
+    (tilt,) = own["joint_tilt"].parameters(
+        "tilt", ["t"], "rad/(N m)", sites_of(fanuc), 0, over=4.0
+    )
     assert (tilt.sign, tilt.plausible) == (1, pytest.approx(0.25 * fanuc.compliance[0]))
-    assert own["stiffening"].parameters("lost beyond", ["b"], "rad/(N m)", sites_of(fanuc), 0)[0].sign == -1
+    assert (
+        own["stiffening"]
+        .parameters("lost beyond", ["b"], "rad/(N m)", sites_of(fanuc), 0)[0]
+        .sign
+        == -1
+    )
 
 
 def test_the_full_torque_has_the_lever_of_a_tool_at_least_and_the_weight_behind_the_joint():
-    """Levers of the outstretched arm, by hand; the weight of a mass half way along its link."""
+    """Levers of the outstretched arm, by hand; the weight of a mass half way along its
+    link."""
     # The weight of a robot that stands on the moon.
-    sites = replace(equipped(chain_of("Rz(q1) Tz(1) Ry(q2) Tx(2) Ry(q3) Tx(0.1) [hand]")), gravity_m_s2=(0.0, 0.0, -1.62))
-    assert [lever_m(sites, joint) for joint in range(3)] == pytest.approx([3.1, 2.1, 0.5])
+    sites = replace(
+        equipped(chain_of("Rz(q1) Tz(1) Ry(q2) Tx(2) Ry(q3) Tx(0.1) [hand]")),
+        gravity_m_s2=(0.0, 0.0, -1.62),
+    )
+    assert [lever_m(sites, joint) for joint in range(3)] == pytest.approx(
+        [3.1, 2.1, 0.5]
+    )
     g = 1.62
     # Eight kilograms a cubic metre of reach suit an arm whose rated load is not known.
-    assert [full_torque_Nm(sites, joint) for joint in range(3)] == pytest.approx(np.array([3.1, 2.1, 0.5]) * 8 * 3.1**3 * g)
-    loaded = replace(sites, payload_kg=10.0, masses=(Mass(2, 30.0, (-1.0, 0.0, 0.0), 0.1),))
-    # It turns joint 2 at a metre, and joint 1, whose axis stands upright, not at all; it is before joint 3.
+    assert [full_torque_Nm(sites, joint) for joint in range(3)] == pytest.approx(
+        np.array([3.1, 2.1, 0.5]) * 8 * 3.1**3 * g
+    )
+    loaded = replace(
+        sites, payload_kg=10.0, masses=(Mass(2, 30.0, (-1.0, 0.0, 0.0), 0.1),)
+    )
+    # It turns joint 2 at a metre, and joint 1, whose axis stands upright, not at all;
+    # it is before joint 3.
     found = [full_torque_Nm(loaded, joint) for joint in range(3)]
     assert found[0] == pytest.approx(31 * g) and found[2] == pytest.approx(5 * g)
     # The longest lever is that of some poses, so almost that of the arm outstretched.

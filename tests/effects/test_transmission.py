@@ -1,4 +1,5 @@
-"""Effects periodic in the angle of a joint, beyond their closed forms: ratios that are known, orders between integers."""
+"""Effects periodic in the angle of a joint, beyond their closed forms: ratios that are
+known, orders between integers."""
 
 from dataclasses import replace
 
@@ -16,22 +17,40 @@ from elastocal.effects.catalogue import candidates_on
 
 
 def test_order_may_lie_anywhere_between_two_integers_and_away_from_both(fanuc):
-    known, states = candidates_on(equipped(fanuc)), made_states(6, 5, seed=3)
-    bands = [c for c in known.values() if c.effect == "transmission_order" and c.joints == (3,)]
+    known = candidates_on(equipped(fanuc))
+    states = made_states(6, 5, seed=3)
+    bands = [
+        c
+        for c in known.values()
+        if c.effect == "transmission_order" and c.joints == (3,)
+    ]
     for above, band in enumerate(bands, 1):
         (shape,) = band.shapes
-        assert above < shape.lowest < shape.start == above + 0.5 < shape.highest < above + 1
+        assert (
+            above
+            < shape.lowest
+            < shape.start
+            == above + 0.5
+            < shape.highest
+            < above + 1
+        )
         np.testing.assert_array_equal(shape.values(3), [above + 0.5])
         assert band.distinct_angles == 4 * (above + 1)
     assert len(bands) == 17 and len({band.location for band in bands}) == 17
     around = conditions_on(fanuc, states)
     made = displacements(bands[1], around, 2.7)
     angle = states.joint_angles[:, 2]
-    np.testing.assert_allclose(made[:, :, 2], [wave(k * angle) for k in (2.7, 5.4) for wave in (np.cos, np.sin)], rtol=1e-13)
+    np.testing.assert_allclose(
+        made[:, :, 2],
+        [wave(k * angle) for k in (2.7, 5.4) for wave in (np.cos, np.sin)],
+        rtol=1e-13,
+    )
 
 
-# An arm of two metres that turns about the vertical; eight kilograms a cubic metre of reach suit it.
-TURNTABLE, FULL_NM = "Rz(q1) Tx(2) [hand]", 8.0 * 2.0**3 * 9.80665 * 2.0
+# An arm of two metres that turns about the vertical; eight kilograms a cubic metre of
+# reach suit it.
+TURNTABLE = "Rz(q1) Tx(2) [hand]"
+FULL_NM = 8.0 * 2.0**3 * 9.80665 * 2.0
 
 
 @pytest.mark.parametrize(
@@ -43,10 +62,19 @@ TURNTABLE, FULL_NM = "Rz(q1) Tx(2) [hand]", 8.0 * 2.0**3 * 9.80665 * 2.0
     ],
 )
 @pytest.mark.parametrize("payload_kg", [None, 100.0])
-def test_torques_of_laws_are_shares_of_the_full_torque_of_the_joint(key, lowest, start, highest, payload_kg):
-    """Lost motion is read at 3 % of it. Of a kilonewton, or of the rated payload, two metres away."""
+def test_torques_of_laws_are_shares_of_the_full_torque_of_the_joint(
+    key, lowest, start, highest, payload_kg
+):
+    """Lost motion is read at 3 % of it. Of a kilonewton, or of the rated payload, two
+    metres away."""
     sites = replace(equipped(chain_of(TURNTABLE)), payload_kg=payload_kg)
     (shape,) = candidates_on(sites)[key].shapes
-    full = FULL_NM if payload_kg is None else 2.0 * payload_kg * np.linalg.norm(sites.gravity_m_s2)
-    assert (shape.lowest, shape.start, shape.highest) == pytest.approx((lowest * full, start * full, highest * full))
+    full = (
+        FULL_NM
+        if payload_kg is None
+        else 2.0 * payload_kg * np.linalg.norm(sites.gravity_m_s2)
+    )
+    assert (shape.lowest, shape.start, shape.highest) == pytest.approx(
+        (lowest * full, start * full, highest * full)
+    )
     assert (shape.name, shape.unit, shape.tried) == ("torque", "N m", 0)

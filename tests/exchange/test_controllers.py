@@ -1,4 +1,5 @@
-"""Programs say each target in the controller's words; names that it does not have are refused, unclear axes asked for."""
+"""Programs say each target in the controller's words; names that it does not have are
+refused, unclear axes asked for."""
 
 import re
 from pathlib import Path
@@ -8,11 +9,23 @@ import pytest
 from made_targets import ANGLES, RAIL, made_targets, numbers
 from support import refused
 
-from elastocal.exchange.controllers import CONTROLLERS, axes_of, check_name, controller_of
+from elastocal.exchange.controllers import (
+    CONTROLLERS,
+    axes_of,
+    check_name,
+    controller_of,
+)
 
-ALL, SIX = CONTROLLERS, (False,) * 6
-# What a line, or in TP a block, of a target begins with, and what the whole begins and ends with.
-TARGET = {"krl": r"  PTP .*", "rapid": r"  CONST .*", "tp": r"(?s)P\[\d\]\{.*?\};", "urscript": r"  movej.*"}
+ALL = CONTROLLERS
+SIX = (False,) * 6
+# What a line, or in TP a block, of a target begins with, and what the whole begins and
+# ends with.
+TARGET = {
+    "krl": r"  PTP .*",
+    "rapid": r"  CONST .*",
+    "tp": r"(?s)P\[\d\]\{.*?\};",
+    "urscript": r"  movej.*",
+}
 WHOLE = {
     "krl": ("&ACCESS RVP\nDEF go()\n", "\nEND\n"),
     "rapid": ("MODULE go\n", "  ENDPROC\nENDMODULE\n"),
@@ -30,7 +43,10 @@ def targets(name, **options):
 def test_a_language_is_found_by_its_name_and_by_the_suffix_of_its_files():
     suffixes = {"krl": ".src", "rapid": ".mod", "tp": ".ls", "urscript": ".script"}
     assert {name: each.suffix for name, each in ALL.items()} == suffixes
-    assert all(controller_of("", each.suffix.upper()) is controller_of(name, "") is each for name, each in ALL.items())
+    assert all(
+        controller_of("", each.suffix.upper()) is controller_of(name, "") is each
+        for name, each in ALL.items()
+    )
     assert controller_of("", ".csv") is None
     with refused("--format", "'karel'", "krl"):
         controller_of("karel", "")
@@ -40,8 +56,13 @@ def test_a_language_is_found_by_its_name_and_by_the_suffix_of_its_files():
 def test_every_target_stands_in_the_program_to_a_microdegree(name):
     found, text = targets(name)
     read = np.array([numbers(each)[:6] for each in found])
-    np.testing.assert_allclose(read if name == "urscript" else np.radians(read), ANGLES, atol=1e-8)
-    moves = {"rapid": r"MoveAbsJ target_(\d), v100, fine", "tp": r" \d:J P\[(\d)\] 10% FINE    ;"}.get(name)
+    np.testing.assert_allclose(
+        read if name == "urscript" else np.radians(read), ANGLES, atol=1e-8
+    )
+    moves = {
+        "rapid": r"MoveAbsJ target_(\d), v100, fine",
+        "tp": r" \d:J P\[(\d)\] 10% FINE    ;",
+    }.get(name)
     assert moves is None or re.findall(moves, text) == ["1", "2", "3", "4"]
 
 
@@ -70,8 +91,20 @@ def test_a_name_that_no_program_may_have_is_refused(name):
 
 
 def test_six_joints_that_turn_are_plain_a_rail_is_an_external_axis_and_others_are_asked_for():
-    assert axes_of(ALL["krl"], (True, *SIX), "") == ("E1", "A1", "A2", "A3", "A4", "A5", "A6")
-    assert axes_of(ALL["rapid"], (True, True, *SIX), "")[:3] == ("eax_a", "eax_b", "rax_1")
+    assert axes_of(ALL["krl"], (True, *SIX), "") == (
+        "E1",
+        "A1",
+        "A2",
+        "A3",
+        "A4",
+        "A5",
+        "A6",
+    )
+    assert axes_of(ALL["rapid"], (True, True, *SIX), "")[:3] == (
+        "eax_a",
+        "eax_b",
+        "rax_1",
+    )
     assert axes_of(ALL["tp"], (*SIX, True), "")[-2:] == ("J6", "E1")
     for prismatic in ((False,) * 7, (False,) * 4, (True,) + (False,) * 5):
         with refused("--format", "joints that turn", "--axes", "A1", "E1"):

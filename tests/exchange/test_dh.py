@@ -1,4 +1,5 @@
-"""Denavit-Hartenberg tables and kinematics files to robots, beside pinocchio; every fault is one line with line and column."""
+"""Denavit-Hartenberg tables and kinematics files to robots, beside pinocchio; every
+fault is one line with line and column."""
 
 import math
 
@@ -15,7 +16,8 @@ from elastocal.exchange.robot_text import robot_text
 from elastocal.mechanics.kinematics import poses
 from elastocal.mechanics.robot_file import robot_from_document
 
-PLAIN, RADIANS = DhOptions("deg", "m"), DhOptions("rad", "m")
+PLAIN = DhOptions("deg", "m")
+RADIANS = DhOptions("rad", "m")
 HEADER = "theta_offset,d,a,alpha"
 
 
@@ -26,7 +28,9 @@ def table(folder, text, name="arm.csv"):
 
 
 def write(folder, rows):
-    return table(folder, "\n".join([HEADER, *(",".join(map(str, row)) for row in rows)]) + "\n")
+    return table(
+        folder, "\n".join([HEADER, *(",".join(map(str, row)) for row in rows)]) + "\n"
+    )
 
 
 def screw(letter, turn, shift):
@@ -37,24 +41,34 @@ def screw(letter, turn, shift):
 def assert_stands(result, rows, modified):
     robot = robot_from_document(yaml.safe_load(robot_text(result)))
     for angles in np.random.default_rng(1).uniform(-2, 2, (4, robot.joints)):
-        at, values = pin.SE3.Identity(), iter(angles)
+        at = pin.SE3.Identity()
+        values = iter(angles)
         for theta, d, a, alpha in rows:
             about_z = screw("z", theta + next(values), d)
-            at = at * (screw("x", alpha, a) * about_z if modified else about_z * screw("x", alpha, a))
+            at = at * (
+                screw("x", alpha, a) * about_z
+                if modified
+                else about_z * screw("x", alpha, a)
+            )
         position, rotation = poses(robot.chain, angles[None], robot.chain.end_effector)
         np.testing.assert_allclose(position[0], at.translation, rtol=0, atol=1e-9)
         assert np.linalg.norm(pin.log3(at.rotation.T @ rotation[0])) < 1e-9
     return robot
 
 
-angle, length = st.floats(-3.2, 3.2), st.floats(-0.5, 0.5)
+angle = st.floats(-3.2, 3.2)
+length = st.floats(-0.5, 0.5)
 tables = st.lists(st.tuples(angle, length, length, angle), min_size=1, max_size=7)
 
 
 @settings(max_examples=20, deadline=None)
 @given(rows=tables, modified=st.booleans())
 def test_any_table_is_where_its_notation_puts_it(tmp_path_factory, rows, modified):
-    assert_stands(robot_from_dh(write(tmp_path_factory.mktemp("dh"), rows), modified, RADIANS), rows, modified)
+    assert_stands(
+        robot_from_dh(write(tmp_path_factory.mktemp("dh"), rows), modified, RADIANS),
+        rows,
+        modified,
+    )
 
 
 # A UR5 as its controller has calibrated it; d of the second to the fourth joint cancel.
@@ -68,8 +82,12 @@ UR5_CALIBRATED = [
 ]
 
 
-@pytest.mark.parametrize(("lever", "modified"), [(None, False), (3.0, True), (300.0, False)])
-def test_lengths_that_cancel_along_nearly_parallel_axes_become_short_ones(tmp_path, lever, modified):
+@pytest.mark.parametrize(
+    ("lever", "modified"), [(None, False), (3.0, True), (300.0, False)]
+)
+def test_lengths_that_cancel_along_nearly_parallel_axes_become_short_ones(
+    tmp_path, lever, modified
+):
     rows = [[*row] for row in UR5_CALIBRATED]
     for number, d in enumerate((lever, -lever - 0.1, 0.2) if lever else (), 1):
         rows[number][1] = d
@@ -86,30 +104,78 @@ def read(folder, text, **options):
 def test_a_row_is_in_si_units_and_names_come_along(tmp_path):
     text = "# maker's manual\njoint; theta_offset_deg; d_mm; a_m; alpha; type\n\nbase;90;250;-0,1;-1,5;R\nrest ;0;0;0;6,2;\n"
     result = read(tmp_path, text, angles="rad", lengths="mm")
-    assert (result.document["joint_names"], result.document["name"]) == (["base", "rest"], "two")
-    assert_stands(result, [(math.pi / 2, 0.25, -0.1, -1.5), (0, 0, 0, 6.2)], modified=False)
+    assert (result.document["joint_names"], result.document["name"]) == (
+        ["base", "rest"],
+        "two",
+    )
+    assert_stands(
+        result, [(math.pi / 2, 0.25, -0.1, -1.5), (0, 0, 0, 6.2)], modified=False
+    )
     # Units stand behind names in brackets or in a row of their own, too.
-    for head in ("[rad],d [mm],a (mm),alpha(rad)", ",d,a,alpha\n[rad],[mm],[mm],(rad)", "_rad,d,a_mm,alpha\nrad,mm,mm,rad"):
-        assert_stands(read(tmp_path, f"theta_offset{head}\n0,0.1,0.2,1.5\n"), [(0, 1e-4, 2e-4, 1.5)], modified=False)
+    for head in (
+        "[rad],d [mm],a (mm),alpha(rad)",
+        ",d,a,alpha\n[rad],[mm],[mm],(rad)",
+        "_rad,d,a_mm,alpha\nrad,mm,mm,rad",
+    ):
+        assert_stands(
+            read(tmp_path, f"theta_offset{head}\n0,0.1,0.2,1.5\n"),
+            [(0, 1e-4, 2e-4, 1.5)],
+            modified=False,
+        )
     text = "maker;d_m;a_m;alpha_deg;dynamics\nx;0.1;0;90;a,b\n"
-    assert "not used: maker, dynamics" in read(tmp_path, text, ignore=("maker", "dynamics")).notes
+    assert (
+        "not used: maker, dynamics"
+        in read(tmp_path, text, ignore=("maker", "dynamics")).notes
+    )
 
 
 JOINT_ROW = "joint,theta_offset_deg,d_m,a_m,alpha_deg,type\n"
 FAULTS = {
-    "no number": (JOINT_ROW + "1,0,0.1,0,90,R\n2,0,x,0,90,R\n", "line 3, column d_m", ["'x'"]),
+    "no number": (
+        JOINT_ROW + "1,0,0.1,0,90,R\n2,0,x,0,90,R\n",
+        "line 3, column d_m",
+        ["'x'"],
+    ),
     "nothing": (JOINT_ROW + "1,0,,0,90,R\n", "line 2, column d_m", ["nothing"]),
-    "a type": (JOINT_ROW + "1,0,0,0,90,P\n", "line 2, column type", ["'P'", "revolute"]),
+    "a type": (
+        JOINT_ROW + "1,0,0,0,90,P\n",
+        "line 2, column type",
+        ["'P'", "revolute"],
+    ),
     "no column": ("d_m,a_m\n0,0\n", "header", ["no column alpha"]),
-    "no unit": ("theta_offset_deg,d,a_m,alpha\ndeg,,,deg\n0,0,0,0\n", "header", ["no unit of 'd'", "--lengths"]),
+    "no unit": (
+        "theta_offset_deg,d,a_m,alpha\ndeg,,,deg\n0,0,0,0\n",
+        "header",
+        ["no unit of 'd'", "--lengths"],
+    ),
     "a column in two units": ("d_m,d_mm,a,alpha\n0,0,0,0\n", "header", ["d twice"]),
-    "more turns than a joint counts": (JOINT_ROW + "1,0,0.1,0,1e9,R\n", "line 2, column alpha_deg", ["'1e9'", "1000 turns at"]),
-    "more rows than a chain has room for": ("d,a,alpha\n" + "0,0,90\n" * 501, "", ["501 rows", "at most 500"]),
-    "a joint's name twice": ("joint,d,a,alpha\na,0,1,0\na,0,1,0\n", "column joint", ["each once"]),
+    "more turns than a joint counts": (
+        JOINT_ROW + "1,0,0.1,0,1e9,R\n",
+        "line 2, column alpha_deg",
+        ["'1e9'", "1000 turns at"],
+    ),
+    "more rows than a chain has room for": (
+        "d,a,alpha\n" + "0,0,90\n" * 501,
+        "",
+        ["501 rows", "at most 500"],
+    ),
+    "a joint's name twice": (
+        "joint,d,a,alpha\na,0,1,0\na,0,1,0\n",
+        "column joint",
+        ["each once"],
+    ),
     "millimetres": ("d,a,alpha\n0,425,0\n", "chain", ["metres"]),
     "two units": ("d_mm,a_m,alpha_deg\nm,m,deg\n0,0,0\n", "header", ["'d_mm' and 'm'"]),
-    "a unit of another kind": ("d_deg,a_m,alpha_deg\n0,0,0\n", "header", ["'d_deg' in deg", "--lengths"]),
-    "a column that nobody needs": ("maker,d,a,alpha\nx,0,0,0\n", "header", ["'maker'", "--ignore 'maker'"]),
+    "a unit of another kind": (
+        "d_deg,a_m,alpha_deg\n0,0,0\n",
+        "header",
+        ["'d_deg' in deg", "--lengths"],
+    ),
+    "a column that nobody needs": (
+        "maker,d,a,alpha\nx,0,0,0\n",
+        "header",
+        ["'maker'", "--ignore 'maker'"],
+    ),
 }
 
 
@@ -117,12 +183,17 @@ FAULTS = {
 def test_a_fault_names_its_line_and_column(tmp_path, fault):
     text, key, words = FAULTS[fault]
     with refused(table(tmp_path, text), key, *words):
-        robot_from_dh(tmp_path / "arm.csv", options=DhOptions("deg") if fault == "no unit" else PLAIN)
+        robot_from_dh(
+            tmp_path / "arm.csv",
+            options=DhOptions("deg") if fault == "no unit" else PLAIN,
+        )
 
 
 def test_degrees_where_radians_are_stated_and_what_is_no_table_are_refused(tmp_path):
     with refused(
-        table(tmp_path, "theta_offset,d,a,alpha\n0,0.162,0,1.5708\n0,0,-0.4,-90\n"), "line 3, column alpha", "--angles deg"
+        table(tmp_path, "theta_offset,d,a,alpha\n0,0.162,0,1.5708\n0,0,-0.4,-90\n"),
+        "line 3, column alpha",
+        "--angles deg",
     ):
         robot_from_dh(tmp_path / "arm.csv", options=RADIANS)
     for name, text in (("arm.yaml", "rows: 3"), ("arm.txt", "x")):
@@ -143,20 +214,38 @@ ORIGINS = {
 
 @pytest.mark.parametrize("order", [1, -1])
 def test_a_calibrated_arm_is_where_its_origins_put_it(tmp_path, order):
-    described = {name: dict(zip(KEYS, ORIGINS[name], strict=True)) for name in [*ORIGINS][::order]} | {"hash": "calib_7"}
-    path = table(tmp_path, yaml.safe_dump({"kinematics": described}, sort_keys=False), "calib.yaml")
+    described = {
+        name: dict(zip(KEYS, ORIGINS[name], strict=True))
+        for name in [*ORIGINS][::order]
+    } | {"hash": "calib_7"}
+    path = table(
+        tmp_path,
+        yaml.safe_dump({"kinematics": described}, sort_keys=False),
+        "calib.yaml",
+    )
     result = robot_from_dh(path, name="ur5")
     robot = robot_from_document(yaml.safe_load(robot_text(result)))
     wrist = "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"
-    assert robot.joint_names == ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", *wrist)
-    assert robot.chain.end_effector.name == "wrist_3" and any("base_link" in note for note in result.notes)
+    assert robot.joint_names == (
+        "shoulder_pan_joint",
+        "shoulder_lift_joint",
+        "elbow_joint",
+        *wrist,
+    )
+    assert robot.chain.end_effector.name == "wrist_3" and any(
+        "base_link" in note for note in result.notes
+    )
     q = np.random.default_rng(0).uniform(-3, 3, (5, 6))
     position, rotation = poses(robot.chain, q, robot.chain.end_effector)
     for number, angles in enumerate(q):
         at = pin.SE3.Identity()
         for name, angle in zip(ORIGINS, angles, strict=True):
             *shift, roll, pitch, yaw = ORIGINS[name]
-            at = at * pin.SE3(pin.rpy.rpyToMatrix(roll, pitch, yaw), np.array(shift, float)) * screw("z", angle, 0.0)
+            at = (
+                at
+                * pin.SE3(pin.rpy.rpyToMatrix(roll, pitch, yaw), np.array(shift, float))
+                * screw("z", angle, 0.0)
+            )
         np.testing.assert_allclose(position[number], at.translation, rtol=0, atol=1e-9)
         np.testing.assert_allclose(rotation[number], at.rotation, rtol=0, atol=1e-9)
     with refused("--modified", "", "kinematics"):
@@ -169,7 +258,11 @@ def test_a_calibrated_arm_is_where_its_origins_put_it(tmp_path, order):
         ({"hash": "x"}, "kinematics", ["no link"]),
         ({"shoulder": {"x": 1}}, "kinematics.shoulder", ["found x;", "roll"]),
         ({"shoulder": dict.fromkeys(KEYS, "a")}, "kinematics.shoulder.x", ["'a'"]),
-        (dict.fromkeys(("shoulder", "forearm"), dict.fromkeys(KEYS, 0)), "kinematics", ["no link upper_arm"]),
+        (
+            dict.fromkeys(("shoulder", "forearm"), dict.fromkeys(KEYS, 0)),
+            "kinematics",
+            ["no link upper_arm"],
+        ),
     ],
 )
 def test_what_is_no_kinematics_is_refused(tmp_path, described, key, words):

@@ -1,4 +1,5 @@
-"""The text of a robot file, read by a person and by the loader; its fixed transforms in words, beside pinocchio's rotations."""
+"""The text of a robot file, read by a person and by the loader; its fixed transforms in
+words, beside pinocchio's rotations."""
 
 import numpy as np
 import pinocchio as pin
@@ -19,8 +20,12 @@ from elastocal.mechanics.chain import parse_chain
 from elastocal.mechanics.kinematics import poses
 
 DOCUMENT = {
-    "masses": [{"link": 1, "mass_kg": 2.0, "centre_m": [1e-5, 0.0, 0.5], "relative_std": 0.2}],
-    "chain": "Tz(0.5) Rz(q1) " + " ".join(["Tx(0.1) Rx(90deg)"] * 20) + " Tz(q2) [flange]",
+    "masses": [
+        {"link": 1, "mass_kg": 2.0, "centre_m": [1e-5, 0.0, 0.5], "relative_std": 0.2}
+    ],
+    "chain": "Tz(0.5) Rz(q1) "
+    + " ".join(["Tx(0.1) Rx(90deg)"] * 20)
+    + " Tz(q2) [flange]",
     "joint_limits_deg": [[-180.0, 180.0], [0.0, 0.5]],
     "joint_names": ["yes", "joint: 2"],
     "name": "arm #1: 'heavy'",
@@ -30,18 +35,30 @@ DOCUMENT = {
 @pytest.fixture
 def result(tmp_path):
     (tmp_path / "x.urdf").write_text("something")
-    return check_imported(DOCUMENT, tmp_path / "x.urdf", "by hand", ["masses are guessed"])
+    return check_imported(
+        DOCUMENT, tmp_path / "x.urdf", "by hand", ["masses are guessed"]
+    )
 
 
-def test_the_text_gives_back_the_document_under_a_head_whatever_the_file_is_called(tmp_path, result):
+def test_the_text_gives_back_the_document_under_a_head_whatever_the_file_is_called(
+    tmp_path, result
+):
     lines = robot_text(result).splitlines()
     assert yaml.safe_load(robot_text(result)) == DOCUMENT
-    assert lines[0] == "# From x.urdf (sha256 3fc9b689459d738f), by hand." and "# Masses are guessed." in lines
-    assert any("No compliances" in line for line in lines) and any("payload_kg" in line for line in lines)
+    assert (
+        lines[0] == "# From x.urdf (sha256 3fc9b689459d738f), by hand."
+        and "# Masses are guessed." in lines
+    )
+    assert any("No compliances" in line for line in lines) and any(
+        "payload_kg" in line for line in lines
+    )
     assert all(len(line) <= 128 for line in lines)
     path = tmp_path / "x\u2028payload_kg: 9"
     path.write_text("")
-    assert yaml.safe_load(robot_text(check_imported(DOCUMENT, path, "by hand", ()))) == DOCUMENT
+    assert (
+        yaml.safe_load(robot_text(check_imported(DOCUMENT, path, "by hand", ())))
+        == DOCUMENT
+    )
 
 
 def test_nothing_is_replaced_unless_it_shall_be(tmp_path, result):
@@ -50,7 +67,9 @@ def test_nothing_is_replaced_unless_it_shall_be(tmp_path, result):
     write_robot(result, path)
     assert yaml.safe_load(path.read_text()) == DOCUMENT
     with refused(path, "chain", "metres"):
-        check_imported(DOCUMENT | {"chain": "Tz(500) Rz(q1) Tz(q2) [flange]"}, path, "by hand", ())
+        check_imported(
+            DOCUMENT | {"chain": "Tz(500) Rz(q1) Tz(q2) [flange]"}, path, "by hand", ()
+        )
     with refused(path, "", "already", "--force"):
         refuse_existing(path, False)
     refuse_existing(path, True)
@@ -59,14 +78,20 @@ def test_nothing_is_replaced_unless_it_shall_be(tmp_path, result):
             refuse_existing(place, True)
 
 
-angles = st.one_of(st.floats(-np.pi, np.pi), st.sampled_from([np.pi / 2, -np.pi / 2, np.pi / 2 - 1e-9, np.pi / 2 - 1e-13, 0.0]))
+angles = st.one_of(
+    st.floats(-np.pi, np.pi),
+    st.sampled_from([np.pi / 2, -np.pi / 2, np.pi / 2 - 1e-9, np.pi / 2 - 1e-13, 0.0]),
+)
 
 
 @given(angles, angles, angles, st.tuples(*[st.floats(-2, 2)] * 3))
 def test_a_displacement_is_what_its_words_make(roll, pitch, yaw, shift):
     transform = np.eye(4)
-    transform[:3, :3], transform[:3, 3] = pin.rpy.rpyToMatrix(roll, pitch, yaw), shift
-    chain = parse_chain(" ".join(["Rz(q1)", *displacement_words(transform), "[E]"]), {}, "x")
+    transform[:3, :3] = pin.rpy.rpyToMatrix(roll, pitch, yaw)
+    transform[:3, 3] = shift
+    chain = parse_chain(
+        " ".join(["Rz(q1)", *displacement_words(transform), "[E]"]), {}, "x"
+    )
     position, rotation = poses(chain, np.zeros((1, 1)), chain.end_effector)
     np.testing.assert_allclose(position[0], shift, rtol=0, atol=1e-11)
     np.testing.assert_allclose(rotation[0], transform[:3, :3], rtol=0, atol=1e-11)

@@ -21,12 +21,18 @@ def write_path(folder, header=HEADER, rows=ROWS):
 def test_poses_are_read_loads_and_postures_where_they_are(tmp_path):
     found = read_target_path(write_path(tmp_path), 6)
     np.testing.assert_array_equal(found.position, [[1.0, 0.2, 0.5], [1.1, 0.2, 0.5]])
-    np.testing.assert_allclose(Rotation.from_matrix(found.rotation[0]).as_rotvec(), [0.1, 0.2, 0.3])
+    np.testing.assert_allclose(
+        Rotation.from_matrix(found.rotation[0]).as_rotvec(), [0.1, 0.2, 0.3]
+    )
     assert found.start is None and found.wrench is None and len(found) == 2
     header = HEADER + ",fx,fy,fz,mx,my,mz,q1,q2"
-    found = read_target_path(write_path(tmp_path, header, [row + ",1,2,3,4,5,6,0.1,0.2" for row in ROWS]), 2)
+    found = read_target_path(
+        write_path(tmp_path, header, [row + ",1,2,3,4,5,6,0.1,0.2" for row in ROWS]), 2
+    )
     np.testing.assert_array_equal(found.wrench[1], [1, 2, 3, 4, 5, 6])
-    forces = read_target_path(write_path(tmp_path, HEADER + ",fx,fy,fz", [row + ",1,2,3" for row in ROWS]), 2)
+    forces = read_target_path(
+        write_path(tmp_path, HEADER + ",fx,fy,fz", [row + ",1,2,3" for row in ROWS]), 2
+    )
     np.testing.assert_array_equal(forces.wrench, [[1, 2, 3, 0, 0, 0]] * 2)
     np.testing.assert_array_equal(found.start[0], [0.1, 0.2])
 
@@ -37,14 +43,39 @@ def test_poses_are_read_loads_and_postures_where_they_are(tmp_path):
         ("x,y,z,rx,ry", "1,0,0,0,0", "line 1", ["no column 'rz'"]),
         (HEADER + ",q3", "1,0,0,0,0,0,1", "line 1", ["unknown column 'q3'"]),
         (HEADER + ",fx", "1,0,0,0,0,0,1", "line 1", ["fx without fy, fz"]),
-        (HEADER + ",fx,fy,fz,mx", "1,0,0,0,0,0,1,2,3,4", "line 1", ["mx without my, mz"]),
+        (
+            HEADER + ",fx,fy,fz,mx",
+            "1,0,0,0,0,0,1,2,3,4",
+            "line 1",
+            ["mx without my, mz"],
+        ),
         (HEADER, "1,0,left,0,0,0", "line 2, column z", ["'left'"]),
-        ("# made by hand\n" + HEADER, "1,0,1e999,0,0,0", "line 3, column z", ["'1e999'"]),
+        (
+            "# made by hand\n" + HEADER,
+            "1,0,1e999,0,0,0",
+            "line 3, column z",
+            ["'1e999'"],
+        ),
         (HEADER, "1100,0,0,0,0,0", "line 2", ["1100", "metres"]),
-        (HEADER, "1,0,0,0,0,90", "line 2", ["a turn of 90", "rad, not degrees, 9.42 at most"]),
+        (
+            HEADER,
+            "1,0,0,0,0,90",
+            "line 2",
+            ["a turn of 90", "rad, not degrees, 9.42 at most"],
+        ),
         (HEADER, "1,0,0,0,0,\x1b[2J", "line 2", [r"the character '\x1b'"]),
-        (HEADER + ",temperature_c", "1,0,0,0,0,0,20", "line 1", ["unknown column 'temperature_c'"]),
-        (HEADER + ",fx,fy,fz,mx,my,mz", "1,0,0,0,0,0,0,0,-1e9,0,0,0", "line 2, column fz", ["'-1e9'", "1e+06 N"]),
+        (
+            HEADER + ",temperature_c",
+            "1,0,0,0,0,0,20",
+            "line 1",
+            ["unknown column 'temperature_c'"],
+        ),
+        (
+            HEADER + ",fx,fy,fz,mx,my,mz",
+            "1,0,0,0,0,0,0,0,-1e9,0,0,0",
+            "line 2, column fz",
+            ["'-1e9'", "1e+06 N"],
+        ),
     ],
 )
 def test_a_fault_is_refused_with_its_place(tmp_path, header, row, key, words):
@@ -54,10 +85,17 @@ def test_a_fault_is_refused_with_its_place(tmp_path, header, row, key, words):
 
 def test_joint_angles_in_degrees_are_refused_as_such(tmp_path):
     header = HEADER + "".join(f",q{joint}" for joint in range(1, 7))
-    path = write_path(tmp_path, header, [ROWS[0] + ",0.5,-1.2,1.4,0,0.6,0", ROWS[1] + ",45,-60,90,0,30,0"])
+    path = write_path(
+        tmp_path,
+        header,
+        [ROWS[0] + ",0.5,-1.2,1.4,0,0.6,0", ROWS[1] + ",45,-60,90,0,30,0"],
+    )
     with refused(path, "line 3", "q1 looks like degrees: 45; allowed: rad"):
         read_target_path_of(path, analysed("kuka"))
     assert (
-        read_target_path_of(write_path(tmp_path, header, [ROWS[0] + ",3.3,-1.2,1.4,0,0.6,0"]), analysed("kuka")).start[0, 0]
+        read_target_path_of(
+            write_path(tmp_path, header, [ROWS[0] + ",3.3,-1.2,1.4,0,0.6,0"]),
+            analysed("kuka"),
+        ).start[0, 0]
         == 3.3
     )

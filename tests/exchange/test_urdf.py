@@ -1,4 +1,5 @@
-"""URDF, read safely, to robot file and back into poses and torques, beside pinocchio; every fault is one line."""
+"""URDF, read safely, to robot file and back into poses and torques, beside pinocchio;
+every fault is one line."""
 
 import numpy as np
 import pytest
@@ -24,10 +25,41 @@ ARM = (
     link("hand", 1.0, (0.0, 0.03, 0.04)),
     link("flange"),
     link("finger", 0.2, (0.0, 0.0, 0.06)),
-    joint("shoulder", "base", "upper", xyz=(0.1, -0.2, 0.4), rpy=(0.3, -0.4, 1.2), axis=(0, 1, 0), limits=(-1.5, 2.0)),
-    joint("bolted", "upper", "bracket", "fixed", xyz=(0.0, 0.1, 0.2), rpy=(np.pi / 2, 0, 0)),
-    joint("elbow", "bracket", "fore", "continuous", xyz=(0.5, 0, 0), rpy=(0, np.pi / 2, 0.7), axis=(1.0, -2.0, 0.5)),
-    joint("rail", "fore", "slide", "prismatic", xyz=(0.3, 0.01, 0), axis=(0.6, 0, 0.8), limits=(-0.1, 0.25)),
+    joint(
+        "shoulder",
+        "base",
+        "upper",
+        xyz=(0.1, -0.2, 0.4),
+        rpy=(0.3, -0.4, 1.2),
+        axis=(0, 1, 0),
+        limits=(-1.5, 2.0),
+    ),
+    joint(
+        "bolted",
+        "upper",
+        "bracket",
+        "fixed",
+        xyz=(0.0, 0.1, 0.2),
+        rpy=(np.pi / 2, 0, 0),
+    ),
+    joint(
+        "elbow",
+        "bracket",
+        "fore",
+        "continuous",
+        xyz=(0.5, 0, 0),
+        rpy=(0, np.pi / 2, 0.7),
+        axis=(1.0, -2.0, 0.5),
+    ),
+    joint(
+        "rail",
+        "fore",
+        "slide",
+        "prismatic",
+        xyz=(0.3, 0.01, 0),
+        axis=(0.6, 0, 0.8),
+        limits=(-0.1, 0.25),
+    ),
     joint("wrist", "slide", "hand", xyz=(0, 0, 0.1), rpy=(-0.2, 0, 0), axis=(-1, 0, 0)),
     joint("plate", "hand", "flange", "fixed", xyz=(0, 0, 0.08), rpy=(0, 0, 3.0)),
     joint("grip", "hand", "finger", "prismatic", xyz=(0.0, 0.02, 0.1), axis=(0, 1, 0)),
@@ -42,36 +74,66 @@ def through_its_file(result):
 
 
 def assert_same_weight(arm, path, within=None):
-    states, by_pinocchio = made_states(arm.joints, 6, seed=3), Pinocchio(path)
+    states = made_states(arm.joints, 6, seed=3)
+    by_pinocchio = Pinocchio(path)
     own = conditions_of(sites_of(arm), arm.compliance, states).gravity[:, : arm.joints]
     for angles, torque in zip(states.joint_angles, own, strict=True):
-        expected = by_pinocchio.weight(dict(zip(arm.joint_names, angles, strict=True)), arm.joint_names)
-        np.testing.assert_allclose(torque, expected, rtol=0, atol=within or 1e-6 * max(1.0, np.abs(expected).max()))
+        expected = by_pinocchio.weight(
+            dict(zip(arm.joint_names, angles, strict=True)), arm.joint_names
+        )
+        np.testing.assert_allclose(
+            torque,
+            expected,
+            rtol=0,
+            atol=within or 1e-6 * max(1.0, np.abs(expected).max()),
+        )
     return np.abs(own).max()
 
 
 @pytest.mark.parametrize(
     ("base", "tip", "names"),
-    [("base", "flange", ("shoulder", "elbow", "rail", "wrist")), ("upper", "hand", ("elbow", "rail", "wrist"))],
+    [
+        ("base", "flange", ("shoulder", "elbow", "rail", "wrist")),
+        ("upper", "hand", ("elbow", "rail", "wrist")),
+    ],
 )
-def test_a_chain_or_a_part_of_the_tree_stands_and_weighs_where_pinocchio_has_it(tmp_path, base, tip, names):
+def test_a_chain_or_a_part_of_the_tree_stands_and_weighs_where_pinocchio_has_it(
+    tmp_path, base, tip, names
+):
     path = written(tmp_path, *ARM)
     result = robot_from_urdf(path, base, tip)
     arm = through_its_file(result)
-    assert arm.joint_names == names and {mass.link for mass in arm.masses} == {*range(len(names) + 1)}
+    assert arm.joint_names == names and {mass.link for mass in arm.masses} == {
+        *range(len(names) + 1)
+    }
     assert_same_poses(arm, path, base, tip)
     assert assert_same_weight(arm, path) > 1.0
     # What a URDF does not say is not made up.
-    assert not arm.compliance_known and {mass.relative_std for mass in arm.masses} == {0.2}
-    assert any("no compliances" in note for note in result.notes) and any("20 %, by assumption" in n for n in result.notes)
+    assert not arm.compliance_known and {mass.relative_std for mass in arm.masses} == {
+        0.2
+    }
+    assert any("no compliances" in note for note in result.notes) and any(
+        "20 %, by assumption" in n for n in result.notes
+    )
 
 
 @pytest.mark.parametrize(
     ("limits", "found"),
-    [(None, "no limits"), ((-1e16, 1e16), "no radians"), ((-170, 170), "limits of -170 to 170, no radians")],
+    [
+        (None, "no limits"),
+        ((-1e16, 1e16), "no radians"),
+        ((-170, 170), "limits of -170 to 170, no radians"),
+    ],
 )
-def test_no_limits_and_those_that_are_no_radians_are_a_turn_either_way(tmp_path, limits, found):
-    free = written(tmp_path, link("a"), link("b"), joint("j", "a", "b", xyz=(0, 0, 1), limits=limits))
+def test_no_limits_and_those_that_are_no_radians_are_a_turn_either_way(
+    tmp_path, limits, found
+):
+    free = written(
+        tmp_path,
+        link("a"),
+        link("b"),
+        joint("j", "a", "b", xyz=(0, 0, 1), limits=limits),
+    )
     result = robot_from_urdf(free, "a", "b")
     assert result.document["joint_limits_deg"] == [[-360.0, 360.0]]
     assert any("'j' has" in note and found in note for note in result.notes)
@@ -87,7 +149,10 @@ TREE = (
 
 
 def one_joint(*names, **more):
-    return (*map(link, names), *(joint(f"j{n}", *names[n : n + 2], **more) for n in range(len(names) - 1)))
+    return (
+        *map(link, names),
+        *(joint(f"j{n}", *names[n : n + 2], **more) for n in range(len(names) - 1)),
+    )
 
 
 @pytest.mark.parametrize(
@@ -106,9 +171,19 @@ def one_joint(*names, **more):
             ["planar", "revolute"],
         ),
         (one_joint("a", "b", axis=(0, 0, 0)), ("a", "b"), "joint 'j0'", ["0 0 0"]),
-        ((*map(link, "ab"), joint("j", "a", "b", mimic=("x", 1.0, 0.0))), ("a", "b"), "joint 'j'", ["mimics"]),
+        (
+            (*map(link, "ab"), joint("j", "a", "b", mimic=("x", 1.0, 0.0))),
+            ("a", "b"),
+            "joint 'j'",
+            ["mimics"],
+        ),
         (one_joint("a", "b c", "b_c"), ("a", "b_c", ["b c"]), "point", ["blanks"]),
-        (one_joint("a", "b", kind="prismatic", limits=None), ("a", "b"), "joint 'j0': limit", ["metres"]),
+        (
+            one_joint("a", "b", kind="prismatic", limits=None),
+            ("a", "b"),
+            "joint 'j0': limit",
+            ["metres"],
+        ),
     ],
 )
 def test_what_makes_no_chain_is_refused(tmp_path, parts, links, key, words):
@@ -131,14 +206,23 @@ def file_of(folder, text, encoding="utf-8"):
 
 
 def test_meshes_and_what_else_is_no_joint_or_mass_is_left_out(tmp_path):
-    mesh = '<visual><geometry><mesh filename="package://gone/x.stl"/></geometry></visual>'
+    mesh = (
+        '<visual><geometry><mesh filename="package://gone/x.stl"/></geometry></visual>'
+    )
     heavy = link("b", 2.0, (0, 0, 1)).replace("</link>", mesh + "</link>")
-    found = read_urdf(file_of(tmp_path, robot(link("a"), heavy, SOUND[2], '<gazebo reference="a"/>', name="arm")))
+    found = read_urdf(
+        file_of(
+            tmp_path,
+            robot(link("a"), heavy, SOUND[2], '<gazebo reference="a"/>', name="arm"),
+        )
+    )
     assert found.name == "arm"
     assert found.moments["b"].tolist() == [0, 0, 2, 2] and not found.moments["a"].any()
 
 
-@pytest.mark.parametrize("text", [BOMB, OUTSIDE], ids=["entities of entities", "an entity outside"])
+@pytest.mark.parametrize(
+    "text", [BOMB, OUTSIDE], ids=["entities of entities", "an entity outside"]
+)
 def test_entities_are_refused_before_they_are_looked_at(tmp_path, text):
     for encoding in ("utf-8", "utf-16"):
         with refused(tmp_path / "made.urdf", "", "<!DOCTYPE"):
@@ -147,7 +231,9 @@ def test_entities_are_refused_before_they_are_looked_at(tmp_path, text):
 
 def test_more_than_a_urdf_can_have_is_refused_at_once(tmp_path, monkeypatch):
     links = [link(f"l{number}") for number in range(2002)]
-    joints = [joint(f"j{number}", f"l{number}", f"l{number + 1}") for number in range(2001)]
+    joints = [
+        joint(f"j{number}", f"l{number}", f"l{number + 1}") for number in range(2001)
+    ]
     with refused(tmp_path / "made.urdf", "", "2002 times <link>", "at most 2000"):
         read_urdf(file_of(tmp_path, robot(*links, *joints)))
     with refused(tmp_path / "made.urdf", "", "more than 50 elements in each other"):
@@ -166,15 +252,39 @@ def changed(old, new):
 MACRO = '<robot name="x" xmlns:xacro="http://ros.org/wiki/xacro"><xacro:include filename="y"/></robot>'
 FAULTS = {
     "a macro": (MACRO, "", ["<xacro:include>", "run it first"]),
-    "a property": (robot(link("${prefix}a"), *SOUND), "<link>", ["${prefix}a", "run it first"]),
+    "a property": (
+        robot(link("${prefix}a"), *SOUND),
+        "<link>",
+        ["${prefix}a", "run it first"],
+    ),
     "no XML": ("name: KUKA\n", "line 1", ["XML"]),
     "no name": (robot(*SOUND, "<link/>"), "link ''", ["a name for each"]),
-    "an unknown type": (robot(*SOUND[:2], joint("j", "a", "b", "hinge")), "joint 'j'", ["'hinge'", "revolute"]),
-    "two parents": (robot(*SOUND, joint("k", "a", "b")), "joint 'k'", ["another joint"]),
+    "an unknown type": (
+        robot(*SOUND[:2], joint("j", "a", "b", "hinge")),
+        "joint 'j'",
+        ["'hinge'", "revolute"],
+    ),
+    "two parents": (
+        robot(*SOUND, joint("k", "a", "b")),
+        "joint 'k'",
+        ["another joint"],
+    ),
     "a loop": (robot(*SOUND, joint("k", "b", "a")), "link", ["a loop"]),
-    "a word for a number": (changed('upper="2"', 'upper="two"'), "joint 'j': limit upper", ["'two'"]),
-    "a negative mass": (robot(link("a", -1.0), *SOUND[1:]), "link 'a': mass value", ["-1", "0 or more"]),
-    "a number beyond all machines": (changed(PLACE, 'xyz="0 0 1e300"'), "joint 'j': origin xyz", ["1e300"]),
+    "a word for a number": (
+        changed('upper="2"', 'upper="two"'),
+        "joint 'j': limit upper",
+        ["'two'"],
+    ),
+    "a negative mass": (
+        robot(link("a", -1.0), *SOUND[1:]),
+        "link 'a': mass value",
+        ["-1", "0 or more"],
+    ),
+    "a number beyond all machines": (
+        changed(PLACE, 'xyz="0 0 1e300"'),
+        "joint 'j': origin xyz",
+        ["1e300"],
+    ),
 }
 
 
@@ -189,7 +299,9 @@ def weights(tmp_path, *parts, base="base", tip="hand"):
     """Entries of the robot file, and notes of what weighs."""
     found = robot_from_urdf(written(tmp_path, *parts), base, tip)
     words = ("zero for what", "placeholders", "gravity")
-    return found.document.get("masses", []), [note for note in found.notes if any(word in note for word in words)]
+    return found.document.get("masses", []), [
+        note for note in found.notes if any(word in note for word in words)
+    ]
 
 
 FLANGED = (
@@ -199,20 +311,36 @@ FLANGED = (
     joint("j1", "base", "arm", xyz=(0, 0, 1), axis=(0, 1, 0)),
     joint("end", "arm", "hand", "fixed", (1, 0, 0)),
 )
-FINGER = (link("finger", 1.0, (0, 0, 0.1)), joint("open", "hand", "finger", "prismatic", (0, 0, 0.2)))
+FINGER = (
+    link("finger", 1.0, (0, 0, 0.1)),
+    joint("open", "hand", "finger", "prismatic", (0, 0, 0.2)),
+)
 
 
-def test_what_moves_beside_the_chain_weighs_as_at_zero_and_beside_the_column_not_at_all(tmp_path):
+def test_what_moves_beside_the_chain_weighs_as_at_zero_and_beside_the_column_not_at_all(
+    tmp_path,
+):
     masses, (note,) = weights(tmp_path, *FLANGED, *FINGER)
-    entry = {"link": 1, "mass_kg": 3.0, "centre_m": pytest.approx([0.4, 0, 0.1]), "relative_std": 0.2}
+    entry = {
+        "link": 1,
+        "mass_kg": 3.0,
+        "centre_m": pytest.approx([0.4, 0, 0.1]),
+        "relative_std": 0.2,
+    }
     assert masses[1] == entry and "open" in note and "zero" in note
-    result = robot_from_urdf(written(tmp_path, *FLANGED, link("door", 7.0), joint("hinge", "base", "door")), "base", "hand")
+    result = robot_from_urdf(
+        written(tmp_path, *FLANGED, link("door", 7.0), joint("hinge", "base", "door")),
+        "base",
+        "hand",
+    )
     assert [entry["mass_kg"] for entry in result.document["masses"]] == [9.0, 2.0]
     assert "joints that are no part of the chain, left out: hinge" in result.notes
 
 
 def test_equal_masses_are_placeholders(tmp_path):
-    parts = [link(name, 2.0) for name in "abcd"] + [joint(f"j{n}", "abcd"[n], "abcd"[n + 1]) for n in range(3)]
+    parts = [link(name, 2.0) for name in "abcd"] + [
+        joint(f"j{n}", "abcd"[n], "abcd"[n + 1]) for n in range(3)
+    ]
     masses, notes = weights(tmp_path, *parts, base="a", tip="d")
     assert masses == [] and "2 kg: placeholders" in notes[0]
     other, _ = weights(tmp_path, link("a", 2.1), *parts[1:], base="a", tip="d")
@@ -220,7 +348,12 @@ def test_equal_masses_are_placeholders(tmp_path):
 
 
 def test_gravity_turns_with_a_base_that_does_not_stand_upright(tmp_path):
-    wall = (link("wall"), joint("bolts", "wall", "base", "fixed", rpy=(0, np.pi / 2, 0)))
+    wall = (
+        link("wall"),
+        joint("bolts", "wall", "base", "fixed", rpy=(0, np.pi / 2, 0)),
+    )
     path = written(tmp_path, *wall, *FLANGED)
-    assert robot_from_urdf(path, "base", "hand").document["gravity_m_s2"] == pytest.approx([9.80665, 0, 0])
+    assert robot_from_urdf(path, "base", "hand").document[
+        "gravity_m_s2"
+    ] == pytest.approx([9.80665, 0, 0])
     assert "gravity_m_s2" not in robot_from_urdf(path, "wall", "hand").document

@@ -1,4 +1,5 @@
-"""The user's own URDF with joint origins changed and nothing else, as pinocchio has it."""
+"""The user's own URDF with joint origins changed and nothing else, as pinocchio has
+it."""
 
 from xml.etree import ElementTree as Xml
 
@@ -15,18 +16,29 @@ from elastocal.exchange.urdf import robot_from_urdf
 from elastocal.exchange.urdf_writing import write_calibrated_origins
 from elastocal.mechanics.sites import sites_of
 
-# With what people have in their files: comments, meshes, other programs' elements, a mimic, an origin that is not written.
+# With what people have in their files: comments, meshes, other programs' elements, a
+# mimic, an origin that is not written.
 MESH = '<visual><geometry><mesh filename="part.stl" scale="0.5 0.5 0.5"/></geometry></visual>'
 PARTS = (
     '<material name="red"><color rgba="1 0 0 1"/></material>',
     *map(link, ("base", "arm", "plate", "hand", "tool0", "finger")),
     link("mount", 2.0).replace("</link>", f"{MESH}</link><!-- geprüft -->"),
-    joint("rail", "base", "mount", "prismatic", xyz=(0, 0, 0.2), axis=(0, 1, 0)).replace(
-        "<origin", "<dynamics damping='1'/><origin"
+    joint(
+        "rail", "base", "mount", "prismatic", xyz=(0, 0, 0.2), axis=(0, 1, 0)
+    ).replace("<origin", "<dynamics damping='1'/><origin"),
+    joint("a1", "mount", "arm", axis=(0.6, 0, 0.8)).replace(
+        '<origin xyz="0.0 0.0 0.0" rpy="0.0 0.0 0.0"/>', "\n"
     ),
-    joint("a1", "mount", "arm", axis=(0.6, 0, 0.8)).replace('<origin xyz="0.0 0.0 0.0" rpy="0.0 0.0 0.0"/>', "\n"),
     joint("bolts", "arm", "plate", "fixed", xyz=(0.5, 0, 0), rpy=(0.2, 0, 0)),
-    joint("a2", "plate", "hand", "continuous", xyz=(0.4, 0.02, 0), rpy=(1.5708, 0, 0), axis=(0, 0, -1)),
+    joint(
+        "a2",
+        "plate",
+        "hand",
+        "continuous",
+        xyz=(0.4, 0.02, 0),
+        rpy=(1.5708, 0, 0),
+        axis=(0, 0, -1),
+    ),
     joint("flange", "hand", "tool0", "fixed", xyz=(0.1, 0, 0)),
     joint("grip", "hand", "finger", "prismatic", mimic=("a2", 1.0, 0.0)),
     '<transmission name="t"><joint name="a1"><origin xyz="5 5 5"/></joint></transmission>',
@@ -34,9 +46,15 @@ PARTS = (
 
 
 def calibrated_of(robot, seed=4):
-    places, known = range(1, robot.joints + 1), candidates_on(sites_of(robot))
-    keys = [*(f"joint_offset@{place}" for place in places), *(f"link_geometry@{place}" for place in places)]
-    made = made_calibrated(robot, *(key for key in keys if key in known), identified=False, seed=seed)
+    places = range(1, robot.joints + 1)
+    known = candidates_on(sites_of(robot))
+    keys = [
+        *(f"joint_offset@{place}" for place in places),
+        *(f"link_geometry@{place}" for place in places),
+    ]
+    made = made_calibrated(
+        robot, *(key for key in keys if key in known), identified=False, seed=seed
+    )
     return fold_effects(made).robot
 
 
@@ -61,9 +79,16 @@ def test_all_but_joint_origins_is_as_it_was(cell):
     assert_same_poses(cell[2], output, "base", "tool0")
 
     def elements(path):
-        root = Xml.fromstring(path.read_bytes(), Xml.XMLParser(target=Xml.TreeBuilder(insert_comments=True)))
+        root = Xml.fromstring(
+            path.read_bytes(),
+            Xml.XMLParser(target=Xml.TreeBuilder(insert_comments=True)),
+        )
         origins = {joint.find("origin") for joint in root.findall("joint")}
-        return [(str(each.tag)[:9], each.attrib, (each.text or "").strip()) for each in root.iter() if each not in origins]
+        return [
+            (str(each.tag)[:9], each.attrib, (each.text or "").strip())
+            for each in root.iter()
+            if each not in origins
+        ]
 
     assert elements(output) == elements(cell[0])
 
@@ -80,7 +105,9 @@ def test_all_but_joint_origins_is_as_it_was(cell):
 def test_another_robots_file_is_refused(cell, old, new, words):
     path, robot, calibrated = cell
     other = path.with_name("other.urdf")
-    other.write_text(path.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
+    other.write_text(
+        path.read_text(encoding="utf-8").replace(old, new), encoding="utf-8"
+    )
     with refused(other, words, "imported"):
         write_calibrated_origins(other, robot, calibrated)
 
@@ -90,9 +117,31 @@ def test_another_robots_file_is_refused(cell, old, new, words):
 def test_any_chain_moves_as_its_calibrated_robot(tmp_path_factory, parts, seed):
     described = [link("l0")]
     for number, (kind, xyz, rpy, axis, *_) in enumerate(parts, 1):
-        described += [link(f"l{number}"), joint(f"j{number}", f"l{number - 1}", f"l{number}", kind, xyz, rpy, axis, (-1, 1))]
-    described += [link("tip"), joint("end", f"l{len(parts)}", "tip", "fixed", (0.1, 0, 0.2))]
+        described += [
+            link(f"l{number}"),
+            joint(
+                f"j{number}",
+                f"l{number - 1}",
+                f"l{number}",
+                kind,
+                xyz,
+                rpy,
+                axis,
+                (-1, 1),
+            ),
+        ]
+    described += [
+        link("tip"),
+        joint("end", f"l{len(parts)}", "tip", "fixed", (0.1, 0, 0.2)),
+    ]
     path = written(tmp_path_factory.mktemp("urdf"), *described)
     robot = robot_from_urdf(path, "l0", "tip").robot
     calibrated = calibrated_of(robot, seed)
-    assert_same_poses(calibrated, export_arm(path, robot, calibrated)[0], "l0", "tip", count=3, within=1e-8)
+    assert_same_poses(
+        calibrated,
+        export_arm(path, robot, calibrated)[0],
+        "l0",
+        "tip",
+        count=3,
+        within=1e-8,
+    )

@@ -1,4 +1,5 @@
-"""Pictures of arms: seen from the side and a little from above, with what the tables and the plan hold."""
+"""Pictures of arms: seen from the side and a little from above, with what the tables
+and the plan hold."""
 
 import numpy as np
 import pytest
@@ -8,7 +9,12 @@ from made_surveys import OPEN, made_candidates, made_survey
 
 from elastocal.application.planning.cell import Cell
 from elastocal.application.planning.plan import choose_plan
-from elastocal.figures.arms import arm_with_errors, plan_picture, pose_pictures, project_view
+from elastocal.figures.arms import (
+    arm_with_errors,
+    plan_picture,
+    pose_pictures,
+    project_view,
+)
 
 
 @pytest.fixture
@@ -20,13 +26,25 @@ def table():
         for stage, size in (("before", 1e-3), ("after", 1e-4))
         for axis in "xyz"
     }
-    return columns | {axis: rng.uniform(-2, 2, 12) for axis in "xyz"} | {"held_out": np.arange(12) % 3 == 0}
+    return (
+        columns
+        | {axis: rng.uniform(-2, 2, 12) for axis in "xyz"}
+        | {"held_out": np.arange(12) % 3 == 0}
+    )
 
 
 def test_each_panel_has_its_errors_and_their_rms(table):
-    heldout = {"before": {"rms_m": 1.23e-3}, "after": {"rms_m": 0.12e-3}, "poses": 4, "noise_floor_rms_m": 0.105e-3}
+    heldout = {
+        "before": {"rms_m": 1.23e-3},
+        "after": {"rms_m": 0.12e-3},
+        "poses": 4,
+        "noise_floor_rms_m": 0.105e-3,
+    }
     figure = arm_with_errors(analysed("kuka"), table, heldout)
-    assert [axis.get_title(loc="left") for axis in figure.axes] == ["1.23 mm", "0.12 mm"]
+    assert [axis.get_title(loc="left") for axis in figure.axes] == [
+        "1.23 mm",
+        "0.12 mm",
+    ]
     for axis, stage in zip(figure.axes, ("before", "after"), strict=True):
         (arrows,) = [found for found in axis.collections if found.get_gid() == stage]
         off = np.column_stack([table[f"{stage}_d{each}"] for each in "xyz"])[::3]
@@ -34,15 +52,26 @@ def test_each_panel_has_its_errors_and_their_rms(table):
         times = np.linalg.norm(drawn) / np.linalg.norm(project_view(off))
         np.testing.assert_allclose(drawn, times * project_view(off), atol=1e-12)
         assert times == pytest.approx(400)
-    assert "4 held-out poses" in figure.get_supxlabel() and "400 times" in figure.get_supxlabel()
+    assert (
+        "4 held-out poses" in figure.get_supxlabel()
+        and "400 times" in figure.get_supxlabel()
+    )
 
 
 def test_views_show_boxes_tracker_and_both_kinds_of_poses():
     survey = made_survey()
     plan = choose_plan(survey, made_candidates(survey, 300), 14, 4, 1)
-    cell = Cell((np.array([[1.0, 2.0], [0.0, 1.0], [0.0, 1.0]]),), np.array([3.0, 1.0, 1.0]), 0.1)
+    cell = Cell(
+        (np.array([[1.0, 2.0], [0.0, 1.0], [0.0, 1.0]]),),
+        np.array([3.0, 1.0, 1.0]),
+        0.1,
+    )
     figure = plan_picture(survey.robot, cell, plan)
-    assert [axis.get_title() for axis in figure.axes] == ["from above", "from the side", "what each pose is worth"]
+    assert [axis.get_title() for axis in figure.axes] == [
+        "from above",
+        "from the side",
+        "what each pose is worth",
+    ]
     labels = legend_entries(figure)
     assert labels == ["to fit", "held out", "kept out of", "tracker", "base"]
     bare = plan_picture(survey.robot, OPEN, plan)
@@ -55,6 +84,14 @@ def test_every_pose_has_a_picture_with_its_number_and_pages_are_full():
     survey = made_survey()
     plan = choose_plan(survey, made_candidates(survey, 300), 55, 4, 1)
     pages = pose_pictures(survey.robot, plan)
-    titles = [axis.get_title(loc="left") for page in pages for axis in page.axes if axis.get_title(loc="left")]
-    assert titles == [*(str(pose) for pose in range(1, 56)), *(f"{pose} held out" for pose in range(56, 60))]
+    titles = [
+        axis.get_title(loc="left")
+        for page in pages
+        for axis in page.axes
+        if axis.get_title(loc="left")
+    ]
+    assert titles == [
+        *(str(pose) for pose in range(1, 56)),
+        *(f"{pose} held out" for pose in range(56, 60)),
+    ]
     assert len(pages) == 2

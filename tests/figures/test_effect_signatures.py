@@ -1,4 +1,5 @@
-"""Signatures show what each effect depends on: the angle of its joint, the load, the approach or the time."""
+"""Signatures show what each effect depends on: the angle of its joint, the load, the
+approach or the time."""
 
 import numpy as np
 import pytest
@@ -20,11 +21,14 @@ def test_every_effect_of_the_catalogue_displaces_the_reflector_somewhere(name, a
     assert all(np.isfinite(each).all() and each.shape[1] == 3 for each in moved)
     # By more than a tracker's noise and by less than would be seen without one.
     assert 5e-3 < max(np.abs(each).max() for each in moved) < 50
-    assert shown.candidate.key in {candidate.key for candidate in list_candidates(name, arm)}
+    assert shown.candidate.key in {
+        candidate.key for candidate in list_candidates(name, arm)
+    }
 
 
 def test_a_drift_begins_at_nothing_and_a_step_happens_in_the_middle(arm):
-    drift, step = signature("frame_drift", arm).moved["by time"], signature("setup_step", arm).moved["by time"]
+    drift = signature("frame_drift", arm).moved["by time"]
+    step = signature("setup_step", arm).moved["by time"]
     assert not drift[0].any() and drift[-1].any()
     half = len(step) // 2
     assert not step[:half].any() and np.abs(step[half:]).max(axis=1).all()

@@ -1,4 +1,5 @@
-"""Figures of a campaign: what is drawn is what the tables hold, and nothing is cut off."""
+"""Figures of a campaign: what is drawn is what the tables hold, and nothing is cut
+off."""
 
 import numpy as np
 import pandas as pd
@@ -9,12 +10,29 @@ from made_loop_tables import candidate_table, plainly, residual_table, step_rows
 from made_loop_tables import probabilities as stated
 from matplotlib.quiver import Quiver, QuiverKey
 
-from elastocal.figures.loop import METRICS, arrows, before_after, budget_bars, campaign_errors, probabilities
+from elastocal.figures.loop import (
+    METRICS,
+    arrows,
+    before_after,
+    budget_bars,
+    campaign_errors,
+    probabilities,
+)
 
-LONG = ("link_elasticity@1+2+3+6[one section]", "force_misalignment[flange axes]", "transmission_harmonic@1[orders 31-36]")
+LONG = (
+    "link_elasticity@1+2+3+6[one section]",
+    "force_misalignment[flange axes]",
+    "transmission_harmonic@1[orders 31-36]",
+)
 LONG_SETS = [
     ({"link_elasticity": ["links 1 and 2 and 3 and 6 one section"]}, 0.7),
-    ({"joint_dependent_stiffness": ["joint 5"], "transmission_harmonic": ["joint 1 orders 1-2", "joint 1 orders 3-6"]}, 0.2),
+    (
+        {
+            "joint_dependent_stiffness": ["joint 5"],
+            "transmission_harmonic": ["joint 1 orders 1-2", "joint 1 orders 3-6"],
+        },
+        0.2,
+    ),
     ({"other": ["base"]}, 0.1),
 ]
 
@@ -30,7 +48,10 @@ FIGURES = {
     "arrows": lambda: arrows(residual_table()),
     "candidates": lambda: probabilities(stated(LONG_SETS), of_the_catalogue()),
     "before_after": lambda: before_after(
-        step_rows(effects=("transmission_harmonic@1[orders 31-36], transmission_ratio@2",)), 5e-6
+        step_rows(
+            effects=("transmission_harmonic@1[orders 31-36], transmission_ratio@2",)
+        ),
+        5e-6,
     ),
 }
 
@@ -45,11 +66,20 @@ def quivers(axis):
 
 
 def state_means(table):
-    """Places and residuals (states, 3) in m, averaged over the repeats of each held-out flag, pose, load and target."""
-    keys = np.column_stack([table[name] for name in ("held_out", "pose", "load", "target")])
+    """Places and residuals (states, 3) in m, averaged over the repeats of each held-out
+    flag, pose, load and target."""
+    keys = np.column_stack(
+        [table[name] for name in ("held_out", "pose", "load", "target")]
+    )
     members = [(keys == key).all(axis=1) for key in np.unique(keys, axis=0)]
     return (
-        np.array([[table[f"{start}{axis}"][mine].mean() for axis in "xyz"] for mine in members]) for start in ("", "before_d")
+        np.array(
+            [
+                [table[f"{start}{axis}"][mine].mean() for axis in "xyz"]
+                for mine in members
+            ]
+        )
+        for start in ("", "before_d")
     )
 
 
@@ -60,17 +90,29 @@ def test_arrows_begin_at_their_state_and_are_its_mean_residual_enlarged_as_the_a
     assert key.label == "200 µm"
     place, off = state_means(table)
     for view, axes in ((0, [0, 2]), (1, [0, 1])):
-        (quiver,) = [quiver for quiver in quivers(figure.axes[view]) if quiver.get_gid() == "before"]
-        assert figure.axes[view].get_xlabel() == "x (m)" and figure.axes[view].get_ylabel() == f"{'xyz'[axes[1]]} (m)"
+        (quiver,) = [
+            quiver
+            for quiver in quivers(figure.axes[view])
+            if quiver.get_gid() == "before"
+        ]
+        assert (
+            figure.axes[view].get_xlabel() == "x (m)"
+            and figure.axes[view].get_ylabel() == f"{'xyz'[axes[1]]} (m)"
+        )
         np.testing.assert_allclose(quiver.XY, place[:, axes])
         drawn = np.column_stack([quiver.U, quiver.V])
-        np.testing.assert_allclose(drawn, off[:, axes] * key.U / 200e-6, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(
+            drawn, off[:, axes] * key.U / 200e-6, rtol=1e-9, atol=1e-12
+        )
 
 
 def test_where_nothing_changed_the_residuals_are_drawn_once():
     table = residual_table()
     same = table | {f"after_d{axis}": table[f"before_d{axis}"] for axis in "xyz"}
-    drawn = [{quiver.get_gid() for quiver in quivers(arrows(each).axes[0])} for each in (table, same)]
+    drawn = [
+        {quiver.get_gid() for quiver in quivers(arrows(each).axes[0])}
+        for each in (table, same)
+    ]
     assert drawn == [{"before", "after"}, {"before"}]
 
 
@@ -81,17 +123,41 @@ def lines_of(axis, gid):
 def test_bars_for_every_model_and_measure_from_top_to_bottom_with_diamonds_for_fitted_poses():
     steps = step_rows()
     figure = before_after(steps, 5e-5)
-    assert [axis.get_title() for axis in figure.axes] == ["mean", "RMS", "95th percentile", "maximum"]
+    assert [axis.get_title() for axis in figure.axes] == [
+        "mean",
+        "RMS",
+        "95th percentile",
+        "maximum",
+    ]
     assert {axis.get_xlabel() for axis in figure.axes} == {"error (µm)"}
     first = figure.axes[0]
-    assert row_labels(first) == ["frames and targets", "declared model", "with lost motion\n(backlash)"]
-    assert first.get_yticks().tolist() == sorted(first.get_yticks()) and first.get_ylim()[0] > first.get_ylim()[1]
+    assert row_labels(first) == [
+        "frames and targets",
+        "declared model",
+        "with lost motion\n(backlash)",
+    ]
+    assert (
+        first.get_yticks().tolist() == sorted(first.get_yticks())
+        and first.get_ylim()[0] > first.get_ylim()[1]
+    )
     for axis, metric in zip(figure.axes, METRICS, strict=True):
-        assert [bar.get_width() for bar in axis.patches] == pytest.approx([1e6 * step[f"heldout_{metric}_m"] for step in steps])
-        assert [len(lines_of(axis, gid)) for gid in ("interval", "noise floor")] == [len(steps), 1]
-        diamonds = [line.get_xydata()[0].tolist() for line in axis.lines if line.get_marker() == "D"]
+        assert [bar.get_width() for bar in axis.patches] == pytest.approx(
+            [1e6 * step[f"heldout_{metric}_m"] for step in steps]
+        )
+        assert [len(lines_of(axis, gid)) for gid in ("interval", "noise floor")] == [
+            len(steps),
+            1,
+        ]
+        diamonds = [
+            line.get_xydata()[0].tolist()
+            for line in axis.lines
+            if line.get_marker() == "D"
+        ]
         rows = [bar.get_y() + bar.get_height() / 2 for bar in axis.patches]
-        expected = [[1e6 * step[f"train_{metric}_m"], row] for step, row in zip(steps, rows, strict=True)]
+        expected = [
+            [1e6 * step[f"train_{metric}_m"], row]
+            for step, row in zip(steps, rows, strict=True)
+        ]
         assert diamonds == [pytest.approx(point) for point in expected]
 
 
@@ -99,16 +165,34 @@ def test_an_interval_reaches_from_end_to_end_or_is_not_drawn():
     steps = step_rows(effects=())
     mean, *_, largest = before_after(steps).axes
     for step, (one, other) in zip(steps, lines_of(mean, "interval"), strict=True):
-        assert [one[0], other[0]] == pytest.approx([1e6 * step["heldout_mean_m_low"], 1e6 * step["heldout_mean_m_high"]])
-    assert np.isnan([x for line in lines_of(largest, "interval") for x, _ in line]).all()
+        assert [one[0], other[0]] == pytest.approx(
+            [1e6 * step["heldout_mean_m_low"], 1e6 * step["heldout_mean_m_high"]]
+        )
+    assert np.isnan(
+        [x for line in lines_of(largest, "interval") for x, _ in line]
+    ).all()
 
 
 TABLE = pd.DataFrame(
     {
         "campaign": ["ur10_a_on_b", "wam_grid"],
         "poses": [24, 1],
-        **{f"before_rms{end}_mm": values for end, values in (("", [0.4, 2.0]), ("_low", [0.3, 1.8]), ("_high", [0.5, np.inf]))},
-        **{f"after_rms{end}_mm": values for end, values in (("", [0.2, 1.9]), ("_low", [0.1, 1.7]), ("_high", [0.3, 2.2]))},
+        **{
+            f"before_rms{end}_mm": values
+            for end, values in (
+                ("", [0.4, 2.0]),
+                ("_low", [0.3, 1.8]),
+                ("_high", [0.5, np.inf]),
+            )
+        },
+        **{
+            f"after_rms{end}_mm": values
+            for end, values in (
+                ("", [0.2, 1.9]),
+                ("_low", [0.1, 1.7]),
+                ("_high", [0.3, 2.2]),
+            )
+        },
     }
 )
 
@@ -119,9 +203,15 @@ def test_each_campaign_has_both_errors_at_their_values():
     before, after = (container.lines[0].get_xydata() for container in axis.containers)
     np.testing.assert_allclose(before, [[0.4, 1], [2.0, 0]])
     np.testing.assert_allclose(after, [[0.2, 1], [1.9, 0]])
-    assert all(np.isfinite(line.get_segments()).all() for container in axis.containers for line in container.lines[2])
+    assert all(
+        np.isfinite(line.get_segments()).all()
+        for container in axis.containers
+        for line in container.lines[2]
+    )
     # Sessions of one campaign stand by their poses.
-    assert row_labels(campaign_errors(TABLE.assign(campaign="fanuc_joint")).axes[0]) == [
+    assert row_labels(
+        campaign_errors(TABLE.assign(campaign="fanuc_joint")).axes[0]
+    ) == [
         "FANUC joint, 24 poses",
         "FANUC joint, 1 pose",
     ]
@@ -139,8 +229,16 @@ def test_each_hypothesis_has_a_bar_as_long_as_its_probability():
         "Everything else",
     ]
     assert [bar.get_width() for bar in axis.patches] == pytest.approx([94, 5, 0.4, 0.6])
-    assert [plainly(text.get_text()) for text in axis.texts] == ["94 %", "5 %", "< 1 %", "1 %"]
-    certain = probabilities(stated([({"lost_motion": ["joint 3"]}, 0.9961), ({}, 0.0039)]), candidate_table(count=3)).axes[0]
+    assert [plainly(text.get_text()) for text in axis.texts] == [
+        "94 %",
+        "5 %",
+        "< 1 %",
+        "1 %",
+    ]
+    certain = probabilities(
+        stated([({"lost_motion": ["joint 3"]}, 0.9961), ({}, 0.0039)]),
+        candidate_table(count=3),
+    ).axes[0]
     assert [plainly(text.get_text()) for text in certain.texts] == ["> 99 %", "< 1 %"]
 
 
@@ -152,7 +250,9 @@ def test_of_many_hypotheses_the_leading_have_bars_and_the_rest_has_one():
 
 def test_where_nothing_can_be_tested_the_figure_says_so():
     figure = probabilities(stated([({}, 1.0)]), candidate_table(count=0, chosen=0))
-    assert texts(figure) == ["None of 5 candidate causes can be tested with these measurements."]
+    assert texts(figure) == [
+        "None of 5 candidate causes can be tested with these measurements."
+    ]
 
 
 def test_the_budget_has_a_bar_for_each_line_that_is_not_zero_the_largest_first_from_zero_on():
@@ -166,7 +266,9 @@ def test_the_budget_has_a_bar_for_each_line_that_is_not_zero_the_largest_first_f
         "noise of the tracker alone",
         "uncertainty of the parameters",
     ]
-    np.testing.assert_allclose([patch.get_width() for patch in axis.patches], [1.5, 1.0, 0.2, 0.15, 0.02])
+    np.testing.assert_allclose(
+        [patch.get_width() for patch in axis.patches], [1.5, 1.0, 0.2, 0.15, 0.02]
+    )
     assert axis.get_xscale() == "linear" and axis.get_xlim()[0] == 0.0
     assert "tolerance 0.2 mm" in legend_entries(figure)
     assert_nothing_cut_off(figure)

@@ -1,4 +1,5 @@
-"""Schemes of robots: joints stand on the arm and links follow one another, all names are there, and none hides another."""
+"""Schemes of robots: joints stand on the arm and links follow one another, all names
+are there, and none hides another."""
 
 from itertools import combinations
 from pathlib import Path
@@ -13,7 +14,9 @@ from elastocal.figures.schemes import kinematic_scheme, lay_out, spring_scheme
 from elastocal.io.documents import read_document
 from elastocal.mechanics.robot_file import robot_from_document
 
-FILES = sorted((Path(__file__).resolve().parents[2] / "config" / "robots").glob("*.yaml"))
+FILES = sorted(
+    (Path(__file__).resolve().parents[2] / "config" / "robots").glob("*.yaml")
+)
 ROBOTS = {file.stem: robot_from_document(read_document(file)) for file in FILES}
 CHAINS = {
     "three joints, turned frames": "Rz(q1) Ry(q2) Tx(1.0) Rx(90deg) Ry(q3) Rz(-30deg) Tx(0.5) [EE]",
@@ -23,13 +26,29 @@ CHAINS = {
 }
 for words, chain in CHAINS.items():
     joints = chain.count("q")
-    known = {"joint_limits_deg": [[-180, 180]] * joints, "compliance_urad_per_Nm": [1.0] * joints}
+    known = {
+        "joint_limits_deg": [[-180, 180]] * joints,
+        "compliance_urad_per_Nm": [1.0] * joints,
+    }
     ROBOTS[words] = robot_from_document({"name": "made up", "chain": chain, **known})
 each_robot = pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
-# A fault of the layout: six shifts of a few millimetres between the Gen3's joints crowd its names. No page shows its scheme.
-CROWDED = pytest.param(ROBOTS["gen3"], marks=pytest.mark.xfail(strict=True, reason="names of tiny shifts crowd"), id="gen3")
+# A fault of the layout: six shifts of a few millimetres between the Gen3's joints crowd
+# its names. No page shows its scheme.
+CROWDED = pytest.param(
+    ROBOTS["gen3"],
+    marks=pytest.mark.xfail(strict=True, reason="names of tiny shifts crowd"),
+    id="gen3",
+)
 each_legible = pytest.mark.parametrize(
-    "robot", [CROWDED, *(pytest.param(robot, id=name) for name, robot in ROBOTS.items() if name != "gen3")]
+    "robot",
+    [
+        CROWDED,
+        *(
+            pytest.param(robot, id=name)
+            for name, robot in ROBOTS.items()
+            if name != "gen3"
+        ),
+    ],
 )
 
 
@@ -44,16 +63,22 @@ def assert_no_overlap(figure):
     for (one, first), (other, second) in combinations(boxes, 2):
         assert not first.overlaps(second), f"{one!r} on {other!r}"
     for text, box in boxes:
-        assert figure.bbox.contains(*box.min) and figure.bbox.contains(*box.max), f"{text!r} is cut off"
+        assert figure.bbox.contains(*box.min) and figure.bbox.contains(*box.max), (
+            f"{text!r} is cut off"
+        )
 
 
 @each_legible
-def test_no_text_of_a_scheme_hides_another_and_each_joint_length_and_point_has_its_name(robot):
+def test_no_text_of_a_scheme_hides_another_and_each_joint_length_and_point_has_its_name(
+    robot,
+):
     figure = kinematic_scheme(robot)
     assert_no_overlap(figure)
     named = {artist.get_gid() for artist in figure.findobj(Text)}
     lengths = sum(t.kind == "T" and bool(t.constant) for t in robot.chain.transforms)
-    expected = {f"joint-{n}" for n in range(1, robot.joints + 1)} | {f"length-{n}" for n in range(1, lengths + 1)}
+    expected = {f"joint-{n}" for n in range(1, robot.joints + 1)} | {
+        f"length-{n}" for n in range(1, lengths + 1)
+    }
     assert expected | {f"point-{point.name}" for point in robot.chain.points} <= named
     assert 25.4 * figure.get_figwidth() == pytest.approx(165, abs=6)
 
@@ -62,18 +87,26 @@ def test_no_text_of_a_scheme_hides_another_and_each_joint_length_and_point_has_i
 def test_no_text_of_a_spring_scheme_hides_another_and_each_spring_has_its_name(robot):
     figure = spring_scheme(robot)
     assert_no_overlap(figure)
-    found, models = texts(figure), 2 if robot.links else 1
-    assert all(found.count(f"$\\theta_{{{joint}}}$") == models for joint in range(1, robot.joints + 1))
+    found = texts(figure)
+    models = 2 if robot.links else 1
+    assert all(
+        found.count(f"$\\theta_{{{joint}}}$") == models
+        for joint in range(1, robot.joints + 1)
+    )
     assert found.count("6D") == len(robot.links)
 
 
 @each_legible
 def test_every_joint_is_drawn_once_on_the_arm_and_apart_from_the_others(robot):
     layout, _ = lay_out(robot.chain)
-    assert [number for number, _, _ in layout.joints] == list(range(1, robot.joints + 1))
+    assert [number for number, _, _ in layout.joints] == list(
+        range(1, robot.joints + 1)
+    )
     ends = [end for start, end, _ in layout.links for end in (start, end)]
     for _, place, axis in layout.joints:
         reach = 0 if axis is None else np.linalg.norm(axis) / 2
-        assert min(np.linalg.norm(place - end) for end in ends) == pytest.approx(reach, abs=1e-9)
+        assert min(np.linalg.norm(place - end) for end in ends) == pytest.approx(
+            reach, abs=1e-9
+        )
     for (_, one, _), (_, other, _) in combinations(layout.joints, 2):
         assert np.linalg.norm(one - other) > 7

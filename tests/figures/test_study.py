@@ -1,4 +1,5 @@
-"""Figures of the study: lines, bands, bars and marks are where the tables have them, in their units."""
+"""Figures of the study: lines, bands, bars and marks are where the tables have them, in
+their units."""
 
 import numpy as np
 import pandas as pd
@@ -9,18 +10,32 @@ from matplotlib.colors import to_hex
 from elastocal.figures.study import noise_impact, scores, stiffness_errors
 from elastocal.figures.style import PALETTE
 
-LENGTHS, TITLES = np.arange(1, 6), {"kuka": "Kuka", "fanuc": "Fanuc"}
+LENGTHS = np.arange(1, 6)
+TITLES = {"kuka": "Kuka", "fanuc": "Fanuc"}
 ORDER = ["6DoF", "2DoF+6DoF"]
 
 
 def metrics_of(robot, strategy, size, noise_um=200.0, untrusted=0):
-    frame = pd.DataFrame({"robot": robot, "strategy": strategy, "noise_um": noise_um, "length": LENGTHS})
-    for name, scale in (("k_sigma", 1.0), ("k_sigma_fixed_joints", 0.5), ("deviation", 1e-6)):
-        frame[name], frame[f"{name}_std_error"] = scale * size / LENGTHS, 0.1 * scale * size / LENGTHS
+    frame = pd.DataFrame(
+        {"robot": robot, "strategy": strategy, "noise_um": noise_um, "length": LENGTHS}
+    )
+    for name, scale in (
+        ("k_sigma", 1.0),
+        ("k_sigma_fixed_joints", 0.5),
+        ("deviation", 1e-6),
+    ):
+        frame[name] = scale * size / LENGTHS
+        frame[f"{name}_std_error"] = 0.1 * scale * size / LENGTHS
     return frame.assign(trustworthy=untrusted < LENGTHS)
 
 
-METRICS = pd.concat([metrics_of(robot, name, 10.0 * n) for robot in TITLES for n, name in enumerate(ORDER, 1)])
+METRICS = pd.concat(
+    [
+        metrics_of(robot, name, 10.0 * n)
+        for robot in TITLES
+        for n, name in enumerate(ORDER, 1)
+    ]
+)
 PAPER = "the paper's Table 4"
 PRINTED = pd.DataFrame(
     [
@@ -38,25 +53,50 @@ def band(collection):
     """Lower and upper edge of a filled band at each length."""
     vertices = collection.get_paths()[0].vertices
     return {
-        x: (vertices[vertices[:, 0] == x, 1].min(), vertices[vertices[:, 0] == x, 1].max()) for x in np.unique(vertices[:, 0])
+        x: (
+            vertices[vertices[:, 0] == x, 1].min(),
+            vertices[vertices[:, 0] == x, 1].max(),
+        )
+        for x in np.unique(vertices[:, 0])
     }
 
 
 def test_noise_levels_are_lines_in_micrometres_that_are_thick_only_where_they_are_trustworthy():
-    frame = pd.concat([metrics_of("kuka", "6DoF", size, noise, 2) for size, noise in ((100.0, 50.0), (200.0, 100.0))])
-    frame = pd.concat([frame, metrics_of("kuka", "2DoF+6DoF", 7.0), metrics_of("fanuc", "6DoF", 7.0)])
+    frame = pd.concat(
+        [
+            metrics_of("kuka", "6DoF", size, noise, 2)
+            for size, noise in ((100.0, 50.0), (200.0, 100.0))
+        ]
+    )
+    frame = pd.concat(
+        [frame, metrics_of("kuka", "2DoF+6DoF", 7.0), metrics_of("fanuc", "6DoF", 7.0)]
+    )
     figure = noise_impact(frame, "6DoF", {"kuka": "Kuka"})
     axis, linear = figure.axes
-    assert (axis.get_yscale(), linear.get_yscale()) == ("log", "linear") and len(linear.lines) == 4
+    assert (axis.get_yscale(), linear.get_yscale()) == ("log", "linear") and len(
+        linear.lines
+    ) == 4
     for index, size in enumerate((100.0, 200.0)):
         thin, thick = axis.lines[2 * index : 2 * index + 2]
-        np.testing.assert_allclose(thin.get_xydata(), np.column_stack([LENGTHS, size / LENGTHS]))
-        np.testing.assert_allclose(thick.get_xydata(), np.column_stack([LENGTHS[2:], size / LENGTHS[2:]]))
-        assert thin.get_linewidth() < thick.get_linewidth() and thin.get_color() == thick.get_color() == PALETTE[index]
+        np.testing.assert_allclose(
+            thin.get_xydata(), np.column_stack([LENGTHS, size / LENGTHS])
+        )
+        np.testing.assert_allclose(
+            thick.get_xydata(), np.column_stack([LENGTHS[2:], size / LENGTHS[2:]])
+        )
+        assert (
+            thin.get_linewidth() < thick.get_linewidth()
+            and thin.get_color() == thick.get_color() == PALETTE[index]
+        )
         # A tenth either way, as a factor.
-        assert band(axis.collections[index])[4] == pytest.approx((np.exp(-0.1) * size / 4, np.exp(0.1) * size / 4))
+        assert band(axis.collections[index])[4] == pytest.approx(
+            (np.exp(-0.1) * size / 4, np.exp(0.1) * size / 4)
+        )
     assert len(axis.lines) == 4 and axis.get_title() == "Kuka"
-    assert (linear.get_xlabel(), axis.get_ylabel()) == ("configurations in the data set", "dev, equation 15 (µm)")
+    assert (linear.get_xlabel(), axis.get_ylabel()) == (
+        "configurations in the data set",
+        "dev, equation 15 (µm)",
+    )
     assert legend_entries(figure) == ["50", "100"]
     assert_nothing_cut_off(figure)
 
@@ -69,19 +109,29 @@ def test_stiffness_errors_stand_under_both_counts_of_joints_with_their_limit():
         np.testing.assert_allclose(one.get_ydata(), 10 * scale / LENGTHS)
         np.testing.assert_allclose(other.get_ydata(), 20 * scale / LENGTHS)
         assert band(axis.collections[1])[2] == pytest.approx((9 * scale, 11 * scale))
-        assert list(limit.get_ydata()) == [3.0, 3.0] and [text.get_text() for text in axis.texts] == ["3 %"]
-    assert "all joints" in whole.get_title() and "fixed in the last stage" in first.get_title()
+        assert list(limit.get_ydata()) == [3.0, 3.0] and [
+            text.get_text() for text in axis.texts
+        ] == ["3 %"]
+    assert (
+        "all joints" in whole.get_title()
+        and "fixed in the last stage" in first.get_title()
+    )
     assert whole.get_ylabel() == r"$k_\Sigma$ (%)"
     assert legend_entries(figure) == [*ORDER, PAPER]
     assert_nothing_cut_off(figure)
-    # Both counts are those of the fixed joints in the paper: its score at 4 configurations, and where it reaches 3 %.
+    # Both counts are those of the fixed joints in the paper: its score at 4
+    # configurations, and where it reaches 3 %.
     marks = [line for line in first.lines if line.get_marker() == "D"]
-    assert len(whole.lines) == 3 and [line.get_xydata().tolist() for line in marks] == [[[4, 2.2]], [[5, 3]]]
+    assert len(whole.lines) == 3 and [line.get_xydata().tolist() for line in marks] == [
+        [[4, 2.2]],
+        [[5, 3]],
+    ]
     assert marks[0].get_color() == first.lines[1].get_color()
 
 
 def find_points(axis, marker):
-    """Points with a marker: x, row, and whether they are filled with the colour of a difference."""
+    """Points with a marker: x, row, and whether they are filled with the colour of a
+    difference."""
     return [
         (float(x), float(y), to_hex(line.get_markerfacecolor()).upper() == PALETTE[1])
         for line in axis.lines
@@ -92,14 +142,21 @@ def find_points(axis, marker):
 
 def test_each_printed_figure_of_table_4_stands_among_the_studies_of_its_robot():
     columns = ["robot", "quantity", "paper", "studies_mean", "studies_std", "p_holm"]
-    rows = [("kuka", "k_sigma_20", 1.5, 1.75, 0.1, 0.002), ("kuka", "dev_20", 1.0, 1.2, 0.08, 0.16)]
-    table = pd.DataFrame([*rows, ("fanuc", "n_dev_2_um", 30.0, 110.0, 40.0, 0.18)], columns=columns)
+    rows = [
+        ("kuka", "k_sigma_20", 1.5, 1.75, 0.1, 0.002),
+        ("kuka", "dev_20", 1.0, 1.2, 0.08, 0.16),
+    ]
+    table = pd.DataFrame(
+        [*rows, ("fanuc", "n_dev_2_um", 30.0, 110.0, 40.0, 0.18)], columns=columns
+    )
     figure = scores(table.assign(table="4", strategy="6DoF"), TITLES)
     heads = [axis.get_title() for axis in figure.axes[:3]]
     assert heads == ["$k_\\Sigma$ at 20 (%)", "dev at 20 (µm)", "length until 2 µm"]
     assert row_labels(figure.axes[0]) == ["6DoF"]
     k_sigma, dev, _ = figure.axes[:3]
     # After Holm's correction the first differs and the second does not.
-    assert find_points(k_sigma, "D") == [(1.5, 0.0, True)] and find_points(dev, "D") == [(1.0, 0.0, False)]
+    assert find_points(k_sigma, "D") == [(1.5, 0.0, True)] and find_points(
+        dev, "D"
+    ) == [(1.0, 0.0, False)]
     assert [x for x, *_ in find_points(dev, "o")] == [1.2]
     assert find_points(figure.axes[5], "D") == [(30.0, 0.0, False)]

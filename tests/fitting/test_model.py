@@ -1,4 +1,5 @@
-"""The model that a campaign declares, its parameters in one vector, and what it predicts."""
+"""The model that a campaign declares, its parameters in one vector, and what it
+predicts."""
 
 from dataclasses import replace
 
@@ -8,7 +9,13 @@ from fitted_models import model_of
 from made_campaigns import POINTS, Plan, made
 from scipy.optimize import root
 from support import OTHER_CHAINS, chain_of
-from synthetic import made_estimate, made_measurements, made_model, made_states, seen_exactly
+from synthetic import (
+    made_estimate,
+    made_measurements,
+    made_model,
+    made_states,
+    seen_exactly,
+)
 
 from elastocal.campaigns.campaign import Campaign, Target, columns_of
 from elastocal.effects.catalogue import candidates_on
@@ -42,35 +49,69 @@ def described(campaign, config_folder, **changes):
         "robot": "kuka",
         "measured": campaign.measured,
         "frame": campaign.frame,
-        "targets": {f"T{name}": {"point": name, "offset_m": "unknown"} for name in POINTS},
+        "targets": {
+            f"T{name}": {"point": name, "offset_m": "unknown"} for name in POINTS
+        },
     }
     robot = read_document(config_folder / "robots" / "kuka.yaml")
-    return {"source": "cell7/campaign.yaml", "campaign": document | changes, "robot": robot}
+    return {
+        "source": "cell7/campaign.yaml",
+        "campaign": document | changes,
+        "robot": robot,
+    }
 
 
 def case_of(campaign, config_folder, **changes):
-    return case_from(described(campaign, config_folder, **changes), columns_of(campaign.measurements))
+    return case_from(
+        described(campaign, config_folder, **changes), columns_of(campaign.measurements)
+    )
 
 
-def test_a_model_of_rigid_joints_knows_that_no_compliances_are_known(campaign, config_folder):
+def test_a_model_of_rigid_joints_knows_that_no_compliances_are_known(
+    campaign, config_folder
+):
     described_ = described(campaign, config_folder)
     del described_["robot"]["compliance_urad_per_Nm"]
-    described_["robot"]["masses"] = [{"link": 2, "mass_kg": 10, "centre_m": [0.3, 0, 0], "relative_std": 0.2}]
+    described_["robot"]["masses"] = [
+        {"link": 2, "mass_kg": 10, "centre_m": [0.3, 0, 0], "relative_std": 0.2}
+    ]
     case = case_from(described_, columns_of(campaign.measurements))
-    assert not case.model.compliance_known and not case.model.nominal_compliance.any() and not case.model.sites.masses
+    assert (
+        not case.model.compliance_known
+        and not case.model.nominal_compliance.any()
+        and not case.model.sites.masses
+    )
     described_["campaign"]["compliance"] = "identify"
     case = case_from(described_, columns_of(campaign.measurements))
-    assert not case.model.compliance_known and (case.model.nominal_compliance > 0).all() and case.model.sites.masses
+    assert (
+        not case.model.compliance_known
+        and (case.model.nominal_compliance > 0).all()
+        and case.model.sites.masses
+    )
 
 
-@pytest.mark.parametrize(("compliance", "springs"), [("identify", ["joint_compliance"]), ("nominal", [])])
-def test_the_model_has_the_declared_effects_and_the_candidates_are_all_others(campaign, config_folder, compliance, springs):
-    case = case_of(campaign, config_folder, compliance=compliance, declared=["joint_offset", "hysteresis"])
+@pytest.mark.parametrize(
+    ("compliance", "springs"), [("identify", ["joint_compliance"]), ("nominal", [])]
+)
+def test_the_model_has_the_declared_effects_and_the_candidates_are_all_others(
+    campaign, config_folder, compliance, springs
+):
+    case = case_of(
+        campaign,
+        config_folder,
+        compliance=compliance,
+        declared=["joint_offset", "hysteresis"],
+    )
     found = {effect.effect for effect in case.model.effects}
     assert found == {*springs, "hysteresis", "joint_offset"}
-    assert [e.key for e in case.model.effects if e.effect == "joint_offset"] == [f"joint_offset@{j}" for j in range(1, 7)]
+    assert [e.key for e in case.model.effects if e.effect == "joint_offset"] == [
+        f"joint_offset@{j}" for j in range(1, 7)
+    ]
     missing = {candidate.effect for candidate in case.candidates.values()}
-    assert not missing & {"joint_offset", "hysteresis"} and {"lost_motion", "link_weight", "frame_drift"} <= missing
+    assert (
+        not missing & {"joint_offset", "hysteresis"}
+        and {"lost_motion", "link_weight", "frame_drift"} <= missing
+    )
     assert all(key == candidate.key for key, candidate in case.candidates.items())
     more = set(case_of(campaign, config_folder).candidates) - set(case.candidates)
     assert more >= {e.key for e in case.model.effects if e.effect not in springs}
@@ -80,11 +121,17 @@ def test_the_model_has_the_declared_effects_and_the_candidates_are_all_others(ca
 @pytest.mark.parametrize(("measured", "rows"), [("position", 3), ("pose", 6)])
 @pytest.mark.parametrize(("frame", "fitted"), [("tracker", True), ("base", False)])
 @pytest.mark.parametrize("compliance", ["nominal", "identify"])
-def test_declared_model_is_that_of_the_campaign(fanuc, measured, rows, frame, fitted, compliance):
+def test_declared_model_is_that_of_the_campaign(
+    fanuc, measured, rows, frame, fitted, compliance
+):
     bare = made_model(fanuc.chain, (Target("A", "6DoF", (0, 0, 0)),))
     measurements = made_measurements(bare, np.random.default_rng(0), 2, 1, 0.0, 0.0)
-    measurements = replace(measurements, time_s=np.array([7.0, 5.0]), row=np.array([4, 9]))
-    campaign = Campaign("c", fanuc, measured, frame, TWO, compliance, (), None, {}, measurements)
+    measurements = replace(
+        measurements, time_s=np.array([7.0, 5.0]), row=np.array([4, 9])
+    )
+    campaign = Campaign(
+        "c", fanuc, measured, frame, TWO, compliance, (), None, {}, measurements
+    )
     offset = candidates_on(made_model(fanuc.chain).sites)["joint_offset@2"]
     model = declared_model(campaign, (offset,))
     assert (model.rows, model.fitted_frames, model.targets) == (rows, fitted, TWO)
@@ -98,8 +145,18 @@ def test_parameters_are_named_in_the_order_of_the_sensitivities(full_case):
     model, estimate, _ = full_case
     owners = [owner for owner, _ in parameters(model, estimate)]
     of_target = model.rows
-    expected = ["frame 0"] * 6 + ["frame 4"] * 6 + ["target A"] * of_target + ["target C"] * of_target
-    assert owners == [*expected, *["joint_compliance"] * 6, *["lost_motion@2"] * 2, *["link_geometry@3"] * 6]
+    expected = (
+        ["frame 0"] * 6
+        + ["frame 4"] * 6
+        + ["target A"] * of_target
+        + ["target C"] * of_target
+    )
+    assert owners == [
+        *expected,
+        *["joint_compliance"] * 6,
+        *["lost_motion@2"] * 2,
+        *["link_geometry@3"] * 6,
+    ]
     names = [parameter.name for _, parameter in parameters(model, estimate)]
     assert names[:6] == ["dx", "dy", "dz", "rx", "ry", "rz"]
     assert names[-8:-6] == ["half_play", "torque"]
@@ -112,18 +169,32 @@ def test_of_a_target_only_what_is_unknown_is_a_parameter(fanuc):
         Target("known", "6DoF", (0.0, 0.0, 0.1), (1.0, 0.0, 0.0)),
         Target("both", "6DoF", None),
     ]
-    names = {6: ["turn rx", "turn ry", "turn rz", "place dx", "place dy", "place dz"], 3: ["place dx", "place dy", "place dz"]}
+    names = {
+        6: ["turn rx", "turn ry", "turn rz", "place dx", "place dy", "place dz"],
+        3: ["place dx", "place dy", "place dz"],
+    }
     both = {6: ["dx", "dy", "dz", "rx", "ry", "rz"], 3: ["dx", "dy", "dz"]}
     for rows in (6, 3):
         model = made_model(fanuc.chain, targets, rows=rows, fitted_frames=False)
         estimate = made_estimate(model, seed=3)
         expected = [*names[rows], *(f"both {name}" for name in both[rows])]
         owned = parameters(model, estimate)
-        assert [f"{owner.removeprefix('target ')} {parameter.name}" for owner, parameter in owned] == expected
+        assert [
+            f"{owner.removeprefix('target ')} {parameter.name}"
+            for owner, parameter in owned
+        ] == expected
         there = stepped(model, estimate, np.full(len(expected), 1e-3))
         moved = np.abs(there.target_offset - estimate.target_offset).max(axis=1) > 0
-        turned = np.abs(there.target_rotation - estimate.target_rotation).max(axis=(1, 2)) > 1e-4
-        assert moved.tolist() == [False, True, False, True] and turned.tolist() == [rows == 6, False, False, rows == 6]
+        turned = (
+            np.abs(there.target_rotation - estimate.target_rotation).max(axis=(1, 2))
+            > 1e-4
+        )
+        assert moved.tolist() == [False, True, False, True] and turned.tolist() == [
+            rows == 6,
+            False,
+            False,
+            rows == 6,
+        ]
 
 
 @pytest.fixture
@@ -135,45 +206,73 @@ def two_laws(fanuc):
 
 def owned(model, estimate, key, name):
     """Places of one parameter of one owner."""
-    return [n for n, (owner, p) in enumerate(parameters(model, estimate)) if (owner, p.name) == (key, name)]
+    return [
+        n
+        for n, (owner, p) in enumerate(parameters(model, estimate))
+        if (owner, p.name) == (key, name)
+    ]
 
 
 def test_only_shapes_have_limits_each_those_of_its_own_law(two_laws):
     model, estimate = two_laws
-    found, expected = limits(model, estimate), np.tile([-np.inf, np.inf], (len(parameters(model, estimate)), 1))
+    found = limits(model, estimate)
+    expected = np.tile([-np.inf, np.inf], (len(parameters(model, estimate)), 1))
     for effect in (model.effects[0], model.effects[2]):
         (place,) = owned(model, estimate, effect.key, "torque")
         expected[place] = effect.shapes[0].lowest, effect.shapes[0].highest
     np.testing.assert_array_equal(found, expected)
-    np.testing.assert_array_equal(nonlinear_parameters(model, estimate), np.isfinite(expected[:, 0]))
+    np.testing.assert_array_equal(
+        nonlinear_parameters(model, estimate), np.isfinite(expected[:, 0])
+    )
     assert np.isfinite(expected).sum() == 4
 
 
 def equilibrium(chain, compliance, states, weighing=None):
-    """Turn of each joint where the springs hold the load at the pose to which it has turned them, by scipy's root finder."""
+    """Turn of each joint where the springs hold the load at the pose to which it has
+    turned them, by scipy's root finder."""
     end = replace(chain.end_effector, offset_m=(0, 0, 0))
 
     def unbalanced(turned, q, wrench):
         torque = joint_torques(chain, q + turned, wrench, end)
-        return turned - compliance * (torque if weighing is None else torque + weighing(q + turned))
+        return turned - compliance * (
+            torque if weighing is None else torque + weighing(q + turned)
+        )
 
     pairs = zip(states.joint_angles, states.wrench, strict=True)
-    return np.array([root(unbalanced, np.zeros(len(q)), (q, wrench), tol=1e-15).x for q, wrench in pairs])
+    return np.array(
+        [
+            root(unbalanced, np.zeros(len(q)), (q, wrench), tol=1e-15).x
+            for q, wrench in pairs
+        ]
+    )
 
 
 def test_nominal_springs_deflect_as_equation_9_with_exact_kinematics(fanuc):
-    targets = tuple(Target(p.name, p.name, (0.05, 0.1, -0.1)) for p in fanuc.chain.points)
-    model = made_model(fanuc.chain, targets, 6, fitted_frames=False, compliance=fanuc.compliance)
-    estimate, states = made_estimate(model), made_states(6, 6, seed=4)
+    targets = tuple(
+        Target(p.name, p.name, (0.05, 0.1, -0.1)) for p in fanuc.chain.points
+    )
+    model = made_model(
+        fanuc.chain, targets, 6, fitted_frames=False, compliance=fanuc.compliance
+    )
+    estimate = made_estimate(model)
+    states = made_states(6, 6, seed=4)
     seen = seen_exactly(model, estimate, states)
-    position, rotation = predict(model, estimate, seen, conditions(model, estimate, states))
+    position, rotation = predict(
+        model, estimate, seen, conditions(model, estimate, states)
+    )
     turned = equilibrium(fanuc.chain, fanuc.compliance, states)
     for index, point in enumerate(fanuc.chain.points):
         target = replace(point, offset_m=(0.05, 0.1, -0.1))
         expected = poses(fanuc.chain, states.joint_angles + turned, target)
-        np.testing.assert_allclose(position[seen.target == index], expected[0], rtol=0, atol=1e-9)
-        np.testing.assert_allclose(rotation[seen.target == index], expected[1], rtol=0, atol=1e-9)
-    bent = exact_deflections(fanuc.chain, states.joint_angles, turned, fanuc.chain.end_effector)
+        np.testing.assert_allclose(
+            position[seen.target == index], expected[0], rtol=0, atol=1e-9
+        )
+        np.testing.assert_allclose(
+            rotation[seen.target == index], expected[1], rtol=0, atol=1e-9
+        )
+    bent = exact_deflections(
+        fanuc.chain, states.joint_angles, turned, fanuc.chain.end_effector
+    )
     assert np.abs(bent).max() > 1e-4
 
 
@@ -181,8 +280,12 @@ def test_nominal_springs_deflect_as_equation_9_with_exact_kinematics(fanuc):
 def test_effects_at_zero_leave_the_declared_model(name):
     chain = chain_of(OTHER_CHAINS[name])
     model = made_model(chain, rows=6)
-    estimate, states = made_estimate(model, seed=8), made_states(chain.coordinates, 4, seed=9)
+    estimate = made_estimate(model, seed=8)
+    states = made_states(chain.coordinates, 4, seed=9)
     effects = tuple(candidates_on(model.sites).values())
-    more, same = model.with_effects(effects), estimate.with_effects(effects)
+    more = model.with_effects(effects)
+    same = estimate.with_effects(effects)
     seen = seen_exactly(model, estimate, states)
-    np.testing.assert_allclose(residuals(more, same, seen, conditions(more, same, states)), 0.0, atol=1e-14)
+    np.testing.assert_allclose(
+        residuals(more, same, seen, conditions(more, same, states)), 0.0, atol=1e-14
+    )

@@ -1,4 +1,5 @@
-"""Normal equations: whitened by a dense factor, by differences, in closed form; what cannot be told is held and named."""
+"""Normal equations: whitened by a dense factor, by differences, in closed form; what
+cannot be told is held and named."""
 
 from dataclasses import replace
 
@@ -16,14 +17,26 @@ from fitted_models import (
     seen_off,
     waves,
 )
-from synthetic import NOISE, made_estimate, made_model, made_states, seen_exactly, with_noise
+from synthetic import (
+    NOISE,
+    made_estimate,
+    made_model,
+    made_states,
+    seen_exactly,
+    with_noise,
+)
 
 from elastocal.campaigns.campaign import Target
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import conditions, parameters, residuals, stepped
 from elastocal.fitting.noise import Noise
-from elastocal.fitting.normal_equations import Parts, identifiable, solve_normal, whitening
+from elastocal.fitting.normal_equations import (
+    Parts,
+    identifiable,
+    solve_normal,
+    whitening,
+)
 from elastocal.fitting.observations import Observations
 
 
@@ -35,13 +48,20 @@ def solved(left, right, plausible, *given):
 
 def test_solution_with_a_prior_is_that_of_numpy_with_a_row_for_each_prior():
     rng = np.random.default_rng(45)
-    left, right, present = 10 * rng.standard_normal((8, 6)), rng.standard_normal(8), rng.standard_normal(6)
+    left = 10 * rng.standard_normal((8, 6))
+    right = rng.standard_normal(8)
+    present = rng.standard_normal(6)
     penalty = np.array([0.0, 0.0, 4.0, 9.0, 25.0, 1.0])
     root = np.diag(np.sqrt(penalty))
-    rows, ends = np.concatenate([left, root]), np.concatenate([right, -root @ present])
-    step, covariance, held = solved(left, right, np.full(6, 2.0), False, penalty, present)
+    rows = np.concatenate([left, root])
+    ends = np.concatenate([right, -root @ present])
+    step, covariance, held = solved(
+        left, right, np.full(6, 2.0), False, penalty, present
+    )
     np.testing.assert_allclose(step, np.linalg.lstsq(rows, ends)[0], rtol=1e-9)
-    np.testing.assert_allclose(covariance, np.linalg.inv(rows.T @ rows), rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(
+        covariance, np.linalg.inv(rows.T @ rows), rtol=1e-9, atol=1e-15
+    )
     assert not held.any()
 
 
@@ -51,21 +71,32 @@ def informed(*covariance):
 
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
-@pytest.mark.parametrize(("correlation", "kept"), [(0.49, [False, True]), (0.51, [True, False])])
-def test_a_shape_is_given_up_for_another_from_a_correlation_of_a_half_on(correlation, kept, sign):
-    """Of either sign. The other has a standard error of 1.05 beside the shape, and is told without it."""
+@pytest.mark.parametrize(
+    ("correlation", "kept"), [(0.49, [False, True]), (0.51, [True, False])]
+)
+def test_a_shape_is_given_up_for_another_from_a_correlation_of_a_half_on(
+    correlation, kept, sign
+):
+    """Of either sign. The other has a standard error of 1.05 beside the shape, and is
+    told without it."""
     shared = sign * correlation * 1.05 * 0.5
     gram = informed([1.05**2, shared], [shared, 0.5**2])
     assert 1 / np.sqrt(gram[0, 0]) < 1.0
-    np.testing.assert_array_equal(identifiable(gram, np.zeros(2, bool), np.array([False, True]))[0], kept)
+    np.testing.assert_array_equal(
+        identifiable(gram, np.zeros(2, bool), np.array([False, True]))[0], kept
+    )
 
 
 @pytest.mark.parametrize(("error", "kept"), [(0.999, True), (1.001, False)])
 @pytest.mark.parametrize("beside", [0.0, 0.6])
-def test_a_standard_error_of_the_plausible_size_is_the_largest_that_is_estimated(error, kept, beside):
+def test_a_standard_error_of_the_plausible_size_is_the_largest_that_is_estimated(
+    error, kept, beside
+):
     """Alone as beside another parameter that is known better."""
     gram = informed([0.01, 0.1 * error * beside], [0.1 * error * beside, error**2])
-    np.testing.assert_array_equal(identifiable(gram, np.zeros(2, bool), np.zeros(2, bool))[0], [True, kept])
+    np.testing.assert_array_equal(
+        identifiable(gram, np.zeros(2, bool), np.zeros(2, bool))[0], [True, kept]
+    )
 
 
 @pytest.mark.parametrize(
@@ -74,39 +105,66 @@ def test_a_standard_error_of_the_plausible_size_is_the_largest_that_is_estimated
         ("joint_offset@1", ["joint_offset@1 offset"]),
         # To positions of one target, a turn of the last joint is a shift of the target.
         ("joint_offset@6", ["joint_offset@6 offset"]),
-        ("link_geometry@6", [f"link_geometry@6 {name}" for name in ("dx", "dy", "dz", "rx", "ry", "rz")]),
+        (
+            "link_geometry@6",
+            [
+                f"link_geometry@6 {name}"
+                for name in ("dx", "dy", "dz", "rx", "ry", "rz")
+            ],
+        ),
     ],
 )
 def test_what_the_frame_or_the_target_makes_as_well_is_held_and_named(fanuc, key, held):
     model = model_of(fanuc, key, "joint_offset@3")
     true = made_estimate(model, seed=13)
-    seen = with_noise(seen_exactly(model, true, made_states(6, 40, seed=14)), np.random.default_rng(15))
+    seen = with_noise(
+        seen_exactly(model, true, made_states(6, 40, seed=14)),
+        np.random.default_rng(15),
+    )
     found = fit(model, seen, NOISE)
     assert names_held(found) == held
     assert not found.estimate.coefficients[0].any()
-    assert not found.covariance[found.held].any() and not found.covariance[:, found.held].any()
+    assert (
+        not found.covariance[found.held].any()
+        and not found.covariance[:, found.held].any()
+    )
     # It is not shrunk towards zero by a penalty: without it the fit is the very same.
     without = fit(model_of(fanuc, "joint_offset@3"), seen, NOISE)
-    np.testing.assert_allclose(found.estimate.coefficients[1], without.estimate.coefficients[0], rtol=1e-9)
-    np.testing.assert_allclose(found.covariance[~found.held][:, ~found.held], without.covariance, rtol=1e-6, atol=1e-22)
+    np.testing.assert_allclose(
+        found.estimate.coefficients[1], without.estimate.coefficients[0], rtol=1e-9
+    )
+    np.testing.assert_allclose(
+        found.covariance[~found.held][:, ~found.held],
+        without.covariance,
+        rtol=1e-6,
+        atol=1e-22,
+    )
 
 
 @pytest.mark.parametrize("off", [-2.0, 0.0, 2.0])
 def test_a_prior_of_the_plausible_size_alone_identifies_nothing_however_it_rounds(off):
     gram = np.diag([50.0, 1.0 + off * np.finfo(float).eps, 3.0])
     none = np.zeros(3, bool)
-    np.testing.assert_array_equal(identifiable(gram, none, none)[0], [True, False, True])
+    np.testing.assert_array_equal(
+        identifiable(gram, none, none)[0], [True, False, True]
+    )
 
 
 def test_kept_are_those_of_one_pivot_after_the_other_where_ranks_are_deficient():
-    rng, given_up = np.random.default_rng(48), 0
+    rng = np.random.default_rng(48)
+    given_up = 0
     for _ in range(200):
         size = int(rng.integers(2, 12))
-        left = rng.standard_normal((int(rng.integers(1, size + 4)), size)) * 10.0 ** rng.uniform(-1, 3, size)
-        gram, kept = left.T @ left, []
+        left = rng.standard_normal(
+            (int(rng.integers(1, size + 4)), size)
+        ) * 10.0 ** rng.uniform(-1, 3, size)
+        gram = left.T @ left
+        kept = []
         for number in range(size):
             before = gram[kept, number]
-            rest = gram[number, number] - before @ np.linalg.solve(gram[np.ix_(kept, kept)], before)
+            rest = gram[number, number] - before @ np.linalg.solve(
+                gram[np.ix_(kept, kept)], before
+            )
             if rest > max(1.0, 1e-11 * gram[number, number]):
                 kept.append(number)
         none = np.zeros(size, bool)
@@ -119,125 +177,205 @@ def test_kept_are_those_of_one_pivot_after_the_other_where_ranks_are_deficient()
     assert given_up > 20
 
 
-THREE = tuple(Target(name, point, (0.1, 0.05, 0.0)) for name, point in (("A", "6DoF"), ("B", "3DoF"), ("C", "2DoF")))
+THREE = tuple(
+    Target(name, point, (0.1, 0.05, 0.0))
+    for name, point in (("A", "6DoF"), ("B", "3DoF"), ("C", "2DoF"))
+)
 
 OF_JOINTS = Noise("repeats", 60e-6, 40e-6, 1e-6 * np.array([30.0, 40, 50, 60, 70, 0]))
 
 
 @pytest.fixture(params=[3, 6], ids=["positions", "poses"])
 def case(request, fanuc):
-    """Observations of one to three targets a state, averaged over one to four repeats, and their Jacobian."""
+    """Observations of one to three targets a state, averaged over one to four repeats,
+    and their Jacobian."""
     model = made_model(fanuc.chain, THREE, request.param, fitted_frames=False)
     states = made_states(6, 7, seed=1)
     states.repeats[:] = [1, 4, 2, 3, 1, 2, 4]
     whole = seen_exactly(model, made_estimate(model), states)
     kept = np.array([0, 1, 2, 4, 6, 7, 8, 9, 12, 13, 14, 17, 18, 19, 20])
     rotation = None if whole.rotation is None else whole.rotation[kept]
-    seen = Observations(states, whole.state[kept], whole.target[kept], whole.position[kept], rotation)
+    seen = Observations(
+        states, whole.state[kept], whole.target[kept], whole.position[kept], rotation
+    )
     estimate = made_estimate(model)
-    jacobian = linearize(model, estimate, seen, conditions(model, estimate, states)).coordinate_jacobian[..., :6]
+    jacobian = linearize(
+        model, estimate, seen, conditions(model, estimate, states)
+    ).coordinate_jacobian[..., :6]
     return seen, jacobian
 
 
 def dense_covariance(seen, jacobian, noise):
     """Covariance of all rows, written out from what the noise means."""
     rows = seen.rows
-    joints, common = jacobian.reshape(-1, 6) * noise.joint_rad, jacobian.reshape(-1, 6) * noise.pose_rad
-    state, pose = np.repeat(seen.state, rows), np.repeat(seen.cluster, rows)
-    sensor = np.tile(([noise.position_m] * 3 + [noise.orientation_rad] * 3)[:rows], len(seen))
+    joints = jacobian.reshape(-1, 6) * noise.joint_rad
+    common = jacobian.reshape(-1, 6) * noise.pose_rad
+    state = np.repeat(seen.state, rows)
+    pose = np.repeat(seen.cluster, rows)
+    sensor = np.tile(
+        ([noise.position_m] * 3 + [noise.orientation_rad] * 3)[:rows], len(seen)
+    )
     one = (joints @ joints.T) * (state[:, None] == state) + np.diag(sensor**2)
     # What a pose has in common no repeat averages.
-    return one / seen.states.repeats[state] + (common @ common.T) * (pose[:, None] == pose)
+    return one / seen.states.repeats[state] + (common @ common.T) * (
+        pose[:, None] == pose
+    )
 
 
 @pytest.mark.parametrize("pose_rad", [0.0, 2e-5, 1e-3])
 def test_whitened_rows_are_those_of_a_dense_cholesky_factor(case, pose_rad):
-    """Poses of one state and of three, which share an error of the joints where there is one."""
+    """Poses of one state and of three, which share an error of the joints where there
+    is one."""
     seen, jacobian = case
-    seen = replace(seen, states=replace(seen.states, pose=np.array([0, 1, 1, 1, 2, 2, 3])))
+    seen = replace(
+        seen, states=replace(seen.states, pose=np.array([0, 1, 1, 1, 2, 2, 3]))
+    )
     noise = replace(OF_JOINTS, pose_rad=pose_rad)
     covariance = dense_covariance(seen, jacobian, noise)
     values = np.random.default_rng(2).standard_normal((len(seen), seen.rows, 5))
     found = whitening(seen, jacobian, noise).apply(values).reshape(-1, 5)
-    # A factor of a covariance is unique but for the order of its rows: what is whitened has the same products.
-    expected = values.reshape(-1, 5).T @ np.linalg.solve(covariance, values.reshape(-1, 5))
-    np.testing.assert_allclose(found.T @ found, expected, rtol=1e-7, atol=1e-7 * np.abs(expected).max())
+    # A factor of a covariance is unique but for the order of its rows: what is whitened
+    # has the same products.
+    expected = values.reshape(-1, 5).T @ np.linalg.solve(
+        covariance, values.reshape(-1, 5)
+    )
+    np.testing.assert_allclose(
+        found.T @ found, expected, rtol=1e-7, atol=1e-7 * np.abs(expected).max()
+    )
     identity = np.eye(len(covariance)).reshape(len(seen), seen.rows, -1)
     factor = whitening(seen, jacobian, noise).apply(identity).reshape(covariance.shape)
-    np.testing.assert_allclose(factor @ covariance @ factor.T, np.eye(len(covariance)), atol=1e-7)
+    np.testing.assert_allclose(
+        factor @ covariance @ factor.T, np.eye(len(covariance)), atol=1e-7
+    )
 
 
 @pytest.mark.parametrize("pose_rad", [0.0, 3e-5])
 @pytest.mark.parametrize("offset", [None, (0.0, 0.0, 0.1)])
-def test_products_by_factors_are_those_of_the_columns_written_out(fanuc, offset, pose_rad, monkeypatch):
-    """Targets that are fitted and that are known; errors of a state alone, and of a pose that has several."""
+def test_products_by_factors_are_those_of_the_columns_written_out(
+    fanuc, offset, pose_rad, monkeypatch
+):
+    """Targets that are fitted and that are known; errors of a state alone, and of a
+    pose that has several."""
     targets = tuple(replace(target, offset_m=offset) for target in TARGETS)
-    model = model_of(fanuc, "joint_offset@2", "lost_motion@3", "link_geometry@3", targets=targets, rows=6)
-    states = replace(made_states(6, 12, seed=88), pose=np.arange(12) // 3, load=np.arange(12) % 3)
+    model = model_of(
+        fanuc,
+        "joint_offset@2",
+        "lost_motion@3",
+        "link_geometry@3",
+        targets=targets,
+        rows=6,
+    )
+    states = replace(
+        made_states(6, 12, seed=88), pose=np.arange(12) // 3, load=np.arange(12) % 3
+    )
     estimate = made_estimate(model, seed=87)
     seen = with_noise(seen_exactly(model, estimate, states), np.random.default_rng(89))
     joints = 1e-6 * np.array([40.0, 15, 15, 30, 45, 220])
     noise = Noise("declared", 5e-6, 1e-5, joints, pose_rad=pose_rad)
-    plausible = np.array([parameter.plausible for _, parameter in parameters(model, estimate)])
-    weights, found = np.random.default_rng(90).uniform(0.3, 1.0, len(seen)), []
+    plausible = np.array(
+        [parameter.plausible for _, parameter in parameters(model, estimate)]
+    )
+    weights = np.random.default_rng(90).uniform(0.3, 1.0, len(seen))
+    found = []
     for fewest in (0, 1000):
-        monkeypatch.setattr("elastocal.fitting.normal_equations._COLUMNS_A_COORDINATE", fewest)
+        monkeypatch.setattr(
+            "elastocal.fitting.normal_equations._COLUMNS_A_COORDINATE", fewest
+        )
         measurements = Parts(model, seen, noise, estimate, plausible)
         measurements.linearize(estimate)
         measurements.whiten()
         found.append(measurements.normal_equations(weights))
     (gram, along), (written_out, _) = found
-    np.testing.assert_allclose(gram, written_out, rtol=1e-9, atol=1e-9 * np.abs(written_out).max())
-    # Products with the residual are half of what the squares fall by with each parameter.
+    np.testing.assert_allclose(
+        gram, written_out, rtol=1e-9, atol=1e-9 * np.abs(written_out).max()
+    )
+    # Products with the residual are half of what the squares fall by with each
+    # parameter.
     steps = 1e-4 * np.diag(plausible / np.sqrt(np.diag(gram)))
-    ends = [[measurements.squares(weights, stepped(model, estimate, way * step)) for way in (-1, 1)] for step in steps]
+    ends = [
+        [
+            measurements.squares(weights, stepped(model, estimate, way * step))
+            for way in (-1, 1)
+        ]
+        for step in steps
+    ]
     slopes = -np.diff(ends, axis=1)[:, 0] / 4e-4 * np.sqrt(np.diag(gram))
     np.testing.assert_allclose(slopes, along, atol=1e-5 * np.abs(along).max())
 
 
 @pytest.mark.parametrize("at_once", [None, 7])
 @pytest.mark.parametrize("kind", GANTRY_NOISES)
-def test_normal_equations_of_a_linear_problem_are_those_written_out(kind, at_once, monkeypatch):
-    """Weights come before the covariance is divided out; in parts of whole poses as in one."""
+def test_normal_equations_of_a_linear_problem_are_those_written_out(
+    kind, at_once, monkeypatch
+):
+    """Weights come before the covariance is divided out; in parts of whole poses as in
+    one."""
     if at_once:
-        monkeypatch.setattr("elastocal.fitting.observations._MOST_HELD", 3 * 60 * at_once)
-    noise, states, plausible = GANTRY_NOISES[kind], gantry_states(20, 8), np.array([0.1, 2.0, 0.5])
+        monkeypatch.setattr(
+            "elastocal.fitting.observations._MOST_HELD", 3 * 60 * at_once
+        )
+    noise = GANTRY_NOISES[kind]
+    states = gantry_states(20, 8)
+    plausible = np.array([0.1, 2.0, 0.5])
     rng = np.random.default_rng(98)
-    left, off, weights = waves(states.joint_angles, 3), 1e-4 * rng.standard_normal((20, 3)), rng.uniform(0.2, 1.0, 20)
-    model, seen = gantry_model(linear_law(3)), seen_off(states, off)
-    estimate = replace(made_estimate(model), coefficients=(np.array([1e-4, -2e-4, 3e-5]),))
+    left = waves(states.joint_angles, 3)
+    off = 1e-4 * rng.standard_normal((20, 3))
+    weights = rng.uniform(0.2, 1.0, 20)
+    model = gantry_model(linear_law(3))
+    seen = seen_off(states, off)
+    estimate = replace(
+        made_estimate(model), coefficients=(np.array([1e-4, -2e-4, 3e-5]),)
+    )
     parts = Parts(model, seen, noise, estimate, plausible)
     assert len(parts.parts) == 1 if at_once is None else len(parts.parts) > 2
     parts.linearize(estimate)
     parts.whiten()
     residual = off - left @ estimate.coefficients[0]
-    inverse, root = np.linalg.inv(gantry_covariance(states, noise)), np.repeat(np.sqrt(weights), 3)
+    inverse = np.linalg.inv(gantry_covariance(states, noise))
+    root = np.repeat(np.sqrt(weights), 3)
     columns = root[:, None] * left.reshape(60, 3) * plausible
     gram, along = parts.normal_equations(weights)
     np.testing.assert_allclose(gram, columns.T @ inverse @ columns, rtol=1e-9)
-    np.testing.assert_allclose(along, columns.T @ inverse @ (root * residual.ravel()), rtol=1e-7)
-    assert parts.squares(weights) == pytest.approx((root * residual.ravel()) @ inverse @ (root * residual.ravel()), rel=1e-7)
+    np.testing.assert_allclose(
+        along, columns.T @ inverse @ (root * residual.ravel()), rtol=1e-7
+    )
+    assert parts.squares(weights) == pytest.approx(
+        (root * residual.ravel()) @ inverse @ (root * residual.ravel()), rel=1e-7
+    )
     there = replace(estimate, coefficients=(np.array([0.0, 1e-4, 0.0]),))
     moved = root * (off - left @ there.coefficients[0]).ravel()
-    assert parts.squares(weights, there) == pytest.approx(moved @ inverse @ moved, rel=1e-7)
+    assert parts.squares(weights, there) == pytest.approx(
+        moved @ inverse @ moved, rel=1e-7
+    )
     if kind != "poses":
-        # Without an error of the pose every state is whitened by itself: its squares are those of its own covariance.
+        # Without an error of the pose every state is whitened by itself: its squares
+        # are those of its own covariance.
         blocks = [inverse[3 * n : 3 * n + 3, 3 * n : 3 * n + 3] for n in range(20)]
-        expected = [np.sqrt(row @ block @ row / 3) for row, block in zip(residual, blocks, strict=True)]
+        expected = [
+            np.sqrt(row @ block @ row / 3)
+            for row, block in zip(residual, blocks, strict=True)
+        ]
         np.testing.assert_allclose(parts.distance(), expected, rtol=1e-7)
 
 
-def test_squares_of_another_estimate_are_whitened_in_the_axes_in_which_the_step_began(fanuc):
+def test_squares_of_another_estimate_are_whitened_in_the_axes_in_which_the_step_began(
+    fanuc,
+):
     model = model_of(fanuc, targets=TARGETS)
     estimate = made_estimate(model, seed=3)
-    seen = with_noise(seen_exactly(model, estimate, made_states(6, 9, seed=4)), np.random.default_rng(5))
+    seen = with_noise(
+        seen_exactly(model, estimate, made_states(6, 9, seed=4)),
+        np.random.default_rng(5),
+    )
     parts = Parts(model, seen, OF_JOINTS, estimate, np.ones(12))
     parts.linearize(estimate)
     parts.whiten()
     there = stepped(model, estimate, np.array([0, 0, 0, 0.3, -0.2, 0.1, *[0.0] * 6]))
     residual = residuals(model, there, seen, conditions(model, there, seen.states))
     turned = residual @ there.frame_rotation[0].T @ estimate.frame_rotation[0]
-    expected = (whitening(seen, parts.parts[0].jacobian, OF_JOINTS).apply(turned) ** 2).sum()
+    expected = (
+        whitening(seen, parts.parts[0].jacobian, OF_JOINTS).apply(turned) ** 2
+    ).sum()
     assert parts.squares(np.ones(len(seen)), there) == pytest.approx(expected, rel=1e-6)
     assert parts.squares(np.ones(len(seen)), there) != pytest.approx(
         (parts.parts[0].whitener.apply(residual) ** 2).sum(), rel=1e-3

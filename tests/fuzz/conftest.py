@@ -1,4 +1,5 @@
-"""How many inputs are tried: the suite's are always the same, `make fuzz` draws others."""
+"""How many inputs are tried: the suite's are always the same, `make fuzz` draws
+others."""
 
 import os
 

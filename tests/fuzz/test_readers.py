@@ -1,4 +1,5 @@
-"""Whatever bytes a file holds, its reader gives a value or an InputError of one short line, in bounded time, and no more."""
+"""Whatever bytes a file holds, its reader gives a value or an InputError of one short
+line, in bounded time, and no more."""
 
 import json
 
@@ -22,7 +23,11 @@ from elastocal.study.strategies import check_strategy, strategy_from_document
 CONFIG = REPOSITORY / "config"
 STUDY, STRATEGY, KUKA = (
     yaml.safe_load((REPOSITORY / name).read_text(encoding="utf-8"))
-    for name in ("config.yaml", "config/strategies/3-6DoF-after-2DoF.yaml", "config/robots/kuka_extended.yaml")
+    for name in (
+        "config.yaml",
+        "config/strategies/3-6DoF-after-2DoF.yaml",
+        "config/robots/kuka_extended.yaml",
+    )
 )
 FULL = DOCUMENT | {
     "compliance": "identify",
@@ -31,13 +36,32 @@ FULL = DOCUMENT | {
     "serial_number": "7",
     "measured_on": "2026-11-20",
 }
-PIECES = [*"TR", *"xyz", "(", ")", "q1", "q2", "-", "90deg", "l", "0.5", " ", "[E]", "1e999", "pas"]
+PIECES = [
+    *"TR",
+    *"xyz",
+    "(",
+    ")",
+    "q1",
+    "q2",
+    "-",
+    "90deg",
+    "l",
+    "0.5",
+    " ",
+    "[E]",
+    "1e999",
+    "pas",
+]
 
 
 def read_strategy(path):
     document = read_document(path)
     check_document(document, "strategy", path)
-    check_strategy(strategy_from_document(document), read_robot(CONFIG / "robots/kuka.yaml").chain, path)
+    check_strategy(
+        strategy_from_document(document),
+        read_robot(CONFIG / "robots/kuka.yaml").chain,
+        path,
+    )
 
 
 def read_study(path):
@@ -48,23 +72,45 @@ def read_study(path):
 
 # What a file of the cell is altered from, its name, and its readers.
 READERS = {
-    "campaign": (FULL, "campaign.yaml", lambda path: read_campaign(path.parent, path.parents[1] / "robots", ["joint_offset"])),
-    "files of a campaign": (FULL, "campaign.yaml", lambda path: campaign_files(path.parent, path.parents[1] / "robots")),
-    "robot": (ARM, "arm.yaml", lambda path: read_campaign(path.parent, path.parents[1] / "robots")),
+    "campaign": (
+        FULL,
+        "campaign.yaml",
+        lambda path: read_campaign(
+            path.parent, path.parents[1] / "robots", ["joint_offset"]
+        ),
+    ),
+    "files of a campaign": (
+        FULL,
+        "campaign.yaml",
+        lambda path: campaign_files(path.parent, path.parents[1] / "robots"),
+    ),
+    "robot": (
+        ARM,
+        "arm.yaml",
+        lambda path: read_campaign(path.parent, path.parents[1] / "robots"),
+    ),
     "robot with links": (KUKA, "arm.yaml", read_robot),
     "strategy": (STRATEGY, "strategy.yaml", read_strategy),
     "configuration": (STUDY, "config.yaml", read_study),
 }
 # Columns of what no number is, or none of measurements, to be repeated.
-ODD = [pa.array([value]) for value in (None, True, b"\xff", [1.0], {"a": 1}, float("nan"), "\ud7ff" * 50)]
-ODD += [pa.array(["A"]).dictionary_encode(), pa.array([None, 1.0]), pa.array([2**63], pa.uint64())]
+ODD = [
+    pa.array([value])
+    for value in (None, True, b"\xff", [1.0], {"a": 1}, float("nan"), "\ud7ff" * 50)
+]
+ODD += [
+    pa.array(["A"]).dictionary_encode(),
+    pa.array([None, 1.0]),
+    pa.array([2**63], pa.uint64()),
+]
 ODD += [pa.array([1], kind) for kind in (pa.timestamp("us"), pa.decimal128(20, 2))]
 ARRAYS = st.sampled_from(ODD)
 
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory):
-    """A valid campaign in a folder, robots beside it; each test writes one file of its own over it and takes it back."""
+    """A valid campaign in a folder, robots beside it; each test writes one file of its
+    own over it and takes it back."""
     cell = Cell(tmp_path_factory.mktemp("fuzz"))
     cell.document = FULL
     cell.write()
@@ -80,17 +126,23 @@ def test_documents(place, kind, data):
     over(path, data.draw(any_document(document)), lambda: read(path))
 
 
-@given(st.lists(st.sampled_from(PIECES), max_size=30).map("".join) | st.text(max_size=30))
+@given(
+    st.lists(st.sampled_from(PIECES), max_size=30).map("".join) | st.text(max_size=30)
+)
 def test_chains(text):
     holds(lambda: parse_chain(text, {"l": 0.5}, "arm.yaml"))
 
 
 @given(
     st.sampled_from(sorted(STUDY)),
-    SCALARS.map(str) | VALUES.map(lambda value: json.dumps(value, default=str)) | st.text(max_size=30),
+    SCALARS.map(str)
+    | VALUES.map(lambda value: json.dumps(value, default=str))
+    | st.text(max_size=30),
 )
 def test_changes_on_the_command_line(key, text):
-    holds(lambda: check_study(override(STUDY, [f"{key}={text}"]), CONFIG, "config.yaml"))
+    holds(
+        lambda: check_study(override(STUDY, [f"{key}={text}"]), CONFIG, "config.yaml")
+    )
 
 
 @given(st.data())
@@ -111,12 +163,18 @@ def parquet(tmp_path_factory):
 @given(st.data())
 def test_measurements_as_parquet(parquet, data):
     path = parquet.folder / "measurements.parquet"
-    content, table = path.read_bytes(), pa.table(parquet.table)
+    content = path.read_bytes()
+    table = pa.table(parquet.table)
     if data.draw(st.booleans()):
-        drawn = data.draw(damaged(content) | st.binary(max_size=100).map(lambda inner: b"PAR1" + inner + b"PAR1"))
+        drawn = data.draw(
+            damaged(content)
+            | st.binary(max_size=100).map(lambda inner: b"PAR1" + inner + b"PAR1")
+        )
     else:
         column = data.draw(st.integers(0, table.num_columns - 1))
-        name = data.draw(st.sampled_from([table.column_names[column], "x", "target", "é\n", ""]))
+        name = data.draw(
+            st.sampled_from([table.column_names[column], "x", "target", "é\n", ""])
+        )
         sink = pa.BufferOutputStream()
         try:
             some = data.draw(ARRAYS)

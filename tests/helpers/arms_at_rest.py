@@ -1,4 +1,5 @@
-"""Arms of the plant in one line; arms at random angles under random forces, and where they come to rest."""
+"""Arms of the plant in one line; arms at random angles under random forces, and where
+they come to rest."""
 
 import re
 
@@ -11,14 +12,22 @@ STATES = 40
 
 
 def arm_of(chain, **more):
-    """An arm from a chain of drives q1 to qn, of compliances 1 to n, which turn half a turn either way."""
+    """An arm from a chain of drives q1 to qn, of compliances 1 to n, which turn half a
+    turn either way."""
     joints = len({*re.findall(r"q\d+", chain)})
-    document = {"name": "test", "chain": chain, "compliance_urad_per_Nm": [*range(1, joints + 1)]}
-    return arm_from_document(document | {"joint_limits_deg": [[-180, 180]] * joints} | more)
+    document = {
+        "name": "test",
+        "chain": chain,
+        "compliance_urad_per_Nm": [*range(1, joints + 1)],
+    }
+    return arm_from_document(
+        document | {"joint_limits_deg": [[-180, 180]] * joints} | more
+    )
 
 
 def driven_to(machine, angles):
-    """Coordinates of a machine whose drives stand at some angles and whose springs are at rest."""
+    """Coordinates of a machine whose drives stand at some angles and whose springs are
+    at rest."""
     coordinates = np.zeros((len(angles), machine.model.nq))
     coordinates[:, machine.drive] = angles
     return coordinates
@@ -36,11 +45,18 @@ def at_rest(arm, angles, wrench, structure=None, compliance=None):
     compliance = arm.compliance if compliance is None else compliance
     machine = machine_of(arm, structure or Structure())
     growth = np.zeros((len(angles), arm.joints + 1))
-    return machine, equilibrium(machine, angles, lambda facing: wrench, growth, lambda torque, unloaded: compliance * torque)
+    return machine, equilibrium(
+        machine,
+        angles,
+        lambda facing: wrench,
+        growth,
+        lambda torque, unloaded: compliance * torque,
+    )
 
 
 def forces_at(machine, angles):
-    """On the gears, and poses of the measuring points, where the drives stand at some angles and no spring has yielded."""
+    """On the gears, and poses of the measuring points, where the drives stand at some
+    angles and no spring has yielded."""
     growth = np.zeros((len(angles), angles.shape[1] + 1))
     force, position, rotation = machine.forces(driven_to(machine, angles), growth)
     return force[:, machine.gear], position, rotation

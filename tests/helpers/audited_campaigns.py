@@ -1,4 +1,5 @@
-"""Small campaigns of the plant, diagnosed, with the files that an audit reads, and what it finds in these."""
+"""Small campaigns of the plant, diagnosed, with the files that an audit reads, and what
+it finds in these."""
 
 from analysed_robots import ROBOTS
 from made_audits import CONFIGURATION
@@ -22,36 +23,67 @@ from elastocal_proof.plant.campaigns import Design, schedule_of
 from elastocal_proof.plant.kinds import drawn_defect, with_defects
 from elastocal_proof.plant.physical_robot import specimen
 
-USUAL = {"poses": 12, "held_out": 4, "ladder": (0.0, 1.0, -1.0), "repeats": 3, "repeated_poses": 4}
+USUAL = {
+    "poses": 12,
+    "held_out": 4,
+    "ladder": (0.0, 1.0, -1.0),
+    "repeats": 3,
+    "repeated_poses": 4,
+}
 
 
 def diagnosed_campaign(top, robot, effects=(), **design):
-    """Measure a robot of the plant with some defects, diagnose it, and write what an audit reads of it: the campaign `cell`."""
+    """Measure a robot of the plant with some defects, diagnose it, and write what an
+    audit reads of it: the campaign `cell`."""
     file = ROBOTS / f"{robot}.yaml"
     arm = arm_from_file(file)
     planned = Design(**USUAL | {"points": arm.points[-1:]} | design)
-    bad = with_defects(specimen(arm, 4, weighs=False), [drawn_defect(effect, arm, 4) for effect in effects])
-    write_blind_campaign(top / "cell", "cell", file, bad, planned, schedule_of(arm, planned, 3))
-    results, reports = top / "results/loop/cell", top / "reports/loop/cell"
+    bad = with_defects(
+        specimen(arm, 4, weighs=False),
+        [drawn_defect(effect, arm, 4) for effect in effects],
+    )
+    write_blind_campaign(
+        top / "cell", "cell", file, bad, planned, schedule_of(arm, planned, 3)
+    )
+    results = top / "results/loop/cell"
+    reports = top / "reports/loop/cell"
     results.mkdir(parents=True)
     reports.mkdir(parents=True)
     descriptions, *parts = load_campaign(top / "cell", ROBOTS)
     for name, part in zip(("training", "held_out"), parts, strict=True):
-        write_table(results / f"{name}.parquet", schemas.measurements(arm.joints), [columns_of(part)], {})
+        write_table(
+            results / f"{name}.parquet",
+            schemas.measurements(arm.joints),
+            [columns_of(part)],
+            {},
+        )
     write_json(results / "campaign.json", descriptions)
     case, unseen = (case_from(descriptions, columns_of(part)) for part in parts)
     found = diagnose(case, Settings(), 1)
-    write_json(results / "diagnosis.json", tables.diagnosis_facts(found) | {"covariance": found.final.covariance.tolist()})
+    write_json(
+        results / "diagnosis.json",
+        tables.diagnosis_facts(found) | {"covariance": found.final.covariance.tolist()},
+    )
     write_table(results / "steps.parquet", schemas.STEPS, tables.step_blocks(found), {})
     # As the next job does: from the files.
     again = tables.diagnosis_from(case, tables.diagnosis_facts(found))
     blocks = residual_blocks(again, judged(again, unseen, 1))
-    write_table(reports / "residuals.parquet", schemas.residuals(arm.joints), blocks, {})
+    write_table(
+        reports / "residuals.parquet", schemas.residuals(arm.joints), blocks, {}
+    )
     return top
 
 
 def audit_of(top, *files):
-    """Findings of files of the campaign `cell`, all of them by default, every row looked at."""
+    """Findings of files of the campaign `cell`, all of them by default, every row
+    looked at."""
     run = Audited(top, CONFIGURATION, {}, {}, 10**6)
-    files = files or [path.relative_to(top).as_posix() for path in sorted(top.glob("re*/loop/cell/*"))]
-    return [finding for file in files for _, check, arguments in checks_of(file) for finding in check(run, file, **arguments)]
+    files = files or [
+        path.relative_to(top).as_posix() for path in sorted(top.glob("re*/loop/cell/*"))
+    ]
+    return [
+        finding
+        for file in files
+        for _, check, arguments in checks_of(file)
+        for finding in check(run, file, **arguments)
+    ]

@@ -11,5 +11,7 @@ def damaged(case, shifts):
     position = measurements.position.copy()
     for place, shift in shifts.items():
         position[place, 0] += shift
-    campaign = replace(case.campaign, measurements=replace(measurements, position=position))
+    campaign = replace(
+        case.campaign, measurements=replace(measurements, position=position)
+    )
     return replace(case, campaign=campaign).select(np.ones(len(measurements), bool))

@@ -1,4 +1,5 @@
-"""A diagnosed campaign with its reports and the records of its jobs, as a certificate is made of it."""
+"""A diagnosed campaign with its reports and the records of its jobs, as a certificate
+is made of it."""
 
 import contextlib
 import shutil
@@ -25,7 +26,8 @@ _PLAN = replace(PLAN, poses=27)
 
 
 def certified_checkout(top, name="made", offset=3e-4, made=None):
-    """A checkout with a campaign that was diagnosed and judged; `made` makes its folder.
+    """A checkout with a campaign that was diagnosed and judged; `made` makes its
+    folder.
 
     Returns folder of the campaign, in `top`.
     """
@@ -37,7 +39,12 @@ def certified_checkout(top, name="made", offset=3e-4, made=None):
         (top / ENGINE).write_text("'''Made it.'''\n", encoding="utf-8")
     robot = analysed("kuka")
     if made is None:
-        folder = made_folder(top / name, robot, name, table=made_table(robot, name, plan=_PLAN, offset_of_joint_3=offset))
+        folder = made_folder(
+            top / name,
+            robot,
+            name,
+            table=made_table(robot, name, plan=_PLAN, offset_of_joint_3=offset),
+        )
     else:
         folder = made(top / name, robot, name)
     out = run_loop(folder, ROBOTS, top / "results" / "loop" / name, ANALYSIS)
@@ -53,17 +60,35 @@ def certified_checkout(top, name="made", offset=3e-4, made=None):
 
 
 def record_jobs(name, files, installed=None):
-    """Keep the records of the jobs behind a campaign's report, in the working directory."""
-    tables, found = ([f"results/loop/{name}/{file}" for file in files] for files in (TABLES, FOUND))
+    """Keep the records of the jobs behind a campaign's report, in the working
+    directory."""
+    tables, found = (
+        [f"results/loop/{name}/{file}" for file in files] for files in (TABLES, FOUND)
+    )
     reports = [f"reports/loop/{name}/{file}" for file in REPORTS]
     jobs = {
         "read_campaign": (files, tables),
         "diagnose_campaign": (tables[:2], found),
         "judge_campaign": (tables + found[:2], reports),
-        "compile_loop_report": (tables + found + reports, [f"reports/loop/{name}/{REPORT}"]),
+        "compile_loop_report": (
+            tables + found + reports,
+            [f"reports/loop/{name}/{REPORT}"],
+        ),
     }
     for number, (rule, (inputs, outputs)) in enumerate(jobs.items()):
         digests, own = input_digests([*inputs, ENGINE], None if number else [ENGINE])
         times = f"2026-01-01T00:00:0{number}", f"2026-01-01T00:00:0{number + 1}"
-        origin, here = Origin("c0ffee", "d16e57", 1), installed or environment(".")
-        write_records(JobRecord(rule, {"campaign": name}, *times, digests, own, tuple(outputs), origin, here))
+        origin = Origin("c0ffee", "d16e57", 1)
+        here = installed or environment(".")
+        write_records(
+            JobRecord(
+                rule,
+                {"campaign": name},
+                *times,
+                digests,
+                own,
+                tuple(outputs),
+                origin,
+                here,
+            )
+        )

@@ -1,4 +1,5 @@
-"""What is written on a figure, whether all of it lies on the page, and files of empty figures for the reports."""
+"""What is written on a figure, whether all of it lies on the page, and files of empty
+figures for the reports."""
 
 import shutil
 

@@ -3,7 +3,8 @@
 import time
 from contextlib import contextmanager
 
-# Waiting for longer means that what is waited for never comes: an hour, for what takes a minute on a machine that is not busy.
+# Waiting for longer means that what is waited for never comes: an hour, for what takes
+# a minute on a machine that is not busy.
 HUNG_S = 3600
 # Of CPU time, for what takes milliseconds.
 _AT_ONCE_S = 5.0

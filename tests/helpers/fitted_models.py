@@ -1,4 +1,5 @@
-"""Models of a robot with effects by their keys, measurements of them, and what a fit does not identify."""
+"""Models of a robot with effects by their keys, measurements of them, and what a fit
+does not identify."""
 
 from dataclasses import replace
 
@@ -6,7 +7,14 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.spatial.transform import Rotation
 from support import chain_of
-from synthetic import candidate_on, made_estimate, made_model, made_states, seen_exactly, with_noise
+from synthetic import (
+    candidate_on,
+    made_estimate,
+    made_model,
+    made_states,
+    seen_exactly,
+    with_noise,
+)
 
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.protocol import Candidate, Parameter
@@ -17,18 +25,26 @@ TARGETS = Target("A", "6DoF", None), Target("B", "3DoF", None)
 
 
 def model_of(robot, *keys, targets=TARGETS[:1], **options):
-    """A model of a robot with its nominal springs and these candidates of the catalogue; one target by default."""
+    """A model of a robot with its nominal springs and these candidates of the
+    catalogue; one target by default."""
     effects = tuple(candidate_on(robot.chain, key) for key in keys)
-    return made_model(robot.chain, targets, effects=effects, compliance=robot.compliance, **options)
+    return made_model(
+        robot.chain, targets, effects=effects, compliance=robot.compliance, **options
+    )
 
 
 def names_held(found):
     """Owners and names of the parameters that a fit held."""
-    return [f"{owner} {p.name}" for (owner, p), held in zip(found.parameters, found.held, strict=True) if held]
+    return [
+        f"{owner} {p.name}"
+        for (owner, p), held in zip(found.parameters, found.held, strict=True)
+        if held
+    ]
 
 
 def bent(fanuc, seed, shape, key="thermal_growth[time]"):
-    """Noisy measurements of a law with a shape somewhere in its range, and the model that made them."""
+    """Noisy measurements of a law with a shape somewhere in its range, and the model
+    that made them."""
     model = model_of(fanuc, key)
     true = made_estimate(model, seed=seed)
     true = replace(true, shapes=(np.array([shape]),))
@@ -36,8 +52,8 @@ def bent(fanuc, seed, shape, key="thermal_growth[time]"):
     return model, with_noise(seen, np.random.default_rng(seed))
 
 
-# A gantry carries its hand where its joints say: a law that shifts the joints is exactly linear, and an error of the joints is
-# an error of the position.
+# A gantry carries its hand where its joints say: a law that shifts the joints is
+# exactly linear, and an error of the joints is an error of the position.
 GANTRY = "Tx(q1) Ty(q2) Tz(q3) [hand]"
 GANTRY_NOISES = {
     "sensor": Noise("declared", 1e-4, 1e-4, np.zeros(3)),
@@ -47,46 +63,78 @@ GANTRY_NOISES = {
 
 
 def waves(joint_angles, count, seed=0):
-    """Columns of a made law: smooth in the joints, alike in size, ndarray (S, 3, count)."""
+    """Columns of a made law: smooth in the joints, alike in size, ndarray (S, 3,
+    count)."""
     rng = np.random.default_rng((90, seed))
-    turns, phases = rng.uniform(0.5, 3.0, (3, count, joint_angles.shape[1])), rng.uniform(0, 2 * np.pi, (3, count))
+    turns = rng.uniform(0.5, 3.0, (3, count, joint_angles.shape[1]))
+    phases = rng.uniform(0, 2 * np.pi, (3, count))
     return np.sin(np.einsum("icj,sj->sic", turns, joint_angles) + phases)
 
 
 def linear_law(count, priors=None, plausible=0.1, seed=0):
-    """A law of so many parameters that shifts the three joints of the gantry by `waves`."""
+    """A law of so many parameters that shifts the three joints of the gantry by
+    `waves`."""
     priors = [None] * count if priors is None else priors
-    listed = tuple(Parameter(f"p{n}", "m", plausible, prior) for n, prior in enumerate(priors))
+    listed = tuple(
+        Parameter(f"p{n}", "m", plausible, prior) for n, prior in enumerate(priors)
+    )
 
     def displacement(around):
         columns = waves(around.joint_angles, count, seed)
-        return [{axis: columns[:, axis, number] for axis in range(3)} for number in range(count)]
+        return [
+            {axis: columns[:, axis, number] for axis in range(3)}
+            for number in range(count)
+        ]
 
     return Candidate("made_law", "made", (1,), "", listed, displacement)
 
 
 def gantry_model(*laws, rows=3):
     """A model of the gantry with these laws, its foot and its target known."""
-    return made_model(chain_of(GANTRY), (Target("A", "hand", (0.0, 0.0, 0.0)),), rows, fitted_frames=False, effects=laws)
+    return made_model(
+        chain_of(GANTRY),
+        (Target("A", "hand", (0.0, 0.0, 0.0)),),
+        rows,
+        fitted_frames=False,
+        effects=laws,
+    )
 
 
 def gantry_states(count, poses=None, seed=0):
-    """Unloaded states of the gantry, so many of them to a pose one after the other; repeated once to four times."""
+    """Unloaded states of the gantry, so many of them to a pose one after the other;
+    repeated once to four times."""
     states = made_states(3, count, (91, seed), force=0.0)
     pose = np.arange(count) * (poses or count) // count
-    return replace(states, pose=pose, repeats=np.random.default_rng((92, seed)).integers(1, 5, count))
+    return replace(
+        states,
+        pose=pose,
+        repeats=np.random.default_rng((92, seed)).integers(1, 5, count),
+    )
 
 
 def seen_off(states, off, turned=None):
-    """Observations of the gantry that are off its commanded positions, and turned, by just so much: ndarrays (S, 3)."""
+    """Observations of the gantry that are off its commanded positions, and turned, by
+    just so much: ndarrays (S, 3)."""
     rotation = None if turned is None else Rotation.from_rotvec(turned).as_matrix()
     count = len(states)
-    return Observations(states, np.arange(count), np.zeros(count, int), states.joint_angles + off, rotation)
+    return Observations(
+        states,
+        np.arange(count),
+        np.zeros(count, int),
+        states.joint_angles + off,
+        rotation,
+    )
 
 
 def gantry_covariance(states, noise):
-    """Covariance of all positions of the gantry, written out: its Jacobian is the identity."""
-    one = block_diag(*((noise.position_m**2 * np.eye(3) + np.diag(noise.joint_rad**2)) / n for n in states.repeats))
+    """Covariance of all positions of the gantry, written out: its Jacobian is the
+    identity."""
+    one = block_diag(
+        *(
+            (noise.position_m**2 * np.eye(3) + np.diag(noise.joint_rad**2)) / n
+            for n in states.repeats
+        )
+    )
     pose = np.repeat(states.pose, 3)
     axis = np.tile(np.arange(3), len(states))
     return one + noise.pose_rad**2 * (pose[:, None] == pose) * (axis[:, None] == axis)

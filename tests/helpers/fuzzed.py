@@ -1,4 +1,5 @@
-"""Damaged files: what hypothesis draws them from, and what a reader has to do with each."""
+"""Damaged files: what hypothesis draws them from, and what a reader has to do with
+each."""
 
 import copy
 
@@ -8,7 +9,8 @@ from hypothesis import strategies as st
 
 from elastocal.errors import LONGEST_MESSAGE, InputError
 
-# What stands in files of people and of those who mean harm; beyond floats and beyond integers too.
+# What stands in files of people and of those who mean harm; beyond floats and beyond
+# integers too.
 SCALARS = st.one_of(
     st.none(),
     st.booleans(),
@@ -16,11 +18,28 @@ SCALARS = st.one_of(
     st.floats(),
     st.text(max_size=20),
     st.sampled_from(
-        ["", "kuka", "../x", "/etc/passwd", "a\0b", "\x1b[2J", "x" * 300, "6e-5", "1_0", "unknown", "EE", "Rz(q1)"]
+        [
+            "",
+            "kuka",
+            "../x",
+            "/etc/passwd",
+            "a\0b",
+            "\x1b[2J",
+            "x" * 300,
+            "6e-5",
+            "1_0",
+            "unknown",
+            "EE",
+            "Rz(q1)",
+        ]
     ),
 )
 VALUES = st.recursive(
-    SCALARS, lambda inner: st.lists(inner, max_size=4) | st.dictionaries(SCALARS, inner, max_size=4), max_leaves=8
+    SCALARS,
+    lambda inner: (
+        st.lists(inner, max_size=4) | st.dictionaries(SCALARS, inner, max_size=4)
+    ),
+    max_leaves=8,
 )
 # Pieces of YAML of which a random text rarely holds two.
 PIECES = ["&a ", "*a", "!!python/object:os.system ", "<<: ", "? ", "- ", "\n", "\n  "]
@@ -36,17 +55,26 @@ BYTES = st.one_of(
 def paths_of(document, at=()):
     """Ways to every value inside of a document."""
     yield at
-    inner = document.items() if isinstance(document, dict) else enumerate(document) if isinstance(document, list) else ()
+    inner = (
+        document.items()
+        if isinstance(document, dict)
+        else enumerate(document)
+        if isinstance(document, list)
+        else ()
+    )
     for key, value in inner:
         yield from paths_of(value, (*at, key))
 
 
 @st.composite
 def altered(draw, document):
-    """A valid document with one to three values replaced, taken away, added or renamed."""
+    """A valid document with one to three values replaced, taken away, added or
+    renamed."""
     document = copy.deepcopy(document)
     for _ in range(draw(st.integers(1, 3))):
-        *way, last = draw(st.sampled_from([path for path in paths_of(document) if path] or [("x",)]))
+        *way, last = draw(
+            st.sampled_from([path for path in paths_of(document) if path] or [("x",)])
+        )
         inner = document
         for key in way:
             inner = inner[key]
@@ -60,7 +88,9 @@ def altered(draw, document):
         elif isinstance(inner[last], list):
             inner[last] = inner[last] * draw(st.integers(0, 4))
         elif isinstance(inner[last], int | float):
-            inner[last] = inner[last] * draw(st.sampled_from([-1, 0, 1e-300, 1e300, 10**6, 0.5]))
+            inner[last] = inner[last] * draw(
+                st.sampled_from([-1, 0, 1e-300, 1e300, 10**6, 0.5])
+            )
     return document
 
 
@@ -76,7 +106,9 @@ def damaged(draw, content):
 
 
 def written(document):
-    return yaml.dump(document, sort_keys=False, allow_unicode=True).encode("utf-8", "surrogatepass")
+    return yaml.dump(document, sort_keys=False, allow_unicode=True).encode(
+        "utf-8", "surrogatepass"
+    )
 
 
 def any_document(document):
@@ -91,7 +123,11 @@ def holds(read):
             read()
         except InputError as error:
             line = str(error)
-            assert len(line) <= LONGEST_MESSAGE and line.isprintable() and "; allowed: " in line, line
+            assert (
+                len(line) <= LONGEST_MESSAGE
+                and line.isprintable()
+                and "; allowed: " in line
+            ), line
             line.encode("utf-8")
 
 
@@ -119,7 +155,9 @@ def tables(draw, content, separator=",", cells=CELLS):
     lines = [line.split(separator) for line in content.decode().splitlines()]
     for _ in range(draw(st.integers(1, 3))):
         row = draw(st.integers(0, len(lines) - 1))
-        change = draw(st.sampled_from(["cell", "cell", "cell", "row", "twice", "column"]))
+        change = draw(
+            st.sampled_from(["cell", "cell", "cell", "row", "twice", "column"])
+        )
         column = draw(st.integers(0, max(0, len(lines[row]) - 1)))
         if change == "cell" and lines[row]:
             lines[row][column] = draw(cells)
@@ -130,4 +168,6 @@ def tables(draw, content, separator=",", cells=CELLS):
         else:
             for line in lines:
                 del line[column : column + 1]
-    return "\n".join(separator.join(line) for line in lines).encode("utf-8", "surrogatepass")
+    return "\n".join(separator.join(line) for line in lines).encode(
+        "utf-8", "surrogatepass"
+    )

@@ -1,4 +1,5 @@
-"""Ground truths, verdicts and oracles of blind cases as documents, without making any case; and the plan that counts them."""
+"""Ground truths, verdicts and oracles of blind cases as documents, without making any
+case; and the plan that counts them."""
 
 import pandas as pd
 from analysed_robots import ROBOTS
@@ -12,7 +13,8 @@ JOINTS = 6
 
 
 def truth(*places, group=None, level=50.0, robot="irb7600", setting="usual", **changes):
-    """A sealed document; a place is an effect with its joints, such as ("joint_offset", 3)."""
+    """A sealed document; a place is an effect with its joints, such as ("joint_offset",
+    3)."""
     group = group or ("single" if places else "none")
     defects = [
         {
@@ -46,7 +48,8 @@ def truth(*places, group=None, level=50.0, robot="irb7600", setting="usual", **c
 
 
 def effect(name, *joints, parameters=(), alternatives=(), adopted=True):
-    """An effect of a verdict; a parameter is a name with its value and its standard error."""
+    """An effect of a verdict; a parameter is a name with its value and its standard
+    error."""
     key = "@".join([name, "+".join(map(str, joints))] if joints else [name])
     return {
         "name": name,
@@ -54,12 +57,27 @@ def effect(name, *joints, parameters=(), alternatives=(), adopted=True):
         "alternatives": list(alternatives),
         "adopted": adopted,
         "parameters": [
-            {"name": f"{key} {of}", "value": value, "std_error": error, "held": error == 0} for of, value, error in parameters
+            {
+                "name": f"{key} {of}",
+                "value": value,
+                "std_error": error,
+                "held": error == 0,
+            }
+            for of, value, error in parameters
         ],
     }
 
 
-def verdict(word, *effects, before=2e-4, after=1e-4, reduction=(0.4, 0.6), warnings=(), compliance=1.0, freedom=0):
+def verdict(
+    word,
+    *effects,
+    before=2e-4,
+    after=1e-4,
+    reduction=(0.4, 0.6),
+    warnings=(),
+    compliance=1.0,
+    freedom=0,
+):
     """A verdict as in verdict.json."""
     return {
         "verdict": word,
@@ -74,7 +92,10 @@ def verdict(word, *effects, before=2e-4, after=1e-4, reduction=(0.4, 0.6), warni
         },
         "noise": {"degrees_of_freedom": freedom},
         "warnings": list(warnings),
-        "compliance_urad_per_Nm": {"after": [compliance] * JOINTS, "std_error": [0.1] * JOINTS},
+        "compliance_urad_per_Nm": {
+            "after": [compliance] * JOINTS,
+            "std_error": [0.1] * JOINTS,
+        },
     }
 
 
@@ -88,15 +109,27 @@ def silence(**changes):
 
 
 def oracle(p_value=1e-6, rms=1e-4):
-    return {"candidates": [], "p_value": p_value, "detected": p_value < 0.05, "heldout": {"rms_m": rms}}
+    return {
+        "candidates": [],
+        "p_value": p_value,
+        "detected": p_value < 0.05,
+        "heldout": {"rms_m": rms},
+    }
 
 
 def frame(*entries):
-    """Rows of cases.csv of (ground truth, verdict, oracle), with a limit behind them where there is one."""
+    """Rows of cases.csv of (ground truth, verdict, oracle), with a limit behind them
+    where there is one."""
     return pd.DataFrame([score(PLAN, *entry) for entry in entries])
 
 
 def summary(*entries):
     """The summary of such entries by robots and quantity."""
-    spans = pd.DataFrame([row for document, found, *_ in entries for row in intervals_of(PLAN, document, found)])
+    spans = pd.DataFrame(
+        [
+            row
+            for document, found, *_ in entries
+            for row in intervals_of(PLAN, document, found)
+        ]
+    )
     return summarize(PLAN, frame(*entries), spans, 1).set_index(["robots", "quantity"])

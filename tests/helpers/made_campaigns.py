@@ -1,4 +1,5 @@
-"""Campaigns made in memory by the exact kinematics of a robot with springs, for the tests of faults."""
+"""Campaigns made in memory by the exact kinematics of a robot with springs, for the
+tests of faults."""
 
 from dataclasses import dataclass, replace
 
@@ -17,8 +18,9 @@ POINTS = ("2DoF", "3DoF", "4DoF", "6DoF")
 class Plan:
     """How a campaign is measured.
 
-    `poses`, `loads`, `repeats`: `loads` without the unloaded one. `tracker`: whether the base stands somewhere in the tracker's
-    frame and the targets anywhere on their points. `oriented`: whether orientations are measured. `noise`: standard deviation,
+    `poses`, `loads`, `repeats`: `loads` without the unloaded one. `tracker`: whether
+    the base stands somewhere in the tracker's frame and the targets anywhere on their
+    points. `oriented`: whether orientations are measured. `noise`: standard deviation,
     m and rad. `force`: N.
     """
 
@@ -36,16 +38,20 @@ def with_measured(campaign, **columns):
     return replace(campaign, measurements=replace(campaign.measurements, **columns))
 
 
-def made(robot, seed, plan=Plan(), true_robot=None, true_offset=0.0, sag=0.0, moving=None):
+def made(
+    robot, seed, plan=Plan(), true_robot=None, true_offset=0.0, sag=0.0, moving=None
+):
     """A campaign of a robot, measured as planned.
 
-    `robot`: what the campaign takes it for. `true_robot`: what it is; `robot` without. `true_offset`: added to the joint
-    angles, rad. `sag`: turn of joint 2 for each unit of the cosine of its angle, rad. `moving`: joints, from 0, that stand at
-    zero in all but so many poses.
+    `robot`: what the campaign takes it for. `true_robot`: what it is; `robot` without.
+    `true_offset`: added to the joint angles, rad. `sag`: turn of joint 2 for each unit
+    of the cosine of its angle, rad. `moving`: joints, from 0, that stand at zero in all
+    but so many poses.
     """
     rng = np.random.default_rng(seed)
     true_robot = true_robot or robot
-    low, high = np.maximum(robot.joint_limits[:, 0], -2.5), np.minimum(robot.joint_limits[:, 1], 2.5)
+    low = np.maximum(robot.joint_limits[:, 0], -2.5)
+    high = np.minimum(robot.joint_limits[:, 1], 2.5)
     angles = rng.uniform(low, high, (plan.poses, robot.joints))
     for joint, few in (moving or {}).items():
         angles[few:, joint] = 0.0
@@ -55,21 +61,30 @@ def made(robot, seed, plan=Plan(), true_robot=None, true_offset=0.0, sag=0.0, mo
     force *= plan.force / np.linalg.norm(force, axis=-1, keepdims=True)
     force[:, 0] = 0.0
     wrenches = np.concatenate([force, np.cross([0.0, 0.5, 0.0], force)], axis=-1)
-    q, wrench = angles[pose], wrenches[pose, load]
+    q = angles[pose]
+    wrench = wrenches[pose, load]
     end = poses_and_jacobians(true_robot.chain, q, true_robot.chain.end_effector)[2]
     moved = q + true_offset + generalized_forces(end, wrench) * true_robot.compliance
     moved[:, 1] += sag * np.cos(q[:, 1])
-    offsets = rng.uniform(-0.15, 0.15, (len(POINTS), 3)) if plan.tracker else np.zeros((len(POINTS), 3))
-    position, rotation = np.empty((len(pose), 3)), np.empty((len(pose), 3, 3))
+    offsets = (
+        rng.uniform(-0.15, 0.15, (len(POINTS), 3))
+        if plan.tracker
+        else np.zeros((len(POINTS), 3))
+    )
+    position = np.empty((len(pose), 3))
+    rotation = np.empty((len(pose), 3, 3))
     for index, name in enumerate(POINTS):
         point = replace(true_robot.chain.point(name), offset_m=tuple(offsets[index]))
         mask = target == index
         position[mask], rotation[mask] = poses(true_robot.chain, moved[mask], point)
     if plan.tracker:
         frame = Rotation.random(random_state=seed).as_matrix()
-        position, rotation = position @ frame.T + rng.uniform(-3, 3, 3), frame @ rotation
+        position = position @ frame.T + rng.uniform(-3, 3, 3)
+        rotation = frame @ rotation
     position = position + plan.noise * rng.standard_normal(position.shape)
-    turned = Rotation.from_rotvec(plan.noise * rng.standard_normal(position.shape)) * Rotation.from_matrix(rotation)
+    turned = Rotation.from_rotvec(
+        plan.noise * rng.standard_normal(position.shape)
+    ) * Rotation.from_matrix(rotation)
     places = {"pose": pose, "load": load, "repeat": repeat, "target": target}
     measurements = measurements_of(
         **{name: index.astype(np.int32) for name, index in places.items()},
@@ -83,7 +98,10 @@ def made(robot, seed, plan=Plan(), true_robot=None, true_offset=0.0, sag=0.0, mo
         robot=robot,
         measured="pose" if plan.oriented else "position",
         frame="tracker" if plan.tracker else "base",
-        targets=tuple(Target(f"T{name}", name, None if plan.tracker else (0.0, 0.0, 0.0)) for name in POINTS),
+        targets=tuple(
+            Target(f"T{name}", name, None if plan.tracker else (0.0, 0.0, 0.0))
+            for name in POINTS
+        ),
         compliance="identify",
         declared=(),
         noise=None,
@@ -96,7 +114,9 @@ def with_geometric_errors(robot, seed, size_m):
     """The same robot with other lengths, m."""
     rng = np.random.default_rng(seed)
     transforms = tuple(
-        replace(transform, constant=transform.constant + size_m * rng.choice([-1.0, 1.0]))
+        replace(
+            transform, constant=transform.constant + size_m * rng.choice([-1.0, 1.0])
+        )
         if transform.kind == "T"
         else transform
         for transform in robot.chain.transforms

@@ -9,11 +9,19 @@ from elastocal.application.accuracy import Accuracy
 
 
 def made_document(decision="pass", misplaced=False, **conformity):
-    document = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8"))
-    sentences = [{"sentence": "reflector or tool sits 5.0 mm from where it is declared"}] if misplaced else []
+    document = yaml.safe_load(
+        Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8")
+    )
+    sentences = (
+        [{"sentence": "reflector or tool sits 5.0 mm from where it is declared"}]
+        if misplaced
+        else []
+    )
     judged = document["conformity"] | {"decision": decision} | conformity
     return document | {
-        "accuracy": asdict(Accuracy("base", 1.2e-4, 3e-4, 1.6e-4, None, 9, "some poses")),
+        "accuracy": asdict(
+            Accuracy("base", 1.2e-4, 3e-4, 1.6e-4, None, 9, "some poses")
+        ),
         "misplaced": sentences,
         "conformity": judged,
     }

@@ -9,7 +9,8 @@ from scipy.spatial.transform import Rotation
 from elastocal.mechanics.kinematics import poses
 
 OFFSETS = np.array([[0.2, 0.0, 0.05], [0.2, 0.06, -0.02], [0.15, -0.04, -0.04]])
-POSES, REPEATS = 8, 3
+POSES = 8
+REPEATS = 3
 
 
 def reflectors(chain, angles, seed):
@@ -21,14 +22,18 @@ def reflectors(chain, angles, seed):
 
 
 def model_angles(degrees, elbow):
-    """The chain's angles in rad from a controller's in degrees, written out; `elbow` is the angle between the arms."""
+    """The chain's angles in rad from a controller's in degrees, written out; `elbow` is
+    the angle between the arms."""
     j1, j2, _, j4, j5, j6 = degrees.T
     return np.radians(np.column_stack([j1, j2 - 90, 90 - elbow, -j4, -j5, -j6]))
 
 
 def static_source(fanuc, folder):
-    """File of the static source and what the campaign of it must hold: joint angles and positions, row by row."""
-    degrees = np.random.default_rng(1).uniform(-50, 50, (POSES, 6)).repeat(REPEATS, axis=0)
+    """File of the static source and what the campaign of it must hold: joint angles and
+    positions, row by row."""
+    degrees = (
+        np.random.default_rng(1).uniform(-50, 50, (POSES, 6)).repeat(REPEATS, axis=0)
+    )
     angles = model_angles(degrees, degrees[:, 2])
     positions = reflectors(fanuc.chain, angles, 2)
     path = Path(folder) / "calibration.mat"
@@ -43,13 +48,19 @@ def cpa_source(fanuc, folder):
     angles = model_angles(degrees, degrees[:, 1] + degrees[:, 2])
     positions = reflectors(fanuc.chain, angles, 4)
     path = Path(folder) / "values.csv"
-    np.savetxt(path, np.hstack([1e3 * positions.reshape(-1, 9), np.zeros((POSES, 6)), degrees]))
+    np.savetxt(
+        path, np.hstack([1e3 * positions.reshape(-1, 9), np.zeros((POSES, 6)), degrees])
+    )
     return path, angles, positions
 
 
 def assert_holds(measurements, angles, positions):
     assert len(measurements) == 3 * len(angles)
-    np.testing.assert_allclose(measurements.joint_angles, angles.repeat(3, axis=0), rtol=0, atol=1e-12)
-    np.testing.assert_allclose(measurements.position, positions.reshape(-1, 3), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(
+        measurements.joint_angles, angles.repeat(3, axis=0), rtol=0, atol=1e-12
+    )
+    np.testing.assert_allclose(
+        measurements.position, positions.reshape(-1, 3), rtol=0, atol=1e-12
+    )
     np.testing.assert_array_equal(measurements.wrench, 0)
     np.testing.assert_array_equal(measurements.load, 0)

@@ -12,7 +12,8 @@ PLAN = Plan(("3DoF", "6DoF"), 14, 800.0, (0, 1), (0.0, 0.5, 0.0), 2, 4, 6e-5, 6e
 
 
 def made_table(robot, name, seed=1, plan=PLAN, offset_of_joint_3=0.0):
-    """Measurements of a robot whose third joint stands beyond what it reports, in no order."""
+    """Measurements of a robot whose third joint stands beyond what it reports, in no
+    order."""
     table = draw_measurements(robot, plan, seed, name)
     table["q3"] = table["q3"] - offset_of_joint_3
     order = np.random.default_rng(seed).permutation(len(table["pose"]))
@@ -22,6 +23,10 @@ def made_table(robot, name, seed=1, plan=PLAN, offset_of_joint_3=0.0):
 def made_folder(folder, robot, /, name="made", kind="csv", table=None, **changes):
     """A campaign's folder."""
     table = made_table(robot, name) if table is None else table
-    document = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8"))
-    write_campaign(folder, document | {"campaign": name} | changes, table, robot.joints, kind)
+    document = yaml.safe_load(
+        Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8")
+    )
+    write_campaign(
+        folder, document | {"campaign": name} | changes, table, robot.joints, kind
+    )
     return folder

@@ -11,29 +11,54 @@ from elastocal_proof.league.methods import DataSet, dealt
 
 def made_data_set(folder, robot, robots_folder, poses=24, **changes):
     """A data set of an unloaded robot that misses its poses by something smooth."""
-    changes = {"frame": "tracker", "offset_m": "unknown", "declared": ["joint_offset"]} | changes
+    changes = {
+        "frame": "tracker",
+        "offset_m": "unknown",
+        "declared": ["joint_offset"],
+    } | changes
     smoothly_wrong_folder(folder, robot, poses=poses, **changes)
     descriptions, campaign = described_campaign(folder, robots_folder)
     seen = campaign.measurements
-    return DataSet(descriptions, columns_of(seen), dealt(seen, 4, np.random.default_rng(1)))
+    return DataSet(
+        descriptions, columns_of(seen), dealt(seen, 4, np.random.default_rng(1))
+    )
 
 
 def made_entries(size_m, poses=40, seed=1, std_m=None, folds=4):
-    """Rows of the entries table with errors of some size, each pose seen by two targets."""
+    """Rows of the entries table with errors of some size, each pose seen by two
+    targets."""
     draws = np.random.default_rng(seed)
     pose = np.repeat(np.arange(poses), 2)
     off = draws.normal(0.0, size_m, (2 * poses, 3))
-    columns = {"fold": pose % folds + 1, "set": np.zeros(2 * poses, int), "session": np.zeros(2 * poses, int), "pose": pose}
+    columns = {
+        "fold": pose % folds + 1,
+        "set": np.zeros(2 * poses, int),
+        "session": np.zeros(2 * poses, int),
+        "pose": pose,
+    }
     columns |= {"load": np.zeros(2 * poses, int), "target": np.tile([0, 1], poses)}
     columns |= {f"d{axis}": off[:, number] for number, axis in enumerate("xyz")}
-    return pd.DataFrame(columns | {f"std_{axis}": np.full(2 * poses, np.nan if std_m is None else std_m) for axis in "xyz"})
+    return pd.DataFrame(
+        columns
+        | {
+            f"std_{axis}": np.full(2 * poses, np.nan if std_m is None else std_m)
+            for axis in "xyz"
+        }
+    )
 
 
 def made_results(data=("one", "two"), splits=("random", "blocks", "session")):
-    """Entries of three methods, by data set, split and method: geometry, one half as wrong, and one that states intervals."""
+    """Entries of three methods, by data set, split and method: geometry, one half as
+    wrong, and one that states intervals."""
     found = {}
     for number, name in enumerate(data):
         for split in splits:
-            for method, size, std in (("geometry", 2e-4, None), ("half", 1e-4, None), ("process", 1.2e-4, 1.2e-4)):
-                found[name, split, method] = made_entries(size, 30 + 10 * number, number + 1, std)
+            for method, size, std in (
+                ("geometry", 2e-4, None),
+                ("half", 1e-4, None),
+                ("process", 1.2e-4, 1.2e-4),
+            ):
+                found[name, split, method] = made_entries(
+                    size, 30 + 10 * number, number + 1, std
+                )
     return found

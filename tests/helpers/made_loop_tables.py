@@ -1,4 +1,5 @@
-"""Tables and verdicts of the loop made up for figures and reports, no robot behind them, and what a report states of them."""
+"""Tables and verdicts of the loop made up for figures and reports, no robot behind
+them, and what a report states of them."""
 
 from copy import deepcopy
 from pathlib import Path
@@ -8,17 +9,34 @@ import yaml
 
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.settings import Settings
-from elastocal.diagnosis.verdict import ADEQUATE, CLASS, NAMED, NOT_TESTABLE, SEVERAL, UNEXPLAINED
+from elastocal.diagnosis.verdict import (
+    ADEQUATE,
+    CLASS,
+    NAMED,
+    NOT_TESTABLE,
+    SEVERAL,
+    UNEXPLAINED,
+)
 from elastocal.report.loop_facts import loop_facts
 
 # What of verdict.json is always the same.
 DATA = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8"))
-FAMILIES = ("geometry", "gravity", "transmission", "elastic", "gearbox", "load", "drift")
+FAMILIES = (
+    "geometry",
+    "gravity",
+    "transmission",
+    "elastic",
+    "gearbox",
+    "load",
+    "drift",
+)
 
 
 def residual_table(poses=30, repeats=1):
-    """Columns of a residuals table; joint 2 makes a sine of 300 µm in the vertical that goes with what is found."""
-    rng, targets = np.random.default_rng(0), 2
+    """Columns of a residuals table; joint 2 makes a sine of 300 µm in the vertical that
+    goes with what is found."""
+    rng = np.random.default_rng(0)
+    targets = 2
     count = poses * targets * repeats * 2
     pose = np.repeat(np.arange(poses), targets * repeats * 2)
     angles = rng.uniform(-2, 2, (poses, 6))[pose]
@@ -36,20 +54,26 @@ def residual_table(poses=30, repeats=1):
         "time_s": 60.0 * np.arange(count),
     }
     table |= {f"q{joint}": angles[:, joint - 1] for joint in range(1, 7)}
-    table |= {name: 500.0 * load * (name == "fz") for name in ("fx", "fy", "fz", "mx", "my", "mz")}
+    table |= {
+        name: 500.0 * load * (name == "fz")
+        for name in ("fx", "fy", "fz", "mx", "my", "mz")
+    }
     place = rng.uniform([0.5, -1, 0.2], [2, 1, 2], (poses, 3))[pose]
     table |= dict(zip("xyz", place.T, strict=True))
     noise = 20e-6 * rng.normal(size=(count, 3))
     wave = 300e-6 * np.sin(angles[:, 1])
     for stage, size in (("before", 1.0), ("after", 0.0)):
         off = noise + size * wave[:, None] * [0, 0, 1]
-        table |= {f"{stage}_d{axis}": off[:, number] for number, axis in enumerate("xyz")}
+        table |= {
+            f"{stage}_d{axis}": off[:, number] for number, axis in enumerate("xyz")
+        }
         table |= {f"{stage}_r{axis}": np.full(count, np.nan) for axis in "xyz"}
     return table
 
 
 def candidate_table(count=30, chosen=1):
-    """Columns of a candidates table: by falling Bayes factor, the last cannot be tested."""
+    """Columns of a candidates table: by falling Bayes factor, the last cannot be
+    tested."""
     total = count + 5
     names = [f"effect_{number}@{number % 6 + 1}" for number in range(total)]
     tested = np.arange(total) < count
@@ -60,7 +84,9 @@ def candidate_table(count=30, chosen=1):
 
     return {
         "candidate": np.array(names, object),
-        "family": np.array([FAMILIES[number % len(FAMILIES)] for number in range(total)], object),
+        "family": np.array(
+            [FAMILIES[number % len(FAMILIES)] for number in range(total)], object
+        ),
         "shape": np.where(rank == 1, 44.7213, np.nan),
         "log_bayes_factor": where_tested(100.0 - 7 * rank),
         "probability": where_tested(np.where(rank < chosen, 0.94, 0.01)),
@@ -70,9 +96,17 @@ def candidate_table(count=30, chosen=1):
 
 
 def probabilities(sets=None, alarm_p_value=0.002):
-    """Probabilities of verdict.json; `sets` of mechanisms with their locations, each with its probability."""
-    sets = sets or [({"lost_motion": ["joint 3"]}, 0.94), ({"joint_tilt": ["joint 2"]}, 0.05), ({}, 0.004)]
-    listed = [{"mechanisms": list(where), "probability": value, "locations": where} for where, value in sets]
+    """Probabilities of verdict.json; `sets` of mechanisms with their locations, each
+    with its probability."""
+    sets = sets or [
+        ({"lost_motion": ["joint 3"]}, 0.94),
+        ({"joint_tilt": ["joint 2"]}, 0.05),
+        ({}, 0.004),
+    ]
+    listed = [
+        {"mechanisms": list(where), "probability": value, "locations": where}
+        for where, value in sets
+    ]
     mechanisms = {}
     for where, value in sets:
         for name in where:
@@ -91,10 +125,16 @@ def step_rows(effects=("lost_motion",), largest_m=3e-4):
         size = largest_m * 0.7**number
         row = {"step": name, "kind": kind, "parameters": 6 * min(number, 1) + number}
         for metric, factor in {"mean": 0.5, "rms": 0.6, "p95": 0.9, "max": 1.0}.items():
-            row |= {f"train_{metric}_m": 0.9 * factor * size, f"heldout_{metric}_m": factor * size}
+            row |= {
+                f"train_{metric}_m": 0.9 * factor * size,
+                f"heldout_{metric}_m": factor * size,
+            }
             # Quantiles have no interval.
             low, high = (0.8, 1.2) if metric in ("mean", "rms") else (np.nan, np.nan)
-            row |= {f"heldout_{metric}_m_low": low * factor * size, f"heldout_{metric}_m_high": high * factor * size}
+            row |= {
+                f"heldout_{metric}_m_low": low * factor * size,
+                f"heldout_{metric}_m_high": high * factor * size,
+            }
             row |= {f"heldout_{metric}_over_floor": factor * size / 5e-5}
         rows.append(row)
     return rows
@@ -102,7 +142,11 @@ def step_rows(effects=("lost_motion",), largest_m=3e-4):
 
 def experiment_rows(count=10):
     """Rows of next_experiment.csv."""
-    return [DATA["experiment"] | {"pose": n, "separation": 10.0 + n, "resolved": 0.5 + 0.04 * n} for n in range(count)]
+    return [
+        DATA["experiment"]
+        | {"pose": n, "separation": 10.0 + n, "resolved": 0.5 + 0.04 * n}
+        for n in range(count)
+    ]
 
 
 def effect_entry(
@@ -117,70 +161,148 @@ def effect_entry(
 ):
     """An entry of the effects of verdict.json."""
     names = [f"{member} {parameter}" for member in members for parameter in parameters]
-    locations = locations or [(f"joint {joint}", 1.0) for joint in joints] or [("", 1.0)]
-    given = {"name": name, "joints": list(joints), "members": list(members), "alternatives": list(alternatives)}
-    given |= {"parameters": [DATA["parameter"] | {"name": each, "value": 1.2e-4 * (1 + n)} for n, each in enumerate(names)]}
-    given |= {"locations": [{"location": where, "probability": value} for where, value in locations]}
+    locations = (
+        locations or [(f"joint {joint}", 1.0) for joint in joints] or [("", 1.0)]
+    )
+    given = {
+        "name": name,
+        "joints": list(joints),
+        "members": list(members),
+        "alternatives": list(alternatives),
+    }
+    given |= {
+        "parameters": [
+            DATA["parameter"] | {"name": each, "value": 1.2e-4 * (1 + n)}
+            for n, each in enumerate(names)
+        ]
+    }
+    given |= {
+        "locations": [
+            {"location": where, "probability": value} for where, value in locations
+        ]
+    }
     judged = {"adopted": True} if adopted else {"adopted": False, "heldout_gain": None}
     return DATA["effect"] | given | judged | {"cost_m": cost_m if adopted else None}
 
 
 def verdict_document(
-    word, effects=(), warnings=(), noise="repeats", sets=None, outside=0, reduction=(0.15, 0.32), remainder=None
+    word,
+    effects=(),
+    warnings=(),
+    noise="repeats",
+    sets=None,
+    outside=0,
+    reduction=(0.15, 0.32),
+    remainder=None,
 ):
     """Contents of verdict.json."""
-    faulty, adopted = data_at_fault({"effects": effects}), any(effect["adopted"] for effect in effects)
+    faulty = data_at_fault({"effects": effects})
+    adopted = any(effect["adopted"] for effect in effects)
     before = DATA["errors"]
     after = {name: (0.7 if adopted else 1.0) * value for name, value in before.items()}
     both = {"before": before, "after": after}
-    found = deepcopy(DATA["verdict"]) | {"campaign": "made_up", "verdict": word, "effects": list(effects)}
-    found |= {"warnings": list(warnings), "held": [], "remainder": remainder, "settings": Settings().document()}
-    found |= {"kept": "effect" if adopted else "declared", "probabilities": None if faulty else probabilities(sets)}
+    found = deepcopy(DATA["verdict"]) | {
+        "campaign": "made_up",
+        "verdict": word,
+        "effects": list(effects),
+    }
+    found |= {
+        "warnings": list(warnings),
+        "held": [],
+        "remainder": remainder,
+        "settings": Settings().document(),
+    }
+    found |= {
+        "kept": "effect" if adopted else "declared",
+        "probabilities": None if faulty else probabilities(sets),
+    }
     found |= {"misfit": None, "candidates_tested": 0} if faulty else {}
-    found["noise"] |= {"source": noise, "degrees_of_freedom": 1008 if noise == "repeats" else 0}
+    found["noise"] |= {
+        "source": noise,
+        "degrees_of_freedom": 1008 if noise == "repeats" else 0,
+    }
     heldout = found["heldout"]
     heldout |= both | {"delivered": remainder["errors"] if remainder else after}
     heldout["uncalibrated"] |= {name: value / 0.7 for name, value in before.items()}
-    heldout |= {"reduction_ci95": list(reduction) if adopted else [0.0, 0.0], "reduction_std_error": 0.04 if adopted else 0.0}
+    heldout |= {
+        "reduction_ci95": list(reduction) if adopted else [0.0, 0.0],
+        "reduction_std_error": 0.04 if adopted else 0.0,
+    }
     heldout["noise_floor_rms_m"] = None if noise == "residual" else 5e-5
-    heldout["outside_range"] = {"poses": outside, "inside": both, "outside": both if outside else None}
+    heldout["outside_range"] = {
+        "poses": outside,
+        "inside": both,
+        "outside": both if outside else None,
+    }
     return found
 
 
-HARMONICS = [f"transmission_harmonic@{joint}[orders {band}]" for joint in range(1, 7) for band in ("1-2", "3-6", "7-12")]
+HARMONICS = [
+    f"transmission_harmonic@{joint}[orders {band}]"
+    for joint in range(1, 7)
+    for band in ("1-2", "3-6", "7-12")
+]
 WAVES = [f"{wave}_{order}q" for order in range(1, 7) for wave in ("cos", "sin")]
-REMAINDER = DATA["remainder"] | {"outside": 3, "half_width_m": {"within": 1.0e-4, "outside": 4.0e-4}}
+REMAINDER = DATA["remainder"] | {
+    "outside": 3,
+    "half_width_m": {"within": 1.0e-4, "outside": 4.0e-4},
+}
 TWO_PLACES = [("joint 3", 0.8), ("joint 5", 0.2)]
 CAMPAIGNS = {
-    "adequate": verdict_document(ADEQUATE, sets=[({}, 0.97), ({"lost_motion": ["joint 3"]}, 0.02)]),
+    "adequate": verdict_document(
+        ADEQUATE, sets=[({}, 0.97), ({"lost_motion": ["joint 3"]}, 0.02)]
+    ),
     "named": verdict_document(NAMED, [effect_entry()]),
-    "named, location uncertain": verdict_document(NAMED, [effect_entry(locations=TWO_PLACES)]),
-    "class": verdict_document(CLASS, [effect_entry(alternatives=["joint_tilt", "link_elasticity"])]),
-    "class with a related mechanism": verdict_document(CLASS, [effect_entry(alternatives=["other"])]),
-    "several": verdict_document(SEVERAL, [effect_entry(), effect_entry("payload", ["payload"], (), ["mass"])]),
+    "named, location uncertain": verdict_document(
+        NAMED, [effect_entry(locations=TWO_PLACES)]
+    ),
+    "class": verdict_document(
+        CLASS, [effect_entry(alternatives=["joint_tilt", "link_elasticity"])]
+    ),
+    "class with a related mechanism": verdict_document(
+        CLASS, [effect_entry(alternatives=["other"])]
+    ),
+    "several": verdict_document(
+        SEVERAL, [effect_entry(), effect_entry("payload", ["payload"], (), ["mass"])]
+    ),
     "named, not adopted": verdict_document(NAMED, [effect_entry(adopted=False)]),
-    "class, not adopted": verdict_document(CLASS, [effect_entry(alternatives=["joint_tilt"], adopted=False)]),
-    "unexplained": verdict_document(UNEXPLAINED, sets=[({"other": ["joint 2"]}, 0.9), ({}, 0.1)]),
+    "class, not adopted": verdict_document(
+        CLASS, [effect_entry(alternatives=["joint_tilt"], adopted=False)]
+    ),
+    "unexplained": verdict_document(
+        UNEXPLAINED, sets=[({"other": ["joint 2"]}, 0.9), ({}, 0.1)]
+    ),
     "not_testable": verdict_document(NOT_TESTABLE, sets=[({}, 1.0)]),
     "fault of the data": verdict_document(
-        NAMED, [effect_entry(adopted=False) | DATA["fault"]], ["the fit of the final model did not converge"]
+        NAMED,
+        [effect_entry(adopted=False) | DATA["fault"]],
+        ["the fit of the final model did not converge"],
     ),
-    "noise not known": verdict_document(ADEQUATE, noise="residual", warnings=["no repeats and no declared noise"]),
-    "hundreds of parameters": verdict_document(SEVERAL, [effect_entry("transmission_harmonic", HARMONICS, range(1, 7), WAVES)]),
-    "with a remainder": verdict_document(NAMED, [effect_entry()], outside=3, remainder=REMAINDER),
+    "noise not known": verdict_document(
+        ADEQUATE, noise="residual", warnings=["no repeats and no declared noise"]
+    ),
+    "hundreds of parameters": verdict_document(
+        SEVERAL, [effect_entry("transmission_harmonic", HARMONICS, range(1, 7), WAVES)]
+    ),
+    "with a remainder": verdict_document(
+        NAMED, [effect_entry()], outside=3, remainder=REMAINDER
+    ),
     "poses outside the range": verdict_document(NAMED, [effect_entry()], outside=3),
 }
 
 
 def facts_of(verdict, **changed):
-    """Facts of the report of a verdict, with tables that fit it where none are given."""
+    """Facts of the report of a verdict, with tables that fit it where none are
+    given."""
     found = [effect["name"] for effect in verdict["effects"] if effect["adopted"]]
     given = {
         "steps": step_rows(effects=found),
         "experiment": [],
         "table": residual_table(),
         "descriptions": DATA["descriptions"],
-        "parameters": {name: np.array(values) for name, values in DATA["parameters"].items()},
+        "parameters": {
+            name: np.array(values) for name, values in DATA["parameters"].items()
+        },
     }
     return loop_facts(verdict, **given | changed)
 

@@ -1,4 +1,5 @@
-"""Metrics, replicates and scores of further studies, made up, and small studies in memory."""
+"""Metrics, replicates and scores of further studies, made up, and small studies in
+memory."""
 
 import numpy as np
 import pandas as pd
@@ -15,24 +16,38 @@ def studies_of(robot="arm", strategy="A", biases=(20.0, 22.0, 24.0)):
     """Studies whose k_sigma and deviation fall as bias / length: percent and µm."""
     parts = []
     for number, bias in enumerate(biases, 1):
-        frame = pd.DataFrame({"robot": robot, "study": number, "strategy": strategy, "length": LENGTHS})
-        frame["k_sigma"], frame["k_sigma_fixed_joints"] = bias / LENGTHS, 0.5 * bias / LENGTHS
-        frame["deviation"], frame["compliance_1"] = 1e-6 * bias / LENGTHS, 1e-6 * bias
+        frame = pd.DataFrame(
+            {"robot": robot, "study": number, "strategy": strategy, "length": LENGTHS}
+        )
+        frame["k_sigma"] = bias / LENGTHS
+        frame["k_sigma_fixed_joints"] = 0.5 * bias / LENGTHS
+        frame["deviation"] = 1e-6 * bias / LENGTHS
+        frame["compliance_1"] = 1e-6 * bias
         parts.append(frame)
     return pd.concat(parts, ignore_index=True)
 
 
 def few_of(robot, key="kuka"):
     """A study of six data sets of 20 configurations."""
-    return StudyInMemory(robot, key, 1, USUAL, Size(data_sets=6, configurations=20, tests=30, noise=1e-5))
+    return StudyInMemory(
+        robot, key, 1, USUAL, Size(data_sets=6, configurations=20, tests=30, noise=1e-5)
+    )
 
 
 def metrics_of(strategy, bias=100.0, robot="arm"):
     """Metrics whose k_sigma and deviation fall as bias / length: percent and µm."""
-    frame = pd.DataFrame({"robot": robot, "noise_um": 200.0, "strategy": strategy, "length": LENGTHS})
-    for name, scale in (("k_sigma", 1.0), ("k_sigma_fixed_joints", 0.5), ("deviation", 1e-6)):
-        frame[name], frame[f"{name}_std_error"] = scale * bias / LENGTHS, scale
-    frame["initial_deviation"], frame["initial_deviation_std_error"] = 1e-3, 1e-5
+    frame = pd.DataFrame(
+        {"robot": robot, "noise_um": 200.0, "strategy": strategy, "length": LENGTHS}
+    )
+    for name, scale in (
+        ("k_sigma", 1.0),
+        ("k_sigma_fixed_joints", 0.5),
+        ("deviation", 1e-6),
+    ):
+        frame[name] = scale * bias / LENGTHS
+        frame[f"{name}_std_error"] = scale
+    frame["initial_deviation"] = 1e-3
+    frame["initial_deviation_std_error"] = 1e-5
     return frame
 
 

@@ -1,4 +1,5 @@
-"""Blocks of the study's tables, made by its own steps from random experiments, and regressors by pinocchio to judge them by."""
+"""Blocks of the study's tables, made by its own steps from random experiments, and
+regressors by pinocchio to judge them by."""
 
 import numpy as np
 from support import PinocchioPoint, without_tool
@@ -22,17 +23,24 @@ CONFIGURATIONS_OF_THE_TEST = 30
 WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 
 
-def experiments_of(robot, sets=5, configurations=4, purpose="identification", key="kuka"):
+def experiments_of(
+    robot, sets=5, configurations=4, purpose="identification", key="kuka"
+):
     """Blocks of the experiments table."""
     drawn = (robot.chain, robot.joint_limits, 1, key, PAPER, purpose)
     blocks = blocks_of_sets(sets)
-    return [experiment_columns(numbers, random_experiments(*drawn, numbers, configurations)) for numbers in blocks]
+    return [
+        experiment_columns(numbers, random_experiments(*drawn, numbers, configurations))
+        for numbers in blocks
+    ]
 
 
 def as_read(blocks):
     """Blocks as a table gives them back: the name of the point in every row."""
     for block in blocks:
-        yield block | {"point": np.full(len(block["data_set"]), block["point"], dtype=object)}
+        yield block | {
+            "point": np.full(len(block["data_set"]), block["point"], dtype=object)
+        }
 
 
 def deflections_of(robot, experiments, noise=0.0, at="end_effector", key="kuka"):
@@ -47,17 +55,23 @@ def deflections_of(robot, experiments, noise=0.0, at="end_effector", key="kuka")
 
 def identified(robot, strategy, experiments, deflections, rows=6, at="end_effector"):
     needed = {name: deflections[name] for name in strategy.points}
-    blocks = identified_blocks(paired_blocks(experiments, needed), robot.chain, strategy, rows, at)
+    blocks = identified_blocks(
+        paired_blocks(experiments, needed), robot.chain, strategy, rows, at
+    )
     return joined(list(blocks))
 
 
 def joined(blocks):
-    return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
+    return {
+        name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]
+    }
 
 
 def compliances(table, length):
     """(sets, 6) of one length."""
-    return np.column_stack([table[f"compliance_{j}"] for j in range(1, 7)])[table["length"] == length]
+    return np.column_stack([table[f"compliance_{j}"] for j in range(1, 7)])[
+        table["length"] == length
+    ]
 
 
 def judge(robot, at="end_effector"):
@@ -67,11 +81,21 @@ def judge(robot, at="end_effector"):
 
 
 def pinocchio_regressors(chain, block, name, at="end_effector", rows=6):
-    """Columns J_j (J^T w)_j of equation 10 for each row of a block of experiments, ndarray (R, rows, n)."""
+    """Columns J_j (J^T w)_j of equation 10 for each row of a block of experiments,
+    ndarray (R, rows, n)."""
     angles = np.column_stack([block[f"q{j + 1}"] for j in range(chain.coordinates)])
     wrench = np.column_stack([block[component] for component in WRENCH])
-    loaded = without_tool(chain.end_effector) if at == "end_effector" else chain.point(name)
-    seen, pushed = (PinocchioPoint(chain, point) for point in (chain.point(name), loaded))
+    loaded = (
+        without_tool(chain.end_effector) if at == "end_effector" else chain.point(name)
+    )
+    seen, pushed = (
+        PinocchioPoint(chain, point) for point in (chain.point(name), loaded)
+    )
     jacobian = np.array([seen.pose_and_jacobian(q)[2] for q in angles])
-    torques = np.array([pushed.pose_and_jacobian(q)[2].T @ force for q, force in zip(angles, wrench, strict=True)])
+    torques = np.array(
+        [
+            pushed.pose_and_jacobian(q)[2].T @ force
+            for q, force in zip(angles, wrench, strict=True)
+        ]
+    )
     return (jacobian * torques[:, None])[:, :rows]

@@ -14,13 +14,18 @@ def made_survey(name="ur10", measured="position", unknown_base=True):
     """One reflector at an unknown place of the end effector."""
     robot = analysed(name)
     target = Target("T", robot.chain.end_effector.name, None)
-    return Survey(robot, (target,), unknown_base, measured, 6e-5, 6e-5, 100.0, pulled=True)
+    return Survey(
+        robot, (target,), unknown_base, measured, 6e-5, 6e-5, 100.0, pulled=True
+    )
 
 
 def made_rows(count=40, numbers=6, parameters=5, seed=1):
     """Rows of candidates of unlike size and direction."""
     draws = np.random.default_rng(seed)
-    return (draws.standard_normal((count, numbers, parameters)) * draws.uniform(0.1, 3.0, (count, 1, 1))).astype(np.float32)
+    return (
+        draws.standard_normal((count, numbers, parameters))
+        * draws.uniform(0.1, 3.0, (count, 1, 1))
+    ).astype(np.float32)
 
 
 def made_candidates(survey, count=200, cell=OPEN):

@@ -10,14 +10,27 @@ from elastocal.mechanics.kinematics import poses
 
 GRAVITY = np.array([0.0, 0.0, -9.80665])
 
-direction = st.tuples(*[st.floats(-1, 1, allow_subnormal=False)] * 3).filter(lambda v: np.linalg.norm(v) > 0.1)
+direction = st.tuples(*[st.floats(-1, 1, allow_subnormal=False)] * 3).filter(
+    lambda v: np.linalg.norm(v) > 0.1
+)
 along = st.sampled_from([(1, 0, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1), (-1, 0, 0)])
-angle = st.one_of(st.floats(-3.2, 3.2), st.sampled_from([0.0, np.pi / 2, -np.pi / 2, np.pi, 1.5708, -1.57079632679]))
+angle = st.one_of(
+    st.floats(-3.2, 3.2),
+    st.sampled_from([0.0, np.pi / 2, -np.pi / 2, np.pi, 1.5708, -1.57079632679]),
+)
 shift = st.tuples(*[st.one_of(st.just(0.0), st.floats(-0.3, 0.3))] * 3)
 kinds = st.sampled_from(["revolute", "continuous", "prismatic", "fixed"])
 # Chains: kind, origin, roll-pitch-yaw, axis, mass, centre, place of a part beside.
 segments = st.lists(
-    st.tuples(kinds, shift, st.tuples(angle, angle, angle), st.one_of(direction, along), st.floats(0.1, 5), shift, shift),
+    st.tuples(
+        kinds,
+        shift,
+        st.tuples(angle, angle, angle),
+        st.one_of(direction, along),
+        st.floats(0.1, 5),
+        shift,
+        shift,
+    ),
     min_size=2,
     max_size=7,
 ).filter(lambda parts: any(part[0] != "fixed" for part in parts))
@@ -39,20 +52,41 @@ def link(name, mass=None, centre=(0.0, 0.0, 0.0), rpy=(0.0, 0.0, 0.0)):
 
 
 def joint(
-    name, parent, child, kind="revolute", xyz=(0.0, 0.0, 0.0), rpy=(0.0, 0.0, 0.0), axis=(0, 0, 1), limits=(-2, 2), mimic=None
+    name,
+    parent,
+    child,
+    kind="revolute",
+    xyz=(0.0, 0.0, 0.0),
+    rpy=(0.0, 0.0, 0.0),
+    axis=(0, 0, 1),
+    limits=(-2, 2),
+    mimic=None,
 ):
-    parts = [f"<parent link={quoteattr(parent)}/><child link={quoteattr(child)}/>", origin(xyz, rpy)]
+    parts = [
+        f"<parent link={quoteattr(parent)}/><child link={quoteattr(child)}/>",
+        origin(xyz, rpy),
+    ]
     if kind != "fixed":
         parts.append(f'<axis xyz="{numbers(axis)}"/>')
     if limits is not None and kind in ("revolute", "prismatic"):
-        parts.append(f'<limit lower="{limits[0]}" upper="{limits[1]}" effort="1" velocity="1"/>')
+        parts.append(
+            f'<limit lower="{limits[0]}" upper="{limits[1]}" effort="1" velocity="1"/>'
+        )
     if mimic is not None:
-        parts.append('<mimic joint="{}" multiplier="{!r}" offset="{!r}"/>'.format(*mimic))
-    return f"<joint name={quoteattr(name)} type={quoteattr(kind)}>{''.join(parts)}</joint>"
+        parts.append(
+            '<mimic joint="{}" multiplier="{!r}" offset="{!r}"/>'.format(*mimic)
+        )
+    return (
+        f"<joint name={quoteattr(name)} type={quoteattr(kind)}>{''.join(parts)}</joint>"
+    )
 
 
 def robot(*parts, name="made"):
-    return f'<?xml version="1.0"?>\n<robot name="{name}">\n' + "\n".join(parts) + "\n</robot>\n"
+    return (
+        f'<?xml version="1.0"?>\n<robot name="{name}">\n'
+        + "\n".join(parts)
+        + "\n</robot>\n"
+    )
 
 
 def written(folder, *parts, **more):
@@ -83,23 +117,41 @@ class Pinocchio:
     def pose(self, base, tip, values):
         """Of one link in the axes of another: position (3,) and rotation (3, 3)."""
         pin.framesForwardKinematics(self.model, self.data, self.configuration(values))
-        at = [self.data.oMf[self.model.getFrameId(name, pin.FrameType.BODY)] for name in (base, tip)]
+        at = [
+            self.data.oMf[self.model.getFrameId(name, pin.FrameType.BODY)]
+            for name in (base, tip)
+        ]
         found = at[0].inverse() * at[1]
         return found.translation, found.rotation
 
     def weight(self, values, names):
         """What the weight of the links does to joints, N m or N."""
-        torque = pin.computeGeneralizedGravity(self.model, self.data, self.configuration(values))
-        return np.array([-torque[self.model.joints[self.model.getJointId(name)].idx_v] for name in names])
+        torque = pin.computeGeneralizedGravity(
+            self.model, self.data, self.configuration(values)
+        )
+        return np.array(
+            [
+                -torque[self.model.joints[self.model.getJointId(name)].idx_v]
+                for name in names
+            ]
+        )
 
 
-def assert_same_poses(robot, path, base, tip, set_joints=None, count=8, within=1e-9, names=None):
-    """To a nanometre and a nanoradian, at what the controller reports. `set_joints` maps a state to values by joint name."""
-    by_pinocchio, rng = Pinocchio(path), np.random.default_rng(5)
+def assert_same_poses(
+    robot, path, base, tip, set_joints=None, count=8, within=1e-9, names=None
+):
+    """To a nanometre and a nanoradian, at what the controller reports. `set_joints`
+    maps a state to values by joint name."""
+    by_pinocchio = Pinocchio(path)
+    rng = np.random.default_rng(5)
     angles = rng.uniform(-np.pi, np.pi, (count, robot.joints))
-    position, rotation = poses(robot.chain, robot.model_angles(angles), robot.chain.end_effector)
+    position, rotation = poses(
+        robot.chain, robot.model_angles(angles), robot.chain.end_effector
+    )
     for state, own, turned in zip(angles, position, rotation, strict=True):
         values = dict(zip(names or robot.joint_names, state, strict=True))
-        there, axes = by_pinocchio.pose(base, tip, values | (set_joints(values) if set_joints else {}))
+        there, axes = by_pinocchio.pose(
+            base, tip, values | (set_joints(values) if set_joints else {})
+        )
         np.testing.assert_allclose(own, there, rtol=0, atol=within)
         assert np.linalg.norm(pin.log3(axes.T @ turned)) < within

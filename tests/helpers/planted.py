@@ -1,9 +1,17 @@
-"""Small campaigns of a known robot that lacks what is planted in it, fitted without that."""
+"""Small campaigns of a known robot that lacks what is planted in it, fitted without
+that."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from synthetic import NOISE, made_estimate, made_model, made_states, seen_exactly, with_noise
+from synthetic import (
+    NOISE,
+    made_estimate,
+    made_model,
+    made_states,
+    seen_exactly,
+    with_noise,
+)
 
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
@@ -46,14 +54,25 @@ def two_loads_a_pose(joints, poses, seed, force=800.0):
     )
 
 
-def planted(robot, sizes, seed=0, poses=25, targets=ELBOW_AND_HAND, states=None, **model):
+def planted(
+    robot, sizes, seed=0, poses=25, targets=ELBOW_AND_HAND, states=None, **model
+):
     """A campaign of positions and, by default, identified compliances.
 
-    `sizes`: what is planted: parameters by the key of a candidate. `**model`: as in `synthetic.made_model`.
+    `sizes`: what is planted: parameters by the key of a candidate. `**model`: as in
+    `synthetic.made_model`.
     """
-    settings = {"fitted_frames": False, "identified": True, "compliance": robot.compliance} | model
+    settings = {
+        "fitted_frames": False,
+        "identified": True,
+        "compliance": robot.compliance,
+    } | model
     declared = made_model(robot.chain, targets, **settings)
-    states = two_loads_a_pose(declared.sites.joints, poses, (5, seed)) if states is None else states
+    states = (
+        two_loads_a_pose(declared.sites.joints, poses, (5, seed))
+        if states is None
+        else states
+    )
     candidates = candidates_on(declared.sites)
     start = made_estimate(declared, seed=seed)
     if declared.identifies_compliance:

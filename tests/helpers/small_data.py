@@ -1,4 +1,5 @@
-"""A few poses of an arm of seven joints on a lift, as a service robot has it: wrong zeros and lengths, drives with play."""
+"""A few poses of an arm of seven joints on a lift, as a service robot has it: wrong
+zeros and lengths, drives with play."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -10,23 +11,43 @@ from made_folders import made_folder
 from elastocal.campaigns.simulation import Plan, draw_measurements
 from elastocal.mechanics.robot_file import robot_from_document
 
-SERVICE_ARM = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8"))
+SERVICE_ARM = yaml.safe_load(
+    Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8")
+)
 # rad; of the lift m.
 _PLAY = 5e-3 * np.array([0.2, 1, 1, 1, 1, 1, 1, 1])
 
 
 def service_arm_folder(folder, seed, poses=34, noise_m=3e-4):
-    """A campaign as `elastocal init` declares it; errors of 5 mm of which a calibration can mend little."""
+    """A campaign as `elastocal init` declares it; errors of 5 mm of which a calibration
+    can mend little."""
     draws = np.random.default_rng((7, seed))
-    lengths = {name: value + 1e-3 * draws.standard_normal() for name, value in SERVICE_ARM["lengths_m"].items()}
-    true = replace(robot_from_document(SERVICE_ARM | {"lengths_m": lengths}), compliance=np.zeros(8))
+    lengths = {
+        name: value + 1e-3 * draws.standard_normal()
+        for name, value in SERVICE_ARM["lengths_m"].items()
+    }
+    true = replace(
+        robot_from_document(SERVICE_ARM | {"lengths_m": lengths}),
+        compliance=np.zeros(8),
+    )
     plan = Plan(("8DoF",), poses, 0.0, (0,), (0.0, 0.0, 0.0), 1, 0, 1e-3, 1e-3)
     table = draw_measurements(true, plan, seed, "service")
     zeros = 0.2 * _PLAY * draws.standard_normal(8)
     for joint in range(8):
-        table[f"q{joint + 1}"] = table[f"q{joint + 1}"] + zeros[joint] + _PLAY[joint] * draws.standard_normal(poses)
-    changes = {"robot": "robot.yaml", "frame": "tracker", "targets": {"8DoF": {"point": "8DoF", "offset_m": "unknown"}}}
-    changes |= {"declared": ["joint_offset", "link_geometry"], "noise": {"position_m": noise_m}}
+        table[f"q{joint + 1}"] = (
+            table[f"q{joint + 1}"]
+            + zeros[joint]
+            + _PLAY[joint] * draws.standard_normal(poses)
+        )
+    changes = {
+        "robot": "robot.yaml",
+        "frame": "tracker",
+        "targets": {"8DoF": {"point": "8DoF", "offset_m": "unknown"}},
+    }
+    changes |= {
+        "declared": ["joint_offset", "link_geometry"],
+        "noise": {"position_m": noise_m},
+    }
     made_folder(folder, true, "service", table=table, **changes)
     (folder / "robot.yaml").write_text(yaml.safe_dump(SERVICE_ARM), encoding="utf-8")
     return folder

@@ -1,4 +1,5 @@
-"""A folder that holds the study: made from the repository's sources, edited, run, and looked at."""
+"""A folder that holds the study: made from the repository's sources, edited, run, and
+looked at."""
 
 import os
 import re
@@ -10,15 +11,34 @@ import yaml
 from snakemake_starts import started
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-SOURCES = ("Snakefile", "requirements", "config.yaml", "config", "workflow", "profiles", "src", "README.md")
+SOURCES = (
+    "Snakefile",
+    "requirements",
+    "config.yaml",
+    "config",
+    "workflow",
+    "profiles",
+    "src",
+    "README.md",
+)
 SOURCES += ("paper", "CITATION.cff")
 # Changes of config.yaml that make a study of minutes.
-SMALL = yaml.safe_load(Path(__file__).with_name("small_study.yaml").read_text(encoding="utf-8"))
+SMALL = yaml.safe_load(
+    Path(__file__).with_name("small_study.yaml").read_text(encoding="utf-8")
+)
 # What most tests need of it: the paper's tables and figures of one robot.
-ROBOT, LEVEL = "kuka", "200"
+ROBOT = "kuka"
+LEVEL = "200"
 PAPER = "paper"
-TINY = {"robots": [ROBOT], "strategies": ["6DoF", "4-6DoF-after-3DoF"], "noise_um": [200], "data_sets": 20}
-_JOB = re.compile(r"^(?:local)?rule (\w+):\n(.*?)(?=^\[|^\S|\Z)", re.MULTILINE | re.DOTALL)
+TINY = {
+    "robots": [ROBOT],
+    "strategies": ["6DoF", "4-6DoF-after-3DoF"],
+    "noise_um": [200],
+    "data_sets": 20,
+}
+_JOB = re.compile(
+    r"^(?:local)?rule (\w+):\n(.*?)(?=^\[|^\S|\Z)", re.MULTILINE | re.DOTALL
+)
 
 
 class Study:
@@ -35,7 +55,11 @@ class Study:
         for name in SOURCES:
             source = REPOSITORY / name
             if source.is_dir():
-                shutil.copytree(source, study.folder / name, ignore=shutil.ignore_patterns("*.egg-info"))
+                shutil.copytree(
+                    source,
+                    study.folder / name,
+                    ignore=shutil.ignore_patterns("*.egg-info"),
+                )
             elif source.exists():
                 shutil.copy2(source, study.folder / name)
         if not study.path("README.md").exists():
@@ -82,8 +106,15 @@ class Study:
 
     def command(self, *arguments):
         """Arguments of a `subprocess` call that runs Snakemake here."""
-        environment = os.environ | {"PYTHONPATH": str(self.folder / "src"), "OMP_NUM_THREADS": "1"}
-        return {"args": [sys.executable, "-m", "snakemake", *arguments], "cwd": self.folder, "env": environment}
+        environment = os.environ | {
+            "PYTHONPATH": str(self.folder / "src"),
+            "OMP_NUM_THREADS": "1",
+        }
+        return {
+            "args": [sys.executable, "-m", "snakemake", *arguments],
+            "cwd": self.folder,
+            "env": environment,
+        }
 
     def snakemake(self, *arguments):
         return started(**self.command(*arguments))
@@ -101,7 +132,11 @@ class Study:
         jobs = []
         for rule, body in _JOB.findall(done.stdout):
             wildcards = re.search(r"^    wildcards: (.*)$", body, re.MULTILINE)
-            values = [pair.split("=", 1)[1] for pair in wildcards[1].split(", ")] if wildcards else []
+            values = (
+                [pair.split("=", 1)[1] for pair in wildcards[1].split(", ")]
+                if wildcards
+                else []
+            )
             jobs.append((rule, *values))
         total = re.search(r"^total +(\d+)$", done.stdout, re.MULTILINE)
         assert len(jobs) == (int(total[1]) if total else 0), done.stdout
@@ -112,9 +147,15 @@ class Study:
         """Files that the jobs of each rule read, from Snakemake's own plan."""
         plan = self.snakemake("-n", "-p", "--forceall", *arguments)
         assert plan.returncode == 0, plan.stderr[-2000:]
-        found = re.findall(r"^(?:local)?rule (\w+):\n    input: (.*)$", plan.stdout, re.MULTILINE)
+        found = re.findall(
+            r"^(?:local)?rule (\w+):\n    input: (.*)$", plan.stdout, re.MULTILINE
+        )
         return {rule: set(files.split(", ")) for rule, files in found}
 
     def files(self, *patterns):
         """Relative paths of files by glob patterns, sorted."""
-        return sorted(p.relative_to(self.folder).as_posix() for pattern in patterns for p in self.folder.glob(pattern))
+        return sorted(
+            p.relative_to(self.folder).as_posix()
+            for pattern in patterns
+            for p in self.folder.glob(pattern)
+        )

@@ -1,4 +1,5 @@
-"""What several test files share: refusals, chains in one line, and models of them that owe nothing to the package."""
+"""What several test files share: refusals, chains in one line, and models of them that
+owe nothing to the package."""
 
 from contextlib import contextmanager
 from copy import deepcopy
@@ -15,11 +16,14 @@ from elastocal.study.simulation import Experiments
 
 UR10 = "Tz(0.1273) Rz(q1) Ty(0.1639) Ry(q2) Tx(0.612) Ry(q3) Tx(0.5723) Ry(q4) Rz(q5) Tz(-0.1157) Ry(q6) Ty(0.0922) [flange]"
 THREE_JOINTS = "Tz(0.4) Rz(q1) Tx(0.1) Ry(q2) Tx(0.7) [elbow] Ry(q3) Tx(0.6) [hand]"
-SEVEN_JOINTS = (
-    "Tz(0.34) Rz(q1) Ry(q2) [shoulder] Tz(0.4) Rz(q3) Ry(-q4) Tz(0.4) [elbow] Rz(q5) Ry(q6) Tz(0.126) Rz(-q7) Tx(0.05) [flange]"
-)
+SEVEN_JOINTS = "Tz(0.34) Rz(q1) Ry(q2) [shoulder] Tz(0.4) Rz(q3) Ry(-q4) Tz(0.4) [elbow] Rz(q5) Ry(q6) Tz(0.126) Rz(-q7) Tx(0.05) [flange]"
 TURNED = "Rx(90deg) Ty(0.3) Rz(-q1) Rx(-90deg) Tx(0.2) Rz(30deg) Ry(-q2) [A] Tx(-0.5) Rx(45.5deg) Rz(q3) Ty(0.4) Rx(-q4) [B]"
-OTHER_CHAINS = {"ur10": UR10, "three joints": THREE_JOINTS, "seven joints": SEVEN_JOINTS, "fixed rotations": TURNED}
+OTHER_CHAINS = {
+    "ur10": UR10,
+    "three joints": THREE_JOINTS,
+    "seven joints": SEVEN_JOINTS,
+    "fixed rotations": TURNED,
+}
 # A robot on a track.
 TRACK = "Tz(0.3) Tx(-q1) Tz(0.5) Rz(q2) Tx(0.3) Ry(q3) Tx(0.7) [elbow] Ry(q4) Tx(0.6) [hand]"
 ODD_CHAINS = {"track": TRACK}
@@ -38,13 +42,24 @@ def robot_of(text, compliance=None, links=()):
 def robot_on(chain, compliance=None, links=()):
     """Robot of a chain, with joint limits that no test needs."""
     n = chain.coordinates
-    compliance = 1e-6 * np.arange(1, n + 1) if compliance is None else np.asarray(compliance)
-    return Robot("test", chain, compliance, np.tile([-1.0, 1.0], (n, 1)), links, np.eye(n), np.zeros(n))
+    compliance = (
+        1e-6 * np.arange(1, n + 1) if compliance is None else np.asarray(compliance)
+    )
+    return Robot(
+        "test",
+        chain,
+        compliance,
+        np.tile([-1.0, 1.0], (n, 1)),
+        links,
+        np.eye(n),
+        np.zeros(n),
+    )
 
 
 @contextmanager
 def refused(source, key, *words):
-    """The block raises an InputError of one line that names the source, the key and, in `words`, what is allowed."""
+    """The block raises an InputError of one line that names the source, the key and, in
+    `words`, what is allowed."""
     with pytest.raises(InputError) as caught:
         yield
     message = str(caught.value)
@@ -62,7 +77,9 @@ def random_angles(rng, chain, *batch):
     return rng.uniform(-np.pi, np.pi, (*batch, chain.coordinates))
 
 
-def random_loads(robot, sets, configurations, seed=0, force=1000.0, offset=(0.0, 0.5, 0.0)):
+def random_loads(
+    robot, sets, configurations, seed=0, force=1000.0, offset=(0.0, 0.5, 0.0)
+):
     """Experiments as the paper makes them, drawn without the package."""
     rng = np.random.default_rng(seed)
     normal = rng.standard_normal((sets, configurations, 3))
@@ -72,38 +89,59 @@ def random_loads(robot, sets, configurations, seed=0, force=1000.0, offset=(0.0,
 
 
 class PinocchioPoint:
-    """A measuring point of a chain as pinocchio sees it: every coordinate a JointModelR. or P., fixed placements between."""
+    """A measuring point of a chain as pinocchio sees it: every coordinate a
+    JointModelR. or P., fixed placements between."""
 
     def __init__(self, chain, point):
-        self.chain, self.model, self.order = chain, pin.Model(), []
+        self.chain = chain
+        self.model = pin.Model()
+        self.order = []
         turns = {"R": (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ)}
         turns["T"] = (pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ)
-        parent, placement = 0, pin.SE3.Identity()
+        parent = 0
+        placement = pin.SE3.Identity()
         for transform in chain.transforms[: point.after]:
             unit = np.eye(3)[transform.axis]
             if transform.kind == "T":
                 placement = placement * pin.SE3(np.eye(3), transform.constant * unit)
             else:
-                placement = placement * pin.SE3(pin.exp3(transform.constant * unit), np.zeros(3))
+                placement = placement * pin.SE3(
+                    pin.exp3(transform.constant * unit), np.zeros(3)
+                )
             if transform.coordinate is not None:
-                # Half a turn about another axis, before and after, reverses the sense of the joint.
-                flip = pin.SE3(pin.exp3(np.pi * np.eye(3)[transform.axis - 1]), np.zeros(3))
+                # Half a turn about another axis, before and after, reverses the sense
+                # of the joint.
+                flip = pin.SE3(
+                    pin.exp3(np.pi * np.eye(3)[transform.axis - 1]), np.zeros(3)
+                )
                 flip = flip if transform.sign < 0 else pin.SE3.Identity()
                 joint = turns[transform.kind][transform.axis]()
-                parent = self.model.addJoint(parent, joint, placement * flip, f"coordinate {transform.coordinate}")
+                parent = self.model.addJoint(
+                    parent,
+                    joint,
+                    placement * flip,
+                    f"coordinate {transform.coordinate}",
+                )
                 self.order.append(transform.coordinate)
                 placement = flip.inverse()
         placement = placement * pin.SE3(np.eye(3), np.array(point.offset_m, float))
-        self.frame = self.model.addFrame(pin.Frame("point", parent, placement, pin.FrameType.OP_FRAME))
+        self.frame = self.model.addFrame(
+            pin.Frame("point", parent, placement, pin.FrameType.OP_FRAME)
+        )
         self.data = self.model.createData()
 
     def pose_and_jacobian(self, coordinates):
-        """Position, rotation and Jacobian (linear over angular, base axes) at one configuration."""
+        """Position, rotation and Jacobian (linear over angular, base axes) at one
+        configuration."""
         moved = np.array(coordinates, float)[self.order]
         aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         jacobian = np.zeros((6, self.chain.coordinates))
-        found = pin.computeFrameJacobian(self.model, self.data, moved, self.frame, aligned)
-        jacobian[:, self.order] = np.reshape(found, (6, -1))  # one joint comes as a plain vector
+        found = pin.computeFrameJacobian(
+            self.model, self.data, moved, self.frame, aligned
+        )
+        jacobian[:, self.order] = np.reshape(
+            found, (6, -1)
+        )  # one joint comes as a plain vector
         pin.framesForwardKinematics(self.model, self.data, moved)
         placement = self.data.oMf[self.frame]
         return placement.translation.copy(), placement.rotation.copy(), jacobian
@@ -115,7 +153,8 @@ def homogeneous(kind, axis, amount):
     if kind == "T":
         matrix[axis, 3] = amount
     else:
-        i, j = (axis + 1) % 3, (axis + 2) % 3
+        i = (axis + 1) % 3
+        j = (axis + 2) % 3
         matrix[[i, j], [i, j]] = np.cos(amount)
         matrix[j, i] = np.sin(amount)
         matrix[i, j] = -np.sin(amount)
@@ -128,7 +167,8 @@ def without_tool(point):
 
 
 def changed(document, path, value):
-    """A copy with the value at a path of keys replaced, or taken away where the value is None."""
+    """A copy with the value at a path of keys replaced, or taken away where the value
+    is None."""
     copy = deepcopy(document)
     *way, last = path
     inner = copy

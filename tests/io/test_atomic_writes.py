@@ -5,18 +5,30 @@ from pathlib import Path
 import pytest
 
 from elastocal.io import atomic_writes
-from elastocal.io.atomic_writes import atomic_write, remove_partials, write_text, write_together
+from elastocal.io.atomic_writes import (
+    atomic_write,
+    remove_partials,
+    write_text,
+    write_together,
+)
 
 
 @pytest.mark.parametrize("before", [None, "much longer than what follows"])
-def test_a_file_appears_only_once_it_is_complete_and_replaces_what_was_there_as_a_whole(tmp_path, before):
+def test_a_file_appears_only_once_it_is_complete_and_replaces_what_was_there_as_a_whole(
+    tmp_path, before
+):
     path = tmp_path / "one.txt"
     if before:
         path.write_text(before, encoding="utf-8")
     with atomic_write(str(path)) as partial:
         Path(partial).write_text("half", encoding="utf-8")
-        assert Path(partial).parent == tmp_path and (path.read_text(encoding="utf-8") if path.exists() else None) == before
-    assert path.read_text(encoding="utf-8") == "half" and list(tmp_path.iterdir()) == [path]
+        assert (
+            Path(partial).parent == tmp_path
+            and (path.read_text(encoding="utf-8") if path.exists() else None) == before
+        )
+    assert path.read_text(encoding="utf-8") == "half" and list(tmp_path.iterdir()) == [
+        path
+    ]
 
 
 @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
@@ -28,7 +40,9 @@ def test_a_block_that_fails_leaves_the_old_file_and_no_other(tmp_path, error):
         raise error
     with pytest.raises(FileNotFoundError), atomic_write(path):
         pass
-    assert path.read_text(encoding="utf-8") == "old" and list(tmp_path.iterdir()) == [path]
+    assert path.read_text(encoding="utf-8") == "old" and list(tmp_path.iterdir()) == [
+        path
+    ]
 
 
 def test_names_on_the_way_are_random_and_opened_exclusively(tmp_path, monkeypatch):
@@ -49,21 +63,32 @@ def test_names_on_the_way_are_random_and_opened_exclusively(tmp_path, monkeypatc
 
 
 def test_old_files_are_gone_before_the_first_new_one_is_there(tmp_path, monkeypatch):
-    """Whenever it is killed: at each rename no file of before stands beside a new one, and the user's own stay."""
+    """Whenever it is killed: at each rename no file of before stands beside a new one,
+    and the user's own stay."""
     for name in ("a", "b", "c", "mine"):
         (tmp_path / name).write_text("old")
-    rename, seen = Path.rename, []
+    rename = Path.rename
+    seen = []
 
     def watched(path, target):
         rename(path, target)
-        seen.append({each.name: each.read_text() for each in tmp_path.iterdir() if each.is_file()})
+        seen.append(
+            {
+                each.name: each.read_text()
+                for each in tmp_path.iterdir()
+                if each.is_file()
+            }
+        )
 
     monkeypatch.setattr(Path, "rename", watched)
     with write_together(tmp_path, ["a", "b", "c"]) as partial:
         for name in "ab":
             (partial / name).write_text("new")
         assert (tmp_path / "a").read_text() == "old"
-    assert seen == [{"a": "new", "mine": "old"}, {"a": "new", "b": "new", "mine": "old"}]
+    assert seen == [
+        {"a": "new", "mine": "old"},
+        {"a": "new", "b": "new", "mine": "old"},
+    ]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b", "mine"]
 
 
@@ -74,10 +99,15 @@ def test_files_that_belong_together_appear_together_or_the_old_ones_stay(tmp_pat
     assert [path.name for path in (tmp_path / "deep/new").iterdir()] == ["a"]
     (tmp_path / "a").write_text("old")
     for folder in (tmp_path, tmp_path / "new"):
-        with pytest.raises(ValueError, match="mine"), write_together(folder, ["a"]) as partial:
+        with (
+            pytest.raises(ValueError, match="mine"),
+            write_together(folder, ["a"]) as partial,
+        ):
             (partial / "a").write_text("new")
             raise ValueError("mine")
-    assert (tmp_path / "a").read_text() == "old" and sorted(path.name for path in tmp_path.iterdir()) == ["a", "deep"]
+    assert (tmp_path / "a").read_text() == "old" and sorted(
+        path.name for path in tmp_path.iterdir()
+    ) == ["a", "deep"]
 
 
 def test_what_killed_runs_left_is_taken_away_and_nothing_else(tmp_path):

@@ -1,4 +1,5 @@
-"""YAML documents: read, and refused in one line that names file, key and what is allowed."""
+"""YAML documents: read, and refused in one line that names file, key and what is
+allowed."""
 
 import math
 
@@ -23,9 +24,19 @@ ROBOT = {
     "lengths_m": {"l": 1.0},
     "joint_limits_deg": [[-180, 180]],
     "compliance_urad_per_Nm": [1.5],
-    "links": {"tubes": [{"outer_diameter_m": 0.2, "wall_m": 0.01}], "youngs_modulus_GPa": 70, "shear_modulus_GPa": 26},
+    "links": {
+        "tubes": [{"outer_diameter_m": 0.2, "wall_m": 0.01}],
+        "youngs_modulus_GPa": 70,
+        "shear_modulus_GPa": 26,
+    },
 }
-STRATEGY = {"name": "x", "stages": [{"points": ["EE"], "joints": [1]}, {"points": ["EE"], "joints": [2], "held": [1]}]}
+STRATEGY = {
+    "name": "x",
+    "stages": [
+        {"points": ["EE"], "joints": [1]},
+        {"points": ["EE"], "joints": [2], "held": [1]},
+    ],
+}
 
 
 def read(tmp_path, text):
@@ -56,7 +67,8 @@ def numbers_in(schema, path=()):
 
 @pytest.mark.parametrize("name", ["robot", "campaign"])
 def test_every_quantity_has_a_least_and_a_largest(name):
-    """A list of strange numbers would be left to some solver, which says nothing of the key."""
+    """A list of strange numbers would be left to some solver, which says nothing of the
+    key."""
     found = dict(numbers_in(read_schema(name)))
     assert len(found) > 4
     for path, rule in found.items():
@@ -68,18 +80,50 @@ def test_every_quantity_has_a_least_and_a_largest(name):
     ("path", "value", "key", "words"),
     [
         (("lengths_m", "l"), math.nan, "lengths_m.l", ["finite"]),
-        (("compliance_urad_per_Nn",), [1], "compliance_urad_per_Nn", ["unknown key", "'compliance_urad_per_Nm'?", "chain"]),
-        (("links", "tubes", 0, "wall_m"), None, "links.tubes[0].wall_m", ["nothing", "metres"]),
-        (("joint_limits_deg",), [[1]], "joint_limits_deg[0]", ["[1]", "allowed: 2 entries"]),
-        (("compliance_urad_per_Nm",), [0], "compliance_urad_per_Nm[0]", ["found 0", "1e-06 to 100000"]),
-        (("compliance_urad_per_Nm",), [True], "compliance_urad_per_Nm[0]", ["True", "number"]),
+        (
+            ("compliance_urad_per_Nn",),
+            [1],
+            "compliance_urad_per_Nn",
+            ["unknown key", "'compliance_urad_per_Nm'?", "chain"],
+        ),
+        (
+            ("links", "tubes", 0, "wall_m"),
+            None,
+            "links.tubes[0].wall_m",
+            ["nothing", "metres"],
+        ),
+        (
+            ("joint_limits_deg",),
+            [[1]],
+            "joint_limits_deg[0]",
+            ["[1]", "allowed: 2 entries"],
+        ),
+        (
+            ("compliance_urad_per_Nm",),
+            [0],
+            "compliance_urad_per_Nm[0]",
+            ["found 0", "1e-06 to 100000"],
+        ),
+        (
+            ("compliance_urad_per_Nm",),
+            [True],
+            "compliance_urad_per_Nm[0]",
+            ["True", "number"],
+        ),
         (("stages", 0, "joints"), [], "stages[0].joints", ["[]", "1 or more entries"]),
-        (("stages", 0, "joints"), [1, 1], "stages[0].joints", ["[1, 1]", "each entry once"]),
+        (
+            ("stages", 0, "joints"),
+            [1, 1],
+            "stages[0].joints",
+            ["[1, 1]", "each entry once"],
+        ),
         (("stages", 0, "joints"), [1.5], "stages[0].joints[0]", ["1.5", "integer"]),
     ],
 )
 def test_a_faulty_robot_or_strategy_is_refused_in_one_line(path, value, key, words):
-    document, schema = (STRATEGY, "strategy") if path[0] == "stages" else (ROBOT, "robot")
+    document, schema = (
+        (STRATEGY, "strategy") if path[0] == "stages" else (ROBOT, "robot")
+    )
     with refused("x.yaml", f"{key}:", *words):
         check_document(changed(document, path, value), schema, "x.yaml")
 
@@ -95,13 +139,25 @@ BOMB = "a: &a [" + "x, " * 500 + "x]\nb: [" + "*a, " * 400 + "*a]\n"
         ("a: &a [*a]\n", "line 1", ["alias *a", "no other anchor"]),
         ("a: &a [x]\nb: &b [*a]\n", "line 2", ["alias *a", "no other anchor"]),
         ("[" * 100_000, "line 1", ["in each other", f"{DEEPEST} deep"]),
-        ("#" * (LARGEST_BYTES + 1), "", [f"more than {LARGEST_BYTES} bytes", f"at most {LARGEST_BYTES}"]),
-        ("x: 1\na: !!python/object/apply:os.system [true]\n", "line 2", ["tag", "without tags"]),
+        (
+            "#" * (LARGEST_BYTES + 1),
+            "",
+            [f"more than {LARGEST_BYTES} bytes", f"at most {LARGEST_BYTES}"],
+        ),
+        (
+            "x: 1\na: !!python/object/apply:os.system [true]\n",
+            "line 2",
+            ["tag", "without tags"],
+        ),
         ("a: 1\nb: x\0\n", "line 2", ["control character", "x00"]),
         ("a: 1\n---\nb: 2\n", "line 2", ["found another document"]),
         ('\n<?xml version="1.0"?>\n<robot>', "", ["XML", "elastocal import urdf"]),
         ("x: 1\na: @x\n", "line 2", ["found character that cannot start"]),
-        ("campaign: a\nrobot: b\ncampaign: c\n", "line 3", ["'campaign' again", "first in line 1"]),
+        (
+            "campaign: a\nrobot: b\ncampaign: c\n",
+            "line 3",
+            ["'campaign' again", "first in line 1"],
+        ),
         ("a: 1\nseed: 1_0\n", "line 2", ["found 1_0", "decimal"]),
         (f"seed: {'9' * 5000}\n", "line 1", ["999", "18 digits"]),
     ],
@@ -116,14 +172,30 @@ def test_numbers_are_read_as_people_write_them(tmp_path):
     assert found == [6e-5, 6e5, -1.5e5, 1e3, 0.5, 17, 3, "1e5", "a1e5"]
 
 
-STEERING = ["a\x1b[2Jb", "a\u202eb", "a\u2067b", "a\u200bb", "a\nb", "a\tb", "a\x85b", "a\ufeffb"]
+STEERING = [
+    "a\x1b[2Jb",
+    "a\u202eb",
+    "a\u2067b",
+    "a\u200bb",
+    "a\nb",
+    "a\tb",
+    "a\x85b",
+    "a\ufeffb",
+]
 FORMULAS = ["=1+1", "@SUM(A1)", "+x", "-x", "＝1"]
 
 
 @pytest.mark.parametrize("text", [*STEERING, *FORMULAS])
-def test_what_would_steer_a_terminal_or_a_spreadsheet_is_refused_wherever_it_stands(tmp_path, text):
-    """In a key as in a value; in the robot file as in the campaign; the message shows it as escapes."""
-    allowed = "printable characters on one line" if text in STEERING else f"does not begin with {text[0]}"
+def test_what_would_steer_a_terminal_or_a_spreadsheet_is_refused_wherever_it_stands(
+    tmp_path, text
+):
+    """In a key as in a value; in the robot file as in the campaign; the message shows
+    it as escapes."""
+    allowed = (
+        "printable characters on one line"
+        if text in STEERING
+        else f"does not begin with {text[0]}"
+    )
     target = {"point": "6DoF", "offset_m": "unknown"}
     for document, schema, key in (
         (CAMPAIGN | {"targets": {text: target}}, "campaign", "targets"),
@@ -140,7 +212,9 @@ def test_what_would_steer_a_terminal_or_a_spreadsheet_is_refused_wherever_it_sta
 @pytest.mark.parametrize("name", ["../robots/one", "one.yaml", "", ".", "x" * 5000])
 def test_a_document_is_named_and_not_reached_by_a_path(tmp_path, name):
     (tmp_path / "robots").mkdir()
-    (tmp_path / "robots" / "one.yaml").write_text(yaml.safe_dump(ROBOT), encoding="utf-8")
+    (tmp_path / "robots" / "one.yaml").write_text(
+        yaml.safe_dump(ROBOT), encoding="utf-8"
+    )
     assert named_document(tmp_path, "robots", "robot", "one", "config.yaml") == ROBOT
     with refused("config.yaml", "robots", "one"):
         named_document(tmp_path, "robots", "robot", name, "config.yaml")

@@ -10,9 +10,17 @@ from elastocal.io.origin import canonical_json, configuration_sha256, provenance
 
 
 def test_equal_configurations_have_one_digest_however_they_are_ordered():
-    one, other = {"a": 1, "b": {"c": [1.5, "µ"], "d": None}}, {"b": {"d": None, "c": [1.5, "µ"]}, "a": 1}
-    assert canonical_json(one) == canonical_json(other) == '{"a":1,"b":{"c":[1.5,"µ"],"d":null}}'
-    assert configuration_sha256(one) == hashlib.sha256(canonical_json(other).encode("utf-8")).hexdigest()
+    one = {"a": 1, "b": {"c": [1.5, "µ"], "d": None}}
+    other = {"b": {"d": None, "c": [1.5, "µ"]}, "a": 1}
+    assert (
+        canonical_json(one)
+        == canonical_json(other)
+        == '{"a":1,"b":{"c":[1.5,"µ"],"d":null}}'
+    )
+    assert (
+        configuration_sha256(one)
+        == hashlib.sha256(canonical_json(other).encode("utf-8")).hexdigest()
+    )
     with pytest.raises(ValueError, match="JSON"):
         canonical_json({"a": float("nan")})
 
@@ -21,6 +29,16 @@ def test_provenance_holds_version_settings_and_whatever_else_is_given_and_does_n
     settings = {"seed": 1, "loading": {"force_N": 1000, "offset_m": [0, 0.5, 0]}}
     found = provenance(settings, noise_um="200")
     assert found["elastocal_version"] == elastocal.__version__
-    assert found["configuration"] == settings and found["noise_um"] == "200" and json.loads(json.dumps(found)) == found
-    turned = {"loading": {"offset_m": (0, 0.5, 0), "force_N": 1000}, "seed": 1, "sources_sha256": "x"}
-    assert provenance(turned) == provenance(settings) != provenance(settings | {"seed": 2})
+    assert (
+        found["configuration"] == settings
+        and found["noise_um"] == "200"
+        and json.loads(json.dumps(found)) == found
+    )
+    turned = {
+        "loading": {"offset_m": (0, 0.5, 0), "force_N": 1000},
+        "seed": 1,
+        "sources_sha256": "x",
+    }
+    assert (
+        provenance(turned) == provenance(settings) != provenance(settings | {"seed": 2})
+    )

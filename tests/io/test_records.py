@@ -1,4 +1,5 @@
-"""Records of jobs: an altered, missing or unrecorded file is found by whoever reads it or what was made from it."""
+"""Records of jobs: an altered, missing or unrecorded file is found by whoever reads it
+or what was made from it."""
 
 import json
 import subprocess
@@ -20,25 +21,55 @@ from elastocal.io.records import (
     write_records,
 )
 
-ORIGIN, HERE = Origin("c0ffee", "d16e57", 1), {"numpy": "2.0"}
-MEASURED, FITTED, TABLE, DRAWN = "data/sealed/block", "results/fit.json", "results/fit.csv", "reports/drawn.png"
-CODE, OWN = "src/fit.py", "data/mine.csv"
-ALTERED = {MEASURED: f"{MEASURED}/2/case.json", FITTED: FITTED, TABLE: TABLE, DRAWN: DRAWN}
+ORIGIN = Origin("c0ffee", "d16e57", 1)
+HERE = {"numpy": "2.0"}
+MEASURED = "data/sealed/block"
+FITTED = "results/fit.json"
+TABLE = "results/fit.csv"
+DRAWN = "reports/drawn.png"
+CODE = "src/fit.py"
+OWN = "data/mine.csv"
+ALTERED = {
+    MEASURED: f"{MEASURED}/2/case.json",
+    FITTED: FITTED,
+    TABLE: TABLE,
+    DRAWN: DRAWN,
+}
 
 
 def write(rule, number, inputs, outputs, checked=None):
     """As a job does that ended well."""
     digests, own = input_digests(inputs, checked)
-    job = JobRecord(rule, {"robot": "kuka"}, f"{number}", f"{number + 1}", digests, own, tuple(outputs), ORIGIN, HERE)
+    job = JobRecord(
+        rule,
+        {"robot": "kuka"},
+        f"{number}",
+        f"{number + 1}",
+        digests,
+        own,
+        tuple(outputs),
+        ORIGIN,
+        HERE,
+    )
     write_records(job)
     return job
 
 
 @pytest.fixture(autouse=True)
 def jobs(tmp_path, monkeypatch):
-    """Three of a chain, from a file of the user in a folder of the pipeline to a figure, and one beside it."""
+    """Three of a chain, from a file of the user in a folder of the pipeline to a
+    figure, and one beside it."""
     monkeypatch.chdir(tmp_path)
-    for name in (CODE, OWN, f"{MEASURED}/1/case.json", f"{MEASURED}/2/case.json", FITTED, TABLE, DRAWN, "results/other.csv"):
+    for name in (
+        CODE,
+        OWN,
+        f"{MEASURED}/1/case.json",
+        f"{MEASURED}/2/case.json",
+        FITTED,
+        TABLE,
+        DRAWN,
+        "results/other.csv",
+    ):
         Path(name).parent.mkdir(parents=True, exist_ok=True)
         Path(name).write_bytes(name.encode() + bytes(range(64)))
     found = [
@@ -89,10 +120,24 @@ def test_a_file_that_was_made_again_since_another_read_it_is_found(jobs):
 def test_any_altered_character_of_a_record_is_found():
     path = record_of(FITTED)
     written = path.read_text(encoding="utf-8")
-    altered = [written[:n] + chr(ord(c) ^ 1) + written[n + 1 :] for n, c in enumerate(written[:-1]) if not c.isspace()]
-    for text in (*altered[::7], "", "{", "{}", "[]", json.dumps({"sha256": "", "files": 1})):
+    altered = [
+        written[:n] + chr(ord(c) ^ 1) + written[n + 1 :]
+        for n, c in enumerate(written[:-1])
+        if not c.isspace()
+    ]
+    for text in (
+        *altered[::7],
+        "",
+        "{",
+        "{}",
+        "[]",
+        json.dumps({"sha256": "", "files": 1}),
+    ):
         path.write_text(text, encoding="utf-8")
-        with pytest.raises(InputError, match=r"^results/records/results/fit\.json\.json: found no record of a job "):
+        with pytest.raises(
+            InputError,
+            match=r"^results/records/results/fit\.json\.json: found no record of a job ",
+        ):
             read_record(FITTED)
 
 
@@ -100,5 +145,7 @@ def test_sha256sum_reads_what_is_recorded():
     called = [sys.executable, "-m", "elastocal.io.records"]
     lines = subprocess.run(called, capture_output=True, text=True, check=True).stdout
     assert len(lines.splitlines()) == len(recorded()) == 6
-    done = subprocess.run(["sha256sum", "--check"], input=lines, capture_output=True, text=True)
+    done = subprocess.run(
+        ["sha256sum", "--check"], input=lines, capture_output=True, text=True
+    )
     assert done.returncode == 0 and f"{FITTED}: OK\n" in done.stdout

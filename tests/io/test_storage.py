@@ -1,4 +1,5 @@
-"""Tables on disk: what is written comes back, and a file that is not as written is refused in one line."""
+"""Tables on disk: what is written comes back, and a file that is not as written is
+refused in one line."""
 
 from pathlib import Path
 
@@ -8,7 +9,14 @@ import pyarrow.parquet as pq
 import pytest
 from support import refused
 
-from elastocal.io.storage import Column, TableSchema, read_blocks, read_provenance, read_table, write_table
+from elastocal.io.storage import (
+    Column,
+    TableSchema,
+    read_blocks,
+    read_provenance,
+    read_table,
+    write_table,
+)
 
 SCHEMA = TableSchema(
     "things",
@@ -25,8 +33,17 @@ ORIGIN = {"elastocal_version": "0.1.0", "configuration": {"seed": 1}, "noise_um"
 
 def block(kind, first, rows=3, **changes):
     numbers = np.arange(first, first + rows)
-    made = {"kind": kind, "number": numbers, "length": 0.1 * numbers, "share": np.where(numbers % 2, np.nan, numbers / 3)}
-    return {name: values for name, values in (made | {"good": numbers % 3 == 0} | changes).items() if values is not None}
+    made = {
+        "kind": kind,
+        "number": numbers,
+        "length": 0.1 * numbers,
+        "share": np.where(numbers % 2, np.nan, numbers / 3),
+    }
+    return {
+        name: values
+        for name, values in (made | {"good": numbers % 3 == 0} | changes).items()
+        if values is not None
+    }
 
 
 @pytest.fixture
@@ -44,9 +61,14 @@ def path(tmp_path):
 
 
 def rewritten(path, change):
-    """The file with changed contents, its metadata and row groups kept: what an editor other than the pipeline leaves."""
+    """The file with changed contents, its metadata and row groups kept: what an editor
+    other than the pipeline leaves."""
     with pq.ParquetFile(path) as file:
-        metadata = {k: v for k, v in file.metadata.metadata.items() if k.startswith(b"elastocal")}
+        metadata = {
+            k: v
+            for k, v in file.metadata.metadata.items()
+            if k.startswith(b"elastocal")
+        }
         groups = [change(file.read_row_group(i)) for i in range(file.num_row_groups)]
     with pq.ParquetWriter(path, groups[0].schema) as writer:
         for group in groups:
@@ -59,13 +81,24 @@ def test_what_is_written_comes_back(path):
     np.testing.assert_array_equal(table["kind"], list("aaabbaaa"))
     np.testing.assert_array_equal(table["number"], np.arange(8))
     np.testing.assert_array_equal(table["length"], 0.1 * np.arange(8))
-    np.testing.assert_array_equal(table["share"], np.where(np.arange(8) % 2, np.nan, np.arange(8) / 3).astype("f4"))
+    np.testing.assert_array_equal(
+        table["share"],
+        np.where(np.arange(8) % 2, np.nan, np.arange(8) / 3).astype("f4"),
+    )
     np.testing.assert_array_equal(table["good"], np.arange(8) % 3 == 0)
-    assert [table[c.name].dtype for c in SCHEMA.columns[1:]] == ["int32", "float64", "float32", "bool"]
+    assert [table[c.name].dtype for c in SCHEMA.columns[1:]] == [
+        "int32",
+        "float64",
+        "float32",
+        "bool",
+    ]
 
 
 def test_only_row_groups_with_the_value_asked_for_are_read(path):
-    assert [b["number"].tolist() for b in read_blocks(path, SCHEMA, kind="a")] == [[0, 1, 2], [5, 6, 7]]
+    assert [b["number"].tolist() for b in read_blocks(path, SCHEMA, kind="a")] == [
+        [0, 1, 2],
+        [5, 6, 7],
+    ]
     assert read_table(path, SCHEMA, ["number"], kind="b")["number"].tolist() == [3, 4]
     assert list(read_blocks(path, SCHEMA, kind="c")) == []
 
@@ -85,13 +118,20 @@ def test_faulty_values_are_not_written(new, changes, key, words):
     assert not Path(new).exists()
 
 
-def test_a_file_that_is_cut_off_or_has_another_column_or_is_somebody_elses_is_refused(path, new):
+def test_a_file_that_is_cut_off_or_has_another_column_or_is_somebody_elses_is_refused(
+    path, new
+):
     whole = Path(path).read_bytes()
     for share in (0.0, 0.3, 0.999):
         Path(new).write_bytes(whole[: int(share * len(whole))])
         with refused(new, "", "Parquet"):
             read_table(new, SCHEMA)
-    rewritten(path, lambda table: table.rename_columns(["kind", "number", "lenght", "share", "good"]))
+    rewritten(
+        path,
+        lambda table: table.rename_columns(
+            ["kind", "number", "lenght", "share", "good"]
+        ),
+    )
     with refused(path, "column length", "nothing", "double"):
         read_table(path, SCHEMA)
     pq.write_table(pa.table({"number": [1, 2]}), new)
@@ -103,29 +143,53 @@ def test_a_file_that_is_cut_off_or_has_another_column_or_is_somebody_elses_is_re
 
 TEXTS = TableSchema(
     "texts",
-    (Column("owner", "text", "", "one of its own for each row"), Column("kind", "string", "", "one for each row group")),
+    (
+        Column("owner", "text", "", "one of its own for each row"),
+        Column("kind", "string", "", "one for each row group"),
+    ),
 )
 ODD_TEXTS = ["", "µrad/(N·m)", "a, b\nc", "", "x" * 300]
 
 
 def test_text_columns_come_back_row_by_row(new):
-    odd, more = {"owner": ODD_TEXTS, "kind": "k"}, {"owner": np.array(["a", "b", "a"], dtype=object), "kind": "l"}
+    odd = {"owner": ODD_TEXTS, "kind": "k"}
+    more = {"owner": np.array(["a", "b", "a"], dtype=object), "kind": "l"}
     write_table(new, TEXTS, [odd, more], ORIGIN)
     back = read_table(new, TEXTS)
-    assert back["owner"].tolist() == [*ODD_TEXTS, "a", "b", "a"] and back["kind"].tolist() == ["k"] * 5 + ["l"] * 3
-    assert read_table(new, TEXTS, ["owner"], kind="l")["owner"].tolist() == ["a", "b", "a"]
-    assert pq.ParquetFile(new).read().column("owner").to_pylist() == [*ODD_TEXTS, "a", "b", "a"]
+    assert (
+        back["owner"].tolist() == [*ODD_TEXTS, "a", "b", "a"]
+        and back["kind"].tolist() == ["k"] * 5 + ["l"] * 3
+    )
+    assert read_table(new, TEXTS, ["owner"], kind="l")["owner"].tolist() == [
+        "a",
+        "b",
+        "a",
+    ]
+    assert pq.ParquetFile(new).read().column("owner").to_pylist() == [
+        *ODD_TEXTS,
+        "a",
+        "b",
+        "a",
+    ]
 
 
-NONE, SOME = {"owner": [], "kind": "k"}, {"owner": ["a"], "kind": "k"}
+NONE = {"owner": [], "kind": "k"}
+SOME = {"owner": ["a"], "kind": "k"}
 
 
-@pytest.mark.parametrize(("blocks", "rows"), [([], 0), ([NONE], 0), ([NONE, SOME, NONE], 1)])
+@pytest.mark.parametrize(
+    ("blocks", "rows"), [([], 0), ([NONE], 0), ([NONE, SOME, NONE], 1)]
+)
 def test_tables_without_rows_come_back(blocks, rows, new):
     write_table(new, TEXTS, blocks, ORIGIN)
     back = read_table(new, TEXTS)
-    assert {name: (len(values), values.dtype) for name, values in back.items()} == dict.fromkeys(back, (rows, np.dtype(object)))
-    assert list(read_table(new, TEXTS, ["owner"])) == ["owner"] and read_provenance(new) == ORIGIN
+    assert {
+        name: (len(values), values.dtype) for name, values in back.items()
+    } == dict.fromkeys(back, (rows, np.dtype(object)))
+    assert (
+        list(read_table(new, TEXTS, ["owner"])) == ["owner"]
+        and read_provenance(new) == ORIGIN
+    )
     assert len(list(read_blocks(new, TEXTS))) == rows
     with refused(new, "metadata elastocal.table", "texts", "things"):
         read_table(new, SCHEMA)

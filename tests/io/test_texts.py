@@ -8,7 +8,9 @@ from support import refused
 from elastocal.io.texts import LARGEST_NUMBER, plain_number, read_bytes, read_text
 
 
-def test_contents_are_read_up_to_a_bound_and_what_might_never_end_is_not_opened(tmp_path):
+def test_contents_are_read_up_to_a_bound_and_what_might_never_end_is_not_opened(
+    tmp_path,
+):
     path = tmp_path / "a.txt"
     path.write_bytes(b"12345")
     assert read_bytes(path, 5) == b"12345"
@@ -17,10 +19,18 @@ def test_contents_are_read_up_to_a_bound_and_what_might_never_end_is_not_opened(
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "zero").symlink_to("/dev/zero")
     (tmp_path / "loop").symlink_to("loop")
-    for name, words in (("pipe", "a pipe"), ("zero", "a device"), ("loop", "Too many levels"), ("", "a folder")):
+    for name, words in (
+        ("pipe", "a pipe"),
+        ("zero", "a device"),
+        ("loop", "Too many levels"),
+        ("", "a folder"),
+    ):
         with refused(tmp_path / name, "", words):
             read_bytes(tmp_path / name, 10)
-    for name, words in (("none", "no such file; allowed: the path of a readable file"), ("a\0b", "null")):
+    for name, words in (
+        ("none", "no such file; allowed: the path of a readable file"),
+        ("a\0b", "null"),
+    ):
         with refused("", "", words):
             read_bytes(tmp_path / name, 10)
 
@@ -35,7 +45,14 @@ def test_text_loses_its_mark_and_other_encodings_are_refused_with_their_line(tmp
 
 
 @pytest.mark.parametrize(
-    ("text", "value"), [("1", 1.0), ("-1.5e-3", -1.5e-3), ("+.5", 0.5), ("2.", 2.0), ("1e12", LARGEST_NUMBER)]
+    ("text", "value"),
+    [
+        ("1", 1.0),
+        ("-1.5e-3", -1.5e-3),
+        ("+.5", 0.5),
+        ("2.", 2.0),
+        ("1e12", LARGEST_NUMBER),
+    ],
 )
 def test_numbers_as_people_write_them(text, value):
     assert plain_number(text) == value

@@ -1,4 +1,5 @@
-"""The same folds for every method, and what a method predicts of poses that it has not seen."""
+"""The same folds for every method, and what a method predicts of poses that it has not
+seen."""
 
 import numpy as np
 import pytest
@@ -31,17 +32,22 @@ from elastocal_proof.league.schemas import ENTRIES, FOLDS
 
 @pytest.fixture(scope="module")
 def data(kuka, config_folder, tmp_path_factory):
-    return made_data_set(tmp_path_factory.mktemp("data_set"), kuka, config_folder / "robots")
+    return made_data_set(
+        tmp_path_factory.mktemp("data_set"), kuka, config_folder / "robots"
+    )
 
 
-def test_every_pose_is_held_out_once_in_folds_of_one_size_and_blocks_are_neighbours(data):
+def test_every_pose_is_held_out_once_in_folds_of_one_size_and_blocks_are_neighbours(
+    data,
+):
     found = dealt(measurements_from(data.columns), 5, np.random.default_rng(2))
     assert len(found["pose"]) == 24
     for split in ("random", "blocks"):
         counts = np.bincount(found[split])
         assert counts[0] == 0 and len(counts) == 6 and np.ptp(counts[1:]) <= 1
     seen = measurements_from(data.columns)
-    angles, block = seen.joint_angles[np.unique(seen.pose, return_index=True)[1]], data.dealt["blocks"]
+    angles = seen.joint_angles[np.unique(seen.pose, return_index=True)[1]]
+    block = data.dealt["blocks"]
     apart = np.linalg.norm(np.exp(1j * angles[:, None]) - np.exp(1j * angles), axis=2)
     same = block[:, None] == block
     assert apart[same & ~np.eye(24, dtype=bool)].mean() < 0.95 * apart[~same].mean()
@@ -51,7 +57,11 @@ def test_a_data_set_comes_back_from_its_files(data, tmp_path):
     write_json(tmp_path / "campaign.json", data.descriptions)
     write_table(tmp_path / "seen.parquet", measurements(6), [data.columns], {})
     write_table(tmp_path / "folds.parquet", FOLDS, [data.dealt], {})
-    found = load_data_set(tmp_path / "campaign.json", tmp_path / "seen.parquet", tmp_path / "folds.parquet")
+    found = load_data_set(
+        tmp_path / "campaign.json",
+        tmp_path / "seen.parquet",
+        tmp_path / "folds.parquet",
+    )
     for mine, read in ((data.columns, found.columns), (data.dealt, found.dealt)):
         for name, values in mine.items():
             np.testing.assert_array_equal(read[name], values)
@@ -68,11 +78,17 @@ def test_the_poses_of_a_fold_are_either_trained_on_or_held_out(data, split):
     assert sorted(held) == list(range(24))
 
 
-def test_another_session_is_tested_as_a_whole_by_all_training_poses(data, kuka, config_folder, tmp_path):
-    other = made_data_set(tmp_path, kuka, config_folder / "robots", poses=8, seed=3, name="other")
+def test_another_session_is_tested_as_a_whole_by_all_training_poses(
+    data, kuka, config_folder, tmp_path
+):
+    other = made_data_set(
+        tmp_path, kuka, config_folder / "robots", poses=8, seed=3, name="other"
+    )
     ((fold, training, tests),) = rounds("session", data, [other])
     assert fold == 1 and len(training.observations.states) == 24
-    assert [test.campaign.name for test in tests] == ["other"] and len(tests[0].observations.states) == 8
+    assert [test.campaign.name for test in tests] == ["other"] and len(
+        tests[0].observations.states
+    ) == 8
 
 
 def residual(columns):
@@ -84,27 +100,56 @@ def test_frames_alone_have_no_parameters_of_the_robot_and_a_regression_lowers_wh
 ):
     many = made_data_set(tmp_path, kuka, config_folder / "robots", poses=60)
     _, training, (held_out,) = next(rounds("random", many))
-    frames, geometry = (fitted_physics(physics, training) for physics in (FRAMES, GEOMETRY))
-    owners = [{owner for owner, _ in fitted.parameters} for fitted in (frames, geometry)]
+    frames, geometry = (
+        fitted_physics(physics, training) for physics in (FRAMES, GEOMETRY)
+    )
+    owners = [
+        {owner for owner, _ in fitted.parameters} for fitted in (frames, geometry)
+    ]
     assert all(owner.startswith(("frame ", "target ")) for owner in owners[0])
-    assert {owner.partition("@")[0] for owner in owners[1] - owners[0]} == {"joint_offset"}
+    assert {owner.partition("@")[0] for owner in owners[1] - owners[0]} == {
+        "joint_offset"
+    }
     alone, process = (
-        entered(Method(GEOMETRY, name), geometry, training, held_out, "random", 1) for name in (None, "gaussian_process")
+        entered(Method(GEOMETRY, name), geometry, training, held_out, "random", 1)
+        for name in (None, "gaussian_process")
     )
     assert (residual(process) ** 2).sum() < 0.64 * (residual(alone) ** 2).sum()
     assert np.isfinite(process["std_x"]).all() and np.isnan(alone["std_x"]).all()
 
 
 def test_a_regression_that_is_not_there_is_refused_in_one_line():
-    with pytest.raises(InputError, match=r"league\.methods\.mine\.regression.*'magic'.*gaussian_process"):
-        method_from({"physics": "geometry", "regression": "magic", "words": ""}, "mine", "config.yaml")
-    assert method_from({"physics": "frames", "words": "frames only"}, "mine", "config.yaml").words == "frames only"
+    with pytest.raises(
+        InputError,
+        match=r"league\.methods\.mine\.regression.*'magic'.*gaussian_process",
+    ):
+        method_from(
+            {"physics": "geometry", "regression": "magic", "words": ""},
+            "mine",
+            "config.yaml",
+        )
+    assert (
+        method_from(
+            {"physics": "frames", "words": "frames only"}, "mine", "config.yaml"
+        ).words
+        == "frames only"
+    )
 
 
 def test_each_observation_has_its_pose_target_and_residual(data, tmp_path):
     fold, training, (held_out,) = next(rounds("blocks", data))
-    columns = entered(Method(GEOMETRY), fitted_physics(GEOMETRY, training), training, held_out, "blocks", 1)
-    fixed = {"fold": np.full(len(columns["pose"]), fold), "set": np.zeros(len(columns["pose"]), int)}
+    columns = entered(
+        Method(GEOMETRY),
+        fitted_physics(GEOMETRY, training),
+        training,
+        held_out,
+        "blocks",
+        1,
+    )
+    fixed = {
+        "fold": np.full(len(columns["pose"]), fold),
+        "set": np.zeros(len(columns["pose"]), int),
+    }
     write_table(tmp_path / "entries.parquet", ENTRIES, [fixed | columns], {})
     found = read_table(tmp_path / "entries.parquet", ENTRIES)
     np.testing.assert_array_equal(residual(found), residual(columns))
@@ -122,7 +167,9 @@ def diagnosed(kuka, config_folder, tmp_path_factory):
 def test_the_fit_of_a_fold_is_that_which_its_diagnosis_left(diagnosed):
     case, found = diagnosed
     again = step_fit(case, diagnosis_facts(found)["steps"][-1])
-    assert [effect.key for effect in again.model.effects] == [effect.key for effect in found.final.model.effects]
+    assert [effect.key for effect in again.model.effects] == [
+        effect.key for effect in found.final.model.effects
+    ]
     np.testing.assert_allclose(again.residual, found.final.residual, atol=2e-8)
     assert len(fitted_physics(GEOMETRY, case).model.effects) < len(again.model.effects)
 

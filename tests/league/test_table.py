@@ -1,4 +1,5 @@
-"""Figures of the league: errors with intervals, ratios on the same poses; the page has each in words that a stranger knows."""
+"""Figures of the league: errors with intervals, ratios on the same poses; the page has
+each in words that a stranger knows."""
 
 import pandas as pd
 import pytest
@@ -17,7 +18,14 @@ METHODS = {
 }
 MECHANISMS = pd.DataFrame(
     [
-        {"robot": "A robot", "data": "one", "mechanism": name, "probability": p, "probability_low": p, "probability_high": p}
+        {
+            "robot": "A robot",
+            "data": "one",
+            "mechanism": name,
+            "probability": p,
+            "probability_low": p,
+            "probability_high": p,
+        }
         | {"share": s, "share_low": s, "share_high": s}
         for name, p, s in (("link_weight", 0.9, 0.4), ("payload", 0.01, 0.2))
     ]
@@ -35,14 +43,24 @@ def page():
 
 def test_each_split_has_a_table_in_which_the_best_is_bold(page):
     assert page.count("## ") == 5
-    for line in (line for line in page.splitlines() if line.startswith("| one ") and "(" in line and "**" in line):
+    for line in (
+        line
+        for line in page.splitlines()
+        if line.startswith("| one ") and "(" in line and "**" in line
+    ):
         assert line.count("**") == 2
     assert page.count("**") == 2 * 6
 
 
 def test_a_split_that_no_data_set_has_is_left_out():
-    page = written(league_table(made_results(splits=("random", "session")), ROBOTS, "geometry", 1))
-    assert "Random poses" in page and "another session" in page and "Blocks of joint space" not in page
+    page = written(
+        league_table(made_results(splits=("random", "session")), ROBOTS, "geometry", 1)
+    )
+    assert (
+        "Random poses" in page
+        and "another session" in page
+        and "Blocks of joint space" not in page
+    )
 
 
 def test_improbable_mechanisms_are_left_out(page):
@@ -51,10 +69,18 @@ def test_improbable_mechanisms_are_left_out(page):
 
 def test_the_page_says_first_how_often_a_diagnosis_leads_and_how_surely(page):
     results = made_results()
-    assert "has the smallest RMS error in 6 of 6 rows, in 6 with 95 % confidence" in page
+    assert (
+        "has the smallest RMS error in 6 of 6 rows, in 6 with 95 % confidence" in page
+    )
     assert "; another has it in 0, in 0 with that confidence." in page
-    # The same entries under two names: one of them is smallest, and neither is ahead for certain.
-    twins = {(*key[:2], name): part for key, part in results.items() if key[2] == "geometry" for name in ("geometry", "half")}
+    # The same entries under two names: one of them is smallest, and neither is ahead
+    # for certain.
+    twins = {
+        (*key[:2], name): part
+        for key, part in results.items()
+        if key[2] == "geometry"
+        for name in ("geometry", "half")
+    }
     table = league_table(twins, ROBOTS, "geometry", 1)
     assert "has the smallest RMS error in 0 of 6 rows, in 0 with" in written(table)
     assert "; another has it in 6, in 0 with that confidence." in written(table)

@@ -1,6 +1,8 @@
-"""The calibrated robot comes from the tables of a diagnosis as it was fitted, and only while all behind it is as it was.
+"""The calibrated robot comes from the tables of a diagnosis as it was fitted, and only
+while all behind it is as it was.
 
-A certificate decides by what is predicted, and its error budget has what each effect costs and what a correction leaves.
+A certificate decides by what is predicted, and its error budget has what each effect
+costs and what a correction leaves.
 """
 
 import hashlib
@@ -32,42 +34,81 @@ def test_the_robot_is_that_of_the_final_fit(checkout):
     tables = checkout / "results/loop/made"
     again = diagnosis_from(found.case, read_json(tables / "diagnosis.json"))
     expected = calibrate_by_fit(again.final, found.case.campaign.robot)
-    assert [e.key for e in found.calibrated.model.effects] == ["joint_compliance", "joint_offset@3"]
-    for mine, theirs in zip(found.calibrated.estimate.coefficients, expected.estimate.coefficients, strict=True):
+    assert [e.key for e in found.calibrated.model.effects] == [
+        "joint_compliance",
+        "joint_offset@3",
+    ]
+    for mine, theirs in zip(
+        found.calibrated.estimate.coefficients,
+        expected.estimate.coefficients,
+        strict=True,
+    ):
         np.testing.assert_allclose(mine, theirs, rtol=1e-6)
-    # What hardly varies together may be off by more than its own thousandth: measured beside the standard errors.
+    # What hardly varies together may be off by more than its own thousandth: measured
+    # beside the standard errors.
     errors = np.sqrt(np.diag(expected.covariance))
     off = np.abs(found.calibrated.covariance - expected.covariance)
-    assert (off <= 1e-3 * np.abs(expected.covariance) + 1e-6 * np.outer(errors, errors)).all()
+    assert (
+        off <= 1e-3 * np.abs(expected.covariance) + 1e-6 * np.outer(errors, errors)
+    ).all()
     assert (found.calibrated.noise.joint_rad >= expected.noise.joint_rad).all()
-    assert found.calibrated.scope.frame == ("robot" if found.case.model.fitted_frames else "base")
+    assert found.calibrated.scope.frame == (
+        "robot" if found.case.model.fitted_frames else "base"
+    )
     assert found.verdict["campaign"] == found.name == "made"
-    assert found.calibrated.scope.form_m == pytest.approx(found.verdict["accuracy"]["form_m"], rel=1e-9)
+    assert found.calibrated.scope.form_m == pytest.approx(
+        found.verdict["accuracy"]["form_m"], rel=1e-9
+    )
 
 
-def test_the_regression_comes_back_and_physics_alone_has_its_own_accuracy(regressed_checkout):
+def test_the_regression_comes_back_and_physics_alone_has_its_own_accuracy(
+    regressed_checkout,
+):
     whole = load_diagnosed(regressed_checkout / "smooth", ROBOTS, regressed_checkout)
     physics = whole.by_physics()
-    stated, heldout = whole.verdict, whole.verdict["heldout"]
+    stated = whole.verdict
+    heldout = whole.verdict["heldout"]
     assert heldout["delivered"]["rms_m"] < 0.6 * heldout["after"]["rms_m"]
-    assert physics.calibrated.remainder is None and physics.verdict["heldout"]["delivered"] == heldout["after"]
-    assert physics.verdict["accuracy"] == stated["physics"]["accuracy"] != stated["accuracy"]
+    assert (
+        physics.calibrated.remainder is None
+        and physics.verdict["heldout"]["delivered"] == heldout["after"]
+    )
+    assert (
+        physics.verdict["accuracy"]
+        == stated["physics"]["accuracy"]
+        != stated["accuracy"]
+    )
     for found in (whole, physics):
         again = campaign_accuracy(found.calibrated)
-        assert again.rms_m == pytest.approx(found.verdict["accuracy"]["rms_m"], rel=1e-3)
-        assert again.form_m == pytest.approx(found.verdict["accuracy"]["form_m"], rel=1e-6)
-    # What it is predicted to miss is by folds with fewer poses, and no less than what it missed.
+        assert again.rms_m == pytest.approx(
+            found.verdict["accuracy"]["rms_m"], rel=1e-3
+        )
+        assert again.form_m == pytest.approx(
+            found.verdict["accuracy"]["form_m"], rel=1e-6
+        )
+    # What it is predicted to miss is by folds with fewer poses, and no less than what
+    # it missed.
     missed = np.sqrt(heldout["delivered"]["rms_m"] ** 2 - 3 * NOISE_M**2)
-    assert missed < stated["accuracy"]["rms_m"] < 3.0 * missed < stated["physics"]["accuracy"]["rms_m"]
+    assert (
+        missed
+        < stated["accuracy"]["rms_m"]
+        < 3.0 * missed
+        < stated["physics"]["accuracy"]["rms_m"]
+    )
 
 
 def test_it_says_what_code_data_and_environment_made_it(checkout):
     origin = load_diagnosed(checkout / "made", ROBOTS, checkout).origin
 
     def digest(value):
-        return hashlib.sha256(json.dumps(value, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+        return hashlib.sha256(
+            json.dumps(value, sort_keys=True, separators=(",", ":")).encode()
+        ).hexdigest()
 
-    files = {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in (checkout / "made").iterdir()}
+    files = {
+        path.name: hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in (checkout / "made").iterdir()
+    }
     files["kuka.yaml"] = hashlib.sha256((ROBOTS / "kuka.yaml").read_bytes()).hexdigest()
     assert origin == {
         "commit": "c0ffee",
@@ -97,30 +138,54 @@ CHANGES = {
 
 
 @pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
-def test_a_campaign_that_has_changed_since_is_refused_be_it_in_a_held_out_row(checkout, tmp_path, change):
+def test_a_campaign_that_has_changed_since_is_refused_be_it_in_a_held_out_row(
+    checkout, tmp_path, change
+):
     shutil.copytree(checkout / "made", tmp_path / "changed")
     change(tmp_path / "changed")
-    with refused((tmp_path / "changed").as_posix(), "", "changes since its diagnosis", "elastocal diagnose"):
+    with refused(
+        (tmp_path / "changed").as_posix(),
+        "",
+        "changes since its diagnosis",
+        "elastocal diagnose",
+    ):
         load_diagnosed(tmp_path / "changed", ROBOTS, checkout)
 
 
 def test_results_of_another_engine_are_refused(checkout, tmp_path):
     changed = shutil.copytree(checkout, tmp_path / "top", symlinks=True)
     (changed / ENGINE).write_text("VERSION = 2\n", encoding="utf-8")
-    with refused(changed / ENGINE, "", "not what read_campaign made was made with", f"elastocal diagnose {changed}/made"):
+    with refused(
+        changed / ENGINE,
+        "",
+        "not what read_campaign made was made with",
+        f"elastocal diagnose {changed}/made",
+    ):
         load_diagnosed(changed / "made", ROBOTS, changed)
 
 
-@pytest.mark.parametrize(("share", "judged", "decision"), [(0.2, 8, "fail"), (2.0, 8, "pass"), (2.0, 3, "undecided")])
+@pytest.mark.parametrize(
+    ("share", "judged", "decision"),
+    [(0.2, 8, "fail"), (2.0, 8, "pass"), (2.0, 3, "undecided")],
+)
 def test_a_certificate_passes_below_and_fails_above_what_is_predicted_if_enough_configurations_judge(
     checkout, share, judged, decision
 ):
     found = load_diagnosed(checkout / "made", ROBOTS, checkout)
-    found = replace(found, verdict=found.verdict | {"heldout": found.verdict["heldout"] | {"configurations": judged}})
+    found = replace(
+        found,
+        verdict=found.verdict
+        | {"heldout": found.verdict["heldout"] | {"configurations": judged}},
+    )
     tolerance_m = share * found.verdict["accuracy"]["rms_m"]
-    conformity = certificate(checkout / "made", ROBOTS, found, tolerance_m, 0.05)["conformity"]
+    conformity = certificate(checkout / "made", ROBOTS, found, tolerance_m, 0.05)[
+        "conformity"
+    ]
     assert conformity["decision"] == decision
-    assert [line.startswith("too few: 3 configurations") for line in conformity["shortfalls"]] == [True] * (judged == 3)
+    assert [
+        line.startswith("too few: 3 configurations")
+        for line in conformity["shortfalls"]
+    ] == [True] * (judged == 3)
 
 
 def rms(one, other):
@@ -135,25 +200,41 @@ def states(fanuc):
     return fanuc.reported_angles(rng.uniform(0.6 * low, 0.6 * high, (60, 6))), wrench
 
 
-def test_each_line_of_the_budget_is_what_the_robot_misses_without_that_effect(fanuc, states):
+def test_each_line_of_the_budget_is_what_the_robot_misses_without_that_effect(
+    fanuc, states
+):
     calibrated = made_calibrated(fanuc, *USUAL)
     found, (whole, _) = error_budget(calibrated, *states), forward(calibrated, *states)
-    assert found["uncorrected"] == pytest.approx(rms(whole, nominal_forward(fanuc, states[0])[0]))
+    assert found["uncorrected"] == pytest.approx(
+        rms(whole, nominal_forward(fanuc, states[0])[0])
+    )
     for name in ("joint_offset", "link_geometry", "joint_compliance", "link_weight"):
         values = tuple(
             0.0 * value if effect.effect == name else value
-            for effect, value in zip(calibrated.model.effects, calibrated.estimate.coefficients, strict=True)
+            for effect, value in zip(
+                calibrated.model.effects, calibrated.estimate.coefficients, strict=True
+            )
         )
-        without = replace(calibrated, estimate=replace(calibrated.estimate, coefficients=values))
+        without = replace(
+            calibrated, estimate=replace(calibrated.estimate, coefficients=values)
+        )
         assert found[name] == pytest.approx(rms(whole, forward(without, *states)[0]))
     names = list(found)
-    assert names[0] == "uncorrected" and names[-2:] == ["uncertainty of the parameters", "repeatability"]
+    assert names[0] == "uncorrected" and names[-2:] == [
+        "uncertainty of the parameters",
+        "repeatability",
+    ]
     middle = [found[name] for name in names[1:-2]]
     assert middle == sorted(middle, reverse=True)
 
 
 def test_springs_of_the_robot_file_cost_what_they_give_under_load(fanuc, states):
     calibrated = made_calibrated(fanuc, "joint_offset@2", identified=False)
-    rigid = replace(calibrated, model=replace(calibrated.model, nominal_compliance=np.zeros(6)))
+    rigid = replace(
+        calibrated, model=replace(calibrated.model, nominal_compliance=np.zeros(6))
+    )
     expected = rms(*(forward(each, *states)[0] for each in (calibrated, rigid)))
-    assert error_budget(calibrated, *states)["joint_compliance"] == pytest.approx(expected) and expected > 1e-5
+    assert (
+        error_budget(calibrated, *states)["joint_compliance"] == pytest.approx(expected)
+        and expected > 1e-5
+    )

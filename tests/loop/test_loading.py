@@ -13,7 +13,13 @@ def test_descriptions_hold_what_a_campaign_may_leave_out(kuka, config_folder, tm
     for key in ("declared", "compliance", "holdout"):
         document.pop(key, None)
     path.write_text(yaml.safe_dump(document), encoding="utf-8")
-    descriptions, _, held_out = load_campaign(folder.as_posix(), config_folder / "robots")
+    descriptions, _, held_out = load_campaign(
+        folder.as_posix(), config_folder / "robots"
+    )
     said = descriptions["campaign"]
-    assert (said["declared"], said["compliance"], said["holdout"]) == ([], "nominal", {"fraction": 0.3, "seed": 1})
+    assert (said["declared"], said["compliance"], said["holdout"]) == (
+        [],
+        "nominal",
+        {"fraction": 0.3, "seed": 1},
+    )
     assert len(held_out)

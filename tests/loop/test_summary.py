@@ -8,7 +8,10 @@ from elastocal.loop.summary import campaign_rows
 
 
 def verdict(word, *effects):
-    return {"verdict": word, "effects": [{"name": name, "joints": list(joints)} for name, joints in effects]}
+    return {
+        "verdict": word,
+        "effects": [{"name": name, "joints": list(joints)} for name, joints in effects],
+    }
 
 
 def errors(before, after=None, pose=None, repeat=None, session=0):
@@ -16,8 +19,15 @@ def errors(before, after=None, pose=None, repeat=None, session=0):
     before = np.asarray(before, float)
     after = before if after is None else np.asarray(after, float)
     count = len(before)
-    table = {"session": np.full(count, session), "pose": np.arange(count) if pose is None else pose}
-    table |= {"load": 0, "target": 0, "repeat": np.zeros(count, int) if repeat is None else repeat}
+    table = {
+        "session": np.full(count, session),
+        "pose": np.arange(count) if pose is None else pose,
+    }
+    table |= {
+        "load": 0,
+        "target": 0,
+        "repeat": np.zeros(count, int) if repeat is None else repeat,
+    }
     for stage, values in (("before", before), ("after", after)):
         table |= {f"{stage}_dx": 1e-3 * values, f"{stage}_dy": 0.0, f"{stage}_dz": 0.0}
     return pd.DataFrame(table)
@@ -28,13 +38,23 @@ def test_errors_are_distances_in_millimetres_and_repeats_of_a_state_are_averaged
         "one": errors([1.0, -2.0, 3.0], [0.1, 0.1, -0.4]),
         "two": errors([1.5, -0.5, 0.25], pose=[4, 4, 7], repeat=[0, 1, 0]),
     }
-    one, two = campaign_rows({name: verdict("named") for name in residuals}, residuals, {}, 1).itertuples()
+    one, two = campaign_rows(
+        {name: verdict("named") for name in residuals}, residuals, {}, 1
+    ).itertuples()
     assert (one.campaign, one.session, one.poses) == ("one", 0, 3)
-    assert (one.before_mean_mm, one.before_rms_mm, one.before_max_mm) == pytest.approx((2.0, np.sqrt(14 / 3), 3.0))
+    assert (one.before_mean_mm, one.before_rms_mm, one.before_max_mm) == pytest.approx(
+        (2.0, np.sqrt(14 / 3), 3.0)
+    )
     assert one.before_p95_mm == pytest.approx(2.9)
-    assert (one.after_mean_mm, one.after_rms_mm, one.after_max_mm) == pytest.approx((0.2, np.sqrt(0.06), 0.4))
+    assert (one.after_mean_mm, one.after_rms_mm, one.after_max_mm) == pytest.approx(
+        (0.2, np.sqrt(0.06), 0.4)
+    )
     # Noise that cancels between repeats is gone; the mean of 1.5 and -0.5 is left.
-    assert two.poses == 2 and two.before_mean_mm == pytest.approx(0.375) and two.before_max_mm == pytest.approx(0.5)
+    assert (
+        two.poses == 2
+        and two.before_mean_mm == pytest.approx(0.375)
+        and two.before_max_mm == pytest.approx(0.5)
+    )
 
 
 def test_folds_of_one_campaign_are_one_row_with_all_their_poses_and_counted_verdicts():
@@ -44,11 +64,19 @@ def test_folds_of_one_campaign_are_one_row_with_all_their_poses_and_counted_verd
         "fold 2": verdict("class", ("joint_offset", (3,)), ("payload", ())),
         "fold 3": verdict("named", ("joint_offset", (3,))),
     }
-    residuals = {name: errors([1.0 + k, 1.0 + k], pose=[2 * k, 2 * k + 1]) for k, name in enumerate(verdicts)}
-    table = campaign_rows(verdicts, residuals, {"all folds": ["fold 1", "fold 2", "fold 3"]}, 1).set_index("campaign")
+    residuals = {
+        name: errors([1.0 + k, 1.0 + k], pose=[2 * k, 2 * k + 1])
+        for k, name in enumerate(verdicts)
+    }
+    table = campaign_rows(
+        verdicts, residuals, {"all folds": ["fold 1", "fold 2", "fold 3"]}, 1
+    ).set_index("campaign")
     assert list(table.index) == ["alone", "all folds"]
     folded = table.loc["all folds"]
     assert folded.poses == 6 and folded.before_mean_mm == pytest.approx((1 + 3 + 4) / 3)
     assert folded.verdict == "2 of 3: named; 1 of 3: class"
-    assert folded.effects == "2 of 3: joint_offset (joint 3); 1 of 3: joint_offset (joint 3) + payload"
+    assert (
+        folded.effects
+        == "2 of 3: joint_offset (joint 3); 1 of 3: joint_offset (joint 3) + payload"
+    )
     assert (table.verdict["alone"], table.effects["alone"]) == ("adequate", "none")

@@ -51,6 +51,8 @@ def test_faulty_chain_is_refused_in_one_line(text, words):
 
 
 @pytest.mark.parametrize("name", ["@SUM(A1)", "=1", "-x", "a\u202eb", "a\x1b[b"])
-def test_a_point_whose_name_a_table_or_a_terminal_takes_for_something_else_is_refused(name):
+def test_a_point_whose_name_a_table_or_a_terminal_takes_for_something_else_is_refused(
+    name,
+):
     with refused("a.yaml", "chain"):
         parse_chain(f"Rz(q1) Tx(1.0) [{name}]", {}, "a.yaml")

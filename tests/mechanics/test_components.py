@@ -4,6 +4,11 @@ from elastocal.mechanics.components import COMPONENTS, WRENCH
 
 
 def test_a_force_and_the_displacement_that_it_works_along_stand_at_the_same_place():
-    for (moved, unit, moves), (load, load_unit, loads) in zip(COMPONENTS, WRENCH, strict=True):
-        assert (moved[0], load[0], unit, load_unit) in [("d", "f", "m", "N"), ("r", "m", "rad", "N m")]
+    for (moved, unit, moves), (load, load_unit, loads) in zip(
+        COMPONENTS, WRENCH, strict=True
+    ):
+        assert (moved[0], load[0], unit, load_unit) in [
+            ("d", "f", "m", "N"),
+            ("r", "m", "rad", "N m"),
+        ]
         assert moved[1] == load[1] == moves[-1] == loads[-1]

@@ -1,4 +1,5 @@
-"""A robot: its angles as the controller reports them, and targets on all of its points."""
+"""A robot: its angles as the controller reports them, and targets on all of its
+points."""
 
 from dataclasses import replace
 
@@ -12,8 +13,13 @@ from elastocal.mechanics.robot_file import robot_from_document
 
 
 def test_reported_angles_are_converted_both_ways():
-    matrix, offset = np.array([[1.0, 0.0], [1.0, -1.0]]), np.radians([90.0, -45.0])
-    robot = replace(robot_of("Rz(q1) Tx(1) Ry(q2) [A]"), reported_matrix=matrix, reported_offset=offset)
+    matrix = np.array([[1.0, 0.0], [1.0, -1.0]])
+    offset = np.radians([90.0, -45.0])
+    robot = replace(
+        robot_of("Rz(q1) Tx(1) Ry(q2) [A]"),
+        reported_matrix=matrix,
+        reported_offset=offset,
+    )
     reported = np.radians([[10.0, 20.0], [-30.0, 5.0], [0.0, 0.0]])
     angles = np.radians([[100.0, -55.0], [60.0, -80.0], [90.0, -45.0]])
     np.testing.assert_allclose(robot.model_angles(reported), angles, rtol=1e-12)
@@ -22,7 +28,11 @@ def test_reported_angles_are_converted_both_ways():
 
 
 @pytest.mark.parametrize("name", ["kuka", "fanuc", "fanuc_measured"])
-def test_published_compliances_are_within_a_factor_of_five_of_the_usual_ones(name, config_folder):
-    robot = robot_from_document(read_document(config_folder / "robots" / f"{name}.yaml"))
+def test_published_compliances_are_within_a_factor_of_five_of_the_usual_ones(
+    name, config_folder
+):
+    robot = robot_from_document(
+        read_document(config_folder / "robots" / f"{name}.yaml")
+    )
     ratio = robot.compliance / usual_compliance(robot.chain, robot.payload_kg)
     assert (np.maximum(ratio, 1 / ratio) < 5).all()

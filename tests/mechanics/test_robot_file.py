@@ -1,4 +1,5 @@
-"""The robot file: what it means, that every fault is refused in one line, and the way back to it."""
+"""The robot file: what it means, that every fault is refused in one line, and the way
+back to it."""
 
 from copy import deepcopy
 
@@ -23,7 +24,10 @@ TRACKED = {
     "lengths_m": {},
     "joint_limits_deg": [[-0.5, 4.0], [-180, 180], [-90, 90]],
     "compliance_urad_per_Nm": [0.02, 1.0, 2.0],
-    "reported_joints": {"matrix": [[-1, 0, 0], [0, 1, 0], [0, 0, 1]], "offset_deg": [2.5, 0, 90]},
+    "reported_joints": {
+        "matrix": [[-1, 0, 0], [0, 1, 0], [0, 0, 1]],
+        "offset_deg": [2.5, 0, 90],
+    },
 }
 WEIGHED = {
     "masses": [
@@ -36,7 +40,11 @@ WEIGHED = {
     "payload_kg": 12,
 }
 REPORTED = {"reported_joints": {"matrix": [[1, 0], [1, -1]], "offset_deg": [90, -45]}}
-TUBES = {"youngs_modulus_GPa": 70, "shear_modulus_GPa": 26, "tubes": [{"outer_diameter_m": 0.2, "wall_m": 0.02}]}
+TUBES = {
+    "youngs_modulus_GPa": 70,
+    "shear_modulus_GPa": 26,
+    "tubes": [{"outer_diameter_m": 0.2, "wall_m": 0.02}],
+}
 
 
 def document(**changes):
@@ -48,7 +56,9 @@ def test_robot_file_comes_in_si_units():
     robot = robot_from_document(document())
     assert robot.joints == 2 and robot.links == ()
     np.testing.assert_allclose(robot.compliance, [1.5e-6, 2.5e-6], rtol=1e-15)
-    np.testing.assert_allclose(robot.joint_limits, [[-np.pi, np.pi], [-np.pi / 2, np.pi / 4]], rtol=1e-15)
+    np.testing.assert_allclose(
+        robot.joint_limits, [[-np.pi, np.pi], [-np.pi / 2, np.pi / 4]], rtol=1e-15
+    )
     np.testing.assert_array_equal(robot.reported_matrix, np.eye(2))
     np.testing.assert_array_equal(robot.reported_offset, np.zeros(2))
     unlimited = robot_from_document(document(joint_limits_deg=None)).joint_limits
@@ -57,8 +67,12 @@ def test_robot_file_comes_in_si_units():
 
 def test_without_compliances_the_usual_ones_are_there_as_not_known_and_never_written():
     robot = robot_from_document(document(compliance_urad_per_Nm=None, payload_kg=20))
-    np.testing.assert_allclose(robot.compliance, usual_compliance(robot.chain, 20.0), rtol=1e-15)
-    assert not robot.compliance_known and robot_from_document(document()).compliance_known
+    np.testing.assert_allclose(
+        robot.compliance, usual_compliance(robot.chain, 20.0), rtol=1e-15
+    )
+    assert (
+        not robot.compliance_known and robot_from_document(document()).compliance_known
+    )
     assert "compliance_urad_per_Nm" not in document_of(robot)
     assert not robot_from_document(document_of(robot)).compliance_known
 
@@ -66,14 +80,46 @@ def test_without_compliances_the_usual_ones_are_there_as_not_known_and_never_wri
 @pytest.mark.parametrize(
     ("changes", "key", "words"),
     [
-        ({"joint_limits_deg": [[-180, 180]]}, "joint_limits_deg", ["1 entry", "each of the 2 joints"]),
-        ({"compliance_urad_per_Nm": [1, 2, 3]}, "compliance_urad_per_Nm", ["3 entries", "each of the 2 joints"]),
-        ({"joint_limits_deg": [[-180, 180], [45, -45]]}, "joint_limits_deg[1]", ["[45, -45]", "[lower, upper]"]),
-        ({"joint_limits_deg": [[5, 5], [-45, 45]]}, "joint_limits_deg[0]", ["[5, 5]", "[lower, upper]"]),
-        ({"joint_names": ["shoulder"]}, "joint_names", ["1 entry", "each of the 2 joints"]),
-        ({"reported_joints": {"matrix": [[1, 0]]}}, "reported_joints", ["2 rows of 2 numbers"]),
-        ({"reported_joints": {"offset_deg": [1, 2, 3]}}, "reported_joints", ["and 2 offsets"]),
-        ({"reported_joints": {"matrix": [[1, 0], [1]]}}, "reported_joints", ["2 rows of 2 numbers"]),
+        (
+            {"joint_limits_deg": [[-180, 180]]},
+            "joint_limits_deg",
+            ["1 entry", "each of the 2 joints"],
+        ),
+        (
+            {"compliance_urad_per_Nm": [1, 2, 3]},
+            "compliance_urad_per_Nm",
+            ["3 entries", "each of the 2 joints"],
+        ),
+        (
+            {"joint_limits_deg": [[-180, 180], [45, -45]]},
+            "joint_limits_deg[1]",
+            ["[45, -45]", "[lower, upper]"],
+        ),
+        (
+            {"joint_limits_deg": [[5, 5], [-45, 45]]},
+            "joint_limits_deg[0]",
+            ["[5, 5]", "[lower, upper]"],
+        ),
+        (
+            {"joint_names": ["shoulder"]},
+            "joint_names",
+            ["1 entry", "each of the 2 joints"],
+        ),
+        (
+            {"reported_joints": {"matrix": [[1, 0]]}},
+            "reported_joints",
+            ["2 rows of 2 numbers"],
+        ),
+        (
+            {"reported_joints": {"offset_deg": [1, 2, 3]}},
+            "reported_joints",
+            ["and 2 offsets"],
+        ),
+        (
+            {"reported_joints": {"matrix": [[1, 0], [1]]}},
+            "reported_joints",
+            ["2 rows of 2 numbers"],
+        ),
         ({"lengths_m": None}, "chain", ["'Tz(l1)'", "metres"]),
         ({"lengths_m": {"l1": 1, "l2": 1, "l3": 1, "l4": 1}}, "lengths_m", ["l4"]),
         (
@@ -81,24 +127,60 @@ def test_without_compliances_the_usual_ones_are_there_as_not_known_and_never_wri
             "lengths_m",
             ["reaches 2250 m", "in metres (not millimetres)", "10 m"],
         ),
-        ({"chain": "Tz(0.5) Rz(q1) Tx(-9) Ry(q2) Tx(0.6) [B]", "lengths_m": None}, "chain", ["reaches 10.1 m", "metres"]),
-        ({"links": TUBES | {"tubes": TUBES["tubes"] * 2}}, "links.tubes", ["2 tubes", "each of the 3"]),
-        ({"links": TUBES | {"tubes": [{"outer_diameter_m": 0.2, "wall_m": 0.101}]}}, "links.tubes", ["0.101", "half"]),
+        (
+            {"chain": "Tz(0.5) Rz(q1) Tx(-9) Ry(q2) Tx(0.6) [B]", "lengths_m": None},
+            "chain",
+            ["reaches 10.1 m", "metres"],
+        ),
+        (
+            {"links": TUBES | {"tubes": TUBES["tubes"] * 2}},
+            "links.tubes",
+            ["2 tubes", "each of the 3"],
+        ),
+        (
+            {"links": TUBES | {"tubes": [{"outer_diameter_m": 0.2, "wall_m": 0.101}]}},
+            "links.tubes",
+            ["0.101", "half"],
+        ),
         # Tubes bend where no link changes its length or turns by itself.
         *(
-            ({"chain": chain, "lengths_m": None, "links": TUBES}, "links", [what, "turn at their joints only"])
+            (
+                {"chain": chain, "lengths_m": None, "links": TUBES},
+                "links",
+                [what, "turn at their joints only"],
+            )
             for chain, what in (
                 ("Rz(q1) Tx(1) Rx(90deg) [A] Ry(q2) Tx(1) [B]", "fixed rotations"),
                 ("Tx(q1) Tz(0.5) Rz(q2) Tx(1) [B]", "prismatic joints"),
             )
         ),
-        (TRACKED | {"joint_limits_deg": None}, "joint_limits_deg", ["T.(q1)", "metres"]),
-        ({"masses": [WEIGHED["masses"][0] | {"link": 3}]}, "masses[0].link", ["3", "to 2"]),
-        ({"masses": WEIGHED["masses"][:1] * 2}, "masses", ["link 2 twice", "each link once"]),
+        (
+            TRACKED | {"joint_limits_deg": None},
+            "joint_limits_deg",
+            ["T.(q1)", "metres"],
+        ),
+        (
+            {"masses": [WEIGHED["masses"][0] | {"link": 3}]},
+            "masses[0].link",
+            ["3", "to 2"],
+        ),
+        (
+            {"masses": WEIGHED["masses"][:1] * 2},
+            "masses",
+            ["link 2 twice", "each link once"],
+        ),
         ({"gravity_m_s2": [0, 0, 0]}, "gravity_m_s2", ["[0, 0, 0]", "base axes"]),
-        ({"gravity_m_s2": [0, 1e-300, 0]}, "gravity_m_s2", ["[0, 1e-300, 0]", "1e-06 m/s² or more"]),
+        (
+            {"gravity_m_s2": [0, 1e-300, 0]},
+            "gravity_m_s2",
+            ["[0, 1e-300, 0]", "1e-06 m/s² or more"],
+        ),
         ({"gear_ratio": [100]}, "gear_ratio", ["1 entry", "2 joints"]),
-        ({"compensator": {"joint": 3, "kind": "gas"}}, "compensator.joint", ["3", "1 to 2"]),
+        (
+            {"compensator": {"joint": 3, "kind": "gas"}},
+            "compensator.joint",
+            ["3", "1 to 2"],
+        ),
     ],
 )
 def test_faulty_robot_file_is_refused_in_one_line(changes, key, words):

@@ -1,4 +1,5 @@
-"""Sites: the chain that holds every deviation against the robot's own chain, finite differences, pinocchio and the eye."""
+"""Sites: the chain that holds every deviation against the robot's own chain, finite
+differences, pinocchio and the eye."""
 
 import numpy as np
 import pytest
@@ -18,46 +19,71 @@ def chain(request, chain_called):
 
 def extended(sites, angles):
     """Coordinates of the sites with nothing but joint angles."""
-    return np.concatenate([angles, np.zeros((*angles.shape[:-1], sites.chain.coordinates - sites.joints))], axis=-1)
+    return np.concatenate(
+        [
+            angles,
+            np.zeros((*angles.shape[:-1], sites.chain.coordinates - sites.joints)),
+        ],
+        axis=-1,
+    )
 
 
 @pytest.mark.parametrize("name", [*NAMES, *ODD_CHAINS])
 def test_sites_at_zero_leave_the_poses_and_jacobians_of_the_robot(name, chain_called):
     chain = chain_called(name)
-    sites, angles = sites_of(robot_on(chain)), random_angles(np.random.default_rng(0), chain, 2, 3)
+    sites = sites_of(robot_on(chain))
+    angles = random_angles(np.random.default_rng(0), chain, 2, 3)
     assert [p.name for p in sites.chain.points] == [p.name for p in chain.points]
     for ours, point in zip(sites.chain.points, chain.points, strict=True):
         expected = poses_and_jacobians(chain, angles, point)
         found = poses_and_jacobians(sites.chain, extended(sites, angles), ours)
         np.testing.assert_allclose(found[0], expected[0], rtol=0, atol=ROUNDING)
         np.testing.assert_allclose(found[1], expected[1], rtol=0, atol=ROUNDING)
-        np.testing.assert_allclose(found[2][..., : sites.joints], expected[2], rtol=0, atol=ROUNDING)
+        np.testing.assert_allclose(
+            found[2][..., : sites.joints], expected[2], rtol=0, atol=ROUNDING
+        )
 
 
 def columns_at(sites, angles, point, coordinates):
-    return poses_and_jacobians(sites.chain, extended(sites, angles), sites.chain.point(point))[2][..., list(coordinates)]
+    return poses_and_jacobians(
+        sites.chain, extended(sites, angles), sites.chain.point(point)
+    )[2][..., list(coordinates)]
 
 
 def test_tilt_about_the_axis_of_a_joint_is_the_joint_itself(chain):
-    sites, angles = sites_of(robot_on(chain)), random_angles(np.random.default_rng(4), chain)
+    sites = sites_of(robot_on(chain))
+    angles = random_angles(np.random.default_rng(4), chain)
     turning = [t for t in chain.transforms if t.coordinate is not None]
     for joint, transform in enumerate(turning):
         assert sites.joint_axes[joint] == transform.axis
         about = sites.tilt[joint][sites.joint_axes[joint]]
         for point in chain.points:
             alone, own = columns_at(sites, angles, point.name, [about, joint]).T
-            np.testing.assert_allclose(transform.sign * alone, own, rtol=0, atol=ROUNDING)
+            np.testing.assert_allclose(
+                transform.sign * alone, own, rtol=0, atol=ROUNDING
+            )
 
 
-@pytest.mark.parametrize(("point", "link"), [("2DoF", 2), ("3DoF", 3), ("4DoF", 4), ("6DoF", 6)])
+@pytest.mark.parametrize(
+    ("point", "link"), [("2DoF", 2), ("3DoF", 3), ("4DoF", 4), ("6DoF", 6)]
+)
 def test_point_at_the_end_of_a_link_moves_with_it(fanuc, point, link):
-    sites, angles = sites_of(fanuc), random_angles(np.random.default_rng(5), fanuc.chain)
+    sites = sites_of(fanuc)
+    angles = random_angles(np.random.default_rng(5), fanuc.chain)
     rotation = poses(fanuc.chain, angles, fanuc.chain.point(point))[1]
-    # At its own origin a site shifts and turns a point along the axes that they share, and nothing else.
+    # At its own origin a site shifts and turns a point along the axes that they share,
+    # and nothing else.
     expected = np.kron(np.eye(2), rotation)
-    np.testing.assert_allclose(columns_at(sites, angles, point, sites.link_end[link]), expected, rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(
+        columns_at(sites, angles, point, sites.link_end[link]),
+        expected,
+        rtol=0,
+        atol=ROUNDING,
+    )
     if link < sites.joints:
-        assert not columns_at(sites, angles, point, [*sites.tilt[link], *sites.link_end[link + 1]]).any()
+        assert not columns_at(
+            sites, angles, point, [*sites.tilt[link], *sites.link_end[link + 1]]
+        ).any()
 
 
 CARRIED = {
@@ -73,13 +99,24 @@ CARRIED = {
 def test_carried_links_are_those_whose_weight_can_turn_the_joint(name, chain_called):
     sites = sites_of(robot_on(chain_called(name)))
     lengths = np.linalg.norm(sites.link_vectors_m, axis=1)
-    expected = [[link for link in links if lengths[link] > 0] for links in CARRIED[name]]
+    expected = [
+        [link for link in links if lengths[link] > 0] for links in CARRIED[name]
+    ]
     assert [sites.carried_links(joint) for joint in range(sites.joints)] == expected
     # The first that carries weight.
-    assert sites.shoulder == next(joint for joint, links in enumerate(expected) if links)
+    assert sites.shoulder == next(
+        joint for joint, links in enumerate(expected) if links
+    )
 
 
 def test_sites_of_a_robot_on_a_track():
     sites = sites_of(robot_of(TRACK))
-    assert sites.prismatic == (True, False, False, False) and sites.joint_signs == (-1.0, 1.0, 1.0, 1.0)
-    np.testing.assert_allclose(sites.link_vectors_m[:3], [(0, 0, 0.3), (0, 0, 0.5), (0.3, 0, 0)], atol=1e-16)
+    assert sites.prismatic == (True, False, False, False) and sites.joint_signs == (
+        -1.0,
+        1.0,
+        1.0,
+        1.0,
+    )
+    np.testing.assert_allclose(
+        sites.link_vectors_m[:3], [(0, 0, 0.3), (0, 0, 0.5), (0.3, 0, 0)], atol=1e-16
+    )

@@ -52,7 +52,8 @@ def schedule(fanuc_arm, small):
 
 @pytest.fixture(scope="session")
 def yardstick(fanuc_specimen, schedule):
-    # As slow as a campaign of usual length, in which a stand that is knocked is so between two of its poses.
+    # As slow as a campaign of usual length, in which a stand that is knocked is so
+    # between two of its poses.
     return Yardstick(fanuc_specimen, replace(schedule, time_s=3.0 * schedule.time_s))
 
 

@@ -1,6 +1,8 @@
-"""What each defect does to a campaign stays what it was: other libraries agreed with these numbers before they were kept.
+"""What each defect does to a campaign stays what it was: other libraries agreed with
+these numbers before they were kept.
 
-Where a law is meant to change, write them anew: `GOLDEN=write python -m pytest tests/plant/test_laws.py`.
+Where a law is meant to change, write them anew: `GOLDEN=write python -m pytest
+tests/plant/test_laws.py`.
 """
 
 import os
@@ -16,30 +18,45 @@ from elastocal_proof.plant.kinds import KINDS, drawn_defect, with_defects
 from elastocal_proof.plant.physical_robot import seen_poses, specimen
 
 GOLDEN = ROBOTS.parents[1] / "tests/golden/plant_defects.csv"
-DESIGN = Design(poses=5, held_out=1, repeats=2, repeated_poses=2, approach_each_load=False)
+DESIGN = Design(
+    poses=5, held_out=1, repeats=2, repeated_poses=2, approach_each_load=False
+)
 KEY = ["arm", "kind", "seed"]
 
 
 def digest(array):
-    """A sum in which each number has a weight of its own, so that no sign and no order is lost."""
+    """A sum in which each number has a weight of its own, so that no sign and no order
+    is lost."""
     return float(array.ravel() @ np.cos(1.0 + np.arange(array.size)))
 
 
 def row_of(name, kind, seed):
     arm = arm_from_file(ROBOTS / f"{name}.yaml")
     schedule = schedule_of(arm, DESIGN, seed)
-    # As slow as a campaign of usual length, in which a stand that is knocked is so between two of its poses.
-    schedule, robot = replace(schedule, time_s=5.0 * schedule.time_s), specimen(arm, seed)
+    # As slow as a campaign of usual length, in which a stand that is knocked is so
+    # between two of its poses.
+    schedule = replace(schedule, time_s=5.0 * schedule.time_s)
+    robot = specimen(arm, seed)
     defect = drawn_defect(kind, arm, seed)
-    good, bad = (seen_poses(one, schedule) for one in (robot, with_defects(robot, [defect])))
+    good, bad = (
+        seen_poses(one, schedule) for one in (robot, with_defects(robot, [defect]))
+    )
     turn = rotation_vector(bad[1] @ np.swapaxes(good[1], -1, -2))
     known = np.array([*defect.on(robot)[1].values()], float)
-    found = {"shift_m": digest(bad[0] - good[0]), "turn_rad": digest(turn), "parameters": digest(known)}
-    return dict(zip(KEY, (name, kind, seed), strict=True)) | {"size": defect.size} | found
+    found = {
+        "shift_m": digest(bad[0] - good[0]),
+        "turn_rad": digest(turn),
+        "parameters": digest(known),
+    }
+    return (
+        dict(zip(KEY, (name, kind, seed), strict=True)) | {"size": defect.size} | found
+    )
 
 
 def test_every_defect_does_what_it_did():
-    arms = {name: arm_from_file(ROBOTS / f"{name}.yaml") for name in ("fanuc", "iiwa14")}
+    arms = {
+        name: arm_from_file(ROBOTS / f"{name}.yaml") for name in ("fanuc", "iiwa14")
+    }
     rows = [
         (name, kind, seed)
         for name, arm in arms.items()

@@ -1,4 +1,5 @@
-"""The compiled arm and its equilibria against the analysis' own model, pinocchio, MuJoCo's inverse dynamics, closed forms."""
+"""The compiled arm and its equilibria against the analysis' own model, pinocchio,
+MuJoCo's inverse dynamics, closed forms."""
 
 from itertools import cycle
 
@@ -29,27 +30,41 @@ def everything(arm):
         base=(1e-8, 1e-8, 5e-9, 5e-8, 5e-8, 1e-8),
         flange=(1e-8, 2e-8, 1e-8, 2e-7, 1e-7, 3e-7),
         bearings={1: (1e-7, 1e-7), arm.joints - 1: (2e-7, 2e-7)},
-        tubes={k: TaperedTube(2e7, 1.5e7, 2e9, 4e8, 0.2) for k in (2, 3) if k < arm.joints},
-        masses=(LinkMass(2, 300.0, (0.1, 0.0, 0.4)), LinkMass(min(3, arm.joints), 200.0, (0.2, 0.0, 0.1), along=0.4)),
+        tubes={
+            k: TaperedTube(2e7, 1.5e7, 2e9, 4e8, 0.2) for k in (2, 3) if k < arm.joints
+        },
+        masses=(
+            LinkMass(2, 300.0, (0.1, 0.0, 0.4)),
+            LinkMass(min(3, arm.joints), 200.0, (0.2, 0.0, 0.1), along=0.4),
+        ),
         payload=LinkMass(arm.joints, 100.0, (0.1, 0.0, 0.1)),
         compensator=((-0.3, 0.0, -0.25), (0.2, 0.0, 0.05), 1.5e5, 0.3),
     )
 
 
 @pytest.mark.parametrize("name_of_chain", sorted(OTHER_CHAINS))
-def test_chains_of_three_to_seven_joints_that_turn_backwards_are_read_and_bend_alike(name_of_chain):
+def test_chains_of_three_to_seven_joints_that_turn_backwards_are_read_and_bend_alike(
+    name_of_chain,
+):
     """J C J^T w of each measuring point; both have compliances 1 to n."""
-    robot, arm = robot_of(OTHER_CHAINS[name_of_chain]), arm_of(OTHER_CHAINS[name_of_chain])
+    robot = robot_of(OTHER_CHAINS[name_of_chain])
+    arm = arm_of(OTHER_CHAINS[name_of_chain])
     angles, wrench = angles_and_wrenches(arm, force=10.0)
     machine, bent = at_rest(arm, angles, wrench)
     _, position, rotation = forces_at(machine, angles)
-    seen = [poses_and_jacobians(robot.chain, angles, point) for point in robot.chain.points]
+    seen = [
+        poses_and_jacobians(robot.chain, angles, point) for point in robot.chain.points
+    ]
     turn = robot.compliance * joint_torques(seen[-1][2], wrench)
     for p, (place, facing, jacobian) in enumerate(seen):
         np.testing.assert_allclose(position[:, p], place, atol=1e-12)
         np.testing.assert_allclose(rotation[:, p], facing, atol=1e-12)
-        found = pose_differences(bent[2][:, p], bent[3][:, p], position[:, p], rotation[:, p])
-        np.testing.assert_allclose(found, np.einsum("sij,sj->si", jacobian, turn), atol=2e-8)
+        found = pose_differences(
+            bent[2][:, p], bent[3][:, p], position[:, p], rotation[:, p]
+        )
+        np.testing.assert_allclose(
+            found, np.einsum("sij,sj->si", jacobian, turn), atol=2e-8
+        )
 
 
 def test_weight_turns_the_joints_as_pinocchio_says(arm):
@@ -59,23 +74,41 @@ def test_weight_turns_the_joints_as_pinocchio_says(arm):
         (2, 90.0, (0.0, 0.1, 0.9)),
         (3, 150.0, (0.3, 0, 0.1)),
     ]
-    masses, load = tuple(LinkMass(*each) for each in places), LinkMass(arm.joints, 120.0, (0.1, -0.05, 0.15))
+    masses = tuple(LinkMass(*each) for each in places)
+    load = LinkMass(arm.joints, 120.0, (0.1, -0.05, 0.15))
     gravity = (3.0, -2.0, -9.0)
     angles, _ = angles_and_wrenches(arm)
-    found = forces_at(machine_of(arm, Structure(masses=masses, payload=load, gravity_m_s2=gravity)), angles)[0]
-    model, parent = pin.Model(), 0
+    found = forces_at(
+        machine_of(arm, Structure(masses=masses, payload=load, gravity_m_s2=gravity)),
+        angles,
+    )[0]
+    model = pin.Model()
+    parent = 0
     for number, axis in enumerate(arm.axes):
         place = pin.SE3(arm.stretches[number].rotation, arm.stretches[number].vector_m)
-        parent = model.addJoint(parent, pin.JointModelRevoluteUnaligned(axis), place, f"q{number}")
+        parent = model.addJoint(
+            parent, pin.JointModelRevoluteUnaligned(axis), place, f"q{number}"
+        )
         stretch = arm.stretches[number + 1]
-        weights = [(m.mass_kg, np.array(m.centre_m)) for m in masses if m.link == number + 1]
+        weights = [
+            (m.mass_kg, np.array(m.centre_m)) for m in masses if m.link == number + 1
+        ]
         if number == arm.joints - 1:
-            weights.append((load.mass_kg, stretch.vector_m + stretch.rotation @ np.array(load.centre_m)))
+            weights.append(
+                (
+                    load.mass_kg,
+                    stretch.vector_m + stretch.rotation @ np.array(load.centre_m),
+                )
+            )
         for kilograms, centre in weights:
-            model.appendBodyToJoint(parent, pin.Inertia(kilograms, centre, np.eye(3)), pin.SE3.Identity())
+            model.appendBodyToJoint(
+                parent, pin.Inertia(kilograms, centre, np.eye(3)), pin.SE3.Identity()
+            )
     model.gravity.linear = np.array(gravity)
     data = model.createData()
-    wanted = -np.array([pin.computeGeneralizedGravity(model, data, row) for row in angles])
+    wanted = -np.array(
+        [pin.computeGeneralizedGravity(model, data, row) for row in angles]
+    )
     np.testing.assert_allclose(found, wanted, atol=1e-9 * np.abs(wanted).max())
 
 
@@ -87,25 +120,45 @@ def test_an_arm_with_everything_is_in_equilibrium_by_mujocos_inverse_dynamics(ar
     compliance = machine.compliance.copy()
     compliance[machine.gear] = arm.compliance
     # What is commanded stays where it is, and so does what no law lets yield.
-    free, flange = np.flatnonzero(compliance > 0), machine.sites[-1]
+    free = np.flatnonzero(compliance > 0)
+    flange = machine.sites[-1]
     for row, push in zip(rest[0][:20], wrench[:20], strict=True):
-        data.qpos[:], data.qvel[:], data.qacc[:] = row, 0.0, 0.0
+        data.qpos[:] = row
+        data.qvel[:] = 0.0
+        data.qacc[:] = 0.0
         mujoco.mj_inverse(model, data)
         force = np.zeros(model.nv)
-        mujoco.mj_applyFT(model, data, push[:3], push[3:], data.site_xpos[flange], model.site_bodyid[flange], force)
+        mujoco.mj_applyFT(
+            model,
+            data,
+            push[:3],
+            push[3:],
+            data.site_xpos[flange],
+            model.site_bodyid[flange],
+            force,
+        )
         left = (data.qfrc_inverse - force)[free] + row[free] / compliance[free]
         assert np.abs(left).max() < 1e-9 * np.abs(force).max()
 
 
 def test_an_arm_that_finds_no_rest_is_an_error():
-    signs, loading = cycle([0.01, -0.01]), (np.zeros((1, 1)), lambda facing: np.zeros((1, 6)), np.zeros((1, 2)))
-    with pytest.raises(RuntimeError, match=r"^no equilibrium after 60 sweeps: the last moved by 0\.02$"):
-        equilibrium(machine_of(LEVER, Structure()), *loading, lambda torque, _: 0 * torque + next(signs))
+    signs = cycle([0.01, -0.01])
+    loading = (np.zeros((1, 1)), lambda facing: np.zeros((1, 6)), np.zeros((1, 2)))
+    with pytest.raises(
+        RuntimeError, match=r"^no equilibrium after 60 sweeps: the last moved by 0\.02$"
+    ):
+        equilibrium(
+            machine_of(LEVER, Structure()),
+            *loading,
+            lambda torque, _: 0 * torque + next(signs),
+        )
 
 
 def test_a_point_inside_a_link_of_wrong_length_keeps_its_place_and_none_may_be_inside_an_elastic_one():
     arm = arm_of("Rz(q1) Tx(0.4) [inner] Tx(0.6) Ry(q2) Tx(0.5) [B]")
     machine = machine_of(arm, Structure(wrong={1: ((0.0, 0.02, 0.0), (0.0, 0.0, 0.1))}))
-    np.testing.assert_allclose(forces_at(machine, np.zeros((1, 2)))[1][0, 0], [0.4, 0.0, 0.0], atol=1e-14)
+    np.testing.assert_allclose(
+        forces_at(machine, np.zeros((1, 2)))[1][0, 0], [0.4, 0.0, 0.0], atol=1e-14
+    )
     with pytest.raises(InputError, match="inner"):
         machine_of(arm, Structure(tubes={1: TaperedTube(1e6, 1e6)}))

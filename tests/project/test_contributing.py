@@ -1,4 +1,5 @@
-"""What CONTRIBUTING.md shows works as it stands there: robot, strategy, effect, importer, language, one entry each."""
+"""What CONTRIBUTING.md shows works as it stands there: robot, strategy, effect,
+importer, language, one entry each."""
 
 import importlib.util
 import re
@@ -47,16 +48,25 @@ def module(tmp_path, monkeypatch):
     return imported
 
 
-def test_the_robot_is_the_file_that_it_is_said_to_be_without_what_its_comment_is_about(config_folder, tmp_path):
+def test_the_robot_is_the_file_that_it_is_said_to_be_without_what_its_comment_is_about(
+    config_folder, tmp_path
+):
     path = tmp_path / "ur10.yaml"
     path.write_text(example("A robot"), encoding="utf-8")
-    shown, whole = read_document(path), read_document(config_folder / "robots" / "ur10.yaml")
-    assert shown == {key: value for key, value in whole.items() if key not in ("compliance_urad_per_Nm", "payload_kg")}
+    shown = read_document(path)
+    whole = read_document(config_folder / "robots" / "ur10.yaml")
+    assert shown == {
+        key: value
+        for key, value in whole.items()
+        if key not in ("compliance_urad_per_Nm", "payload_kg")
+    }
     robot = read_robot(path)
     assert robot.joints == 6 and not robot.compliance_known
 
 
-def test_the_strategy_is_one_that_the_papers_robots_can_carry_out_and_none_of_theirs(tmp_path, robot, strategies):
+def test_the_strategy_is_one_that_the_papers_robots_can_carry_out_and_none_of_theirs(
+    tmp_path, robot, strategies
+):
     path = tmp_path / "mine.yaml"
     path.write_text(example("A strategy"), encoding="utf-8")
     document = read_document(path)
@@ -68,23 +78,39 @@ def test_the_strategy_is_one_that_the_papers_robots_can_carry_out_and_none_of_th
 
 def test_the_effect_is_whole_and_displaces_what_its_formula_says(module, kuka):
     effect = module("An effect").hoses
-    assert isinstance(effect, Effect) and effect.name not in catalogue.effects() and "k q^3" in effect.doc
-    sites, states = sites_of(kuka), made_states(6, 5)
+    assert (
+        isinstance(effect, Effect)
+        and effect.name not in catalogue.effects()
+        and "k q^3" in effect.doc
+    )
+    sites = sites_of(kuka)
+    states = made_states(6, 5)
     found = effect.candidates(sites)
-    assert [candidate.key for candidate in found] == [f"hoses@{joint}" for joint in range(1, 7)]
+    assert [candidate.key for candidate in found] == [
+        f"hoses@{joint}" for joint in range(1, 7)
+    ]
     conditions = conditions_of(sites, kuka.compliance, states)
     (moved,) = displacements(found[2], conditions)
     np.testing.assert_array_equal(moved[:, 2], states.joint_angles[:, 2] ** 3)
     assert not np.delete(moved, 2, axis=1).any()
 
 
-def test_the_importer_makes_a_campaign_and_refuses_a_file_of_another_kind(config_folder, tmp_path):
+def test_the_importer_makes_a_campaign_and_refuses_a_file_of_another_kind(
+    config_folder, tmp_path
+):
     (tmp_path / "public_data.yaml").write_text(example("An importer"), encoding="utf-8")
-    mine, robots = importer("mine", tmp_path, "a test"), config_folder / "robots"
-    angles, positions = np.linspace(-90, 90, 12)[:, None] + np.arange(6), np.arange(36.0).reshape(12, 3)
+    mine = importer("mine", tmp_path, "a test")
+    robots = config_folder / "robots"
+    angles = np.linspace(-90, 90, 12)[:, None] + np.arange(6)
+    positions = np.arange(36.0).reshape(12, 3)
     path = tmp_path / "values.csv"
-    rows = [";".join(map(str, [*row, *place])) for row, place in zip(angles, positions, strict=True)]
-    path.write_text("\n".join(["J1;J2;J3;J4;J5;J6;X;Y;Z", *rows]) + "\n", encoding="utf-8")
+    rows = [
+        ";".join(map(str, [*row, *place]))
+        for row, place in zip(angles, positions, strict=True)
+    ]
+    path.write_text(
+        "\n".join(["J1;J2;J3;J4;J5;J6;X;Y;Z", *rows]) + "\n", encoding="utf-8"
+    )
     mine.write_campaign([path], tmp_path / "mine", robots, "mine")
     measurements = read_campaign(tmp_path / "mine", robots).measurements
     np.testing.assert_allclose(np.degrees(measurements.joint_angles), angles, atol=1e-9)
@@ -98,5 +124,7 @@ def test_the_language_is_whole_and_writes_targets(module):
     language = module("A controller's language").LINES
     assert language.name not in CONTROLLERS
     shifts = (True, *6 * (False,))
-    targets = targets_of(np.array([[0.5, *6 * (np.pi / 6,)]]), shifts, axes_of(language, shifts, ""))
+    targets = targets_of(
+        np.array([[0.5, *6 * (np.pi / 6,)]]), shifts, axes_of(language, shifts, "")
+    )
     assert language.program("GO", targets) == f"GO\n{6 * '30.000000 '}500.000000\n"

@@ -1,4 +1,5 @@
-"""A release: one version, licence and list of requirements in every file, files of the form that hosts ask for, one way out."""
+"""A release: one version, licence and list of requirements in every file, files of the
+form that hosts ask for, one way out."""
 
 import json
 import re
@@ -15,13 +16,22 @@ import elastocal
 
 ROOT = Path(__file__).resolve().parents[2]
 # Names that conda has for packages of the index.
-CONDA = {"snakemake": "snakemake-minimal", "matplotlib": "matplotlib-base", "typst": "typst-py"}
+CONDA = {
+    "snakemake": "snakemake-minimal",
+    "matplotlib": "matplotlib-base",
+    "typst": "typst-py",
+}
 AUTHORS = "the elastocal developers"
 # Schemas that come with check-jsonschema, so that nothing is downloaded.
 CHECKED = {
     "citation-file-format": ["CITATION.cff"],
-    "github-workflows": [f".github/workflows/{name}.yml" for name in ("ci", "nightly", "release")],
-    "github-issue-forms": [f".github/ISSUE_TEMPLATE/{name}.yml" for name in ("fault", "verdict", "proposal")],
+    "github-workflows": [
+        f".github/workflows/{name}.yml" for name in ("ci", "nightly", "release")
+    ],
+    "github-issue-forms": [
+        f".github/ISSUE_TEMPLATE/{name}.yml"
+        for name in ("fault", "verdict", "proposal")
+    ],
     "dependabot": [".github/dependabot.yml"],
     "github-issue-config": [".github/ISSUE_TEMPLATE/config.yml"],
 }
@@ -36,39 +46,73 @@ PROJECT = tomllib.loads(text("pyproject.toml"))["project"]
 
 @pytest.mark.parametrize("schema", CHECKED)
 def test_a_file_is_of_its_schema(schema):
-    words = [sys.executable, "-m", "check_jsonschema", "--builtin-schema", f"vendor.{schema}", *CHECKED[schema]]
+    words = [
+        sys.executable,
+        "-m",
+        "check_jsonschema",
+        "--builtin-schema",
+        f"vendor.{schema}",
+        *CHECKED[schema],
+    ]
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_every_form_is_checked():
-    forms = {path.relative_to(ROOT).as_posix() for path in (ROOT / ".github").rglob("*.yml")}
-    assert forms == {name for names in CHECKED.values() for name in names if name.startswith(".github/")}
+    forms = {
+        path.relative_to(ROOT).as_posix() for path in (ROOT / ".github").rglob("*.yml")
+    }
+    assert forms == {
+        name
+        for names in CHECKED.values()
+        for name in names
+        if name.startswith(".github/")
+    }
 
 
 def test_public_ci_makes_the_targets_of_ours_in_their_order():
     steps = yaml.safe_load(text(".github/workflows/ci.yml"))["jobs"]["check"]["steps"]
-    public, ours = "\n".join(step.get("run", "") for step in steps), text(".ci/run")
-    made = [re.findall(r"^(?:step \w+ )?make ([a-z-]+)", each, re.MULTILINE) for each in (public, ours)]
+    public = "\n".join(step.get("run", "") for step in steps)
+    ours = text(".ci/run")
+    made = [
+        re.findall(r"^(?:step \w+ )?make ([a-z-]+)", each, re.MULTILINE)
+        for each in (public, ours)
+    ]
     assert made == 2 * [["lint", "paper", "test"]]
 
 
 def test_every_file_has_the_version_and_the_licence_of_the_package():
-    citation, codemeta = yaml.safe_load(text("CITATION.cff")), json.loads(text("codemeta.json"))
+    citation = yaml.safe_load(text("CITATION.cff"))
+    codemeta = json.loads(text("codemeta.json"))
     assert citation["version"] == codemeta["version"] == elastocal.__version__
-    assert f"({elastocal.__version__})" in text("CHANGELOG.md") or f"## {elastocal.__version__} " in text("CHANGELOG.md")
+    assert f"({elastocal.__version__})" in text(
+        "CHANGELOG.md"
+    ) or f"## {elastocal.__version__} " in text("CHANGELOG.md")
     assert "version" in PROJECT["dynamic"]
-    assert PROJECT["license"] == citation["license"] == codemeta["license"].rpartition("/")[2] == "MIT"
-    assert text("LICENSE").startswith("MIT License\n") and f" {AUTHORS}\n" in text("LICENSE")
+    assert (
+        PROJECT["license"]
+        == citation["license"]
+        == codemeta["license"].rpartition("/")[2]
+        == "MIT"
+    )
+    assert text("LICENSE").startswith("MIT License\n") and f" {AUTHORS}\n" in text(
+        "LICENSE"
+    )
 
 
 def test_the_recipe_has_the_version_and_the_requirements_of_the_wheel():
     recipe = yaml.safe_load(text("recipe/recipe.yaml"))
     assert recipe["context"]["version"] == elastocal.__version__
-    run = dict(line.split() for line in recipe["requirements"]["run"] if isinstance(line, str) and " " in line)
+    run = dict(
+        line.split()
+        for line in recipe["requirements"]["run"]
+        if isinstance(line, str) and " " in line
+    )
     assert run.pop("python") == PROJECT["requires-python"]
     requirements = map(Requirement, PROJECT["dependencies"])
-    assert run == {CONDA.get(each.name, each.name): str(each.specifier) for each in requirements}
+    assert run == {
+        CONDA.get(each.name, each.name): str(each.specifier) for each in requirements
+    }
     (script,) = recipe["build"]["python"]["entry_points"]
     assert script.split(" = ") == ["elastocal", PROJECT["scripts"]["elastocal"]]
 
@@ -76,24 +120,39 @@ def test_the_recipe_has_the_version_and_the_requirements_of_the_wheel():
 def test_only_a_tag_publishes_and_only_the_job_without_our_code_may():
     release = yaml.safe_load(text(".github/workflows/release.yml"))
     # YAML 1.1 reads the key "on" as true.
-    assert release[True] == {"push": {"tags": ["v[0-9]+.[0-9]+.[0-9]+"]}} and release["permissions"] == {"contents": "read"}
+    assert release[True] == {"push": {"tags": ["v[0-9]+.[0-9]+.[0-9]+"]}} and release[
+        "permissions"
+    ] == {"contents": "read"}
     jobs = release["jobs"]
     assert "permissions" not in jobs["build"] and jobs["publish"]["needs"] == "build"
-    assert any("make installed" in step.get("run", "") for step in jobs["build"]["steps"])
+    assert any(
+        "make installed" in step.get("run", "") for step in jobs["build"]["steps"]
+    )
     ran = [step["run"] for step in jobs["publish"]["steps"] if "run" in step]
-    assert len(ran) == 2 and "--require-hashes" in ran[0] and "--trusted-publishing always" in ran[1]
+    assert (
+        len(ran) == 2
+        and "--require-hashes" in ran[0]
+        and "--trusted-publishing always" in ran[1]
+    )
 
 
 def test_papers_cite_what_their_bibliography_has():
-    """That of the software, and that of the study, whose labels of figures and tables look like references."""
+    """That of the software, and that of the study, whose labels of figures and tables
+    look like references."""
     cited = set(re.findall(r"@([\w:-]+)", text("paper/paper.md").split("---\n", 2)[2]))
     study = text("src/elastocal/report/study.typ")
-    labels = set(re.findall(r"<(\w+)>", study)) | set(re.findall(r'tag: "(\w+)"', study))
+    labels = set(re.findall(r"<(\w+)>", study)) | set(
+        re.findall(r'tag: "(\w+)"', study)
+    )
     cited |= set(re.findall(r"(?<!\w)@(\w+)", study)) - labels
-    assert cited == set(re.findall(r"^@\w+\{([\w:-]+),$", text("paper/paper.bib"), re.MULTILINE))
+    assert cited == set(
+        re.findall(r"^@\w+\{([\w:-]+),$", text("paper/paper.bib"), re.MULTILINE)
+    )
 
 
 def test_every_figure_of_the_paper_is_one_of_a_page():
-    found = re.findall(r"<!-- (README\.md|docs/\w+\.md): (.*?) -->", text("paper/paper.md"))
+    found = re.findall(
+        r"<!-- (README\.md|docs/\w+\.md): (.*?) -->", text("paper/paper.md")
+    )
     assert len(found) >= 4
     assert [(page, words) for page, words in found if words not in text(page)] == []

@@ -1,4 +1,5 @@
-"""The site of `make site`: every page, link and picture is there, and nothing is fetched from elsewhere."""
+"""The site of `make site`: every page, link and picture is there, and nothing is
+fetched from elsewhere."""
 
 import re
 import subprocess
@@ -23,7 +24,10 @@ class Links(HTMLParser):
 
     def __init__(self, path):
         super().__init__()
-        self.links, self.anchors, self.formulas, self.pictures = [], set(), 0, []
+        self.links = []
+        self.anchors = set()
+        self.formulas = 0
+        self.pictures = []
         self.feed(path.read_text(encoding="utf-8"))
 
     def handle_starttag(self, tag, attributes):
@@ -53,19 +57,32 @@ def test_every_link_leads_to_a_file_and_an_anchor_that_are_there(pages):
             parts = urlsplit(link)
             if parts.scheme or link.startswith("//"):
                 continue
-            target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
+            target = (
+                (path.parent / unquote(parts.path)).resolve() if parts.path else path
+            )
             anchor = unquote(parts.fragment)
-            if not target.exists() or (anchor and target in pages and anchor not in pages[target].anchors):
+            if not target.exists() or (
+                anchor and target in pages and anchor not in pages[target].anchors
+            ):
                 lost.append(f"{path.relative_to(SITE)}: {link}")
     assert lost == []
 
 
 def test_nothing_is_fetched_from_elsewhere(pages):
-    """Links that a reader follows may lead away; styles, scripts, fonts and pictures may not."""
-    fetched = re.compile(r'<(?:link|script|img|iframe)[^>]*(?:href|src)="(?:https?:)?//[^"]*"')
-    assert [found for path in pages for found in fetched.findall(path.read_text(encoding="utf-8"))] == []
+    """Links that a reader follows may lead away; styles, scripts, fonts and pictures
+    may not."""
+    fetched = re.compile(
+        r'<(?:link|script|img|iframe)[^>]*(?:href|src)="(?:https?:)?//[^"]*"'
+    )
+    assert [
+        found
+        for path in pages
+        for found in fetched.findall(path.read_text(encoding="utf-8"))
+    ] == []
     styles = [
-        path for path in SITE.rglob("*.css") if re.search(r"url\(\s*[\"']?(?:https?:)?//", path.read_text(encoding="utf-8"))
+        path
+        for path in SITE.rglob("*.css")
+        if re.search(r"url\(\s*[\"']?(?:https?:)?//", path.read_text(encoding="utf-8"))
     ]
     assert styles == []
 
@@ -74,12 +91,15 @@ def test_every_effect_has_a_formula_and_a_picture(pages):
     page = pages[SITE / "reference" / "effects.html"]
     assert {Path(picture).stem for picture in page.pictures} >= set(effects())
     assert page.formulas == len(effects())
-    formulas = yaml.safe_load((ROOT / "docs" / "site" / "effect_formulas.yaml").read_text(encoding="utf-8"))
+    formulas = yaml.safe_load(
+        (ROOT / "docs" / "site" / "effect_formulas.yaml").read_text(encoding="utf-8")
+    )
     assert set(formulas) == set(effects())
 
 
-# Headings without a level, code that no keyboard reaches (critical to axe), landmarks and columns without a name, figures that
-# lead nowhere, control characters, and figures that were to be filled in.
+# Headings without a level, code that no keyboard reaches (critical to axe), landmarks
+# and columns without a name, figures that lead nowhere, control characters, and figures
+# that were to be filled in.
 WRONG = re.compile(
     r'role="heading"(?! aria-level)|<pre>|<aside class="[\w-]+">|<th class="head"><p></p></th>|<p><img '
     r"|[\x00-\x08\x0b-\x1f]|@[A-Z]+@"
@@ -87,8 +107,18 @@ WRONG = re.compile(
 
 
 def test_no_page_has_what_cannot_be_read_or_reached_and_none_is_missing(pages):
-    assert [(path.name, found) for path in pages for found in WRONG.findall(path.read_text(encoding="utf-8"))] == []
-    written = [path.relative_to(ROOT) for path in (ROOT / "docs").rglob("*.md") if path.name != "index.md"]
-    assert [page for page in written if not (SITE / page.with_suffix(".html")).is_file()] == []
+    assert [
+        (path.name, found)
+        for path in pages
+        for found in WRONG.findall(path.read_text(encoding="utf-8"))
+    ] == []
+    written = [
+        path.relative_to(ROOT)
+        for path in (ROOT / "docs").rglob("*.md")
+        if path.name != "index.md"
+    ]
+    assert [
+        page for page in written if not (SITE / page.with_suffix(".html")).is_file()
+    ] == []
     commands = (SITE / "reference" / "commands.html").read_text(encoding="utf-8")
     assert diagnose.__doc__.split("\n")[0] in commands.replace("’", "'")

@@ -1,4 +1,5 @@
-"""The wheel has all that the package and its pipeline need, and its command runs where there is no checkout."""
+"""The wheel has all that the package and its pipeline need, and its command runs where
+there is no checkout."""
 
 import os
 import shutil
@@ -15,24 +16,49 @@ from made_folders import made_folder
 import elastocal
 
 ROOT = Path(__file__).resolve().parents[2]
-SOURCES = ("pyproject.toml", "README.md", "LICENSE", "Snakefile", "config.yaml", "config", "profiles", "src", "workflow")
+SOURCES = (
+    "pyproject.toml",
+    "README.md",
+    "LICENSE",
+    "Snakefile",
+    "config.yaml",
+    "config",
+    "profiles",
+    "src",
+    "workflow",
+)
 SOURCES += ("paper", "CITATION.cff", "data/measured")
 # Of the checkout alone: it checks, rehearses and explains.
-LEFT_OUT = ("workflow/lint.py", "workflow/examples/", "workflow/searches/", "config/README.md")
-OUTSIDE = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"} | {"OMP_NUM_THREADS": "1"}
+LEFT_OUT = (
+    "workflow/lint.py",
+    "workflow/examples/",
+    "workflow/searches/",
+    "config/README.md",
+)
+OUTSIDE = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"} | {
+    "OMP_NUM_THREADS": "1"
+}
 IGNORED = shutil.ignore_patterns("__pycache__", "*.egg-info")
 
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):
-    """Built of a copy of the sources, as the build leaves folders behind; without a network."""
+    """Built of a copy of the sources, as the build leaves folders behind; without a
+    network."""
     place = tmp_path_factory.mktemp("wheel")
     for name in SOURCES:
         source = ROOT / name
-        shutil.copytree(source, place / name, ignore=IGNORED) if source.is_dir() else shutil.copy2(source, place / name)
+        shutil.copytree(
+            source, place / name, ignore=IGNORED
+        ) if source.is_dir() else shutil.copy2(source, place / name)
     pip = [sys.executable, "-m", "pip", "-q", "--disable-pip-version-check"]
     alone = ["--no-deps", "--no-build-isolation", "--no-index"]
-    done = subprocess.run([*pip, "wheel", *alone, ".", "-w", "dist"], cwd=place, capture_output=True, text=True)
+    done = subprocess.run(
+        [*pip, "wheel", *alone, ".", "-w", "dist"],
+        cwd=place,
+        capture_output=True,
+        text=True,
+    )
     assert done.returncode == 0, done.stderr
     (found,) = (place / "dist").iterdir()
     return found
@@ -45,8 +71,20 @@ def installed(wheel, tmp_path_factory):
     venv.create(place, symlinks=True)
     packages = Path(sysconfig.get_path("purelib", "venv", {"base": place}))
     (packages / "libraries.pth").write_text(sysconfig.get_path("purelib"))
-    pip = [sys.executable, "-m", "pip", "--python", str(place), "-q", "--disable-pip-version-check"]
-    done = subprocess.run([*pip, "install", "--no-deps", "--no-index", str(wheel)], capture_output=True, text=True)
+    pip = [
+        sys.executable,
+        "-m",
+        "pip",
+        "--python",
+        str(place),
+        "-q",
+        "--disable-pip-version-check",
+    ]
+    done = subprocess.run(
+        [*pip, "install", "--no-deps", "--no-index", str(wheel)],
+        capture_output=True,
+        text=True,
+    )
     assert done.returncode == 0, done.stderr
     return place
 
@@ -57,39 +95,77 @@ def run(installed, tmp_path):
 
     def called(program, *words):
         command = [str(installed / "bin" / program), *map(str, words)]
-        return subprocess.run(command, cwd=tmp_path, env=OUTSIDE, capture_output=True, text=True)
+        return subprocess.run(
+            command, cwd=tmp_path, env=OUTSIDE, capture_output=True, text=True
+        )
 
     return called
 
 
 def files_of(folder):
     found = (path for path in (ROOT / folder).rglob("*") if path.is_file())
-    return {path.relative_to(ROOT).as_posix() for path in found if not {"__pycache__"} & set(path.parts)}
+    return {
+        path.relative_to(ROOT).as_posix()
+        for path in found
+        if not {"__pycache__"} & set(path.parts)
+    }
 
 
 @pytest.mark.slow
-def test_the_wheel_holds_every_file_of_the_package_and_of_its_pipeline_and_says_whose_it_is(wheel):
-    packages = {name.removeprefix("src/") for name in files_of("src") if ".egg-info/" not in name}
+def test_the_wheel_holds_every_file_of_the_package_and_of_its_pipeline_and_says_whose_it_is(
+    wheel,
+):
+    packages = {
+        name.removeprefix("src/")
+        for name in files_of("src")
+        if ".egg-info/" not in name
+    }
     pipeline = {"Snakefile", "config.yaml", "paper/paper.bib", "CITATION.cff"}
-    pipeline |= {name for folder in ("config", "data/measured", "profiles", "workflow") for name in files_of(folder)}
+    pipeline |= {
+        name
+        for folder in ("config", "data/measured", "profiles", "workflow")
+        for name in files_of(folder)
+    }
     pipeline = {name for name in pipeline if not name.startswith(LEFT_OUT)}
     with zipfile.ZipFile(wheel) as archive:
         names = {name for name in archive.namelist() if not name.endswith("/")}
         (stated,) = (name for name in names if name.endswith(".dist-info/METADATA"))
         metadata = archive.read(stated).decode()
-    held = {name.rpartition(".data/data/share/elastocal/")[2] for name in names if ".dist-info/" not in name}
-    assert held == packages | pipeline and any(name.endswith(".dist-info/licenses/LICENSE") for name in names)
-    for line in (f"Version: {elastocal.__version__}", "Author: the elastocal developers", "License-Expression: MIT"):
+    held = {
+        name.rpartition(".data/data/share/elastocal/")[2]
+        for name in names
+        if ".dist-info/" not in name
+    }
+    assert held == packages | pipeline and any(
+        name.endswith(".dist-info/licenses/LICENSE") for name in names
+    )
+    for line in (
+        f"Version: {elastocal.__version__}",
+        "Author: the elastocal developers",
+        "License-Expression: MIT",
+    ):
         assert f"\n{line}\n" in metadata
 
 
 @pytest.mark.slow
-def test_the_installed_pipeline_reads_a_campaign_in_the_working_directory(installed, run, tmp_path, kuka):
-    """A robot of config/robots; the first step runs, and what the others read is looked for: a diagnosis takes too long."""
+def test_the_installed_pipeline_reads_a_campaign_in_the_working_directory(
+    installed, run, tmp_path, kuka
+):
+    """A robot of config/robots; the first step runs, and what the others read is looked
+    for: a diagnosis takes too long."""
     made_folder(tmp_path / "cell", kuka)
     snakefile = installed / "share" / "elastocal" / "Snakefile"
     for target in (["results/loop/made/campaign.json"], ["diagnose", "-n", "-p"]):
-        words = ["-m", "snakemake", *target, "--snakefile", snakefile, "-j1", "--config", f"campaign={tmp_path / 'cell'}"]
+        words = [
+            "-m",
+            "snakemake",
+            *target,
+            "--snakefile",
+            snakefile,
+            "-j1",
+            "--config",
+            f"campaign={tmp_path / 'cell'}",
+        ]
         done = run("python", *words)
         assert done.returncode == 0, done.stderr[-2000:]
     assert (tmp_path / "results" / "loop" / "made" / "training.parquet").is_file()

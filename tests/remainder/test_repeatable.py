@@ -1,4 +1,5 @@
-"""What is a function of the joints is told from chance, though a fit has taken out of chance what it can follow."""
+"""What is a function of the joints is told from chance, though a fit has taken out of
+chance what it can follow."""
 
 from dataclasses import replace
 
@@ -14,11 +15,17 @@ from elastocal.remainder.repeatable import repeatable_part
 @pytest.fixture(scope="module")
 def smooth(kuka, config_folder, tmp_path_factory):
     changes = {"poses": 90, "declared": ["joint_offset", "link_geometry"]}
-    case, _ = smoothly_wrong_cases(tmp_path_factory.mktemp("repeatable"), kuka, config_folder / "robots", **changes)
-    return case, fit(case.model, case.observations, Noise("declared", NOISE_M, NOISE_M, np.zeros(6)))
+    case, _ = smoothly_wrong_cases(
+        tmp_path_factory.mktemp("repeatable"), kuka, config_folder / "robots", **changes
+    )
+    return case, fit(
+        case.model, case.observations, Noise("declared", NOISE_M, NOISE_M, np.zeros(6))
+    )
 
 
-def test_a_smooth_remainder_remains_with_its_size_and_its_signs_turned_it_does_not(smooth):
+def test_a_smooth_remainder_remains_with_its_size_and_its_signs_turned_it_does_not(
+    smooth,
+):
     case, fitted = smooth
     found = repeatable_part(fitted, case.observations, 1)
     left = np.sqrt((fitted.residual**2).sum(axis=1).mean())
@@ -27,21 +34,32 @@ def test_a_smooth_remainder_remains_with_its_size_and_its_signs_turned_it_does_n
 
 
 def test_chance_is_called_repeatable_no_more_often_than_stated(smooth):
-    """Noise through the same fit: of 30, a test at 5 % passes more than four with a probability of 2 %."""
+    """Noise through the same fit: of 30, a test at 5 % passes more than four with a
+    probability of 2 %."""
     case, fitted = smooth
-    draws, passed = np.random.default_rng(3), []
+    draws = np.random.default_rng(3)
+    passed = []
     sensitivities, white = (
-        np.concatenate(parts) for parts in list(zip(*fitted.sensitivities(case.observations), strict=True))[1:]
+        np.concatenate(parts)
+        for parts in list(zip(*fitted.sensitivities(case.observations), strict=True))[
+            1:
+        ]
     )
     for seed in range(30):
         noise = draws.normal(0.0, NOISE_M, fitted.residual.shape)
         step = fitted.covariance @ np.einsum("mrp,mr->p", white, fitted.whitened(noise))
-        found = repeatable_part(replace(fitted, residual=noise - sensitivities @ step), case.observations, seed)
+        found = repeatable_part(
+            replace(fitted, residual=noise - sensitivities @ step),
+            case.observations,
+            seed,
+        )
         passed.append(found.p_value <= 0.05)
     assert sum(passed) <= 4
 
 
 def test_too_few_configurations_say_nothing(kuka, config_folder, tmp_path):
     case, _ = smoothly_wrong_cases(tmp_path, kuka, config_folder / "robots", poses=12)
-    fitted = fit(case.model, case.observations, Noise("declared", NOISE_M, NOISE_M, np.zeros(6)))
+    fitted = fit(
+        case.model, case.observations, Noise("declared", NOISE_M, NOISE_M, np.zeros(6))
+    )
     assert repeatable_part(fitted, case.observations, 1) is None

@@ -1,4 +1,5 @@
-"""What stands in several artefacts of a campaign is the same in all: PDF, HTML, verdict.json and the terminal."""
+"""What stands in several artefacts of a campaign is the same in all: PDF, HTML,
+verdict.json and the terminal."""
 
 import html
 import json
@@ -29,29 +30,67 @@ def bare(text):
 
 
 @pytest.mark.parametrize("campaign", CAMPAIGNS)
-def test_artefacts_of_every_verdict_agree(campaign, kuka, pictures, tmp_path, monkeypatch):
+def test_artefacts_of_every_verdict_agree(
+    campaign, kuka, pictures, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
-    verdict, folder = CAMPAIGNS[campaign], Path("reports/loop/made")
+    verdict = CAMPAIGNS[campaign]
+    folder = Path("reports/loop/made")
     folder.mkdir(parents=True)
     facts = facts_of(verdict)
     (folder / "verdict.json").write_text(json.dumps(verdict), encoding="utf-8")
     compile_document(folder / "report.pdf", "loop.typ", {"facts": facts}, pictures)
     write_loop_page(folder / "report.html", *loop_page(facts, residual_table(), kuka))
-    page = (folder / "report.html").read_text(encoding="utf-8").partition('<script type="application/json"')[0]
-    texts = {"page": bare(html.unescape(re.sub(r"<style>.*?</style>|<[^>]+>", " ", page, flags=re.DOTALL)))}
+    page = (
+        (folder / "report.html")
+        .read_text(encoding="utf-8")
+        .partition('<script type="application/json"')[0]
+    )
+    texts = {
+        "page": bare(
+            html.unescape(
+                re.sub(r"<style>.*?</style>|<[^>]+>", " ", page, flags=re.DOTALL)
+            )
+        )
+    }
     if shutil.which("pdftotext"):
         shown = ["pdftotext", "-raw", str(folder / "report.pdf"), "-"]
-        texts["report"] = bare(subprocess.run(shown, capture_output=True, text=True, check=True).stdout)
-    faulty, errors = verdict["probabilities"] is None, verdict["heldout"]
-    stages = ["uncalibrated", *(["after"] if errors["delivered"] != errors["after"] else []), "delivered"]
+        texts["report"] = bare(
+            subprocess.run(shown, capture_output=True, text=True, check=True).stdout
+        )
+    faulty = verdict["probabilities"] is None
+    errors = verdict["heldout"]
+    stages = [
+        "uncalibrated",
+        *(["after"] if errors["delivered"] != errors["after"] else []),
+        "delivered",
+    ]
     wanted = [] if faulty else [1e3 * errors[stage]["rms_m"] for stage in stages]
-    for name, text in (texts | {"terminal": bare(" ".join(outcome([f"{folder}/report.pdf"])))}).items():
-        found = re.findall(rf"{' ?→ ?'.join([r'([0-9.]+)'] * len(stages))} mm(?: ?\(noise ([\d.]+)\))?", text)
+    for name, text in (
+        texts | {"terminal": bare(" ".join(outcome([f"{folder}/report.pdf"])))}
+    ).items():
+        found = re.findall(
+            rf"{' ?→ ?'.join([r'([0-9.]+)'] * len(stages))} mm(?: ?\(noise ([\d.]+)\))?",
+            text,
+        )
         *stated, noise = found[0] if found and not faulty else [""]
-        assert [float(value) for value in stated] == pytest.approx(wanted, rel=5e-3, abs=5.1e-4), name
+        assert [float(value) for value in stated] == pytest.approx(
+            wanted, rel=5e-3, abs=5.1e-4
+        ), name
         known = None if faulty else errors["noise_floor_rms_m"]
-        assert float(noise or 0) == pytest.approx(1e3 * (known or 0), rel=5e-3, abs=5.1e-4), name
+        assert float(noise or 0) == pytest.approx(
+            1e3 * (known or 0), rel=5e-3, abs=5.1e-4
+        ), name
     # On page 1 the probability of a cause and its cost follow each other.
-    causes = [plainly(f"{row['words']} {row['cost']}").partition(":")[0] for row in facts["causes"] if row["cost"]]
+    causes = [
+        plainly(f"{row['words']} {row['cost']}").partition(":")[0]
+        for row in facts["causes"]
+        if row["cost"]
+    ]
     assert len(causes) == (0 if faulty else len(verdict["effects"]))
-    assert [(name, cause) for name, text in texts.items() for cause in causes if cause not in text] == []
+    assert [
+        (name, cause)
+        for name, text in texts.items()
+        for cause in causes
+        if cause not in text
+    ] == []

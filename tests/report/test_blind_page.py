@@ -1,27 +1,54 @@
 """The page of targets has each quantity once with its robots and its limit."""
 
 import pandas as pd
-from made_blind_documents import PLAN, effect, frame, oracle, said, silence, truth, verdict
+from made_blind_documents import (
+    PLAN,
+    effect,
+    frame,
+    oracle,
+    said,
+    silence,
+    truth,
+    verdict,
+)
 
 from elastocal_proof.blind.summary import of_each_robot, summarize
 from elastocal_proof.report.blind_page import reached_words, targets_page
 
 
 def test_each_quantity_stands_beside_its_target_with_each_robot_alone_and_the_limit():
-    pairs = [truth(("payload",), ("joint_tilt", 2), group="pair", robot=robot) for robot in ("irb7600", "gen3")]
-    both, best = verdict("several", effect("payload"), effect("joint_tilt", 2)), {"detected": True, "right": True}
+    pairs = [
+        truth(("payload",), ("joint_tilt", 2), group="pair", robot=robot)
+        for robot in ("irb7600", "gen3")
+    ]
+    both = verdict("several", effect("payload"), effect("joint_tilt", 2))
+    best = {"detected": True, "right": True}
     entries = [
         (pairs[0], both, oracle(), best),
         (pairs[1], said("named", "payload"), oracle(), best),
         (pairs[1], both, oracle()),
     ]
     cases = frame(*entries)
-    summary, alone = summarize(PLAN, cases, pd.DataFrame(), 1), of_each_robot(PLAN, cases, 1)
-    page = targets_page(PLAN, summary, {"The heavy one": alone["irb7600"], "A soft one": alone["gen3"]}, "full", 7)
-    assert page.startswith("# ") and "blind_pictures --config blind=full seed=7`" in page
-    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in page.splitlines() if line.startswith("| ")]
+    summary = summarize(PLAN, cases, pd.DataFrame(), 1)
+    alone = of_each_robot(PLAN, cases, 1)
+    page = targets_page(
+        PLAN,
+        summary,
+        {"The heavy one": alone["irb7600"], "A soft one": alone["gen3"]},
+        "full",
+        7,
+    )
+    assert (
+        page.startswith("# ") and "blind_pictures --config blind=full seed=7`" in page
+    )
+    rows = [
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for line in page.splitlines()
+        if line.startswith("| ")
+    ]
     found = {row[0]: dict(zip(rows[0], row, strict=True)) for row in rows[1:]}
-    # Of the quantities with a target those of single effects at 50 and 200 have no case, and so no row.
+    # Of the quantities with a target those of single effects at 50 and 200 have no
+    # case, and so no row.
     assert len(found) == len(rows) - 1 == int((summary.target != "").sum())
     assert found["both of two effects, at 50 each"] == {
         "quantity": "both of two effects, at 50 each",
@@ -35,11 +62,21 @@ def test_each_quantity_stands_beside_its_target_with_each_robot_alone_and_the_li
         "found over limit, same sample": "50.0 % (0.0–100.0 %)",
     }
     alarms = found["false alarms, 3 kN"]
-    assert (alarms["outcome"], alarms["cases"], alarms["limit, on a sample"]) == ("no case", "0 of 0", "")
+    assert (alarms["outcome"], alarms["cases"], alarms["limit, on a sample"]) == (
+        "no case",
+        "0 of 0",
+        "",
+    )
 
 
 def test_how_many_are_reached_says_on_which_robots():
-    fine = summarize(PLAN, frame(*[(truth(), silence(), oracle(1.0))] * 100), pd.DataFrame(), 1)
-    assert reached_words(fine).endswith("with a target reach it on the robots of the proof.")
-    tuned = summarize(PLAN, frame((truth(robot="kuka"), silence(), oracle(1.0))), pd.DataFrame(), 1)
+    fine = summarize(
+        PLAN, frame(*[(truth(), silence(), oracle(1.0))] * 100), pd.DataFrame(), 1
+    )
+    assert reached_words(fine).endswith(
+        "with a target reach it on the robots of the proof."
+    )
+    tuned = summarize(
+        PLAN, frame((truth(robot="kuka"), silence(), oracle(1.0))), pd.DataFrame(), 1
+    )
     assert "which proves nothing" in reached_words(tuned)

@@ -13,19 +13,34 @@ from elastocal.report.typesetting import compile_document
 @pytest.mark.parametrize(
     ("decision", "changed", "words"),
     [
-        ("pass", {"risk_above": 0.01}, ["larger than the tolerance is 1 %; 5 % are accepted"]),
+        (
+            "pass",
+            {"risk_above": 0.01},
+            ["larger than the tolerance is 1 %; 5 % are accepted"],
+        ),
         ("pass", {"risk_above": 0.0001}, ["is below 0.1 %;"]),
-        ("fail", {"risk_above": 0.98}, ["larger than the tolerance is 98 %; to fail wrongly"]),
+        (
+            "fail",
+            {"risk_above": 0.98},
+            ["larger than the tolerance is 98 %; to fail wrongly"],
+        ),
         ("undecided", {"risk_above": 0.4}, ["is 40 %: too much to pass"]),
-        ("undecided", {"risk_above": 0.01, "shortfalls": ["too few"]}, ["too little of the robot's use to pass: too few."]),
+        (
+            "undecided",
+            {"risk_above": 0.01, "shortfalls": ["too few"]},
+            ["too little of the robot's use to pass: too few."],
+        ),
     ],
 )
 def test_decisions_come_with_their_criterion_and_risk(decision, changed, words):
     text = certificate_facts(made_document(decision, **changed))["decision_sentences"]
-    criterion = (
-        "the predicted RMS position error of the corrected robot, 95 % sure to be below 0.160 mm, against the tolerance of"
-    )
-    for word in (*words, f"{criterion} 0.200 mm", "Nobody has measured the corrected robot", "0.120 mm"):
+    criterion = "the predicted RMS position error of the corrected robot, 95 % sure to be below 0.160 mm, against the tolerance of"
+    for word in (
+        *words,
+        f"{criterion} 0.200 mm",
+        "Nobody has measured the corrected robot",
+        "0.120 mm",
+    ):
         assert word in text
     assert ("too much to pass" in text) == (changed["risk_above"] == 0.4)
 
@@ -33,16 +48,25 @@ def test_decisions_come_with_their_criterion_and_risk(decision, changed, words):
 def test_a_correction_that_makes_validation_poses_worse_is_advised_against():
     document = made_document()
     document["validation_rms_m"]["corrected"] = 2e-3
-    assert certificate_facts(document)["now"].startswith("Do not correct the robot by this campaign")
+    assert certificate_facts(document)["now"].startswith(
+        "Do not correct the robot by this campaign"
+    )
 
 
 @pytest.mark.parametrize("decision", ["pass", "fail", "undecided"])
 def test_every_kind_of_certificate_is_typeset(tmp_path, decision):
     facts = certificate_facts(made_document(decision, misplaced=decision == "fail"))
     json.dumps(facts, allow_nan=False)
-    small = certificate_facts(made_document() | {"budget": [{"name": "payload", "rms_m": 5e-8}]})
+    small = certificate_facts(
+        made_document() | {"budget": [{"name": "payload", "rms_m": 5e-8}]}
+    )
     assert small["budget"] == [["weight of an undeclared payload", "below 0.1\u00a0µm"]]
-    assert facts["budget"][-1][1] == "hidden by the tracker's noise" and share_name("link_weight") == "gravity sag"
+    assert (
+        facts["budget"][-1][1] == "hidden by the tracker's noise"
+        and share_name("link_weight") == "gravity sag"
+    )
     path = tmp_path / "certificate.pdf"
-    compile_document(path, "certificate.typ", {"facts": facts}, empty_pictures(tmp_path, ["budget"]))
+    compile_document(
+        path, "certificate.typ", {"facts": facts}, empty_pictures(tmp_path, ["budget"])
+    )
     assert path.read_bytes().startswith(b"%PDF")

@@ -1,4 +1,5 @@
-"""What the report of a campaign states fits together, is said in words that people know, and compiles, whatever the verdict."""
+"""What the report of a campaign states fits together, is said in words that people
+know, and compiles, whatever the verdict."""
 
 import json
 import re
@@ -48,7 +49,10 @@ def test_facts_are_json_and_the_verdict_is_said_in_plain_words(campaign):
     said = json.dumps(facts, allow_nan=False, ensure_ascii=False)
     assert WORDS.get(campaign, "") in plainly(" ".join(facts["sentences"]))
     # No sentence has a hole, a double blank or what a template leaves behind.
-    assert not re.search(r"  | [.,;:] |\{|None|Undefined|\.\.\"", " ".join(facts["sentences"] + facts["now"]))
+    assert not re.search(
+        r"  | [.,;:] |\{|None|Undefined|\.\.\"",
+        " ".join(facts["sentences"] + facts["now"]),
+    )
     assert "{{" not in said and "{%" not in said
 
 
@@ -57,11 +61,26 @@ def test_what_to_do_follows_from_the_verdict_and_from_the_gain():
         return campaign_sentences(verdict, experiment=experiment)["now"]
 
     ends = ((0.15, 0.32), (-0.3, -0.1), (-0.1, 0.3))
-    gained, lost, unsure = (now(verdict_document(NAMED, [effect_entry()], reduction=each))[0] for each in ends)
-    assert gained.startswith("Use the corrected model") and lost.startswith("Do not use") and "not certain" in unsure
-    assert "the 10 poses of the next experiment, which the report lists" in now(CAMPAIGNS["class"], experiment_rows())[1]
-    assert "trust the correction at poses and loads like these only" in now(CAMPAIGNS["class"])[1]
-    assert any("extrapolated" in advice for advice in now(CAMPAIGNS["poses outside the range"]))
+    gained, lost, unsure = (
+        now(verdict_document(NAMED, [effect_entry()], reduction=each))[0]
+        for each in ends
+    )
+    assert (
+        gained.startswith("Use the corrected model")
+        and lost.startswith("Do not use")
+        and "not certain" in unsure
+    )
+    assert (
+        "the 10 poses of the next experiment, which the report lists"
+        in now(CAMPAIGNS["class"], experiment_rows())[1]
+    )
+    assert (
+        "trust the correction at poses and loads like these only"
+        in now(CAMPAIGNS["class"])[1]
+    )
+    assert any(
+        "extrapolated" in advice for advice in now(CAMPAIGNS["poses outside the range"])
+    )
     assert not any("extrapolated" in advice for advice in now(CAMPAIGNS["named"]))
     assert "Use the declared model" in now(CAMPAIGNS["adequate"])[0]
     assert "loose target" in now(CAMPAIGNS["unexplained"])[0]
@@ -79,7 +98,10 @@ def test_what_to_do_follows_from_the_verdict_and_from_the_gain():
         ({"cost_m": 1.5e-5, "probability": 0.7}, "0.015 mm: negligible"),
         ({"cost_m": 4.4e-10, "probability": 0.996}, "below 0.001 mm: real, negligible"),
         ({"cost_m": None}, "in no command"),
-        ({"cost_m": None, "name": "setup_step"}, "an error of the measurement, not of the robot"),
+        (
+            {"cost_m": None, "name": "setup_step"},
+            "an error of the measurement, not of the robot",
+        ),
     ],
 )
 def test_each_cause_states_its_cost_and_small_ones_are_negligible(changed, words):
@@ -87,21 +109,33 @@ def test_each_cause_states_its_cost_and_small_ones_are_negligible(changed, words
 
 
 def test_causes_are_those_found_and_what_else_is_probable_with_the_probabilities_of_the_verdict():
-    sets = [({"lost_motion": ["joint 3"]}, 0.6), ({"joint_tilt": ["joint 2"], "other": [""]}, 0.36), ({}, 0.04)]
-    rows = cause_rows(verdict_document(NAMED, [effect_entry() | {"probability": 0.6}], sets=sets))
+    sets = [
+        ({"lost_motion": ["joint 3"]}, 0.6),
+        ({"joint_tilt": ["joint 2"], "other": [""]}, 0.36),
+        ({}, 0.04),
+    ]
+    rows = cause_rows(
+        verdict_document(NAMED, [effect_entry() | {"probability": 0.6}], sets=sets)
+    )
     assert [(row["name"], plainly(row["words"]), row["cost"]) for row in rows] == [
         ("Lost motion (backlash) of joint 3", "60 %", "0.085 mm"),
         ("Bearing tilt", "36 %", ""),
         ("A related mechanism", "36 %", ""),
         ("Nothing is missing", "4 %", ""),
     ]
-    assert cause_rows(CAMPAIGNS["unexplained"])[0]["name"] == "Something that the catalogue does not have"
+    assert (
+        cause_rows(CAMPAIGNS["unexplained"])[0]["name"]
+        == "Something that the catalogue does not have"
+    )
 
 
 def test_a_fault_of_the_data_is_no_effect():
     facts = facts_of(CAMPAIGNS["fault of the data"])
     assert facts["faulty"] and facts["verdict"] == AT_FAULT
-    assert facts["now"][1] == "Wrong unit: the data fit with newtons for each unit of force written = 1000 N."
+    assert (
+        facts["now"][1]
+        == "Wrong unit: the data fit with newtons for each unit of force written = 1000 N."
+    )
     (fault,) = facts["effects"]
     assert [row[:3] for row in fault["parameters"]] == [
         ["newtons for each unit of force written", "1000", "N"],
@@ -110,35 +144,72 @@ def test_a_fault_of_the_data_is_no_effect():
     assert [plainly(each) for each in fault["evidence"]] == ["500 mm", "100 µm"]
     assert fault["alternatives"] == "a load that is 1000 times larger"
     # What was fitted to data that are wrong says nothing of the model.
-    assert facts["warnings"] == [] and facts["probabilities"] == "" and facts["held_out"] == ""
+    assert (
+        facts["warnings"] == []
+        and facts["probabilities"] == ""
+        and facts["held_out"] == ""
+    )
     assert not facts_of(CAMPAIGNS["named"])["faulty"]
 
 
 def test_parameters_stand_in_readable_units_with_what_determines_them_and_of_whom_they_are():
-    effect, heldout = effect_entry(), CAMPAIGNS["named"]["heldout"]
-    assert effect_facts(effect, heldout)["parameters"] == [["half play", "120.0 ± 3.0", "µrad", "measurements"]]
+    effect = effect_entry()
+    heldout = CAMPAIGNS["named"]["heldout"]
+    assert effect_facts(effect, heldout)["parameters"] == [
+        ["half play", "120.0 ± 3.0", "µrad", "measurements"]
+    ]
     # What the measurements do not identify is counted, and no number of it is printed.
     effect["parameters"][0] |= {"identifiable": False}
     facts = effect_facts(effect, heldout)
     assert (facts["parameters"], facts["held"]) == ([], 1)
-    # What belongs to an effect as a whole, such as its largest sag, stands without a member.
-    effect = effect_entry("link_weight", ("link_weight@2", "link_weight@3"), (2, 3), ("compliance_times_mass",))
-    effect["parameters"].insert(0, effect["parameters"][0] | {"name": "link_weight largest_sag", "unit": "m"})
+    # What belongs to an effect as a whole, such as its largest sag, stands without a
+    # member.
+    effect = effect_entry(
+        "link_weight",
+        ("link_weight@2", "link_weight@3"),
+        (2, 3),
+        ("compliance_times_mass",),
+    )
+    effect["parameters"].insert(
+        0, effect["parameters"][0] | {"name": "link_weight largest_sag", "unit": "m"}
+    )
     names = [row[0] for row in effect_facts(effect, heldout)["parameters"]]
     assert names[0] == "largest sag" and names[1].startswith("joint 2: ")
     many = effect_facts(CAMPAIGNS["hundreds of parameters"]["effects"][0], heldout)
-    assert len(many["parameters"]) == 10 and many["left_out"] == str(len(HARMONICS) * len(WAVES)) and many["with_angle"]
+    assert (
+        len(many["parameters"]) == 10
+        and many["left_out"] == str(len(HARMONICS) * len(WAVES))
+        and many["with_angle"]
+    )
 
 
 def test_before_and_after_have_intervals_and_multiples():
     table = table_rows(step_rows(), 5e-5)
-    assert table["unit"] == "µm" and [row["kind"] for row in table["rows"]] == ["frames", "declared", "effect"]
+    assert table["unit"] == "µm" and [row["kind"] for row in table["rows"]] == [
+        "frames",
+        "declared",
+        "effect",
+    ]
     cells = table["rows"][0]["cells"]
-    assert cells[1:] == [["180", "[144, 216]", "3.60 × floor"], ["270", "–", "5.40 × floor"], ["300", "–", "6.00 × floor"]]
-    assert table_rows(step_rows(largest_m=0.05), None)["rows"][0]["cells"][0] == ["25.000", "[20.000, 30.000]"]
+    assert cells[1:] == [
+        ["180", "[144, 216]", "3.60 × floor"],
+        ["270", "–", "5.40 × floor"],
+        ["300", "–", "6.00 × floor"],
+    ]
+    assert table_rows(step_rows(largest_m=0.05), None)["rows"][0]["cells"][0] == [
+        "25.000",
+        "[20.000, 30.000]",
+    ]
 
 
 def test_of_a_compliance_that_is_not_identifiable_no_number_is_stated_and_of_a_file_that_fits_none_all_are():
-    rows = compliance_rows({"before": [0.5, 0.4], "after": [0.48, 0.4], "std_error": [0.01, 0.0]})
-    assert rows == [["1", "0.500", "0.480 ± 0.010"], ["2", "not identifiable", "not identifiable"]]
-    assert compliance_rows({"before": [0.5], "after": [0.5], "std_error": [0.0]}) == [["1", "0.5", "0.5"]]
+    rows = compliance_rows(
+        {"before": [0.5, 0.4], "after": [0.48, 0.4], "std_error": [0.01, 0.0]}
+    )
+    assert rows == [
+        ["1", "0.500", "0.480 ± 0.010"],
+        ["2", "not identifiable", "not identifiable"],
+    ]
+    assert compliance_rows({"before": [0.5], "after": [0.5], "std_error": [0.0]}) == [
+        ["1", "0.5", "0.5"]
+    ]

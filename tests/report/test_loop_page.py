@@ -1,4 +1,5 @@
-"""The page to look into: it draws what the tables have, asks nothing of the network, and every control works by key."""
+"""The page to look into: it draws what the tables have, asks nothing of the network,
+and every control works by key."""
 
 import json
 import re
@@ -37,7 +38,11 @@ def page_of(kuka, name="named", **changed):
 
 def data_in(path):
     text = path.read_text(encoding="utf-8")
-    return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)[1])
+    return json.loads(
+        re.search(
+            r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL
+        )[1]
+    )
 
 
 @pytest.fixture(scope="module")
@@ -47,23 +52,44 @@ def written(kuka, tmp_path_factory):
     return path
 
 
-def test_measurements_are_in_metres_and_micrometres_with_what_they_may_be_drawn_against(kuka):
+def test_measurements_are_in_metres_and_micrometres_with_what_they_may_be_drawn_against(
+    kuka,
+):
     table = residual_table()
     _, data = page_of(kuka)
-    np.testing.assert_allclose(data["position"], np.column_stack([table[axis] for axis in "xyz"]), atol=1e-6)
-    np.testing.assert_allclose(data["after"], 1e6 * np.column_stack([table[f"after_d{axis}"] for axis in "xyz"]), atol=0.01)
+    np.testing.assert_allclose(
+        data["position"], np.column_stack([table[axis] for axis in "xyz"]), atol=1e-6
+    )
+    np.testing.assert_allclose(
+        data["after"],
+        1e6 * np.column_stack([table[f"after_d{axis}"] for axis in "xyz"]),
+        atol=0.01,
+    )
     assert data["held_out"] == table["held_out"].astype(bool).tolist()
     against = {entry["name"]: entry for entry in data["against"]}
-    np.testing.assert_allclose(against["angle of joint 2"]["values"], np.degrees(table["q2"]), rtol=1e-4)
+    np.testing.assert_allclose(
+        against["angle of joint 2"]["values"], np.degrees(table["q2"]), rtol=1e-4
+    )
     # What does not vary explains nothing.
     assert all(np.ptp(entry["values"]) > 0 for entry in data["against"])
 
 
-def test_the_robot_is_drawn_at_the_angles_of_the_model_whatever_its_controller_reports(kuka):
-    table, verdict = residual_table(), CAMPAIGNS["named"]
-    other = replace(kuka, reported_matrix=np.diag([1.0, -1, -1, 1, 1, 1]), reported_offset=np.full(6, 0.3))
+def test_the_robot_is_drawn_at_the_angles_of_the_model_whatever_its_controller_reports(
+    kuka,
+):
+    table = residual_table()
+    verdict = CAMPAIGNS["named"]
+    other = replace(
+        kuka,
+        reported_matrix=np.diag([1.0, -1, -1, 1, 1, 1]),
+        reported_offset=np.full(6, 0.3),
+    )
     _, data = loop_page(facts_of(verdict), table, other)
-    np.testing.assert_allclose(data["outlines"][0], corners(kuka.chain, angles_of(table, 6)[:1])[:, 0], atol=1e-4)
+    np.testing.assert_allclose(
+        data["outlines"][0],
+        corners(kuka.chain, angles_of(table, 6)[:1])[:, 0],
+        atol=1e-4,
+    )
 
 
 def test_texts_of_other_people_stay_texts(kuka, tmp_path):
@@ -73,27 +99,46 @@ def test_texts_of_other_people_stay_texts(kuka, tmp_path):
     data = data | {"poses": [evil]}
     path = tmp_path / "report.html"
     write_loop_page(path, page | {"robot": evil}, data)
-    assert "alert(1)</script>" not in path.read_text(encoding="utf-8").replace("&lt;/script&gt;", "")
+    assert "alert(1)</script>" not in path.read_text(encoding="utf-8").replace(
+        "&lt;/script&gt;", ""
+    )
     assert data_in(path)["poses"] == [evil]
 
 
 def test_the_page_names_nothing_that_a_browser_would_fetch(written):
-    text = re.sub(r"<script>.*?</script>", "", written.read_text(encoding="utf-8"), flags=re.DOTALL)
+    text = re.sub(
+        r"<script>.*?</script>",
+        "",
+        written.read_text(encoding="utf-8"),
+        flags=re.DOTALL,
+    )
     assert re.findall(r'(?:src|href)="(?!data:)([^"]*)', text) == ["report.pdf"]
     assert "@import" not in text and "url(" not in text
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="Debian's chromium is not installed")
 @pytest.mark.parametrize(("width", "scheme"), [(1280, "light"), (390, "dark")])
-def test_in_a_browser_every_control_works_by_key_and_nothing_leaves_the_page(written, width, scheme):
+def test_in_a_browser_every_control_works_by_key_and_nothing_leaves_the_page(
+    written, width, scheme
+):
     from playwright.sync_api import sync_playwright
 
-    faults, requests = [], []
+    faults = []
+    requests = []
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        page = browser.new_page(viewport={"width": width, "height": 844}, color_scheme=scheme)
+        browser = playwright.chromium.launch(
+            executable_path=CHROMIUM, args=["--no-sandbox"]
+        )
+        page = browser.new_page(
+            viewport={"width": width, "height": 844}, color_scheme=scheme
+        )
         page.set_default_timeout(1000 * HUNG_S)
-        page.on("console", lambda message: faults.append(message.text) if message.type == "error" else None)
+        page.on(
+            "console",
+            lambda message: (
+                faults.append(message.text) if message.type == "error" else None
+            ),
+        )
         page.on("pageerror", lambda error: faults.append(str(error)))
         page.on("request", lambda request: requests.append(request.url))
         page.goto(written.as_uri())
@@ -106,9 +151,16 @@ def test_in_a_browser_every_control_works_by_key_and_nothing_leaves_the_page(wri
         # What is fitted and what validates are not thrown together.
         table = residual_table()
         for part, held_out in (("fitted", False), ("validation", True)):
-            off = 1e6 * np.column_stack([table[f"before_d{axis}"] for axis in "xyz"])[table["held_out"] == held_out]
+            off = (
+                1e6
+                * np.column_stack([table[f"before_d{axis}"] for axis in "xyz"])[
+                    table["held_out"] == held_out
+                ]
+            )
             root = np.sqrt((off**2).sum(axis=1).mean())
-            stated = re.search(rf"before .*?([\d.]+) µm \({part}\)", page.inner_text("#scatter-words"))
+            stated = re.search(
+                rf"before .*?([\d.]+) µm \({part}\)", page.inner_text("#scatter-words")
+            )
             assert float(stated[1]) == pytest.approx(root, rel=6e-3), part
 
         def drawn(plot):
@@ -139,4 +191,6 @@ def test_in_a_browser_every_control_works_by_key_and_nothing_leaves_the_page(wri
         assert page.input_value("#pose") == page.evaluate("String(data.worst)")
         browser.close()
     assert faults == []
-    assert [url for url in requests if not url.startswith(("file:", "data:", "blob:"))] == []
+    assert [
+        url for url in requests if not url.startswith(("file:", "data:", "blob:"))
+    ] == []

@@ -1,4 +1,5 @@
-"""The sheet of a plan has a row for each pose, in degrees, with a box for each measurement."""
+"""The sheet of a plan has a row for each pose, in degrees, with a box for each
+measurement."""
 
 from dataclasses import replace
 
@@ -31,11 +32,15 @@ def test_a_row_has_the_angles_in_degrees_and_as_many_boxes_as_measurements():
     assert boxes * len(survey.targets) == len(rows)
     # Where the reflector has to sit, which no error afterwards shows.
     known = replace(survey, targets=(Target("T", "tool0", (0.1, 0.0, 0.05)),))
-    assert "T on tool0, at (100.00, 0.00, 50.00) mm of it" in plan_facts(known, plan, rows, ["worth"])["targets"][0]
+    assert (
+        "T on tool0, at (100.00, 0.00, 50.00) mm of it"
+        in plan_facts(known, plan, rows, ["worth"])["targets"][0]
+    )
     assert "an offset that is fitted" in facts["targets"][0]
 
 
 def test_the_sheet_is_typeset(tmp_path):
-    facts, pictures = plan_facts(*made(), ["It is worth the effort."]), empty_pictures(tmp_path, ["overview", "poses0"])
+    facts = plan_facts(*made(), ["It is worth the effort."])
+    pictures = empty_pictures(tmp_path, ["overview", "poses0"])
     compile_document(tmp_path / "plan.pdf", "plan.typ", {"facts": facts}, pictures)
     assert (tmp_path / "plan.pdf").read_bytes().startswith(b"%PDF")

@@ -1,4 +1,5 @@
-"""What the report of the study states follows from its tables, with errors and intervals; the report and its page show it."""
+"""What the report of the study states follows from its tables, with errors and
+intervals; the report and its page show it."""
 
 import json
 import re
@@ -15,9 +16,24 @@ from elastocal.study.strategies import Stage, Strategy
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden"
 # By the names that the report has for them.
-FILES = {"joint": "joint_test", "studies": "strategies_over_studies", "break_even": "break_even", "ladder": "ladder"}
-FILES |= {"simulated": "simulated_designs", "budget": "budget", "pairs": "budget_pairs", "needed": "configurations_needed"}
-FILES |= {"scores": "strategy_scores", "score_pairs": "strategy_pairs", "comparison": "comparison", "table2": "table2"}
+FILES = {
+    "joint": "joint_test",
+    "studies": "strategies_over_studies",
+    "break_even": "break_even",
+    "ladder": "ladder",
+}
+FILES |= {
+    "simulated": "simulated_designs",
+    "budget": "budget",
+    "pairs": "budget_pairs",
+    "needed": "configurations_needed",
+}
+FILES |= {
+    "scores": "strategy_scores",
+    "score_pairs": "strategy_pairs",
+    "comparison": "comparison",
+    "table2": "table2",
+}
 FILES |= {"extended": "extended"}
 
 
@@ -28,20 +44,60 @@ def table(name):
 def facts(**changed):
     """Facts of the report of these tables, some of which may be changed."""
     names = {"kuka": "Kuka", "kuka_extended": "Kuka with elastic links"}
-    settings = {"noise_um": 200.0, "length": 20, "configurations": 20, "classical": "6DoF", "best": "3+6DoF comb"}
-    settings |= {"accuracy_um": 120.0, "strategies": [Strategy("6DoF", (Stage(("6DoF",), tuple(range(6))),))]}
-    stated = {"force_N": 1000, "offset_m": 0.5, "edge_m": 1.0, "weight_N": 1000, "path_m": 0.5, "cutting_N": 500}
-    found = study_facts({name: table(name) for name in FILES} | changed, names, ["kuka"], settings | {"stated": stated})
+    settings = {
+        "noise_um": 200.0,
+        "length": 20,
+        "configurations": 20,
+        "classical": "6DoF",
+        "best": "3+6DoF comb",
+    }
+    settings |= {
+        "accuracy_um": 120.0,
+        "strategies": [Strategy("6DoF", (Stage(("6DoF",), tuple(range(6))),))],
+    }
+    stated = {
+        "force_N": 1000,
+        "offset_m": 0.5,
+        "edge_m": 1.0,
+        "weight_N": 1000,
+        "path_m": 0.5,
+        "cutting_N": 500,
+    }
+    found = study_facts(
+        {name: table(name) for name in FILES} | changed,
+        names,
+        ["kuka"],
+        settings | {"stated": stated},
+    )
     return found | {
-        "citation": {"authors": "the developers", "date": "2026-11-25", "version": "0.1.0", "license": "MIT"},
+        "citation": {
+            "authors": "the developers",
+            "date": "2026-11-25",
+            "version": "0.1.0",
+            "license": "MIT",
+        },
         "names": names,
         "full_names": ["Kuka"],
-        "size": {"data_sets": "12", "configurations": "20", "test_configurations": "20", "seed": "1"},
+        "size": {
+            "data_sets": "12",
+            "configurations": "20",
+            "test_configurations": "20",
+            "seed": "1",
+        },
     }
 
 
 EVERY = facts()
-FIGURES = ["figure2", "figure3", "figure4", "figure5a", "figure5c", "scores_against_paper", "ladder", "designs"]
+FIGURES = [
+    "figure2",
+    "figure3",
+    "figure4",
+    "figure5a",
+    "figure5c",
+    "scores_against_paper",
+    "ladder",
+    "designs",
+]
 BIBLIOGRAPHY = Path(__file__).resolve().parents[2] / "paper" / "paper.bib"
 HEAD = {
     "table1": ["robot", "c1"],
@@ -52,17 +108,54 @@ HEAD = {
 }
 # First rows of tables, in words, as they follow from the golden files.
 ROWS = {
-    "outside": ["Table 4: n, dev ≤ 2 µm", "Kuka", "3+6DoF comb", "46", "130 ± 45", "0.011", "0.2"],
+    "outside": [
+        "Table 4: n, dev ≤ 2 µm",
+        "Kuka",
+        "3+6DoF comb",
+        "46",
+        "130 ± 45",
+        "0.011",
+        "0.2",
+    ],
     "one_set": ["Kuka", "mean", "0.929", "1.069", "1.07 ± 0.17", "0.46"],
-    "joint": ["fixed joints", "18", "0", "1", "0 (to 3)", "0.47", "32", "38 (to 54)", "0.71"],
-    "table4": ["Kuka", "6DoF", "3.5 ± 3.5", "3.5 ± 3.5", "46 ± 46†", "46 ± 46†", "16.1 ± 7.6", "161 ± 76†", "-0.2 ± 3.4"],
+    "joint": [
+        "fixed joints",
+        "18",
+        "0",
+        "1",
+        "0 (to 3)",
+        "0.47",
+        "32",
+        "38 (to 54)",
+        "0.71",
+    ],
+    "table4": [
+        "Kuka",
+        "6DoF",
+        "3.5 ± 3.5",
+        "3.5 ± 3.5",
+        "46 ± 46†",
+        "46 ± 46†",
+        "16.1 ± 7.6",
+        "161 ± 76†",
+        "-0.2 ± 3.4",
+    ],
     "over_studies": ["Kuka", "16.1 ± 7.6", "67 ± 10", "4.1", "1.32", "12.9 ± 6.0"],
     "break_even": ["Kuka", "6DoF twice", "5.9", "11.4", "0.08 (0.00 to 15.54)"],
     "budget": ["Kuka", "6DoF", "72 ± 11", "40", "", ""],
     "needed": ["Kuka", "6DoF", "12 (8 to 18)", "12"],
     "ladder": ["50", "10", "651 ± 40", "114 ± 11", "5", "121 ± 14"],
     "smallest": ["Kuka", "4", "52.0 ± 6.9"],
-    "simulated": ["Kuka", "random", "none", "66.0 ± 2.3", "37.7 ± 3.2", "29.8 ± 4.3", "32.3 ± 4.3", "2.04"],
+    "simulated": [
+        "Kuka",
+        "random",
+        "none",
+        "66.0 ± 2.3",
+        "37.7 ± 3.2",
+        "29.8 ± 4.3",
+        "32.3 ± 4.3",
+        "2.04",
+    ],
     "scores": ["Kuka", "6DoF", "72 ± 11 (3)", "144.6 ± 6.5 (3)"],
     "staged": ["6DoF", "the same"],
     "extended": ["6DoF", "2.26 ± 0.26", "364 ± 115", "83.9 ± 3.3"],
@@ -77,25 +170,48 @@ def test_rows_of_tables_have_their_values_with_errors_and_intervals(name):
 
 
 def test_figures_that_differ_are_those_below_the_level_after_correction():
-    assert [EVERY[name] for name in ("cells", "differ", "studies")] == ["18", "0", "16"] and len(EVERY["outside"]) == 1
+    assert [EVERY[name] for name in ("cells", "differ", "studies")] == [
+        "18",
+        "0",
+        "16",
+    ] and len(EVERY["outside"]) == 1
     changed = table("comparison")
-    changed.loc[changed.p_value < 0.05, "p_holm"], changed.loc[changed.table == "2", "p_value"] = 0.01, np.nan
+    changed.loc[changed.p_value < 0.05, "p_holm"] = 0.01
+    changed.loc[changed.table == "2", "p_value"] = np.nan
     found = facts(comparison=changed)
     assert (found["differ"], found["one_set"][0][-1]) == ("1", "fitted")
 
 
 def test_the_page_has_the_rows_of_each_table():
     def tables_of(stated):
-        _, *parts = re.split(r"^## (.*)$", template("study_tables.md").render(stated), flags=re.MULTILINE)
+        _, *parts = re.split(
+            r"^## (.*)$", template("study_tables.md").render(stated), flags=re.MULTILINE
+        )
         rows = {
-            title: re.findall(r"^\| (.*) \|$", text, re.MULTILINE) for title, text in zip(parts[::2], parts[1::2], strict=True)
+            title: re.findall(r"^\| (.*) \|$", text, re.MULTILINE)
+            for title, text in zip(parts[::2], parts[1::2], strict=True)
         }
-        return {title: [line.split(" | ") for line in lines] for title, lines in rows.items()}
+        return {
+            title: [line.split(" | ") for line in lines]
+            for title, lines in rows.items()
+        }
 
     found = tables_of(EVERY)
     assert [len(rows) - 1 for rows in found.values()] == [
         len(EVERY[name])
-        for name in (*("joint", "table4", "break_even", "simulated", "needed", "smallest", "budget", "staged", "ladder"),)
+        for name in (
+            *(
+                "joint",
+                "table4",
+                "break_even",
+                "simulated",
+                "needed",
+                "smallest",
+                "budget",
+                "staged",
+                "ladder",
+            ),
+        )
     ]
     assert found["Random configurations for an accuracy"][1] == EVERY["needed"][0]
     assert all(len(row) == len(rows[0]) for rows in found.values() for row in rows)
@@ -108,7 +224,12 @@ def pictures(tmp_path_factory):
 
 def write_report(path, stated, pictures):
     shown = {name: [head, ["1.0 ± 0.1"] * len(head)] for name, head in HEAD.items()}
-    compile_document(path, "study.typ", {"facts": json.loads(json.dumps(stated, allow_nan=False)), "tables": shown}, pictures)
+    compile_document(
+        path,
+        "study.typ",
+        {"facts": json.loads(json.dumps(stated, allow_nan=False)), "tables": shown},
+        pictures,
+    )
 
 
 def test_the_report_is_a_pdf_that_the_same_facts_give_again(pictures, tmp_path):

@@ -1,4 +1,5 @@
-"""A document compiles with the data and pictures that it reads, and its PDF appears whole or not at all."""
+"""A document compiles with the data and pictures that it reads, and its PDF appears
+whole or not at all."""
 
 from importlib import resources
 
@@ -23,7 +24,8 @@ DATA = {"facts": {"name": "Übermaß µ", "rows": [[1, 2.5], [None, True]]}, "ot
 @pytest.fixture
 def written(tmp_path, monkeypatch):
     """Folder of the results; documents stand in a folder beside it."""
-    documents, results = tmp_path / "documents", tmp_path / "results"
+    documents = tmp_path / "documents"
+    results = tmp_path / "results"
     documents.mkdir()
     results.mkdir()
     monkeypatch.setattr(resources, "files", {"elastocal.report": documents}.__getitem__)
@@ -33,7 +35,9 @@ def written(tmp_path, monkeypatch):
 
 
 def test_a_document_reads_its_data_and_pictures_as_they_were_given(written, tmp_path):
-    compile_document(written / "made.pdf", "made.typ", DATA, empty_pictures(tmp_path, ["picture"]))
+    compile_document(
+        written / "made.pdf", "made.typ", DATA, empty_pictures(tmp_path, ["picture"])
+    )
     assert (written / "made.pdf").read_bytes().startswith(b"%PDF")
     assert [file.name for file in written.iterdir()] == ["made.pdf"]
 
@@ -48,7 +52,9 @@ def test_a_document_reads_its_data_and_pictures_as_they_were_given(written, tmp_
         ("unknown.typ", {}, [], FileNotFoundError, "unknown.typ"),
     ],
 )
-def test_what_cannot_be_compiled_leaves_the_earlier_pdf_as_it_was(written, document, data, pictures, error, message):
+def test_what_cannot_be_compiled_leaves_the_earlier_pdf_as_it_was(
+    written, document, data, pictures, error, message
+):
     (written / "report.pdf").write_text("earlier", encoding="utf-8")
     with pytest.raises(error, match=message):
         compile_document(written / "report.pdf", document, data, pictures)
@@ -56,13 +62,18 @@ def test_what_cannot_be_compiled_leaves_the_earlier_pdf_as_it_was(written, docum
     assert (written / "report.pdf").read_text(encoding="utf-8") == "earlier"
 
 
-def test_a_template_has_paragraphs_and_rows_and_keeps_what_may_not_break(tmp_path, monkeypatch):
+def test_a_template_has_paragraphs_and_rows_and_keeps_what_may_not_break(
+    tmp_path, monkeypatch
+):
     made = "# one\n{% for n in (1, 2) %}\nA {{ n | probability_words }}\n  line.\n\n{% endfor %}\n"
     made += "## rows\na ¦ {{ b }} ¦\n{# no #}\n\nc ¦ d ¦ e\n"
     (tmp_path / "made.txt").write_text(made, encoding="utf-8")
     monkeypatch.setattr(resources, "files", {"elastocal.report": tmp_path}.__getitem__)
     said = sentences("made.txt", FILTERS, b="x")
-    assert said == {"one": ["A >\u00a099\u00a0% line."] * 2, "rows": [["a", "x", ""], ["c", "d", "e"]]}
+    assert said == {
+        "one": ["A >\u00a099\u00a0% line."] * 2,
+        "rows": [["a", "x", ""], ["c", "d", "e"]],
+    }
     # What a template shows and nobody gave is an error and no hole.
     with pytest.raises(UndefinedError, match="b"):
         sentences("made.txt", FILTERS)

@@ -1,4 +1,5 @@
-"""Effects, locations, hypotheses, numbers and units stand as a robot engineer writes them."""
+"""Effects, locations, hypotheses, numbers and units stand as a robot engineer writes
+them."""
 
 import pytest
 
@@ -22,7 +23,11 @@ from elastocal.report.words import (
 def test_every_effect_of_the_catalogue_brings_its_own_physical_name_and_a_kind():
     named = {name: effect.words for name, effect in effects().items()}
     assert all(named.values()) and len(set(named.values())) == len(named)
-    assert not [words for words in named.values() if "_" in words or words != words.strip() or words[0].isupper()]
+    assert not [
+        words
+        for words in named.values()
+        if "_" in words or words != words.strip() or words[0].isupper()
+    ]
     assert all(in_common(name, []) for name in effects())
 
 
@@ -31,17 +36,37 @@ def test_every_effect_of_the_catalogue_brings_its_own_physical_name_and_a_kind()
     [
         ("link_weight", ["joint 2"], "gravity sag of joint 2"),
         ("joint_offset", ["joint 3", "joint 2"], "zero offset of joints 2 and 3"),
-        ("link_elasticity", ["links 1 and 2 and 6 one section"], "of links 1, 2 and 6 (all of one cross-section)"),
+        (
+            "link_elasticity",
+            ["links 1 and 2 and 6 one section"],
+            "of links 1, 2 and 6 (all of one cross-section)",
+        ),
         ("link_elasticity", ["column", "link 2"], "of the column and of link 2"),
-        ("cross_compliance", ["joints 2 and 3", "joints 4 and 5"], "elastic coupling of joints 2 and 3 and of joints 4 and 5"),
-        ("transmission_harmonic", ["joint 4 orders 1-2", "joint 4 orders 3-6"], "of joint 4 (orders 1-2, orders 3-6)"),
+        (
+            "cross_compliance",
+            ["joints 2 and 3", "joints 4 and 5"],
+            "elastic coupling of joints 2 and 3 and of joints 4 and 5",
+        ),
+        (
+            "transmission_harmonic",
+            ["joint 4 orders 1-2", "joint 4 orders 3-6"],
+            "of joint 4 (orders 1-2, orders 3-6)",
+        ),
         (
             "transmission_harmonic",
             ["joint 4 orders 1-2", "joint 2 orders 3-6"],
             "(orders 1-2) and of joint 2 (orders 3-6)",
         ),
-        ("transmission_harmonic", [f"joint {k} orders 1-2" for k in (4, 2, 10)], "error of joints 2, 4 and 10"),
-        ("link_weight", ["off the line", "joint 5"], "of the whole arm (centres of mass off the links' axes) and of joint 5"),
+        (
+            "transmission_harmonic",
+            [f"joint {k} orders 1-2" for k in (4, 2, 10)],
+            "error of joints 2, 4 and 10",
+        ),
+        (
+            "link_weight",
+            ["off the line", "joint 5"],
+            "of the whole arm (centres of mass off the links' axes) and of joint 5",
+        ),
         ("payload", [""], "weight of an undeclared payload"),
     ],
 )
@@ -55,8 +80,20 @@ def test_a_place_stands_without_the_effect_that_acts_there():
 
 
 def test_hypotheses_that_hold_the_first_are_stated_by_what_they_add_and_other_is_unknown_or_related():
-    sets = [["link_weight"], ["link_weight", "other"], ["joint_offset", "link_weight"], ["joint_offset"], [], ["other"]]
-    assert hypotheses_words([{"mechanisms": names, "locations": {"link_weight": ["joint 2"]}} for names in sets]) == [
+    sets = [
+        ["link_weight"],
+        ["link_weight", "other"],
+        ["joint_offset", "link_weight"],
+        ["joint_offset"],
+        [],
+        ["other"],
+    ]
+    assert hypotheses_words(
+        [
+            {"mechanisms": names, "locations": {"link_weight": ["joint 2"]}}
+            for names in sets
+        ]
+    ) == [
         "gravity sag of joint 2",
         "the same or a related mechanism",
         "the same with zero offset",
@@ -65,8 +102,15 @@ def test_hypotheses_that_hold_the_first_are_stated_by_what_they_add_and_other_is
         UNKNOWN,
     ]
     # Beside "nothing" all are stated in full.
-    assert hypotheses_words([{"mechanisms": names, "locations": {}} for names in ([], ["joint_offset"])])[1] == "zero offset"
-    assert (alternative_words("other"), alternative_words("payload"))[0] == "a related mechanism"
+    assert (
+        hypotheses_words(
+            [{"mechanisms": names, "locations": {}} for names in ([], ["joint_offset"])]
+        )[1]
+        == "zero offset"
+    )
+    assert (alternative_words("other"), alternative_words("payload"))[
+        0
+    ] == "a related mechanism"
 
 
 @pytest.mark.parametrize(
@@ -88,10 +132,26 @@ def test_values_come_in_units_that_suit_them(value, error, unit, expected):
 
 
 def test_no_probability_is_zero_or_one_and_lengths_and_lists_are_those_of_sentences():
-    said = [probability_words(value).replace("\u00a0", " ") for value in (0.0, 0.004, 0.02, 0.944, 0.996, 1.0)]
+    said = [
+        probability_words(value).replace("\u00a0", " ")
+        for value in (0.0, 0.004, 0.02, 0.944, 0.996, 1.0)
+    ]
     assert said == ["< 1 %", "< 1 %", "2 %", "94 %", "> 99 %", "> 99 %"]
-    stated = [length(value).replace("\u00a0", " ") for value in (1.2345e-4, 0.9999e-3, 0.0213, None)]
+    stated = [
+        length(value).replace("\u00a0", " ")
+        for value in (1.2345e-4, 0.9999e-3, 0.0213, None)
+    ]
     assert stated == ["123 µm", "1.00 mm", "21.3 mm", "unknown"]
-    assert [millimetres(value) for value in (1.5e-5, 0.9999e-3, 1.184e-3, 0.0213)] == ["0.015", "1.00", "1.18", "21.3"]
+    assert [millimetres(value) for value in (1.5e-5, 0.9999e-3, 1.184e-3, 0.0213)] == [
+        "0.015",
+        "1.00",
+        "1.18",
+        "21.3",
+    ]
     assert plain(0.000123) == "0.000123" and plain(1234.5) == "1234"
-    assert [listed("abc"), listed("a"), listed(""), listed("abcde", 2)] == ["a, b and c", "a", "none", "a, b and 3 more"]
+    assert [listed("abc"), listed("a"), listed(""), listed("abcde", 2)] == [
+        "a, b and c",
+        "a",
+        "none",
+        "a, b and 3 more",
+    ]

@@ -1,11 +1,18 @@
-"""Equation 11 for every prefix, against a plain loop of numpy.linalg.lstsq and against explicit matrices."""
+"""Equation 11 for every prefix, against a plain loop of numpy.linalg.lstsq and against
+explicit matrices."""
 
 from functools import cache
 from itertools import product
 
 import numpy as np
 import pytest
-from made_study_blocks import AT, deflections_of, experiments_of, identified, pinocchio_regressors
+from made_study_blocks import (
+    AT,
+    deflections_of,
+    experiments_of,
+    identified,
+    pinocchio_regressors,
+)
 from support import OTHER_CHAINS, random_loads, robot_of, without_tool
 
 from elastocal.mechanics.elastostatics import joint_torques, regressor
@@ -22,7 +29,8 @@ from elastocal.study.equation_11 import (
 from elastocal.study.simulation import to_experiments, true_deflections
 from elastocal.study.strategies import Stage, Strategy
 
-SETS, CONFIGURATIONS = 3, 5
+SETS = 3
+CONFIGURATIONS = 5
 NAMES = [
     "6DoF",
     "6DoF-after-3DoF",
@@ -33,8 +41,11 @@ NAMES = [
     "3-6DoF-after-2DoF",
     "5-6DoF-after-4DoF",
 ]
-# Not the paper's, but allowed: a later stage that holds nothing need not make the earlier ones superfluous.
-REFINED = Strategy("3DoF after 6DoF", (Stage(("6DoF",), tuple(range(6))), Stage(("3DoF",), (0, 1, 2))))
+# Not the paper's, but allowed: a later stage that holds nothing need not make the
+# earlier ones superfluous.
+REFINED = Strategy(
+    "3DoF after 6DoF", (Stage(("6DoF",), tuple(range(6))), Stage(("3DoF",), (0, 1, 2)))
+)
 RESUMED = Strategy(
     "2DoF again after 3DoF",
     (
@@ -44,34 +55,54 @@ RESUMED = Strategy(
         Stage(("6DoF",), (3, 4, 5), (0, 1, 2)),
     ),
 )
-SHUFFLED = Strategy("6DoF, joints in any order", (Stage(("6DoF",), (4, 0, 5, 2, 1, 3)),))
+SHUFFLED = Strategy(
+    "6DoF, joints in any order", (Stage(("6DoF",), (4, 0, 5, 2, 1, 3)),)
+)
 SEVEN = Strategy("seven", (Stage(("A",), (0, 1)), Stage(("A",), (0, 1, 2, 3, 4, 5, 6))))
 BY_POSITIONS = ("6DoF", "3+6DoF-comb", "4-6DoF-after-3DoF", "4-6DoF-after-6+3DoF")
 UNUSUAL = {"refined": REFINED, "resumed": RESUMED, "shuffled": SHUFFLED}
 
 
 class Data:
-    """Regressors (sets, configurations, rows, n) and measured deflections (sets, configurations, rows) of each point."""
+    """Regressors (sets, configurations, rows, n) and measured deflections (sets,
+    configurations, rows) of each point."""
 
     def __init__(self, robot, rows):
         rng = np.random.default_rng(0)
         loads = random_loads(robot, SETS, CONFIGURATIONS)
-        torques = joint_torques(robot.chain, loads.joint_angles, loads.wrench, without_tool(robot.chain.end_effector))
-        self.matrix, self.measured = {}, {}
+        torques = joint_torques(
+            robot.chain,
+            loads.joint_angles,
+            loads.wrench,
+            without_tool(robot.chain.end_effector),
+        )
+        self.matrix = {}
+        self.measured = {}
         for point in robot.chain.points:
             jacobian = poses_and_jacobians(robot.chain, loads.joint_angles, point)[2]
             self.matrix[point.name] = regressor(jacobian, torques)[..., :rows, :]
-            deflection = true_deflections(robot, loads, point, "end_effector")[..., :rows]
-            self.measured[point.name] = deflection + 2e-4 * rng.standard_normal(deflection.shape)
+            deflection = true_deflections(robot, loads, point, "end_effector")[
+                ..., :rows
+            ]
+            self.measured[point.name] = deflection + 2e-4 * rng.standard_normal(
+                deflection.shape
+            )
 
     def measurements(self):
-        return {name: Measurements(self.matrix[name].transpose(2, 3, 1, 0), self.measured[name].T) for name in self.matrix}
+        return {
+            name: Measurements(
+                self.matrix[name].transpose(2, 3, 1, 0), self.measured[name].T
+            )
+            for name in self.matrix
+        }
 
 
 @cache
 def data_of(robot_key, rows, load):
     robot = load(robot_key)
-    return Data(with_target_offset(robot, (0.1, 0.05, 0.2)) if rows == 3 else robot, rows)
+    return Data(
+        with_target_offset(robot, (0.1, 0.05, 0.2)) if rows == 3 else robot, rows
+    )
 
 
 @pytest.fixture
@@ -80,14 +111,20 @@ def robots(kuka, fanuc):
 
 
 def plain(strategy, matrix, measured, joints=6):
-    """One data set, one prefix: the stages one after the other by numpy.linalg.lstsq; (configurations, rows, ...) per point."""
+    """One data set, one prefix: the stages one after the other by numpy.linalg.lstsq;
+    (configurations, rows, ...) per point."""
     compliance = np.full(joints, np.nan)
     for stage in strategy.stages:
-        rows = np.concatenate([matrix[name].reshape(-1, joints) for name in stage.points])
+        rows = np.concatenate(
+            [matrix[name].reshape(-1, joints) for name in stage.points]
+        )
         right = np.concatenate([measured[name].ravel() for name in stage.points])
-        fixed, identified = list(stage.fixed), list(stage.identified)
+        fixed = list(stage.fixed)
+        identified = list(stage.identified)
         right = right - rows[:, fixed] @ compliance[fixed]
-        compliance[identified] = np.linalg.lstsq(rows[:, identified], right, rcond=None)[0]
+        compliance[identified] = np.linalg.lstsq(
+            rows[:, identified], right, rcond=None
+        )[0]
     return compliance
 
 
@@ -97,30 +134,64 @@ def strategy_called(strategies):
 
 
 @pytest.mark.parametrize("key", ["kuka", "fanuc"])
-@pytest.mark.parametrize(("name", "rows"), [*((name, 6) for name in (*NAMES, *UNUSUAL)), *((name, 3) for name in BY_POSITIONS)])
-def test_estimates_of_every_prefix_are_those_of_a_plain_loop(robots, strategy_called, name, rows, key):
-    strategy, data = strategy_called(name), data_of(key, rows, robots)
+@pytest.mark.parametrize(
+    ("name", "rows"),
+    [
+        *((name, 6) for name in (*NAMES, *UNUSUAL)),
+        *((name, 3) for name in BY_POSITIONS),
+    ],
+)
+def test_estimates_of_every_prefix_are_those_of_a_plain_loop(
+    robots, strategy_called, name, rows, key
+):
+    strategy = strategy_called(name)
+    data = data_of(key, rows, robots)
     found = estimate_compliance(strategy, data.measurements(), 6)[0]
-    # One position says two things about three joints that meet in a wrist, so one configuration is not enough.
+    # One position says two things about three joints that meet in a wrist, so one
+    # configuration is not enough.
     for k, s in product(range(1 if rows == 6 else 2, CONFIGURATIONS + 1), range(SETS)):
         expected = plain(
-            strategy, *({name: part[s, :k] for name, part in all_.items()} for all_ in (data.matrix, data.measured))
+            strategy,
+            *(
+                {name: part[s, :k] for name, part in all_.items()}
+                for all_ in (data.matrix, data.measured)
+            ),
         )
         tolerance = {6: 1e-9, 3: 1e-8}[rows]
-        np.testing.assert_allclose(found[k - 1, :, s], expected, rtol=0, atol=tolerance * np.abs(expected).max())
+        np.testing.assert_allclose(
+            found[k - 1, :, s],
+            expected,
+            rtol=0,
+            atol=tolerance * np.abs(expected).max(),
+        )
 
 
 @pytest.mark.parametrize(
-    ("name", "poses", "positions"), [("6DoF", 1, 2), ("3+6DoF-comb", 1, 1), ("5-6DoF-after-4DoF", 1, 2), ("seven", 2, 3)]
+    ("name", "poses", "positions"),
+    [
+        ("6DoF", 1, 2),
+        ("3+6DoF-comb", 1, 1),
+        ("5-6DoF-after-4DoF", 1, 2),
+        ("seven", 2, 3),
+    ],
 )
-def test_first_solvable_length_counts_measurements_against_unknowns_of_a_stage(strategy_called, name, poses, positions):
+def test_first_solvable_length_counts_measurements_against_unknowns_of_a_stage(
+    strategy_called, name, poses, positions
+):
     strategy = strategy_called(name)
-    assert (first_solvable_length(strategy, 6), first_solvable_length(strategy, 3)) == (poses, positions)
+    assert (first_solvable_length(strategy, 6), first_solvable_length(strategy, 3)) == (
+        poses,
+        positions,
+    )
 
 
-def test_a_prefix_that_has_measurements_enough_but_not_the_right_ones_is_undetermined(robots, strategies):
-    # One position of the end-effector cannot tell three joints that meet in a wrist apart.
-    strategy, measurements = strategies["4-6DoF-after-3DoF"], data_of("kuka", 3, robots).measurements()
+def test_a_prefix_that_has_measurements_enough_but_not_the_right_ones_is_undetermined(
+    robots, strategies
+):
+    # One position of the end-effector cannot tell three joints that meet in a wrist
+    # apart.
+    strategy = strategies["4-6DoF-after-3DoF"]
+    measurements = data_of("kuka", 3, robots).measurements()
     compliance, triangles = estimate_compliance(strategy, measurements, 6)
     unknown = undetermined(strategy, 3, triangles)
     assert unknown[0].all() and not unknown[1:].any()
@@ -130,26 +201,43 @@ def test_a_prefix_that_has_measurements_enough_but_not_the_right_ones_is_undeter
 
 def test_undetermined_are_the_prefixes_beyond_the_largest_condition():
     rng = np.random.default_rng(5)
-    strategy, sets = Strategy("A", (Stage(("A",), (0, 1, 2)),)), 200
-    # The third column is the first but for parts from 1e-4 to 1e-9, on either side of the largest condition.
+    strategy = Strategy("A", (Stage(("A",), (0, 1, 2)),))
+    sets = 200
+    # The third column is the first but for parts from 1e-4 to 1e-9, on either side of
+    # the largest condition.
     matrix = rng.standard_normal((6, 3, 2, sets))
     matrix[:, 2] = matrix[:, 0] + np.logspace(-9, -4, sets) * matrix[:, 2]
-    triangles = estimate_compliance(strategy, {"A": Measurements(matrix, np.zeros((6, 2, sets)))}, 3)[1]
+    triangles = estimate_compliance(
+        strategy, {"A": Measurements(matrix, np.zeros((6, 2, sets)))}, 3
+    )[1]
     found = undetermined(strategy, 6, triangles)
     for length in (1, 2):
-        conditions = np.array([np.linalg.cond(np.moveaxis(matrix[:, :, :length, s], 2, 0).reshape(-1, 3)) for s in range(sets)])
+        conditions = np.array(
+            [
+                np.linalg.cond(
+                    np.moveaxis(matrix[:, :, :length, s], 2, 0).reshape(-1, 3)
+                )
+                for s in range(sets)
+            ]
+        )
         clear = np.abs(np.log(conditions / LARGEST_CONDITION)) > 0.1
-        np.testing.assert_array_equal(found[length - 1][clear], (conditions > LARGEST_CONDITION)[clear])
+        np.testing.assert_array_equal(
+            found[length - 1][clear], (conditions > LARGEST_CONDITION)[clear]
+        )
         assert 0 < found[length - 1].sum() < sets
 
 
-def test_nothing_is_identified_before_anything_loads_the_robot_and_everything_after(kuka, strategies):
+def test_nothing_is_identified_before_anything_loads_the_robot_and_everything_after(
+    kuka, strategies
+):
     (experiments,) = experiments_of(kuka, sets=2)
     # No load in the first configuration of one data set and the first two of the other.
     empty = np.array([True, False, False, False, True, True, False, False])
     for name in ("fx", "fy", "fz", "mx", "my", "mz"):
         experiments[name] = np.where(empty, 0.0, experiments[name])
-    table = identified(kuka, strategies["6DoF"], [experiments], deflections_of(kuka, [experiments]))
+    table = identified(
+        kuka, strategies["6DoF"], [experiments], deflections_of(kuka, [experiments])
+    )
     for joint in range(1, 7):
         np.testing.assert_array_equal(np.isnan(table[f"compliance_{joint}"]), empty)
 
@@ -159,9 +247,15 @@ def test_nothing_is_identified_before_anything_loads_the_robot_and_everything_af
 def test_regressors_are_those_of_equation_10_by_pinocchio(at, rows):
     robot = robot_of(OTHER_CHAINS["seven joints"])
     (block,) = experiments_of(robot, sets=2, configurations=3)
-    regressors = regressors_of(to_experiments(block), robot.chain, ("elbow", "flange"), rows, at)
+    regressors = regressors_of(
+        to_experiments(block), robot.chain, ("elbow", "flange"), rows, at
+    )
     assert set(regressors) == {"elbow", "flange"}
     for name, found in regressors.items():
         assert found.shape == (rows, 7, 3, 2)
-        expected = pinocchio_regressors(robot.chain, block, name, at, rows).reshape(2, 3, rows, 7)
-        np.testing.assert_allclose(found, expected.transpose(2, 3, 1, 0), rtol=0, atol=1e-9)
+        expected = pinocchio_regressors(robot.chain, block, name, at, rows).reshape(
+            2, 3, rows, 7
+        )
+        np.testing.assert_allclose(
+            found, expected.transpose(2, 3, 1, 0), rtol=0, atol=1e-9
+        )

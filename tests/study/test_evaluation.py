@@ -17,22 +17,36 @@ from elastocal.study.evaluation import (
     to_weights,
 )
 from elastocal.study.metrics import make_judge, position_errors
-from elastocal.study.simulation import bootstrap_weights, true_deflections, weight_blocks
+from elastocal.study.simulation import (
+    bootstrap_weights,
+    true_deflections,
+    weight_blocks,
+)
 
-SETS, LENGTHS, REPLICATES, TESTS = 60, 3, 25, 30
+SETS = 60
+LENGTHS = 3
+REPLICATES = 25
+TESTS = 30
 METHODS = ("stiffness", "compliance")
 
 
 @pytest.fixture(scope="module")
 def judge(kuka):
     loads = random_loads(kuka, 1, TESTS)
-    return make_judge(kuka, loads, true_deflections(kuka, loads, kuka.chain.end_effector, "end_effector"))
+    return make_judge(
+        kuka,
+        loads,
+        true_deflections(kuka, loads, kuka.chain.end_effector, "end_effector"),
+    )
 
 
 @pytest.fixture(scope="module")
 def estimates(kuka):
     """Compliances that scatter by 10 % of their values, less at each length."""
-    scatter = np.random.default_rng(1).standard_normal((SETS, LENGTHS, 6)) / np.arange(1, LENGTHS + 1)[:, None]
+    scatter = (
+        np.random.default_rng(1).standard_normal((SETS, LENGTHS, 6))
+        / np.arange(1, LENGTHS + 1)[:, None]
+    )
     return kuka.compliance * (1 + 0.1 * np.clip(scatter, -3, 3))
 
 
@@ -53,8 +67,12 @@ def blocks_of(estimates, weights, *cuts):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_averages_are_those_written_out_whatever_the_blocks(judge, estimates, weights, counts, method):
-    found = average(iter(blocks_of(estimates, weights, 1, 20, 21)), judge, method, counts)
+def test_averages_are_those_written_out_whatever_the_blocks(
+    judge, estimates, weights, counts, method
+):
+    found = average(
+        iter(blocks_of(estimates, weights, 1, 20, 21)), judge, method, counts
+    )
     for replicate in (0, 1, REPLICATES):
         drawn = np.repeat(estimates, weights[replicate].astype(int), axis=0)
         expected = {
@@ -63,17 +81,27 @@ def test_averages_are_those_written_out_whatever_the_blocks(judge, estimates, we
         }[method](drawn)
         np.testing.assert_allclose(found.compliance[replicate], expected, rtol=1e-12)
         tests = counts[replicate].astype(int)
-        deviation = np.repeat(position_errors(judge, expected), tests, axis=1).mean(axis=1)
+        deviation = np.repeat(position_errors(judge, expected), tests, axis=1).mean(
+            axis=1
+        )
         np.testing.assert_allclose(
-            found.initial_deviation[replicate], np.repeat(judge.initial_errors, tests).mean(), rtol=1e-12
+            found.initial_deviation[replicate],
+            np.repeat(judge.initial_errors, tests).mean(),
+            rtol=1e-12,
         )
         np.testing.assert_allclose(found.deviation[replicate], deviation, rtol=1e-9)
     relative = estimates / judge.reference
-    np.testing.assert_allclose(found.relative_spread, (relative.std(axis=0) / relative.mean(axis=0)).max(axis=-1), rtol=1e-9)
+    np.testing.assert_allclose(
+        found.relative_spread,
+        (relative.std(axis=0) / relative.mean(axis=0)).max(axis=-1),
+        rtol=1e-9,
+    )
     assert (found.nonpositive_share == 0).all()
 
 
-def test_share_of_nonpositive_compliances_counts_data_sets_and_takes_trust_away(judge, estimates, weights, counts):
+def test_share_of_nonpositive_compliances_counts_data_sets_and_takes_trust_away(
+    judge, estimates, weights, counts
+):
     spoiled = estimates.copy()
     spoiled[:3, 1, 4] *= -1
     spoiled[0, 1, 5] = 0.0
@@ -84,7 +112,9 @@ def test_share_of_nonpositive_compliances_counts_data_sets_and_takes_trust_away(
     np.testing.assert_array_equal(table["trustworthy"], [True, False, True])
 
 
-def test_metrics_are_equations_13_and_14_of_the_averages(judge, estimates, weights, counts):
+def test_metrics_are_equations_13_and_14_of_the_averages(
+    judge, estimates, weights, counts
+):
     averages = average(blocks_of(estimates, weights), judge, "stiffness", counts)
     table = metrics_table(averages, judge.reference, (0, 1))
     assert set(table) == {column.name for column in metrics(6).columns}
@@ -92,23 +122,35 @@ def test_metrics_are_equations_13_and_14_of_the_averages(judge, estimates, weigh
     delta = 100 * (stiffness * judge.reference - 1)
     np.testing.assert_array_equal(table["length"], [1, 2, 3])
     for joint in range(6):
-        np.testing.assert_allclose(table[f"compliance_{joint + 1}"], 1 / stiffness[:, joint], rtol=1e-12)
-        np.testing.assert_allclose(table[f"delta_k_{joint + 1}"], delta[:, joint], rtol=0, atol=1e-10)
+        np.testing.assert_allclose(
+            table[f"compliance_{joint + 1}"], 1 / stiffness[:, joint], rtol=1e-12
+        )
+        np.testing.assert_allclose(
+            table[f"delta_k_{joint + 1}"], delta[:, joint], rtol=0, atol=1e-10
+        )
     np.testing.assert_allclose(table["k_sigma"], delta.sum(axis=1), rtol=0, atol=1e-10)
-    np.testing.assert_allclose(table["k_sigma_fixed_joints"], delta[:, :2].sum(axis=1), rtol=0, atol=1e-10)
+    np.testing.assert_allclose(
+        table["k_sigma_fixed_joints"], delta[:, :2].sum(axis=1), rtol=0, atol=1e-10
+    )
     np.testing.assert_array_equal(table["deviation"], averages.deviation[0])
 
 
-def test_replicates_are_every_one_but_the_first_and_their_spread_is_the_standard_error(judge, estimates, weights, counts):
+def test_replicates_are_every_one_but_the_first_and_their_spread_is_the_standard_error(
+    judge, estimates, weights, counts
+):
     averages = average(blocks_of(estimates, weights), judge, "stiffness", counts)
     table = replicates_table(averages, judge.reference, (0, 1))
     assert len(table["replicate"]) == REPLICATES * LENGTHS
-    np.testing.assert_array_equal(np.unique(table["replicate"]), np.arange(1, REPLICATES + 1))
+    np.testing.assert_array_equal(
+        np.unique(table["replicate"]), np.arange(1, REPLICATES + 1)
+    )
     row = (table["replicate"] == 4) & (table["length"] == 2)
     assert table["deviation"][row] == averages.deviation[4, 1]
     delta = 100 * (judge.reference / averages.compliance[4, 1] - 1)
     np.testing.assert_allclose(table["k_sigma"][row], delta.sum(), rtol=1e-9)
-    np.testing.assert_allclose(table["k_sigma_fixed_joints"][row], delta[:2].sum(), rtol=1e-9)
+    np.testing.assert_allclose(
+        table["k_sigma_fixed_joints"][row], delta[:2].sum(), rtol=1e-9
+    )
     metrics = metrics_table(averages, judge.reference, (0, 1))
     for name in ("k_sigma", "deviation", "initial_deviation"):
         spread = table[name].reshape(REPLICATES, LENGTHS).std(axis=0, ddof=1)
@@ -125,7 +167,9 @@ def test_replicates_are_every_one_but_the_first_and_their_spread_is_the_standard
         (0.25, (0.5, 0.75, -1.0), np.inf, (6, 9, 12)),
     ],
 )
-def test_a_length_comes_with_the_spread_of_replicates_that_go_on_beyond_their_curves(limit, ends, length, lengths):
+def test_a_length_comes_with_the_spread_of_replicates_that_go_on_beyond_their_curves(
+    limit, ends, length, lengths
+):
     """As one over the length: from 0.5, 0.75 and 1 at length 3 to 0.25."""
     replicates = np.column_stack([[3.0, 3.0, 2.0], [0.9, 2.6, 0.9], ends])
     found, error = find_length(np.array([3.0, 0.9, 0.5]), replicates, limit)
@@ -134,11 +178,23 @@ def test_a_length_comes_with_the_spread_of_replicates_that_go_on_beyond_their_cu
 
 def test_table_4_over_studies_is_their_median_with_a_spread_that_one_outlier_does_not_move():
     """Biases of 20, 22 and 24, then one far out, over the length: percent and µm."""
-    frame = studies_of(biases=(20.0, 22.0, 24.0, 22.0, 900.0)).assign(mean_square=25e-12)
+    frame = studies_of(biases=(20.0, 22.0, 24.0, 22.0, 900.0)).assign(
+        mean_square=25e-12
+    )
     for name in ("k_sigma", "k_sigma_fixed_joints", "deviation"):
         frame[f"{name}_mean_compliance"] = frame[name] / 10
-    usual, averaged = over_studies_table(frame, 20, {"k_sigma": 2.0, "deviation": 4.0}).to_dict("records")
+    usual, averaged = over_studies_table(
+        frame, 20, {"k_sigma": 2.0, "deviation": 4.0}
+    ).to_dict("records")
     assert [usual["average"], averaged["average"]] == ["stiffness", "compliance"]
-    assert usual["dev_20_um"] == pytest.approx(1.1) and usual["dev_20_um_std"] == pytest.approx(1.4826 * 0.1)
-    assert (usual["n_k_sigma_2_percent"], usual["n_k_sigma_fixed_joints_2_percent"], usual["n_dev_4_um"]) == (11, 6, 6)
-    assert averaged["k_sigma_20_percent"] == pytest.approx(0.11) and usual["rms_20_um"] == pytest.approx(5.0)
+    assert usual["dev_20_um"] == pytest.approx(1.1) and usual[
+        "dev_20_um_std"
+    ] == pytest.approx(1.4826 * 0.1)
+    assert (
+        usual["n_k_sigma_2_percent"],
+        usual["n_k_sigma_fixed_joints_2_percent"],
+        usual["n_dev_4_um"],
+    ) == (11, 6, 6)
+    assert averaged["k_sigma_20_percent"] == pytest.approx(0.11) and usual[
+        "rms_20_um"
+    ] == pytest.approx(5.0)

@@ -25,9 +25,14 @@ def test_data_sets_of_studies_follow_on_each_other_without_overlap(kuka):
 def test_measurements_are_those_of_the_pipelines_steps(kuka):
     (block,) = deflections_of(kuka, experiments_of(kuka, 4, 5), SIZE.noise)["3DoF"]
     found = study_of(kuka).measure(np.arange(4), ("3DoF",))["3DoF"]
-    np.testing.assert_allclose(np.moveaxis(found.deflection, (0, 1), (2, 1)), to_deflections(block), rtol=1e-12)
+    np.testing.assert_allclose(
+        np.moveaxis(found.deflection, (0, 1), (2, 1)), to_deflections(block), rtol=1e-12
+    )
 
 
 def test_the_score_sheet_of_the_study_of_the_tables_is_the_pipelines(kuka):
-    found, models = study_of(kuka).judge(), 1.1 * kuka.compliance[None]
-    np.testing.assert_allclose(position_errors(found, models), position_errors(judge(kuka), models), rtol=1e-9)
+    found = study_of(kuka).judge()
+    models = 1.1 * kuka.compliance[None]
+    np.testing.assert_allclose(
+        position_errors(found, models), position_errors(judge(kuka), models), rtol=1e-9
+    )

@@ -1,4 +1,5 @@
-"""Tables of the study: every column has a name of its own, a meaning, and a unit where it has one; and what jobs share."""
+"""Tables of the study: every column has a name of its own, a meaning, and a unit where
+it has one; and what jobs share."""
 
 from importlib import import_module
 from pathlib import Path
@@ -13,30 +14,63 @@ from elastocal.study.evaluation import metrics, repeated
 from elastocal.study.jobs import ERROR, SET, frames, origin, table, write_csvs
 from elastocal.study.simulation import experiments
 
-MODULES = [import_module(f"elastocal.study.{path.stem}") for path in Path(study.__file__).parent.glob("[a-z]*.py")]
-SCHEMAS = {thing.name: thing for module in MODULES for thing in vars(module).values() if isinstance(thing, TableSchema)}
+MODULES = [
+    import_module(f"elastocal.study.{path.stem}")
+    for path in Path(study.__file__).parent.glob("[a-z]*.py")
+]
+SCHEMAS = {
+    thing.name: thing
+    for module in MODULES
+    for thing in vars(module).values()
+    if isinstance(thing, TableSchema)
+}
 BY_JOINTS = (experiments, identified, metrics, repeated)
 ALL = [*SCHEMAS.values(), *(make(joints) for make in BY_JOINTS for joints in (3, 7))]
 
 
-@pytest.mark.parametrize("schema", ALL, ids=lambda schema: f"{schema.name} of {len(schema.columns)} columns")
-def test_columns_have_a_name_of_their_own_a_meaning_and_a_unit_but_for_shares_and_ratios(schema):
+@pytest.mark.parametrize(
+    "schema", ALL, ids=lambda schema: f"{schema.name} of {len(schema.columns)} columns"
+)
+def test_columns_have_a_name_of_their_own_a_meaning_and_a_unit_but_for_shares_and_ratios(
+    schema,
+):
     names = [column.name for column in schema.columns]
-    assert len(set(names)) == len(names) and all(column.meaning for column in schema.columns)
-    without = {column.name for column in schema.columns if column.type.startswith("float") and not column.unit}
+    assert len(set(names)) == len(names) and all(
+        column.meaning for column in schema.columns
+    )
+    without = {
+        column.name
+        for column in schema.columns
+        if column.type.startswith("float") and not column.unit
+    }
     assert without <= {"nonpositive_share", "relative_spread"}
 
 
 @pytest.mark.parametrize("joints", [3, 7])
 def test_there_is_one_column_for_each_joint(joints):
-    assert [column.name for column in identified(joints).columns if "compl" in column.name][-1] == f"compliance_{joints}"
+    assert [
+        column.name for column in identified(joints).columns if "compl" in column.name
+    ][-1] == f"compliance_{joints}"
 
 
 def test_a_job_keeps_a_table_with_its_origin_and_reads_those_of_all_robots(tmp_path):
-    job = SimpleNamespace(params={"seed": 1, "step": "of no account"}, wildcards={"robot": "arm"}, output={})
+    job = SimpleNamespace(
+        params={"seed": 1, "step": "of no account"},
+        wildcards={"robot": "arm"},
+        output={},
+    )
     schema = table("made", SET, ERROR)
-    write_table(tmp_path / "arm.parquet", schema, [{"data_set": [0, 1], "mean_square": [1.0, 4.0]}], origin(job))
+    write_table(
+        tmp_path / "arm.parquet",
+        schema,
+        [{"data_set": [0, 1], "mean_square": [1.0, 4.0]}],
+        origin(job),
+    )
     assert read_provenance(tmp_path / "arm.parquet")["configuration"] == {"seed": 1}
-    job = SimpleNamespace(params=SimpleNamespace(robots=["arm"]), output={"table": tmp_path / "table.csv"})
+    job = SimpleNamespace(
+        params=SimpleNamespace(robots=["arm"]), output={"table": tmp_path / "table.csv"}
+    )
     write_csvs(job, table=frames(job, [tmp_path / "arm.parquet"], schema)["arm"])
-    assert (tmp_path / "table.csv").read_text(encoding="utf-8") == "data_set,mean_square\n0,1\n1,4\n"
+    assert (tmp_path / "table.csv").read_text(
+        encoding="utf-8"
+    ) == "data_set,mean_square\n0,1\n1,4\n"

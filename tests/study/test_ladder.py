@@ -1,10 +1,15 @@
-"""The ladder of models: against dense least squares, and on a robot whose links yield."""
+"""The ladder of models: against dense least squares, and on a robot whose links
+yield."""
 
 import numpy as np
 import pytest
 from made_study_blocks import PAPER
 
-from elastocal.mechanics.elastostatics import extended_chain, generalized_forces, spring_compliance
+from elastocal.mechanics.elastostatics import (
+    extended_chain,
+    generalized_forces,
+    spring_compliance,
+)
 from elastocal.mechanics.kinematics import jacobians
 from elastocal.study.ladder import ladder, products_of, spring_columns
 from elastocal.study.simulation import random_experiments, true_deflections
@@ -14,48 +19,81 @@ FOLDS = 4
 
 @pytest.fixture(scope="module")
 def seen(kuka_extended):
-    drawn = random_experiments(kuka_extended.chain, kuka_extended.joint_limits, 1, "x", PAPER, "identification", range(3), 24)
+    drawn = random_experiments(
+        kuka_extended.chain,
+        kuka_extended.joint_limits,
+        1,
+        "x",
+        PAPER,
+        "identification",
+        range(3),
+        24,
+    )
     return drawn, spring_columns(kuka_extended, drawn)
 
 
 def folds_of(columns, deflection):
-    return [products_of(columns[:, fold::FOLDS], deflection[:, fold::FOLDS]) for fold in range(FOLDS)]
+    return [
+        products_of(columns[:, fold::FOLDS], deflection[:, fold::FOLDS])
+        for fold in range(FOLDS)
+    ]
 
 
-def test_columns_times_the_true_compliances_are_the_linear_deflection(kuka_extended, seen):
+def test_columns_times_the_true_compliances_are_the_linear_deflection(
+    kuka_extended, seen
+):
     """The springs' own elements in beam axes, against J C J'w of the extended chain."""
     drawn, columns = seen
-    chain, n = extended_chain(kuka_extended), kuka_extended.joints
+    chain = extended_chain(kuka_extended)
+    n = kuka_extended.joints
     coordinates = np.zeros((*drawn.joint_angles.shape[:-1], chain.coordinates))
     coordinates[..., :n] = drawn.joint_angles
     jacobian = jacobians(chain, coordinates, chain.end_effector)
-    springs = generalized_forces(jacobian, drawn.wrench) @ spring_compliance(kuka_extended)
+    springs = generalized_forces(jacobian, drawn.wrench) @ spring_compliance(
+        kuka_extended
+    )
     expected = (jacobian @ springs[..., None])[..., 0]
-    found, *_ = np.linalg.lstsq(columns.reshape(-1, columns.shape[-1]), expected.ravel(), rcond=1e-12)
-    np.testing.assert_allclose(columns @ found, expected, atol=1e-6 * np.abs(expected).max())
+    found, *_ = np.linalg.lstsq(
+        columns.reshape(-1, columns.shape[-1]), expected.ravel(), rcond=1e-12
+    )
+    np.testing.assert_allclose(
+        columns @ found, expected, atol=1e-6 * np.abs(expected).max()
+    )
 
 
 def test_cross_validation_is_that_of_fits_to_all_other_folds(kuka_extended, seen):
     """Joints alone, by numpy's least squares for each fold."""
     drawn, columns = seen
-    deflection = true_deflections(kuka_extended, drawn, kuka_extended.chain.end_effector, "end_effector")
+    deflection = true_deflections(
+        kuka_extended, drawn, kuka_extended.chain.end_effector, "end_effector"
+    )
     found = ladder(folds_of(columns, deflection), 6, len(kuka_extended.links))
-    place, total = np.arange(24), 0.0
+    place = np.arange(24)
+    total = 0.0
     for fold in range(FOLDS):
-        inside, outside = place % FOLDS != fold, place % FOLDS == fold
+        inside = place % FOLDS != fold
+        outside = place % FOLDS == fold
         left = columns[0, inside][..., :6].reshape(-1, 6)
         fitted = np.linalg.lstsq(left, deflection[0, inside].ravel(), rcond=None)[0]
-        total += ((deflection[0, outside] - columns[0, outside][..., :6] @ fitted) ** 2).sum()
+        total += (
+            (deflection[0, outside] - columns[0, outside][..., :6] @ fitted) ** 2
+        ).sum()
     assert found.cross_validated[0, 0] == pytest.approx(total, rel=1e-6)
 
 
-def test_a_robot_with_one_yielding_link_gets_that_spring_first_and_nothing_of_worth_after(kuka_extended, seen):
-    """A noise of 1 µm beside 0.1 mm of the link: what the best of four further links takes off by chance is a few percent."""
+def test_a_robot_with_one_yielding_link_gets_that_spring_first_and_nothing_of_worth_after(
+    kuka_extended, seen
+):
+    """A noise of 1 µm beside 0.1 mm of the link: what the best of four further links
+    takes off by chance is a few percent."""
     _, columns = seen
     weights = np.zeros(columns.shape[-1])
-    weights[:6], weights[6 + 8 * 2 : 6 + 8 * 3] = kuka_extended.compliance, 1e-6
+    weights[:6] = kuka_extended.compliance
+    weights[6 + 8 * 2 : 6 + 8 * 3] = 1e-6
     noise = 1e-6 * np.random.default_rng(3).standard_normal(columns.shape[:3])
-    found = ladder(folds_of(columns, columns @ weights + noise), 6, len(kuka_extended.links))
+    found = ladder(
+        folds_of(columns, columns @ weights + noise), 6, len(kuka_extended.links)
+    )
     assert (found.order[:, 0] == 2).all() and (found.chosen >= 1).all()
     assert (found.cross_validated[:, 0] > 100 * found.cross_validated[:, 1]).all()
     assert (found.cross_validated[:, 1] < 1.1 * found.cross_validated.min(axis=1)).all()

@@ -17,31 +17,47 @@ from elastocal.study.metrics import (
 )
 from elastocal.study.simulation import true_deflections
 
-RELATIVE_ERRORS = np.array([[0.01, -0.02, 0.03, -0.04, 0.05, -0.06], [-0.2, 0.1, 0.3, 0.1, -0.3, 0.2], [0.0] * 6])
+RELATIVE_ERRORS = np.array(
+    [
+        [0.01, -0.02, 0.03, -0.04, 0.05, -0.06],
+        [-0.2, 0.1, 0.3, 0.1, -0.3, 0.2],
+        [0.0] * 6,
+    ]
+)
 
 
 def judge_of(robot, loads=None):
     loads = random_loads(robot, 1, 40) if loads is None else loads
-    return make_judge(robot, loads, true_deflections(robot, loads, robot.chain.end_effector, "end_effector"))
+    return make_judge(
+        robot,
+        loads,
+        true_deflections(robot, loads, robot.chain.end_effector, "end_effector"),
+    )
 
 
 def exact_errors(robot, loads, compliance):
     """Position error of one model: pose by pose, without any linearisation."""
     end = robot.chain.end_effector
-    torques = joint_torques(robot.chain, loads.joint_angles, loads.wrench, without_tool(end))
-    predicted = exact_deflections(robot.chain, loads.joint_angles, compliance * torques, end)
+    torques = joint_torques(
+        robot.chain, loads.joint_angles, loads.wrench, without_tool(end)
+    )
+    predicted = exact_deflections(
+        robot.chain, loads.joint_angles, compliance * torques, end
+    )
     truth = true_deflections(robot, loads, end, "end_effector")
     return np.linalg.norm((predicted - truth)[..., :3], axis=-1).ravel()
 
 
 def test_position_errors_are_those_of_the_exact_kinematics(robot):
-    loads, models = random_loads(robot, 1, 40), robot.compliance * (1 + RELATIVE_ERRORS)
+    loads = random_loads(robot, 1, 40)
+    models = robot.compliance * (1 + RELATIVE_ERRORS)
     found = position_errors(judge_of(robot, loads), models)
     assert found.shape == (3, 40)
     for model, errors in zip(models[:2], found, strict=False):
         expected = exact_errors(robot, loads, model)
         assert errors.mean() == pytest.approx(expected.mean(), rel=1e-3)
-        # Second order: an error of up to a third of the compliance turns by up to a milliradian more.
+        # Second order: an error of up to a third of the compliance turns by up to a
+        # milliradian more.
         np.testing.assert_allclose(errors, expected, rtol=0, atol=3e-3 * expected.max())
     # Root of rounding: squares of 1e-3 m lose sixteen digits.
     np.testing.assert_allclose(found[2], 0, atol=1e-10)
@@ -53,7 +69,9 @@ def test_mean_deviation_counts_each_test_configuration_as_often_as_it_weighs(kuk
     counts = np.random.default_rng(1).poisson(1.0, (2, 40))
     found = mean_deviation(judge, models, counts)
     for group in range(2):
-        expected = np.repeat(position_errors(judge, models[group]), counts[group], axis=1).mean(axis=1)
+        expected = np.repeat(
+            position_errors(judge, models[group]), counts[group], axis=1
+        ).mean(axis=1)
         np.testing.assert_allclose(found[group], expected, rtol=1e-12)
 
 
@@ -61,18 +79,33 @@ def test_k_sigma_is_the_signed_sum_over_all_joints_or_some():
     true_compliance = np.array([1.0, 2.0, 4.0])
     compliance = true_compliance / [1.01, 0.97, 1.05]
     assert k_sigma(compliance, true_compliance) == pytest.approx(3.0, rel=1e-10)
-    assert k_sigma(compliance, true_compliance, [0, 1]) == pytest.approx(-2.0, rel=1e-10)
-    np.testing.assert_allclose(k_sigma(np.stack([compliance, true_compliance]), true_compliance), [3.0, 0.0], atol=1e-12)
+    assert k_sigma(compliance, true_compliance, [0, 1]) == pytest.approx(
+        -2.0, rel=1e-10
+    )
+    np.testing.assert_allclose(
+        k_sigma(np.stack([compliance, true_compliance]), true_compliance),
+        [3.0, 0.0],
+        atol=1e-12,
+    )
 
 
 def test_what_is_not_determined_counts_as_above_the_limit():
-    found = [first_length_below(np.array(values), 1.0) for values in ([np.nan, np.nan, 0.1], [np.nan] * 2, [np.inf, -1.0])]
+    found = [
+        first_length_below(np.array(values), 1.0)
+        for values in ([np.nan, np.nan, 0.1], [np.nan] * 2, [np.inf, -1.0])
+    ]
     assert found == [3, np.inf, 2]
 
 
-@given(st.floats(0.1, 1e4), st.floats(1e-3, 1e3), st.sampled_from([-1.0, 1.0]), st.integers(1, 40))
+@given(
+    st.floats(0.1, 1e4),
+    st.floats(1e-3, 1e3),
+    st.sampled_from([-1.0, 1.0]),
+    st.integers(1, 40),
+)
 def test_lengths_follow_a_bias_over_the_length_to_any_limit(bias, limit, sign, lengths):
-    """It is below the limit from the first whole length beyond bias / limit on, and past the curve it goes on to just that."""
+    """It is below the limit from the first whole length beyond bias / limit on, and
+    past the curve it goes on to just that."""
     values = sign * bias / np.arange(1, lengths + 1)
     crossing = bias / limit
     # Exactly at a whole length rounding decides.
@@ -80,4 +113,6 @@ def test_lengths_follow_a_bias_over_the_length_to_any_limit(bias, limit, sign, l
     whole = max(np.ceil(crossing), 1.0)
     reached = whole <= lengths
     assert first_length_below(values, limit) == (whole if reached else np.inf)
-    assert length_to_reach(values, limit) == pytest.approx(whole if reached else crossing, rel=1e-12)
+    assert length_to_reach(values, limit) == pytest.approx(
+        whole if reached else crossing, rel=1e-12
+    )

@@ -1,10 +1,18 @@
-"""Data sets as the paper makes them: random loads with the right distribution, exact deflections, noise."""
+"""Data sets as the paper makes them: random loads with the right distribution, exact
+deflections, noise."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_study_blocks import AT, WRENCH, deflections_of, experiments_of, identified, joined
+from made_study_blocks import (
+    AT,
+    WRENCH,
+    deflections_of,
+    experiments_of,
+    identified,
+    joined,
+)
 from scipy.spatial.transform import Rotation
 from scipy.stats import kstest
 from support import OTHER_CHAINS, PinocchioPoint, robot_of, without_tool
@@ -28,33 +36,70 @@ from elastocal.study.simulation import (
 PAPER = Loading(1000.0, (0.0, 0.5, 0.0), "base", "full_turn")
 
 
-def draw(robot, loading=PAPER, seed=1, key="kuka", purpose="identification", data_sets=range(4), configurations=5):
-    return random_experiments(robot.chain, robot.joint_limits, seed, key, loading, purpose, data_sets, configurations)
+def draw(
+    robot,
+    loading=PAPER,
+    seed=1,
+    key="kuka",
+    purpose="identification",
+    data_sets=range(4),
+    configurations=5,
+):
+    return random_experiments(
+        robot.chain,
+        robot.joint_limits,
+        seed,
+        key,
+        loading,
+        purpose,
+        data_sets,
+        configurations,
+    )
 
 
-@pytest.mark.parametrize("change", [{"seed": 2}, {"key": "fanuc"}, {"purpose": "test"}, {"data_sets": range(4, 8)}])
+@pytest.mark.parametrize(
+    "change",
+    [{"seed": 2}, {"key": "fanuc"}, {"purpose": "test"}, {"data_sets": range(4, 8)}],
+)
 def test_another_seed_robot_purpose_or_set_gives_other_experiments(kuka, change):
-    loads, others = draw(kuka), draw(kuka, **change)
+    loads = draw(kuka)
+    others = draw(kuka, **change)
     assert not np.isin(loads.joint_angles, others.joint_angles).any()
     assert not np.isin(loads.wrench[..., :3], others.wrench[..., :3]).any()
 
 
 def test_forces_are_uniform_on_the_sphere(kuka):
-    direction = draw(kuka, data_sets=range(20), configurations=1000).wrench[..., :3].reshape(-1, 3) / 1000
+    direction = (
+        draw(kuka, data_sets=range(20), configurations=1000)
+        .wrench[..., :3]
+        .reshape(-1, 3)
+        / 1000
+    )
     five_sigma = 5 / np.sqrt(len(direction))
-    # Kolmogorov-Smirnov at 1e-4: of 20,000 it sees a distribution that is off by 0.025 anywhere with a power of 0.99.
-    # Each component of a direction uniform on the sphere is uniform in [-1, 1] (Archimedes).
+    # Kolmogorov-Smirnov at 1e-4: of 20,000 it sees a distribution that is off by 0.025
+    # anywhere with a power of 0.99. Each component of a direction uniform on the sphere
+    # is uniform in [-1, 1] (Archimedes).
     for component in direction.T:
         assert kstest(component, "uniform", (-1, 2)).pvalue > 1e-4
-    np.testing.assert_allclose(direction.mean(axis=0), 0, atol=five_sigma * np.sqrt(1 / 3))
-    np.testing.assert_allclose(direction.T @ direction / len(direction), np.eye(3) / 3, atol=five_sigma * 0.3)
-    np.testing.assert_allclose((direction**4).mean(axis=0), 1 / 5, atol=five_sigma * np.sqrt(1 / 9 - 1 / 25))
+    np.testing.assert_allclose(
+        direction.mean(axis=0), 0, atol=five_sigma * np.sqrt(1 / 3)
+    )
+    np.testing.assert_allclose(
+        direction.T @ direction / len(direction), np.eye(3) / 3, atol=five_sigma * 0.3
+    )
+    np.testing.assert_allclose(
+        (direction**4).mean(axis=0), 1 / 5, atol=five_sigma * np.sqrt(1 / 9 - 1 / 25)
+    )
 
 
 @pytest.mark.parametrize("joint_range", ["full_turn", "limits"])
-def test_joint_angles_are_uniform_over_the_full_turn_or_within_the_limits(fanuc, joint_range):
+def test_joint_angles_are_uniform_over_the_full_turn_or_within_the_limits(
+    fanuc, joint_range
+):
     loading = replace(PAPER, joint_range=joint_range)
-    angles = draw(fanuc, loading, data_sets=range(10), configurations=500).joint_angles.reshape(-1, 6)
+    angles = draw(
+        fanuc, loading, data_sets=range(10), configurations=500
+    ).joint_angles.reshape(-1, 6)
     ranges = fanuc.joint_limits if joint_range == "limits" else [(-np.pi, np.pi)] * 6
     # Of 5,000 it sees 0.05 anywhere with a power of 0.99.
     for joint, (low, high) in zip(angles.T, ranges, strict=True):
@@ -63,24 +108,33 @@ def test_joint_angles_are_uniform_over_the_full_turn_or_within_the_limits(fanuc,
 
 
 def test_offset_in_the_tool_frame_turns_with_the_tool(kuka):
-    base, tool = draw(kuka), draw(kuka, replace(PAPER, offset_frame="tool"))
+    base = draw(kuka)
+    tool = draw(kuka, replace(PAPER, offset_frame="tool"))
     np.testing.assert_array_equal(tool.joint_angles, base.joint_angles)
     np.testing.assert_array_equal(tool.wrench[..., :3], base.wrench[..., :3])
     rotation = poses(kuka.chain, tool.joint_angles, kuka.chain.end_effector)[1]
     lever = rotation[..., 1] * 0.5
-    np.testing.assert_allclose(tool.wrench[..., 3:], np.cross(lever, tool.wrench[..., :3]), rtol=0, atol=1e-10)
+    np.testing.assert_allclose(
+        tool.wrench[..., 3:], np.cross(lever, tool.wrench[..., :3]), rtol=0, atol=1e-10
+    )
 
 
 def test_noise_is_standard_normal_and_independent_between_components():
     noise = measurement_noise(1, "kuka", "6DoF", range(20), 500).reshape(-1, 6)
-    # Of 10,000 it sees 0.035 anywhere with a power of 0.99: a standard deviation off by 16 %.
+    # Of 10,000 it sees 0.035 anywhere with a power of 0.99: a standard deviation off by
+    # 16 %.
     for component in noise.T:
         assert kstest(component, "norm").pvalue > 1e-4
-    np.testing.assert_allclose(np.corrcoef(noise.T), np.eye(6), atol=5 / np.sqrt(len(noise)))
+    np.testing.assert_allclose(
+        np.corrcoef(noise.T), np.eye(6), atol=5 / np.sqrt(len(noise))
+    )
 
 
-def test_numbers_of_a_data_set_do_not_depend_on_how_many_there_are_or_how_long_they_are(kuka):
-    few, many = joined(experiments_of(kuka, 2, 3)), joined(experiments_of(kuka, 5, 4))
+def test_numbers_of_a_data_set_do_not_depend_on_how_many_there_are_or_how_long_they_are(
+    kuka,
+):
+    few = joined(experiments_of(kuka, 2, 3))
+    many = joined(experiments_of(kuka, 5, 4))
     shared = (many["data_set"] < 2) & (many["configuration"] < 3)
     for name, values in few.items():
         np.testing.assert_array_equal(many[name][shared], values)
@@ -92,20 +146,31 @@ def test_ideal_deflections_are_the_poses_by_pinocchio_with_the_joints_yielded(na
     robot = robot_of(OTHER_CHAINS[name])
     experiments = experiments_of(robot, sets=2, configurations=2)
     found = list(ideal_blocks(experiments, robot, at))
-    assert [block["point"] for block in found] == [point.name for point in robot.chain.points]
+    assert [block["point"] for block in found] == [
+        point.name for point in robot.chain.points
+    ]
     loads = joined(experiments)
     angles = np.column_stack([loads[f"q{j + 1}"] for j in range(robot.joints)])
     wrench = np.column_stack([loads[component] for component in WRENCH])
     for block, point in zip(found, robot.chain.points, strict=True):
-        assert block["data_set"].tolist() == [0, 0, 1, 1] and block["configuration"].tolist() == [0, 1, 0, 1]
+        assert block["data_set"].tolist() == [0, 0, 1, 1] and block[
+            "configuration"
+        ].tolist() == [0, 1, 0, 1]
         seen = PinocchioPoint(robot.chain, point)
-        loaded = PinocchioPoint(robot.chain, without_tool(robot.chain.end_effector) if at == "end_effector" else point)
+        loaded = PinocchioPoint(
+            robot.chain,
+            without_tool(robot.chain.end_effector) if at == "end_effector" else point,
+        )
         found = to_deflections(block).reshape(-1, 6)
         for q, force, row in zip(angles, wrench, found, strict=True):
             yielded = q + robot.compliance * (loaded.pose_and_jacobian(q)[2].T @ force)
-            (before, turned_before), (after, turned_after) = (seen.pose_and_jacobian(each)[:2] for each in (q, yielded))
+            (before, turned_before), (after, turned_after) = (
+                seen.pose_and_jacobian(each)[:2] for each in (q, yielded)
+            )
             turn = Rotation.from_matrix(turned_after @ turned_before.T).as_rotvec()
-            np.testing.assert_allclose(row, [*(after - before), *turn], rtol=0, atol=1e-12)
+            np.testing.assert_allclose(
+                row, [*(after - before), *turn], rtol=0, atol=1e-12
+            )
 
 
 def test_measurements_are_ideal_plus_scaled_noise_of_each_point(kuka):
@@ -121,8 +186,18 @@ def test_measurements_are_ideal_plus_scaled_noise_of_each_point(kuka):
 
 def test_statistics_are_of_the_lengths_of_the_displacements_set_by_set():
     """Lengths 5 and 1; 7 and 13; what follows the displacements does not count."""
-    found = bending(np.pad([[[3.0, 4, 0], [0, 0, 1]], [[2, 3, 6], [0, -5, 12]]], ((0, 0), (0, 0), (0, 3)), constant_values=9))
-    expected = {"mean": [3.0, 10.0], "mean_square": [13.0, 109.0], "maximum": [5.0, 13.0]}
+    found = bending(
+        np.pad(
+            [[[3.0, 4, 0], [0, 0, 1]], [[2, 3, 6], [0, -5, 12]]],
+            ((0, 0), (0, 0), (0, 3)),
+            constant_values=9,
+        )
+    )
+    expected = {
+        "mean": [3.0, 10.0],
+        "mean_square": [13.0, 109.0],
+        "maximum": [5.0, 13.0],
+    }
     assert {name: values.tolist() for name, values in found.items()} == expected
 
 
@@ -130,8 +205,13 @@ def test_the_weights_table_gives_back_the_weights_whatever_its_blocks(monkeypatc
     for size in (500, 5, 2):
         monkeypatch.setattr(simulation, "SETS_PER_BLOCK", size)
         *sets, tests = weight_blocks("kuka", 1, 5, 7, 4)
-        assert [block["members"] for block in sets] == [DATA_SETS] * -(-5 // size) and tests["members"] == TESTS
-        np.testing.assert_array_equal(np.hstack([to_weights(b) for b in sets]), bootstrap_weights(1, "kuka", range(5), 4))
+        assert [block["members"] for block in sets] == [DATA_SETS] * -(
+            -5 // size
+        ) and tests["members"] == TESTS
+        np.testing.assert_array_equal(
+            np.hstack([to_weights(b) for b in sets]),
+            bootstrap_weights(1, "kuka", range(5), 4),
+        )
         assert to_weights(tests).shape == (5, 7)
 
 
@@ -142,13 +222,19 @@ def test_numbers_do_not_depend_on_blocks(kuka, strategies, monkeypatch):
         experiments = experiments_of(kuka)
         assert len(experiments) == -(-5 // size)
         deflections = deflections_of(kuka, experiments, noise=2e-4)
-        table = identified(kuka, strategies["4-6DoF-after-6+3DoF"], experiments, deflections)
+        table = identified(
+            kuka, strategies["4-6DoF-after-6+3DoF"], experiments, deflections
+        )
         tables.append((joined(experiments), joined(deflections["3DoF"]), table))
     for other in tables[1:]:
         for name, values in tables[0][0].items():
             np.testing.assert_array_equal(other[0][name], values)
         for name in ("dx", "rz"):
             # Whole vectors and their remainders may round otherwise.
-            np.testing.assert_allclose(other[1][name], tables[0][1][name], rtol=0, atol=1e-14)
+            np.testing.assert_allclose(
+                other[1][name], tables[0][1][name], rtol=0, atol=1e-14
+            )
         for name, values in tables[0][2].items():
-            np.testing.assert_allclose(other[2][name], values, rtol=1e-6, atol=1e-12, err_msg=name)
+            np.testing.assert_allclose(
+                other[2][name], values, rtol=1e-6, atol=1e-12, err_msg=name
+            )

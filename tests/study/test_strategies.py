@@ -1,9 +1,14 @@
-"""Strategies as data: what the eight files say, and that what a chain cannot carry out is refused in one line."""
+"""Strategies as data: what the eight files say, and that what a chain cannot carry out
+is refused in one line."""
 
 import pytest
 from support import chain_of, refused
 
-from elastocal.study.strategies import check_strategy, drop_forgotten_stages, strategy_from_document
+from elastocal.study.strategies import (
+    check_strategy,
+    drop_forgotten_stages,
+    strategy_from_document,
+)
 
 ALL = (0, 1, 2, 3, 4, 5)
 # Joints that the last stage takes over, else all, and points that are measured.
@@ -26,20 +31,34 @@ def test_the_repository_has_the_eight_strategies_of_the_paper(strategies):
 
 
 @pytest.mark.parametrize("name", PAPERS)
-def test_fixed_joints_are_those_that_the_last_stage_takes_over_and_each_point_is_named_once(strategies, name):
+def test_fixed_joints_are_those_that_the_last_stage_takes_over_and_each_point_is_named_once(
+    strategies, name
+):
     fixed, points = PAPERS[name]
     assert strategies[name].fixed_joints == fixed
-    assert set(strategies[name].points) == points and len(strategies[name].points) == len(points)
+    assert set(strategies[name].points) == points and len(
+        strategies[name].points
+    ) == len(points)
 
 
 def test_a_stage_that_identifies_every_joint_forgets_those_before_it(strategies):
-    left = {name: drop_forgotten_stages(strategy, 6).stages for name, strategy in strategies.items()}
-    assert left.pop("6DoF-after-3DoF") == left.pop("6DoF-after-3+3DoF") == strategies["6DoF"].stages
+    left = {
+        name: drop_forgotten_stages(strategy, 6).stages
+        for name, strategy in strategies.items()
+    }
+    assert (
+        left.pop("6DoF-after-3DoF")
+        == left.pop("6DoF-after-3+3DoF")
+        == strategies["6DoF"].stages
+    )
     assert left == {name: strategies[name].stages for name in left}
 
 
 CHAIN = chain_of("Rz(q1) Tx(1) Ry(q2) Tx(1) [A] Ry(q3) Tx(1) [B]")
-STAGED = [{"points": ["A"], "joints": [1, 2]}, {"points": ["B"], "joints": [3], "held": [1, 2]}]
+STAGED = [
+    {"points": ["A"], "joints": [1, 2]},
+    {"points": ["B"], "joints": [3], "held": [1, 2]},
+]
 
 
 def stages(*changes):
@@ -48,16 +67,56 @@ def stages(*changes):
 
 
 FAULTS = {
-    "unknown point": (stages({"points": ["C"]}, {}), "stages[0].points", ["'C'", "A, B"]),
-    "unknown point later": (stages({}, {"points": ["A", "end"]}), "stages[1].points", ["'end'", "A, B"]),
-    "joint that the robot has not": (stages({}, {"joints": [3, 4]}), "stages[1].joints", ["joint 4", "move B: 1, 2, 3"]),
-    "joint behind the point": (stages({"joints": [1, 2, 3]}, {}), "stages[0].joints", ["joint 3", "move A: 1, 2"]),
-    "joint in neither list": (stages({"joints": [1]}, {}), "stages[0]", ["joint 2", "in joints or held"]),
-    "nothing held": (stages({}, {"held": []}), "stages[1]", ["joint 1, 2", "1, 2, 3 in joints or held"]),
-    "held before it is known": (stages({"joints": [1], "held": [2]}, {}), "stages[0].held", ["joint 2", "none"]),
-    "held that is no joint": (stages({}, {"held": [1, 2, 7]}), "stages[1].held", ["joint 7", "earlier stages: 1, 2"]),
-    "held and identified": (stages({}, {"joints": [2, 3]}), "stages[1].held", ["joint 2", "earlier stages"]),
-    "joint that no stage identifies": (STAGED[:1], "stages", ["joint 3", "every joint"]),
+    "unknown point": (
+        stages({"points": ["C"]}, {}),
+        "stages[0].points",
+        ["'C'", "A, B"],
+    ),
+    "unknown point later": (
+        stages({}, {"points": ["A", "end"]}),
+        "stages[1].points",
+        ["'end'", "A, B"],
+    ),
+    "joint that the robot has not": (
+        stages({}, {"joints": [3, 4]}),
+        "stages[1].joints",
+        ["joint 4", "move B: 1, 2, 3"],
+    ),
+    "joint behind the point": (
+        stages({"joints": [1, 2, 3]}, {}),
+        "stages[0].joints",
+        ["joint 3", "move A: 1, 2"],
+    ),
+    "joint in neither list": (
+        stages({"joints": [1]}, {}),
+        "stages[0]",
+        ["joint 2", "in joints or held"],
+    ),
+    "nothing held": (
+        stages({}, {"held": []}),
+        "stages[1]",
+        ["joint 1, 2", "1, 2, 3 in joints or held"],
+    ),
+    "held before it is known": (
+        stages({"joints": [1], "held": [2]}, {}),
+        "stages[0].held",
+        ["joint 2", "none"],
+    ),
+    "held that is no joint": (
+        stages({}, {"held": [1, 2, 7]}),
+        "stages[1].held",
+        ["joint 7", "earlier stages: 1, 2"],
+    ),
+    "held and identified": (
+        stages({}, {"joints": [2, 3]}),
+        "stages[1].held",
+        ["joint 2", "earlier stages"],
+    ),
+    "joint that no stage identifies": (
+        STAGED[:1],
+        "stages",
+        ["joint 3", "every joint"],
+    ),
 }
 
 

@@ -1,4 +1,5 @@
-"""What poses must span; pass, fail or undecided by the robots that a fit leaves possible."""
+"""What poses must span; pass, fail or undecided by the robots that a fit leaves
+possible."""
 
 from dataclasses import replace
 
@@ -21,8 +22,12 @@ from elastocal.validation.conformity import (
 )
 
 
-@pytest.mark.parametrize(("tolerance", "decision"), [(1.3e-4, PASS), (0.7e-4, FAIL), (1e-4, UNDECIDED)])
-def test_a_prediction_is_decided_by_the_robots_that_it_leaves_possible(tolerance, decision):
+@pytest.mark.parametrize(
+    ("tolerance", "decision"), [(1.3e-4, PASS), (0.7e-4, FAIL), (1e-4, UNDECIDED)]
+)
+def test_a_prediction_is_decided_by_the_robots_that_it_leaves_possible(
+    tolerance, decision
+):
     rms = 1e-4 * (1.0 + 0.1 * np.random.default_rng(1).standard_normal(4000))
     found = predicted_conformity(rms, tolerance, 0.05)
     assert found.decision == decision
@@ -54,23 +59,37 @@ def test_fewer_configurations_than_a_judgement_needs_are_too_few(kuka, states):
 
 @pytest.mark.parametrize(("share", "count"), [(0.9, 1), (1.1, 0)])
 def test_a_joint_that_hardly_turned_is_too_close(kuka, states, share, count):
-    found = shortfalls(FEWEST_CONFIGURATIONS, turned(states, 3, share * LEAST_TURN_RAD), kuka)
-    assert len(found) == count and all("joint 4 moved by 26°, and 29° are needed" in sentence for sentence in found)
+    found = shortfalls(
+        FEWEST_CONFIGURATIONS, turned(states, 3, share * LEAST_TURN_RAD), kuka
+    )
+    assert len(found) == count and all(
+        "joint 4 moved by 26°, and 29° are needed" in sentence for sentence in found
+    )
 
 
 @pytest.mark.parametrize(("share", "count"), [(0.9, 1), (1.1, 0)])
 def test_a_rail_needs_a_share_of_its_travel(kuka, states, share, count):
     rails = chain_of("Tx(q1) Ty(q2) Tz(q3) [hand]")
     gantry = replace(kuka, chain=rails, joint_limits=np.array([[0.0, 4.0]] * 3))
-    moved = replace(states, joint_angles=np.linspace(0.0, [[share * LEAST_TRAVEL * 4.0, 2.0, 2.0]], len(states))[:, 0])
+    moved = replace(
+        states,
+        joint_angles=np.linspace(
+            0.0, [[share * LEAST_TRAVEL * 4.0, 2.0, 2.0]], len(states)
+        )[:, 0],
+    )
     found = shortfalls(FEWEST_CONFIGURATIONS, moved, gantry)
-    assert len(found) == count and all("too close: joint 1 moved by 0.36 m, and 0.4 m are needed" in each for each in found)
+    assert len(found) == count and all(
+        "too close: joint 1 moved by 0.36 m, and 0.4 m are needed" in each
+        for each in found
+    )
 
 
 def test_the_least_turn_is_that_over_which_a_sine_changes_by_half_its_amplitude():
     """At most by that: about the extremes of the sine less."""
     turn = np.linspace(-np.pi, np.pi, 100_001)
-    change = np.abs(np.sin(turn + 0.5 * LEAST_TURN_RAD) - np.sin(turn - 0.5 * LEAST_TURN_RAD)).max()
+    change = np.abs(
+        np.sin(turn + 0.5 * LEAST_TURN_RAD) - np.sin(turn - 0.5 * LEAST_TURN_RAD)
+    ).max()
     assert change == pytest.approx(0.5, abs=1e-6)
 
 
@@ -78,4 +97,6 @@ def test_joint_ranges_are_smallest_and_largest_angles_in_degrees(kuka, states):
     found = joint_ranges(states, kuka)
     assert {entry["unit"] for entry in found} == {"deg"}
     spans = [entry["high"] - entry["low"] for entry in found]
-    np.testing.assert_allclose(spans, np.rad2deg(np.ptp(states.joint_angles, axis=0)), rtol=1e-12)
+    np.testing.assert_allclose(
+        spans, np.rad2deg(np.ptp(states.joint_angles, axis=0)), rtol=1e-12
+    )

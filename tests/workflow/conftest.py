@@ -1,4 +1,5 @@
-"""A small study, made once for all workers, and a folder of its own for each test that changes something."""
+"""A small study, made once for all workers, and a folder of its own for each test that
+changes something."""
 
 import fcntl
 import os
@@ -9,7 +10,8 @@ from study_folder import PAPER, TINY, Study
 
 
 def made_once(factory, name, changes, *arguments):
-    """A finished run on two cores, by a small study with `changes`: the worker that asks first makes it, others wait for it.
+    """A finished run on two cores, by a small study with `changes`: the worker that
+    asks first makes it, others wait for it.
 
     To be read, not to be changed.
     """
@@ -45,8 +47,11 @@ def small_study(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def small_proof(tmp_path_factory):
-    """The smallest blind proof, finished; not by the seed of the proof: what is looked at here is not part of it."""
-    return made_once(tmp_path_factory, "proof", {"seed": 31}, "blind", "--config", "blind=smoke")
+    """The smallest blind proof, finished; not by the seed of the proof: what is looked
+    at here is not part of it."""
+    return made_once(
+        tmp_path_factory, "proof", {"seed": 31}, "blind", "--config", "blind=smoke"
+    )
 
 
 @pytest.fixture

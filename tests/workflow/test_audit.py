@@ -1,4 +1,5 @@
-"""An audit holds on a finished study and finds an error of each kind that is planted into it."""
+"""An audit holds on a finished study and finds an error of each kind that is planted
+into it."""
 
 import shutil
 import subprocess
@@ -16,22 +17,31 @@ pytestmark = pytest.mark.slow
 
 CAMPAIGN = "kuka_extended_end_effector"
 MEASURED = "data/simulated/kuka/200um/measured.parquet"
-IDENTIFIED, OF_STRATEGY = (f"results/identified/kuka/200um/{name}.parquet" for name in ("6DoF", "3+6DoF-comb"))
+IDENTIFIED, OF_STRATEGY = (
+    f"results/identified/kuka/200um/{name}.parquet" for name in ("6DoF", "3+6DoF-comb")
+)
 
 
 def audited(folder):
     configuration = yaml.safe_load((folder / "config.yaml").read_text("utf-8"))
     robots, strategies = (
-        {name: yaml.safe_load((folder / f"config/{kind}/{name}.yaml").read_text("utf-8")) for name in configuration[kind]}
+        {
+            name: yaml.safe_load(
+                (folder / f"config/{kind}/{name}.yaml").read_text("utf-8")
+            )
+            for name in configuration[kind]
+        }
         for kind in ("robots", "strategies")
     )
-    # Of so few data sets enough that what is planted in a whole column is in the sample.
+    # Of so few data sets enough that what is planted in a whole column is in the
+    # sample.
     return Audited(folder, configuration, robots, strategies, 12)
 
 
 @pytest.fixture(scope="module")
 def folder(small_study, tmp_path_factory):
-    """A copy of the finished study with a campaign; each test puts back the file that it changed."""
+    """A copy of the finished study with a campaign; each test puts back the file that
+    it changed."""
     study = small_study.copied_to(tmp_path_factory.mktemp("audited") / "study")
     study.configure({"loop": {"campaigns": [CAMPAIGN]}})
     study.run("reports/loop/campaigns.csv")
@@ -41,7 +51,13 @@ def folder(small_study, tmp_path_factory):
 def test_a_finished_study_holds_in_every_check(folder):
     found = audit(audited(folder))
     assert [finding for finding in found if not finding.holds] == []
-    by = {"numpy's Philox stream", "pinocchio", "numpy on pinocchio", "statsmodels on pinocchio", "MuJoCo"}
+    by = {
+        "numpy's Philox stream",
+        "pinocchio",
+        "numpy on pinocchio",
+        "statsmodels on pinocchio",
+        "MuJoCo",
+    }
     assert by <= {finding.by for finding in found}
 
 
@@ -58,16 +74,26 @@ def test_a_finished_study_holds_in_every_check(folder):
         (f"reports/loop/{CAMPAIGN}/residuals.parquet", "after_dx", 0.99),
     ],
 )
-def test_a_column_multiplied_is_found_although_its_checksum_is_forged(folder, file, column, factor):
+def test_a_column_multiplied_is_found_although_its_checksum_is_forged(
+    folder, file, column, factor
+):
     audited_files = {file, file.replace("held_out", "training")}
     with altered(folder, file, (column, slice(None)), lambda values: factor * values):
-        assert [finding.file for finding in audit(audited(folder), audited_files) if not finding.holds]
+        assert [
+            finding.file
+            for finding in audit(audited(folder), audited_files)
+            if not finding.holds
+        ]
 
 
 def test_an_edited_robot_makes_its_files_stale(folder):
     run = audited(folder)
     run.robots["kuka"]["compliance_urad_per_Nm"][0] *= 1.1
-    wrong = [finding for finding in audit(run, {"results/metrics/kuka/200um/6DoF.parquet"}) if not finding.holds]
+    wrong = [
+        finding
+        for finding in audit(run, {"results/metrics/kuka/200um/6DoF.parquet"})
+        if not finding.holds
+    ]
     assert any(finding.checked == "made by what is configured" for finding in wrong)
 
 
@@ -76,7 +102,12 @@ def test_the_command_says_which_file_is_wrong(finished):
     done = finished.snakemake("-j2", "audit")
     assert done.returncode == 0, done.stderr[-3000:]
     assert finished.path("reports/audit.txt").read_text("utf-8").endswith("all hold\n")
-    with altered(finished.folder, IDENTIFIED, ("compliance_2", slice(None)), lambda values: 1.001 * values):
+    with altered(
+        finished.folder,
+        IDENTIFIED,
+        ("compliance_2", slice(None)),
+        lambda values: 1.001 * values,
+    ):
         # As of the time of the job that made it, so that no job is run again.
         shutil.copystat(finished.path(OF_STRATEGY), finished.path(IDENTIFIED))
         finished.path("reports/audit.csv").unlink()
@@ -90,10 +121,18 @@ def test_the_command_says_which_file_is_wrong(finished):
 
 
 def test_without_pinocchio_an_audit_ends_in_a_line_before_any_job(unstarted):
-    """It comes with an extra; Python imports `sitecustomize` before all else, which hides it here."""
-    unstarted.path("src/sitecustomize.py").write_text("import sys\n\nsys.modules['pinocchio'] = None\n", encoding="utf-8")
+    """It comes with an extra; Python imports `sitecustomize` before all else, which
+    hides it here."""
+    unstarted.path("src/sitecustomize.py").write_text(
+        "import sys\n\nsys.modules['pinocchio'] = None\n", encoding="utf-8"
+    )
     command = unstarted.command("-j1", "--quiet", "all", "--", "audit")
     done = subprocess.run(**command, capture_output=True, text=True, timeout=HUNG_S)
     line = "audit: pinocchio: found no such package; allowed: the extra audit: make audit, or pip install pin"
-    assert (done.returncode, done.stderr.strip().splitlines()[-1:]) == (1, [line]), done.stderr
-    assert "Traceback" not in done.stderr and unstarted.files("data/**/*.parquet", "results/**/*.parquet") == []
+    assert (done.returncode, done.stderr.strip().splitlines()[-1:]) == (1, [line]), (
+        done.stderr
+    )
+    assert (
+        "Traceback" not in done.stderr
+        and unstarted.files("data/**/*.parquet", "results/**/*.parquet") == []
+    )

@@ -1,4 +1,5 @@
-"""The lines that follow a cell of Table 3 to the measured rows run as they are written, in the folder of a finished study."""
+"""The lines that follow a cell of Table 3 to the measured rows run as they are written,
+in the folder of a finished study."""
 
 import re
 import subprocess
@@ -9,18 +10,30 @@ PAGE = Path(__file__).resolve().parents[2] / "docs" / "audit.md"
 
 
 def code():
-    (found,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    (found,) = re.findall(
+        r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL
+    )
     return found
 
 
 def run(folder, text):
-    return subprocess.run([sys.executable, "-c", text], cwd=folder, capture_output=True, text=True, check=False)
+    return subprocess.run(
+        [sys.executable, "-c", text],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
 
 
 def test_a_cell_of_table_3_follows_from_the_measured_rows(paper):
     done = run(paper.folder, code())
     assert done.returncode == 0, done.stderr
-    lines = [line for line in code().splitlines() if line.strip() and not line.startswith("#")]
+    lines = [
+        line
+        for line in code().splitlines()
+        if line.strip() and not line.startswith("#")
+    ]
     assert "elastocal" not in code() and len(lines) <= 25 and "1e-12" in code()
 
 

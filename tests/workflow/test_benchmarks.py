@@ -1,4 +1,5 @@
-"""Every benchmark in its small setting: that it runs, lest it rot, and not how fast, which `make bench` measures."""
+"""Every benchmark in its small setting: that it runs, lest it rot, and not how fast,
+which `make bench` measures."""
 
 import re
 import runpy
@@ -17,14 +18,17 @@ RUN = runpy.run_path(str(BENCHMARKS / "run.py"))
 
 def ended(script, *arguments):
     command = [sys.executable, str(BENCHMARKS / script), *map(str, arguments)]
-    done = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, timeout=HUNG_S)
+    done = subprocess.run(
+        command, cwd=REPOSITORY, capture_output=True, text=True, timeout=HUNG_S
+    )
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
     return done.stdout
 
 
 @pytest.fixture(scope="module")
 def said():
-    """What all of them print in one run, in which the rerun finds the study made; no report is touched."""
+    """What all of them print in one run, in which the rerun finds the study made; no
+    report is touched."""
     kept = RUN["REPORT"].read_bytes() if RUN["REPORT"].exists() else None
     yield ended("run.py", "--small", "--only", *RUN["NAMES"])
     assert (RUN["REPORT"].read_bytes() if RUN["REPORT"].exists() else None) == kept
@@ -32,7 +36,12 @@ def said():
 
 @pytest.mark.parametrize("name", RUN["NAMES"])
 def test_a_small_setting_has_a_ratio_for_each_row(name, said):
-    ratios = [float(ratio) for ratio in re.findall(rf"^  {name}\b.*: ratio (\S+), target none", said, re.MULTILINE)]
+    ratios = [
+        float(ratio)
+        for ratio in re.findall(
+            rf"^  {name}\b.*: ratio (\S+), target none", said, re.MULTILINE
+        )
+    ]
     assert ratios and min(ratios) > 0 and max(ratios) < float("inf")
 
 
@@ -40,6 +49,8 @@ def test_the_cost_of_a_finished_run_is_stated(small_study, tmp_path):
     proof = tmp_path / "proof"
     shutil.copytree(small_study.path("results/timings"), proof / "results" / "timings")
     (proof / "data" / "blind" / "block" / "case").mkdir(parents=True)
-    said = ended("cost.py", small_study.folder, small_study.folder, proof, "--data-sets", 12, 24)
+    said = ended(
+        "cost.py", small_study.folder, small_study.folder, proof, "--data-sets", 12, 24
+    )
     cost = re.search(r"^\| blind case \| (\S+) \|", said, re.MULTILINE)
     assert float(cost[1]) > 0 and "from 12 and 24 data sets, 1 cases" in said

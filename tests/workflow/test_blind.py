@@ -1,4 +1,5 @@
-"""The blind proof as a workflow: no truth is read before the diagnosis, scores do not rerun it, a changed truth is refused."""
+"""The blind proof as a workflow: no truth is read before the diagnosis, scores do not
+rerun it, a changed truth is refused."""
 
 import pytest
 
@@ -22,13 +23,19 @@ def rules(planned):
 
 def test_no_diagnosing_rule_has_a_sealed_file_among_its_inputs(small_proof):
     inputs = small_proof.inputs_by_rule(*BLIND)
-    readers = {rule for rule, files in inputs.items() if any("sealed" in file for file in files if not file.startswith("src/"))}
+    readers = {
+        rule
+        for rule, files in inputs.items()
+        if any("sealed" in file for file in files if not file.startswith("src/"))
+    }
     assert readers == AFTERWARDS
     assert set(inputs) >= ANALYSIS and not readers & ANALYSIS
     # Nor anything that was made of one, but the manifest.
     assert not any("oracle" in file for rule in ANALYSIS for file in inputs[rule])
     assert "reports/blind/manifest.sha256" in inputs["diagnose_cases"]
-    assert {"results/blind/smoke_1.json", "reports/blind/manifest.sha256"} <= inputs["oracle_cases"]
+    assert {"results/blind/smoke_1.json", "reports/blind/manifest.sha256"} <= inputs[
+        "oracle_cases"
+    ]
 
 
 def test_a_finished_proof_has_nothing_to_do(small_proof):
@@ -36,9 +43,18 @@ def test_a_finished_proof_has_nothing_to_do(small_proof):
 
 
 EDITS = {
-    "the scores": ("src/elastocal_proof/blind/scores.py", {"score_cases", "draw_blind", "write_blind_page"}),
-    "the figures of the proof": ("src/elastocal_proof/blind/summary.py", {"score_cases", "draw_blind", "write_blind_page"}),
-    "the oracle": ("src/elastocal_proof/blind/oracle.py", {"oracle_cases", "score_cases"}),
+    "the scores": (
+        "src/elastocal_proof/blind/scores.py",
+        {"score_cases", "draw_blind", "write_blind_page"},
+    ),
+    "the figures of the proof": (
+        "src/elastocal_proof/blind/summary.py",
+        {"score_cases", "draw_blind", "write_blind_page"},
+    ),
+    "the oracle": (
+        "src/elastocal_proof/blind/oracle.py",
+        {"oracle_cases", "score_cases"},
+    ),
     "a target": ("config/blind.yaml", {"score_cases", "write_blind_page"}),
 }
 
@@ -47,7 +63,11 @@ EDITS = {
 def test_edit_reruns_scores_and_no_diagnosis_of(edit, copy):
     path, expected = EDITS[edit]
     if edit == "a target":
-        copy.replace(path, "upper limit below 4 %, high: 0.04", "upper limit below 5 %, high: 0.05")
+        copy.replace(
+            path,
+            "upper limit below 4 %, high: 0.04",
+            "upper limit below 5 %, high: 0.05",
+        )
     else:
         copy.edit(path)
     planned = rules(copy.planned(*BLIND))
@@ -64,6 +84,8 @@ def test_a_truth_that_was_edited_ends_in_one_line_with_its_file(copy, module):
     ended = copy.snakemake("-j1", *BLIND)
     assert ended.returncode != 0
     said = [line for line in ended.stderr.splitlines() if line.startswith(truth)]
-    assert len(set(said)) == 1 and said[-1] == ended.stderr.splitlines()[-1], ended.stderr[-3000:]
+    assert len(set(said)) == 1 and said[-1] == ended.stderr.splitlines()[-1], (
+        ended.stderr[-3000:]
+    )
     assert "found other contents than were written" in said[0]
     assert "Traceback" not in ended.stderr

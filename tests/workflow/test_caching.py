@@ -18,8 +18,12 @@ SCRIPTS = sorted(
     if path.read_text(encoding="utf-8").splitlines()[-1].startswith("run(")
 )
 RUN_STEP = "run_step.py"
-# Modules of the study, most of which hold a step of a rule, by the script that calls it.
-STEPS = [f"{RUN_STEP}:elastocal.study.{path.stem}" for path in sorted((REPOSITORY / "src/elastocal/study").glob("[a-z]*.py"))]
+# Modules of the study, most of which hold a step of a rule, by the script that calls
+# it.
+STEPS = [
+    f"{RUN_STEP}:elastocal.study.{path.stem}"
+    for path in sorted((REPOSITORY / "src/elastocal/study").glob("[a-z]*.py"))
+]
 DATA = {"draw_experiments", "simulate", "measure"}
 GRID = DATA | {"identify"}
 STAGED = "4-6DoF-after-3DoF"
@@ -39,18 +43,42 @@ def every_job(paper):
 
 
 def test_what_changes_no_result_reruns_nothing(finished_paper):
-    """As after a checkout, of which the times are new and figures still name another commit; pages; pins of other tools."""
+    """As after a checkout, of which the times are new and figures still name another
+    commit; pages; pins of other tools."""
     study = finished_paper
     assert study.planned(PAPER) == set()
     study.append("README.md", "\n<!-- a comment -->\n")
-    for name in study.files("config.yaml", "config/robots/*.yaml", "config/strategies/*.yaml"):
+    for name in study.files(
+        "config.yaml", "config/robots/*.yaml", "config/strategies/*.yaml"
+    ):
         study.append(name, "# a comment\n")
     for name in ("test", "cluster", "install"):
-        study.path(f"requirements/{name}.lock").write_text("# edited\n", encoding="utf-8")
-    for name in study.files("Snakefile", "config.yaml", "config/**/*.*", "workflow/**/*.*", "src/**/*.*", "README.md"):
+        study.path(f"requirements/{name}.lock").write_text(
+            "# edited\n", encoding="utf-8"
+        )
+    for name in study.files(
+        "Snakefile",
+        "config.yaml",
+        "config/**/*.*",
+        "workflow/**/*.*",
+        "src/**/*.*",
+        "README.md",
+    ):
         os.utime(study.path(name))
-    git = ["git", "-c", "user.name=somebody", "-c", "user.email=somebody@example.org", "-c", "commit.gpgsign=false"]
-    for words in (["init", "-q"], ["add", "Snakefile", "src", "workflow"], ["commit", "-q", "-m", "a"]):
+    git = [
+        "git",
+        "-c",
+        "user.name=somebody",
+        "-c",
+        "user.email=somebody@example.org",
+        "-c",
+        "commit.gpgsign=false",
+    ]
+    for words in (
+        ["init", "-q"],
+        ["add", "Snakefile", "src", "workflow"],
+        ["commit", "-q", "-m", "a"],
+    ):
         subprocess.run([*git, *words], cwd=study.folder, check=True)
     assert study.planned(PAPER) == set()
 
@@ -58,29 +86,50 @@ def test_what_changes_no_result_reruns_nothing(finished_paper):
 def _another_numpy(study):
     """Of two on the path the first counts."""
     study.path("src/numpy-1.0.dist-info").mkdir()
-    study.path("src/numpy-1.0.dist-info/METADATA").write_text("Name: numpy\nVersion: 1.0\n", encoding="utf-8")
+    study.path("src/numpy-1.0.dist-info/METADATA").write_text(
+        "Name: numpy\nVersion: 1.0\n", encoding="utf-8"
+    )
 
 
 def _figures_and_a_script(study):
-    """Dated back, as from an archive or a clock that was set back: what counts is what the file holds."""
+    """Dated back, as from an archive or a clock that was set back: what counts is what
+    the file holds."""
     study.edit("src/elastocal/figures/study.py")
-    study.replace("workflow/scripts/typeset_table.py", "\nrun(", "\nEDITED = True\nrun(")
+    study.replace(
+        "workflow/scripts/typeset_table.py", "\nrun(", "\nEDITED = True\nrun("
+    )
     os.utime(study.path("workflow/scripts/typeset_table.py"), (1e9, 1e9))
 
 
-# Jobs of the grid that run again, by their rules and wildcards; further rules that do; and rules that do not.
+# Jobs of the grid that run again, by their rules and wildcards; further rules that do;
+# and rules that do not.
 EDITS = {
-    "list of pins": (lambda study: study.append("requirements/run.lock", "# edited\n"), None, {"typeset_table"}, set()),
+    "list of pins": (
+        lambda study: study.append("requirements/run.lock", "# edited\n"),
+        None,
+        {"typeset_table"},
+        set(),
+    ),
     "library": (_another_numpy, None, {"typeset_table"}, set()),
     "points of a strategy": (
-        lambda study: study.replace(f"config/strategies/{STAGED}.yaml", "points: [3DoF]", "points: [2DoF, 3DoF]"),
+        lambda study: study.replace(
+            f"config/strategies/{STAGED}.yaml", "points: [3DoF]", "points: [2DoF, 3DoF]"
+        ),
         {("identify", ROBOT, LEVEL, STAGED)},
         {"tabulate_strategies", "typeset_table"},
         {"tabulate_initial", "tabulate_compliances", "draw_scheme"},
     ),
     "compliance of a robot": (
-        lambda study: study.replace("config/robots/kuka.yaml", "compliance_urad_per_Nm: [", "compliance_urad_per_Nm: [1"),
-        {("simulate", ROBOT, ""), ("simulate", ROBOT, "/test"), ("measure", ROBOT, LEVEL)}
+        lambda study: study.replace(
+            "config/robots/kuka.yaml",
+            "compliance_urad_per_Nm: [",
+            "compliance_urad_per_Nm: [1",
+        ),
+        {
+            ("simulate", ROBOT, ""),
+            ("simulate", ROBOT, "/test"),
+            ("measure", ROBOT, LEVEL),
+        }
         | {("identify", ROBOT, LEVEL, strategy) for strategy in (STAGED, "6DoF")},
         {"summarize_initial", "tabulate_initial", "tabulate_compliances"},
         set(),
@@ -94,7 +143,12 @@ EDITS = {
     "figures, and a script that seems older than its results": (
         _figures_and_a_script,
         set(),
-        {"draw_noise_impact", "draw_stiffness_errors", "draw_deviations", "typeset_table"},
+        {
+            "draw_noise_impact",
+            "draw_stiffness_errors",
+            "draw_deviations",
+            "typeset_table",
+        },
         {"tabulate_strategies", "tabulate_initial", "draw_scheme"},
     ),
 }
@@ -113,9 +167,19 @@ def test_what_is_added_runs_no_job_of_what_is_there(finished_paper):
     """A robot, a strategy and a noise level: each a file or an entry."""
     study = finished_paper
     text = study.path(f"config/strategies/{STAGED}.yaml").read_text(encoding="utf-8")
-    added = text.replace("after 3DoF", "after 2+3DoF").replace("points: [3DoF]", "points: [2DoF, 3DoF]")
-    study.path("config/strategies/4-6DoF-after-2+3DoF.yaml").write_text(added, encoding="utf-8")
-    study.configure({"robots": ["ur10", ROBOT], "strategies": ["6DoF", "4-6DoF-after-2+3DoF", STAGED], "noise_um": [50, 200]})
+    added = text.replace("after 3DoF", "after 2+3DoF").replace(
+        "points: [3DoF]", "points: [2DoF, 3DoF]"
+    )
+    study.path("config/strategies/4-6DoF-after-2+3DoF.yaml").write_text(
+        added, encoding="utf-8"
+    )
+    study.configure(
+        {
+            "robots": ["ur10", ROBOT],
+            "strategies": ["6DoF", "4-6DoF-after-2+3DoF", STAGED],
+            "noise_um": [50, 200],
+        }
+    )
     planned = of_the_grid(study.planned(PAPER))
     assert rules(planned) == GRID
     new = {"ur10", "4-6DoF-after-2+3DoF", "50"}
@@ -124,18 +188,24 @@ def test_what_is_added_runs_no_job_of_what_is_there(finished_paper):
 
 
 def test_every_script_is_of_a_rule_and_a_rule_watches_the_sources_of_its_own():
-    """`complete_rules` gives them to each rule with a script; that of a named step watches the function that it calls."""
+    """`complete_rules` gives them to each rule with a script; that of a named step
+    watches the function that it calls."""
     seen = []
     for file in sorted((REPOSITORY / "workflow" / "rules").glob("*.smk")):
-        for body in re.split(r"^ *rule\b", file.read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]:
+        for body in re.split(
+            r"^ *rule\b", file.read_text(encoding="utf-8"), flags=re.MULTILINE
+        )[1:]:
             scripts = re.findall(r'"\.\./scripts/(\w+\.py)"', body)
             steps = re.findall(r'\bstep=("[\w.]+"|step)', body)
-            assert len(scripts) == ("script:" in body) and len(steps) == scripts.count(RUN_STEP)
+            assert len(scripts) == ("script:" in body) and len(steps) == scripts.count(
+                RUN_STEP
+            )
             seen += scripts
     assert sorted(set(seen) | {RUN_STEP}) == SCRIPTS
 
 
-# Imports of a script, or of a step, in a process of its own: files of the sources that are loaded then.
+# Imports of a script, or of a step, in a process of its own: files of the sources that
+# are loaded then.
 _LOADED = """
 import ast, importlib, json, sys
 from pathlib import Path
@@ -157,18 +227,44 @@ print(json.dumps(sorted(f.relative_to(root).as_posix() for f in files if f.is_re
 
 # Each twelfth has scripts of every kind: data, questions, the loop, proofs.
 @pytest.mark.parametrize(
-    "scripts", [[*SCRIPTS[::12], *STEPS[::8]], pytest.param([*SCRIPTS, *STEPS], marks=pytest.mark.slow)], ids=["some", "all"]
+    "scripts",
+    [
+        [*SCRIPTS[::12], *STEPS[::8]],
+        pytest.param([*SCRIPTS, *STEPS], marks=pytest.mark.slow),
+    ],
+    ids=["some", "all"],
 )
 def test_the_import_closure_is_what_a_script_loads(scripts, unstarted):
     for each in scripts:
         script, _, step = each.partition(":")
-        command = [sys.executable, "-c", _LOADED, str(unstarted.folder), f"{script}:{step}"]
+        command = [
+            sys.executable,
+            "-c",
+            _LOADED,
+            str(unstarted.folder),
+            f"{script}:{step}",
+        ]
         environment = unstarted.command()["env"]
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True, timeout=HUNG_S)
-        found = closure(unstarted.path("workflow/scripts") / script, unstarted.path("src"), *([step] if step else []))
+        done = subprocess.run(
+            command,
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=HUNG_S,
+        )
+        found = closure(
+            unstarted.path("workflow/scripts") / script,
+            unstarted.path("src"),
+            *([step] if step else []),
+        )
         names = [file.relative_to(unstarted.folder).as_posix() for file in found]
         # What reads tables into frames is loaded when it is called.
         later = {"src/elastocal/io/data_frames.py"}
         # A table that a module reads beside it counts as the module does.
-        assert ("src/elastocal/diagnosis/settings.json" in names) == ("src/elastocal/diagnosis/settings.py" in names)
-        assert sorted({*json.loads(done.stdout)} | (later & {*names})) == [name for name in names if name.endswith(".py")], each
+        assert ("src/elastocal/diagnosis/settings.json" in names) == (
+            "src/elastocal/diagnosis/settings.py" in names
+        )
+        assert sorted({*json.loads(done.stdout)} | (later & {*names})) == [
+            name for name in names if name.endswith(".py")
+        ], each

@@ -6,11 +6,20 @@ import pytest
 
 from commit import UNKNOWN, commit_of
 
-WHO = ["-c", "user.name=somebody", "-c", "user.email=somebody@example.org", "-c", "commit.gpgsign=false"]
+WHO = [
+    "-c",
+    "user.name=somebody",
+    "-c",
+    "user.email=somebody@example.org",
+    "-c",
+    "commit.gpgsign=false",
+]
 
 
 def git(folder, *words):
-    return subprocess.run(["git", *WHO, "-C", folder, *words], check=True, capture_output=True, text=True).stdout.strip()
+    return subprocess.run(
+        ["git", *WHO, "-C", folder, *words], check=True, capture_output=True, text=True
+    ).stdout.strip()
 
 
 @pytest.fixture
@@ -23,15 +32,27 @@ def checkout(tmp_path):
     return tmp_path
 
 
-@pytest.mark.parametrize(("edited", "ending"), [("notes.md", ""), ("Snakefile", "-dirty"), ("src/new.py", "-dirty")])
-def test_a_checkout_is_its_commit_with_a_word_behind_it_where_a_source_is_edited_or_new(checkout, edited, ending):
-    assert commit_of(checkout, ["Snakefile", "src"]) == git(checkout, "rev-parse", "HEAD")
+@pytest.mark.parametrize(
+    ("edited", "ending"),
+    [("notes.md", ""), ("Snakefile", "-dirty"), ("src/new.py", "-dirty")],
+)
+def test_a_checkout_is_its_commit_with_a_word_behind_it_where_a_source_is_edited_or_new(
+    checkout, edited, ending
+):
+    assert commit_of(checkout, ["Snakefile", "src"]) == git(
+        checkout, "rev-parse", "HEAD"
+    )
     (checkout / edited).parent.mkdir(exist_ok=True)
     (checkout / edited).write_text("b\n")
-    assert commit_of(checkout, ["Snakefile", "src"]) == git(checkout, "rev-parse", "HEAD") + ending
+    assert (
+        commit_of(checkout, ["Snakefile", "src"])
+        == git(checkout, "rev-parse", "HEAD") + ending
+    )
 
 
-def test_sources_inside_of_another_repository_have_no_commit_nor_have_those_without_one_or_without_git(checkout, monkeypatch):
+def test_sources_inside_of_another_repository_have_no_commit_nor_have_those_without_one_or_without_git(
+    checkout, monkeypatch
+):
     (checkout / "copy").mkdir()
     assert commit_of(checkout / "copy", ["Snakefile"]) == UNKNOWN
     monkeypatch.setenv("PATH", "")

@@ -1,4 +1,5 @@
-"""What every script does around its one call: whatever ends it, the log says why, and bad input is one line."""
+"""What every script does around its one call: whatever ends it, the log says why, and
+bad input is one line."""
 
 import errno
 import hashlib
@@ -17,12 +18,15 @@ from job import run
 
 from elastocal.errors import InputError
 
-INPUT, OUTPUT = "own/a.csv", "results/b.csv"
+INPUT = "own/a.csv"
+OUTPUT = "results/b.csv"
 
 
 def job_of(**files):
     origin = {"commit": "c0ffee", "configuration_sha256": "d16e57", "seed": 1}
-    return SimpleNamespace(**files, rule="copy", wildcards={"robot": "kuka"}, config={"origin": origin})
+    return SimpleNamespace(
+        **files, rule="copy", wildcards={"robot": "kuka"}, config={"origin": origin}
+    )
 
 
 @pytest.fixture
@@ -45,12 +49,16 @@ def copied(job):
 def test_what_a_job_wrote_is_checked_by_the_next(job):
     run(copied, job)
     assert log(job) == "done\n"
-    following = job_of(input=[OUTPUT], output=["results/c.csv"], log=["results/logs/c.log"])
+    following = job_of(
+        input=[OUTPUT], output=["results/c.csv"], log=["results/logs/c.log"]
+    )
     run(copied, following)
     Path(OUTPUT).write_text("2\n")
     with pytest.raises(SystemExit) as ended:
         run(copied, following)
-    assert str(ended.value).startswith(f"{OUTPUT}: found other contents than were written; allowed: ")
+    assert str(ended.value).startswith(
+        f"{OUTPUT}: found other contents than were written; allowed: "
+    )
     assert log(following) == f"{ended.value}\n"
 
 
@@ -62,7 +70,10 @@ def test_what_a_job_wrote_is_checked_by_the_next(job):
             OSError(errno.ENOSPC, "No space left on device"),
             f"{OUTPUT}: found No space left on device; allowed: a file or folder",
         ),
-        (PermissionError(errno.EROFS, "Read-only file system", "results/x"), "results/x: found Read-only file system; "),
+        (
+            PermissionError(errno.EROFS, "Read-only file system", "results/x"),
+            "results/x: found Read-only file system; ",
+        ),
     ],
 )
 def test_bad_input_and_faults_of_the_machine_are_one_line(job, fault, line):
@@ -76,7 +87,10 @@ def test_bad_input_and_faults_of_the_machine_are_one_line(job, fault, line):
     assert ("Traceback" in log(job)) == (not isinstance(fault, InputError))
 
 
-@pytest.mark.parametrize("fault", [ZeroDivisionError("x"), KeyboardInterrupt(), RuntimeError("y"), SystemExit(3)])
+@pytest.mark.parametrize(
+    "fault",
+    [ZeroDivisionError("x"), KeyboardInterrupt(), RuntimeError("y"), SystemExit(3)],
+)
 def test_the_log_holds_the_traceback_of_anything_else(job, fault):
     def step(_):
         raise fault
@@ -86,11 +100,26 @@ def test_the_log_holds_the_traceback_of_anything_else(job, fault):
     assert "Traceback" in log(job) and type(fault).__name__ in log(job).splitlines()[-1]
 
 
-def test_a_job_that_ended_well_leaves_a_record_of_what_it_read_and_wrote_when_and_from_what(job):
+def test_a_job_that_ended_well_leaves_a_record_of_what_it_read_and_wrote_when_and_from_what(
+    job,
+):
     run(copied, job)
-    record = json.loads(Path("results/records/results/b.csv.json").read_text(encoding="utf-8"))
+    record = json.loads(
+        Path("results/records/results/b.csv.json").read_text(encoding="utf-8")
+    )
     digest = hashlib.sha256(b"1\n").hexdigest()
-    assert record["inputs"] == {INPUT: digest} and record["outputs"] == [OUTPUT] and record["files"] == {OUTPUT: digest}
-    assert record["environment"]["numpy"] == np.__version__ and "requirements/run.lock" in record["environment"]
-    assert (record["rule"], record["wildcards"], record["origin"]) == ("copy", {"robot": "kuka"}, job.config["origin"])
+    assert (
+        record["inputs"] == {INPUT: digest}
+        and record["outputs"] == [OUTPUT]
+        and record["files"] == {OUTPUT: digest}
+    )
+    assert (
+        record["environment"]["numpy"] == np.__version__
+        and "requirements/run.lock" in record["environment"]
+    )
+    assert (record["rule"], record["wildcards"], record["origin"]) == (
+        "copy",
+        {"robot": "kuka"},
+        job.config["origin"],
+    )
     assert record["started"] <= record["ended"] and record["ended"].endswith("+00:00")

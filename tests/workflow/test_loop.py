@@ -1,4 +1,5 @@
-"""Closing the loop on a user's own campaign: one command, one folder, and no more work than an edit asks for."""
+"""Closing the loop on a user's own campaign: one command, one folder, and no more work
+than an edit asks for."""
 
 import json
 from pathlib import Path
@@ -25,9 +26,12 @@ OF_THE_STUDY = "data/simulated/kuka/200um/measured.parquet"
 
 @pytest.fixture(scope="module")
 def diagnosed(kuka, tmp_path_factory):
-    """The sources, a campaign of a robot whose joint 3 stands 1 mrad off, its diagnosis, and some data of the study."""
+    """The sources, a campaign of a robot whose joint 3 stands 1 mrad off, its
+    diagnosis, and some data of the study."""
     study = Study.of_sources(tmp_path_factory.mktemp("loop") / "study")
-    made_folder(study.path(CELL), kuka, table=made_table(kuka, "made", offset_of_joint_3=OFFSET))
+    made_folder(
+        study.path(CELL), kuka, table=made_table(kuka, "made", offset_of_joint_3=OFFSET)
+    )
     study.run(OF_THE_STUDY, *OWN)
     return study
 
@@ -44,19 +48,57 @@ def report(study, name):
 
 def test_verdict_has_every_key_of_the_contract(diagnosed):
     verdict = json.loads(report(diagnosed, "verdict.json").read_text(encoding="utf-8"))
-    heldout, settings = verdict["heldout"], verdict["settings"]
-    assert verdict["campaign"] == "made" and verdict["verdict"] == "named" and isinstance(verdict["warnings"], list)
-    told = {"probabilities", "misfit", "untestable", "held", "candidates_tested", "next_experiment", "accuracy", "noise"}
-    assert told <= set(verdict) and verdict["converged"] == {"declared": True, "final": True}
-    assert {"noise_floor_rms_m", "reduction_ci95", "reduction_std_error", "poses", "outside_range"} <= set(heldout)
-    assert heldout["after"]["rms_m"] < min(heldout["before"]["rms_m"], verdict["uncorrected_m"])
+    heldout = verdict["heldout"]
+    settings = verdict["settings"]
+    assert (
+        verdict["campaign"] == "made"
+        and verdict["verdict"] == "named"
+        and isinstance(verdict["warnings"], list)
+    )
+    told = {
+        "probabilities",
+        "misfit",
+        "untestable",
+        "held",
+        "candidates_tested",
+        "next_experiment",
+        "accuracy",
+        "noise",
+    }
+    assert told <= set(verdict) and verdict["converged"] == {
+        "declared": True,
+        "final": True,
+    }
+    assert {
+        "noise_floor_rms_m",
+        "reduction_ci95",
+        "reduction_std_error",
+        "poses",
+        "outside_range",
+    } <= set(heldout)
+    assert heldout["after"]["rms_m"] < min(
+        heldout["before"]["rms_m"], verdict["uncorrected_m"]
+    )
     assert set(map(len, verdict["compliance_urad_per_Nm"].values())) == {6}
-    assert settings["alarm_level"]["value"] == 0.02 and settings["alarm_level"]["reason"]
+    assert (
+        settings["alarm_level"]["value"] == 0.02 and settings["alarm_level"]["reason"]
+    )
     (effect,) = verdict["effects"]
-    assert (effect["name"], effect["joints"], effect["alternatives"]) == ("joint_offset", [3], [])
-    assert 0.9 < effect["probability"] < 1 + 1e-9 and 0 < effect["p_value"] < 0.05 and 0 < effect["heldout_gain"] < 1
+    assert (effect["name"], effect["joints"], effect["alternatives"]) == (
+        "joint_offset",
+        [3],
+        [],
+    )
+    assert (
+        0.9 < effect["probability"] < 1 + 1e-9
+        and 0 < effect["p_value"] < 0.05
+        and 0 < effect["heldout_gain"] < 1
+    )
     (parameter,) = effect["parameters"]
-    assert parameter["unit"] == "rad" and abs(parameter["value"] - OFFSET) < 5 * parameter["std_error"]
+    assert (
+        parameter["unit"] == "rad"
+        and abs(parameter["value"] - OFFSET) < 5 * parameter["std_error"]
+    )
 
 
 # What each needs besides a campaign, and would write.
@@ -67,22 +109,51 @@ COMMANDS = {
 }
 
 
-def test_each_file_behind_a_report_that_was_changed_is_found_by_every_command(cell, monkeypatch):
-    """In one line, before it writes: edited and deleted, and by the commands, in turn."""
-    own = cell.files(f"{CELL}/**/*", "results/**/made/**/*", "reports/**/made/**/*", "results/**/*made*")
+def test_each_file_behind_a_report_that_was_changed_is_found_by_every_command(
+    cell, monkeypatch
+):
+    """In one line, before it writes: edited and deleted, and by the commands, in
+    turn."""
+    own = cell.files(
+        f"{CELL}/**/*",
+        "results/**/made/**/*",
+        "reports/**/made/**/*",
+        "results/**/*made*",
+    )
     # Texts for people are read by no job.
-    files = [name for name in own if cell.path(name).is_file() and not name.startswith(("results/logs/", "results/timings/"))]
-    files = [*sorted({*files}), "src/elastocal/diagnosis/search.py", "config/robots/kuka.yaml"]
-    assert {name.split("/")[0] for name in files} == {"cells", "results", "reports", "src", "config"} and len(files) > 35
+    files = [
+        name
+        for name in own
+        if cell.path(name).is_file()
+        and not name.startswith(("results/logs/", "results/timings/"))
+    ]
+    files = [
+        *sorted({*files}),
+        "src/elastocal/diagnosis/search.py",
+        "config/robots/kuka.yaml",
+    ]
+    assert {name.split("/")[0] for name in files} == {
+        "cells",
+        "results",
+        "reports",
+        "src",
+        "config",
+    } and len(files) > 35
     monkeypatch.chdir(cell.folder)
     assert diagnosed_campaign(Path(CELL)).name == "made"
     for number, name in enumerate(files):
         path = cell.path(name)
         before = path.read_bytes()
-        path.write_bytes(before[:-1] + bytes([before[-1] ^ 1])) if number % 2 else path.unlink()
+        path.write_bytes(
+            before[:-1] + bytes([before[-1] ^ 1])
+        ) if number % 2 else path.unlink()
         command = [*COMMANDS][number // 2 % len(COMMANDS)]
         error = CliRunner().invoke(app, [command, CELL, *COMMANDS[command]]).exception
-        assert isinstance(error, InputError) and len(str(error).splitlines()) == 1, (command, name, error)
+        assert isinstance(error, InputError) and len(str(error).splitlines()) == 1, (
+            command,
+            name,
+            error,
+        )
         assert cell.files("out", "targets.csv") == []
         path.write_bytes(before)
     assert cell.planned(OF_THE_STUDY, *OWN) == set()
@@ -91,14 +162,25 @@ def test_each_file_behind_a_report_that_was_changed_is_found_by_every_command(ce
 def test_no_step_before_the_judgement_reads_held_out_poses(diagnosed):
     inputs = diagnosed.inputs_by_rule(*OWN)
     assert set(STEPS) <= set(inputs)
-    readers = {rule for rule, files in inputs.items() if any("held_out.parquet" in file for file in files)}
+    readers = {
+        rule
+        for rule, files in inputs.items()
+        if any("held_out.parquet" in file for file in files)
+    }
     # The target asks whether each file is there, and reads none.
     assert readers - {"diagnose"} == {"judge_campaign"}
     # Nor the file in which they stand with all others.
-    whole = {rule for rule, files in inputs.items() if any(file.startswith(CELL) for file in files)}
+    whole = {
+        rule
+        for rule, files in inputs.items()
+        if any(file.startswith(CELL) for file in files)
+    }
     assert whole == {"read_campaign"}
     # What the judgement makes goes to reports, to no step before it.
-    judged = {f"reports/loop/made/{name}" for name in ("verdict.json", "before_after.csv", "residuals.parquet")}
+    judged = {
+        f"reports/loop/made/{name}"
+        for name in ("verdict.json", "before_after.csv", "residuals.parquet")
+    }
     for rule in STEPS[: STEPS.index("judge_campaign")]:
         assert not inputs[rule] & judged
 
@@ -109,7 +191,11 @@ def rules_of(planned):
 
 # Modules edited at once, the rules that run again, and those that do not.
 EDITS = {
-    "figures of the study and style of all figures": (["figures/study", "figures/style"], set(), set(STEPS)),
+    "figures of the study and style of all figures": (
+        ["figures/study", "figures/style"],
+        set(),
+        set(STEPS),
+    ),
     "the judgement": (["diagnosis/judge"], set(STEPS[2:]), set(STEPS[:2])),
     "an effect": (["effects/gravity"], set(STEPS[1:]), {"simulate", "measure"}),
     "a fault": (["data_checks/faults"], set(STEPS[1:]), set(STEPS[:1])),
@@ -128,7 +214,9 @@ def test_edit_reruns_what_depends_on_it_of(edit, cell):
 def test_a_campaign_is_one_however_it_is_spelled(cell):
     cell.path("link").symlink_to(cell.path(CELL))
     for spelled in (cell.path(CELL), f"{CELL}/", f"./cells/../{CELL}", "link"):
-        assert cell.planned("diagnose", "--config", f"campaign={spelled}") <= {("diagnose",)}, spelled
+        assert cell.planned("diagnose", "--config", f"campaign={spelled}") <= {
+            ("diagnose",)
+        }, spelled
 
 
 def test_a_broken_campaign_ends_with_one_line(unstarted, kuka):
@@ -139,12 +227,28 @@ def test_a_broken_campaign_ends_with_one_line(unstarted, kuka):
     table.to_csv(file, index=False, na_rep="nan")
     ended = unstarted.snakemake("-j2", *OWN)
     assert ended.returncode != 0
-    lines = [line for line in ended.stderr.splitlines() if line.startswith(f"{CELL}/measurements.csv")]
+    lines = [
+        line
+        for line in ended.stderr.splitlines()
+        if line.startswith(f"{CELL}/measurements.csv")
+    ]
     # By the job and, last of all, by the run.
-    assert len(lines) == 2 and lines[0] == lines[1] == ended.stderr.splitlines()[-1], ended.stderr
-    assert all(word in lines[0] for word in ("line 9", "column y", "nan", "; allowed: ")) and "Traceback" not in ended.stderr
-    log = unstarted.path("results/logs/read_campaign/made.log").read_text(encoding="utf-8").splitlines()
-    assert log == lines[:1] and unstarted.files("results/loop/**/*.*", "reports/loop/**/*.*") == []
+    assert len(lines) == 2 and lines[0] == lines[1] == ended.stderr.splitlines()[-1], (
+        ended.stderr
+    )
+    assert (
+        all(word in lines[0] for word in ("line 9", "column y", "nan", "; allowed: "))
+        and "Traceback" not in ended.stderr
+    )
+    log = (
+        unstarted.path("results/logs/read_campaign/made.log")
+        .read_text(encoding="utf-8")
+        .splitlines()
+    )
+    assert (
+        log == lines[:1]
+        and unstarted.files("results/loop/**/*.*", "reports/loop/**/*.*") == []
+    )
 
 
 SAG = '''"""A sag of joint 2 that no other effect has."""
@@ -161,27 +265,56 @@ def sag(own, sites):
 '''
 
 
-def test_a_new_effect_is_a_module_and_a_new_campaign_a_file_that_is_read_again_with_its_robot(cell):
+def test_a_new_effect_is_a_module_and_a_new_campaign_a_file_that_is_read_again_with_its_robot(
+    cell,
+):
     """Of the robot that is simulated and of the one that is declared, which are two."""
     cell.path("src/elastocal/effects/sag.py").write_text(SAG, encoding="utf-8")
-    known = yaml.safe_load(cell.path("config/campaigns/kuka_extended_end_effector.yaml").read_text(encoding="utf-8"))
-    cell.path("config/campaigns/tiny.yaml").write_text(yaml.safe_dump(known | {"poses": 8}), encoding="utf-8")
+    known = yaml.safe_load(
+        cell.path("config/campaigns/kuka_extended_end_effector.yaml").read_text(
+            encoding="utf-8"
+        )
+    )
+    cell.path("config/campaigns/tiny.yaml").write_text(
+        yaml.safe_dump(known | {"poses": 8}), encoding="utf-8"
+    )
     cell.configure({"loop": {"campaigns": ["tiny"]}})
-    candidates, training = "reports/loop/made/candidates.csv", "results/loop/tiny/training.parquet"
+    candidates = "reports/loop/made/candidates.csv"
+    training = "results/loop/tiny/training.parquet"
     cell.run(candidates, training, *OWN[1:])
     assert "\nsag@2," in cell.path(candidates).read_text(encoding="utf-8")
     measurements = pq.ParquetFile(cell.path(training)).read()
     assert set(measurements.column("pose").to_pylist()) < set(range(8))
-    planned = cell.planned("reports/loop/tiny/verdict.json", "reports/loop/campaigns.csv")
-    assert {job for job in planned if job[0] in STEPS} == {(step, "tiny") for step in STEPS[1:]}
-    cell.replace("config/robots/kuka.yaml", "compliance_urad_per_Nm: [", "compliance_urad_per_Nm: [1")
+    planned = cell.planned(
+        "reports/loop/tiny/verdict.json", "reports/loop/campaigns.csv"
+    )
+    assert {job for job in planned if job[0] in STEPS} == {
+        (step, "tiny") for step in STEPS[1:]
+    }
+    cell.replace(
+        "config/robots/kuka.yaml",
+        "compliance_urad_per_Nm: [",
+        "compliance_urad_per_Nm: [1",
+    )
     assert cell.planned(training) == {("read_campaign", "tiny")}
 
 
-def test_a_campaign_waits_for_the_one_that_tests_its_test_and_two_may_test_each_other(unstarted):
+def test_a_campaign_waits_for_the_one_that_tests_its_test_and_two_may_test_each_other(
+    unstarted,
+):
     """Which reading the test looks for: ur5_random is tested on ur5_grid."""
-    unstarted.configure({"loop": {"measured": ["ur5_grid_on_random", "ur5_random", "ur5_grid"]}})
+    unstarted.configure(
+        {"loop": {"measured": ["ur5_grid_on_random", "ur5_random", "ur5_grid"]}}
+    )
     campaigns = "ur5_grid_on_random", "fanuc_cpa"
-    planned = unstarted.planned(*(f"results/loop/{name}/training.parquet" for name in campaigns))
+    planned = unstarted.planned(
+        *(f"results/loop/{name}/training.parquet" for name in campaigns)
+    )
     imported = {job[1] for job in planned if job[0] == "import_campaign"}
-    assert imported == {"ur5_grid_on_random", "ur5_random", "ur5_grid", "fanuc_cpa", "fanuc_static"}
+    assert imported == {
+        "ur5_grid_on_random",
+        "ur5_random",
+        "ur5_grid",
+        "fanuc_cpa",
+        "fanuc_static",
+    }

@@ -1,4 +1,5 @@
-"""While it works Snakemake says one line a job; at the end, reports and verdicts, or last of all why a job failed."""
+"""While it works Snakemake says one line a job; at the end, reports and verdicts, or
+last of all why a job failed."""
 
 import re
 from collections import Counter
@@ -13,7 +14,9 @@ def test_a_job_is_one_line_without_lists_of_files(finished_paper):
     finished_paper.path(IDENTIFIED).unlink()
     lines = finished_paper.run(IDENTIFIED).stderr.splitlines()
     assert "1 job" in lines
-    assert [line for line in lines if line.startswith("1 of 1: identify")] == ["1 of 1: identify kuka 200 6DoF"]
+    assert [line for line in lines if line.startswith("1 of 1: identify")] == [
+        "1 of 1: identify kuka 200 6DoF"
+    ]
     assert max(map(len, lines)) < 200
 
 
@@ -22,7 +25,10 @@ def test_a_dry_run_is_a_summary_and_every_job_is_listed_on_request(unstarted):
     assert done.returncode == 0, done.stderr
     counts = dict(re.findall(r"^(\w+) +(\d+)$", done.stdout, re.MULTILINE))
     jobs = Counter(rule for rule, *_ in unstarted.planned(PAPER))
-    assert {rule: int(count) for rule, count in counts.items()} == {**jobs, "total": sum(jobs.values())}
+    assert {rule: int(count) for rule, count in counts.items()} == {
+        **jobs,
+        "total": sum(jobs.values()),
+    }
     assert "input:" not in done.stdout
 
 
@@ -36,9 +42,13 @@ def test_the_log_of_a_script_that_fails_while_it_imports_says_why(finished_paper
     assert log[0].startswith("Traceback") and log[-1] == last
 
 
-def test_a_script_that_is_ended_before_it_begins_has_no_log_and_is_said_to_have_none(finished_paper):
+def test_a_script_that_is_ended_before_it_begins_has_no_log_and_is_said_to_have_none(
+    finished_paper,
+):
     finished_paper.replace(
-        "workflow/scripts/typeset_table.py", "from job import Job, origin_of, run\n", "import os\n\nos._exit(9)\n"
+        "workflow/scripts/typeset_table.py",
+        "from job import Job, origin_of, run\n",
+        "import os\n\nos._exit(9)\n",
     )
     ended = finished_paper.snakemake("-j1", "reports/tables/table1.md")
     found = "typeset_table: found an end before its log began (results/logs/typeset_table/table1.log); allowed: "

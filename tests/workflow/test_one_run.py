@@ -1,4 +1,5 @@
-"""Before any job: locks of killed runs are taken away, those of living ones stay, and a disk that is full is said."""
+"""Before any job: locks of killed runs are taken away, those of living ones stay, and a
+disk that is full is said."""
 
 import fcntl
 import subprocess
@@ -26,13 +27,20 @@ def folder(tmp_path):
 
 
 def holding(path):
-    process = subprocess.Popen([sys.executable, "-c", _HOLD, path], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        [sys.executable, "-c", _HOLD, path],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
     assert process.stdout.readline() == "held\n"
     return process
 
 
 @pytest.mark.parametrize("living", [False, True])
-def test_locks_of_a_run_that_was_killed_are_taken_away_and_those_of_a_living_one_stay(folder, living):
+def test_locks_of_a_run_that_was_killed_are_taken_away_and_those_of_a_living_one_stay(
+    folder, living
+):
     run = holding(folder / RUNS)
     if not living:
         run.kill()
@@ -44,11 +52,19 @@ def test_locks_of_a_run_that_was_killed_are_taken_away_and_those_of_a_living_one
 
 def test_jobs_that_a_killed_run_left_behind_are_waited_for(folder, capfd, monkeypatch):
     """The job ends once it is waited for; until then the locks stay."""
-    job, flock, seen = holding(folder / JOBS), fcntl.flock, []
+    job = holding(folder / JOBS)
+    flock = fcntl.flock
+    seen = []
 
     def waited(file, operation):
         if file.name == str(folder / JOBS) and operation == fcntl.LOCK_EX:
-            seen.append((len(list((folder / "locks").iterdir())), job.poll(), capfd.readouterr().out))
+            seen.append(
+                (
+                    len(list((folder / "locks").iterdir())),
+                    job.poll(),
+                    capfd.readouterr().out,
+                )
+            )
             job.kill()
         flock(file, operation)
 

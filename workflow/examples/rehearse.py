@@ -1,12 +1,15 @@
-"""Rehearse a calibration: a physical robot in simulation, with hidden defects, stands in for a real one.
+"""Rehearse a calibration: a physical robot in simulation, with hidden defects, stands
+in for a real one.
 
     python workflow/examples/rehearse.py measure FOLDER                  fills the measurement sheet of a campaign
     python workflow/examples/rehearse.py path FOLDER PATH.csv            writes a path of 50 poses, as for milling
     python workflow/examples/rehearse.py move FOLDER PATH.csv OUT.csv    goes along it, uncorrected and corrected
 
-FOLDER is the campaign; PATH.csv has the wanted poses and OUT.csv the joint targets of `elastocal correct`. The robot follows
-from the robot file of the campaign, --seed and --effect, and is the same in all three. Errors of `move` are what
-the tracker reads, in the campaign's frame of the base; its noise and the repeatability alone leave those of the last line.
+FOLDER is the campaign; PATH.csv has the wanted poses and OUT.csv the joint targets of
+`elastocal correct`. The robot follows from the robot file of the campaign, --seed and
+--effect, and is the same in all three. Errors of `move` are what the tracker reads, in
+the campaign's frame of the base; its noise and the repeatability alone leave those of
+the last line.
 """
 
 import argparse
@@ -37,20 +40,26 @@ def measure(given, robot, document):
 
 def path(given, robot, document):
     declared = read_robot(read_descriptions(given.folder, ROBOTS)[1])
-    print(f"{write_milling_path(given.path, declared, robot, given.seed)} poses in {given.path}")
+    print(
+        f"{write_milling_path(given.path, declared, robot, given.seed)} poses in {given.path}"
+    )
 
 
 def move(given, robot, document):
     missed = measured_errors(given.path, given.targets, robot, given.seed)
     rms = {name: 1e3 * np.sqrt((off**2).mean()) for name, off in missed.items()}
     for name, off in missed.items():
-        print(f"{name:12} position error: RMS {rms[name]:.3f} mm, largest {1e3 * off.max():.3f} mm")
+        print(
+            f"{name:12} position error: RMS {rms[name]:.3f} mm, largest {1e3 * off.max():.3f} mm"
+        )
     if rms["corrected"] >= rms["uncorrected"]:
         sys.exit("the corrected robot is no better")
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     what = parser.add_subparsers(required=True)
     for run in (measure, path, move):
         command = what.add_parser(run.__name__)
@@ -60,9 +69,20 @@ if __name__ == "__main__":
         if run is move:
             command.add_argument("targets", type=Path)
         command.add_argument("--seed", type=int, default=1)
-        command.add_argument("--effect", action="append", default=[], help="a hidden effect; one is drawn without")
-        command.add_argument("--misplaced-base", action="store_true", help="the tracker's base frame is not quite the robot's")
-        command.add_argument("--reveal", action="store_true", help="say what was hidden")
+        command.add_argument(
+            "--effect",
+            action="append",
+            default=[],
+            help="a hidden effect; one is drawn without",
+        )
+        command.add_argument(
+            "--misplaced-base",
+            action="store_true",
+            help="the tracker's base frame is not quite the robot's",
+        )
+        command.add_argument(
+            "--reveal", action="store_true", help="say what was hidden"
+        )
         command.set_defaults(run=run)
     given = parser.parse_args()
     try:

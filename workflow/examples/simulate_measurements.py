@@ -1,7 +1,9 @@
-"""Fill the folder of a campaign with measurements of a simulated robot, to see the format and to try the loop without one.
+"""Fill the folder of a campaign with measurements of a simulated robot, to see the
+format and to try the loop without one.
 
-Usage: python workflow/examples/simulate_measurements.py FOLDER ROBOT_FILE. FOLDER has a campaign.yaml that measures poses in
-the base frame; ROBOT_FILE is the robot that is measured, which may have more than the one that the campaign declares.
+Usage: python workflow/examples/simulate_measurements.py FOLDER ROBOT_FILE. FOLDER has a
+campaign.yaml that measures poses in the base frame; ROBOT_FILE is the robot that is
+measured, which may have more than the one that the campaign declares.
 """
 
 import argparse
@@ -20,8 +22,20 @@ LADDER = (0.0, 1.0, 0.5, -0.5, -1.0)
 def measure(folder: Path, robot_file: Path, seed: int) -> None:
     document, _ = read_descriptions(folder, Path("config/robots"))
     robot = read_robot(robot_file)
-    targets = targets_from(document["targets"], robot.chain, (folder / DOCUMENT).as_posix())
-    plan = Plan(tuple(target.point for target in targets), 30, 1000.0, LADDER, (0.0, 0.5, 0.0), 4, 10, 6e-5, 6e-5)
+    targets = targets_from(
+        document["targets"], robot.chain, (folder / DOCUMENT).as_posix()
+    )
+    plan = Plan(
+        tuple(target.point for target in targets),
+        30,
+        1000.0,
+        LADDER,
+        (0.0, 0.5, 0.0),
+        4,
+        10,
+        6e-5,
+        6e-5,
+    )
     table = draw_measurements(robot, plan, seed, document["campaign"])
     names = {target.point: target.name for target in targets}
     table["target"] = [names[point] for point in table["target"]]

@@ -12,9 +12,13 @@ if config["blind"] not in PLAN["sizes"]:
     sys.exit(f"config.yaml: blind: found {config['blind']!r}; allowed: {', '.join(PLAN['sizes'])}")
 BLIND_SIZE = PLAN["sizes"][config["blind"]]
 # All that the cases follow from: another target or another size makes none anew.
-CASES = {key: PLAN[key] for key in ("tuned", "absent", "settings", "limit")} | {"sizes": {config["blind"]: BLIND_SIZE}}
+CASES = {key: PLAN[key] for key in ("tuned", "absent", "settings", "limit")} | {
+    "sizes": {config["blind"]: BLIND_SIZE}
+}
 BLIND = [f"{config['blind']}_{number + 1}" for number in range(BLIND_SIZE["blocks"])]
-BLIND_ROBOTS = list(dict.fromkeys(robot for part in BLIND_SIZE["parts"] for robot in part["robots"]))
+BLIND_ROBOTS = list(
+    dict.fromkeys(robot for part in BLIND_SIZE["parts"] for robot in part["robots"])
+)
 
 
 rule make_cases:
@@ -85,10 +89,18 @@ rule score_cases:
         cases="reports/blind/cases.csv",
         intervals="reports/blind/intervals.csv",
         summary=shown(
-            "reports/blind/summary.csv", "blind_targets", "Blind proof", shows="Every figure beside its target", kind="table"
+            "reports/blind/summary.csv",
+            "blind_targets",
+            "Blind proof",
+            shows="Every figure beside its target",
+            kind="table",
         ),
         rates=shown(
-            "reports/blind/rates.csv", "blind_power", "Blind proof", shows="Rates by group, truth and size", kind="table"
+            "reports/blind/rates.csv",
+            "blind_power",
+            "Blind proof",
+            shows="Rates by group, truth and size",
+            kind="table",
         ),
         reliability="reports/blind/reliability.csv",
     params:
@@ -106,7 +118,11 @@ rule draw_blind:
         rates=rules.score_cases.output.rates,
     output:
         targets=shown(
-            "reports/blind/figures/targets.png", "blind_targets", "Blind proof", shows="Figures against targets", kind="figure"
+            "reports/blind/figures/targets.png",
+            "blind_targets",
+            "Blind proof",
+            shows="Figures against targets",
+            kind="figure",
         ),
         reliability=shown(
             "reports/blind/figures/reliability.png",
@@ -116,7 +132,11 @@ rule draw_blind:
             kind="figure",
         ),
         power=shown(
-            "reports/blind/figures/power.png", "blind_power", "Blind proof", shows="What is detected by size", kind="figure"
+            "reports/blind/figures/power.png",
+            "blind_power",
+            "Blind proof",
+            shows="What is detected by size",
+            kind="figure",
         ),
         targets_pdf="reports/blind/figures/targets.pdf",
         reliability_pdf="reports/blind/figures/reliability.pdf",
@@ -147,7 +167,9 @@ rule blind_pictures:
     """Pictures and the table of docs/, from a finished proof."""
     input:
         page=rules.write_blind_page.output.page,
-        figures=expand("reports/blind/figures/{figure}.png", figure=["targets", "reliability", "power"]),
+        figures=expand(
+            "reports/blind/figures/{figure}.png", figure=["targets", "reliability", "power"]
+        ),
     output:
         page="docs/blind_tables.md",
         figures=expand("docs/blind_{figure}.png", figure=["targets", "reliability", "power"]),

@@ -79,7 +79,11 @@ rule state_accuracy:
 
 rule tabulate_coverage:
     input:
-        stated=expand(rules.state_accuracy.output.stated, robot=CLOSED_LOOP["robots"], frame=["base", "tracker"]),
+        stated=expand(
+            rules.state_accuracy.output.stated,
+            robot=CLOSED_LOOP["robots"],
+            frame=["base", "tracker"],
+        ),
     output:
         cases="reports/closed_loop/stated.csv",
         coverage="reports/closed_loop/coverage.csv",

@@ -46,7 +46,12 @@ BOX = placed(ROOT / "data" / "measured")
 
 def shown(file, caption, category, **labels):
     """An output that `snakemake --report` shows; its caption is a page of workflow/report."""
-    return report(file, caption=str(ROOT / "workflow" / "report" / f"{caption}.rst"), category=category, labels=labels)
+    return report(
+        file,
+        caption=str(ROOT / "workflow" / "report" / f"{caption}.rst"),
+        category=category,
+        labels=labels,
+    )
 
 
 # Categories of the report.
@@ -68,12 +73,18 @@ REFERENCE = {"reference": f"{CONFIG}/paper/reference.csv"}
 gc.freeze()
 
 # What --config says; Snakemake takes numbers inside of a mapping for texts.
-CHANGES = [entry for entry in workflow.config_settings.config_args or () if not entry.startswith("campaign=")]
+CHANGES = [
+    entry
+    for entry in workflow.config_settings.config_args or ()
+    if not entry.startswith("campaign=")
+]
 
 try:
     config.update(override(config, CHANGES))
     STUDY = check_study(
-        config, CONFIG, " with --config ".join(["config.yaml", *(entry.partition("=")[0] for entry in CHANGES)])
+        config,
+        CONFIG,
+        " with --config ".join(["config.yaml", *(entry.partition("=")[0] for entry in CHANGES)]),
     )
     SOURCES = campaign_sources(config, CONFIG)
     # Name and folder of the user's own campaign, if there is one.
@@ -93,7 +104,18 @@ RESOLVED = {
 }
 # Scripts find it in the configuration, an edit of which reruns nothing by itself: a new commit makes no figure anew.
 ORIGIN = Origin(
-    commit_of(ROOT, ["Snakefile", "config.yaml", "config", "profiles", "src", "workflow", "requirements/run.lock"]),
+    commit_of(
+        ROOT,
+        [
+            "Snakefile",
+            "config.yaml",
+            "config",
+            "profiles",
+            "src",
+            "workflow",
+            "requirements/run.lock",
+        ],
+    ),
     configuration_sha256(RESOLVED),
     config["seed"],
 )
@@ -112,7 +134,16 @@ STUDY_SIZE = {
 }
 # Keys of config.yaml that the files of study, loop and league depend on, and so their audit.
 AUDITED = [
-    *("seed", "robots", "strategies", "noise_um", "data_sets", "configurations", "test_configurations", "loading"),
+    *(
+        "seed",
+        "robots",
+        "strategies",
+        "noise_um",
+        "data_sets",
+        "configurations",
+        "test_configurations",
+        "loading",
+    ),
     *("interpretations", "evaluation", "tables", "questions", "loop", "league"),
 ]
 # Files that jobs make.
@@ -140,7 +171,11 @@ def draw_panel(panels, function, caption, words, limit):
         "metrics": lambda wildcards: cells("metrics", panels[wildcards.panel], TABLE_NOISE),
         "printed": f"{CONFIG}/paper/reference.csv",
     }
-    return (function, "figure5{panel}", caption, PAPER, f"Figure 5{{panel}}: {words}"), tables, settings
+    return (
+        (function, "figure5{panel}", caption, PAPER, f"Figure 5{{panel}}: {words}"),
+        tables,
+        settings,
+    )
 
 
 def sources(step):
@@ -148,7 +183,9 @@ def sources(step):
 
     Their dates count for nothing: `watch_sources` has their digests. The parameter `step` of a rule names the same function.
     """
-    script, modules = (step, ()) if step.endswith(".py") else ("run_step.py", [step.rpartition(".")[0]])
+    script, modules = (
+        (step, ()) if step.endswith(".py") else ("run_step.py", [step.rpartition(".")[0]])
+    )
     path = ROOT / "workflow" / "scripts" / script
     try:
         files = [path, *closure(path, PACKAGES, *modules)]
@@ -171,7 +208,12 @@ def remember_checksums():
 
     async def checksum(file, *asked, **settings):
         status = os.stat(file) if os.path.exists(file) else None
-        key = (str(file), status and (status.st_ino, status.st_mtime_ns, status.st_size), asked, *settings.items())
+        key = (
+            str(file),
+            status and (status.st_ino, status.st_mtime_ns, status.st_size),
+            asked,
+            *settings.items(),
+        )
         if key not in known:
             known[key] = await digest(file, *asked, **settings)
         return known[key]
@@ -185,7 +227,9 @@ def complete_rules():
         if each.norun:
             continue
         each.log_modifier = each.benchmark_modifier = each.input_modifier = each.output_modifier
-        place = Path(each.name, *(f"{{{name}}}" for name in re.findall(r"{(\w+)", each.output[0]))).as_posix()
+        place = Path(
+            each.name, *(f"{{{name}}}" for name in re.findall(r"{(\w+)", each.output[0]))
+        ).as_posix()
         if not each.log:
             each.set_log(f"results/logs/{place}.log")
         if not each.benchmark:
@@ -201,7 +245,11 @@ def watch_sources():
     """
     environment_sha256 = configuration_sha256(environment(ROOT))
     watched = {
-        each: [file for file in each.input if isinstance(file, str) and not MADE.match(file) and Path(file).is_file()]
+        each: [
+            file
+            for file in each.input
+            if isinstance(file, str) and not MADE.match(file) and Path(file).is_file()
+        ]
         for each in workflow.rules
         if "sources" in each.input.keys()
     }
@@ -236,7 +284,9 @@ def strategy_document(wildcards):
 
 def study_in_memory(**size):
     """What a script draws the study of a robot from: the robot, the seed, how the paper is read, the study's size."""
-    read = {key: INTERPRETATIONS[key] for key in ("wrench_at", "average")} | {"rows": rows_read(INTERPRETATIONS["measured"])}
+    read = {key: INTERPRETATIONS[key] for key in ("wrench_at", "average")} | {
+        "rows": rows_read(INTERPRETATIONS["measured"])
+    }
     return lambda wildcards: {
         "robot": robot_document(wildcards),
         "seed": config["seed"],
@@ -249,7 +299,12 @@ def study_in_memory(**size):
 
 def cells(kind, robots, noise, strategies=config["strategies"]):
     """Results of one kind for robots, noise levels and strategies."""
-    return expand(f"results/{kind}/{{robot}}/{{noise}}um/{{strategy}}.parquet", robot=robots, noise=noise, strategy=strategies)
+    return expand(
+        f"results/{kind}/{{robot}}/{{noise}}um/{{strategy}}.parquet",
+        robot=robots,
+        noise=noise,
+        strategy=strategies,
+    )
 
 
 def all_cells(robots):
@@ -271,9 +326,13 @@ def files_of_campaign(campaign):
     source = SOURCES[campaign]
     # Who reads the test looks whether the campaign is there that tests this one in turn; two may test each other.
     names = [campaign]
-    while (other := SOURCES[names[-1]].get("holdout", {}).get("campaign")) and Path(other).name not in names:
+    while (other := SOURCES[names[-1]].get("holdout", {}).get("campaign")) and Path(
+        other
+    ).name not in names:
         names.append(Path(other).name)
-    files = expand("data/campaigns/{name}/{file}", name=names, file=["campaign.yaml", "measurements.parquet"])
+    files = expand(
+        "data/campaigns/{name}/{file}", name=names, file=["campaign.yaml", "measurements.parquet"]
+    )
     # An import has its robots among its inputs; a simulation does not have the robot that it declares.
     declared = [source["declared_robot"]] if source["source"] == "simulated" else []
     return files + expand(f"{CONFIG}/robots/{{robot}}.yaml", robot=declared)
@@ -281,7 +340,9 @@ def files_of_campaign(campaign):
 
 def robots_of_import(wildcards):
     """Files of the robots that an importer reads or names."""
-    source = importer(SOURCES[wildcards.campaign]["importer"], CONFIG, f"campaign {wildcards.campaign}")
+    source = importer(
+        SOURCES[wildcards.campaign]["importer"], CONFIG, f"campaign {wildcards.campaign}"
+    )
     return expand(f"{CONFIG}/robots/{{robot}}.yaml", robot=source.robots)
 
 
@@ -291,7 +352,9 @@ def loop_reports(campaigns):
 
 def reports_of_own(wildcards):
     if not OWN:
-        sys.exit("diagnose: found no campaign; allowed: snakemake -j2 diagnose --config campaign=FOLDER")
+        sys.exit(
+            "diagnose: found no campaign; allowed: snakemake -j2 diagnose --config campaign=FOLDER"
+        )
     return files_behind(loop_reports(OWN))
 
 
@@ -307,5 +370,14 @@ def folds_of_one(campaigns):
 def audited(wildcards):
     """What is audited; asked for before any job of the run begins, so that nobody waits for results that cannot be audited."""
     if find_spec("pinocchio") is None:
-        sys.exit(str(InputError("audit", "pinocchio", "no such package", "the extra audit: make audit, or pip install pin")))
+        sys.exit(
+            str(
+                InputError(
+                    "audit",
+                    "pinocchio",
+                    "no such package",
+                    "the extra audit: make audit, or pip install pin",
+                )
+            )
+        )
     return files_behind(rules.all.input)

@@ -6,12 +6,18 @@ Needs results/ and reports/tables/. Writes reports/figures/*.pdf and *.png.
 TITLES = {name: STUDY.robots[name]["name"] for name in config["robots"]}
 REDUCED_TITLES = {name: TITLES[name] for name in REDUCED}
 # Figure 2 shows the first robot and has one more for each further one; Figure 3 shows the extended robot where there is one.
-SCHEME_ROBOTS = dict(zip(["figure2", *(f"figure2_{name}" for name in REDUCED[1:])], REDUCED, strict=True))
+SCHEME_ROBOTS = dict(
+    zip(["figure2", *(f"figure2_{name}" for name in REDUCED[1:])], REDUCED, strict=True)
+)
 SCHEME_ROBOTS |= {"figure3": (EXTENDED or REDUCED)[-1]}
 # Figures 5a and 5c show the first robot, 5b and 5d the second, as in the paper.
 STIFFNESS_PANELS = dict(zip("ab", REDUCED, strict=False))
 DEVIATION_PANELS = dict(zip("cd", REDUCED, strict=False))
-PAPER_FIGURES = [*SCHEME_ROBOTS, "figure4", *(f"figure5{panel}" for panel in (STIFFNESS_PANELS | DEVIATION_PANELS))]
+PAPER_FIGURES = [
+    *SCHEME_ROBOTS,
+    "figure4",
+    *(f"figure5{panel}" for panel in (STIFFNESS_PANELS | DEVIATION_PANELS)),
+]
 FIGURES = [*PAPER_FIGURES, "scores_against_paper", "ladder", "designs"]
 
 # Each other figure: its function, file, caption, category, what it shows, tables, settings.
@@ -22,7 +28,13 @@ DRAWN = {
         {"strategy": NAMES[CLASSICAL], "titles": REDUCED_TITLES},
     ),
     "draw_scores": (
-        ("scores", "scores_against_paper", "scores_against_paper", PAPER, "Table 4 against further studies"),
+        (
+            "scores",
+            "scores_against_paper",
+            "scores_against_paper",
+            PAPER,
+            "Table 4 against further studies",
+        ),
         {"comparison": rules.compare_with_studies.output.table},
         {"titles": REDUCED_TITLES},
     ),
@@ -40,7 +52,12 @@ DRAWN = {
 # Figures 5a and 5b, and 5c and 5d: their panels, function, caption, words, and the limit that they show.
 PANELS = {
     "draw_stiffness_errors": (
-        *(STIFFNESS_PANELS, "stiffness_errors", "figure5_stiffness", "stiffness errors of all strategies"),
+        *(
+            STIFFNESS_PANELS,
+            "stiffness_errors",
+            "figure5_stiffness",
+            "stiffness errors of all strategies",
+        ),
         {"limit_percent": config["tables"]["k_sigma_limit_percent"]},
     ),
     "draw_deviations": (
@@ -87,6 +104,8 @@ rule draw_scheme:
         scheme="|".join(SCHEME_ROBOTS),
     params:
         robot=lambda wildcards: STUDY.robots[SCHEME_ROBOTS[wildcards.scheme]],
-        scheme=lambda wildcards: "spring_scheme" if wildcards.scheme == "figure3" else "kinematic_scheme",
+        scheme=lambda wildcards: (
+            "spring_scheme" if wildcards.scheme == "figure3" else "kinematic_scheme"
+        ),
     script:
         "../scripts/draw_scheme.py"

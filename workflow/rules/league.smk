@@ -63,21 +63,38 @@ rule enter_league:
 
 rule tabulate_league:
     input:
-        entries=lambda wildcards: of_rounds(rules.enter_league.output.entries, entry_keys(wildcards.league)),
+        entries=lambda wildcards: of_rounds(
+            rules.enter_league.output.entries, entry_keys(wildcards.league)
+        ),
         mechanisms=lambda wildcards: of_rounds(
-            rules.diagnose_league_folds.output.mechanisms, [key for key in rounds_of(wildcards.league) if key[1] == "random"]
+            rules.diagnose_league_folds.output.mechanisms,
+            [key for key in rounds_of(wildcards.league) if key[1] == "random"],
         ),
     output:
-        league=shown("reports/league/{league}/league.csv", "league", "League", shows="Errors of all methods", kind="table"),
+        league=shown(
+            "reports/league/{league}/league.csv",
+            "league",
+            "League",
+            shows="Errors of all methods",
+            kind="table",
+        ),
         mechanisms="reports/league/{league}/mechanisms.csv",
         page="reports/league/{league}/league.md",
         picture_pdf="reports/league/{league}/league.pdf",
         picture_png=shown(
-            "reports/league/{league}/league.png", "league", "League", shows="Methods against one another", kind="figure"
+            "reports/league/{league}/league.png",
+            "league",
+            "League",
+            shows="Methods against one another",
+            kind="figure",
         ),
         mechanisms_pdf="reports/league/{league}/mechanisms.pdf",
         mechanisms_png=shown(
-            "reports/league/{league}/mechanisms.png", "league_mechanisms", "League", shows="Mechanisms found", kind="figure"
+            "reports/league/{league}/mechanisms.png",
+            "league_mechanisms",
+            "League",
+            shows="Mechanisms found",
+            kind="figure",
         ),
     params:
         step="elastocal_proof.figures.league.tabulate_league",

@@ -9,7 +9,9 @@ def missing_data(names):
     """A file that is missing of each data set of which one is."""
     sources = {name: SOURCES[name] for name in names if SOURCES[name]["source"] == "public"}
     files = {
-        name: find_missing(source["files"], importer(source["importer"], CONFIG, name).files, "data/public", BOX)
+        name: find_missing(
+            source["files"], importer(source["importer"], CONFIG, name).files, "data/public", BOX
+        )
         for name, source in sources.items()
     }
     return {name: file for name, file in files.items() if file}
@@ -18,7 +20,11 @@ def missing_data(names):
 MISSING_DATA = missing_data(named_league(config))
 # Robots of each league with the data sets that are at hand.
 LEAGUES = {
-    league: {robot: there for robot, names in robots.items() if (there := [name for name in names if name not in MISSING_DATA])}
+    league: {
+        robot: there
+        for robot, names in robots.items()
+        if (there := [name for name in names if name not in MISSING_DATA])
+    }
     for league, robots in LEAGUE["data"].items()
 }
 
@@ -38,7 +44,11 @@ def sessions_of(data):
 def rounds_of(league):
     """Pairs of data set and split; sessions only where a robot has several data sets."""
     names = [name for names in LEAGUES[league].values() for name in names]
-    return [(name, split) for name in names for split in ("random", "blocks", *(["session"] if sessions_of(name) else []))]
+    return [
+        (name, split)
+        for name in names
+        for split in ("random", "blocks", *(["session"] if sessions_of(name) else []))
+    ]
 
 
 def league_files(kind):
@@ -58,7 +68,9 @@ def diagnosed_facts(wildcards):
 
 
 def entry_keys(league):
-    return [(data, split, method) for data, split in rounds_of(league) for method in LEAGUE["methods"]]
+    return [
+        (data, split, method) for data, split in rounds_of(league) for method in LEAGUE["methods"]
+    ]
 
 
 def of_rounds(pattern, keys):

@@ -65,7 +65,9 @@ rule read_campaign:
         step="elastocal.loop.loading.read_campaign",
         folder=lambda wildcards: folder_of(wildcards.campaign),
         robots=f"{CONFIG}/robots",
-        files_sha256=lambda wildcards: digest_of(files_of(wildcards)) if wildcards.campaign in OWN else None,
+        files_sha256=lambda wildcards: (
+            digest_of(files_of(wildcards)) if wildcards.campaign in OWN else None
+        ),
     script:
         "../scripts/run_step.py"
 
@@ -113,8 +115,12 @@ rule judge_campaign:
 
 rule summarize_campaigns:
     input:
-        verdicts=lambda wildcards: expand("reports/loop/{name}/verdict.json", name=config["loop"][wildcards.kind]),
-        residuals=lambda wildcards: expand("reports/loop/{name}/residuals.parquet", name=config["loop"][wildcards.kind]),
+        verdicts=lambda wildcards: expand(
+            "reports/loop/{name}/verdict.json", name=config["loop"][wildcards.kind]
+        ),
+        residuals=lambda wildcards: expand(
+            "reports/loop/{name}/residuals.parquet", name=config["loop"][wildcards.kind]
+        ),
     output:
         table=shown(
             "reports/loop/{kind}.csv",

@@ -81,7 +81,10 @@ rule draw_hero:
 rule pictures:
     input:
         figures=expand("reports/figures/{figure}.png", figure=FIGURES),
-        loop=expand("reports/loop/kuka_extended_end_effector/figures/{figure}.png", figure=["arrows", "candidates"]),
+        loop=expand(
+            "reports/loop/kuka_extended_end_effector/figures/{figure}.png",
+            figure=["arrows", "candidates"],
+        ),
         hero="reports/loop/kuka_extended_end_effector/figures/hero.png",
         measured="reports/loop/ur5_every_seventh/figures/before_after.png",
         steps=expand("reports/loop/{campaign}/before_after.csv", campaign=config["loop"]["main"]),

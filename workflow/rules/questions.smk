@@ -10,7 +10,11 @@ QUESTIONS = config["questions"]
 AT_LENGTH = study_in_memory(configurations=config["tables"]["length"])
 # Each question asked of one robot: its step in the package, folders of what it writes, and parameters.
 ASKED = {
-    "compare_point_sets": ("points", ["budget"], {"study": study_in_memory(), "point_sets": QUESTIONS["point_sets"]}),
+    "compare_point_sets": (
+        "points",
+        ["budget"],
+        {"study": study_in_memory(), "point_sets": QUESTIONS["point_sets"]},
+    ),
     "climb_ladder": (
         "ladder",
         ["ladder"],
@@ -23,7 +27,11 @@ ASKED = {
     "judge_in_use": (
         "uses",
         ["uses"],
-        {"study": AT_LENGTH, "strategies": list(STUDY.strategies.values()), "uses": QUESTIONS["uses"]},
+        {
+            "study": AT_LENGTH,
+            "strategies": list(STUDY.strategies.values()),
+            "uses": QUESTIONS["uses"],
+        },
     ),
     "simulate_designs": (
         "designs",
@@ -37,7 +45,10 @@ ASKED = {
     ),
 }
 LENGTH = {"length": config["tables"]["length"]}
-SETS_OF_POINTS = {"point_sets": QUESTIONS["point_sets"], "accuracies_um": QUESTIONS["accuracies_um"]}
+SETS_OF_POINTS = {
+    "point_sets": QUESTIONS["point_sets"],
+    "accuracies_um": QUESTIONS["accuracies_um"],
+}
 # Tables of all robots: the step, inputs, outputs with caption and what they show (none of those that no report shows), parameters.
 TABULATED = {
     "tabulate_budget": (
@@ -46,7 +57,11 @@ TABULATED = {
         {
             "budget": ("budget", "budget", "Sets of points (RQ2)"),
             "pairs": ("budget_pairs",),
-            "lengths": ("configurations_needed", "configurations_needed", "Configurations needed (RQ3)"),
+            "lengths": (
+                "configurations_needed",
+                "configurations_needed",
+                "Configurations needed (RQ3)",
+            ),
         },
         SETS_OF_POINTS | LENGTH,
     ),
@@ -54,9 +69,20 @@ TABULATED = {
         "points",
         {"budgets": "budget"},
         {"table": ("break_even",)},
-        SETS_OF_POINTS | {"weights": {"seed": config["seed"], "replicates": config["evaluation"]["bootstrap_replicates"]}},
+        SETS_OF_POINTS
+        | {
+            "weights": {
+                "seed": config["seed"],
+                "replicates": config["evaluation"]["bootstrap_replicates"],
+            }
+        },
     ),
-    "tabulate_ladder": ("ladder", {"ladders": "ladder"}, {"table": ("ladder", "ladder", "Link springs (RQ1)")}, {}),
+    "tabulate_ladder": (
+        "ladder",
+        {"ladders": "ladder"},
+        {"table": ("ladder", "ladder", "Link springs (RQ1)")},
+        {},
+    ),
     "tabulate_simulated_designs": (
         "designs",
         {"designs": "simulated_designs"},
@@ -66,7 +92,10 @@ TABULATED = {
     "tabulate_uses": (
         "uses",
         {"uses": "uses"},
-        {"scores": ("strategy_scores", "strategy_scores", "Strategies by metric (RQ4)"), "pairs": ("strategy_pairs",)},
+        {
+            "scores": ("strategy_scores", "strategy_scores", "Strategies by metric (RQ4)"),
+            "pairs": ("strategy_pairs",),
+        },
         {"classical": NAMES[CLASSICAL]} | LENGTH,
     ),
 }
@@ -90,7 +119,10 @@ for question, (module, folders, settings) in ASKED.items():
 for question, (module, given, made, settings) in TABULATED.items():
     # What links alone have is asked of robots with links.
     of = EXTENDED if question == "tabulate_ladder" else REDUCED
-    given = {name: expand(f"results/{folder}/{{robot}}.parquet", robot=of) for name, folder in given.items()}
+    given = {
+        name: expand(f"results/{folder}/{{robot}}.parquet", robot=of)
+        for name, folder in given.items()
+    }
     given |= all_cells(of) if question == "tabulate_uses" else {}
     made = {name: table_of(file, ABOUT, *shows) for name, (file, *shows) in made.items()}
     STUDY_TABLES[question] = module, given, made, {"robots": of} | settings

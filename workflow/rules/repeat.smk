@@ -21,7 +21,11 @@ STUDY_TABLES |= {
     "tabulate_studies": (
         "evaluation",
         ONE_STUDY,
-        {"table": table_of("strategies_over_studies", PAPER, "strategies_over_studies", "Table 4 over studies")},
+        {
+            "table": table_of(
+                "strategies_over_studies", PAPER, "strategies_over_studies", "Table 4 over studies"
+            )
+        },
         {
             "slugs": {name: key for key, name in NAMES.items()},
             "length": config["tables"]["length"],

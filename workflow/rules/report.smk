@@ -20,14 +20,21 @@ rule compile_paper:
         pages=placed(PACKAGES / "elastocal" / "report" / "paper.typ"),
     output:
         report=shown(
-            "reports/paper.pdf", "paper", "Tables and figures of the paper", shows="The paper, regenerated", kind="report"
+            "reports/paper.pdf",
+            "paper",
+            "Tables and figures of the paper",
+            shows="The paper, regenerated",
+            kind="report",
         ),
     params:
         names=TITLES,
         stated={
             "classical": NAMES[CLASSICAL],
             **{key: str(config["tables"][key]) for key in ("noise_um", "length")},
-            **{key: str(config[key]) for key in ("data_sets", "configurations", "test_configurations")},
+            **{
+                key: str(config[key])
+                for key in ("data_sets", "configurations", "test_configurations")
+            },
         },
     script:
         "../scripts/compile_paper.py"
@@ -55,12 +62,16 @@ rule state_answers:
     params:
         robots=REDUCED,
         names=TITLES,
-        cells={key: config["tables"][key] for key in ("noise_um", "length")} | {"configurations": config["configurations"]},
+        cells={key: config["tables"][key] for key in ("noise_um", "length")}
+        | {"configurations": config["configurations"]},
         classical=NAMES[CLASSICAL],
         strategies=list(STUDY.strategies.values()),
         best=NAMES.get("3+6DoF-comb", NAMES[CLASSICAL]),
         accuracy_um=QUESTIONS["accuracies_um"][0],
-        size={key: config[key] for key in ("data_sets", "configurations", "test_configurations", "seed")},
+        size={
+            key: config[key]
+            for key in ("data_sets", "configurations", "test_configurations", "seed")
+        },
         stated=STATED,
     script:
         "../scripts/state_answers.py"
@@ -89,7 +100,11 @@ rule compile_report:
         pages=placed(PACKAGES / "elastocal" / "report" / "study.typ"),
     output:
         report=shown(
-            "reports/study.pdf", "study", "Tables and figures of the paper", shows="The report of the study", kind="report"
+            "reports/study.pdf",
+            "study",
+            "Tables and figures of the paper",
+            shows="The report of the study",
+            kind="report",
         ),
     script:
         "../scripts/compile_report.py"

@@ -21,7 +21,9 @@ rule draw_experiments:
         loading=LOADING,
         purpose=lambda wildcards: "test" if wildcards.test else "identification",
         data_sets=lambda wildcards: 1 if wildcards.test else config["data_sets"],
-        configurations=lambda wildcards: config["test_configurations" if wildcards.test else "configurations"],
+        configurations=lambda wildcards: config[
+            "test_configurations" if wildcards.test else "configurations"
+        ],
     script:
         "../scripts/run_step.py"
 

@@ -30,7 +30,11 @@ STUDY_TABLES |= {
         "tables",
         INITIAL,
         {"table": table_of("table2", PAPER, "table2", "Table 2: deflection before calibration")},
-        {"robots": config["robots"], "seed": config["seed"], "replicates": config["evaluation"]["bootstrap_replicates"]},
+        {
+            "robots": config["robots"],
+            "seed": config["seed"],
+            "replicates": config["evaluation"]["bootstrap_replicates"],
+        },
     ),
     "tabulate_identified": (
         "tables",
@@ -45,7 +49,9 @@ STUDY_TABLES |= {
         {
             "robots": REDUCED,
             "strategies": {name: key for key, name in NAMES.items()},
-            "cells": {key: value for key, value in config["tables"].items() if key != "classical_strategy"},
+            "cells": {
+                key: value for key, value in config["tables"].items() if key != "classical_strategy"
+            },
         },
     ),
     "tabulate_extended": (
@@ -57,16 +63,25 @@ STUDY_TABLES |= {
     "compare_with_paper": (
         "printed",
         REFERENCE
-        | {name: f"reports/tables/{name}.csv" for name in ("table1", "table2", "table3", "table4", "extended")}
+        | {
+            name: f"reports/tables/{name}.csv"
+            for name in ("table1", "table2", "table3", "table4", "extended")
+        }
         | all_cells(config["robots"]),
-        {"table": table_of("beside_paper", PAPER, "beside_paper", "Every printed figure beside ours")},
+        {
+            "table": table_of(
+                "beside_paper", PAPER, "beside_paper", "Every printed figure beside ours"
+            )
+        },
         AT,
     ),
     "compare_with_studies": (
         "printed",
         {"beside": "reports/tables/beside_paper.csv"} | ONE_STUDY | INITIAL | REFERENCE,
         {
-            "table": table_of("comparison", PAPER, "comparison", "Every printed figure among further studies"),
+            "table": table_of(
+                "comparison", PAPER, "comparison", "Every printed figure among further studies"
+            ),
             "joint": table_of("joint_test", PAPER),
         },
         {"robots": config["robots"], "length": config["tables"]["length"]},

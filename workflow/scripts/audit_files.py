@@ -13,14 +13,23 @@ from elastocal_proof.audit.whole import as_table, audit, page_of
 
 def audit_files(job: Job) -> None:
     settings = job.params
-    finished = Audited(Path(), settings.configuration, settings.robots, settings.strategies, settings.rows)
+    finished = Audited(
+        Path(),
+        settings.configuration,
+        settings.robots,
+        settings.strategies,
+        settings.rows,
+    )
     table = as_table(audit(finished))
     made = [target for target, digest in settings.others.items() if digest]
     facts = {
         "Seed of the random numbers": str(finished.seed),
         "Rows sampled of a large file": str(settings.rows),
         "Other targets audited": ", ".join(made) or "none has finished",
-        "Absent, so not audited": ", ".join(target for target in settings.others if target not in made) or "none",
+        "Absent, so not audited": ", ".join(
+            target for target in settings.others if target not in made
+        )
+        or "none",
         "Version of elastocal": __version__,
         "Origin": origin_of(job).words,
     }

@@ -15,13 +15,25 @@ from elastocal.report.typesetting import compile_document
 
 
 def compile_loop_report(job: Job) -> None:
-    verdict, descriptions = read_json(job.input.verdict), read_json(job.input.descriptions)
+    verdict = read_json(job.input.verdict)
+    descriptions = read_json(job.input.descriptions)
     robot = robot_from_document(descriptions["robot"])
-    rows = [pd.read_csv(path).to_dict("records") for path in (job.input.before_after, job.input.experiment)]
+    rows = [
+        pd.read_csv(path).to_dict("records")
+        for path in (job.input.before_after, job.input.experiment)
+    ]
     table = read_residuals(job.input.residuals, robot.joints)
-    parameters = final_parameters(read_json(job.input.diagnosis), read_table(job.input.steps, STEPS))
+    parameters = final_parameters(
+        read_json(job.input.diagnosis), read_table(job.input.steps, STEPS)
+    )
     facts = loop_facts(verdict, *rows, table, descriptions, parameters)
-    compile_document(job.output.report, "loop.typ", {"facts": facts}, job.input.figures, origin_of(job))
+    compile_document(
+        job.output.report,
+        "loop.typ",
+        {"facts": facts},
+        job.input.figures,
+        origin_of(job),
+    )
     write_loop_page(job.output.page, *loop_page(facts, table, robot), origin_of(job))
 
 

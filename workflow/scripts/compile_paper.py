@@ -12,9 +12,17 @@ from elastocal.report.typesetting import compile_document
 def compile_paper(job: Job) -> None:
     beside = pd.read_csv(job.input.beside, dtype={"table": str})
     authors = [each["name"] for each in read_document(job.input.citation)["authors"]]
-    rows = paper_rows(beside, brief_names(job.params.names), int(job.params.stated["configurations"]))
+    rows = paper_rows(
+        beside, brief_names(job.params.names), int(job.params.stated["configurations"])
+    )
     facts = job.params.stated | {"rows": rows, "authors": authors}
-    compile_document(job.output.report, "paper.typ", {"facts": facts}, job.input.figures, origin_of(job))
+    compile_document(
+        job.output.report,
+        "paper.typ",
+        {"facts": facts},
+        job.input.figures,
+        origin_of(job),
+    )
 
 
 run(compile_paper, snakemake)

@@ -16,7 +16,13 @@ def compile_report(job: Job) -> None:
     frames = {name: pd.read_csv(job.input[name]) for name in TABLES}
     tables = paper_tables(frames, facts["names"], int(facts["size"]["configurations"]))
     beside = [*job.input.figures, job.input.bibliography]
-    compile_document(job.output.report, "study.typ", {"facts": facts, "tables": tables}, beside, origin_of(job))
+    compile_document(
+        job.output.report,
+        "study.typ",
+        {"facts": facts, "tables": tables},
+        beside,
+        origin_of(job),
+    )
 
 
 run(compile_report, snakemake)

@@ -1,4 +1,5 @@
-"""Pictures of a campaign: its residuals, what may be missing in its model, its errors."""
+"""Pictures of a campaign: its residuals, what may be missing in its model, its
+errors."""
 
 from job import Job, origin_of, run
 
@@ -20,11 +21,17 @@ def draw_campaign(job: Job) -> None:
     stated = read_json(job.input.diagnosis)["document"]["probabilities"]
     errors = pd.read_csv(job.input.before_after).to_dict("records")
     drawn = {
-        "before_after": before_after(errors, read_json(job.input.verdict)["heldout"]["noise_floor_rms_m"]),
+        "before_after": before_after(
+            errors, read_json(job.input.verdict)["heldout"]["noise_floor_rms_m"]
+        ),
         "arrows": arrows(table, arm),
-        "candidates": probabilities(stated, {name: column.to_numpy() for name, column in candidates.items()}),
+        "candidates": probabilities(
+            stated, {name: column.to_numpy() for name, column in candidates.items()}
+        ),
     }
-    for name, pdf, png in zip(job.params.figures, job.output.pdf, job.output.png, strict=True):
+    for name, pdf, png in zip(
+        job.params.figures, job.output.pdf, job.output.png, strict=True
+    ):
         save(drawn[name], pdf, png, origin_of(job))
 
 

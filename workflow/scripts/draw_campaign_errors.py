@@ -9,7 +9,12 @@ from elastocal.figures.style import save
 
 
 def draw_campaign_errors(job: Job) -> None:
-    save(campaign_errors(pd.read_csv(job.input.table)), job.output.pdf, job.output.png, origin_of(job))
+    save(
+        campaign_errors(pd.read_csv(job.input.table)),
+        job.output.pdf,
+        job.output.png,
+        origin_of(job),
+    )
 
 
 run(draw_campaign_errors, snakemake)

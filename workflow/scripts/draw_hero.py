@@ -11,7 +11,11 @@ from elastocal.mechanics.robot_file import robot_from_document
 
 def draw_hero(job: Job) -> None:
     robot = robot_from_document(read_json(job.input.descriptions)["robot"])
-    figure = arm_with_errors(robot, read_residuals(job.input.residuals, robot.joints), read_json(job.input.verdict)["heldout"])
+    figure = arm_with_errors(
+        robot,
+        read_residuals(job.input.residuals, robot.joints),
+        read_json(job.input.verdict)["heldout"],
+    )
     save(figure, job.output.pdf, job.output.png, origin_of(job))
 
 

@@ -9,7 +9,12 @@ from elastocal.mechanics.robot_file import robot_from_document
 
 def draw_scheme(job: Job) -> None:
     robot = robot_from_document(job.params.robot)
-    save(getattr(schemes, job.params.scheme)(robot), job.output.pdf, job.output.png, origin_of(job))
+    save(
+        getattr(schemes, job.params.scheme)(robot),
+        job.output.pdf,
+        job.output.png,
+        origin_of(job),
+    )
 
 
 run(draw_scheme, snakemake)

@@ -14,7 +14,9 @@ def draw_signatures(job: Job) -> None:
     robot = read_robot(Path(job.input.robot))
     Path(job.output.figures).mkdir(exist_ok=True)
     for name in effects():
-        save_svg(signature_figure(signature(name, robot)), f"{job.output.figures}/{name}.svg")
+        save_svg(
+            signature_figure(signature(name, robot)), f"{job.output.figures}/{name}.svg"
+        )
 
 
 run(draw_signatures, snakemake)

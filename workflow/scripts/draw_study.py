@@ -1,4 +1,5 @@
-"""A figure of the study: the function of `figures.study` that the rule names, of tables and settings by their names."""
+"""A figure of the study: the function of `figures.study` that the rule names, of tables
+and settings by their names."""
 
 from functools import partial
 
@@ -17,7 +18,12 @@ READ = {"metrics": partial(read_long, schema=metrics), "printed": read_reference
 
 
 def draw_study(job: Job) -> None:
-    tables = {name: READ.get(name, partial(pd.read_csv, dtype={"table": str}))(job.input[name]) for name in job.params.tables}
+    tables = {
+        name: READ.get(name, partial(pd.read_csv, dtype={"table": str}))(
+            job.input[name]
+        )
+        for name in job.params.tables
+    }
     figure = getattr(study, job.params.figure)(**tables, **job.params.settings)
     save(figure, job.output.pdf, job.output.png, origin_of(job))
 

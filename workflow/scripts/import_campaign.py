@@ -8,10 +8,17 @@ from elastocal.campaigns.importers import fetch, importer
 
 
 def import_campaign(job: Job) -> None:
-    settings, name = job.params.source, job.wildcards.campaign
-    source = importer(settings["importer"], Path(job.input.sources).parent, f"campaign {name}")
-    paths = [fetch(file, source.files, job.params.kept, job.params.box) for file in settings["files"]]
-    folder, robots = Path(job.output.document).parent, Path(job.input.robots[0]).parent
+    settings = job.params.source
+    name = job.wildcards.campaign
+    source = importer(
+        settings["importer"], Path(job.input.sources).parent, f"campaign {name}"
+    )
+    paths = [
+        fetch(file, source.files, job.params.kept, job.params.box)
+        for file in settings["files"]
+    ]
+    folder = Path(job.output.document).parent
+    robots = Path(job.input.robots[0]).parent
     test = {key: settings[key] for key in ("holdout", "fold") if key in settings}
     source.write_campaign(paths, folder, robots, name, **test)
 

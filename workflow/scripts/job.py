@@ -1,4 +1,5 @@
-"""What every script does around its one call: a log, checked inputs, and one line where the input is at fault."""
+"""What every script does around its one call: a log, checked inputs, and one line where
+the input is at fault."""
 
 import fcntl
 import sys
@@ -17,7 +18,8 @@ from elastocal.io.records import JobRecord, input_digests, write_records
 
 # With the Snakefile; the name of this file goes by the folder of the rules.
 TOP = Path(__file__).resolve().parents[2]
-# Shared by the jobs under way: a run that begins after another one was killed waits for the jobs that this one left behind.
+# Shared by the jobs under way: a run that begins after another one was killed waits for
+# the jobs that this one left behind.
 JOBS_LOCK = Path(".snakemake/jobs.lock")
 
 
@@ -33,11 +35,14 @@ class Job(Protocol):
     config: Any
 
 
-def run(step: Callable[[Job], None], snakemake: Job, checked: Iterable[str] | None = None) -> None:
-    """Call ``step(snakemake)``; an `InputError` or a fault of the machine ends the job with one line.
+def run(
+    step: Callable[[Job], None], snakemake: Job, checked: Iterable[str] | None = None
+) -> None:
+    """Call ``step(snakemake)``; an `InputError` or a fault of the machine ends the job
+    with one line.
 
-    Files in `checked` that are no longer what a job wrote, or have no record of it, are refused before; all inputs where it is
-    not given.
+    Files in `checked` that are no longer what a job wrote, or have no record of it, are
+    refused before; all inputs where it is not given.
     """
     log = snakemake.log[0]
     sys.excepthook = sys.__excepthook__
@@ -45,7 +50,9 @@ def run(step: Callable[[Job], None], snakemake: Job, checked: Iterable[str] | No
     try:
         with _under_way():
             started = _now()
-            digests, own = input_digests(snakemake.input, None if checked is None else set(map(str, checked)))
+            digests, own = input_digests(
+                snakemake.input, None if checked is None else set(map(str, checked))
+            )
             step(snakemake)
             write_records(_record(snakemake, started, digests, own))
     except InputError as error:
@@ -78,10 +85,22 @@ def _under_way() -> Iterator[None]:
         yield
 
 
-def _record(job: Job, started: str, inputs: dict[str, str], own: tuple[str, ...]) -> JobRecord:
+def _record(
+    job: Job, started: str, inputs: dict[str, str], own: tuple[str, ...]
+) -> JobRecord:
     wildcards = {name: str(value) for name, value in job.wildcards.items()}
     outputs = tuple(map(str, job.output))
-    return JobRecord(job.rule, wildcards, started, _now(), inputs, own, outputs, origin_of(job), environment(TOP))
+    return JobRecord(
+        job.rule,
+        wildcards,
+        started,
+        _now(),
+        inputs,
+        own,
+        outputs,
+        origin_of(job),
+        environment(TOP),
+    )
 
 
 def _now() -> str:

@@ -1,4 +1,5 @@
-"""The script of every rule that names a `step`, a function of the packages: calls it with the job."""
+"""The script of every rule that names a `step`, a function of the packages: calls it
+with the job."""
 
 from importlib import import_module
 
@@ -11,4 +12,8 @@ def run_step(job: Job) -> None:
 
 
 # Of a user's own files, which come with their digest, there is no record.
-run(run_step, snakemake, snakemake.input.sources if snakemake.params.get("files_sha256") else None)
+run(
+    run_step,
+    snakemake,
+    snakemake.input.sources if snakemake.params.get("files_sha256") else None,
+)

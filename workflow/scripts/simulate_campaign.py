@@ -10,15 +10,25 @@ from elastocal.mechanics.robot_file import robot_from_document
 
 
 def simulate_campaign(job: Job) -> None:
-    settings, name = job.params.source, job.wildcards.campaign
+    settings = job.params.source
+    name = job.wildcards.campaign
     robot = robot_from_document(settings["robot_document"], settings["robot"])
-    plan = Plan(**{key: tuple(v) if isinstance(v, list) else v for key, v in settings.items() if key in Plan.__annotations__})
+    plan = Plan(
+        **{
+            key: tuple(v) if isinstance(v, list) else v
+            for key, v in settings.items()
+            if key in Plan.__annotations__
+        }
+    )
     document = {
         "campaign": name,
         "robot": settings["declared_robot"],
         "measured": "pose",
         "frame": "base",
-        "targets": {point: {"point": point, "offset_m": [0, 0, 0]} for point in settings["points"]},
+        "targets": {
+            point: {"point": point, "offset_m": [0, 0, 0]}
+            for point in settings["points"]
+        },
         "compliance": "identify",
         "declared": [],
         "holdout": {"fraction": 0.3, "seed": 1},

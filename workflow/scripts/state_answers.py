@@ -11,7 +11,18 @@ from elastocal.io.documents import read_document
 from elastocal.report.study import brief_names, study_facts
 from elastocal.study.strategies import strategy_from_document
 
-_PLAIN = ("table2", "extended", "joint", "studies", "break_even", "budget", "pairs", "needed", "scores", "score_pairs")
+_PLAIN = (
+    "table2",
+    "extended",
+    "joint",
+    "studies",
+    "break_even",
+    "budget",
+    "pairs",
+    "needed",
+    "scores",
+    "score_pairs",
+)
 # Each table, and how it is read: what looks like a number may be none.
 _TABLES = {name: {} for name in _PLAIN} | {
     "comparison": {"dtype": {"table": str}},
@@ -23,19 +34,38 @@ _TABLES = {name: {} for name in _PLAIN} | {
 def state_answers(job: Job) -> None:
     settings = job.params
     names = brief_names(settings.names)
-    tables = {name: pd.read_csv(getattr(job.input, name), **how) for name, how in _TABLES.items()}
+    tables = {
+        name: pd.read_csv(getattr(job.input, name), **how)
+        for name, how in _TABLES.items()
+    }
     strategies = [strategy_from_document(document) for document in settings.strategies]
-    chosen = {name: getattr(settings, name) for name in ("classical", "best", "accuracy_um", "stated")}
-    facts = study_facts(tables, names, settings.robots, settings.cells | chosen | {"strategies": strategies})
+    chosen = {
+        name: getattr(settings, name)
+        for name in ("classical", "best", "accuracy_um", "stated")
+    }
+    facts = study_facts(
+        tables,
+        names,
+        settings.robots,
+        settings.cells | chosen | {"strategies": strategies},
+    )
     citation = read_document(job.input.citation)
-    cited = {"date": str(citation["date-released"]), "version": citation["version"], "license": citation["license"]}
+    cited = {
+        "date": str(citation["date-released"]),
+        "version": citation["version"],
+        "license": citation["license"],
+    }
     facts |= {
-        "citation": {"authors": ", ".join(each["name"] for each in citation["authors"])} | cited,
+        "citation": {"authors": ", ".join(each["name"] for each in citation["authors"])}
+        | cited,
         "names": names,
         "full_names": [settings.names[robot] for robot in settings.robots],
         "size": {name: f"{value:g}" for name, value in settings.size.items()},
     }
-    write_text(job.output.answers, json.dumps(facts, indent=1, ensure_ascii=False, allow_nan=False))
+    write_text(
+        job.output.answers,
+        json.dumps(facts, indent=1, ensure_ascii=False, allow_nan=False),
+    )
 
 
 run(state_answers, snakemake)

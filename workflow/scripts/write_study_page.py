@@ -8,7 +8,10 @@ from elastocal.report.typesetting import template
 
 
 def write_study_page(job: Job) -> None:
-    write_text(job.output.page, template("study_tables.md").render(read_json(job.input.answers)))
+    write_text(
+        job.output.page,
+        template("study_tables.md").render(read_json(job.input.answers)),
+    )
 
 
 run(write_study_page, snakemake)

@@ -1,7 +1,9 @@
-"""Which tube diameter gives kuka_extended the mean deflection that the paper's Table 2 prints.
+"""Which tube diameter gives kuka_extended the mean deflection that the paper's Table 2
+prints.
 
-Run once by hand, from the top of the repository: python workflow/searches/choose_tube.py
-Its answer, rounded to 0.1 mm, stands in config/robots/kuka_extended.yaml; nothing else of the paper went into the choice.
+Run once by hand, from the top of the repository: python
+workflow/searches/choose_tube.py Its answer, rounded to 0.1 mm, stands in
+config/robots/kuka_extended.yaml; nothing else of the paper went into the choice.
 """
 
 from dataclasses import replace
@@ -12,22 +14,35 @@ from scipy.optimize import brentq
 from elastocal.io.documents import read_document
 from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.robot_file import robot_from_document
-from elastocal.study.simulation import Experiments, Loading, random_experiments, true_deflections
+from elastocal.study.simulation import (
+    Experiments,
+    Loading,
+    random_experiments,
+    true_deflections,
+)
 
 TABLE_2_MEAN_M = 1.749e-3
 
 
-def diameter_for_mean_deflection(robot: Robot, experiments: Experiments, target_m: float) -> float:
-    """Outer diameter (m) of the tubes, at their wall, for which the mean end-effector deflection comes out, by Brent's method.
+def diameter_for_mean_deflection(
+    robot: Robot, experiments: Experiments, target_m: float
+) -> float:
+    """Outer diameter (m) of the tubes, at their wall, for which the mean end-effector
+    deflection comes out, by Brent's method.
 
-    One figure of the paper fixes this one free size of the extended robot (interpretation R11). `robot`: with links, all of one
-    tube. `target_m`: mean over the experiments of the norm of the displacement.
+    One figure of the paper fixes this one free size of the extended robot
+    (interpretation R11). `robot`: with links, all of one tube. `target_m`: mean over
+    the experiments of the norm of the displacement.
     """
 
     def excess(diameter: float) -> float:
         tube = replace(robot.links[0].tube, outer_diameter_m=diameter)
-        candidate = replace(robot, links=tuple(replace(link, tube=tube) for link in robot.links))
-        deflections = true_deflections(candidate, experiments, robot.chain.end_effector, "end_effector")
+        candidate = replace(
+            robot, links=tuple(replace(link, tube=tube) for link in robot.links)
+        )
+        deflections = true_deflections(
+            candidate, experiments, robot.chain.end_effector, "end_effector"
+        )
         return np.linalg.norm(deflections[..., :3], axis=-1).mean() - target_m
 
     return brentq(excess, 0.1, 0.8, xtol=1e-6)
@@ -36,7 +51,9 @@ def diameter_for_mean_deflection(robot: Robot, experiments: Experiments, target_
 if __name__ == "__main__":
     config = read_document("config.yaml")
     robot = robot_from_document(read_document("config/robots/kuka_extended.yaml"))
-    measurements = {key: config["interpretations"][key] for key in ("offset_frame", "joint_range")}
+    measurements = {
+        key: config["interpretations"][key] for key in ("offset_frame", "joint_range")
+    }
     experiments = random_experiments(
         robot.chain,
         robot.joint_limits,

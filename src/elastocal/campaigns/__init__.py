@@ -1,4 +1,5 @@
-"""A measured campaign: its files, checked as they are read; simulated ones; other people's data and their importers.
+"""A measured campaign: its files, checked as they are read; simulated ones; other
+people's data and their importers.
 
 Imports `mechanics` and `io`; fits nothing.
 """

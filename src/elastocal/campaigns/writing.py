@@ -1,4 +1,5 @@
-"""A campaign's folder, written so that it is never half a campaign, and one to begin with: every key explained."""
+"""A campaign's folder, written so that it is never half a campaign, and one to begin
+with: every key explained."""
 
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -9,7 +10,13 @@ import numpy as np
 import yaml
 
 from elastocal.campaigns.campaign import DOCUMENT
-from elastocal.campaigns.measurements import CSV, PARQUET, check_column_names, file_columns, write_measurements
+from elastocal.campaigns.measurements import (
+    CSV,
+    PARQUET,
+    check_column_names,
+    file_columns,
+    write_measurements,
+)
 from elastocal.io.atomic_writes import write_text, write_together
 from elastocal.io.documents import check_document, one_line, read_schema
 from elastocal.mechanics.robot import Robot
@@ -22,47 +29,84 @@ def write_campaign(
     joints: int,
     kind: str = "parquet",
 ) -> None:
-    """Write a campaign's folder; each file appears whole or not at all, ``campaign.yaml`` last.
+    """Write a campaign's folder; each file appears whole or not at all,
+    ``campaign.yaml`` last.
 
-    `folder`: made where it is not there. `document`: contents of ``campaign.yaml``. `table`: columns of one length, named as in
-    `file_columns`. `kind`: one of "parquet", "csv". Raises `InputError`: a document that the schema refuses, or a column that
-    the format does not have.
+    `folder`: made where it is not there. `document`: contents of ``campaign.yaml``.
+    `table`: columns of one length, named as in `file_columns`. `kind`: one of
+    "parquet", "csv". Raises `InputError`: a document that the schema refuses, or a
+    column that the format does not have.
     """
     folder = Path(folder)
     check_document(document, "campaign", (folder / DOCUMENT).as_posix())
     path = folder / (PARQUET if kind == "parquet" else CSV)
     check_column_names(table, joints, path.as_posix())
-    # Until its document is there the folder is no campaign; nor may it hold measurements of both kinds.
+    # Until its document is there the folder is no campaign; nor may it hold
+    # measurements of both kinds.
     with write_together(folder, (CSV, PARQUET, DOCUMENT)) as partial:
         write_measurements(partial / path.name, table, joints)
-        text = yaml.safe_dump(document, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120)
+        text = yaml.safe_dump(
+            document,
+            sort_keys=False,
+            allow_unicode=True,
+            default_flow_style=None,
+            width=120,
+        )
         write_text(partial / DOCUMENT, text)
 
 
-def campaign_template(name: str, robot: Robot, targets: Sequence[str] = (), measured: str = "position") -> str:
-    """Text of a campaign.yaml to fill in, each key explained; those that it leaves out stand as comments.
+def campaign_template(
+    name: str, robot: Robot, targets: Sequence[str] = (), measured: str = "position"
+) -> str:
+    """Text of a campaign.yaml to fill in, each key explained; those that it leaves out
+    stand as comments.
 
-    `robot`: whose file is robot.yaml beside it. `targets`, `measured`: as the measurements have them that lie there.
+    `robot`: whose file is robot.yaml beside it. `targets`, `measured`: as the
+    measurements have them that lie there.
     """
     document = {
         "campaign": name,
         "robot": "robot.yaml",
         "measured": measured,
         "frame": "tracker",
-        "targets": {t: {"point": robot.chain.end_effector.name, "offset_m": "unknown"} for t in targets or ("reflector",)},
+        "targets": {
+            t: {"point": robot.chain.end_effector.name, "offset_m": "unknown"}
+            for t in targets or ("reflector",)
+        },
         "compliance": "nominal" if robot.compliance_known else "identify",
         "declared": ["joint_offset", "link_geometry"],
         "holdout": {"fraction": 0.3, "seed": 1},
     }
     text = f"# {read_schema('campaign')['title']}. Keys behind # are optional.\n"
     for key, rule in read_schema("campaign")["properties"].items():
-        meaning = textwrap.fill(rule.get("description", key), 110, initial_indent="# ", subsequent_indent="# ")
-        entry = f"{key}: {one_line(document[key])}" if key in document else f"# {key}: {one_line(rule['examples'][0])}"
+        meaning = textwrap.fill(
+            rule.get("description", key),
+            110,
+            initial_indent="# ",
+            subsequent_indent="# ",
+        )
+        entry = (
+            f"{key}: {one_line(document[key])}"
+            if key in document
+            else f"# {key}: {one_line(rule['examples'][0])}"
+        )
         text += f"\n{meaning}\n{entry}\n"
     return text
 
 
 def sheet_template(joints: int) -> str:
     """Header of a measurements.csv to fill in, without optional covariates."""
-    optional = ("session", "approach", "time_s", "temperature_c", "u95_m", "rx", "ry", "rz")
-    return ",".join(name for name in file_columns(joints) if not name.startswith(optional)) + "\n"
+    optional = (
+        "session",
+        "approach",
+        "time_s",
+        "temperature_c",
+        "u95_m",
+        "rx",
+        "ry",
+        "rz",
+    )
+    return (
+        ",".join(name for name in file_columns(joints) if not name.startswith(optional))
+        + "\n"
+    )

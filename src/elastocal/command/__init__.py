@@ -1,1 +1,2 @@
-"""The command `elastocal`, thin over the library and the Snakemake targets: one module for each subcommand, and `main`."""
+"""The command `elastocal`, thin over the library and the Snakemake targets: one module
+for each subcommand, and `main`."""

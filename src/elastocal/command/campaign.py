@@ -1,4 +1,5 @@
-"""A campaign's folder: `elastocal init` begins it, `check` says what it can show, `diagnose` runs its Snakemake target."""
+"""A campaign's folder: `elastocal init` begins it, `check` says what it can show,
+`diagnose` runs its Snakemake target."""
 
 from __future__ import annotations
 
@@ -10,23 +11,38 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
-from elastocal.command.terminal import MOST_ROWS, pipeline, print_answer, print_lines, robots, workplace
+from elastocal.command.terminal import (
+    MOST_ROWS,
+    pipeline,
+    print_answer,
+    print_lines,
+    robots,
+    workplace,
+)
 from elastocal.counting import counted
 from elastocal.errors import InputError, steering
 
 _ROBOT = "robot.yaml"
 # Snakemake prints the second before its logger begins.
-_NOTHING, _NO_NEWS = "Nothing to be done", "Using workflow specific profile"
+_NOTHING = "Nothing to be done"
+_NO_NEWS = "Using workflow specific profile"
 
 
 def init(
-    folder: Annotated[Path, Argument(help="New folder, or one that has measurements or a robot file already.")],
-    robot: Annotated[Path | None, Option(help="Robot file to copy there, where there is none.")] = None,
+    folder: Annotated[
+        Path,
+        Argument(
+            help="New folder, or one that has measurements or a robot file already."
+        ),
+    ],
+    robot: Annotated[
+        Path | None, Option(help="Robot file to copy there, where there is none.")
+    ] = None,
 ) -> None:
     """Begin a campaign: campaign.yaml with every key explained.
 
-    It has the targets of measurements that lie there; without any, measurements.csv is made to be filled in. No file that
-    exists is replaced.
+    It has the targets of measurements that lie there; without any, measurements.csv is
+    made to be filled in. No file that exists is replaced.
     """
     from rich.console import Console
 
@@ -40,11 +56,21 @@ def init(
 
     check_places(*(folder / name for name in (_ROBOT, DOCUMENT, CSV, PARQUET)))
     if (folder / DOCUMENT).exists():
-        raise InputError(folder / DOCUMENT, "", "a campaign that is there already", "a folder without campaign.yaml")
+        raise InputError(
+            folder / DOCUMENT,
+            "",
+            "a campaign that is there already",
+            "a folder without campaign.yaml",
+        )
     if (folder / _ROBOT).exists() == (robot is not None):
         found = "a robot that is there already" if robot else "no robot file"
-        raise InputError(folder / _ROBOT, "", found, "one robot file: there, or with --robot")
-    arm, (targets, measured) = read_robot(robot or folder / _ROBOT), described_by(folder)
+        raise InputError(
+            folder / _ROBOT, "", found, "one robot file: there, or with --robot"
+        )
+    arm, (targets, measured) = (
+        read_robot(robot or folder / _ROBOT),
+        described_by(folder),
+    )
     files = {} if robot is None else {_ROBOT: read_text(robot, LARGEST_BYTES)}
     if not (folder / CSV).exists() and not (folder / PARQUET).exists():
         files[CSV] = sheet_template(arm.joints)
@@ -52,9 +78,15 @@ def init(
     with write_together(folder, files) as partial:
         for name, text in files.items():
             write_text(partial / name, text)
-    first = "check campaign.yaml for the frame and where targets sit" if targets else "fill in measurements.csv"
+    first = (
+        "check campaign.yaml for the frame and where targets sit"
+        if targets
+        else "fill in measurements.csv"
+    )
     following = f"{first}, then elastocal check {folder.as_posix()}"
-    print_answer(True, f"{folder.as_posix()}: {', '.join(files)}", [], following, Console())
+    print_answer(
+        True, f"{folder.as_posix()}: {', '.join(files)}", [], following, Console()
+    )
 
 
 def check(folder: Annotated[Path, Argument(help="Folder of the campaign.")]) -> None:
@@ -66,38 +98,75 @@ def check(folder: Annotated[Path, Argument(help="Folder of the campaign.")]) -> 
 
     from elastocal.loop.overview import overview
 
-    found, console = overview(folder, robots()), Console()
+    found = overview(folder, robots())
+    console = Console()
     answer = f"{found.campaign} cannot be diagnosed: the data are at fault"
     if found.diagnosable:
-        more = f"; {counted(len(found.attention), 'remark')} below" if found.attention else ""
+        more = (
+            f"; {counted(len(found.attention), 'remark')} below"
+            if found.attention
+            else ""
+        )
         answer = f"{found.campaign} can be diagnosed: {counted(found.testable, 'candidate effect')} can be tested{more}"
-    details = [*(f"{name:<16}{words}" for name, words in found.rows), *(f"! {sentence}" for sentence in found.attention)]
-    following = f"elastocal diagnose {folder}" if found.diagnosable else "mend the data, then check again"
+    details = [
+        *(f"{name:<16}{words}" for name, words in found.rows),
+        *(f"! {sentence}" for sentence in found.attention),
+    ]
+    following = (
+        f"elastocal diagnose {folder}"
+        if found.diagnosable
+        else "mend the data, then check again"
+    )
     print_answer(found.diagnosable, answer, details, following, console)
     raise typer.Exit(0 if found.diagnosable else 1)
 
 
 def diagnose(
     folder: Annotated[Path, Argument(help="Folder of the campaign.")],
-    cores: Annotated[int, Option("--cores", "-j", min=1, max=MOST_ROWS, help="Jobs that run at a time.")] = 2,
+    cores: Annotated[
+        int,
+        Option("--cores", "-j", min=1, max=MOST_ROWS, help="Jobs that run at a time."),
+    ] = 2,
 ) -> None:
     """Find which effects the robot's model lacks; write the report.
 
-    The report compares the error before and after on held-out poses. It is the Snakemake target `diagnose` of this campaign.
+    The report compares the error before and after on held-out poses. It is the
+    Snakemake target `diagnose` of this campaign.
     """
     from rich.console import Console
 
-    campaign, console = str(folder.resolve()), Console(stderr=True)
+    campaign = str(folder.resolve())
+    console = Console(stderr=True)
     # Braces are wildcards to Snakemake, the others mapping and comment of YAML.
-    if mark := next((mark for mark in ("{", "}", ": ", " #") if mark in campaign), steering(campaign)):
-        raise InputError(folder, "", repr(mark), "a path without it, which Snakemake does not take for a path")
-    place, snakefile = workplace(), pipeline() / "Snakefile"
-    words = ["-m", "snakemake", f"-j{cores}", "diagnose", "--config", f"campaign={campaign}"]
+    if mark := next(
+        (mark for mark in ("{", "}", ": ", " #") if mark in campaign),
+        steering(campaign),
+    ):
+        raise InputError(
+            folder,
+            "",
+            repr(mark),
+            "a path without it, which Snakemake does not take for a path",
+        )
+    place = workplace()
+    snakefile = pipeline() / "Snakefile"
+    words = [
+        "-m",
+        "snakemake",
+        f"-j{cores}",
+        "diagnose",
+        "--config",
+        f"campaign={campaign}",
+    ]
     # What is installed beside the package runs in the working directory.
     words += [] if snakefile.parent == place else ["--snakefile", str(snakefile)]
     current = False
     with subprocess.Popen(
-        [sys.executable, *words], cwd=place, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        [sys.executable, *words],
+        cwd=place,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
     ) as run:
         for line in map(str.rstrip, run.stdout or ()):
             current = current or line.startswith(_NOTHING)

@@ -1,4 +1,5 @@
-"""The application of all subcommands, in the order of the work; bad input ends in one line."""
+"""The application of all subcommands, in the order of the work; bad input ends in one
+line."""
 
 import sys
 from collections.abc import Callable
@@ -17,7 +18,8 @@ from elastocal.command.results import certificate, correct, export
 from elastocal.command.terminal import example
 from elastocal.errors import InputError, fault_of_machine
 
-# Each subcommand with an example, in the order in which a calibration needs them; `import` is a group of its own.
+# Each subcommand with an example, in the order in which a calibration needs them;
+# `import` is a group of its own.
 COMMANDS: dict[Callable[..., None], str] = {
     demo: "",
     init: "campaigns/cell --robot robot.yaml",
@@ -35,7 +37,11 @@ class InOrder(TyperGroup):
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Names of all subcommands."""
-        return ["demo", "import", *(command.__name__ for command in COMMANDS if command is not demo)]
+        return [
+            "demo",
+            "import",
+            *(command.__name__ for command in COMMANDS if command is not demo),
+        ]
 
 
 # Without the boxes of rich the last line says what is wrong with an option.
@@ -49,12 +55,18 @@ app = typer.Typer(
     epilog=example("elastocal demo"),
 )
 for _command, _typed in COMMANDS.items():
-    app.command(epilog=example(f"elastocal {_command.__name__} {_typed}".strip()))(_command)
+    app.command(epilog=example(f"elastocal {_command.__name__} {_typed}".strip()))(
+        _command
+    )
 app.add_typer(importing)
 
 
 @app.callback(invoke_without_command=True)
-def with_version(version: Annotated[bool, Option("--version", help="Print the version and exit.")] = False) -> None:
+def with_version(
+    version: Annotated[
+        bool, Option("--version", help="Print the version and exit.")
+    ] = False,
+) -> None:
     """From a robot and a laser tracker to a corrected robot.
 
     The order of the work: plan, measure, check, diagnose, correct, certificate.
@@ -65,7 +77,8 @@ def with_version(version: Annotated[bool, Option("--version", help="Print the ve
 
 
 def main() -> None:
-    """Run the command; exit code 1 with one line on standard error where the input is wrong, or the machine fails."""
+    """Run the command; exit code 1 with one line on standard error where the input is
+    wrong, or the machine fails."""
     try:
         app()
     except InputError as error:

@@ -1,4 +1,5 @@
-"""Where the nominal robot puts each measurement, without loads, in frames and targets fitted to most of the measurements."""
+"""Where the nominal robot puts each measurement, without loads, in frames and targets
+fitted to most of the measurements."""
 
 from __future__ import annotations
 
@@ -23,12 +24,16 @@ if TYPE_CHECKING:
 # Poses enough to tell what concerns all measurements.
 MANY_POSES = 80
 # No geometric error, no deflection moves a robot so far.
-IMPLAUSIBLE_M, IMPLAUSIBLE_RAD = 0.02, 0.1
+IMPLAUSIBLE_M = 0.02
+IMPLAUSIBLE_RAD = 0.1
 # A correction must lower the residual by this factor.
 FAR_BETTER = 5.0
-# Share of the measurements that frames and targets are first fitted to, and steps of fitting to those that fit best. Those
-# beyond so many robust standard deviations, by the median of their distances, take no part in the last fit.
-_CORE, _CORE_STEPS, _APART = 0.6, 5, 5.0
+# Share of the measurements that frames and targets are first fitted to, and steps of
+# fitting to those that fit best. Those beyond so many robust standard deviations, by
+# the median of their distances, take no part in the last fit.
+_CORE = 0.6
+_CORE_STEPS = 5
+_APART = 5.0
 _TRIMMED = 0.1
 
 
@@ -36,7 +41,8 @@ _TRIMMED = 0.1
 class Placement:
     """Measurements beside the nominal robot, in base axes.
 
-    `model`: frames and targets alone. `nominal` (N, 3), (N, 3, 3): poses of the measuring points. `estimate`: frames, targets.
+    `model`: frames and targets alone. `nominal` (N, 3), (N, 3, 3): poses of the
+    measuring points. `estimate`: frames, targets.
     """
 
     model: Model
@@ -48,11 +54,18 @@ class Placement:
     def predicted(self) -> np.ndarray:
         """Positions that the robot gives the targets, ndarray (N, 3), m."""
         position, rotation = self.nominal
-        return position + (rotation @ self.estimate.target_offset[self.observations.target][..., None])[..., 0]
+        return (
+            position
+            + (
+                rotation
+                @ self.estimate.target_offset[self.observations.target][..., None]
+            )[..., 0]
+        )
 
     @cached_property
     def measured(self) -> tuple[np.ndarray, np.ndarray | None]:
-        """Positions (N, 3), m, and orientations (N, 3, 3); these None where positions alone are measured."""
+        """Positions (N, 3), m, and orientations (N, 3, 3); these None where positions
+        alone are measured."""
         return measured_in_base(self.estimate, self.observations)
 
     @cached_property
@@ -62,35 +75,54 @@ class Placement:
 
     @cached_property
     def turn(self) -> np.ndarray | None:
-        """Angle between predicted and measured orientation, ndarray (N,), rad; None where positions are measured."""
+        """Angle between predicted and measured orientation, ndarray (N,), rad; None
+        where positions are measured."""
         if (seen := self.measured[1]) is None:
             return None
-        predicted = self.nominal[1] @ self.estimate.target_rotation[self.observations.target]
-        return np.linalg.norm(rotation_vectors(seen @ predicted.transpose(0, 2, 1)), axis=1)
+        predicted = (
+            self.nominal[1] @ self.estimate.target_rotation[self.observations.target]
+        )
+        return np.linalg.norm(
+            rotation_vectors(seen @ predicted.transpose(0, 2, 1)), axis=1
+        )
 
     @cached_property
     def misfit(self) -> np.ndarray:
-        """What is left of positions (m) and orientations (rad) of the target that fits worst, ndarray (2,).
+        """What is left of positions (m) and orientations (rad) of the target that fits
+        worst, ndarray (2,).
 
         RMS without the largest tenth: single measurements say nothing of all.
         """
-        target, parts = self.observations.target, (self.distance, self.turn)
+        target = self.observations.target
+        parts = (self.distance, self.turn)
         each = [target == number for number in np.unique(target)]
-        return np.array([0.0 if part is None else max(_trimmed_rms(part[mine]) for mine in each) for part in parts])
+        return np.array(
+            [
+                0.0 if part is None else max(_trimmed_rms(part[mine]) for mine in each)
+                for part in parts
+            ]
+        )
 
 
 def placed(campaign: Campaign, estimate: Estimate | None = None) -> Placement:
-    """Measurements in given frames and targets, or in those fitted to all measurements alike."""
-    model, observations = replace(declared_model(campaign), effects=()), single_observations(campaign.measurements)
+    """Measurements in given frames and targets, or in those fitted to all measurements
+    alike."""
+    model = replace(declared_model(campaign), effects=())
+    observations = single_observations(campaign.measurements)
     nominal = nominal_poses(model, observations)
-    return Placement(model, observations, nominal, estimate or registered_to(model, observations, *nominal))
+    return Placement(
+        model,
+        observations,
+        nominal,
+        estimate or registered_to(model, observations, *nominal),
+    )
 
 
 def robustly_placed(campaign: Campaign) -> Placement:
     """Fit frames and targets to the measurements that agree with each other.
 
-    Least trimmed squares by concentration steps [1] from the fit to all, trimmed for each target in each session; then one
-    reweighted fit.
+    Least trimmed squares by concentration steps [1] from the fit to all, trimmed for
+    each target in each session; then one reweighted fit.
 
     [1] Rousseeuw, P. J. and Van Driessen, K., Computing LTS regression for large data sets, Data Mining and Knowledge Discovery
         12, 2006.
@@ -99,24 +131,35 @@ def robustly_placed(campaign: Campaign) -> Placement:
     if campaign.frame == "base" and not found.model.fitted_parts:
         return found
     for step in range(_CORE_STEPS + 1):
-        distance, kept = found.distance, np.zeros(len(campaign.measurements), bool)
+        distance = found.distance
+        kept = np.zeros(len(campaign.measurements), bool)
         for members in of_each_target(campaign.measurements):
             limit = np.quantile(distance[members], _CORE)
             if step == _CORE_STEPS:
-                limit = max(limit, _APART * np.median(distance[members]) / np.sqrt(chdtri(3, 0.5)))
+                limit = max(
+                    limit,
+                    _APART * np.median(distance[members]) / np.sqrt(chdtri(3, 0.5)),
+                )
             kept[members] = distance[members] <= limit
-        some, nominal = select_states(found.observations, kept), (part[kept] for part in found.nominal)
+        some = select_states(found.observations, kept)
+        nominal = (part[kept] for part in found.nominal)
         found = replace(found, estimate=registered_to(found.model, some, *nominal))
     return found
 
 
 def spread(campaign: Campaign, poses: int = MANY_POSES) -> Campaign:
-    """A campaign with measurements of so many poses of each target in each session at most, at the lowest load of each."""
-    seen, chosen = campaign.measurements, []
+    """A campaign with measurements of so many poses of each target in each session at
+    most, at the lowest load of each."""
+    seen = campaign.measurements
+    chosen = []
     for members in of_each_target(seen):
-        order = members[np.lexsort((seen.repeat[members], seen.load[members], seen.pose[members]))]
+        order = members[
+            np.lexsort((seen.repeat[members], seen.load[members], seen.pose[members]))
+        ]
         first = order[np.unique(seen.pose[order], return_index=True)[1]]
-        chosen.append(first[np.unique(np.linspace(0, len(first) - 1, poses).round().astype(int))])
+        chosen.append(
+            first[np.unique(np.linspace(0, len(first) - 1, poses).round().astype(int))]
+        )
     return replace(campaign, measurements=seen.select(np.sort(np.concatenate(chosen))))
 
 

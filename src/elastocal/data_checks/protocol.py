@@ -1,4 +1,5 @@
-"""What a fault of the data is: a name, what the data resemble in plain words, and how much better they fit without it."""
+"""What a fault of the data is: a name, what the data resemble in plain words, and how
+much better they fit without it."""
 
 from __future__ import annotations
 
@@ -23,10 +24,12 @@ class Value:
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault that the measurements show, and that must be mended before anything is traced.
+    """A fault that the measurements show, and that must be mended before anything is
+    traced.
 
-    `joints`: joints concerned, counted from 1; empty where there are none. `detail`: one sentence in plain words. `evidence`:
-    RMS residual as written and with the correction, m. Where only orientations show the fault: of a point 1 m away.
+    `joints`: joints concerned, counted from 1; empty where there are none. `detail`:
+    one sentence in plain words. `evidence`: RMS residual as written and with the
+    correction, m. Where only orientations show the fault: of a point 1 m away.
     `alternatives`: what would explain the measurements as well, in plain words.
     """
 
@@ -39,5 +42,6 @@ class Fault:
 
 
 def data_at_fault(verdict: Mapping[str, Any]) -> bool:
-    """Whether the document of a diagnosis or verdict finds a fault of the data, after which it says nothing of the robot."""
+    """Whether the document of a diagnosis or verdict finds a fault of the data, after
+    which it says nothing of the robot."""
     return any(effect["family"] == OF_DATA for effect in verdict["effects"])

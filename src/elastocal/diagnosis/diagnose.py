@@ -1,4 +1,5 @@
-"""The two calls: `diagnose` looks at training poses alone, `judge` opens the held-out ones, once, at the end."""
+"""The two calls: `diagnose` looks at training poses alone, `judge` opens the held-out
+ones, once, at the end."""
 
 from __future__ import annotations
 
@@ -21,7 +22,11 @@ from elastocal.diagnosis.gross_errors import (
     searched_of,
     warnings_of,
 )
-from elastocal.diagnosis.linearize import linearized, looked_at_closely, with_probable_centres
+from elastocal.diagnosis.linearize import (
+    linearized,
+    looked_at_closely,
+    with_probable_centres,
+)
 from elastocal.diagnosis.search import alarm_of, initial_screening, posterior
 from elastocal.diagnosis.verdict import Evidence
 from elastocal.effects.catalogue import effects
@@ -44,15 +49,18 @@ if TYPE_CHECKING:
 
 # Mechanisms that are added one at a time, each by a fit; of more, only the first.
 _MOST_STEPS = 4
-# Standard errors by which parameters move where nothing else is found: they change a log likelihood by 0.03 each.
+# Standard errors by which parameters move where nothing else is found: they change a
+# log likelihood by 0.03 each.
 _HARDLY = 0.25
 
 
 @dataclass(frozen=True)
 class Step:
-    """One model on the way from the nominal robot to all effects found, fitted to the training poses.
+    """One model on the way from the nominal robot to all effects found, fitted to the
+    training poses.
 
-    `kind`: of the last, "kept" where frames alone predict training poses better than what was fitted.
+    `kind`: of the last, "kept" where frames alone predict training poses better than
+    what was fitted.
     """
 
     name: str
@@ -64,8 +72,8 @@ class Step:
 class Diagnosis:
     """What training poses say of a campaign.
 
-    `steps`: the last is the final model. `document`: contents of verdict.json, but for what held-out poses say. `left_out`:
-    gross errors, which are no part of the case.
+    `steps`: the last is the final model. `document`: contents of verdict.json, but for
+    what held-out poses say. `left_out`: gross errors, which are no part of the case.
     """
 
     case: Case
@@ -85,10 +93,16 @@ class Diagnosis:
         return self.steps[-1].fitted
 
 
-def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str], None] | None = None) -> Diagnosis:
+def diagnose(
+    case: Case,
+    settings: Settings,
+    seed: int,
+    progress: Callable[[str], None] | None = None,
+) -> Diagnosis:
     """Find what the declared model of a campaign lacks.
 
-    `case`: of training poses. `seed`: of the simulated null distribution. `progress`: gets a line after each stage.
+    `case`: of training poses. `seed`: of the simulated null distribution. `progress`:
+    gets a line after each stage.
     """
     whole = case.campaign
     tell = progress or (lambda line: None)
@@ -100,100 +114,192 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
     else:
         part = with_probable_centres(part, settings)
         case = replace(case, model=part.case.model)
-    tell(f"declared model fitted to {counted(len(part.case.observations), 'measurement')}")
+    tell(
+        f"declared model fitted to {counted(len(part.case.observations), 'measurement')}"
+    )
     found: Evidence | None = None
-    about, start, most_pose_error_rad = part.declared, None, np.inf
-    measurements, errors = case.campaign.measurements, Deviations.none(len(part.kept), case.model.rows)
+    about = part.declared
+    start = None
+    most_pose_error_rad = np.inf
+    measurements = case.campaign.measurements
+    errors = Deviations.none(len(part.kept), case.model.rows)
     good = np.zeros(len(part.kept), bool)
     for number in range(0 if known else settings.gross_error_rounds):
         if not found:
             found = _explained(part, settings, seed, tell, start, most_pose_error_rad)
             about = found.fitted
         errors = gross_errors(about, part.noise, measurements, part.kept, settings)
-        # A row that a model without it explains stays, whatever the next model says of it: no set of rows comes back.
+        # A row that a model without it explains stays, whatever the next model says of
+        # it: no set of rows comes back.
         good |= ~part.kept & ~errors.gross
         remaining = ~errors.gross | good
         if (remaining == part.kept).all() or number + 1 == settings.gross_error_rounds:
             break
-        # The model found looks at all rows once more, without these, before another search is made.
+        # The model found looks at all rows once more, without these, before another
+        # search is made.
         some = searched_of(case, case.select(remaining), settings)
         about = fit(about.model, some, about.noise, about.estimate, True, ON_THE_WAY)
         errors = gross_errors(about, part.noise, measurements, remaining, settings)
         good |= ~remaining & ~errors.gross
-        last, part = part, fitted_to(case, ~errors.gross | good, settings, part)
+        last = part
+        part = fitted_to(case, ~errors.gross | good, settings, part)
         if part is last:
             break
-        tell(f"{counted((~part.kept).sum(), 'gross error')} in {counted(len(good), 'row')}: once more without")
+        tell(
+            f"{counted((~part.kept).sum(), 'gross error')} in {counted(len(good), 'row')}: once more without"
+        )
         if noise_facts(part.noise) == noise_facts(last.noise):
             again = about
             if (part.kept != remaining).any():
-                again = fit(about.model, part.searched, about.noise, about.estimate, True, ON_THE_WAY)
-            moved = np.subtract(*(parameter_values(each.model, each.estimate) for each in (again, found.fitted)))
-            if (np.abs(moved) <= _HARDLY * np.sqrt(np.diag(found.fitted.covariance))).all():
+                again = fit(
+                    about.model,
+                    part.searched,
+                    about.noise,
+                    about.estimate,
+                    True,
+                    ON_THE_WAY,
+                )
+            moved = np.subtract(
+                *(
+                    parameter_values(each.model, each.estimate)
+                    for each in (again, found.fitted)
+                )
+            )
+            if (
+                np.abs(moved) <= _HARDLY * np.sqrt(np.diag(found.fitted.covariance))
+            ).all():
                 # Rows of so little weight that the search would find the same.
                 about = again
                 continue
-        # What was linearised about a model found is so again: from the declared one the way is the same and twice as long.
-        relinearized = len(found.linearized.about.model.effects) > len(part.declared.model.effects)
+        # What was linearised about a model found is so again: from the declared one the
+        # way is the same and twice as long.
+        relinearized = len(found.linearized.about.model.effects) > len(
+            part.declared.model.effects
+        )
         start = (about, found.conclusion.best.named) if relinearized else None
         most_pose_error_rad = found.linearized.most_pose_error_rad
         # Its statistics make room for those of the next search.
         found = None
     errors = replace(errors, gross=~part.kept)
-    case, noise, declared = part.case, part.noise, part.to_all(part.declared)
-    bare = fit(replace(case.model, effects=()), case.observations, noise, settled=ON_THE_WAY)
-    steps = [Step("frames and targets", "frames", bare), Step("declared model", "declared", declared)]
-    final, lost, contradicting, repeatable = declared, list[str](), list[str](), None
+    case = part.case
+    noise = part.noise
+    declared = part.to_all(part.declared)
+    bare = fit(
+        replace(case.model, effects=()), case.observations, noise, settled=ON_THE_WAY
+    )
+    steps = [
+        Step("frames and targets", "frames", bare),
+        Step("declared model", "declared", declared),
+    ]
+    final = declared
+    lost = list[str]()
+    contradicting = list[str]()
+    repeatable = None
     warnings = [*part.warnings]
     if found:
         final = about
         if about is not found.fitted or part.searched is not case.observations:
             final = part.to_all(about)
-        named, word = found.conclusion.best.named, found.conclusion.verdict
-        found = replace(found, conclusion=verdict.with_related(found.conclusion, verdict.oversized(final, named)))
+        named = found.conclusion.best.named
+        word = found.conclusion.verdict
+        found = replace(
+            found,
+            conclusion=verdict.with_related(
+                found.conclusion, verdict.oversized(final, named)
+            ),
+        )
         if not found.adopted:
-            # Under the noise that it leaves itself, for nothing else enters the model that is kept.
+            # Under the noise that it leaves itself, for nothing else enters the model
+            # that is kept.
             line = found.linearized
-            left = refit.remaining_noise(line.problem, found.posterior.nothing, line.about.noise, declared.noise)
-            alone = fit(declared.model, case.observations, left, declared.estimate, reweighted=True) if named else final
+            left = refit.remaining_noise(
+                line.problem, found.posterior.nothing, line.about.noise, declared.noise
+            )
+            alone = (
+                fit(
+                    declared.model,
+                    case.observations,
+                    left,
+                    declared.estimate,
+                    reweighted=True,
+                )
+                if named
+                else final
+            )
             steps[-1] = replace(steps[-1], fitted=alone)
-        lost = _losses(bare, [steps[-1].fitted, *([final] if found.adopted else [])], case.observations, settings)
+        lost = _losses(
+            bare,
+            [steps[-1].fitted, *([final] if found.adopted else [])],
+            case.observations,
+            settings,
+        )
         found = replace(found, adopted=found.adopted and not lost)
         if found.adopted:
             steps += _effect_steps(part, final, found)
         elif lost and lost[0]:
-            kept = fit(bare.model, case.observations, steps[-1].fitted.noise, bare.estimate)
+            kept = fit(
+                bare.model, case.observations, steps[-1].fitted.noise, bare.estimate
+            )
             steps.append(Step("frames and targets, kept", "kept", kept))
         kept, (asked, repeatable) = steps[-1].fitted, found.tested or (None, None)
         if asked is not kept:
             repeatable = repeatable_part(kept, case.observations, seed)
         unnamed = verdict.remainder_sentences(repeatable)
         if word in (verdict.ADEQUATE, verdict.NOT_TESTABLE):
-            contradicting = unnamed or (verdict.contradictions(final, noise, settings) if word == verdict.ADEQUATE else [])
+            contradicting = unnamed or (
+                verdict.contradictions(final, noise, settings)
+                if word == verdict.ADEQUATE
+                else []
+            )
         if contradicting:
-            found = replace(found, conclusion=replace(found.conclusion, verdict=verdict.UNEXPLAINED))
+            found = replace(
+                found, conclusion=replace(found.conclusion, verdict=verdict.UNEXPLAINED)
+            )
         warnings = [*contradicting, *warnings, *filter(None, lost)]
-        warnings += [] if unnamed else verdict.pose_error_warnings(kept.noise, found.linearized.pose_std_error_rad)
+        warnings += (
+            []
+            if unnamed
+            else verdict.pose_error_warnings(
+                kept.noise, found.linearized.pose_std_error_rad
+            )
+        )
     left_out = entries_of(errors, whole, held_out=False)
     document = _document(case, noise, steps, final, found, known, settings, warnings)
-    document |= {"contradictions": contradicting, "gross_errors": left_out, "repeatable": repeatable and asdict(repeatable)}
+    document |= {
+        "contradictions": contradicting,
+        "gross_errors": left_out,
+        "repeatable": repeatable and asdict(repeatable),
+    }
     document["warnings"] += warnings_of(left_out)
-    return Diagnosis(case, tuple(steps), found, document, whole.measurements.select(errors.gross))
+    return Diagnosis(
+        case, tuple(steps), found, document, whole.measurements.select(errors.gross)
+    )
 
 
-def _losses(bare: Fit, models: Sequence[Fit], observations: Observations, settings: Settings) -> list[str]:
-    """A sentence for each model that predicts left-out training poses worse than frames alone, empty for one that does not.
+def _losses(
+    bare: Fit, models: Sequence[Fit], observations: Observations, settings: Settings
+) -> list[str]:
+    """A sentence for each model that predicts left-out training poses worse than frames
+    alone, empty for one that does not.
 
-    Of the declared model and, if it is given, that with effects; nothing where the last holds.
+    Of the declared model and, if it is given, that with effects; nothing where the last
+    holds.
     """
     found = []
-    for fitted, name in zip(models, ("declared model", "model with the effects found"), strict=False):
-        effective, words = effective_parameters(fitted), ""
+    for fitted, name in zip(
+        models, ("declared model", "model with the effects found"), strict=False
+    ):
+        effective = effective_parameters(fitted)
+        words = ""
         if fitted.residual.size < settings.numbers_a_parameter * effective:
-            mine, others = (left_out_squares(each, observations) for each in (fitted, bare))
+            mine, others = (
+                left_out_squares(each, observations) for each in (fitted, bare)
+            )
             off = mine - others
             if off.mean() > off.std(ddof=1) / np.sqrt(len(off)):
-                rms = [f"{1e3 * np.sqrt(each.mean()):.2f} mm" for each in (mine, others)]
+                rms = [
+                    f"{1e3 * np.sqrt(each.mean()):.2f} mm" for each in (mine, others)
+                ]
                 words = (
                     f"training poses left out in turn are off by {rms[0]} RMS by the {name}, by {rms[1]} with frames and"
                     f" targets alone: {len(mine)} poses are too few for {effective:.0f} parameters, and the {name} is not kept"
@@ -210,51 +316,87 @@ def _explained(
     start: tuple[Fit, tuple[str, ...]] | None,
     most_pose_error_rad: float,
 ) -> Evidence:
-    """Evidence about the declared model, and again about the model found where that, or its noise, is far from it.
+    """Evidence about the declared model, and again about the model found where that, or
+    its noise, is far from it.
 
-    At once about a model, with the mechanisms that it has beyond the declared one, where the search is to ``start``. What an
-    error common to the measurements of a pose takes beyond what robots repeat to must be chance: where it is a function of the
-    joints no more of it is thought of. And where what is left is one, the search goes on about each model that is new.
+    At once about a model, with the mechanisms that it has beyond the declared one,
+    where the search is to ``start``. What an error common to the measurements of a pose
+    takes beyond what robots repeat to must be chance: where it is a function of the
+    joints no more of it is thought of. And where what is left is one, the search goes
+    on about each model that is new.
     """
-    candidates, searched, declared = list(part.case.candidates.values()), part.searched, part.declared
+    candidates = list(part.case.candidates.values())
+    searched = part.searched
+    declared = part.declared
     about, before = start or (declared, None)
     tested: tuple[Fit, Repeatable | None] | None = None
     # The fit to all measurements starts where that to some ends.
     enough = SETTLED if searched is part.case.observations else ON_THE_WAY
     if start:
-        about = fit(about.model, searched, about.noise, about.estimate, True, ON_THE_WAY)
+        about = fit(
+            about.model, searched, about.noise, about.estimate, True, ON_THE_WAY
+        )
     for round_number in range(1 if start else 0, settings.linearizations):
-        problem, near = linearized(about, searched, candidates, settings, most_pose_error_rad), about if before else None
+        problem = linearized(about, searched, candidates, settings, most_pose_error_rad)
+        near = about if before else None
         nothing, alone = initial_screening(problem.problem)
         draws = stream(seed, part.case.campaign.name, "null distribution", round_number)
-        alarm = alarm_of(problem.problem, problem.products, nothing.pose_error_rad, draws)
-        # The alarm comes before the measurements choose at which shapes to look more closely: it would no longer be exact.
+        alarm = alarm_of(
+            problem.problem, problem.products, nothing.pose_error_rad, draws
+        )
+        # The alarm comes before the measurements choose at which shapes to look more
+        # closely: it would no longer be exact.
         if alarm.raised:
             problem = looked_at_closely(problem, alone)
-        found = posterior(problem.problem, {effect.key for effect in about.model.effects})
+        found = posterior(
+            problem.problem, {effect.key for effect in about.model.effects}
+        )
         conclusion = verdict.concluded(problem.problem, found, alarm)
-        # Rows of a long campaign make room for the fit, and for those of the next linearisation.
+        # Rows of a long campaign make room for the fit, and for those of the next
+        # linearisation.
         problem = problem.without_rows
-        named, taken = conclusion.best.named, about.noise
+        named = conclusion.best.named
+        taken = about.noise
         model = found.models[conclusion.best.model] if named else found.nothing
-        # No verdict yet, and no probability: a later search, or the poses left out, may say otherwise.
-        words = [getattr(effects().get(name), "words", "an unknown mechanism") for name in conclusion.best.mechanisms]
+        # No verdict yet, and no probability: a later search, or the poses left out, may
+        # say otherwise.
+        words = [
+            getattr(effects().get(name), "words", "an unknown mechanism")
+            for name in conclusion.best.mechanisms
+        ]
         leading = " with ".join(words) or "nothing is missing"
-        tell(f"search {round_number + 1} of at most {settings.linearizations}: leading so far, {leading}")
+        tell(
+            f"search {round_number + 1} of at most {settings.linearizations}: leading so far, {leading}"
+        )
         noise = refit.remaining_noise(problem.problem, model, taken, declared.noise)
-        about = refit.fit_with_sizes(declared, searched, noise, refit.selected(problem, model), near, settled=enough)
+        about = refit.fit_with_sizes(
+            declared,
+            searched,
+            noise,
+            refit.selected(problem, model),
+            near,
+            settled=enough,
+        )
         off = noise.position_m > settings.relinearize_noise * taken.position_m
         small = not named or alarm.statistic < settings.relinearize_above
-        ends = not off and (small or named == before or abs(refit.mean_square(about) - 1.0) < settings.linear_misfit)
-        # What is a function of the joints is no error of poses, and about a model that is new the problem is another one.
-        large, left = model.pose_error_rad > settings.pose_repeatability_rad, None
+        ends = not off and (
+            small
+            or named == before
+            or abs(refit.mean_square(about) - 1.0) < settings.linear_misfit
+        )
+        # What is a function of the joints is no error of poses, and about a model that
+        # is new the problem is another one.
+        large = model.pose_error_rad > settings.pose_repeatability_rad
+        left = None
         if large or (ends and named not in (before, ())):
             left = repeatable_part(about, searched, seed)
             tested = about, left
         remains = left is not None and left.remains
         settled = ends and not remains
         adopted = bool(named) and refit.expected_to_help(problem.problem, found, model)
-        evidence = Evidence(problem, found, alarm, conclusion, adopted, settled, about, tested)
+        evidence = Evidence(
+            problem, found, alarm, conclusion, adopted, settled, about, tested
+        )
         if settled:
             break
         if remains:
@@ -270,21 +412,38 @@ def _explained(
 
 
 def _effect_steps(part: Kept, final: Fit, found: Evidence) -> list[Step]:
-    """One step for each mechanism, that which explains most first, each with those before it; of many, the rest together.
+    """One step for each mechanism, that which explains most first, each with those
+    before it; of many, the rest together.
 
     All but the last come from what a search looks at: only their errors are shown.
     """
     model = found.posterior.models[found.conclusion.best.model]
-    chosen = [(effect, final.values_of(effect.key)[1]) for effect, _ in refit.selected(found.linearized, model)]
+    chosen = [
+        (effect, final.values_of(effect.key)[1])
+        for effect, _ in refit.selected(found.linearized, model)
+    ]
     explained = refit.squares_explained(found.linearized.problem, model)
     names = sorted(found.conclusion.best.named, key=lambda name: -explained[name])
     alone = names[:-1] if len(names) <= _MOST_STEPS else names[:1]
     rest = names[len(alone) :]
-    steps = [Step(f"with {rest[0] if len(rest) == 1 else f'{len(rest)} further effects'}", "effect", final)]
+    steps = [
+        Step(
+            f"with {rest[0] if len(rest) == 1 else f'{len(rest)} further effects'}",
+            "effect",
+            final,
+        )
+    ]
     for number in range(len(alone), 0, -1):
         some = tuple(entry for entry in chosen if entry[0].effect in alone[:number])
         # Errors that a tenth of a standard error in a parameter hardly moves.
-        fitted = refit.fit_with_sizes(part.declared, part.searched, final.noise, some, steps[0].fitted, settled=ON_THE_WAY)
+        fitted = refit.fit_with_sizes(
+            part.declared,
+            part.searched,
+            final.noise,
+            some,
+            steps[0].fitted,
+            settled=ON_THE_WAY,
+        )
         steps.insert(0, Step(f"with {alone[number - 1]}", "effect", fitted))
     return steps
 
@@ -299,8 +458,10 @@ def _document(
     settings: Settings,
     warnings: Sequence[str],
 ) -> dict[str, Any]:
-    declared, final = steps[1].fitted, steps[-1].fitted
-    springs, tested = refit.Averaged({}, {}), set[str]()
+    declared = steps[1].fitted
+    final = steps[-1].fitted
+    springs = refit.Averaged({}, {})
+    tested = set[str]()
     stated: dict[str, Any] = {
         "verdict": verdict.NAMED if len(known) == 1 else verdict.SEVERAL,
         "effects": [verdict.fault_entry(fault) for fault in known],
@@ -308,42 +469,76 @@ def _document(
     untestable: dict[str, str] = {}
     remarks = [*warnings]
     if found:
-        problem, conclusion = found.linearized.problem, found.conclusion
-        models, nothing = found.posterior.models, found.posterior.nothing
+        problem = found.linearized.problem
+        conclusion = found.conclusion
+        models = found.posterior.models
+        nothing = found.posterior.nothing
         best = models[conclusion.best.model] if conclusion.best.mechanisms else nothing
         chosen = best if conclusion.best.named else nothing
         kept = chosen if found.adopted else nothing
         owners = [(owner, parameter.name) for owner, parameter in declared.parameters]
         averages = refit.averaged(found.linearized, found.posterior, chosen, owners)
-        springs = averages if kept is chosen else refit.averaged(found.linearized, found.posterior, nothing, owners)
-        entries = verdict.effect_entries(found, with_effects, averages, case.observations)
-        untestable, other = found.linearized.untestable, refit.other_predictions(problem, found.posterior, kept)
+        springs = (
+            averages
+            if kept is chosen
+            else refit.averaged(found.linearized, found.posterior, nothing, owners)
+        )
+        entries = verdict.effect_entries(
+            found, with_effects, averages, case.observations
+        )
+        untestable = found.linearized.untestable
+        other = refit.other_predictions(problem, found.posterior, kept)
         tested = {unit.candidate.key for unit in problem.units if unit.candidate}
         stated = {
             "verdict": conclusion.verdict,
             "effects": entries,
             "probabilities": verdict.probability_facts(found),
-            "misfit": {"before": refit.mean_square_left(problem, nothing), "after": refit.mean_square_left(problem, best)},
-            # Root mean square by which positions may be elsewhere by other models than the one that is kept.
-            "other_models_m": float(np.sqrt(3.0 * other / found.linearized.products.freedom)) * noise.position_m,
+            "misfit": {
+                "before": refit.mean_square_left(problem, nothing),
+                "after": refit.mean_square_left(problem, best),
+            },
+            # Root mean square by which positions may be elsewhere by other models than
+            # the one that is kept.
+            "other_models_m": float(
+                np.sqrt(3.0 * other / found.linearized.products.freedom)
+            )
+            * noise.position_m,
         }
         if entries and not found.adopted:
-            remarks.append("what was found is too uncertain to make predictions better: the model stays as declared")
+            remarks.append(
+                "what was found is too uncertain to make predictions better: the model stays as declared"
+            )
         remarks += verdict.implausible(with_effects, entries)
         if not found.settled:
             words = f"the problem was linearised {settings.linearizations} times, and each time another model was found"
             remarks.append(f"{words}: more may be missing")
-    remarks += compliance_warnings(final) + verdict.scatter_warnings(final.noise, noise, settings.relinearize_noise)
+    remarks += compliance_warnings(final) + verdict.scatter_warnings(
+        final.noise, noise, settings.relinearize_noise
+    )
     for name, fitted in (("declared", declared), ("final", final)):
         if not fitted.converged:
-            remarks.append(f"the fit of the {name} model did not converge: its parameters are not to be relied on")
+            remarks.append(
+                f"the fit of the {name} model did not converge: its parameters are not to be relied on"
+            )
     return stated | {
         "campaign": case.campaign.name,
-        "noise": noise_facts(noise) | {"pose_rad": final.noise.pose_rad, "factor": final.noise.position_m / noise.position_m},
+        "noise": noise_facts(noise)
+        | {
+            "pose_rad": final.noise.pose_rad,
+            "factor": final.noise.position_m / noise.position_m,
+        },
         "heldout": None,
         "kept": steps[-1].kind.replace("kept", "frames"),
-        "compliance_urad_per_Nm": _compliances(declared, final, springs, settings.prior_share),
-        "held": sorted({f"{o} {p.name}" for (o, p), held in zip(final.parameters, final.held, strict=True) if held}),
+        "compliance_urad_per_Nm": _compliances(
+            declared, final, springs, settings.prior_share
+        ),
+        "held": sorted(
+            {
+                f"{o} {p.name}"
+                for (o, p), held in zip(final.parameters, final.held, strict=True)
+                if held
+            }
+        ),
         "candidates_tested": len(tested),
         "untestable": untestable,
         "converged": {"declared": declared.converged, "final": final.converged},
@@ -352,18 +547,37 @@ def _document(
     }
 
 
-def _compliances(declared: Fit, final: Fit, springs: refit.Averaged, prior_share: float) -> dict[str, list[float]]:
+def _compliances(
+    declared: Fit, final: Fit, springs: refit.Averaged, prior_share: float
+) -> dict[str, list[float]]:
     joints = final.model.sites.joints
-    after, deviations = joint_compliances(final.model, final.estimate).copy(), np.zeros(joints)
+    after = joint_compliances(final.model, final.estimate).copy()
+    deviations = np.zeros(joints)
     identified = np.zeros(joints, bool)
     if final.model.identifies_compliance:
         mine = final.places_of("joint_compliance")
-        names = [("joint_compliance", final.parameters[index][1].name) for index in mine]
+        names = [
+            ("joint_compliance", final.parameters[index][1].name) for index in mine
+        ]
         alone = np.sqrt(np.diag(final.covariance))[mine]
         after += [springs.shift.get(name, 0.0) for name in names]
-        deviations = np.array([springs.std_error.get(name, error) for name, error in zip(names, alone, strict=True)])
-        # With a prior of the size that such a spring reaches, of which that share would be left.
+        deviations = np.array(
+            [
+                springs.std_error.get(name, error)
+                for name, error in zip(names, alone, strict=True)
+            ]
+        )
+        # With a prior of the size that such a spring reaches, of which that share would
+        # be left.
         plausible = np.array([final.parameters[index][1].plausible for index in mine])
-        identified = ~final.held[mine] & (deviations**2 < prior_share * (deviations**2 + plausible**2))
-    found = {"before": joint_compliances(declared.model, declared.estimate), "after": after, "std_error": deviations}
-    return {name: (1e6 * values).tolist() for name, values in found.items()} | {"identifiable": identified.tolist()}
+        identified = ~final.held[mine] & (
+            deviations**2 < prior_share * (deviations**2 + plausible**2)
+        )
+    found = {
+        "before": joint_compliances(declared.model, declared.estimate),
+        "after": after,
+        "std_error": deviations,
+    }
+    return {name: (1e6 * values).tolist() for name, values in found.items()} | {
+        "identifiable": identified.tolist()
+    }

@@ -1,11 +1,15 @@
-"""Rows that no model of the robot explains: a lost beam, a held point, a mistyped angle. They are found, named and left out.
+"""Rows that no model of the robot explains: a lost beam, a held point, a mistyped
+angle. They are found, named and left out.
 
-A row is judged by its distance from what the other rows predict, in standard deviations (externally studentized residual; Cook
-and Weisberg, Residuals and Influence in Regression, 1982), and is a gross error beyond what the largest of so many good rows
-exceeds with a small probability (mean-shift outliers with Bonferroni's bound; Barnett and Lewis, Outliers in Statistical Data,
-1994). The unit is one standard deviation or, where that is more, what the rows that do not stand out scatter: a model that does
-not fit makes no row stand out. Before it is known what the model lacks, rows are predicted by everything that it might lack at
-once (`improbable`); rows that the final model explains after all are taken back.
+A row is judged by its distance from what the other rows predict, in standard deviations
+(externally studentized residual; Cook and Weisberg, Residuals and Influence in
+Regression, 1982), and is a gross error beyond what the largest of so many good rows
+exceeds with a small probability (mean-shift outliers with Bonferroni's bound; Barnett
+and Lewis, Outliers in Statistical Data, 1994). The unit is one standard deviation or,
+where that is more, what the rows that do not stand out scatter: a model that does not
+fit makes no row stand out. Before it is known what the model lacks, rows are predicted
+by everything that it might lack at once (`improbable`); rows that the final model
+explains after all are taken back.
 """
 
 from __future__ import annotations
@@ -46,19 +50,24 @@ if TYPE_CHECKING:
     from elastocal.fitting.model import Case, Estimate, Model
     from elastocal.fitting.noise import Noise
 
-# Shares of the distances from which the scale is estimated: the second sees tails that are heavier than normal ones.
+# Shares of the distances from which the scale is estimated: the second sees tails that
+# are heavier than normal ones.
 _SCALE_QUANTILES = (0.5, 0.75)
-# Least share of a row's variance that is its own and not that of the parameters fitted to it.
+# Least share of a row's variance that is its own and not that of the parameters fitted
+# to it.
 _LEAST_OWN = 0.01
 # Shares of the error common to a pose that a fit states.
 _POSE_SHARES = (0.0, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)
-# Rows of which the scale is estimated at most, to a percent; more determine the parameters so well that one hardly counts.
+# Rows of which the scale is estimated at most, to a percent; more determine the
+# parameters so well that one hardly counts.
 _MOST = 4_000
 # Extrapolated rows of which the usual error is known.
 _FEWEST_TO_COMPARE = 5
-# Standard errors of the last step by all measurements of a long campaign: what it leaves is a tenth of it, or less.
+# Standard errors of the last step by all measurements of a long campaign: what it
+# leaves is a tenth of it, or less.
 _LAST_STEP = 1.0
-# Gross errors that have a sentence each among the warnings; the table of residuals has all.
+# Gross errors that have a sentence each among the warnings; the table of residuals has
+# all.
 _MOST_NAMED = 10
 
 
@@ -66,8 +75,8 @@ _MOST_NAMED = 10
 class Deviations:
     """Rows beside a model.
 
-    `residual` (N, rows): m and rad, base axes. `distance` (N,): from what the other rows predict, in robust standard
-    deviations. `gross` (N,) of bool.
+    `residual` (N, rows): m and rad, base axes. `distance` (N,): from what the other
+    rows predict, in robust standard deviations. `gross` (N,) of bool.
     """
 
     residual: np.ndarray
@@ -82,7 +91,8 @@ class Deviations:
 
 @dataclass(frozen=True)
 class Yardstick:
-    """What rows are judged by: noise of one row, and covariance (P, P) of the parameters under it, None where negligible."""
+    """What rows are judged by: noise of one row, and covariance (P, P) of the
+    parameters under it, None where negligible."""
 
     noise: Noise
     covariance: np.ndarray | None
@@ -90,12 +100,14 @@ class Yardstick:
 
 @dataclass(frozen=True)
 class _Beside:
-    """Rows of measurements beside a model, of which a sample and all that lie far off are looked at closely.
+    """Rows of measurements beside a model, of which a sample and all that lie far off
+    are looked at closely.
 
-    `residual` (N, rows). `far` (N,): whole distance in standard deviations of the sensor. `sample`, `closely` (N,): poses
-    spread over those kept; these, and what is as far off as a quarter of all. `parts`: which of the latter; their
-    sensitivities, None where so many rows were fitted that no parameter is unsure; variance (m, rows, rows) of each, and that
-    of a radian in each joint. `noise`: of one row.
+    `residual` (N, rows). `far` (N,): whole distance in standard deviations of the
+    sensor. `sample`, `closely` (N,): poses spread over those kept; these, and what is
+    as far off as a quarter of all. `parts`: which of the latter; their sensitivities,
+    None where so many rows were fitted that no parameter is unsure; variance (m, rows,
+    rows) of each, and that of a radian in each joint. `noise`: of one row.
     """
 
     residual: np.ndarray
@@ -107,12 +119,21 @@ class _Beside:
 
     @classmethod
     def of(
-        cls, model: Model, estimate: Estimate, measurements: Measurements, noise: Noise, kept: np.ndarray, unsure: bool
+        cls,
+        model: Model,
+        estimate: Estimate,
+        measurements: Measurements,
+        noise: Noise,
+        kept: np.ndarray,
+        unsure: bool,
     ) -> _Beside:
-        """Of rows that are ``kept``, (N,) of bool; ``unsure``: whether parameters are so."""
-        single, sample = single_observations(measurements), kept.copy()
+        """Of rows that are ``kept``, (N,) of bool; ``unsure``: whether parameters are
+        so."""
+        single = single_observations(measurements)
+        sample = kept.copy()
         sample[kept] = spread_poses(select_states(single, kept), _MOST)
-        near, residual = spread_poses(single, _MOST), np.empty((len(single), model.rows))
+        near = spread_poses(single, _MOST)
+        residual = np.empty((len(single), model.rows))
         whole = conditions(model, estimate, single.states) if near.all() else None
 
         def around(part: Observations, states: slice) -> Conditions:
@@ -123,140 +144,249 @@ class _Beside:
 
         for states, seen, part in parts_of(single, 0):
             residual[seen] = residuals(model, estimate, part, around(part, states))
-        far = np.linalg.norm(residual / np.repeat([noise.position_m, noise.orientation_rad], 3)[: model.rows], axis=1)
+        far = np.linalg.norm(
+            residual
+            / np.repeat([noise.position_m, noise.orientation_rad], 3)[: model.rows],
+            axis=1,
+        )
         closely = near | sample | (far > np.quantile(far[near], _SCALE_QUANTILES[-1]))
-        some, parts = select_states(single, closely), []
+        some = select_states(single, closely)
+        parts = []
         for states, seen, part in parts_of(some, len(parameters(model, estimate))):
-            line = (linearize if unsure else by_coordinates)(model, estimate, part, around(part, states))
+            line = (linearize if unsure else by_coordinates)(
+                model, estimate, part, around(part, states)
+            )
             jacobian = line.joint_jacobian
             own = measurement_covariances(noise, jacobian[:, None], model.rows)
-            parts.append((seen, line.sensitivities if unsure else None, own, jacobian @ jacobian.transpose(0, 2, 1)))
+            parts.append(
+                (
+                    seen,
+                    line.sensitivities if unsure else None,
+                    own,
+                    jacobian @ jacobian.transpose(0, 2, 1),
+                )
+            )
         return cls(residual, far, sample, closely, parts, noise)
 
     def yardstick(self, fitted: Fit) -> Yardstick:
         """As `yardstick_of`, by the sample."""
-        free, mine, rows = ~fitted.held, self.sample[self.closely], fitted.model.rows
+        free = ~fitted.held
+        mine = self.sample[self.closely]
+        rows = fitted.model.rows
         negligible = any(by is None for _, by, _, _ in self.parts) or not free.any()
         sizes = np.array([p.plausible for _, p in fitted.parameters])[free]
         best = (np.inf, Yardstick(self.noise, None))
         for share in _POSE_SHARES if fitted.noise.pose_rad else (0.0,):
-            covariance, white = None, self._white(share * fitted.noise.pose_rad)
+            covariance = None
+            white = self._white(share * fitted.noise.pose_rad)
             if not negligible:
                 information = np.diag((sizes / fitted.prior_std[free]) ** 2)
                 for (seen, by, _, _), each in zip(self.parts, white, strict=True):
                     assert by is not None
-                    seen_by = (each @ (by[..., free] * sizes))[mine[seen]].reshape(-1, len(sizes))
+                    seen_by = (each @ (by[..., free] * sizes))[mine[seen]].reshape(
+                        -1, len(sizes)
+                    )
                     information += seen_by.T @ seen_by
                 covariance = np.zeros((len(free), len(free)))
-                covariance[np.ix_(free, free)] = np.linalg.pinv(information, hermitian=True) * np.outer(sizes, sizes)
-            distance = self._distances(white, covariance, np.ones(len(mine), bool))[mine]
-            volume = -np.concatenate([np.log(np.diagonal(each, axis1=1, axis2=2)).sum(axis=1) for each in white])[mine].mean()
-            # Rows do not scatter less than the noise that is known of them: a share that says so is too large.
-            spread = volume + rows * np.log(max(np.median(distance) / np.sqrt(2 * gammaincinv(rows / 2, 0.5)), 1.0))
-            found = Yardstick(replace(self.noise, pose_rad=share * fitted.noise.pose_rad), covariance)
+                covariance[np.ix_(free, free)] = np.linalg.pinv(
+                    information, hermitian=True
+                ) * np.outer(sizes, sizes)
+            distance = self._distances(white, covariance, np.ones(len(mine), bool))[
+                mine
+            ]
+            volume = -np.concatenate(
+                [
+                    np.log(np.diagonal(each, axis1=1, axis2=2)).sum(axis=1)
+                    for each in white
+                ]
+            )[mine].mean()
+            # Rows do not scatter less than the noise that is known of them: a share
+            # that says so is too large.
+            spread = volume + rows * np.log(
+                max(np.median(distance) / np.sqrt(2 * gammaincinv(rows / 2, 0.5)), 1.0)
+            )
+            found = Yardstick(
+                replace(self.noise, pose_rad=share * fitted.noise.pose_rad), covariance
+            )
             best = min(best, (spread, found), key=lambda each: each[0])
         return best[1]
 
     def distances(self, yardstick: Yardstick, fitted: np.ndarray) -> np.ndarray:
-        """From the prediction by the other rows, in standard deviations, (N,); `far` where nothing looks closely.
+        """From the prediction by the other rows, in standard deviations, (N,); `far`
+        where nothing looks closely.
 
-        ``fitted`` says which rows the parameters were fitted to, (N,): residuals of these are smaller, those of others larger.
+        ``fitted`` says which rows the parameters were fitted to, (N,): residuals of
+        these are smaller, those of others larger.
         """
-        found, white = self.far.copy(), self._white(yardstick.noise.pose_rad)
-        found[self.closely] = self._distances(white, yardstick.covariance, fitted[self.closely])
+        found = self.far.copy()
+        white = self._white(yardstick.noise.pose_rad)
+        found[self.closely] = self._distances(
+            white, yardstick.covariance, fitted[self.closely]
+        )
         return found
 
     def _white(self, pose_rad: float) -> list[np.ndarray]:
-        return [np.linalg.inv(np.linalg.cholesky(own + pose_rad**2 * common)) for _, _, own, common in self.parts]
+        return [
+            np.linalg.inv(np.linalg.cholesky(own + pose_rad**2 * common))
+            for _, _, own, common in self.parts
+        ]
 
-    def _distances(self, white: list[np.ndarray], covariance: np.ndarray | None, fitted: np.ndarray) -> np.ndarray:
-        found, residual = np.empty(len(fitted)), self.residual[self.closely]
+    def _distances(
+        self, white: list[np.ndarray], covariance: np.ndarray | None, fitted: np.ndarray
+    ) -> np.ndarray:
+        found = np.empty(len(fitted))
+        residual = self.residual[self.closely]
         for (seen, by, _, _), each in zip(self.parts, white, strict=True):
             off = each @ residual[seen, :, None]
             matrix = np.tile(np.eye(each.shape[1]), (len(each), 1, 1))
             if covariance is not None:
                 rows = each @ by
-                share = (rows.reshape(-1, len(covariance)) @ covariance).reshape(rows.shape) @ rows.transpose(0, 2, 1)
+                share = (rows.reshape(-1, len(covariance)) @ covariance).reshape(
+                    rows.shape
+                ) @ rows.transpose(0, 2, 1)
                 matrix += np.where(fitted[seen], -1.0, 1.0)[:, None, None] * share
-                own = fitted[seen] & (np.trace(share, axis1=1, axis2=2) > 1.0 - _LEAST_OWN)
+                own = fitted[seen] & (
+                    np.trace(share, axis1=1, axis2=2) > 1.0 - _LEAST_OWN
+                )
                 values, axes = np.linalg.eigh(matrix[own])
-                matrix[own] = (axes * np.maximum(values, _LEAST_OWN)[:, None]) @ axes.transpose(0, 2, 1)
+                matrix[own] = (
+                    axes * np.maximum(values, _LEAST_OWN)[:, None]
+                ) @ axes.transpose(0, 2, 1)
             found[seen] = np.sqrt((off * np.linalg.solve(matrix, off)).sum(axis=(1, 2)))
         return found
 
 
 def yardstick_of(fitted: Fit, noise: Noise, measurements: Measurements) -> Yardstick:
-    """What the rows that a model was fitted to say of themselves, beside the noise that was declared or repeats show.
+    """What the rows that a model was fitted to say of themselves, beside the noise that
+    was declared or repeats show.
 
-    Of the error common to a pose that the fit states the share counts that makes the generalized variance of most rows smallest
-    (an S-estimate; Davies, Annals of Statistics 1987): the rest may be that of the very errors that are looked for, or of a law
-    that is not linear.
+    Of the error common to a pose that the fit states the share counts that makes the
+    generalized variance of most rows smallest (an S-estimate; Davies, Annals of
+    Statistics 1987): the rest may be that of the very errors that are looked for, or of
+    a law that is not linear.
     """
     near = spread_poses(single_observations(measurements), _MOST)
-    some, few = measurements.select(near), len(measurements) <= _MOST
-    return _Beside.of(fitted.model, fitted.estimate, some, noise, near[near], few).yardstick(fitted)
+    some = measurements.select(near)
+    few = len(measurements) <= _MOST
+    return _Beside.of(
+        fitted.model, fitted.estimate, some, noise, near[near], few
+    ).yardstick(fitted)
 
 
-def beyond_chance(distance: np.ndarray, rows: int, kept: np.ndarray, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
+def beyond_chance(
+    distance: np.ndarray, rows: int, kept: np.ndarray, settings: Settings
+) -> tuple[np.ndarray, np.ndarray]:
     """Distances in units of their scale, and which of them are gross errors, (N,).
 
-    ``rows`` says how many numbers a distance is of. Those not ``kept`` count as large for the first, robust scale; the second
-    is the root mean square of what does not stand out by the first, and the limit that of an F distribution. Where more than
+    ``rows`` says how many numbers a distance is of. Those not ``kept`` count as large
+    for the first, robust scale; the second is the root mean square of what does not
+    stand out by the first, and the limit that of an F distribution. Where more than
     `gross_error_share` of all stand out, none does: then it is the model that is wrong.
     """
     ordered = np.sort(np.where(kept, distance, np.inf))
     usual = ordered[(np.array(_SCALE_QUANTILES) * (len(ordered) - 1)).astype(int)]
     scale = np.max(
-        usual[np.isfinite(usual)] / np.sqrt(2 * gammaincinv(rows / 2, _SCALE_QUANTILES))[np.isfinite(usual)], initial=1.0
+        usual[np.isfinite(usual)]
+        / np.sqrt(2 * gammaincinv(rows / 2, _SCALE_QUANTILES))[np.isfinite(usual)],
+        initial=1.0,
     )
     inside = distance <= scale * most_by_chance(len(distance), rows, settings)
     if inside.mean() < 1.0 - settings.gross_error_share:
         return distance / scale, np.zeros(len(distance), bool)
     scale = max(1.0, float(np.sqrt((distance[inside] ** 2).mean() / rows)))
-    gross = distance > scale * most_by_chance(len(distance), rows, settings, inside.sum() * rows)
-    return distance / scale, gross if gross.mean() <= settings.gross_error_share else np.zeros(len(gross), bool)
+    gross = distance > scale * most_by_chance(
+        len(distance), rows, settings, inside.sum() * rows
+    )
+    return (
+        distance / scale,
+        gross
+        if gross.mean() <= settings.gross_error_share
+        else np.zeros(len(gross), bool),
+    )
 
 
-def most_by_chance(count: int, rows: int, settings: Settings, freedom: float = np.inf) -> float:
-    """Standard deviations that the largest of so many good rows exceeds with the probability of the settings.
+def most_by_chance(
+    count: int, rows: int, settings: Settings, freedom: float = np.inf
+) -> float:
+    """Standard deviations that the largest of so many good rows exceeds with the
+    probability of the settings.
 
     ``freedom`` is that of the scale: infinite where it is known.
     """
     level = settings.gross_error_level / count
-    return float(np.sqrt(chdtri(rows, level) if np.isinf(freedom) else rows * fdtri(rows, freedom, 1.0 - level)))
+    return float(
+        np.sqrt(
+            chdtri(rows, level)
+            if np.isinf(freedom)
+            else rows * fdtri(rows, freedom, 1.0 - level)
+        )
+    )
 
 
-def gross_errors(fitted: Fit, noise: Noise, measurements: Measurements, kept: np.ndarray, settings: Settings) -> Deviations:
-    """Judge the rows of a campaign by a fit to those that are ``kept``, (N,), and the noise declared or shown by repeats."""
-    rows = _Beside.of(fitted.model, fitted.estimate, measurements, noise, kept, kept.sum() <= _MOST)
+def gross_errors(
+    fitted: Fit,
+    noise: Noise,
+    measurements: Measurements,
+    kept: np.ndarray,
+    settings: Settings,
+) -> Deviations:
+    """Judge the rows of a campaign by a fit to those that are ``kept``, (N,), and the
+    noise declared or shown by repeats."""
+    rows = _Beside.of(
+        fitted.model, fitted.estimate, measurements, noise, kept, kept.sum() <= _MOST
+    )
     distance = rows.distances(rows.yardstick(fitted), kept)
-    return Deviations(rows.residual, *beyond_chance(distance, fitted.model.rows, kept, settings))
+    return Deviations(
+        rows.residual, *beyond_chance(distance, fitted.model.rows, kept, settings)
+    )
 
 
 def held_out_gross_errors(
-    fitted: Fit, there: tuple[Model, Estimate], yardstick: Yardstick, held_out: Case, outside: np.ndarray, settings: Settings
+    fitted: Fit,
+    there: tuple[Model, Estimate],
+    yardstick: Yardstick,
+    held_out: Case,
+    outside: np.ndarray,
+    settings: Settings,
 ) -> Deviations:
-    """Judge held-out rows by the rule of `gross_errors`, in the model and estimate that were carried to them.
+    """Judge held-out rows by the rule of `gross_errors`, in the model and estimate that
+    were carried to them.
 
-    Where a prediction is extrapolated, ``outside`` (N,), the model errs first: such a row has to be farther off, and farther
-    than most of them.
+    Where a prediction is extrapolated, ``outside`` (N,), the model errs first: such a
+    row has to be farther off, and farther than most of them.
     """
     model, estimate = there
     measurements = held_out.campaign.measurements
     if model is not fitted.model or estimate is not fitted.estimate:
         yardstick = replace(yardstick, covariance=None)
     every = np.ones(len(measurements), bool)
-    rows = _Beside.of(model, estimate, measurements, yardstick.noise, every, yardstick.covariance is not None)
-    distance, gross = beyond_chance(rows.distances(yardstick, ~every), model.rows, every, settings)
+    rows = _Beside.of(
+        model,
+        estimate,
+        measurements,
+        yardstick.noise,
+        every,
+        yardstick.covariance is not None,
+    )
+    distance, gross = beyond_chance(
+        rows.distances(yardstick, ~every), model.rows, every, settings
+    )
     least = settings.extrapolated_error
     if outside.sum() >= _FEWEST_TO_COMPARE:
-        least = max(least, float(np.median(distance[outside])) / np.sqrt(2 * gammaincinv(model.rows / 2, 0.5)))
+        least = max(
+            least,
+            float(np.median(distance[outside]))
+            / np.sqrt(2 * gammaincinv(model.rows / 2, 0.5)),
+        )
     far = distance > least * most_by_chance(len(distance), model.rows, settings)
     return Deviations(rows.residual, distance, gross & (far | ~outside))
 
 
-def entries_of(found: Deviations, campaign: Campaign, held_out: bool) -> list[dict[str, Any]]:
-    """Gross errors as verdict.json has them, each with its row, its size and a sentence."""
+def entries_of(
+    found: Deviations, campaign: Campaign, held_out: bool
+) -> list[dict[str, Any]]:
+    """Gross errors as verdict.json has them, each with its row, its size and a
+    sentence."""
     measurements = campaign.measurements
     return [
         {
@@ -267,7 +397,9 @@ def entries_of(found: Deviations, campaign: Campaign, held_out: bool) -> list[di
             "target": campaign.targets[measurements.target[place]].name,
             "held_out": held_out,
             "distance_m": float(np.linalg.norm(found.residual[place, :3])),
-            "turn_rad": float(np.linalg.norm(found.residual[place, 3:])) if found.residual.shape[1] > 3 else None,
+            "turn_rad": float(np.linalg.norm(found.residual[place, 3:]))
+            if found.residual.shape[1] > 3
+            else None,
             "standard_deviations": float(found.distance[place]),
             "detail": _sentence(found, campaign, int(place)),
         }
@@ -283,21 +415,27 @@ def warnings_of(entries: list[dict[str, Any]]) -> list[str]:
 
 
 def _sentence(found: Deviations, campaign: Campaign, place: int) -> str:
-    measurements, off = campaign.measurements, found.residual[place]
+    measurements = campaign.measurements
+    off = found.residual[place]
     away = 1e3 * float(np.linalg.norm(off[:3]))
     size = f"{away:.3g} mm" if away < 1e3 else f"{1e-3 * away:.3g} m"
     size += f" and {1e3 * np.linalg.norm(off[3:]):.3g} mrad" if len(off) > 3 else ""
     alike = (measurements.position == measurements.position[place]).all(axis=1)
     alike[place] = False
-    reason = f", the same point as {campaign.place_of(int(measurements.row[np.argmax(alike)]))}" if alike.any() else ""
+    reason = (
+        f", the same point as {campaign.place_of(int(measurements.row[np.argmax(alike)]))}"
+        if alike.any()
+        else ""
+    )
     reason = reason if measurements.position[place].any() else ", reads 0, 0, 0"
     return f"{campaign.place_of(int(measurements.row[place]))}: {size} off{reason}, left out"
 
 
 @dataclass(frozen=True)
 class Kept:
-    """The part of a case that is fitted, ``kept`` of all its measurements (N,), with its noise, and its declared model fitted
-    to what is `searched`: observations that a search looks at, no more than so many."""
+    """The part of a case that is fitted, ``kept`` of all its measurements (N,), with
+    its noise, and its declared model fitted to what is `searched`: observations that a
+    search looks at, no more than so many."""
 
     case: Case
     kept: np.ndarray
@@ -309,65 +447,98 @@ class Kept:
     def to_all(self, found: Fit) -> Fit:
         """A model that is fitted to what is searched, fitted to all that is kept.
 
-        From an estimate that some measurements lead to, a step or two by all of them are as good as the fit's end (one-step
-        M-estimators; Bickel, One-step Huber estimates in the linear model, JASA 1975).
+        From an estimate that some measurements lead to, a step or two by all of them
+        are as good as the fit's end (one-step M-estimators; Bickel, One-step Huber
+        estimates in the linear model, JASA 1975).
         """
         every = self.case.observations
         if self.searched is not every:
             settled = ON_THE_WAY if len(every) <= LONG else _LAST_STEP
-            return fit(found.model, every, found.noise, found.estimate, reweighted=True, settled=settled)
-        return found if found is self.declared else fit(found.model, every, found.noise, found.estimate, reweighted=True)
+            return fit(
+                found.model,
+                every,
+                found.noise,
+                found.estimate,
+                reweighted=True,
+                settled=settled,
+            )
+        return (
+            found
+            if found is self.declared
+            else fit(found.model, every, found.noise, found.estimate, reweighted=True)
+        )
 
 
-def fitted_to(case: Case, kept: np.ndarray, settings: Settings, last: Kept | None = None) -> Kept:
+def fitted_to(
+    case: Case, kept: np.ndarray, settings: Settings, last: Kept | None = None
+) -> Kept:
     """The part of a case that is kept, or the last one where that is the same."""
     if last is not None and (kept == last.kept).all():
         return last
     part = case if kept.all() else case.select(kept)
     noise, warnings = estimated_noise(part)
     searched = searched_of(case, part, settings)
-    return Kept(part, kept, noise, warnings, fit_declared(part.model, searched, noise), searched)
+    return Kept(
+        part, kept, noise, warnings, fit_declared(part.model, searched, noise), searched
+    )
 
 
 def searched_of(case: Case, part: Case, settings: Settings) -> Observations:
-    """What a search looks at of a part of a case: at the same poses whatever is kept, so that only gross errors move a fit."""
+    """What a search looks at of a part of a case: at the same poses whatever is kept,
+    so that only gross errors move a fit."""
     most = settings.searched_observations
     return sample_of(part.observations, most, sample_of(case.observations, most))
 
 
 def first_kept(case: Case, settings: Settings) -> Kept:
-    """The part of a case that its declared model, or all candidates together, might explain.
+    """The part of a case that its declared model, or all candidates together, might
+    explain.
 
-    Rows under far larger loads than most are judged by the others alone: they would pull any fit to themselves (bad leverage
-    points; Rousseeuw and Leroy, Robust Regression and Outlier Detection, 1987).
+    Rows under far larger loads than most are judged by the others alone: they would
+    pull any fit to themselves (bad leverage points; Rousseeuw and Leroy, Robust
+    Regression and Outlier Detection, 1987).
     """
-    measurements, candidates = case.campaign.measurements, list(case.candidates.values())
+    measurements = case.campaign.measurements
+    candidates = list(case.candidates.values())
     pulling = extreme_loads(measurements, settings)
     whole = part = fitted_to(case, ~pulling, settings)
     for _ in range(settings.gross_error_rounds):
-        errors = gross_errors(part.declared, part.noise, measurements, part.kept, settings)
-        last, part = part, fitted_to(case, ~errors.gross, settings, part)
+        errors = gross_errors(
+            part.declared, part.noise, measurements, part.kept, settings
+        )
+        last = part
+        part = fitted_to(case, ~errors.gross, settings, part)
         if part is last:
             break
-    observations, most = case.observations, settings.gross_start_numbers // case.model.rows
+    observations = case.observations
+    most = settings.gross_start_numbers // case.model.rows
     few = spread_poses(observations, most)
     if part is whole and not few.all():
         # Nothing stands apart, and there are too many to look more closely.
         return whole
-    apart = np.unique(observations.state[measured_in(observations, measurements, ~part.kept)])
+    apart = np.unique(
+        observations.state[measured_in(observations, measurements, ~part.kept)]
+    )
     few[apart[np.linspace(0, len(apart) - 1, min(len(apart), most)).astype(int)]] = True
     few[observations.state[measured_in(observations, measurements, pulling)]] = False
     some = select_states(observations, few)
     about = evaluated(part.declared.model, some, part.noise, part.declared.estimate)
     taken = improbable(linearized(about, some, candidates, settings))
-    # A repeat far from its others is in no average, and stays what the declared model says of it.
+    # A repeat far from its others is in no average, and stays what the declared model
+    # says of it.
     looked_at = measured_in(measurements, some, np.ones(len(some), bool))
     looked_at &= np.isin(measurements.row, without_outlying_repeats(measurements).row)
-    return fitted_to(case, ~np.where(looked_at, measured_in(measurements, some, taken), ~part.kept), settings, whole)
+    return fitted_to(
+        case,
+        ~np.where(looked_at, measured_in(measurements, some, taken), ~part.kept),
+        settings,
+        whole,
+    )
 
 
 def extreme_loads(measurements: Measurements, settings: Settings) -> np.ndarray:
-    """Which rows are under a force far beyond that of most loaded ones, if these are few, ndarray of bool (N,)."""
+    """Which rows are under a force far beyond that of most loaded ones, if these are
+    few, ndarray of bool (N,)."""
     force = np.linalg.norm(measurements.wrench[:, :3], axis=1)
     usual = np.quantile(force[force > 0], 0.75) if force.any() else np.inf
     far = force > settings.extreme_load * usual
@@ -377,19 +548,33 @@ def extreme_loads(measurements: Measurements, settings: Settings) -> np.ndarray:
 def improbable(line: Linearized) -> np.ndarray:
     """Which observations all candidates together do not explain, ndarray of bool (M,).
 
-    The whitened residual has the covariance I + X D X' + W S W', with X the declared sensitivities, D their priors, W those of
-    all candidates, S their mean square size. The worst are taken out until what is left agrees; then those that it predicts
-    come back.
+    The whitened residual has the covariance I + X D X' + W S W', with X the declared
+    sensitivities, D their priors, W those of all candidates, S their mean square size.
+    The worst are taken out until what is left agrees; then those that it predicts come
+    back.
     """
-    products, settings = line.products, line.settings
-    rows, count = products.rows, products.declared
+    products = line.products
+    settings = line.settings
+    rows = products.rows
+    count = products.declared
     observed, own = rows.residual.shape
-    grid, kept, residual = Grid.of_settings(settings), np.ones(observed, bool), rows.residual.ravel()
-    size, limit = np.sqrt(np.exp(grid.log_weights) @ grid.scales**2), most_by_chance(observed, own, settings)
-    basis, candidates = (part.reshape(len(residual), -1) for part in (products.beside[..., :-1], rows.candidates.dense()))
+    grid = Grid.of_settings(settings)
+    kept = np.ones(observed, bool)
+    residual = rows.residual.ravel()
+    size = np.sqrt(np.exp(grid.log_weights) @ grid.scales**2)
+    limit = most_by_chance(observed, own, settings)
+    basis, candidates = (
+        part.reshape(len(residual), -1)
+        for part in (products.beside[..., :-1], rows.candidates.dense())
+    )
     candidates -= basis @ products.projected[:, :-1]
-    whole = _Precision((), np.tile(np.eye(own), (observed, 1, 1)), residual, residual).less(basis, np.eye(count))
-    whole = whole.less(size * candidates, np.eye(candidates.shape[1]) + size**2 * products.gram[count:-1, count:-1])
+    whole = _Precision(
+        (), np.tile(np.eye(own), (observed, 1, 1)), residual, residual
+    ).less(basis, np.eye(count))
+    whole = whole.less(
+        size * candidates,
+        np.eye(candidates.shape[1]) + size**2 * products.gram[count:-1, count:-1],
+    )
     some = whole
     while kept.mean() > 1.0 - settings.gross_error_share:
         distance = some.distances(kept)
@@ -403,10 +588,15 @@ def improbable(line: Linearized) -> np.ndarray:
     while not kept.all():
         out = np.flatnonzero(np.repeat(~kept, own))
         some = whole.without(out)
-        distance, variance = some.distances(kept), np.linalg.inv(whole.between(out)[out])
+        distance = some.distances(kept)
+        variance = np.linalg.inv(whole.between(out)[out])
         rest = (variance @ whole.along[out]).reshape(-1, own, 1)
-        blocks = variance.reshape(len(rest), own, len(rest), own)[np.arange(len(rest)), :, np.arange(len(rest))]
-        distance[~kept] = np.sqrt((rest * np.linalg.solve(blocks, rest)).sum(axis=(1, 2)))
+        blocks = variance.reshape(len(rest), own, len(rest), own)[
+            np.arange(len(rest)), :, np.arange(len(rest))
+        ]
+        distance[~kept] = np.sqrt(
+            (rest * np.linalg.solve(blocks, rest)).sum(axis=(1, 2))
+        )
         back = ~kept & ~beyond_chance(distance, own, kept, settings)[1]
         if not back.any():
             break
@@ -416,11 +606,13 @@ def improbable(line: Linearized) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Precision:
-    """Inverse covariance I - F F' of the n numbers of M observations: what is added to a covariance, or is taken out of the
-    observations, adds some columns to F (Woodbury's identity).
+    """Inverse covariance I - F F' of the n numbers of M observations: what is added to
+    a covariance, or is taken out of the observations, adds some columns to F
+    (Woodbury's identity).
 
-    `factors` (n, ...): F, some columns after the other. `blocks` (M, own, own): on the diagonal, of each observation.
-    `residual`, `along` (n,): what the inverse is times the residual. Zero of observations that are taken out.
+    `factors` (n, ...): F, some columns after the other. `blocks` (M, own, own): on the
+    diagonal, of each observation. `residual`, `along` (n,): what the inverse is times
+    the residual. Zero of observations that are taken out.
     """
 
     factors: tuple[np.ndarray, ...]
@@ -432,8 +624,11 @@ class _Precision:
         """This less left inner^-1 left', `left` (n, q), `inner` (q, q)."""
         factor = solve_triangular(np.linalg.cholesky(inner), left.T, lower=True).T
         each = factor.reshape(*self.blocks.shape[:2], -1)
-        blocks, along = self.blocks - each @ each.swapaxes(1, 2), self.along - factor @ (factor.T @ self.residual)
-        return replace(self, factors=(*self.factors, factor), blocks=blocks, along=along)
+        blocks = self.blocks - each @ each.swapaxes(1, 2)
+        along = self.along - factor @ (factor.T @ self.residual)
+        return replace(
+            self, factors=(*self.factors, factor), blocks=blocks, along=along
+        )
 
     def between(self, some: np.ndarray) -> np.ndarray:
         """Some columns, ndarray (n, q)."""
@@ -447,15 +642,21 @@ class _Precision:
         return self.less(columns, columns[out])
 
     def distances(self, kept: np.ndarray) -> np.ndarray:
-        """Length of the deletion residual of each observation that is kept, 0 of others, (M,)."""
-        blocks = np.where(kept[:, None, None], self.blocks, np.eye(self.blocks.shape[1]))
+        """Length of the deletion residual of each observation that is kept, 0 of
+        others, (M,)."""
+        blocks = np.where(
+            kept[:, None, None], self.blocks, np.eye(self.blocks.shape[1])
+        )
         along = self.along.reshape(*self.blocks.shape[:2], 1)
         squares = (along * np.linalg.solve(blocks, along)).sum(axis=(1, 2))
         return np.where(kept, np.sqrt(np.maximum(squares, 0.0)), 0.0)
 
 
-def _with_pose_error(whole: _Precision, some: _Precision, products: Products, pose_errors_rad: np.ndarray) -> _Precision:
-    """The inverse covariance with an error common to a pose, of the size that makes some of the numbers most probable.
+def _with_pose_error(
+    whole: _Precision, some: _Precision, products: Products, pose_errors_rad: np.ndarray
+) -> _Precision:
+    """The inverse covariance with an error common to a pose, of the size that makes
+    some of the numbers most probable.
 
     `some`: the same without those that are taken out.
     """
@@ -464,9 +665,15 @@ def _with_pose_error(whole: _Precision, some: _Precision, products: Products, po
     for seen, part, _, _ in products.by_pose():
         jacobian[np.flatnonzero(seen), :, rows.pose[seen]] = part.jacobian
     jacobian = jacobian.reshape(len(whole.residual), -1)
-    of_whole = jacobian - sum(factor @ (factor.T @ jacobian) for factor in whole.factors)
-    of_some = of_whole - sum(factor @ (factor.T @ jacobian) for factor in some.factors[len(whole.factors) :])
-    inner, along, unit = jacobian.T @ of_some, jacobian.T @ some.along, np.eye(jacobian.shape[1])
+    of_whole = jacobian - sum(
+        factor @ (factor.T @ jacobian) for factor in whole.factors
+    )
+    of_some = of_whole - sum(
+        factor @ (factor.T @ jacobian) for factor in some.factors[len(whole.factors) :]
+    )
+    inner = jacobian.T @ of_some
+    along = jacobian.T @ some.along
+    unit = np.eye(jacobian.shape[1])
     best = (-np.inf, 0.0)
     for tau in pose_errors_rad.tolist():
         root = np.linalg.cholesky(unit + tau**2 * inner)

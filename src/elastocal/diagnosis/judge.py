@@ -11,7 +11,13 @@ import numpy as np
 from elastocal.campaigns.campaign import NO_REMAINDER, Measurements, residual_columns
 from elastocal.counting import counted
 from elastocal.data_checks.protocol import data_at_fault
-from elastocal.diagnosis.gross_errors import Deviations, entries_of, held_out_gross_errors, warnings_of, yardstick_of
+from elastocal.diagnosis.gross_errors import (
+    Deviations,
+    entries_of,
+    held_out_gross_errors,
+    warnings_of,
+    yardstick_of,
+)
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.model import Case, conditions, measured_in_base, residuals
 from elastocal.fitting.noise import noise_from
@@ -32,16 +38,22 @@ if TYPE_CHECKING:
 _REPLICATES = 1000
 # What warnings of errors that grew are known by.
 ABOUT_ERRORS = "of the validation poses"
-_ERRORS = {"mean_m": "mean error", "rms_m": "RMS error", "p95_m": "95th percentile of the errors", "max_m": "largest error"}
+_ERRORS = {
+    "mean_m": "mean error",
+    "rms_m": "RMS error",
+    "p95_m": "95th percentile of the errors",
+    "max_m": "largest error",
+}
 
 
 @dataclass(frozen=True)
 class Verdict:
     """A diagnosis with what held-out poses say of it.
 
-    `document`: contents of verdict.json. `rows`: of before_after.csv. `held_out`: what was held out, without its gross errors.
-    `left_out`: these. `outside` (P,) of bool: poses held out that lie outside the range of the fitted ones. `delivered`: what
-    the final model and a regression leave of the held-out poses; None where there is none.
+    `document`: contents of verdict.json. `rows`: of before_after.csv. `held_out`: what
+    was held out, without its gross errors. `left_out`: these. `outside` (P,) of bool:
+    poses held out that lie outside the range of the fitted ones. `delivered`: what the
+    final model and a regression leave of the held-out poses; None where there is none.
     """
 
     document: dict[str, Any]
@@ -55,68 +67,126 @@ class Verdict:
 def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     """Open the held-out poses and state the verdict.
 
-    `held_out`: the held-out measurements; of another campaign, whose frames and targets are then fitted to them. `seed`: of the
-    bootstrap over poses.
+    `held_out`: the held-out measurements; of another campaign, whose frames and targets
+    are then fitted to them. `seed`: of the bootstrap over poses.
     """
-    case, steps = diagnosis.case, diagnosis.steps
+    case = diagnosis.case
+    steps = diagnosis.steps
     errors, part, outside = without_gross_errors(diagnosis, held_out)
     left_out = entries_of(errors, held_out.campaign, held_out=True)
     rows, heldout, warnings = heldout_errors(steps, case, part, outside, seed)
-    whole = [figures.summary(error.distance) for error in _errors(steps, case, held_out)[1]] if left_out else []
-    of_all = [error["rms_m"] for error in whole] or [row["heldout_rms_m"] for row in rows]
-    rows = [row | {"heldout_rms_all_rows_m": rms} for row, rms in zip(rows, of_all, strict=True)]
-    heldout["with_gross_errors"] = {"before": whole[_declared(steps)], "after": whole[-1]} if left_out else None
+    whole = (
+        [figures.summary(error.distance) for error in _errors(steps, case, held_out)[1]]
+        if left_out
+        else []
+    )
+    of_all = [error["rms_m"] for error in whole] or [
+        row["heldout_rms_m"] for row in rows
+    ]
+    rows = [
+        row | {"heldout_rms_all_rows_m": rms}
+        for row, rms in zip(rows, of_all, strict=True)
+    ]
+    heldout["with_gross_errors"] = (
+        {"before": whole[_declared(steps)], "after": whole[-1]} if left_out else None
+    )
     if left_out:
-        gross, sizes = counted(len(left_out), "gross error"), [1e3 * each["rms_m"] for each in (whole[-1], heldout["after"])]
+        gross = counted(len(left_out), "gross error")
+        sizes = [1e3 * each["rms_m"] for each in (whole[-1], heldout["after"])]
         words = "with all rows the RMS is {:.3g} mm instead of {:.3g} mm".format(*sizes)
         warnings.append(f"held-out errors are without {gross}: {words}")
     # By what share each step lowers the held-out RMS.
     pairs = [(last, row) for last, row in pairwise(rows) if row["kind"] == "effect"]
-    gains = {row["step"].removeprefix("with "): float(1 - row["heldout_rms_m"] / last["heldout_rms_m"]) for last, row in pairs}
-    found, remainder, delivered = diagnosis.document, None, as_delivered(diagnosis, part, seed)
+    gains = {
+        row["step"].removeprefix("with "): float(
+            1 - row["heldout_rms_m"] / last["heldout_rms_m"]
+        )
+        for last, row in pairs
+    }
+    found = diagnosis.document
+    remainder = None
+    delivered = as_delivered(diagnosis, part, seed)
     if delivered is not None:
         draws = stream(seed, case.campaign.name, "remainder", 0)
-        remainder = remainder_facts(delivered, diagnosis.declared, diagnosis.final, case, part, draws)
+        remainder = remainder_facts(
+            delivered, diagnosis.declared, diagnosis.final, case, part, draws
+        )
     heldout["delivered"] = remainder["errors"] if remainder else heldout["after"]
     document = found | {
-        "effects": [entry | {"heldout_gain": gains.get(entry["name"])} for entry in found["effects"]],
+        "effects": [
+            entry | {"heldout_gain": gains.get(entry["name"])}
+            for entry in found["effects"]
+        ],
         "heldout": heldout,
         "remainder": remainder,
         "gross_errors": [*found["gross_errors"], *left_out],
         "warnings": [*found["warnings"], *warnings_of(left_out), *warnings],
     }
-    return Verdict(document, rows, part, held_out.campaign.measurements.select(errors.gross), outside, delivered)
+    return Verdict(
+        document,
+        rows,
+        part,
+        held_out.campaign.measurements.select(errors.gross),
+        outside,
+        delivered,
+    )
 
 
 def as_delivered(diagnosis: Diagnosis, held_out: Case, seed: int) -> Corrected | None:
-    """The final model with the regression that a campaign asks for, on held-out poses without gross errors; None for none."""
+    """The final model with the regression that a campaign asks for, on held-out poses
+    without gross errors; None for none."""
     campaign = diagnosis.case.campaign
     if campaign.remainder == NO_REMAINDER or data_at_fault(diagnosis.document):
         return None
-    # Poses held out at random have neighbours among those fitted; others have none, nor may those that set the intervals.
-    final, case, blocks = diagnosis.final, diagnosis.case, "fraction" not in campaign.holdout
-    return corrected(final, case, held_out, campaign.remainder, blocks=blocks, within_range=True, seed=seed)
+    # Poses held out at random have neighbours among those fitted; others have none, nor
+    # may those that set the intervals.
+    final = diagnosis.final
+    case = diagnosis.case
+    blocks = "fraction" not in campaign.holdout
+    return corrected(
+        final,
+        case,
+        held_out,
+        campaign.remainder,
+        blocks=blocks,
+        within_range=True,
+        seed=seed,
+    )
 
 
-def without_gross_errors(diagnosis: Diagnosis, held_out: Case) -> tuple[Deviations, Case, np.ndarray]:
-    """Held-out rows that the final model does not explain, by the rule of the training rows; the case without; and which of
-    its poses lie outside the range of the fitted ones, (P,)."""
-    final, measurements = diagnosis.final, held_out.campaign.measurements
+def without_gross_errors(
+    diagnosis: Diagnosis, held_out: Case
+) -> tuple[Deviations, Case, np.ndarray]:
+    """Held-out rows that the final model does not explain, by the rule of the training
+    rows; the case without; and which of its poses lie outside the range of the fitted
+    ones, (P,)."""
+    final = diagnosis.final
+    measurements = held_out.campaign.measurements
     poses = outside_poses(final, diagnosis.case, held_out)
-    part, errors = held_out, Deviations.none(len(measurements), held_out.model.rows)
+    part = held_out
+    errors = Deviations.none(len(measurements), held_out.model.rows)
     if data_at_fault(diagnosis.document):
         return errors, part, poses
-    settings, noise = Settings(), noise_from(diagnosis.document).of_measurements
+    settings = Settings()
+    noise = noise_from(diagnosis.document).of_measurements
     yardstick = yardstick_of(final, noise, diagnosis.case.campaign.measurements)
     outside = poses[state_clusters(measurements)]
     for _ in range(settings.gross_error_rounds):
         # Frames of another campaign are fitted to what is kept of it.
-        there, last = placed(final, diagnosis.case, part), errors.gross
-        errors = held_out_gross_errors(final, there, yardstick, held_out, outside, settings)
+        there = placed(final, diagnosis.case, part)
+        last = errors.gross
+        errors = held_out_gross_errors(
+            final, there, yardstick, held_out, outside, settings
+        )
         part = held_out.select(~errors.gross) if errors.gross.any() else held_out
         if (errors.gross == last).all():
             break
-    return errors, part, np.bincount(state_clusters(part.campaign.measurements), outside[~errors.gross]) > 0
+    return (
+        errors,
+        part,
+        np.bincount(state_clusters(part.campaign.measurements), outside[~errors.gross])
+        > 0,
+    )
 
 
 def heldout_errors(
@@ -124,31 +194,59 @@ def heldout_errors(
 ) -> tuple[list[dict[str, Any]], dict[str, Any], list[str]]:
     """Errors of every step on training and held-out poses.
 
-    `held_out`, `seed`: as in `judge`. `outside` (P,): as of `Verdict`. Returns `rows`: of before_after.csv; `heldout`: as in
-    verdict.json.
+    `held_out`, `seed`: as in `judge`. `outside` (P,): as of `Verdict`. Returns `rows`:
+    of before_after.csv; `heldout`: as in verdict.json.
     """
     there, errors = _errors(steps, case, held_out)
-    before, after = _declared(steps), len(steps) - 1
+    before = _declared(steps)
+    after = len(steps) - 1
     draws = stream(seed, case.campaign.name, "held-out poses", 0)
     limits, reductions = figures.intervals(errors, _REPLICATES, draws, before)
-    of_calibration = figures.intervals([errors[0], errors[after]], _REPLICATES, draws)[1][1]
-    floor = figures.noise_floor(steps[after].fitted, held_out.observations, *there[after])
-    rows, warnings = [], []
+    of_calibration = figures.intervals([errors[0], errors[after]], _REPLICATES, draws)[
+        1
+    ][1]
+    floor = figures.noise_floor(
+        steps[after].fitted, held_out.observations, *there[after]
+    )
+    rows = []
+    warnings = []
     for step, error, limit in zip(steps, errors, limits, strict=True):
-        training, tested = figures.summary(np.linalg.norm(step.fitted.residual[:, :3], axis=1)), figures.summary(error.distance)
-        row: dict[str, Any] = {"step": step.name, "kind": step.kind, "parameters": int((~step.fitted.held).sum())}
+        training = figures.summary(np.linalg.norm(step.fitted.residual[:, :3], axis=1))
+        tested = figures.summary(error.distance)
+        row: dict[str, Any] = {
+            "step": step.name,
+            "kind": step.kind,
+            "parameters": int((~step.fitted.held).sum()),
+        }
         row |= {f"train_{name}": training[name] for name in figures.METRICS}
         for name in figures.METRICS:
             low, high = limit[name]
-            row |= {f"heldout_{name}": tested[name], f"heldout_{name}_low": low, f"heldout_{name}_high": high}
-        rows.append(row | {f"heldout_{name.removesuffix('_m')}_over_floor": tested[name] / floor for name in figures.METRICS})
+            row |= {
+                f"heldout_{name}": tested[name],
+                f"heldout_{name}_low": low,
+                f"heldout_{name}_high": high,
+            }
+        rows.append(
+            row
+            | {
+                f"heldout_{name.removesuffix('_m')}_over_floor": tested[name] / floor
+                for name in figures.METRICS
+            }
+        )
     for name in figures.METRICS:
-        low, high = (1e3 * rows[number][f"heldout_{name}"] for number in (before, after))
+        low, high = (
+            1e3 * rows[number][f"heldout_{name}"] for number in (before, after)
+        )
         if high > low:
-            warnings.append(f"the {_ERRORS[name]} {ABOUT_ERRORS} grew from {low:.3f} to {high:.3f} mm")
-    by_range = figures.errors_by_range({"before": errors[before], "after": errors[after]}, outside)
+            warnings.append(
+                f"the {_ERRORS[name]} {ABOUT_ERRORS} grew from {low:.3f} to {high:.3f} mm"
+            )
+    by_range = figures.errors_by_range(
+        {"before": errors[before], "after": errors[after]}, outside
+    )
     heldout = {
-        "uncalibrated": figures.summary(errors[0].distance) | {"reduction_ci95": [of_calibration.low, of_calibration.high]},
+        "uncalibrated": figures.summary(errors[0].distance)
+        | {"reduction_ci95": [of_calibration.low, of_calibration.high]},
         "before": figures.summary(errors[before].distance),
         "after": figures.summary(errors[after].distance),
         "noise_floor_rms_m": None if np.isnan(floor) else floor,
@@ -156,40 +254,74 @@ def heldout_errors(
         "reduction_std_error": reductions[after].std_error,
         "poses": errors[0].poses,
         "configurations": count_configurations(held_out.observations.states),
-        "joint_ranges": joint_ranges(held_out.observations.states, held_out.campaign.robot),
+        "joint_ranges": joint_ranges(
+            held_out.observations.states, held_out.campaign.robot
+        ),
         "share_below_max": figures.share_below_largest(errors[0].poses),
         "outside_range": by_range,
     }
     if count := by_range["poses"]:
         lie = f"{count} of {counted(len(outside), 'validation pose')} {'lies' if count == 1 else 'lie'}"
-        warnings.append(f"{lie} outside the range of the fitted poses: errors there are extrapolated")
-    return rows, heldout, warnings + repeat_warnings(case.observations.states, held_out.observations.states)
+        warnings.append(
+            f"{lie} outside the range of the fitted poses: errors there are extrapolated"
+        )
+    return (
+        rows,
+        heldout,
+        warnings
+        + repeat_warnings(case.observations.states, held_out.observations.states),
+    )
 
 
-def _errors(steps: Sequence[Step], case: Case, held_out: Case) -> tuple[list[tuple[Model, Estimate]], list[figures.Errors]]:
-    """Models of all steps, placed where held-out measurements were made, and their errors there."""
+def _errors(
+    steps: Sequence[Step], case: Case, held_out: Case
+) -> tuple[list[tuple[Model, Estimate]], list[figures.Errors]]:
+    """Models of all steps, placed where held-out measurements were made, and their
+    errors there."""
     there = [placed(step.fitted, case, held_out) for step in steps]
-    return there, [figures.position_errors(model, estimate, held_out.observations) for model, estimate in there]
+    return there, [
+        figures.position_errors(model, estimate, held_out.observations)
+        for model, estimate in there
+    ]
 
 
 def _declared(steps: Sequence[Step]) -> int:
     return next(number for number, step in enumerate(steps) if step.kind == "declared")
 
 
-def residual_blocks(diagnosis: Diagnosis, verdict: Verdict) -> Iterator[dict[str, np.ndarray]]:
-    """Blocks of the residuals table: every measurement before and after, gross errors behind the others."""
-    case, before, after = diagnosis.case, diagnosis.declared, diagnosis.final
-    for part, left_out, unseen in ((case, diagnosis.left_out, False), (verdict.held_out, verdict.left_out, True)):
+def residual_blocks(
+    diagnosis: Diagnosis, verdict: Verdict
+) -> Iterator[dict[str, np.ndarray]]:
+    """Blocks of the residuals table: every measurement before and after, gross errors
+    behind the others."""
+    case = diagnosis.case
+    before = diagnosis.declared
+    after = diagnosis.final
+    for part, left_out, unseen in (
+        (case, diagnosis.left_out, False),
+        (verdict.held_out, verdict.left_out, True),
+    ):
         there = [placed(fitted, case, part) for fitted in (before, after)]
-        outside = verdict.outside if unseen else np.zeros(part.observations.cluster.max() + 1, bool)
+        outside = (
+            verdict.outside
+            if unseen
+            else np.zeros(part.observations.cluster.max() + 1, bool)
+        )
         measurements = part.campaign.measurements
-        for some, beyond in ((measurements, outside[state_clusters(measurements)]), (left_out, np.zeros(len(left_out), bool))):
+        for some, beyond in (
+            (measurements, outside[state_clusters(measurements)]),
+            (left_out, np.zeros(len(left_out), bool)),
+        ):
             if not len(some):
                 continue
             observations = single_observations(some)
             off = {
-                stage: residuals(*each, observations, conditions(*each, observations.states))
+                stage: residuals(
+                    *each, observations, conditions(*each, observations.states)
+                )
                 for stage, each in zip(("before", "after"), there, strict=True)
             }
             position = measured_in_base(there[-1][1], observations)[0]
-            yield residual_columns(some, unseen, some is left_out, beyond, position, off)
+            yield residual_columns(
+                some, unseen, some is left_out, beyond, position, off
+            )

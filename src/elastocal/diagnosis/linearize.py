@@ -1,4 +1,5 @@
-"""From a fit to the problem that is searched: columns of everything that its model might lack, whitened, and their products."""
+"""From a fit to the problem that is searched: columns of everything that its model
+might lack, whitened, and their products."""
 
 from __future__ import annotations
 
@@ -12,7 +13,13 @@ from scipy.special import chdtri
 from elastocal.diagnosis.evidence import Blocks, log_sum_exp
 from elastocal.diagnosis.hypotheses import Law, Unit, laws_of, units_of
 from elastocal.diagnosis.search import Problem, pose_errors_within_reach
-from elastocal.diagnosis.statistics import Products, Statistics, WhiteRows, products_of, statistics_of
+from elastocal.diagnosis.statistics import (
+    Products,
+    Statistics,
+    WhiteRows,
+    products_of,
+    statistics_of,
+)
 from elastocal.effects.gravity import DECLARED_WEIGHT
 from elastocal.errors import InputError
 from elastocal.fitting.least_squares import fit
@@ -33,31 +40,41 @@ if TYPE_CHECKING:
 
     Shapes = tuple[float, ...]
 
-# Values of a shape that are tried: neighbours differ by less than measurements show at the sizes that matter.
+# Values of a shape that are tried: neighbours differ by less than measurements show at
+# the sizes that matter.
 _SHAPES_TRIED = 3
 # Of one pose about the joints, 1/rad^2: below it the targets move by rounding only.
 _LEAST_INFORMATION = 1e-6
-# Values that a closer look tries to either side of the best, short of its neighbours. Where the fit has the candidate already,
-# a step is looked for within a quarter of the spacing to either side.
-_SHAPES_CLOSER, _CLOSER_STILL = 3, 0.25
-# A candidate is looked at more closely whose log odds come so near to those of the best and whose log Bayes factor is so large:
-# below, its shape hardly matters.
-_NEAR_THE_BEST, _WORTH_A_LOOK = 10.0, 5.0
-# Declared parameters without a prior of their own get one this many times their plausible size: it decides nothing, and keeps
-# well posed what the measurements do not determine.
+# Values that a closer look tries to either side of the best, short of its neighbours.
+# Where the fit has the candidate already, a step is looked for within a quarter of the
+# spacing to either side.
+_SHAPES_CLOSER = 3
+_CLOSER_STILL = 0.25
+# A candidate is looked at more closely whose log odds come so near to those of the best
+# and whose log Bayes factor is so large: below, its shape hardly matters.
+_NEAR_THE_BEST = 10.0
+_WORTH_A_LOOK = 5.0
+# Declared parameters without a prior of their own get one this many times their
+# plausible size: it decides nothing, and keeps well posed what the measurements do not
+# determine.
 _WIDE = 10.0
-# Beyond so many rows a sample tells which sizes of the pose error are out of question: several for each parameter.
-_MANY_ROWS, _SAMPLE_ROWS = 8000, 1500
+# Beyond so many rows a sample tells which sizes of the pose error are out of question:
+# several for each parameter.
+_MANY_ROWS = 8000
+_SAMPLE_ROWS = 1500
 
 
 @dataclass(frozen=True)
 class Linearized:
-    """A model about a fit, and everything that it might lack; what asks for more work is done when it is first asked for.
+    """A model about a fit, and everything that it might lack; what asks for more work
+    is done when it is first asked for.
 
-    Coefficients count from zero, not from the fit: what candidates and declared geometry contribute to the prediction is given
-    back to the residual, so that their priors mean what they say. `around`: of the states looked at. `tried`: candidates that
-    can be tested at all, each with values of its shape; `lacking`: why not others. `candidates`: keys of all: parameters of the
-    fit that they own are coefficients of units here. `against`: laws of the competitor.
+    Coefficients count from zero, not from the fit: what candidates and declared
+    geometry contribute to the prediction is given back to the residual, so that their
+    priors mean what they say. `around`: of the states looked at. `tried`: candidates
+    that can be tested at all, each with values of its shape; `lacking`: why not others.
+    `candidates`: keys of all: parameters of the fit that they own are coefficients of
+    units here. `against`: laws of the competitor.
     """
 
     about: Fit
@@ -71,14 +88,16 @@ class Linearized:
     most_pose_error_rad: float
 
     def alike(self, **changes: Any) -> Linearized:
-        """The same but for what does not change the whitened rows of the fit, which are not made again."""
+        """The same but for what does not change the whitened rows of the fit, which are
+        not made again."""
         found = replace(self, **changes)
         vars(found).update({"_fitted": self._fitted})
         return found
 
     @property
     def without_rows(self) -> Linearized:
-        """The same where nothing but the statistics and what goes with them is needed any more."""
+        """The same where nothing but the statistics and what goes with them is needed
+        any more."""
         found = replace(self)
         kept = {name: value for name, value in vars(self).items() if name != "_fitted"}
         vars(found).update(kept | {"products": self.products.without_rows})
@@ -91,37 +110,67 @@ class Linearized:
 
     @property
     def priors(self) -> tuple[np.ndarray, np.ndarray]:
-        """Standard deviation of the prior of each declared parameter, wide where it has none, and its present value, (P,)."""
+        """Standard deviation of the prior of each declared parameter, wide where it has
+        none, and its present value, (P,)."""
         pairs = zip(self.about.parameters, self._values, strict=True)
-        kept = [(p, value) for (owner, p), value in pairs if owner not in self.candidates]
-        deviation = np.array([_WIDE * p.plausible if p.prior_std is None else p.prior_std for p, _ in kept])
-        return deviation, np.array([value if p.prior_std is not None else 0.0 for p, value in kept])
+        kept = [
+            (p, value) for (owner, p), value in pairs if owner not in self.candidates
+        ]
+        deviation = np.array(
+            [
+                _WIDE * p.plausible if p.prior_std is None else p.prior_std
+                for p, _ in kept
+            ]
+        )
+        return deviation, np.array(
+            [value if p.prior_std is not None else 0.0 for p, value in kept]
+        )
 
     @property
     def _values(self) -> np.ndarray:
-        """Of all parameters of the fit in which the prediction is linear; zero for shapes, (P,)."""
-        model, estimate = self.about.model, self.about.estimate
-        return np.where(nonlinear_parameters(model, estimate), 0.0, parameter_values(model, estimate))
+        """Of all parameters of the fit in which the prediction is linear; zero for
+        shapes, (P,)."""
+        model = self.about.model
+        estimate = self.about.estimate
+        return np.where(
+            nonlinear_parameters(model, estimate),
+            0.0,
+            parameter_values(model, estimate),
+        )
 
     @cached_property
     def _fitted(self) -> tuple[WhiteRows, Conditions]:
-        """Whitened rows without candidates, but for the Jacobian of the coordinates, and where the robot has yielded to.
+        """Whitened rows without candidates, but for the Jacobian of the coordinates,
+        and where the robot has yielded to.
 
-        What errs together is of one state, and a candidate displaces states: the Jacobian is whitened, not every column.
+        What errs together is of one state, and a candidate displaces states: the
+        Jacobian is whitened, not every column.
         """
-        fitted, some = self.about, self.observations
+        fitted = self.about
+        some = self.observations
         line = linearize(fitted.model, fitted.estimate, some, self.around)
-        jacobian, root = line.joint_jacobian, np.sqrt(fitted.weights)
+        jacobian = line.joint_jacobian
+        root = np.sqrt(fitted.weights)
         whitener = whitening(some, jacobian, fitted.noise.of_measurements)
 
         def white(values: np.ndarray) -> np.ndarray:
             return whitener.apply(values * root.reshape(-1, *[1] * (values.ndim - 1)))
 
-        found = np.isin([owner for owner, _ in fitted.parameters], list(self.candidates))
-        residual = line.residual + line.columns.of_columns(found).dense() @ self._values[found]
-        nothing = Factored.of([], white(line.coordinate_jacobian), some.state, len(some.states))
+        found = np.isin(
+            [owner for owner, _ in fitted.parameters], list(self.candidates)
+        )
+        residual = (
+            line.residual + line.columns.of_columns(found).dense() @ self._values[found]
+        )
+        nothing = Factored.of(
+            [], white(line.coordinate_jacobian), some.state, len(some.states)
+        )
         rows = WhiteRows(
-            white(line.columns.of_columns(~found).dense()), nothing, white(residual), white(jacobian), some.cluster
+            white(line.columns.of_columns(~found).dense()),
+            nothing,
+            white(residual),
+            white(jacobian),
+            some.cluster,
         )
         return rows, line.conditions
 
@@ -129,12 +178,28 @@ class Linearized:
     def rows(self) -> WhiteRows:
         """Whitened rows, candidates in the order of the units."""
         rows, conditions = self._fitted
-        tried = [(candidate, each) for candidate, shapes in self.tried.values() for each in shapes]
-        laws = [law for candidate, shapes in tried for law in candidate.displacement(conditions, *shapes)]
-        laws += [law for against in self.against for law in against.displacement(conditions)]
+        tried = [
+            (candidate, each)
+            for candidate, shapes in self.tried.values()
+            for each in shapes
+        ]
+        laws = [
+            law
+            for candidate, shapes in tried
+            for law in candidate.displacement(conditions, *shapes)
+        ]
+        laws += [
+            law for against in self.against for law in against.displacement(conditions)
+        ]
         sizes = np.concatenate([unit.sizes for unit in self.units])
-        jacobian, state = rows.candidates.jacobian, rows.candidates.state
-        return replace(rows, candidates=Factored.of(laws, jacobian, state, len(self.observations.states), sizes))
+        jacobian = rows.candidates.jacobian
+        state = rows.candidates.state
+        return replace(
+            rows,
+            candidates=Factored.of(
+                laws, jacobian, state, len(self.observations.states), sizes
+            ),
+        )
 
     @cached_property
     def products(self) -> Products:
@@ -145,38 +210,73 @@ class Linearized:
     def pose_std_error_rad(self) -> float:
         """Standard error with which the measurements of one pose tell a joint angle."""
         rows, _ = self._fitted
-        shown = float(np.median(np.bincount(rows.pose, (rows.jacobian**2).sum(axis=(1, 2)) / rows.jacobian.shape[-1])))
+        shown = float(
+            np.median(
+                np.bincount(
+                    rows.pose,
+                    (rows.jacobian**2).sum(axis=(1, 2)) / rows.jacobian.shape[-1],
+                )
+            )
+        )
         if shown < _LEAST_INFORMATION:
-            found, allowed = "measurements that no joint moves", "targets on what moves, off a lone axis"
+            found = "measurements that no joint moves"
+            allowed = "targets on what moves, off a lone axis"
             raise InputError("campaign", "targets", found, allowed)
         return 1.0 / np.sqrt(shown)
 
     @property
     def pose_errors_rad(self) -> np.ndarray:
         """Sizes of the pose error that are thought of, zero first."""
-        return np.unique(np.minimum(self.pose_std_error_rad * np.array(self.settings.pose_steps), self.most_pose_error_rad))
+        return np.unique(
+            np.minimum(
+                self.pose_std_error_rad * np.array(self.settings.pose_steps),
+                self.most_pose_error_rad,
+            )
+        )
 
     @cached_property
     def problem(self) -> Problem:
-        """What is searched. Columns of units that could not be seen stay in the statistics, where nothing refers to them."""
-        grid, products, settings = self.pose_errors_rad, self.products, self.settings
-        grid = grid[pose_errors_within_reach(statistics_of(products.without_candidates, grid), settings)]
+        """What is searched. Columns of units that could not be seen stay in the
+        statistics, where nothing refers to them."""
+        grid = self.pose_errors_rad
+        products = self.products
+        settings = self.settings
+        grid = grid[
+            pose_errors_within_reach(
+                statistics_of(products.without_candidates, grid), settings
+            )
+        ]
         if products.rows.residual.size > _MANY_ROWS:
-            some = spread_poses(self.observations, _SAMPLE_ROWS // self.observations.rows)[self.observations.state]
+            some = spread_poses(
+                self.observations, _SAMPLE_ROWS // self.observations.rows
+            )[self.observations.state]
             sample = products_of(products.rows.at(some), *self.priors)
             # Zero, to which Gram matrices refer, always.
-            grid = np.union1d(0.0, Problem(statistics_of(sample, grid), self.units, settings).started.statistics.pose_error_rad)
+            grid = np.union1d(
+                0.0,
+                Problem(
+                    statistics_of(sample, grid), self.units, settings
+                ).started.statistics.pose_error_rad,
+            )
         statistics = statistics_of(products, grid)
         smallest = smallest_shown(statistics, self.units, settings)
         pairs = zip(self.units, smallest.tolist(), strict=True)
-        shown = tuple(replace(unit, smallest=number) for unit, number in pairs if number <= unit.largest)
+        shown = tuple(
+            replace(unit, smallest=number)
+            for unit, number in pairs
+            if number <= unit.largest
+        )
         return Problem(statistics, shown, settings)
 
     @property
     def untestable(self) -> dict[str, str]:
         """Why a candidate is not tested."""
-        small = set(self.tried) - {unit.candidate.key for unit in self.problem.units if unit.candidate}
-        return self.lacking | dict.fromkeys(sorted(small), "too small to be seen at any size that such an effect has")
+        small = set(self.tried) - {
+            unit.candidate.key for unit in self.problem.units if unit.candidate
+        }
+        return self.lacking | dict.fromkeys(
+            sorted(small), "too small to be seen at any size that such an effect has"
+        )
 
 
 def linearized(
@@ -189,32 +289,53 @@ def linearized(
     """Gather what the measurements say of a fit to them and of all candidates."""
     around = fitted.conditions_of(observations.states)
     there = fitted.model.offered(observations.states)
-    why = {candidate.key: lacking(candidate, there, observations.states.joint_angles) for candidate in candidates}
+    why = {
+        candidate.key: lacking(candidate, there, observations.states.joint_angles)
+        for candidate in candidates
+    }
     tried = {c.key: (c, shapes_tried(c, fitted)) for c in candidates if not why[c.key]}
     # Beside no candidate nothing competes.
     against = laws_of(around, settings.other_features) if candidates else []
     missing = {key: reason for key, reason in why.items() if reason}
-    return Linearized(fitted, observations, settings, around, tried, missing, frozenset(why), against, most_pose_error_rad)
+    return Linearized(
+        fitted,
+        observations,
+        settings,
+        around,
+        tried,
+        missing,
+        frozenset(why),
+        against,
+        most_pose_error_rad,
+    )
 
 
-def smallest_shown(statistics: Statistics, units: Sequence[Unit], settings: Settings) -> np.ndarray:
-    """The smallest size at which each unit would be found with a power of one half, were it the only candidate.
+def smallest_shown(
+    statistics: Statistics, units: Sequence[Unit], settings: Settings
+) -> np.ndarray:
+    """The smallest size at which each unit would be found with a power of one half,
+    were it the only candidate.
 
-    A test for one direction, with a Bonferroni correction for all units, reaches that where the non-centrality is the critical
-    value. A smaller effect counts as not there. Returns places among the sizes (number of units,); their number where even the
-    largest is too small to be seen.
+    A test for one direction, with a Bonferroni correction for all units, reaches that
+    where the non-centrality is the critical value. A smaller effect counts as not
+    there. Returns places among the sizes (number of units,); their number where even
+    the largest is too small to be seen.
     """
-    critical, largest = chdtri(1, settings.alarm_level / max(len(units), 1)), np.zeros(len(units))
+    critical = chdtri(1, settings.alarm_level / max(len(units), 1))
+    largest = np.zeros(len(units))
     for block in Blocks.of(statistics.at(slice(1)), units):
         largest[block.numbers] = block.axes[0][0].max(axis=1)
-    return np.searchsorted(np.array(settings.scales) ** 2, critical / np.maximum(largest, 1e-9 * critical))
+    return np.searchsorted(
+        np.array(settings.scales) ** 2, critical / np.maximum(largest, 1e-9 * critical)
+    )
 
 
 def shapes_tried(candidate: Candidate, fitted: Fit) -> list[Shapes]:
     """Values of the shape of a candidate over its range, list of tuple.
 
-    Where the fit has the candidate, its value alone; or, where a search must try many lest it step over the law, which is a law
-    that no fit can follow, values close to that of the fit.
+    Where the fit has the candidate, its value alone; or, where a search must try many
+    lest it step over the law, which is a law that no fit can follow, values close to
+    that of the fit.
     """
     if not candidate.shapes:
         return [()]
@@ -231,46 +352,89 @@ def shapes_tried(candidate: Candidate, fitted: Fit) -> list[Shapes]:
 
 
 def looked_at_closely(line: Linearized, alone: np.ndarray) -> Linearized:
-    """The same with more shapes of the best candidates, closer to each other about the best value of each.
+    """The same with more shapes of the best candidates, closer to each other about the
+    best value of each.
 
-    `alone` (number of units,): log Bayes factor of each unit alone. Returns itself where no shape matters.
+    `alone` (number of units,): log Bayes factor of each unit alone. Returns itself
+    where no shape matters.
     """
-    units, tried = line.problem.units, dict(line.tried)
+    units = line.problem.units
+    tried = dict(line.tried)
     odds = alone + line.problem.started.first
-    near = (odds > odds.max() - _NEAR_THE_BEST) & (alone > _WORTH_A_LOOK) if len(units) else []
+    near = (
+        (odds > odds.max() - _NEAR_THE_BEST) & (alone > _WORTH_A_LOOK)
+        if len(units)
+        else []
+    )
     for unit in (units[number] for number in np.argsort(-odds) if near[number]):
-        if unit.shapes and unit.candidate and tried[unit.candidate.key] is line.tried[unit.candidate.key]:
-            (shape,), (best,), key = unit.candidate.shapes, unit.shapes, unit.candidate.key
-            known = sorted(each.shapes[0] for each in units if each.candidate and each.candidate.key == key)
+        if (
+            unit.shapes
+            and unit.candidate
+            and tried[unit.candidate.key] is line.tried[unit.candidate.key]
+        ):
+            (shape,), (best,), key = (
+                unit.candidate.shapes,
+                unit.shapes,
+                unit.candidate.key,
+            )
+            known = sorted(
+                each.shapes[0]
+                for each in units
+                if each.candidate and each.candidate.key == key
+            )
             place = known.index(best)
-            below, above = [shape.lowest, *known][place], [*known, shape.highest][place + 1]
+            below = [shape.lowest, *known][place]
+            above = [*known, shape.highest][place + 1]
             # The best may lie at an end of the range.
-            sides = [edges for edges in ((below, best), (best, above)) if edges[0] < edges[1]]
-            closer = [value for edges in sides for value in shape.between(*edges, _SHAPES_CLOSER)]
-            tried[key] = unit.candidate, [(float(value),) for value in sorted({*known, *closer})]
+            sides = [
+                edges for edges in ((below, best), (best, above)) if edges[0] < edges[1]
+            ]
+            closer = [
+                value
+                for edges in sides
+                for value in shape.between(*edges, _SHAPES_CLOSER)
+            ]
+            tried[key] = (
+                unit.candidate,
+                [(float(value),) for value in sorted({*known, *closer})],
+            )
     return line if tried == line.tried else line.alike(tried=tried)
 
 
-def lacking(candidate: Candidate, there: frozenset[str], joint_angles: np.ndarray) -> str:
-    """Why measurements at some joint angles (S, n) cannot test a candidate at all; empty where they might.
+def lacking(
+    candidate: Candidate, there: frozenset[str], joint_angles: np.ndarray
+) -> str:
+    """Why measurements at some joint angles (S, n) cannot test a candidate at all;
+    empty where they might.
 
     `there`: of what it may need, as of `Model.offered`.
     """
     if missing := sorted(candidate.needs - there):
         return f"no {' and no '.join(missing)} in the data"
-    for joint in (candidate.joints or candidate.turning) if candidate.distinct_angles else ():
-        angles = len(np.unique(np.round(np.mod(joint_angles[:, joint - 1], 2 * np.pi), 3)))
+    for joint in (
+        (candidate.joints or candidate.turning) if candidate.distinct_angles else ()
+    ):
+        angles = len(
+            np.unique(np.round(np.mod(joint_angles[:, joint - 1], 2 * np.pi), 3))
+        )
         if angles < candidate.distinct_angles:
-            return f"joint {joint} stood still" if angles == 1 else "too few different angles of a joint"
+            return (
+                f"joint {joint} stood still"
+                if angles == 1
+                else "too few different angles of a joint"
+            )
     return ""
 
 
 def with_probable_centres(part: Kept, settings: Settings) -> Kept:
-    """The kept part of a case, fitted with the prior of its centres of mass that is more probable; itself without masses.
+    """The kept part of a case, fitted with the prior of its centres of mass that is
+    more probable; itself without masses.
 
-    Most robot files state centres of mass as well as masses; of some nobody ever asked. Priors as wide as the links' girth for
-    all robots would hide a payload, narrow ones would take a centre off its link for one. So both are hypotheses, equally
-    probable beforehand, and the measurements choose by the evidence of each, whatever single mechanism may be beside it.
+    Most robot files state centres of mass as well as masses; of some nobody ever asked.
+    Priors as wide as the links' girth for all robots would hide a payload, narrow ones
+    would take a centre off its link for one. So both are hypotheses, equally probable
+    beforehand, and the measurements choose by the evidence of each, whatever single
+    mechanism may be beside it.
 
     `part`: with the wide prior.
     """
@@ -279,31 +443,63 @@ def with_probable_centres(part: Kept, settings: Settings) -> Kept:
         return part
     line = linearized(part.declared, part.searched, (), settings)
     lines = [line, line.alike(about=replace(line.about, model=stated))]
-    wide, narrow = (_log_evidence(each, products_of(each._fitted[0], *each.priors)) for each in lines)
-    # A prior that is better without any mechanism is not worse with one, for a mechanism explains what it leaves.
+    wide, narrow = (
+        _log_evidence(each, products_of(each._fitted[0], *each.priors))
+        for each in lines
+    )
+    # A prior that is better without any mechanism is not worse with one, for a
+    # mechanism explains what it leaves.
     if wide > narrow:
-        every = linearized(part.declared, part.searched, list(part.case.candidates.values()), settings)
+        every = linearized(
+            part.declared, part.searched, list(part.case.candidates.values()), settings
+        )
         lines = [each.alike(tried=every.tried, against=every.against) for each in lines]
-        wide, narrow = (_log_evidence(each, each.products, each.problem) for each in lines)
+        wide, narrow = (
+            _log_evidence(each, each.products, each.problem) for each in lines
+        )
         if wide > narrow:
             return part
-    fitted = fit(stated, part.searched, part.noise, part.declared.estimate, reweighted=True)
-    return replace(part, case=replace(part.case, model=with_stated_centres(part.case.model)), declared=fitted)
+    fitted = fit(
+        stated, part.searched, part.noise, part.declared.estimate, reweighted=True
+    )
+    return replace(
+        part,
+        case=replace(part.case, model=with_stated_centres(part.case.model)),
+        declared=fitted,
+    )
 
 
 def with_stated_centres(model: Model) -> Model:
-    """A declared model whose first moments are known as well as the robot file says; itself without declared masses."""
-    weight = next((effect for effect in model.effects if effect.effect == DECLARED_WEIGHT), None)
+    """A declared model whose first moments are known as well as the robot file says;
+    itself without declared masses."""
+    weight = next(
+        (effect for effect in model.effects if effect.effect == DECLARED_WEIGHT), None
+    )
     if weight is None:
         return model
-    stated = replace(weight, parameters=tuple(replace(p, prior_std=p.plausible) for p in weight.parameters))
-    return replace(model, effects=tuple(stated if effect is weight else effect for effect in model.effects))
+    stated = replace(
+        weight,
+        parameters=tuple(replace(p, prior_std=p.plausible) for p in weight.parameters),
+    )
+    return replace(
+        model,
+        effects=tuple(
+            stated if effect is weight else effect for effect in model.effects
+        ),
+    )
 
 
-def _log_evidence(line: Linearized, products: Products, problem: Problem | None = None) -> float:
-    """Of the measurements, up to what any prior of the declared parameters shares; with none or one mechanism of a problem."""
+def _log_evidence(
+    line: Linearized, products: Products, problem: Problem | None = None
+) -> float:
+    """Of the measurements, up to what any prior of the declared parameters shares; with
+    none or one mechanism of a problem."""
     if problem is None:
-        problem = Problem(statistics_of(products, line.pose_errors_rad), (), line.settings)
-    of_declared = np.linalg.slogdet(products.into_basis)[1] - np.log(line.priors[0]).sum()
+        problem = Problem(
+            statistics_of(products, line.pose_errors_rad), (), line.settings
+        )
+    of_declared = (
+        np.linalg.slogdet(products.into_basis)[1] - np.log(line.priors[0]).sum()
+    )
     met = np.array(list(problem.started.met.values()))
     return float(of_declared + problem.started.empty.log_evidence + log_sum_exp(met))

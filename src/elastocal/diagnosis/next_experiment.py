@@ -1,14 +1,18 @@
-"""The next experiment: poses and loads after which the measurements, most probably, say which hypothesis holds.
+"""The next experiment: poses and loads after which the measurements, most probably, say
+which hypothesis holds.
 
-Each pose is read at the campaign's targets without its load and under it. Loads are those of the campaign, made as large as its
-largest or as the rated payload.
+Each pose is read at the campaign's targets without its load and under it. Loads are
+those of the campaign, made as large as its largest or as the rated payload.
 
-A hypothesis, in its most probable model, is linear in its coefficients: where present measurements leave these normal with mean
-m and covariance C, new rows A are expected with mean A m and covariance I + A C A'. How far the best hypothesis and another one
-are apart is eight times the Bhattacharyya distance of both predictions (Kailath, IEEE Transactions on Communication Technology
-1967): their squared Mahalanobis distance, or twice the expected log Bayes factor, where both predict as surely. Of random poses
-those are chosen, one after the other, that make the bound on the probability of a wrong choice least, the sum of
-sqrt(p q) exp(-separation / 8). What earlier poses will tell is taken off by conditioning on them, as a Kalman filter does.
+A hypothesis, in its most probable model, is linear in its coefficients: where present
+measurements leave these normal with mean m and covariance C, new rows A are expected
+with mean A m and covariance I + A C A'. How far the best hypothesis and another one are
+apart is eight times the Bhattacharyya distance of both predictions (Kailath, IEEE
+Transactions on Communication Technology 1967): their squared Mahalanobis distance, or
+twice the expected log Bayes factor, where both predict as surely. Of random poses those
+are chosen, one after the other, that make the bound on the probability of a wrong
+choice least, the sum of sqrt(p q) exp(-separation / 8). What earlier poses will tell is
+taken off by conditioning on them, as a Kalman filter does.
 """
 
 from __future__ import annotations
@@ -22,7 +26,13 @@ from scipy.special import ndtr
 
 from elastocal.diagnosis.refit import mean_square_left
 from elastocal.diagnosis.statistics import normal_equations
-from elastocal.diagnosis.verdict import ADEQUATE, NAMED, NOT_TESTABLE, Evidence, Hypothesis
+from elastocal.diagnosis.verdict import (
+    ADEQUATE,
+    NAMED,
+    NOT_TESTABLE,
+    Evidence,
+    Hypothesis,
+)
 from elastocal.fitting.model import conditions
 from elastocal.fitting.observations import Observations, States
 from elastocal.mechanics.components import WRENCH_NAMES
@@ -38,18 +48,25 @@ if TYPE_CHECKING:
 
 # Said where nothing within reach helps.
 NOT_DISTINGUISHABLE = "not distinguishable with this robot and tracker"
-NOTHING_MISSING, NOTHING_AMBIGUOUS = "nothing is missing", "nothing is ambiguous"
-DATA_AT_FAULT, NOTHING_TESTABLE = "the data are at fault", "the measurements can test no mechanism"
-# Random poses that are chosen from, and hypotheses between which they decide; the others hold a few per cent.
-_DRAWN, _HYPOTHESES = 200, 6
+NOTHING_MISSING = "nothing is missing"
+NOTHING_AMBIGUOUS = "nothing is ambiguous"
+DATA_AT_FAULT = "the data are at fault"
+NOTHING_TESTABLE = "the measurements can test no mechanism"
+# Random poses that are chosen from, and hypotheses between which they decide; the
+# others hold a few per cent.
+_DRAWN = 200
+_HYPOTHESES = 6
 # Poses after which nobody goes on: some two days with a tracker.
 _MOST_POSES = 100
 # Odds of the right hypothesis against another one with which it counts as resolved.
 _SURE_ODDS = 19.0
 
 
-def drawn(states: States, robot: Robot, count: int, stream: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Random joint angles (E, n), rad, within reach, and the heavier loads of a campaign at its last measuring point (E, 6)."""
+def drawn(
+    states: States, robot: Robot, count: int, stream: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """Random joint angles (E, n), rad, within reach, and the heavier loads of a
+    campaign at its last measuring point (E, 6)."""
     low, high = np.clip(robot.joint_limits, -np.pi, np.pi).T
     angles = low + (high - low) * stream.random((count, len(low)))
     size = np.linalg.norm(states.wrench[:, :3], axis=1)
@@ -61,55 +78,99 @@ def drawn(states: States, robot: Robot, count: int, stream: np.random.Generator)
     return angles, states.wrench[chosen] * (largest / size[chosen])[:, None]
 
 
-def observations_at(model: FittedModel, own: States, angles: np.ndarray, wrench: np.ndarray) -> Observations:
-    """Entries as observations with zeros measured, those of an entry together, joints approached from either side in turn.
+def observations_at(
+    model: FittedModel, own: States, angles: np.ndarray, wrench: np.ndarray
+) -> Observations:
+    """Entries as observations with zeros measured, those of an entry together, joints
+    approached from either side in turn.
 
     `own`: states of the campaign, which go on where the last of them is.
     """
     # Without the load, and under it.
     shares = np.array([0.0, 1.0] if own.wrench[:, :3].any() else [1.0])
-    entry, load = np.repeat(np.arange(len(angles)), len(shares)), np.tile(np.arange(len(shares)), len(angles))
-    count, targets = len(entry), len(model.targets)
-    side = np.where(np.add.outer(np.arange(count), np.arange(angles.shape[1])) % 2, -1.0, 1.0)
-    last = {name: np.repeat(values[-1:], count, axis=0) for name, values in vars(own).items() if values is not None}
-    new = {"pose": entry, "load": load, "joint_angles": angles[entry], "wrench": wrench[entry] * shares[load, None]}
-    new |= {"repeats": np.ones(count, int)} | ({} if own.approach is None else {"approach": side})
-    state, target = np.repeat(np.arange(count), targets), np.tile(np.arange(targets), count)
+    entry = np.repeat(np.arange(len(angles)), len(shares))
+    load = np.tile(np.arange(len(shares)), len(angles))
+    count = len(entry)
+    targets = len(model.targets)
+    side = np.where(
+        np.add.outer(np.arange(count), np.arange(angles.shape[1])) % 2, -1.0, 1.0
+    )
+    last = {
+        name: np.repeat(values[-1:], count, axis=0)
+        for name, values in vars(own).items()
+        if values is not None
+    }
+    new = {
+        "pose": entry,
+        "load": load,
+        "joint_angles": angles[entry],
+        "wrench": wrench[entry] * shares[load, None],
+    }
+    new |= {"repeats": np.ones(count, int)} | (
+        {} if own.approach is None else {"approach": side}
+    )
+    state = np.repeat(np.arange(count), targets)
+    target = np.tile(np.arange(targets), count)
     rotation = np.tile(np.eye(3), (len(target), 1, 1)) if model.rows == 6 else None
-    return Observations(States(**last | new), state, target, np.zeros((len(target), 3)), rotation)
+    return Observations(
+        States(**last | new), state, target, np.zeros((len(target), 3)), rotation
+    )
 
 
-def whitened_rows(linearized: Linearized, observations: Observations, columns: np.ndarray, pose_error_rad: float) -> np.ndarray:
-    """Sensitivities of entries to declared parameters and some columns, in those of `products`, over the noise, (E, R, U)."""
-    about, products = linearized.about, linearized.products
+def whitened_rows(
+    linearized: Linearized,
+    observations: Observations,
+    columns: np.ndarray,
+    pose_error_rad: float,
+) -> np.ndarray:
+    """Sensitivities of entries to declared parameters and some columns, in those of
+    `products`, over the noise, (E, R, U)."""
+    about = linearized.about
+    products = linearized.products
     # Nothing comes after the last row of the campaign but these.
     around = conditions(about.model, about.estimate, observations.states)
     around = replace(around, progress=np.ones(len(observations.states)))
     about = replace(about, weights=np.ones(len(observations)))
-    seen = replace(linearized, about=about, observations=observations, around=around).rows
+    seen = replace(
+        linearized, about=about, observations=observations, around=around
+    ).rows
     basis = seen.declared @ products.into_basis
-    beside = seen.candidates.dense()[..., columns] - basis @ products.projected[:, columns]
+    beside = (
+        seen.candidates.dense()[..., columns] - basis @ products.projected[:, columns]
+    )
     entries = seen.pose.max() + 1
-    rows = np.concatenate([basis, beside], axis=-1).reshape(entries, -1, basis.shape[-1] + len(columns))
+    rows = np.concatenate([basis, beside], axis=-1).reshape(
+        entries, -1, basis.shape[-1] + len(columns)
+    )
     jacobian = seen.jacobian.reshape(entries, rows.shape[1], -1)
-    covariance = np.eye(rows.shape[1]) + pose_error_rad**2 * jacobian @ jacobian.swapaxes(1, 2)
+    covariance = np.eye(
+        rows.shape[1]
+    ) + pose_error_rad**2 * jacobian @ jacobian.swapaxes(1, 2)
     return np.linalg.solve(np.linalg.cholesky(covariance), rows)
 
 
 def posteriors_of(
     linearized: Linearized, columns: np.ndarray, models: Sequence[Model], factor: float
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Mean (U,) and covariance (U, U) of declared parameters and columns under each model; zero for what it does not have.
+    """Mean (U,) and covariance (U, U) of declared parameters and columns under each
+    model; zero for what it does not have.
 
-    At the pose error of the first one, in units of `factor` times the noise taken. Half-normal priors count as normal ones.
+    At the pose error of the first one, in units of `factor` times the noise taken.
+    Half-normal priors count as normal ones.
     """
-    count, found = linearized.products.declared, []
+    count = linearized.products.declared
+    found = []
     declared = np.arange(count)
-    total = normal_equations(linearized.products, models[0].pose_error_rad, columns) / factor**2
+    total = (
+        normal_equations(linearized.products, models[0].pose_error_rad, columns)
+        / factor**2
+    )
     for model in models:
         mine, deviations = linearized.problem.columns_of(model.units, model.scales)
         at = np.append(declared, count + np.searchsorted(columns, mine))
-        precision = total[np.ix_(at, at)] + np.diag(np.append(0.0 * declared, (factor * deviations) ** -2))
+        precision = total[np.ix_(at, at)] + np.diag(
+            np.append(0.0 * declared, (factor * deviations) ** -2)
+        )
         covariance = np.zeros((len(total) - 1, len(total) - 1))
         covariance[np.ix_(at, at)] = np.linalg.inv(precision)
         found.append((covariance @ total[:-1, -1], covariance))
@@ -120,8 +181,8 @@ def posteriors_of(
 class Pair:
     """Two hypotheses after some experiments.
 
-    `apart` (U,): difference of their means. `covariances` (3, U, U): the mean of both, and each. `separation`: of what was
-    measured.
+    `apart` (U,): difference of their means. `covariances` (3, U, U): the mean of both,
+    and each. `separation`: of what was measured.
     """
 
     apart: np.ndarray
@@ -129,13 +190,20 @@ class Pair:
     separation: float = 0.0
 
     @classmethod
-    def of(cls, one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray]) -> Pair:
+    def of(
+        cls, one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray]
+    ) -> Pair:
         """Of two normal distributions of the coefficients."""
-        return cls(one[0] - other[0], np.array([(one[1] + other[1]) / 2, one[1], other[1]]))
+        return cls(
+            one[0] - other[0], np.array([(one[1] + other[1]) / 2, one[1], other[1]])
+        )
 
     def gained(self, rows: np.ndarray) -> np.ndarray:
-        """By how much each of some further experiments (E, R, U) separates them more, (E,)."""
-        predicted = np.eye(rows.shape[1]) + rows @ self.covariances[:, None] @ rows.swapaxes(1, 2)
+        """By how much each of some further experiments (E, R, U) separates them more,
+        (E,)."""
+        predicted = np.eye(rows.shape[1]) + rows @ self.covariances[
+            :, None
+        ] @ rows.swapaxes(1, 2)
         off = (rows @ self.apart)[..., None]
         squares = (off * np.linalg.solve(predicted[0], off)).sum(axis=(1, 2))
         return squares + np.array([4.0, -2.0, -2.0]) @ np.linalg.slogdet(predicted)[1]
@@ -145,17 +213,29 @@ class Pair:
         seen = rows @ self.covariances
         gain = np.linalg.solve(np.eye(len(rows)) + seen @ rows.T, seen).swapaxes(1, 2)
         separation = self.separation + float(self.gained(rows[None])[0])
-        return Pair(self.apart - gain[0] @ (rows @ self.apart), self.covariances - gain @ seen, separation)
+        return Pair(
+            self.apart - gain[0] @ (rows @ self.apart),
+            self.covariances - gain @ seen,
+            separation,
+        )
 
 
-def best_of(pairs: Sequence[Pair], weights: np.ndarray, rows: np.ndarray, count: int) -> tuple[list[int], np.ndarray]:
-    """So many experiments, each the best after those before it, and the separation of each pair after each, (count, pairs).
+def best_of(
+    pairs: Sequence[Pair], weights: np.ndarray, rows: np.ndarray, count: int
+) -> tuple[list[int], np.ndarray]:
+    """So many experiments, each the best after those before it, and the separation of
+    each pair after each, (count, pairs).
 
-    `weights` (pairs,): of each pair in the bound. `rows` (E, R, U): of what is chosen from.
+    `weights` (pairs,): of each pair in the bound. `rows` (E, R, U): of what is chosen
+    from.
     """
-    chosen, separations, present = list[int](), [], list(pairs)
+    chosen = list[int]()
+    separations = []
+    present = list(pairs)
     for _ in range(count):
-        bound = weights @ np.exp([-(pair.separation + pair.gained(rows)) / 8.0 for pair in present])
+        bound = weights @ np.exp(
+            [-(pair.separation + pair.gained(rows)) / 8.0 for pair in present]
+        )
         bound[chosen] = np.inf
         chosen.append(int(np.argmin(bound)))
         present = [pair.after(rows[chosen[-1]]) for pair in present]
@@ -164,49 +244,83 @@ def best_of(pairs: Sequence[Pair], weights: np.ndarray, rows: np.ndarray, count:
 
 
 def resolved(separation: np.ndarray | float) -> np.ndarray:
-    """Probability that the right one of two hypotheses gets odds of 19:1 from even ones: the log Bayes factor is normal with
-    this variance and half of it as its mean, where both predict as surely."""
+    """Probability that the right one of two hypotheses gets odds of 19:1 from even
+    ones: the log Bayes factor is normal with this variance and half of it as its mean,
+    where both predict as surely."""
     size = np.maximum(separation, 1e-12)
     return np.asarray(ndtr((0.5 * size - np.log(_SURE_ODDS)) / np.sqrt(size)))
 
 
-def propose(diagnosis: Diagnosis, stream: np.random.Generator, poses: int = 10) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """Choose the poses and loads that most probably resolve what a diagnosis leaves ambiguous.
+def propose(
+    diagnosis: Diagnosis, stream: np.random.Generator, poses: int = 10
+) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """Choose the poses and loads that most probably resolve what a diagnosis leaves
+    ambiguous.
 
-    Returns columns of the table of poses, in the order of their worth: ``effect``, the best hypothesis and the nearest other;
-    ``pose``; ``point``, at which targets are read; joint angles as the controller reports them (rad); the load; and what they
-    and all before them promise, ``separation`` from the nearest other and the probability ``resolved`` that follows from it.
-    And what verdict.json says: ``reason`` why there is nothing to measure, and what is ``indistinguishable`` from the best by
-    any experiment within reach, which the promise leaves aside.
+    Returns columns of the table of poses, in the order of their worth: ``effect``, the
+    best hypothesis and the nearest other; ``pose``; ``point``, at which targets are
+    read; joint angles as the controller reports them (rad); the load; and what they and
+    all before them promise, ``separation`` from the nearest other and the probability
+    ``resolved`` that follows from it. And what verdict.json says: ``reason`` why there
+    is nothing to measure, and what is ``indistinguishable`` from the best by any
+    experiment within reach, which the promise leaves aside.
     """
-    campaign, evidence = diagnosis.case.campaign, diagnosis.evidence
+    campaign = diagnosis.case.campaign
+    evidence = diagnosis.evidence
     if evidence is None:
         return _stated(campaign.robot, (), DATA_AT_FAULT)
     kept, reason = _ambiguous(evidence)
-    best, others = evidence.conclusion.best.mechanisms, kept[1:]
+    best = evidence.conclusion.best.mechanisms
+    others = kept[1:]
     if reason:
         return _stated(campaign.robot, best, reason)
-    linearized, model, states = evidence.linearized, diagnosis.final.model, diagnosis.case.observations.states
+    linearized = evidence.linearized
+    model = diagnosis.final.model
+    states = diagnosis.case.observations.states
     models = [evidence.posterior.models[each.model] for each in kept]
     factor = float(np.sqrt(max(mean_square_left(linearized.problem, models[0]), 1.0)))
-    columns = np.unique(np.concatenate([linearized.problem.columns_of(each.units, each.scales)[0] for each in models]))
+    columns = np.unique(
+        np.concatenate(
+            [
+                linearized.problem.columns_of(each.units, each.scales)[0]
+                for each in models
+            ]
+        )
+    )
     angles, wrench = drawn(states, campaign.robot, _DRAWN, stream)
-    rows = whitened_rows(linearized, observations_at(model, states, angles, wrench), columns, models[0].pose_error_rad) / factor
+    rows = (
+        whitened_rows(
+            linearized,
+            observations_at(model, states, angles, wrench),
+            columns,
+            models[0].pose_error_rad,
+        )
+        / factor
+    )
     leading, *following = posteriors_of(linearized, columns, models, factor)
     pairs = [Pair.of(leading, each) for each in following]
     probabilities = np.array([each.probability for each in others])
-    chosen, separations = best_of(pairs, np.sqrt(kept[0].probability * probabilities), rows, poses)
+    chosen, separations = best_of(
+        pairs, np.sqrt(kept[0].probability * probabilities), rows, poses
+    )
     whole = np.sqrt(_MOST_POSES / poses) * rows[chosen].reshape(1, -1, rows.shape[-1])
     reached = np.array([bool(resolved(pair.gained(whole)[0]) >= 0.5) for pair in pairs])
-    unreachable = [each.mechanisms for each, within in zip(others, reached, strict=True) if not within]
-    # What is distinguishable from the best holds no more probability than is left open where nothing is ambiguous.
+    unreachable = [
+        each.mechanisms
+        for each, within in zip(others, reached, strict=True)
+        if not within
+    ]
+    # What is distinguishable from the best holds no more probability than is left open
+    # where nothing is ambiguous.
     left = kept[0].probability / (kept[0].probability + probabilities[reached].sum())
     if unreachable and left >= linearized.settings.credible:
         return _stated(campaign.robot, best, NOT_DISTINGUISHABLE, unreachable)
     nearest = int(np.argmin(np.where(reached, separations[-1], np.inf)))
     point = " ".join(dict.fromkeys(target.point for target in model.targets))
     table = angles[chosen], wrench[chosen], point, separations[:, reached].min(axis=1)
-    return _stated(campaign.robot, best, "", unreachable, others[nearest].mechanisms, table)
+    return _stated(
+        campaign.robot, best, "", unreachable, others[nearest].mechanisms, table
+    )
 
 
 def _stated(
@@ -217,19 +331,34 @@ def _stated(
     nearest: tuple[str, ...] = (),
     table: tuple[np.ndarray, np.ndarray, str, np.ndarray] | None = None,
 ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    angles, wrench, point, separation = table or (np.zeros((0, robot.joints)), np.zeros((0, 6)), "", np.zeros(0))
+    angles, wrench, point, separation = table or (
+        np.zeros((0, robot.joints)),
+        np.zeros((0, 6)),
+        "",
+        np.zeros(0),
+    )
     count = len(angles)
     columns = {
         "effect": np.full(count, f"{' + '.join(best)} or {' + '.join(nearest)}"),
         "pose": np.arange(count),
         "point": np.full(count, point),
-        **{f"q{joint}": angle for joint, angle in enumerate(robot.reported_angles(angles).T, 1)},
+        **{
+            f"q{joint}": angle
+            for joint, angle in enumerate(robot.reported_angles(angles).T, 1)
+        },
         **dict(zip(WRENCH_NAMES, wrench.T, strict=True)),
         "separation": separation,
         "resolved": resolved(separation),
     }
-    last = {name: float(columns[name][-1]) if count else None for name in ("separation", "resolved")}
-    names = {"best": list(best), "nearest": list(nearest), "indistinguishable": [list(name) for name in indistinguishable]}
+    last = {
+        name: float(columns[name][-1]) if count else None
+        for name in ("separation", "resolved")
+    }
+    names = {
+        "best": list(best),
+        "nearest": list(nearest),
+        "indistinguishable": [list(name) for name in indistinguishable],
+    }
     return columns, {"poses": count, "reason": reason} | names | last
 
 
@@ -237,14 +366,29 @@ def _ambiguous(evidence: Evidence) -> tuple[list[Hypothesis], str]:
     """Credible hypotheses, the best first; or why there is nothing to resolve."""
     conclusion = evidence.conclusion
     if conclusion.verdict in (ADEQUATE, NOT_TESTABLE):
-        return [], NOTHING_MISSING if conclusion.verdict == ADEQUATE else NOTHING_TESTABLE
-    there = [each for each in conclusion.hypotheses if each.mechanisms and each.model >= 0]
+        return (
+            [],
+            NOTHING_MISSING if conclusion.verdict == ADEQUATE else NOTHING_TESTABLE,
+        )
+    there = [
+        each for each in conclusion.hypotheses if each.mechanisms and each.model >= 0
+    ]
     reached = np.cumsum([each.probability for each in there])
-    credible = there[: int(np.searchsorted(reached, evidence.linearized.settings.credible * reached[-1])) + 1]
+    credible = there[
+        : int(
+            np.searchsorted(
+                reached, evidence.linearized.settings.credible * reached[-1]
+            )
+        )
+        + 1
+    ]
     best = conclusion.best
     found = [best, *(each for each in credible if each != best)][:_HYPOTHESES]
-    # Where the verdict names one mechanism, whatever else is beside it does not make the name ambiguous.
-    instead = [each for each in found[1:] if not set(each.mechanisms) >= set(best.mechanisms)]
+    # Where the verdict names one mechanism, whatever else is beside it does not make
+    # the name ambiguous.
+    instead = [
+        each for each in found[1:] if not set(each.mechanisms) >= set(best.mechanisms)
+    ]
     if len(found) < 2 or (conclusion.verdict == NAMED and not instead):
         return [], NOTHING_AMBIGUOUS
     return found, ""

@@ -1,11 +1,16 @@
-"""Every number that a diagnosis rests on: with its reason in settings.json, and recorded in verdict.json."""
+"""Every number that a diagnosis rests on: with its reason in settings.json, and
+recorded in verdict.json."""
 
 import json
 from dataclasses import asdict, dataclass
 from importlib import resources
 from typing import Any
 
-_TABLE = json.loads(resources.files("elastocal").joinpath("diagnosis", "settings.json").read_text(encoding="utf-8"))
+_TABLE = json.loads(
+    resources.files("elastocal")
+    .joinpath("diagnosis", "settings.json")
+    .read_text(encoding="utf-8")
+)
 
 
 def _stated(name: str) -> Any:
@@ -61,4 +66,7 @@ class Settings:
 
     def document(self) -> dict[str, dict[str, Any]]:
         """Name, value and reason of every setting, JSON-serialisable."""
-        return {name: {"value": value, "reason": _TABLE[name]["reason"]} for name, value in asdict(self).items()}
+        return {
+            name: {"value": value, "reason": _TABLE[name]["reason"]}
+            for name, value in asdict(self).items()
+        }

@@ -1,9 +1,11 @@
-"""Programs with joint targets in the languages of robot controllers: `CONTROLLERS`, one entry each.
+"""Programs with joint targets in the languages of robot controllers: `CONTROLLERS`, one
+entry each.
 
-Each program goes to all targets, slowly. After: KUKA System Software 8.3, Operating and Programming Instructions for System
-Integrators (PTP to axis positions); ABB, Technical reference manual: RAPID Instructions, 3HAC050917 (MoveAbsJ, jointtarget);
-FANUC, R-30iB Plus Operator's Manual, B-83284EN (joint positions, ASCII upload); Universal Robots, The URScript Programming
-Language for e-Series (movej).
+Each program goes to all targets, slowly. After: KUKA System Software 8.3, Operating and
+Programming Instructions for System Integrators (PTP to axis positions); ABB, Technical
+reference manual: RAPID Instructions, 3HAC050917 (MoveAbsJ, jointtarget); FANUC, R-30iB
+Plus Operator's Manual, B-83284EN (joint positions, ASCII upload); Universal Robots, The
+URScript Programming Language for e-Series (movej).
 """
 
 import re
@@ -20,24 +22,35 @@ from elastocal.errors import InputError, printable
 
 @dataclass(frozen=True)
 class JointTargets:
-    """Targets (N, n) in degrees, of prismatic joints in mm, by the controller's names of the axes, with their ``units``."""
+    """Targets (N, n) in degrees, of prismatic joints in mm, by the controller's names
+    of the axes, with their ``units``."""
 
     axes: tuple[str, ...]
     units: tuple[str, ...]
     values: np.ndarray
 
     def rows(self, names: Sequence[str]) -> list[list[str | None]]:
-        """Numbers as all controllers read them, target for target, of these axes; None of one that the robot does not have."""
-        places = [self.axes.index(name) if name in self.axes else None for name in names]
-        return [[None if place is None else f"{round(row[place], 6) + 0.0:.6f}" for place in places] for row in self.values]
+        """Numbers as all controllers read them, target for target, of these axes; None
+        of one that the robot does not have."""
+        places = [
+            self.axes.index(name) if name in self.axes else None for name in names
+        ]
+        return [
+            [
+                None if place is None else f"{round(row[place], 6) + 0.0:.6f}"
+                for place in places
+            ]
+            for row in self.values
+        ]
 
 
 @dataclass(frozen=True)
 class Controller:
-    """A language: `words` as a person calls it, `suffix` of its files, what it calls the axes of the robot and those beside.
+    """A language: `words` as a person calls it, `suffix` of its files, what it calls
+    the axes of the robot and those beside.
 
-    `pattern`, `pattern_words`: of names of programs. `write`: the text of a program from its name, targets and notes;
-    `remarks` makes these comments.
+    `pattern`, `pattern_words`: of names of programs. `write`: the text of a program
+    from its name, targets and notes; `remarks` makes these comments.
     """
 
     name: str
@@ -49,20 +62,34 @@ class Controller:
     pattern_words: str
     write: Callable[[str, JointTargets, Sequence[str]], list[str]]
 
-    def program(self, name: str, targets: JointTargets, notes: Sequence[str] = ()) -> str:
+    def program(
+        self, name: str, targets: JointTargets, notes: Sequence[str] = ()
+    ) -> str:
         """The text of the file; the name is one that `check_name` allows."""
         return "\n".join([*self.write(name, targets, notes), ""])
 
 
-def remarks(notes: Sequence[str], mark: str, longest: int = 100, end: str = "") -> list[str]:
-    """Lines of comments with notes of any text, each behind the language's mark: no note is more than a comment.
+def remarks(
+    notes: Sequence[str], mark: str, longest: int = 100, end: str = ""
+) -> list[str]:
+    """Lines of comments with notes of any text, each behind the language's mark: no
+    note is more than a comment.
 
-    What no controller takes for a sign of its language is kept: letters and digits of ASCII, blanks and ``. , : _ + - / ( )``.
+    What no controller takes for a sign of its language is kept: letters and digits of
+    ASCII, blanks and ``. , : _ + - / ( )``.
     """
     plain = [
-        "".join(c if c.isascii() and (c.isalnum() or c in " .,:_+-/()") else "?" for c in printable(note)) for note in notes
+        "".join(
+            c if c.isascii() and (c.isalnum() or c in " .,:_+-/()") else "?"
+            for c in printable(note)
+        )
+        for note in notes
     ]
-    return [f"{mark}{piece}{end}" for note in plain for piece in textwrap.wrap(note, longest)]
+    return [
+        f"{mark}{piece}{end}"
+        for note in plain
+        for piece in textwrap.wrap(note, longest)
+    ]
 
 
 def _krl(name: str, targets: JointTargets, notes: Sequence[str]) -> list[str]:
@@ -73,49 +100,98 @@ def _krl(name: str, targets: JointTargets, notes: Sequence[str]) -> list[str]:
         "  ; joint targets corrected by elastocal, degrees and mm",
         *remarks(notes, "  ; - "),
     ]
-    lines += ["  INT i", "  BAS(#INITMOV, 0)", "  FOR i = 1 TO 6", "    $VEL_AXIS[i] = 10", "  ENDFOR"]
+    lines += [
+        "  INT i",
+        "  BAS(#INITMOV, 0)",
+        "  FOR i = 1 TO 6",
+        "    $VEL_AXIS[i] = 10",
+        "  ENDFOR",
+    ]
     for row in targets.rows(targets.axes):
-        lines.append(f"  PTP {{E6AXIS: {', '.join(f'{axis} {value}' for axis, value in zip(targets.axes, row, strict=True))}}}")
+        lines.append(
+            f"  PTP {{E6AXIS: {', '.join(f'{axis} {value}' for axis, value in zip(targets.axes, row, strict=True))}}}"
+        )
     return [*lines, "END"]
 
 
 def _rapid(name: str, targets: JointTargets, notes: Sequence[str]) -> list[str]:
-    """A module with the targets, and a procedure that goes to all of them with a tool of the caller's."""
+    """A module with the targets, and a procedure that goes to all of them with a tool
+    of the caller's."""
     rows = targets.rows((*_RAPID_AXES, *_RAPID_EXTERNAL))
-    lines = [f"MODULE {name}", "  ! joint targets corrected by elastocal, degrees and mm", *remarks(notes, "  ! ")]
+    lines = [
+        f"MODULE {name}",
+        "  ! joint targets corrected by elastocal, degrees and mm",
+        *remarks(notes, "  ! "),
+    ]
     for number, row in enumerate(rows, 1):
         own = ",".join(value or "0" for value in row[:6])
         beside = ",".join(value or "9E9" for value in row[6:])
         lines.append(f"  CONST jointtarget target_{number} := [[{own}],[{beside}]];")
     lines += ["", "  PROC go_to_targets(PERS tooldata used_tool)"]
-    lines += [f"    MoveAbsJ target_{number}, v100, fine, used_tool;" for number in range(1, len(rows) + 1)]
+    lines += [
+        f"    MoveAbsJ target_{number}, v100, fine, used_tool;"
+        for number in range(1, len(rows) + 1)
+    ]
     return [*lines, "  ENDPROC", "ENDMODULE"]
 
 
 def _tp(name: str, targets: JointTargets, notes: Sequence[str]) -> list[str]:
-    """A program of group 1, of which extended axes are too; three axes a line, remarks of 32 characters."""
+    """A program of group 1, of which extended axes are too; three axes a line, remarks
+    of 32 characters."""
     names = [axis for axis in (*_TP_AXES, *_TP_EXTERNAL) if axis in targets.axes]
-    units, rows = dict(zip(targets.axes, targets.units, strict=True)), targets.rows(names)
-    lines = [f"/PROG  {name.upper()}", "/ATTR", 'COMMENT\t\t= "elastocal";', "DEFAULT_GROUP\t= 1,*,*,*,*;", "/MN"]
-    inside = [*remarks(notes, "  !", 32, " ;"), *(f"J P[{number}] 10% FINE    ;" for number in range(1, len(rows) + 1))]
-    lines += [*(f"{number:4d}:{instruction}" for number, instruction in enumerate(inside, 1)), "/POS"]
+    units = dict(zip(targets.axes, targets.units, strict=True))
+    rows = targets.rows(names)
+    lines = [
+        f"/PROG  {name.upper()}",
+        "/ATTR",
+        'COMMENT\t\t= "elastocal";',
+        "DEFAULT_GROUP\t= 1,*,*,*,*;",
+        "/MN",
+    ]
+    inside = [
+        *remarks(notes, "  !", 32, " ;"),
+        *(f"J P[{number}] 10% FINE    ;" for number in range(1, len(rows) + 1)),
+    ]
+    lines += [
+        *(f"{number:4d}:{instruction}" for number, instruction in enumerate(inside, 1)),
+        "/POS",
+    ]
     for number, row in enumerate(rows, 1):
-        words = [f"{axis}= {value} {units[axis]}" for axis, value in zip(names, row, strict=True)]
-        inside = [",\t".join(words[first : first + 3]) for first in range(0, len(words), 3)]
-        lines += [f"P[{number}]{{", "   GP1:", "\tUF : 0, UT : 1,\t", "\t" + ",\n\t".join(inside), "};"]
+        words = [
+            f"{axis}= {value} {units[axis]}"
+            for axis, value in zip(names, row, strict=True)
+        ]
+        inside = [
+            ",\t".join(words[first : first + 3]) for first in range(0, len(words), 3)
+        ]
+        lines += [
+            f"P[{number}]{{",
+            "   GP1:",
+            "\tUF : 0, UT : 1,\t",
+            "\t" + ",\n\t".join(inside),
+            "};",
+        ]
     return [*lines, "/END"]
 
 
 def _urscript(name: str, targets: JointTargets, notes: Sequence[str]) -> list[str]:
     order = [targets.axes.index(axis) for axis in _UR_AXES]
-    lines = [f"def {name}():", "  # joint targets corrected by elastocal, rad", *remarks(notes, "  # ")]
+    lines = [
+        f"def {name}():",
+        "  # joint targets corrected by elastocal, rad",
+        *remarks(notes, "  # "),
+    ]
     for row in np.radians(targets.values[:, order]):
-        lines.append(f"  movej([{', '.join(f'{round(value, 9) + 0.0:.9f}' for value in row)}], a=0.5, v=0.2)")
+        lines.append(
+            f"  movej([{', '.join(f'{round(value, 9) + 0.0:.9f}' for value in row)}], a=0.5, v=0.2)"
+        )
     return [*lines, "end"]
 
 
-_RAPID_AXES, _RAPID_EXTERNAL = tuple(f"rax_{axis}" for axis in range(1, 7)), tuple(f"eax_{axis}" for axis in "abcdef")
-_TP_AXES, _TP_EXTERNAL = tuple(f"J{axis}" for axis in range(1, 7)), tuple(f"E{axis}" for axis in range(1, 4))
+_RAPID_AXES = tuple(f"rax_{axis}" for axis in range(1, 7))
+_RAPID_EXTERNAL = tuple(f"eax_{axis}" for axis in "abcdef")
+_TP_AXES = tuple(f"J{axis}" for axis in range(1, 7))
+_TP_EXTERNAL = tuple(f"E{axis}" for axis in range(1, 4))
 _UR_AXES = ("base", "shoulder", "elbow", "wrist1", "wrist2", "wrist3")
 _NAMED = "letters, digits and underscores that begin with"
 _ALL = (
@@ -140,46 +216,72 @@ CONTROLLERS = {each.name: each for each in _ALL}
 
 
 def controller_of(name: str, suffix: str) -> Controller | None:
-    """The language of a name; without one that of a file's suffix, None where it is none's. An unknown name is refused."""
+    """The language of a name; without one that of a file's suffix, None where it is
+    none's. An unknown name is refused."""
     if name and name not in CONTROLLERS:
         raise InputError("--format", "", repr(name), " | ".join(CONTROLLERS))
-    return CONTROLLERS[name] if name else next((each for each in _ALL if suffix.lower() == each.suffix), None)
+    return (
+        CONTROLLERS[name]
+        if name
+        else next((each for each in _ALL if suffix.lower() == each.suffix), None)
+    )
 
 
 def check_name(controller: Controller, path: Path) -> str:
-    """The name of the program in a file: the file's without its suffix, which an InputError refuses where it is none."""
+    """The name of the program in a file: the file's without its suffix, which an
+    InputError refuses where it is none."""
     name = path.stem
     if not re.fullmatch(controller.pattern, name, re.ASCII):
         found = f"{name!r} as the name of a program"
-        raise InputError(path, "--output", found, f"in {controller.words}: {controller.pattern_words}")
+        raise InputError(
+            path,
+            "--output",
+            found,
+            f"in {controller.words}: {controller.pattern_words}",
+        )
     return name
 
 
-def axes_of(controller: Controller, prismatic: Sequence[bool], stated: str) -> tuple[str, ...]:
-    """What the controller calls q1, q2, ...: as stated, ``A1,A2,...``, or six joints that turn in order and shifts beside them.
+def axes_of(
+    controller: Controller, prismatic: Sequence[bool], stated: str
+) -> tuple[str, ...]:
+    """What the controller calls q1, q2, ...: as stated, ``A1,A2,...``, or six joints
+    that turn in order and shifts beside them.
 
-    Other robots' axes are a question: whether the third of seven is an external axis, or which of six a palletizer has.
+    Other robots' axes are a question: whether the third of seven is an external axis,
+    or which of six a palletizer has.
     """
     known = (*controller.axes, *controller.external)
     if stated:
         names = tuple(name.strip() for name in stated.split(","))
-        if len(names) != len(prismatic) or len(set(names)) < len(names) or not set(names) <= set(known):
+        if (
+            len(names) != len(prismatic)
+            or len(set(names)) < len(names)
+            or not set(names) <= set(known)
+        ):
             allowed = f"{counted(len(prismatic), 'different name')}, of q1 to q{len(prismatic)}, of {', '.join(known)}"
             raise InputError("--axes", "", repr(stated), allowed)
         return names
     shifts = sum(prismatic)
-    if len(prismatic) - shifts != len(controller.axes) or shifts > len(controller.external):
+    if len(prismatic) - shifts != len(controller.axes) or shifts > len(
+        controller.external
+    ):
         found = f"{counted(len(prismatic) - shifts, 'joint that turns', 'joints that turn')} and {shifts} that shift"
         allowed = f"--axes with what {controller.words} calls each of q1 to q{len(prismatic)}: {', '.join(known)}"
         if not controller.external:
             axes = counted(len(controller.axes), "joint that turns", "joints that turn")
             allowed = f"{axes}, which is all that {controller.words} has"
         raise InputError("--format", controller.name, found, allowed)
-    turning, shifting = iter(controller.axes), iter(controller.external)
+    turning = iter(controller.axes)
+    shifting = iter(controller.external)
     return tuple(next(shifting if shift else turning) for shift in prismatic)
 
 
-def targets_of(joint_angles: np.ndarray, prismatic: Sequence[bool], axes: tuple[str, ...]) -> JointTargets:
+def targets_of(
+    joint_angles: np.ndarray, prismatic: Sequence[bool], axes: tuple[str, ...]
+) -> JointTargets:
     """Targets of joint angles (N, n) in rad and, of prismatic joints, m."""
     values = np.where(prismatic, 1e3 * joint_angles, np.degrees(joint_angles))
-    return JointTargets(axes, tuple("mm" if shift else "deg" for shift in prismatic), values)
+    return JointTargets(
+        axes, tuple("mm" if shift else "deg" for shift in prismatic), values
+    )

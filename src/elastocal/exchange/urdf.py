@@ -1,11 +1,13 @@
-"""A URDF file, read safely, and the serial chain between two of its links as the contents of a robot file.
+"""A URDF file, read safely, and the serial chain between two of its links as the
+contents of a robot file.
 
-The Unified Robot Description Format (wiki.ros.org/urdf/XML) is XML. No document type is accepted, and so no entity that grows
-or fetches another file; no other file is opened.
+The Unified Robot Description Format (wiki.ros.org/urdf/XML) is XML. No document type is
+accepted, and so no entity that grows or fetches another file; no other file is opened.
 
-A joint is a fixed transform (``origin``), which becomes ``Tx Ty Tz Rz Ry Rx``, and then a motion about or along an axis; one
-that is not x, y or z is turned into z and back. All that a joint carries rigidly is one mass, side branches and what stands
-behind the tip included.
+A joint is a fixed transform (``origin``), which becomes ``Tx Ty Tz Rz Ry Rx``, and then
+a motion about or along an axis; one that is not x, y or z is turned into z and back.
+All that a joint carries rigidly is one mass, side branches and what stands behind the
+tip included.
 """
 
 import math
@@ -37,14 +39,18 @@ from elastocal.mechanics.robot import STANDARD_GRAVITY, UNLIMITED_DEG
 
 # The longest public descriptions, of humanoids with hands, have less than a megabyte.
 LARGEST_BYTES = 20_000_000
-# Elements, and how deep in each other: each takes memory many times its size in the file.
-_MOST_ELEMENTS, _DEEPEST = 200_000, 50
-# Whole cells with grippers and cameras have some hundred links; each is followed to the root.
+# Elements, and how deep in each other: each takes memory many times its size in the
+# file.
+_MOST_ELEMENTS = 200_000
+_DEEPEST = 50
+# Whole cells with grippers and cameras have some hundred links; each is followed to the
+# root.
 _MOST_PARTS = 2000
 _MOVING = {"revolute": "R", "continuous": "R", "prismatic": "T"}
 _KINDS = (*_MOVING, "fixed", "floating", "planar")
 _XACRO = "a URDF; this is xacro, run it first: xacro FILE > robot.urdf"
-# How many numbers each attribute has that is read, by its element and name, and what they are where nothing states them.
+# How many numbers each attribute has that is read, by its element and name, and what
+# they are where nothing states them.
 _NUMBERS = {
     ("origin", "xyz"): (3, "0 0 0"),
     ("origin", "rpy"): (3, "0 0 0"),
@@ -53,21 +59,26 @@ _NUMBERS = {
     ("limit", "upper"): (1, "0"),
     ("mass", "value"): (1, ""),
 }
-# Limits to a billionth of a degree, or to a nanometre; gravity to so many m/s²; masses to so many kg.
+# Limits to a billionth of a degree, or to a nanometre; gravity to so many m/s²; masses
+# to so many kg.
 _DECIMALS = 9
-# How well masses are known, as a standard deviation over the value. A URDF does not say where they come from: of a drawing
-# without cables, grease and covers, or guessed; where dynamic parameters of robots were identified, masses and centres of such
-# models were off by a tenth to a third.
+# How well masses are known, as a standard deviation over the value. A URDF does not say
+# where they come from: of a drawing without cables, grease and covers, or guessed;
+# where dynamic parameters of robots were identified, masses and centres of such models
+# were off by a tenth to a third.
 _MASS_STD = 0.2
-# Two turns, and rounding; limits in degrees are farther, and so are those of programs where a joint has none.
+# Two turns, and rounding; limits in degrees are farther, and so are those of programs
+# where a joint has none.
 _FARTHEST_RAD = 4.0 * math.pi + 0.01
 # So many links of a robot never weigh the same; links and joints that a note names.
-_FEWEST_ALIKE, _NAMED = 3, 4
+_FEWEST_ALIKE = 3
+_NAMED = 4
 
 
 @dataclass(frozen=True)
 class Joint:
-    """`origin` (4, 4) is in the parent's frame, `axis` (3,) in its own; limits that are not stated are 0."""
+    """`origin` (4, 4) is in the parent's frame, `axis` (3,) in its own; limits that are
+    not stated are 0."""
 
     name: str
     kind: str
@@ -84,8 +95,9 @@ class Joint:
 class Urdf:
     """A tree of links: every name once, every joint between two of them.
 
-    `moments` (4,): of each link by its name the mass times its centre in the link's frame (kg m), and the mass (kg, 0 where
-    none is stated). `above`: the joint that carries a link, by the link's name; the root has none.
+    `moments` (4,): of each link by its name the mass times its centre in the link's
+    frame (kg m), and the mass (kg, 0 where none is stated). `above`: the joint that
+    carries a link, by the link's name; the root has none.
     """
 
     name: str
@@ -100,16 +112,21 @@ class Urdf:
             link = self.above[link].parent
 
     def path_to(self, tip: str, base: str | None) -> list[Joint]:
-        """The joints from a link, or from the root of the tree where it does not carry the tip, to the tip."""
-        return [*takewhile(lambda joint: joint.child != base, self.joints_above(tip))][::-1]
+        """The joints from a link, or from the root of the tree where it does not carry
+        the tip, to the tip."""
+        return [*takewhile(lambda joint: joint.child != base, self.joints_above(tip))][
+            ::-1
+        ]
 
 
 @dataclass(frozen=True)
 class UrdfChain:
-    """The chain between two links: in the notation, with measuring points; the joints of q1, q2, ...
+    """The chain between two links: in the notation, with measuring points; the joints
+    of q1, q2, ...
 
-    `links`: of each link on it the number of the joint that carries it, 0 for the column, and its frame (4, 4) in the one
-    directly behind that joint, all joints at zero.
+    `links`: of each link on it the number of the joint that carries it, 0 for the
+    column, and its frame (4, 4) in the one directly behind that joint, all joints at
+    zero.
     """
 
     notation: str
@@ -117,62 +134,107 @@ class UrdfChain:
     links: dict[str, tuple[int, np.ndarray]]
 
 
-def robot_from_urdf(path: str | Path, base: str, tip: str, points: Sequence[str] = ()) -> Imported:
-    """The robot between two links of a URDF: its base frame, and its last measuring point; `points` between become others."""
-    urdf, source = read_urdf(path), str(path)
+def robot_from_urdf(
+    path: str | Path, base: str, tip: str, points: Sequence[str] = ()
+) -> Imported:
+    """The robot between two links of a URDF: its base frame, and its last measuring
+    point; `points` between become others."""
+    urdf = read_urdf(path)
+    source = str(path)
     chain = chain_between(urdf, base, tip, points, source)
     masses, notes = _weights(urdf, chain)
-    notes.insert(0, f"read: {', '.join(f'q{n} from {joint.name!r}' for n, joint in enumerate(chain.joints, 1))}")
+    notes.insert(
+        0,
+        f"read: {', '.join(f'q{n} from {joint.name!r}' for n, joint in enumerate(chain.joints, 1))}",
+    )
     limits = [_limits(joint, notes, source) for joint in chain.joints]
-    document: dict[str, Any] = {"name": urdf.name, "joint_names": [joint.name for joint in chain.joints]}
+    document: dict[str, Any] = {
+        "name": urdf.name,
+        "joint_names": [joint.name for joint in chain.joints],
+    }
     document |= {"chain": chain.notation, "joint_limits_deg": limits}
     # The tree's root is upright.
-    before = np.linalg.multi_dot([np.eye(4), np.eye(4), *(joint.origin for joint in urdf.path_to(base, None))])
+    before = np.linalg.multi_dot(
+        [np.eye(4), np.eye(4), *(joint.origin for joint in urdf.path_to(base, None))]
+    )
     gravity = np.round(-STANDARD_GRAVITY * before[2, :3], _DECIMALS) + 0.0
     if gravity[2] != -STANDARD_GRAVITY:
         document["gravity_m_s2"] = gravity.tolist()
-        notes.append(f"gravity as at {base!r} where the root of the tree stands upright and the joints before it are at zero")
+        notes.append(
+            f"gravity as at {base!r} where the root of the tree stands upright and the joints before it are at zero"
+        )
     if masses:
         document["masses"] = masses
-        notes.append(f"masses are known to {100 * _MASS_STD:g} %, by assumption: a URDF does not say")
-    if beside := [joint.name for joint in urdf.joints if joint.kind != "fixed" and joint.child not in chain.links]:
-        notes.append(f"joints that are no part of the chain, left out: {', '.join(beside)}")
+        notes.append(
+            f"masses are known to {100 * _MASS_STD:g} %, by assumption: a URDF does not say"
+        )
+    if beside := [
+        joint.name
+        for joint in urdf.joints
+        if joint.kind != "fixed" and joint.child not in chain.links
+    ]:
+        notes.append(
+            f"joints that are no part of the chain, left out: {', '.join(beside)}"
+        )
     return check_imported(document, path, f"the links from {base!r} to {tip!r}", notes)
 
 
 def _limits(joint: Joint, notes: list[str], source: str) -> list[float]:
-    """Degrees, of prismatic joints metres; a turn either way where a joint that turns has none, or none in radians."""
-    low, high, prismatic = joint.lower, joint.upper, joint.kind == "prismatic"
+    """Degrees, of prismatic joints metres; a turn either way where a joint that turns
+    has none, or none in radians."""
+    low = joint.lower
+    high = joint.upper
+    prismatic = joint.kind == "prismatic"
     if low >= high and prismatic:
         allowed = 'of a prismatic joint, <limit lower="..." upper="..."> in metres'
-        raise InputError(source, f"joint {joint.name!r}: limit", f"{low:g} to {high:g}", allowed)
+        raise InputError(
+            source, f"joint {joint.name!r}: limit", f"{low:g} to {high:g}", allowed
+        )
     if prismatic or (low < high and max(-low, high) <= _FARTHEST_RAD):
-        return [round(value if prismatic else math.degrees(value), _DECIMALS) for value in (low, high)]
+        return [
+            round(value if prismatic else math.degrees(value), _DECIMALS)
+            for value in (low, high)
+        ]
     if joint.kind != "continuous":
-        found = f"limits of {low:g} to {high:g}, no radians" if low < high else "no limits in the URDF"
+        found = (
+            f"limits of {low:g} to {high:g}, no radians"
+            if low < high
+            else "no limits in the URDF"
+        )
         notes.append(f"joint {joint.name!r} has {found}: a turn either way")
     return list(UNLIMITED_DEG)
 
 
 def read_urdf(path: str | Path) -> Urdf:
-    """Links, joints and masses of a URDF file; one whose joints and links do not hold together is refused."""
+    """Links, joints and masses of a URDF file; one whose joints and links do not hold
+    together is refused."""
     source = Path(path).as_posix()
     root = _root_of(read_bytes(path, LARGEST_BYTES, "a URDF file"), source)
-    links, joints = root.findall("link"), root.findall("joint")
+    links = root.findall("link")
+    joints = root.findall("joint")
     _check_tree(links, joints, source)
     moments = {}
     for part in links:
-        called, inertial = f"link {part.attrib['name']!r}", part.find("inertial")
-        mass, centre = 0.0, [0.0, 0.0, 0.0]
+        called = f"link {part.attrib['name']!r}"
+        inertial = part.find("inertial")
+        mass = 0.0
+        centre = [0.0, 0.0, 0.0]
         if inertial is not None:
             centre = _numbers(inertial, "origin", "xyz", called, source)
             if inertial.find("mass") is not None:
                 (mass,) = _numbers(inertial, "mass", "value", called, source)
             if mass < 0:
-                raise InputError(source, f"{called}: mass value", f"{mass:g}", "0 or more kg")
+                raise InputError(
+                    source, f"{called}: mass value", f"{mass:g}", "0 or more kg"
+                )
         moments[part.attrib["name"]] = mass * np.array([*centre, 1.0])
     made = tuple(_joint(part, source) for part in joints)
-    return Urdf(root.get("name") or Path(path).stem, moments, made, {joint.child: joint for joint in made})
+    return Urdf(
+        root.get("name") or Path(path).stem,
+        moments,
+        made,
+        {joint.child: joint for joint in made},
+    )
 
 
 def _joint(part: Element, source: str) -> Joint:
@@ -182,20 +244,38 @@ def _joint(part: Element, source: str) -> Joint:
         return _numbers(part, tag, attribute, f"joint {name!r}", source)
 
     origin = origin_transform(numbers("origin", "xyz"), numbers("origin", "rpy"))
-    (lower,), (upper,), axis = numbers("limit", "lower"), numbers("limit", "upper"), np.array(numbers("axis", "xyz"))
+    (lower,), (upper,), axis = (
+        numbers("limit", "lower"),
+        numbers("limit", "upper"),
+        np.array(numbers("axis", "xyz")),
+    )
     ends = _end(part, "parent"), _end(part, "child")
-    return Joint(name, part.attrib["type"], *ends, origin, axis, lower, upper, part.find("mimic") is not None)
+    return Joint(
+        name,
+        part.attrib["type"],
+        *ends,
+        origin,
+        axis,
+        lower,
+        upper,
+        part.find("mimic") is not None,
+    )
 
 
-def _numbers(part: Element, tag: str, attribute: str, called: str, source: str) -> list[float]:
-    """Numbers of an attribute of a child, or what they are where nothing states them."""
+def _numbers(
+    part: Element, tag: str, attribute: str, called: str, source: str
+) -> list[float]:
+    """Numbers of an attribute of a child, or what they are where nothing states
+    them."""
     count, default = _NUMBERS[tag, attribute]
     child = part.find(tag)
     text = default if child is None else child.get(attribute, default)
     # Programs write 1e16 and more where a joint has no limit.
     largest = 1e100 if tag == "limit" else LARGEST_NUMBER
     words = text.split(None, count)
-    numbers = [number for each in words if (number := plain_number(each, largest)) is not None]
+    numbers = [
+        number for each in words if (number := plain_number(each, largest)) is not None
+    ]
     if not len(words) == len(numbers) == count:
         allowed = f"{'a number' if count == 1 else f'{count} numbers'}, up to {largest:g} in size"
         raise InputError(source, f"{called}: {tag} {attribute}", repr(text), allowed)
@@ -208,11 +288,14 @@ def _end(joint: Element, tag: str) -> str:
 
 
 class _Builder(ElementTree.TreeBuilder):
-    """Builds a tree whose names have no namespaces; what could grow without end, and what xacro has not read, is refused."""
+    """Builds a tree whose names have no namespaces; what could grow without end, and
+    what xacro has not read, is refused."""
 
     def __init__(self, source: str) -> None:
         super().__init__()
-        self.source, self.count, self.depth = source, 0, 0
+        self.source = source
+        self.count = 0
+        self.depth = 0
 
     def doctype(self, *_: object) -> None:
         allowed = "a URDF without a document type, for entities of one could be endless or other files"
@@ -220,13 +303,22 @@ class _Builder(ElementTree.TreeBuilder):
 
     def start(self, tag: str, attrs: dict[str, str]) -> Element:
         uri, _, name = tag.rpartition("}")
-        self.count, self.depth = self.count + 1, self.depth + 1
+        self.count = self.count + 1
+        self.depth = self.depth + 1
         if self.count > _MOST_ELEMENTS or self.depth > _DEEPEST:
-            most = f"{_DEEPEST} elements in each other" if self.depth > _DEEPEST else f"{_MOST_ELEMENTS} elements"
-            raise InputError(self.source, "", f"more than {most}", "a URDF, which needs fewer")
+            most = (
+                f"{_DEEPEST} elements in each other"
+                if self.depth > _DEEPEST
+                else f"{_MOST_ELEMENTS} elements"
+            )
+            raise InputError(
+                self.source, "", f"more than {most}", "a URDF, which needs fewer"
+            )
         if "xacro" in uri:
             raise InputError(self.source, "", f"<xacro:{name}>", _XACRO)
-        if wrong := next((value for value in attrs.values() if "${" in value or "$(" in value), None):
+        if wrong := next(
+            (value for value in attrs.values() if "${" in value or "$(" in value), None
+        ):
             raise InputError(self.source, f"<{name}>", repr(wrong), _XACRO)
         return super().start(name, attrs)
 
@@ -237,52 +329,87 @@ class _Builder(ElementTree.TreeBuilder):
 
 def _root_of(data: bytes, source: str) -> Element:
     try:
-        root = ElementTree.fromstring(data, ElementTree.XMLParser(target=_Builder(source)))
+        root = ElementTree.fromstring(
+            data, ElementTree.XMLParser(target=_Builder(source))
+        )
     except ElementTree.ParseError as error:
-        where, words = f"line {error.position[0]}", str(error).partition(":")[0]
+        where = f"line {error.position[0]}"
+        words = str(error).partition(":")[0]
         raise InputError(source, where, words, "a URDF, which is XML") from None
     except (ValueError, LookupError) as error:
-        raise error if isinstance(error, InputError) else InputError(source, "", str(error), "a URDF, which is XML") from None
+        raise (
+            error
+            if isinstance(error, InputError)
+            else InputError(source, "", str(error), "a URDF, which is XML")
+        ) from None
     if root.tag != "robot":
         raise InputError(source, "", f"<{root.tag}>", "a URDF, which is a <robot>")
     return root
 
 
-def _check_tree(links: Sequence[Element], joints: Sequence[Element], source: str) -> None:
+def _check_tree(
+    links: Sequence[Element], joints: Sequence[Element], source: str
+) -> None:
     for tag, parts in (("link", links), ("joint", joints)):
         if not 0 < len(parts) <= _MOST_PARTS:
             found = f"{len(parts)} times <{tag}>" if parts else f"no <{tag}>"
-            raise InputError(source, "", found, f"a URDF with links and joints, at most {_MOST_PARTS}")
+            raise InputError(
+                source,
+                "",
+                found,
+                f"a URDF with links and joints, at most {_MOST_PARTS}",
+            )
         counts = Counter(part.get("name", "") for part in parts)
         if wrong := [name for name, times in counts.items() if times > 1 or not name]:
-            raise InputError(source, f"{tag} {wrong[0]!r}", f"{counts[wrong[0]]} times", "a name for each, and each name once")
+            raise InputError(
+                source,
+                f"{tag} {wrong[0]!r}",
+                f"{counts[wrong[0]]} times",
+                "a name for each, and each name once",
+            )
     names = {link.attrib["name"] for link in links}
     parent_of: dict[str, str] = {}
     for joint in joints:
         called = f"joint {joint.attrib['name']!r}"
         if joint.get("type") not in _KINDS:
-            raise InputError(source, called, f"type {joint.get('type')!r}", " | ".join(_KINDS))
+            raise InputError(
+                source, called, f"type {joint.get('type')!r}", " | ".join(_KINDS)
+            )
         parent, child = (_end(joint, tag) for tag in ("parent", "child"))
         for tag, name in (("parent", parent), ("child", child)):
             if name not in names:
-                raise InputError(source, called, f"{tag} {name!r}", "a link of this file")
+                raise InputError(
+                    source, called, f"{tag} {name!r}", "a link of this file"
+                )
         if child in parent_of:
             found = f"child {child!r}, which another joint has too"
             raise InputError(source, called, found, "a tree: each link below one joint")
         parent_of[child] = parent
     try:
-        TopologicalSorter({child: [parent] for child, parent in parent_of.items()}).prepare()
+        TopologicalSorter(
+            {child: [parent] for child, parent in parent_of.items()}
+        ).prepare()
     except CycleError as error:
-        raise InputError(source, f"link {error.args[1][0]!r}", "a loop of joints", "a tree: no link below itself") from None
+        raise InputError(
+            source,
+            f"link {error.args[1][0]!r}",
+            "a loop of joints",
+            "a tree: no link below itself",
+        ) from None
 
 
-def chain_between(urdf: Urdf, base: str, tip: str, points: Sequence[str], source: str) -> UrdfChain:
-    """The chain from one link, `base`, to another that it carries; `points`, links of it, and the tip are measuring points."""
+def chain_between(
+    urdf: Urdf, base: str, tip: str, points: Sequence[str], source: str
+) -> UrdfChain:
+    """The chain from one link, `base`, to another that it carries; `points`, links of
+    it, and the tip are measuring points."""
     path = _path(urdf, base, tip, source)
     on_chain = [base, *(joint.child for joint in path)]
     for name in points:
         if name not in on_chain:
-            allowed = f"a link between {base!r} and {tip!r}: {closest_first(name, on_chain)}"
+            allowed = (
+                f"a link between {base!r} and {tip!r}: {closest_first(name, on_chain)}"
+            )
             raise InputError(source, "point", repr(name), allowed)
     marked = {name: point_name(name) for name in (*points, tip)}
     if len(set(marked.values())) < len(marked):
@@ -290,7 +417,8 @@ def chain_between(urdf: Urdf, base: str, tip: str, points: Sequence[str], source
         raise InputError(source, "point", ", ".join(map(repr, marked)), allowed)
     words = [f"[{marked[base]}]"] if base in marked else []
     moving: list[Joint] = []
-    body, here = 0, np.eye(4)
+    body = 0
+    here = np.eye(4)
     links = {base: (body, here)}
     for joint in path:
         words += displacement_words(joint.origin)
@@ -299,10 +427,13 @@ def chain_between(urdf: Urdf, base: str, tip: str, points: Sequence[str], source
             # Of a shorter axis the direction is no more than rounding.
             if not np.linalg.norm(joint.axis) > 1e-9:
                 axis = " ".join(f"{part:g}" for part in joint.axis)
-                raise InputError(source, f"joint {joint.name!r}: axis xyz", axis, "a direction")
+                raise InputError(
+                    source, f"joint {joint.name!r}: axis xyz", axis, "a direction"
+                )
             moving.append(joint)
             before, letter, minus, after, turn = express_axis(joint.axis)
-            body, here = len(moving), homogeneous(turn.T)
+            body = len(moving)
+            here = homogeneous(turn.T)
             words += [*before, f"{_MOVING[joint.kind]}{letter}({minus}q{body})", *after]
         if joint.child in marked:
             words.append(f"[{marked[joint.child]}]")
@@ -311,30 +442,56 @@ def chain_between(urdf: Urdf, base: str, tip: str, points: Sequence[str], source
 
 
 def _path(urdf: Urdf, base: str, tip: str, source: str) -> list[Joint]:
-    names, both = [*urdf.moments], f"base {base!r}, tip {tip!r}"
+    names = [*urdf.moments]
+    both = f"base {base!r}, tip {tip!r}"
     for key, name in (("base", base), ("tip", tip)):
         if name not in names:
-            raise InputError(source, key, repr(name), f"a link: {closest_first(name, names)}")
+            raise InputError(
+                source, key, repr(name), f"a link: {closest_first(name, names)}"
+            )
     path = urdf.path_to(tip, base)
     if base != (path[0].parent if path else tip):
         turned = any(joint.parent == tip for joint in urdf.joints_above(base))
-        found = "a base that the tip carries (give them the other way round)" if turned else "two branches of the tree"
+        found = (
+            "a base that the tip carries (give them the other way round)"
+            if turned
+            else "two branches of the tree"
+        )
         raise InputError(source, both, found, "a tip that the base carries")
     if not any(joint.kind in _MOVING for joint in path):
-        raise InputError(source, both, "no joint that moves between them", "links with joints between")
-    if wrong := next((joint for joint in path if joint.mimics or joint.kind not in (*_MOVING, "fixed")), None):
-        found = "a joint that mimics another one" if wrong.mimics else f"type {wrong.kind}"
+        raise InputError(
+            source,
+            both,
+            "no joint that moves between them",
+            "links with joints between",
+        )
+    if wrong := next(
+        (
+            joint
+            for joint in path
+            if joint.mimics or joint.kind not in (*_MOVING, "fixed")
+        ),
+        None,
+    ):
+        found = (
+            "a joint that mimics another one" if wrong.mimics else f"type {wrong.kind}"
+        )
         allowed = f"{' | '.join((*_MOVING, 'fixed'))}; parallel links are written in the robot file, see docs/campaign.md"
         raise InputError(source, f"joint {wrong.name!r}", found, allowed)
     return path
 
 
 def _weights(urdf: Urdf, chain: UrdfChain) -> tuple[list[dict[str, Any]], list[str]]:
-    """Entries of ``masses`` of a robot file, see `mechanics.robot_file`, and what is to be said of them."""
+    """Entries of ``masses`` of a robot file, see `mechanics.robot_file`, and what is to
+    be said of them."""
     moments: dict[int, np.ndarray] = {}
     at_zero = set()
     for name, moment in urdf.moments.items():
-        path = [*takewhile(lambda joint: joint.child not in chain.links, urdf.joints_above(name))]
+        path = [
+            *takewhile(
+                lambda joint: joint.child not in chain.links, urdf.joints_above(name)
+            )
+        ]
         carrier = chain.links.get(path[-1].parent if path else name)
         moved = [joint.name for joint in path if joint.kind != "fixed"]
         # What moves beside the column weighs on no joint of the chain.
@@ -346,14 +503,22 @@ def _weights(urdf: Urdf, chain: UrdfChain) -> tuple[list[dict[str, Any]], list[s
         moments[carrier[0]] = moments.get(carrier[0], np.zeros(4)) + carrier[1] @ moment
     alike = {float(moment[3]) for moment in moments.values()}
     if len(moments) >= _FEWEST_ALIKE and len(alike) == 1:
-        return [], [f"every link weighs {alike.pop():g} kg: placeholders, which are left out"]
+        return [], [
+            f"every link weighs {alike.pop():g} kg: placeholders, which are left out"
+        ]
     notes = [] if moments else ["no masses: the weight of the links is not known"]
     if at_zero:
         held = first_names(sorted(at_zero), _NAMED)
-        notes.insert(0, f"joints beside the chain are held at zero for what they carry: {held}")
+        notes.insert(
+            0, f"joints beside the chain are held at zero for what they carry: {held}"
+        )
     entries = []
     for number, (*mass_times_centre, mass) in sorted(moments.items()):
         centre = np.round(np.array(mass_times_centre) / mass, _DECIMALS) + 0.0
-        entry = {"link": number, "mass_kg": round(float(mass), _DECIMALS), "centre_m": centre.tolist()}
+        entry = {
+            "link": number,
+            "mass_kg": round(float(mass), _DECIMALS),
+            "centre_m": centre.tolist(),
+        }
         entries.append(entry | {"relative_std": _MASS_STD})
     return entries, notes

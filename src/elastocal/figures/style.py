@@ -1,4 +1,5 @@
-"""One look for all figures: sizes, colours that colour-blind readers can distinguish, and a line style for each strategy."""
+"""One look for all figures: sizes, colours that colour-blind readers can distinguish,
+and a line style for each strategy."""
 
 from __future__ import annotations
 
@@ -20,12 +21,35 @@ if TYPE_CHECKING:
     from elastocal.io.origin import Origin
 
 WIDTH_MM = 165
-MICRO, MILLI = 1e6, 1e3
-# Okabe and Ito's, without black and the yellow that is too pale for lines; then two more.
-PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F3C8D", "#4D4D4D")
+MICRO = 1e6
+MILLI = 1e3
+# Okabe and Ito's, without black and the yellow that is too pale for lines; then two
+# more.
+PALETTE = (
+    "#0072B2",
+    "#D55E00",
+    "#009E73",
+    "#CC79A7",
+    "#E69F00",
+    "#56B4E9",
+    "#7F3C8D",
+    "#4D4D4D",
+)
 # Errors of a campaign, before and after.
-STAGES = {"before": ("declared model", PALETTE[1]), "after": ("with the effects found", PALETTE[0])}
-DASHES = ("-", (0, (1, 2)), "--", (0, (4, 4)), "-", (0, (2, 3)), "-.", (0, (6, 1.5, 1, 1.5)))
+STAGES = {
+    "before": ("declared model", PALETTE[1]),
+    "after": ("with the effects found", PALETTE[0]),
+}
+DASHES = (
+    "-",
+    (0, (1, 2)),
+    "--",
+    (0, (4, 4)),
+    "-",
+    (0, (2, 3)),
+    "-.",
+    (0, (6, 1.5, 1, 1.5)),
+)
 SETTINGS: dict[RcKeyType, Any] = {
     "font.size": 8,
     "axes.titlesize": 9,
@@ -42,11 +66,18 @@ SETTINGS: dict[RcKeyType, Any] = {
 }
 
 
-# Legends and titles take the look that is set while they are made: decorate each figure function with it.
+# Legends and titles take the look that is set while they are made: decorate each figure
+# function with it.
 styled = rc_context(SETTINGS)
 
 
-def panels(rows: int, columns: int, height_mm: float, width_mm: float = WIDTH_MM, **options: Any) -> tuple[Figure, np.ndarray]:
+def panels(
+    rows: int,
+    columns: int,
+    height_mm: float,
+    width_mm: float = WIDTH_MM,
+    **options: Any,
+) -> tuple[Figure, np.ndarray]:
     """A figure with a grid of axes in the common look.
 
     `**options`: passed on to ``Figure.subplots``. Returns `axes` (rows, columns).
@@ -57,8 +88,18 @@ def panels(rows: int, columns: int, height_mm: float, width_mm: float = WIDTH_MM
 
 def legend_below(figure: Figure, columns: int, title: str | None = None) -> None:
     """One legend of all panels below them, each entry once."""
-    entries = {label: one for axis in figure.axes for one, label in zip(*axis.get_legend_handles_labels(), strict=True)}
-    figure.legend([*entries.values()], [*entries], title=title, loc="outside lower center", ncols=columns)
+    entries = {
+        label: one
+        for axis in figure.axes
+        for one, label in zip(*axis.get_legend_handles_labels(), strict=True)
+    }
+    figure.legend(
+        [*entries.values()],
+        [*entries],
+        title=title,
+        loc="outside lower center",
+        ncols=columns,
+    )
 
 
 def note(text: str, height_mm: float = 25) -> Figure:
@@ -70,8 +111,12 @@ def note(text: str, height_mm: float = 25) -> Figure:
 
 
 def line_style(index: int) -> dict[str, Any]:
-    """Colour and dashes of the strategy with this place in the list; lines that coincide remain visible through the gaps."""
-    return {"color": PALETTE[index % len(PALETTE)], "linestyle": DASHES[index % len(DASHES)]}
+    """Colour and dashes of the strategy with this place in the list; lines that
+    coincide remain visible through the gaps."""
+    return {
+        "color": PALETTE[index % len(PALETTE)],
+        "linestyle": DASHES[index % len(DASHES)],
+    }
 
 
 def label_decades(*axes: Axis) -> None:
@@ -83,31 +128,51 @@ def label_decades(*axes: Axis) -> None:
 
 
 def ink_on(colour: tuple[float, ...]) -> str:
-    """Black or white, whichever has the higher contrast on a colour by its relative luminance [1].
+    """Black or white, whichever has the higher contrast on a colour by its relative
+    luminance [1].
 
     `colour`: red, green and blue of sRGB, 0 to 1; what follows is ignored.
 
-    [1] World Wide Web Consortium, Web Content Accessibility Guidelines 2.2, "relative luminance" and "contrast ratio", 2023.
+    [1] World Wide Web Consortium, Web Content Accessibility Guidelines 2.2, "relative
+    luminance" and "contrast ratio", 2023.
     """
-    linear = [value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4 for value in colour[:3]]
+    linear = [
+        value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4
+        for value in colour[:3]
+    ]
     luminance = 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
     return "black" if (luminance + 0.05) ** 2 > 1.05 * 0.05 else "white"
 
 
 @styled
 def save(figure: Figure, pdf: str, png: str, origin: Origin | None = None) -> None:
-    """Write a figure as PDF and PNG without dates, so that the same data give the same bytes.
+    """Write a figure as PDF and PNG without dates, so that the same data give the same
+    bytes.
 
-    Each has a layout of its own: the widths of its letters differ by a few per cent, and labels would be cut off.
+    Each has a layout of its own: the widths of its letters differ by a few per cent,
+    and labels would be cut off.
 
-    `pdf`, `png`: paths; each file appears whole or not at all. `origin`: named in the metadata of both: Subject and Keywords of
-    the PDF, Description and Source of the PNG.
+    `pdf`, `png`: paths; each file appears whole or not at all. `origin`: named in the
+    metadata of both: Subject and Keywords of the PDF, Description and Source of the
+    PNG.
     """
-    subject = {} if origin is None else {"Subject": origin.words, "Keywords": " ".join(map(str, vars(origin).values()))}
-    described = {} if origin is None else {"Description": origin.words, "Source": origin.commit}
+    subject = (
+        {}
+        if origin is None
+        else {
+            "Subject": origin.words,
+            "Keywords": " ".join(map(str, vars(origin).values())),
+        }
+    )
+    described = (
+        {} if origin is None else {"Description": origin.words, "Source": origin.commit}
+    )
     of_pdf = {"CreationDate": None, **subject}
     of_png = {"Software": None, **described}
-    for path, options in ((pdf, {"metadata": of_pdf}), (png, {"dpi": 150, "metadata": of_png})):
+    for path, options in (
+        (pdf, {"metadata": of_pdf}),
+        (png, {"dpi": 150, "metadata": of_png}),
+    ):
         with atomic_write(path) as partial:
             figure.savefig(partial, format=path.rsplit(".", 1)[1], **options)
 
@@ -121,11 +186,15 @@ def save_all(figures: Mapping[str, Figure], folder: str) -> dict[str, str]:
 
 @styled
 def save_svg(figure: Figure, path: str) -> None:
-    """Write a figure for a page of the site, without a date and with names that are the same in every run.
+    """Write a figure for a page of the site, without a date and with names that are the
+    same in every run.
 
     Letters stay letters, which the reader's own sans serif draws.
 
     `path`: the file appears whole or not at all.
     """
-    with rc_context({"svg.hashsalt": "elastocal", "svg.fonttype": "none"}), atomic_write(path) as partial:
+    with (
+        rc_context({"svg.hashsalt": "elastocal", "svg.fonttype": "none"}),
+        atomic_write(path) as partial,
+    ):
         figure.savefig(partial, format="svg", metadata={"Date": None})

@@ -1,4 +1,5 @@
-"""Robust generalized least squares on the composite model, by Gauss-Newton steps on exact predictions; and what it finds."""
+"""Robust generalized least squares on the composite model, by Gauss-Newton steps on
+exact predictions; and what it finds."""
 
 from __future__ import annotations
 
@@ -38,26 +39,37 @@ if TYPE_CHECKING:
 
     Solved = tuple[np.ndarray, np.ndarray, np.ndarray]
 
-# Rounds by which frames and targets are registered at most, and the move that ends them.
-_ROUNDS, _SETTLED_M = 200, 1e-9
+# Rounds by which frames and targets are registered at most, and the move that ends
+# them.
+_ROUNDS = 200
+_SETTLED_M = 1e-9
 _STEPS = 30
-# A step that does not help is halved so often at most: one of a 64th that does not help points the wrong way, or along a kink.
+# A step that does not help is halved so often at most: one of a 64th that does not help
+# points the wrong way, or along a kink.
 _HALVINGS = 6
-# Largest step that remains, in standard errors: in a fit, and in one from which others start.
-SETTLED, ON_THE_WAY = 1e-3, 0.1
-# A fit to more observations that does not come of a fit starts from the fit to so many of them: they show the size of some
-# fifty parameters as well as any number.
+# Largest step that remains, in standard errors: in a fit, and in one from which others
+# start.
+SETTLED = 1e-3
+ON_THE_WAY = 0.1
+# A fit to more observations that does not come of a fit starts from the fit to so many
+# of them: they show the size of some fifty parameters as well as any number.
 STARTED_FROM = 2_000
-# Standard errors: a step that moves no parameter farther, and no shape, leaves its Gram matrix to the next one: standard errors
-# by it are as sure as an estimate is within `SETTLED`.
+# Standard errors: a step that moves no parameter farther, and no shape, leaves its Gram
+# matrix to the next one: standard errors by it are as sure as an estimate is within
+# `SETTLED`.
 _NEAR = 0.3
-# A step by all of so many observations takes seconds: the last of some that a fit to all takes follow a fit to so many.
-LONG, _STEPPING_STONE = 100_000, 20_000
-# Loads are those of the step before: of a step so much is still to come, at most, by deflection over reach.
+# A step by all of so many observations takes seconds: the last of some that a fit to
+# all takes follow a fit to so many.
+LONG = 100_000
+_STEPPING_STONE = 20_000
+# Loads are those of the step before: of a step so much is still to come, at most, by
+# deflection over reach.
 _LAGGING = 1e-2
-# Share of the slope by which a step must lower the objective (Armijo); a parabola gives a half.
+# Share of the slope by which a step must lower the objective (Armijo); a parabola gives
+# a half.
 _LEAST_FALL = 0.1
-# Of the objective. In a fit of a thousand rows a thousandth of a standard error in one parameter makes half of that.
+# Of the objective. In a fit of a thousand rows a thousandth of a standard error in one
+# parameter makes half of that.
 _ROUNDING = 1e-9
 # Observations beyond this quantile of their distance lose weight.
 _HUBER_QUANTILE = 0.99
@@ -67,12 +79,15 @@ _HUBER_QUANTILE = 0.99
 class Fit:
     """A model fitted to observations.
 
-    `held` (P,) of bool: parameters that are not identifiable from the data. `covariance` (P, P): of the parameters: inverse of
-    the normal matrix of the last step, which approximates the Hessian (Gauss-Newton); with priors as in Laplace's approximation
-    (Tierney and Kadane, J. Am. Stat. Assoc. 81, 1986). Zero where held. `weights` (M,): robust weight of each observation.
-    `residual` (M, rows): m and rad, base axes. `joint_jacobian` (M, rows, n): of each target with respect to the joints; None
-    where there are too many to keep it. `conditions`: of the states fitted; None where these are too many to keep it.
-    `converged`: whether the last step was as small as was asked for, in standard errors, in every parameter.
+    `held` (P,) of bool: parameters that are not identifiable from the data.
+    `covariance` (P, P): of the parameters: inverse of the normal matrix of the last
+    step, which approximates the Hessian (Gauss-Newton); with priors as in Laplace's
+    approximation (Tierney and Kadane, J. Am. Stat. Assoc. 81, 1986). Zero where held.
+    `weights` (M,): robust weight of each observation. `residual` (M, rows): m and rad,
+    base axes. `joint_jacobian` (M, rows, n): of each target with respect to the joints;
+    None where there are too many to keep it. `conditions`: of the states fitted; None
+    where these are too many to keep it. `converged`: whether the last step was as small
+    as was asked for, in standard errors, in every parameter.
     """
 
     model: Model
@@ -94,11 +109,18 @@ class Fit:
 
     @property
     def prior_std(self) -> np.ndarray:
-        """Standard deviation of the prior of each of the parameters, infinite where it has none, ndarray (P,)."""
-        return np.array([np.inf if parameter.prior_std is None else parameter.prior_std for _, parameter in self.parameters])
+        """Standard deviation of the prior of each of the parameters, infinite where it
+        has none, ndarray (P,)."""
+        return np.array(
+            [
+                np.inf if parameter.prior_std is None else parameter.prior_std
+                for _, parameter in self.parameters
+            ]
+        )
 
     def places_of(self, owner: str) -> np.ndarray:
-        """Places among the parameters of those that belong to one owner, such as the key of an effect; ndarray of int."""
+        """Places among the parameters of those that belong to one owner, such as the
+        key of an effect; ndarray of int."""
         return np.flatnonzero([each == owner for each, _ in self.parameters])
 
     def values_of(self, key: str) -> tuple[np.ndarray, np.ndarray]:
@@ -108,22 +130,40 @@ class Fit:
 
     def whitened(self, values: np.ndarray) -> np.ndarray:
         """Rows (M, rows, ...) weighted and whitened as in the fit."""
-        return self.whitener.apply(values * np.sqrt(self.weights).reshape(-1, *[1] * (values.ndim - 1)))
+        return self.whitener.apply(
+            values * np.sqrt(self.weights).reshape(-1, *[1] * (values.ndim - 1))
+        )
 
-    def sensitivities(self, observations: Observations) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
-        """Sensitivities of the observations that were fitted, as they are and whitened, in parts of whole poses.
+    def sensitivities(
+        self, observations: Observations
+    ) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
+        """Sensitivities of the observations that were fitted, as they are and whitened,
+        in parts of whole poses.
 
         Yields `seen`: observations of the part; `plain`, `whitened` (M', rows, P).
         """
         for states, seen, part in parts_of(observations, len(self.held)):
-            around = self.conditions_of(part.states, states if len(part) < len(observations) else None)
+            around = self.conditions_of(
+                part.states, states if len(part) < len(observations) else None
+            )
             line = linearize(self.model, self.estimate, part, around)
-            jacobian = line.joint_jacobian if self.joint_jacobian is None else self.joint_jacobian[seen]
+            jacobian = (
+                line.joint_jacobian
+                if self.joint_jacobian is None
+                else self.joint_jacobian[seen]
+            )
             white = whitening(part, jacobian, self.noise)
-            yield seen, line.sensitivities, white.apply(line.sensitivities * np.sqrt(self.weights[seen])[:, None, None])
+            yield (
+                seen,
+                line.sensitivities,
+                white.apply(
+                    line.sensitivities * np.sqrt(self.weights[seen])[:, None, None]
+                ),
+            )
 
     def conditions_of(self, states: States, chosen: slice | None = None) -> Conditions:
-        """Conditions of the states, or of those chosen: as they were kept, or found again where they were too many."""
+        """Conditions of the states, or of those chosen: as they were kept, or found
+        again where they were too many."""
         if self.conditions is None:
             return conditions(self.model, self.estimate, states)
         return self.conditions if chosen is None else at_states(self.conditions, chosen)
@@ -137,32 +177,50 @@ def fit(
     reweighted: bool = False,
     settled: float = SETTLED,
 ) -> Fit:
-    """Fit a model by robust generalized least squares and Gauss-Newton steps (Björck 1996), see `robustly`.
+    """Fit a model by robust generalized least squares and Gauss-Newton steps (Björck
+    1996), see `robustly`.
 
-    `start`: of this model; by `registered` without. `reweighted`: whether the start comes of a fit: outliers lose weight from
-    the first step on. `settled`: largest step that remains, in standard errors.
+    `start`: of this model; by `registered` without. `reweighted`: whether the start
+    comes of a fit: outliers lose weight from the first step on. `settled`: largest step
+    that remains, in standard errors.
     """
-    for most in ([] if reweighted else [STARTED_FROM]) + ([_STEPPING_STONE] if len(observations) > LONG else []):
+    for most in ([] if reweighted else [STARTED_FROM]) + (
+        [_STEPPING_STONE] if len(observations) > LONG else []
+    ):
         few = sample_of(observations, most)
         if len(few) < len(observations):
             # Where all the measurements lead is close to where some of them do.
-            start, reweighted = fit(model, few, noise, start, reweighted, ON_THE_WAY).estimate, True
+            start = fit(model, few, noise, start, reweighted, ON_THE_WAY).estimate
+            reweighted = True
     start = registered(model, observations) if start is None else start
-    return robustly(model, observations, noise, start, reweighted=reweighted, settled=settled)
+    return robustly(
+        model, observations, noise, start, reweighted=reweighted, settled=settled
+    )
 
 
-def evaluated(model: Model, observations: Observations, noise: Noise, estimate: Estimate) -> Fit:
-    """An estimate as a fit to observations that it need not come of; they have weight one, whatever their distance."""
-    return replace(robustly(model, observations, noise, estimate, frozen=True), weights=np.ones(len(observations)))
+def evaluated(
+    model: Model, observations: Observations, noise: Noise, estimate: Estimate
+) -> Fit:
+    """An estimate as a fit to observations that it need not come of; they have weight
+    one, whatever their distance."""
+    return replace(
+        robustly(model, observations, noise, estimate, frozen=True),
+        weights=np.ones(len(observations)),
+    )
 
 
 def fit_frames(fitted: Fit, model: Model, observations: Observations) -> Estimate:
-    """Fit frames and targets of other observations; everything else stays as it was found.
+    """Fit frames and targets of other observations; everything else stays as it was
+    found.
 
     `model`: the same effects with the targets of these observations.
     """
     found = fitted.estimate
-    start = replace(registered(model, observations), coefficients=found.coefficients, shapes=found.shapes)
+    start = replace(
+        registered(model, observations),
+        coefficients=found.coefficients,
+        shapes=found.shapes,
+    )
     frozen = ~of_placement(owner for owner, _ in parameters(model, start))
     return robustly(model, observations, fitted.noise, start, frozen).estimate
 
@@ -176,55 +234,89 @@ def robustly(
     reweighted: bool = False,
     settled: float = SETTLED,
 ) -> Fit:
-    """Iteratively reweighted least squares with Huber's weights [1] by Gauss-Newton steps, each halved until it helps enough.
+    """Iteratively reweighted least squares with Huber's weights [1] by Gauss-Newton
+    steps, each halved until it helps enough.
 
-    Where errors are independent, weighted squares are a bound of Huber's objective that touches it at the present estimate
-    (Huber and Ronchetti, Robust Statistics, 7.8), so that it falls with them. Where measurements have errors in common there is
-    none: weights come before whitening, which would carry an outlier into the measurements beside it, and the estimate solves
-    the weighted equations (Preisser and Qaqish, Biometrics 55, 1999). A whitening belongs to the axes in which a step begins:
-    residuals after the step are turned into these, or a fit would turn frame and robot together on and on. Against curvature a
-    step is backtracked until weighted squares and priors fall by Armijo's condition (Nocedal and Wright, Numerical
-    Optimization, 3.1). Where that hinders the first trial, what is linear given the laws that other parameters load, and given
-    their shapes, is solved for again there, as in variable projection (Golub and Pereyra 1973): that is the acceleration by
-    which a path follows a bent valley (Transtrum and Sethna, arXiv 1201.5885), in which steps are then halved. The first step
-    gives all observations one weight, unless the start comes of reweighted steps already.
+    Where errors are independent, weighted squares are a bound of Huber's objective that
+    touches it at the present estimate (Huber and Ronchetti, Robust Statistics, 7.8), so
+    that it falls with them. Where measurements have errors in common there is none:
+    weights come before whitening, which would carry an outlier into the measurements
+    beside it, and the estimate solves the weighted equations (Preisser and Qaqish,
+    Biometrics 55, 1999). A whitening belongs to the axes in which a step begins:
+    residuals after the step are turned into these, or a fit would turn frame and robot
+    together on and on. Against curvature a step is backtracked until weighted squares
+    and priors fall by Armijo's condition (Nocedal and Wright, Numerical Optimization,
+    3.1). Where that hinders the first trial, what is linear given the laws that other
+    parameters load, and given their shapes, is solved for again there, as in variable
+    projection (Golub and Pereyra 1973): that is the acceleration by which a path
+    follows a bent valley (Transtrum and Sethna, arXiv 1201.5885), in which steps are
+    then halved. The first step gives all observations one weight, unless the start
+    comes of reweighted steps already.
 
-    `estimate`: from which the first step is taken. `frozen` (P,) of bool: parameters not to move. `reweighted`, `settled`: as
-    in `fit`.
+    `estimate`: from which the first step is taken. `frozen` (P,) of bool: parameters
+    not to move. `reweighted`, `settled`: as in `fit`.
 
     [1] Holland, P. W. and Welsch, R. E., Robust regression using iteratively reweighted least-squares, Communications in
         Statistics A6, 1977.
     """
-    rows, listed = observations.rows, [parameter for _, parameter in parameters(model, estimate)]
+    rows = observations.rows
+    listed = [parameter for _, parameter in parameters(model, estimate)]
     # Of chi-squared with as many degrees of freedom as a measurement has rows.
     corner, typical = np.sqrt(2 * gammaincinv(rows / 2, [_HUBER_QUANTILE, 0.5]) / rows)
-    nonlinear, bounds, plausible = nonlinear_parameters(model, estimate), limits(model, estimate), sizes_of(model, estimate)
-    penalty = np.array([0.0 if p.prior_std is None else p.prior_std**-2 for p in listed])
-    # Given what goes with the loads that other parameters make, and shapes, the residual is nearly linear in all others.
-    through = {effect.key for effect in model.effects if effect.effect == "joint_compliance" or "load" in effect.needs}
-    yielding = np.array([owner in through for owner, _ in parameters(model, estimate)], bool)
+    nonlinear = nonlinear_parameters(model, estimate)
+    bounds = limits(model, estimate)
+    plausible = sizes_of(model, estimate)
+    penalty = np.array(
+        [0.0 if p.prior_std is None else p.prior_std**-2 for p in listed]
+    )
+    # Given what goes with the loads that other parameters make, and shapes, the
+    # residual is nearly linear in all others.
+    through = {
+        effect.key
+        for effect in model.effects
+        if effect.effect == "joint_compliance" or "load" in effect.needs
+    }
+    yielding = np.array(
+        [owner in through for owner, _ in parameters(model, estimate)], bool
+    )
 
     def objective(estimate: Estimate, squares: float) -> float:
         """Half the weighted squares of the residual and of what has a prior."""
         return 0.5 * (squares + penalty @ parameter_values(model, estimate) ** 2)
 
-    def solved(gram: np.ndarray, along: np.ndarray, present: np.ndarray, frozen: bool | np.ndarray) -> Solved:
-        """Gauss-Newton step, covariance and what is held, as of `solve_normal`, within the ranges of the shapes."""
-        step, covariance, held = solve_normal(gram, along, plausible, frozen, penalty, present, nonlinear)
-        # A shape that would leave its range goes to the end of it, and the others as they do then.
+    def solved(
+        gram: np.ndarray,
+        along: np.ndarray,
+        present: np.ndarray,
+        frozen: bool | np.ndarray,
+    ) -> Solved:
+        """Gauss-Newton step, covariance and what is held, as of `solve_normal`, within
+        the ranges of the shapes."""
+        step, covariance, held = solve_normal(
+            gram, along, plausible, frozen, penalty, present, nonlinear
+        )
+        # A shape that would leave its range goes to the end of it, and the others as
+        # they do then.
         leaving = (present + step < bounds[:, 0]) | (present + step > bounds[:, 1])
         if leaving.any():
             ends = np.clip(present + step, *bounds.T)[leaving] - present[leaving]
             rest = along - gram[:, leaving] @ (ends / plausible[leaving])
-            step = solve_normal(gram, rest, plausible, frozen | leaving, penalty, present, nonlinear)[0]
+            step = solve_normal(
+                gram, rest, plausible, frozen | leaving, penalty, present, nonlinear
+            )[0]
             step[leaving] = ends
         return step, covariance, held
 
-    measurements, weights = Parts(model, observations, noise, estimate, plausible), np.ones(len(observations))
+    measurements = Parts(model, observations, noise, estimate, plausible)
+    weights = np.ones(len(observations))
     measurements.linearize(estimate)
-    scale, last, stuck, known = 1.0, np.zeros(len(plausible)), False, None
+    scale = 1.0
+    last = np.zeros(len(plausible))
+    stuck = False
+    known = None
     for number in range(_STEPS):
-        # Loads where the robot yielded to in the last step: a fixed point that the steps bring about.
+        # Loads where the robot yielded to in the last step: a fixed point that the
+        # steps bring about.
         measurements.whiten()
         if number or reweighted:
             distance = measurements.distance()
@@ -237,22 +329,29 @@ def robustly(
             deviation = np.sqrt(np.diag(covariance))
         else:
             step = covariance @ (along / plausible - penalty * present)
-        # Standard errors of the errors that are there, which the noise may be less than.
+        # Standard errors of the errors that are there, which the noise may be less
+        # than.
         small = settled * (scale * deviation) + (deviation == 0)
-        # A small step under the loads of before a large one says nothing of what these loads still bring about.
-        coming = np.maximum(np.abs(step), _LAGGING * np.abs(last) * plausible * yielding)
+        # A small step under the loads of before a large one says nothing of what these
+        # loads still bring about.
+        coming = np.maximum(
+            np.abs(step), _LAGGING * np.abs(last) * plausible * yielding
+        )
         converged = bool(number or reweighted) and bool((coming <= small).all())
         if converged:
             estimate = stepped(model, estimate, step)
             break
-        # Weights and whitening follow the estimate. Where they throw it to and fro, half the way lies between (relaxation of a
-        # fixed-point iteration): a step that takes back more than half of the last one is halved.
+        # Weights and whitening follow the estimate. Where they throw it to and fro,
+        # half the way lies between (relaxation of a fixed-point iteration): a step that
+        # takes back more than half of the last one is halved.
         with_priors = gram + np.diag(penalty * plausible**2)
         first = int(with_priors @ (step / plausible + last / 2) @ last < 0)
         last = step / plausible
         # Twice the fall that a parabola promises.
         slope = along @ (step / plausible) - penalty @ (present * step)
-        before, origin, acceleration = objective(estimate, measurements.squares(weights)), estimate, np.zeros(len(step))
+        before = objective(estimate, measurements.squares(weights))
+        origin = estimate
+        acceleration = np.zeros(len(step))
         for halving in range(first, _HALVINGS + 1):
             share = 0.5**halving
             estimate = stepped(model, origin, share * step + share**2 * acceleration)
@@ -262,80 +361,139 @@ def robustly(
             if after > before - least and halving == first:
                 # What it fell from was under the loads of the step before.
                 before = objective(origin, measurements.squares(weights, origin))
-                if after > before - least and (nonlinear | yielding).any() and measurements.kept:
+                if (
+                    after > before - least
+                    and (nonlinear | yielding).any()
+                    and measurements.kept
+                ):
                     there = measurements.normal_equations(weights)
-                    rest = solved(*there, parameter_values(model, estimate), frozen | nonlinear | yielding)[0]
+                    rest = solved(
+                        *there,
+                        parameter_values(model, estimate),
+                        frozen | nonlinear | yielding,
+                    )[0]
                     acceleration = rest / share**2
-                    estimate = stepped(model, origin, share * step + share**2 * acceleration)
+                    estimate = stepped(
+                        model, origin, share * step + share**2 * acceleration
+                    )
                     measurements.linearize(estimate)
                     after = objective(estimate, measurements.squares(weights))
             if after <= before - least:
-                near = np.abs(step) <= np.where(nonlinear & ~held, 0.0, _NEAR * scale * deviation + (deviation == 0))
-                known = gram if (number or reweighted) and not halving and near.all() else None
+                near = np.abs(step) <= np.where(
+                    nonlinear & ~held, 0.0, _NEAR * scale * deviation + (deviation == 0)
+                )
+                known = (
+                    gram
+                    if (number or reweighted) and not halving and near.all()
+                    else None
+                )
                 stuck = False
                 break
         else:
             estimate = origin
             measurements.linearize(estimate)
-            # A step goes by the loads of the step before, and the first one by weights that are all alike: once more by those
-            # of now.
+            # A step goes by the loads of the step before, and the first one by weights
+            # that are all alike: once more by those of now.
             if stuck:
                 break
-            stuck, known = True, None
-    return Fit(model, estimate, noise, held, covariance, weights, *measurements.ended(estimate), converged)
+            stuck = True
+            known = None
+    return Fit(
+        model,
+        estimate,
+        noise,
+        held,
+        covariance,
+        weights,
+        *measurements.ended(estimate),
+        converged,
+    )
 
 
 def sizes_of(model: Model, estimate: Estimate) -> np.ndarray:
-    """Sizes of the parameters, ndarray (P,), beyond which a standard error means that the data do not identify them.
+    """Sizes of the parameters, ndarray (P,), beyond which a standard error means that
+    the data do not identify them.
 
-    What has a prior need not be held: where the data do not identify it, the prior does. Nor need what the start has found
-    larger than it should be, or it would be held there, without a standard error, once the noise turns out to be larger.
+    What has a prior need not be held: where the data do not identify it, the prior
+    does. Nor need what the start has found larger than it should be, or it would be
+    held there, without a standard error, once the noise turns out to be larger.
     """
-    plausible = np.array([max(p.plausible, p.prior_std or 0.0) for _, p in parameters(model, estimate)])
+    plausible = np.array(
+        [max(p.plausible, p.prior_std or 0.0) for _, p in parameters(model, estimate)]
+    )
     linear = ~nonlinear_parameters(model, estimate)
     return np.maximum(plausible, linear * np.abs(parameter_values(model, estimate)))
 
 
 def registered(model: Model, observations: Observations) -> Estimate:
-    """Frames and targets of a model that its nominal kinematics explain best, by alternating closed-form steps.
+    """Frames and targets of a model that its nominal kinematics explain best, by
+    alternating closed-form steps.
 
-    Block coordinate descent: frames by the Kabsch algorithm (Acta Cryst. A32, 1976) for Wahba's problem, given the targets;
-    positions of targets as means, given the frames. The turn of a target is the chordal mean of rotations (Markley et al., J.
-    Guidance 30, 2007).
+    Block coordinate descent: frames by the Kabsch algorithm (Acta Cryst. A32, 1976) for
+    Wahba's problem, given the targets; positions of targets as means, given the frames.
+    The turn of a target is the chordal mean of rotations (Markley et al., J. Guidance
+    30, 2007).
 
-    Returns with all effects at zero, except that joint compliances start at their nominal values.
+    Returns with all effects at zero, except that joint compliances start at their
+    nominal values.
     """
     observations = sample_of(observations, STARTED_FROM)
     return registered_to(model, observations, *nominal_poses(model, observations))
 
 
-def nominal_poses(model: Model, observations: Observations) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (M, 3) and rotations (M, 3, 3) of measuring points on the nominal robot without loads, base axes."""
+def nominal_poses(
+    model: Model, observations: Observations
+) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (M, 3) and rotations (M, 3, 3) of measuring points on the nominal robot
+    without loads, base axes."""
     chain = model.sites.chain
     points = [chain.point(target.point) for target in model.targets]
-    position, rotation = poses_of_points(chain, chain.at(observations.states.joint_angles), points)
+    position, rotation = poses_of_points(
+        chain, chain.at(observations.states.joint_angles), points
+    )
     seen = observations.target, observations.state
     return position[seen], rotation[seen]
 
 
 def registered_to(
-    model: Model, observations: Observations, nominal_position: np.ndarray, nominal_rotation: np.ndarray
+    model: Model,
+    observations: Observations,
+    nominal_position: np.ndarray,
+    nominal_rotation: np.ndarray,
 ) -> Estimate:
     """As `registered`, to nominal poses that are known, as by `nominal_poses`."""
-    states, target, measured = observations.states, observations.target, observations.position
+    states = observations.states
+    target = observations.target
+    measured = observations.position
     sessions = np.unique(states.session)
     session = np.searchsorted(sessions, states.session[observations.state])
     of_session = [np.flatnonzero(session == number) for number in range(len(sessions))]
     # A target may have all of its measurements among those held out.
-    seen = {index: mine for index in range(len(model.targets)) if len(mine := np.flatnonzero(target == index))}
-    unknown = {index: mine for index, mine in seen.items() if model.targets[index].offset_m is None}
-    offsets = np.array([target.offset_m or (0.0, 0.0, 0.0) for target in model.targets], float)
-    turn, shift = np.tile(np.eye(3), (len(sessions), 1, 1)), np.zeros((len(sessions), 3))
+    seen = {
+        index: mine
+        for index in range(len(model.targets))
+        if len(mine := np.flatnonzero(target == index))
+    }
+    unknown = {
+        index: mine
+        for index, mine in seen.items()
+        if model.targets[index].offset_m is None
+    }
+    offsets = np.array(
+        [target.offset_m or (0.0, 0.0, 0.0) for target in model.targets], float
+    )
+    turn = np.tile(np.eye(3), (len(sessions), 1, 1))
+    shift = np.zeros((len(sessions), 3))
     for _ in range(_ROUNDS if model.fitted_frames and unknown else 1):
-        placed = nominal_position + np.einsum("mij,mj->mi", nominal_rotation, offsets[target])
+        placed = nominal_position + np.einsum(
+            "mij,mj->mi", nominal_rotation, offsets[target]
+        )
         for number, mine in enumerate(of_session if model.fitted_frames else ()):
-            centre, middle = placed[mine].mean(axis=0), measured[mine].mean(axis=0)
-            left, _, right = np.linalg.svd((measured[mine] - middle).T @ (placed[mine] - centre))
+            centre = placed[mine].mean(axis=0)
+            middle = measured[mine].mean(axis=0)
+            left, _, right = np.linalg.svd(
+                (measured[mine] - middle).T @ (placed[mine] - centre)
+            )
             left[:, -1] *= np.sign(np.linalg.det(left @ right))
             turn[number] = left @ right
             shift[number] = middle - turn[number] @ centre
@@ -346,10 +504,18 @@ def registered_to(
             offsets[index] = local[mine].mean(axis=0)
         if np.abs(offsets - before).max() < _SETTLED_M:
             break
-    turns = Rotation.from_rotvec([target.rotation or NOT_TURNED for target in model.targets]).as_matrix()
+    turns = Rotation.from_rotvec(
+        [target.rotation or NOT_TURNED for target in model.targets]
+    ).as_matrix()
     if observations.rotation is not None:
-        turned = nominal_rotation.transpose(0, 2, 1) @ turn[session].transpose(0, 2, 1) @ observations.rotation
+        turned = (
+            nominal_rotation.transpose(0, 2, 1)
+            @ turn[session].transpose(0, 2, 1)
+            @ observations.rotation
+        )
         for index in (index for index in seen if model.targets[index].rotation is None):
             turns[index] = Rotation.from_matrix(turned[seen[index]]).mean().as_matrix()
-    nothing = Estimate(tuple(sessions.tolist()), turn, shift, offsets, turns).with_effects(model.effects)
+    nothing = Estimate(
+        tuple(sessions.tolist()), turn, shift, offsets, turns
+    ).with_effects(model.effects)
     return replace(nothing, coefficients=model.nominal_coefficients)

@@ -1,13 +1,16 @@
-"""What is taken of errors before effects are sought: noise of the measurements, and tolerances of what a campaign declares.
+"""What is taken of errors before effects are sought: noise of the measurements, and
+tolerances of what a campaign declares.
 
-Noise is a sensor part, alike in all directions, and the repeatability of the joints, by the Jacobian. Repeats of a state tell
-both: each repeat is a fresh approach, so that the joints come to rest a little differently and move all targets together, while
-the sensor errs for each target on its own.
+Noise is a sensor part, alike in all directions, and the repeatability of the joints, by
+the Jacobian. Repeats of a state tell both: each repeat is a fresh approach, so that the
+joints come to rest a little differently and move all targets together, while the sensor
+errs for each target on its own.
 
-A robot is off its drawing by so many times what is plausible; one number for all declared geometry, by type II maximum
-likelihood (Good, The Estimation of Probabilities, 1965), together with how many times the noise taken the measurements
-scatter. Both come of the declared model alone, so that all models of a campaign, with effects and without, have the same
-geometry beforehand.
+A robot is off its drawing by so many times what is plausible; one number for all
+declared geometry, by type II maximum likelihood (Good, The Estimation of Probabilities,
+1965), together with how many times the noise taken the measurements scatter. Both come
+of the declared model alone, so that all models of a campaign, with effects and without,
+have the same geometry beforehand.
 """
 
 from __future__ import annotations
@@ -23,7 +26,13 @@ from scipy.special import gammaincinv
 from elastocal.fitting.least_squares import ON_THE_WAY, STARTED_FROM, fit, registered
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import conditions, parameter_values
-from elastocal.fitting.observations import each_approach, groups_by_size, sample_of, select_states, without_outlying_repeats
+from elastocal.fitting.observations import (
+    each_approach,
+    groups_by_size,
+    sample_of,
+    select_states,
+    without_outlying_repeats,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -35,21 +44,27 @@ if TYPE_CHECKING:
     from elastocal.fitting.model import Case, Estimate, Model
     from elastocal.fitting.observations import Observations
 
-# Fewer contrasts of repeats than this do not separate the joints' part from the sensor's; fewer than the second say nothing of
-# their own; as many as the third tell every deviation to a percent, and more only take time.
-FEWEST_FOR_JOINTS, FEWEST, MOST = 60, 9, 20_000
-# No sensor repeats to less than this, m or rad: a sixtieth of the wavelength of a laser.
+# Fewer contrasts of repeats than this do not separate the joints' part from the
+# sensor's; fewer than the second say nothing of their own; as many as the third tell
+# every deviation to a percent, and more only take time.
+FEWEST_FOR_JOINTS = 60
+FEWEST = 9
+MOST = 20_000
+# No sensor repeats to less than this, m or rad: a sixtieth of the wavelength of a
+# laser.
 FINEST = 1e-8
-# Half width of the interval that holds 95 % of a normal distribution, in standard deviations (JCGM 100:2008, section 6).
+# Half width of the interval that holds 95 % of a normal distribution, in standard
+# deviations (JCGM 100:2008, section 6).
 _COVERAGE = 1.959964
-# How sure the joint part should be to be no smaller than taken: too small a value raises false alarms, too large one costs
-# power.
+# How sure the joint part should be to be no smaller than taken: too small a value
+# raises false alarms, too large one costs power.
 _UPPER = 0.8
-_SMALLEST_RAD, _LARGEST_RAD = 1e-8, 1e-2
+_SMALLEST_RAD = 1e-8
+_LARGEST_RAD = 1e-2
 # Deviations of a joint that are tried between these: steps of two fifths.
 _DEVIATIONS = 40
-# Sizes of declared geometry, in plausible sizes: measured robots exceed data-sheet tolerances tenfold, and none is ten times
-# better than these.
+# Sizes of declared geometry, in plausible sizes: measured robots exceed data-sheet
+# tolerances tenfold, and none is ten times better than these.
 SIZES = np.geomspace(0.1, 10.0, 9)
 # Noise that is there over the noise taken, in steps that change no verdict.
 _FACTORS = np.geomspace(1.0, 1e4, 185)
@@ -63,9 +78,11 @@ _ASSUMED = 1e-4
 class Noise:
     """Standard deviations of one measurement.
 
-    `source`: one of "repeats", "declared", "residual". `position_m`, `orientation_rad`: sensor part, each component.
-    `joint_rad` (n,): repeatability of each joint. `degrees_of_freedom`: contrasts of repeats behind the figures; 0 where they
-    are declared. `pose_rad`: error of each joint that all measurements of a pose have in common.
+    `source`: one of "repeats", "declared", "residual". `position_m`, `orientation_rad`:
+    sensor part, each component. `joint_rad` (n,): repeatability of each joint.
+    `degrees_of_freedom`: contrasts of repeats behind the figures; 0 where they are
+    declared. `pose_rad`: error of each joint that all measurements of a pose have in
+    common.
     """
 
     source: str
@@ -82,8 +99,12 @@ class Noise:
 
     def scaled(self, factor: float) -> Noise:
         """The same with the noise of single measurements multiplied."""
-        position, orientation, joint = factor * self.position_m, factor * self.orientation_rad, factor * self.joint_rad
-        return replace(self, position_m=position, orientation_rad=orientation, joint_rad=joint)
+        position = factor * self.position_m
+        orientation = factor * self.orientation_rad
+        joint = factor * self.joint_rad
+        return replace(
+            self, position_m=position, orientation_rad=orientation, joint_rad=joint
+        )
 
     def sensor_std(self, rows: int) -> np.ndarray:
         """The sensor's part of each component of a measurement, (rows,)."""
@@ -101,71 +122,118 @@ def noise_from(facts: Mapping[str, Any]) -> Noise:
     return Noise(**known | {"joint_rad": np.array(known["joint_rad"])})
 
 
-def chosen_noise(campaign: Campaign, model: Model, estimate: Estimate) -> tuple[Noise | None, list[str]]:
-    """Noise from repeats where there are enough, else as a campaign declares it, or by what its measurements state.
+def chosen_noise(
+    campaign: Campaign, model: Model, estimate: Estimate
+) -> tuple[Noise | None, list[str]]:
+    """Noise from repeats where there are enough, else as a campaign declares it, or by
+    what its measurements state.
 
-    Of expanded uncertainties of the measurements, 95 % of one coordinate, the root mean square counts. A ratio of the two
-    outside the chi-squared interval of 99 % of a variance is a warning. Returns `noise`: None where there are neither.
+    Of expanded uncertainties of the measurements, 95 % of one coordinate, the root mean
+    square counts. A ratio of the two outside the chi-squared interval of 99 % of a
+    variance is a warning. Returns `noise`: None where there are neither.
     """
-    repeats, stated = noise_from_repeats(model, estimate, campaign.measurements), campaign.noise or {}
-    u95, declared = campaign.measurements.u95_m, None
+    repeats = noise_from_repeats(model, estimate, campaign.measurements)
+    stated = campaign.noise or {}
+    u95 = campaign.measurements.u95_m
+    declared = None
     if stated or u95 is not None:
-        position = stated["position_m"] if u95 is None else float(np.sqrt((u95**2).mean())) / _COVERAGE
+        position = (
+            stated["position_m"]
+            if u95 is None
+            else float(np.sqrt((u95**2).mean())) / _COVERAGE
+        )
         joints = np.zeros(campaign.robot.joints) + stated.get("joint_rad", 0.0)
-        declared = Noise("declared", position, stated.get("orientation_rad", position), joints)
+        declared = Noise(
+            "declared", position, stated.get("orientation_rad", position), joints
+        )
     if repeats is None:
-        return declared, [] if declared else ["no repeats and no declared noise: nothing says how large the residual may be"]
+        return declared, [] if declared else [
+            "no repeats and no declared noise: nothing says how large the residual may be"
+        ]
     if declared is None:
         return repeats, []
     ratio = repeats.position_m / declared.position_m
     of_positions = repeats.degrees_of_freedom * 3 // model.rows
-    low, high = np.sqrt(2 * gammaincinv(of_positions / 2, [0.005, 0.995]) / of_positions)
+    low, high = np.sqrt(
+        2 * gammaincinv(of_positions / 2, [0.005, 0.995]) / of_positions
+    )
     if low < ratio < high:
         return repeats, []
-    return repeats, [f"repeats show {ratio:.2f} times the declared noise of positions; the repeats are used"]
+    return repeats, [
+        f"repeats show {ratio:.2f} times the declared noise of positions; the repeats are used"
+    ]
 
 
 def estimated_noise(case: Case) -> tuple[Noise, list[str]]:
-    """Noise from repeats or as declared, from the residual of the declared model where there is neither; and warnings."""
+    """Noise from repeats or as declared, from the residual of the declared model where
+    there is neither; and warnings."""
     start = registered(case.model, case.observations)
     noise, warnings = chosen_noise(case.campaign, case.model, start)
     if noise is None:
-        assumed = Noise("residual", _ASSUMED, _ASSUMED, np.zeros(case.campaign.robot.joints))
-        # The widest prior leaves nearly what none would leave, without parameters that nothing determines.
+        assumed = Noise(
+            "residual", _ASSUMED, _ASSUMED, np.zeros(case.campaign.robot.joints)
+        )
+        # The widest prior leaves nearly what none would leave, without parameters that
+        # nothing determines.
         model = with_size(case.model, SIZES[-1])
         left = fit(model, case.observations, assumed, start).residual
-        typical = [max(float(np.sqrt((part**2).mean())), FINEST) for part in (left[:, :3], left[:, -3:])]
+        typical = [
+            max(float(np.sqrt((part**2).mean())), FINEST)
+            for part in (left[:, :3], left[:, -3:])
+        ]
         noise = replace(assumed, position_m=typical[0], orientation_rad=typical[1])
         # What parameters have taken of it is given back.
-        noise = noise.scaled(most_probable(fit(model, case.observations, noise, start, settled=ON_THE_WAY))[1])
+        noise = noise.scaled(
+            most_probable(
+                fit(model, case.observations, noise, start, settled=ON_THE_WAY)
+            )[1]
+        )
     return noise, warnings
 
 
-def noise_from_repeats(model: Model, estimate: Estimate, measurements: Measurements) -> Noise | None:
+def noise_from_repeats(
+    model: Model, estimate: Estimate, measurements: Measurements
+) -> Noise | None:
     """Noise by restricted maximum likelihood from the differences between repeats.
 
-    The likelihood is that of error contrasts (Patterson and Thompson, Biometrika 58, 1971), here of orthonormal Helmert
-    contrasts of repeats; L-BFGS-B (Byrd et al. 1995) finds its maximum. The joints' part is taken where it is worth its
-    parameters by Akaike's criterion (1974), at the upper limit of a one-sided chi-squared interval of 80 %; with fewer
-    contrasts than show it, their mean square is the sensor's part.
+    The likelihood is that of error contrasts (Patterson and Thompson, Biometrika 58,
+    1971), here of orthonormal Helmert contrasts of repeats; L-BFGS-B (Byrd et al. 1995)
+    finds its maximum. The joints' part is taken where it is worth its parameters by
+    Akaike's criterion (1974), at the upper limit of a one-sided chi-squared interval of
+    80 %; with fewer contrasts than show it, their mean square is the sensor's part.
 
-    `estimate`: its frames turn measurements into base axes; nothing else of it matters. Returns None where there are too few
-    repeats, or where they do not differ at all.
+    `estimate`: its frames turn measurements into base axes; nothing else of it matters.
+    Returns None where there are too few repeats, or where they do not differ at all.
     """
-    contrasts, sensors, joints = _contrasts(model, estimate, measurements), model.rows // 3, model.sites.joints
+    contrasts = _contrasts(model, estimate, measurements)
+    sensors = model.rows // 3
+    joints = model.sites.joints
     if contrasts is None:
         return None
-    total, start = contrasts.count * sensors, np.sqrt(contrasts.squares / contrasts.count)
+    total = contrasts.count * sensors
+    start = np.sqrt(contrasts.squares / contrasts.count)
     if start.min() < FINEST:
-        # The same number again and again is a sensor that stands still or digits that were cut off, not one without noise.
+        # The same number again and again is a sensor that stands still or digits that
+        # were cut off, not one without noise.
         return None
-    sensor = Noise("repeats", float(start[0]), float(start[-1]), np.zeros(joints), total)
+    sensor = Noise(
+        "repeats", float(start[0]), float(start[-1]), np.zeros(joints), total
+    )
     if total < FEWEST_FOR_JOINTS:
         return sensor
     both = np.log(start)
     free = np.concatenate([both, np.full(joints, np.log(0.3 * start[0]))])
-    bounds = [(value - 7, value + 1) for value in both] + [(np.log(_SMALLEST_RAD), np.log(_LARGEST_RAD))] * joints
-    fitted = scipy.optimize.minimize(_negative_log_likelihood, free, (contrasts,), "L-BFGS-B", jac=True, bounds=bounds)
+    bounds = [(value - 7, value + 1) for value in both] + [
+        (np.log(_SMALLEST_RAD), np.log(_LARGEST_RAD))
+    ] * joints
+    fitted = scipy.optimize.minimize(
+        _negative_log_likelihood,
+        free,
+        (contrasts,),
+        "L-BFGS-B",
+        jac=True,
+        bounds=bounds,
+    )
     # Akaike: the joints' part must be worth its parameters.
     nothing = np.concatenate([both, np.full(joints, np.log(_SMALLEST_RAD))])
     if fitted.fun + joints > _negative_log_likelihood(nothing, contrasts)[0]:
@@ -174,41 +242,66 @@ def noise_from_repeats(model: Model, estimate: Estimate, measurements: Measureme
     # Each approach draws a joint once, however many targets are read.
     per_joint = max(min(total // (joints + 1), len(contrasts.along)), 1)
     inflation = np.sqrt(per_joint / (2 * gammaincinv(per_joint / 2, 1 - _UPPER)))
-    position, orientation = float(values[0]), float(values[sensors - 1])
-    return replace(sensor, position_m=position, orientation_rad=orientation, joint_rad=values[sensors:] * inflation)
+    position = float(values[0])
+    orientation = float(values[sensors - 1])
+    return replace(
+        sensor,
+        position_m=position,
+        orientation_rad=orientation,
+        joint_rad=values[sensors:] * inflation,
+    )
 
 
-def hidden_repeatability(model: Model, estimate: Estimate, measurements: Measurements) -> tuple[float, float]:
-    """How well joints repeat, rad, all alike, where the sensor hides each of them; degrees of freedom that its square has.
+def hidden_repeatability(
+    model: Model, estimate: Estimate, measurements: Measurements
+) -> tuple[float, float]:
+    """How well joints repeat, rad, all alike, where the sensor hides each of them;
+    degrees of freedom that its square has.
 
-    The root mean square of what repeats leave possible, by the restricted likelihood of `noise_from_repeats`, its maximum over
-    the sensor's part, evenly over the deviation of a joint. Zeros where there are too few repeats to say anything.
+    The root mean square of what repeats leave possible, by the restricted likelihood of
+    `noise_from_repeats`, its maximum over the sensor's part, evenly over the deviation
+    of a joint. Zeros where there are too few repeats to say anything.
     """
-    contrasts, sensors, joints = _contrasts(model, estimate, measurements), model.rows // 3, model.sites.joints
+    contrasts = _contrasts(model, estimate, measurements)
+    sensors = model.rows // 3
+    joints = model.sites.joints
     if contrasts is None:
         return 0.0, 0.0
     start = 0.5 * np.log(np.maximum(contrasts.squares / contrasts.count, FINEST**2))
     deviations = np.geomspace(_SMALLEST_RAD, _LARGEST_RAD, _DEVIATIONS)
 
     def value(free: np.ndarray, joint: float) -> tuple[float, np.ndarray]:
-        total, slope = _negative_log_likelihood(np.concatenate([free, np.full(joints, np.log(joint))]), contrasts)
+        total, slope = _negative_log_likelihood(
+            np.concatenate([free, np.full(joints, np.log(joint))]), contrasts
+        )
         return total, slope[:sensors]
 
-    minimize, bounds = scipy.optimize.minimize, [(at - 7, at + 1) for at in start]
-    likelihood = -np.array([minimize(value, start, (d,), "L-BFGS-B", jac=True, bounds=bounds).fun for d in deviations])
-    # Even steps of the logarithm: each stands for a range as wide as the deviation itself.
+    minimize = scipy.optimize.minimize
+    bounds = [(at - 7, at + 1) for at in start]
+    likelihood = -np.array(
+        [
+            minimize(value, start, (d,), "L-BFGS-B", jac=True, bounds=bounds).fun
+            for d in deviations
+        ]
+    )
+    # Even steps of the logarithm: each stands for a range as wide as the deviation
+    # itself.
     weights = np.exp(likelihood - likelihood.max()) * deviations
     weights /= weights.sum()
     mean = float(weights @ deviations**2)
-    return float(np.sqrt(mean)), 2.0 * mean**2 / float(weights @ (deviations**2 - mean) ** 2)
+    return float(np.sqrt(mean)), 2.0 * mean**2 / float(
+        weights @ (deviations**2 - mean) ** 2
+    )
 
 
 @dataclass(frozen=True)
 class _Contrasts:
-    """What orthonormal contrasts v (k * rows,) of repeats with k targets, G of them, say of the noise, Jacobians S beside them.
+    """What orthonormal contrasts v (k * rows,) of repeats with k targets, G of them,
+    say of the noise, Jacobians S beside them.
 
-    `count`: numbers of one sensor's part, of positions or of orientations, in all v. `squares` (s,): v'v of each sensor's part,
-    of all. `along` (G, s, n): S'v of each. `gram` (G, s, n, n): S'S of each.
+    `count`: numbers of one sensor's part, of positions or of orientations, in all v.
+    `squares` (s,): v'v of each sensor's part, of all. `along` (G, s, n): S'v of each.
+    `gram` (G, s, n, n): S'S of each.
     """
 
     count: int
@@ -217,7 +310,9 @@ class _Contrasts:
     gram: np.ndarray
 
 
-def _contrasts(model: Model, estimate: Estimate, measurements: Measurements) -> _Contrasts | None:
+def _contrasts(
+    model: Model, estimate: Estimate, measurements: Measurements
+) -> _Contrasts | None:
     """Contrasts between repeats; None where there are too few to say anything."""
     if not len(measurements) or not np.ptp(measurements.repeat):
         return None
@@ -225,75 +320,129 @@ def _contrasts(model: Model, estimate: Estimate, measurements: Measurements) -> 
     first = np.flatnonzero(np.diff(repeated, prepend=-1))
     # The targets that an approach saw, beside those of the first approach to its state.
     seen = np.bincount(observations.state)
-    targets, before = np.full((len(seen), seen.max()), -1), (np.cumsum(seen) - seen)[observations.state]
-    targets[observations.state, np.arange(len(observations)) - before] = observations.target
+    targets = np.full((len(seen), seen.max()), -1)
+    before = (np.cumsum(seen) - seen)[observations.state]
+    targets[observations.state, np.arange(len(observations)) - before] = (
+        observations.target
+    )
     alike = (targets == targets[first[repeated]]).all(axis=1)
     number = np.bincount(repeated, alike).astype(int)
     # As many as tell, of states spread over the campaign.
-    wanted, share = np.flatnonzero(number > 1), ((number - 1) * seen[first]).sum() * model.rows / MOST
-    wanted = wanted[np.linspace(0, len(wanted) - 1, int(len(wanted) / share)).astype(int)] if share > 1 else wanted
+    wanted = np.flatnonzero(number > 1)
+    share = ((number - 1) * seen[first]).sum() * model.rows / MOST
+    wanted = (
+        wanted[np.linspace(0, len(wanted) - 1, int(len(wanted) / share)).astype(int)]
+        if share > 1
+        else wanted
+    )
     chosen = alike & np.isin(repeated, wanted)
-    some, bare = select_states(observations, chosen), replace(model, effects=())
+    some = select_states(observations, chosen)
+    bare = replace(model, effects=())
     if len(some) * model.rows < FEWEST:
         return None
     at = replace(estimate, coefficients=(), shapes=())
     line = linearize(bare, at, some, conditions(bare, at, some.states))
-    sensors, squares, found = model.rows // 3, np.zeros(model.rows // 3), []
+    sensors = model.rows // 3
+    squares = np.zeros(model.rows // 3)
+    found = []
     targets_of = np.bincount(some.state)[some.state]
-    for members in groups_by_size(np.unique(repeated[chosen], return_inverse=True)[1][some.state]):
+    for members in groups_by_size(
+        np.unique(repeated[chosen], return_inverse=True)[1][some.state]
+    ):
         for count in np.unique(targets_of[members[:, 0]]):
-            mine = members[targets_of[members[:, 0]] == count].reshape(-1, members.shape[1] // count, count)
+            mine = members[targets_of[members[:, 0]] == count].reshape(
+                -1, members.shape[1] // count, count
+            )
             groups, repeats = mine.shape[:2]
-            vectors = helmert(repeats) @ line.residual[mine].reshape(groups, repeats, -1)
+            vectors = helmert(repeats) @ line.residual[mine].reshape(
+                groups, repeats, -1
+            )
             vectors = vectors.reshape(groups, repeats - 1, count, sensors, 3)
-            jacobian = line.joint_jacobian[mine[:, 0]].reshape(groups, count, sensors, 3, -1)
+            jacobian = line.joint_jacobian[mine[:, 0]].reshape(
+                groups, count, sensors, 3, -1
+            )
             along = np.einsum("gtsxn,grtsx->grsn", jacobian, vectors)
             gram = np.einsum("gtsxn,gtsxm->gsnm", jacobian, jacobian)
             squares += (vectors**2).sum(axis=(0, 1, 2, 4))
-            found.append((along.reshape(-1, *along.shape[2:]), np.repeat(gram, repeats - 1, axis=0), vectors.size // sensors))
+            found.append(
+                (
+                    along.reshape(-1, *along.shape[2:]),
+                    np.repeat(gram, repeats - 1, axis=0),
+                    vectors.size // sensors,
+                )
+            )
     alongs, grams, counts = zip(*found, strict=True)
-    contrasts = _Contrasts(sum(counts), squares, np.concatenate(alongs), np.concatenate(grams))
+    contrasts = _Contrasts(
+        sum(counts), squares, np.concatenate(alongs), np.concatenate(grams)
+    )
     return contrasts if contrasts.count * sensors >= FEWEST else None
 
 
-def _negative_log_likelihood(logs: np.ndarray, contrasts: _Contrasts) -> tuple[float, np.ndarray]:
-    """Minus the logarithm of the restricted likelihood, and its derivatives by the logarithms of the deviations.
+def _negative_log_likelihood(
+    logs: np.ndarray, contrasts: _Contrasts
+) -> tuple[float, np.ndarray]:
+    """Minus the logarithm of the restricted likelihood, and its derivatives by the
+    logarithms of the deviations.
 
-    With D the variances of the sensors and L those of the joints, Sigma = D + S L S' has the determinant |D| |I + L C| and the
-    inverse D^-1 - D^-1 S A S' D^-1, C = S' D^-1 S and A = (I + L C)^-1 L, by Woodbury's identity (Hager, SIAM Review 31, 1989).
+    With D the variances of the sensors and L those of the joints, Sigma = D + S L S'
+    has the determinant |D| |I + L C| and the inverse D^-1 - D^-1 S A S' D^-1, C = S'
+    D^-1 S and A = (I + L C)^-1 L, by Woodbury's identity (Hager, SIAM Review 31, 1989).
     """
     sensors = len(contrasts.squares)
-    precision, deviation = np.exp(-2.0 * logs[:sensors]), np.exp(logs[sensors:])
-    along, gram = precision @ contrasts.along, (precision[:, None, None] * contrasts.gram).sum(axis=1)
+    precision = np.exp(-2.0 * logs[:sensors])
+    deviation = np.exp(logs[sensors:])
+    along = precision @ contrasts.along
+    gram = (precision[:, None, None] * contrasts.gram).sum(axis=1)
     inner = np.eye(len(deviation)) + deviation[:, None] * gram * deviation
     left = deviation[:, None] * np.linalg.inv(inner) * deviation
     solved = (left @ along[..., None])[..., 0]
-    total = contrasts.count * logs[:sensors].sum() + 0.5 * (precision @ contrasts.squares - (along * solved).sum())
+    total = contrasts.count * logs[:sensors].sum() + 0.5 * (
+        precision @ contrasts.squares - (along * solved).sum()
+    )
     total += 0.5 * np.linalg.slogdet(inner)[1].sum()
-    # S' times what the inverse makes of v; of each sensor's part, what the joints explain of its squares and its variance.
+    # S' times what the inverse makes of v; of each sensor's part, what the joints
+    # explain of its squares and its variance.
     rest = along - (gram @ solved[..., None])[..., 0]
     explained = 2.0 * (contrasts.along @ solved[..., None])[..., 0]
-    explained -= ((contrasts.gram @ solved[:, None, :, None])[..., 0] * solved[:, None]).sum(axis=2)
+    explained -= (
+        (contrasts.gram @ solved[:, None, :, None])[..., 0] * solved[:, None]
+    ).sum(axis=2)
     explained -= (left[:, None] * contrasts.gram).sum(axis=(2, 3))
     slopes = contrasts.count + precision * (explained.sum(axis=0) - contrasts.squares)
     variance = np.diagonal(gram, axis1=1, axis2=2) - (gram * (gram @ left)).sum(axis=2)
-    return total, np.concatenate([slopes, deviation**2 * (variance - rest**2).sum(axis=0)])
+    return total, np.concatenate(
+        [slopes, deviation**2 * (variance - rest**2).sum(axis=0)]
+    )
 
 
 def fit_declared(model: Model, observations: Observations, noise: Noise) -> Fit:
-    """Fit a declared model, its geometry under priors of the most probable size; without geometry as `least_squares.fit`."""
+    """Fit a declared model, its geometry under priors of the most probable size;
+    without geometry as `least_squares.fit`."""
     if not declared_geometry(model):
         return fit(model, observations, noise)
-    wide = fit(with_size(model, SIZES[-1]), sample_of(observations, STARTED_FROM), noise, settled=ON_THE_WAY)
-    return fit(with_size(model, most_probable(wide)[0]), observations, noise, wide.estimate, reweighted=True)
+    wide = fit(
+        with_size(model, SIZES[-1]),
+        sample_of(observations, STARTED_FROM),
+        noise,
+        settled=ON_THE_WAY,
+    )
+    return fit(
+        with_size(model, most_probable(wide)[0]),
+        observations,
+        noise,
+        wide.estimate,
+        reweighted=True,
+    )
 
 
 def declared_geometry(model: Model) -> set[str]:
-    """Names of declared effects whose size is estimated: those whose parameters have no prior of their own, but for springs."""
+    """Names of declared effects whose size is estimated: those whose parameters have no
+    prior of their own, but for springs."""
     return {
         effect.effect
         for effect in model.effects
-        if effect.family != "declared" and all(p.prior_std is None or p.sized for p in effect.parameters)
+        if effect.family != "declared"
+        and all(p.prior_std is None or p.sized for p in effect.parameters)
     }
 
 
@@ -301,43 +450,72 @@ def with_size(model: Model, size: float) -> Model:
     """A declared model with priors of a size, in plausible sizes, on its geometry."""
     sized = declared_geometry(model)
     effects = [
-        with_prior(effect, [size * p.plausible for p in effect.parameters]) if effect.effect in sized else effect
+        with_prior(effect, [size * p.plausible for p in effect.parameters])
+        if effect.effect in sized
+        else effect
         for effect in model.effects
     ]
     return replace(model, effects=tuple(effects))
 
 
-def with_prior(candidate: Candidate, deviations: Sequence[float] | np.ndarray) -> Candidate:
-    """A candidate with normal priors about zero whose standard deviations were estimated."""
+def with_prior(
+    candidate: Candidate, deviations: Sequence[float] | np.ndarray
+) -> Candidate:
+    """A candidate with normal priors about zero whose standard deviations were
+    estimated."""
     pairs = zip(candidate.parameters, deviations, strict=True)
-    return replace(candidate, parameters=tuple(replace(p, prior_std=float(std), sized=True) for p, std in pairs))
+    return replace(
+        candidate,
+        parameters=tuple(
+            replace(p, prior_std=float(std), sized=True) for p, std in pairs
+        ),
+    )
 
 
 def most_probable(wide: Fit) -> tuple[float, float]:
-    """Size of declared geometry, in plausible sizes, and noise over the noise taken that make the measurements most probable.
+    """Size of declared geometry, in plausible sizes, and noise over the noise taken
+    that make the measurements most probable.
 
-    In closed form from a fit under the widest prior: given frames and targets the geometry is linear, and the principal axes of
-    its covariance in units of the prior are independent. The noise is no less than the noise taken.
+    In closed form from a fit under the widest prior: given frames and targets the
+    geometry is linear, and the principal axes of its covariance in units of the prior
+    are independent. The noise is no less than the noise taken.
     """
-    mine = np.flatnonzero(np.array([parameter.sized for _, parameter in wide.parameters], bool) & ~wide.held)
+    mine = np.flatnonzero(
+        np.array([parameter.sized for _, parameter in wide.parameters], bool)
+        & ~wide.held
+    )
     prior = wide.prior_std[mine]
-    left, axes = np.linalg.eigh(wide.covariance[np.ix_(mine, mine)] / np.outer(prior, prior))
+    left, axes = np.linalg.eigh(
+        wide.covariance[np.ix_(mine, mine)] / np.outer(prior, prior)
+    )
     left = np.clip(left, _ROUNDING, 1.0)
-    shift, seen = axes.T @ (parameter_values(wide.model, wide.estimate)[mine] / prior), 1.0 / left - 1.0
+    shift = axes.T @ (parameter_values(wide.model, wide.estimate)[mine] / prior)
+    seen = 1.0 / left - 1.0
     # Squares of the whitened residual were all of it zero, beside frames and targets.
-    squares = (wide.whitened(wide.residual) ** 2).sum() + ((seen + 2.0) * shift**2).sum()
-    freedom = max(wide.weights.sum() * wide.residual.shape[1] - (~wide.held).sum() + len(mine), 1.0)
+    squares = (wide.whitened(wide.residual) ** 2).sum() + (
+        (seen + 2.0) * shift**2
+    ).sum()
+    freedom = max(
+        wide.weights.sum() * wide.residual.shape[1] - (~wide.held).sum() + len(mine),
+        1.0,
+    )
     variance = _FACTORS[:, None, None] ** 2
     wider = ((SIZES / SIZES[-1]) ** 2)[:, None]
     explained = ((shift / left) ** 2 * wider / (variance + seen * wider)).sum(axis=2)
     volume = np.log1p(wider * seen / variance).sum(axis=2)
     variance = variance[..., 0]
-    evidence = -0.5 * (freedom * np.log(variance) + (squares - explained) / variance + volume)
+    evidence = -0.5 * (
+        freedom * np.log(variance) + (squares - explained) / variance + volume
+    )
     factor, size = np.unravel_index(np.argmax(evidence), evidence.shape)
     return float(SIZES[size]), float(_FACTORS[factor])
 
 
 def effective_parameters(fitted: Fit) -> float:
-    """Free parameters, with a prior the share that it leaves open: trace of a ridge's hat matrix (Hastie et al., 3.4.1)."""
+    """Free parameters, with a prior the share that it leaves open: trace of a ridge's
+    hat matrix (Hastie et al., 3.4.1)."""
     free = ~fitted.held
-    return float(free.sum() - (np.diag(fitted.covariance)[free] / fitted.prior_std[free] ** 2).sum())
+    return float(
+        free.sum()
+        - (np.diag(fitted.covariance)[free] / fitted.prior_std[free] ** 2).sum()
+    )

@@ -1,4 +1,5 @@
-"""The one way to write: files that appear whole or not at all, and never where a link, a pipe or a device stands."""
+"""The one way to write: files that appear whole or not at all, and never where a link,
+a pipe or a device stands."""
 
 import os
 import re
@@ -16,11 +17,17 @@ _PARTIAL = re.compile(r"\.[0-9a-f]{16}\.partial$")
 
 
 def check_places(*paths: str | Path, top: Path | None = None) -> None:
-    """Refuse a file to be written whose name something else has, which is never replaced or written through.
+    """Refuse a file to be written whose name something else has, which is never
+    replaced or written through.
 
     Nor is a folder between the file and `top`, which the user named, a link.
     """
-    folders = dict.fromkeys(folder for path in paths for folder in Path(path).parents if top in folder.parents)
+    folders = dict.fromkeys(
+        folder
+        for path in paths
+        for folder in Path(path).parents
+        if top in folder.parents
+    )
     if link := next((folder for folder in folders if folder.is_symlink()), None):
         raise InputError(link, "", "a link", "a folder")
     for path in paths:
@@ -31,11 +38,17 @@ def check_places(*paths: str | Path, top: Path | None = None) -> None:
         except ValueError as error:
             raise InputError(path, "", str(error), "a place for a file") from None
         if not stat.S_ISREG(mode):
-            raise InputError(path, "", kind_of(mode), "a place for a file: a new name, or that of a file")
+            raise InputError(
+                path,
+                "",
+                kind_of(mode),
+                "a place for a file: a new name, or that of a file",
+            )
 
 
 def check_folder(folder: str | Path) -> None:
-    """Refuse a folder that holds links, pipes or devices, however deep: what is written there would go elsewhere."""
+    """Refuse a folder that holds links, pipes or devices, however deep: what is written
+    there would go elsewhere."""
     # Another run may take away what it has just listed.
     with suppress(FileNotFoundError), os.scandir(folder) as entries:
         for entry in entries:
@@ -46,7 +59,8 @@ def check_folder(folder: str | Path) -> None:
 
 
 def remove_partials(folder: str | Path) -> None:
-    """Take away what was being written below a folder by runs that were killed; none may be at work."""
+    """Take away what was being written below a folder by runs that were killed; none
+    may be at work."""
     for path in Path(folder).rglob("*.partial"):
         if _PARTIAL.search(path.name):
             shutil.rmtree(path) if path.is_dir() else path.unlink()
@@ -54,13 +68,16 @@ def remove_partials(folder: str | Path) -> None:
 
 @contextmanager
 def atomic_write(path: str | Path, empty: bool = False) -> Iterator[str]:
-    """Write to a name beside a file that nobody can foresee, then rename; if the block raises, nothing is left behind.
+    """Write to a name beside a file that nobody can foresee, then rename; if the block
+    raises, nothing is left behind.
 
     That it wrote nothing is an OSError, unless the file may be `empty`.
     """
     check_places(path)
     partial = _beside(path)
-    os.close(os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o666))
+    os.close(
+        os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o666)
+    )
     try:
         yield partial
         if not empty and not os.path.getsize(partial):
@@ -73,15 +90,20 @@ def atomic_write(path: str | Path, empty: bool = False) -> Iterator[str]:
 
 @contextmanager
 def write_together(folder: str | Path, names: Iterable[str]) -> Iterator[Path]:
-    """Write files that belong together to the folder that is given to the block, each with one of these names.
+    """Write files that belong together to the folder that is given to the block, each
+    with one of these names.
 
-    A new folder appears with all of them. In one that is there they replace those of these names, in this order, after all of
-    the old ones are gone: a run that is killed leaves no old file beside a new one.
+    A new folder appears with all of them. In one that is there they replace those of
+    these names, in this order, after all of the old ones are gone: a run that is killed
+    leaves no old file beside a new one.
     """
-    folder, names = Path(os.path.abspath(folder)), [*names]
+    folder = Path(os.path.abspath(folder))
+    names = [*names]
     check_places(*(folder / name for name in names))
     if os.path.lexists(folder) and not folder.is_dir():
-        raise InputError(folder, "", kind_of(os.lstat(folder).st_mode), "a folder, or a new name")
+        raise InputError(
+            folder, "", kind_of(os.lstat(folder).st_mode), "a folder, or a new name"
+        )
     new = not folder.exists()
     folder.parent.mkdir(parents=True, exist_ok=True)
     partial = Path(_beside(folder if new else folder / names[0]))
@@ -103,7 +125,10 @@ def write_together(folder: str | Path, names: Iterable[str]) -> Iterator[Path]:
 
 def write_text(path: str | Path, text: str) -> None:
     """Write a text in UTF-8; the file appears whole or not at all."""
-    with atomic_write(path, empty=not text) as partial, open(partial, "w", encoding="utf-8") as file:
+    with (
+        atomic_write(path, empty=not text) as partial,
+        open(partial, "w", encoding="utf-8") as file,
+    ):
         file.write(text)
 
 

@@ -1,4 +1,5 @@
-"""JSON files of the steps, read and written with nothing but the standard library behind it: jobs start quickly."""
+"""JSON files of the steps, read and written with nothing but the standard library
+behind it: jobs start quickly."""
 
 import json
 from pathlib import Path
@@ -16,5 +17,6 @@ def read_json(path: str | Path) -> Any:
 
 
 def write_json(path: str | Path, contents: Any, **options: Any) -> None:
-    """Write a JSON file that people can read too, with options of ``json.dumps``; it appears whole or not at all."""
+    """Write a JSON file that people can read too, with options of ``json.dumps``; it
+    appears whole or not at all."""
     write_text(path, json.dumps(contents, indent=1, **options) + "\n")

@@ -1,4 +1,5 @@
-"""Modules that a catalogue finds by itself: what is added to its package is one file."""
+"""Modules that a catalogue finds by itself: what is added to its package is one
+file."""
 
 import pkgutil
 from types import ModuleType

@@ -1,7 +1,9 @@
-"""What each job read and wrote, when, and from which commit, configuration, seed and environment: a record beside every output.
+"""What each job read and wrote, when, and from which commit, configuration, seed and
+environment: a record beside every output.
 
-A record has the SHA-256 of its output and of all that the job read: whoever reads a file next finds a byte that was altered, in
-it or in anything behind it. `python -m elastocal.io.records | sha256sum --check` judges all files.
+A record has the SHA-256 of its output and of all that the job read: whoever reads a
+file next finds a byte that was altered, in it or in anything behind it. `python -m
+elastocal.io.records | sha256sum --check` judges all files.
 """
 
 import hashlib
@@ -20,15 +22,17 @@ RECORDS = Path("results/records")
 _MADE = ("data", "results", "reports")
 _AS_WRITTEN = "the file as the pipeline wrote it (delete {} and run the pipeline again)"
 # Of one output, and of all else that its record says.
-_FILES, _DIGEST = "files", "sha256"
+_FILES = "files"
+_DIGEST = "sha256"
 
 
 @dataclass(frozen=True)
 class JobRecord:
     """One job that has ended well.
 
-    `started`, `ended`: UTC, ISO 8601. `inputs`: digests of files by their names in the working directory, scripts and
-    modules among them. `own`: inputs of the user, which no job made and which may lie elsewhere by now. `environment`: from
+    `started`, `ended`: UTC, ISO 8601. `inputs`: digests of files by their names in the
+    working directory, scripts and modules among them. `own`: inputs of the user, which
+    no job made and which may lie elsewhere by now. `environment`: from
     `origin.environment`.
     """
 
@@ -50,16 +54,26 @@ class JobRecord:
     @property
     def made_inputs(self) -> dict[str, str]:
         """Inputs that other jobs made."""
-        return {file: digest for file, digest in self.inputs.items() if _made(file) and file not in self.own}
+        return {
+            file: digest
+            for file, digest in self.inputs.items()
+            if _made(file) and file not in self.own
+        }
 
     @property
     def sources(self) -> dict[str, str]:
-        """Inputs that come with the program or its configuration: modules, scripts, robots."""
-        return {file: digest for file, digest in self.inputs.items() if not _made(file) and file not in self.own}
+        """Inputs that come with the program or its configuration: modules, scripts,
+        robots."""
+        return {
+            file: digest
+            for file, digest in self.inputs.items()
+            if not _made(file) and file not in self.own
+        }
 
 
 def write_records(job: JobRecord) -> None:
-    """Keep the record of each output that lies where the pipeline makes files; a folder's has all of these."""
+    """Keep the record of each output that lies where the pipeline makes files; a
+    folder's has all of these."""
     for output in filter(_made, job.outputs):
         place = record_of(output)
         place.parent.mkdir(parents=True, exist_ok=True)
@@ -68,10 +82,12 @@ def write_records(job: JobRecord) -> None:
 
 
 def read_record(path: str, within: str | Path = "") -> tuple[JobRecord, dict[str, str]]:
-    """The job that made a file or folder, and the SHA-256 of each file that it wrote there.
+    """The job that made a file or folder, and the SHA-256 of each file that it wrote
+    there.
 
-    `within` is the folder that `path` and the records are in, here and below; the working directory without. An InputError
-    refuses a missing record and one that is not as it was written.
+    `within` is the folder that `path` and the records are in, here and below; the
+    working directory without. An InputError refuses a missing record and one that is
+    not as it was written.
     """
     place = record_of(path, within)
     if not place.is_file():
@@ -85,14 +101,26 @@ def read_record(path: str, within: str | Path = "") -> tuple[JobRecord, dict[str
         names = {key: tuple(kept[key]) for key in ("own", "outputs")}
         return JobRecord(**kept | names | {"origin": Origin(**kept["origin"])}), files
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(place, "", f"no record of a job ({error})", f"of {path} {_AS_WRITTEN.format('it')}") from None
+        raise InputError(
+            place,
+            "",
+            f"no record of a job ({error})",
+            f"of {path} {_AS_WRITTEN.format('it')}",
+        ) from None
 
 
 def recorded(within: str | Path = "") -> dict[str, str]:
     """SHA-256 of every file that has a record, as `read_record`."""
     top = Path(within, RECORDS)
-    names = sorted(place.relative_to(top).as_posix().removesuffix(".json") for place in top.rglob("*.json"))
-    return {file: digest for name in names for file, digest in read_record(name, within)[1].items()}
+    names = sorted(
+        place.relative_to(top).as_posix().removesuffix(".json")
+        for place in top.rglob("*.json")
+    )
+    return {
+        file: digest
+        for name in names
+        for file, digest in read_record(name, within)[1].items()
+    }
 
 
 def record_of(path: str, within: str | Path = "") -> Path:
@@ -100,26 +128,33 @@ def record_of(path: str, within: str | Path = "") -> Path:
     return Path(within, RECORDS, f"{path}.json")
 
 
-def input_digests(paths: Iterable[str], checked: Collection[str] | None = None) -> tuple[dict[str, str], tuple[str, ...]]:
-    """SHA-256 of what a job reads, and which of it is the user's own: what need not be checked and has no record.
+def input_digests(
+    paths: Iterable[str], checked: Collection[str] | None = None
+) -> tuple[dict[str, str], tuple[str, ...]]:
+    """SHA-256 of what a job reads, and which of it is the user's own: what need not be
+    checked and has no record.
 
-    Of what is `checked`, all without, an InputError refuses a file in data, results or reports that has no record or is no
-    longer what the job wrote that made it.
+    Of what is `checked`, all without, an InputError refuses a file in data, results or
+    reports that has no record or is no longer what the job wrote that made it.
     """
-    digests, own = {}, []
+    digests = {}
+    own = []
     for path in map(str, paths):
         judged = checked is None or path in checked
-        digests[path] = _intact(path)[1] if judged and _made(path) else _joint(_digests(path))
+        digests[path] = (
+            _intact(path)[1] if judged and _made(path) else _joint(_digests(path))
+        )
         if not judged and not record_of(path).is_file():
             own.append(path)
     return digests, tuple(own)
 
 
 def jobs_behind(targets: Iterable[str], within: str | Path = "") -> list[JobRecord]:
-    """The jobs that made some files, and those that made what these read, to the first; in the order in which they began.
+    """The jobs that made some files, and those that made what these read, to the first;
+    in the order in which they began.
 
-    An InputError refuses a missing record or file, and any file of these jobs that is not as it was written or not the one that
-    the next job read.
+    An InputError refuses a missing record or file, and any file of these jobs that is
+    not as it was written or not the one that the next job read.
     """
     found: dict[tuple[str, str], JobRecord] = {}
     digests: dict[str, str] = {}
@@ -133,16 +168,26 @@ def jobs_behind(targets: Iterable[str], within: str | Path = "") -> list[JobReco
     for job in found.values():
         for path, digest in job.made_inputs.items():
             if digests[path] != digest:
-                raise InputError(Path(within, path), "", f"not what {job.name} read", _AS_WRITTEN.format("it"))
+                raise InputError(
+                    Path(within, path),
+                    "",
+                    f"not what {job.name} read",
+                    _AS_WRITTEN.format("it"),
+                )
     return [job for _, job in sorted(found.items())]
 
 
 def check_sources(jobs: Iterable[JobRecord], within: str | Path, allowed: str) -> None:
-    """Refuse results that other modules, scripts or robots made than those that are here now: an InputError with `allowed`."""
+    """Refuse results that other modules, scripts or robots made than those that are
+    here now: an InputError with `allowed`."""
     for job in jobs:
-        for path, digest in ((Path(within, file), digest) for file, digest in job.sources.items()):
+        for path, digest in (
+            (Path(within, file), digest) for file, digest in job.sources.items()
+        ):
             if not path.is_file() or checksum(path) != digest:
-                raise InputError(path, "", f"not what {job.name} was made with", allowed)
+                raise InputError(
+                    path, "", f"not what {job.name} was made with", allowed
+                )
 
 
 def checksum(path: str | Path) -> str:
@@ -153,27 +198,46 @@ def checksum(path: str | Path) -> str:
 
 
 def _digests(path: str, within: str | Path = "") -> dict[str, str]:
-    """SHA-256 of the file, or of all files below the folder but for hidden ones: Snakemake notes the time in one."""
+    """SHA-256 of the file, or of all files below the folder but for hidden ones:
+    Snakemake notes the time in one."""
     folder = Path(within, path)
-    files = [file for file in folder.rglob("*") if file.is_file() and not file.name.startswith(".")]
-    names = sorted(file.relative_to(within).as_posix() for file in files) if folder.is_dir() else [path]
+    files = [
+        file
+        for file in folder.rglob("*")
+        if file.is_file() and not file.name.startswith(".")
+    ]
+    names = (
+        sorted(file.relative_to(within).as_posix() for file in files)
+        if folder.is_dir()
+        else [path]
+    )
     return {name: checksum(Path(within, name)) for name in names}
 
 
 def _intact(path: str, within: str | Path = "") -> tuple[JobRecord, str]:
-    """The job that made a file or folder, and what it holds, which is what the job wrote."""
+    """The job that made a file or folder, and what it holds, which is what the job
+    wrote."""
     job, written = read_record(path, within)
     found = _digests(path, within) if Path(within, path).exists() else {}
     for file in sorted(written.keys() | found.keys()):
         if written.get(file) != found.get(file):
             what = "other contents than were written" if file in found else "nothing"
-            raise InputError(Path(within, file), "", what, _AS_WRITTEN.format("it" if file == path else path))
+            raise InputError(
+                Path(within, file),
+                "",
+                what,
+                _AS_WRITTEN.format("it" if file == path else path),
+            )
     return job, _joint(written)
 
 
 def _joint(files: Mapping[str, str]) -> str:
     """Of a file its own SHA-256, of a folder that of its list."""
-    return next(iter(files.values())) if len(files) == 1 else hashlib.sha256("".join(_lines(files)).encode()).hexdigest()
+    return (
+        next(iter(files.values()))
+        if len(files) == 1
+        else hashlib.sha256("".join(_lines(files)).encode()).hexdigest()
+    )
 
 
 def _lines(files: Mapping[str, str]) -> list[str]:
@@ -182,7 +246,10 @@ def _lines(files: Mapping[str, str]) -> list[str]:
 
 
 def _made(path: str) -> bool:
-    return Path(path).parts[:1] in [(name,) for name in _MADE] and ".." not in Path(path).parts
+    return (
+        Path(path).parts[:1] in [(name,) for name in _MADE]
+        and ".." not in Path(path).parts
+    )
 
 
 if __name__ == "__main__":

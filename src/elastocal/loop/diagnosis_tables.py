@@ -32,7 +32,8 @@ if TYPE_CHECKING:
 
 
 # Parts of an estimate in diagnosis.json: arrays, and an array for each effect.
-_PLACEMENTS, _OF_EFFECTS = ("frame_rotation", "frame_position", "target_offset", "target_rotation"), ("coefficients", "shapes")
+_PLACEMENTS = ("frame_rotation", "frame_position", "target_offset", "target_rotation")
+_OF_EFFECTS = ("coefficients", "shapes")
 
 
 def diagnose_campaign(job: Any) -> None:
@@ -43,18 +44,39 @@ def diagnose_campaign(job: Any) -> None:
     from elastocal.io.data_frames import write_csv
 
     case = load_case(job.input.descriptions, job.input.training)
-    name, seed = job.wildcards.campaign, job.params.seed
-    found = diagnose(case, Settings(), seed, lambda line: print(f"{name}: {line}", file=sys.stderr, flush=True))
-    columns, facts = propose(found, stream(seed, case.campaign.name, "next experiment", 0), job.params.states)
+    name = job.wildcards.campaign
+    seed = job.params.seed
+    found = diagnose(
+        case,
+        Settings(),
+        seed,
+        lambda line: print(f"{name}: {line}", file=sys.stderr, flush=True),
+    )
+    columns, facts = propose(
+        found, stream(seed, case.campaign.name, "next experiment", 0), job.params.states
+    )
     write_csv(job.output.experiment, pd.DataFrame(columns))
     found = replace(found, document=found.document | {"next_experiment": facts})
     write_csv(job.output.candidates, pd.DataFrame(candidate_rows(found)))
-    write_json(job.output.diagnosis, diagnosis_facts(found) | {"covariance": found.final.covariance.tolist()})
-    write_table(job.output.steps, STEPS, step_blocks(found), provenance(job.params, **job.wildcards))
+    write_json(
+        job.output.diagnosis,
+        diagnosis_facts(found) | {"covariance": found.final.covariance.tolist()},
+    )
+    write_table(
+        job.output.steps,
+        STEPS,
+        step_blocks(found),
+        provenance(job.params, **job.wildcards),
+    )
 
 
-def load_case(descriptions_path: str | Path, measurements_path: str | Path, part: str | None = None) -> Case:
-    """A campaign from the files of step 1; `part` is the campaign that holds the test, where it is another one."""
+def load_case(
+    descriptions_path: str | Path,
+    measurements_path: str | Path,
+    part: str | None = None,
+) -> Case:
+    """A campaign from the files of step 1; `part` is the campaign that holds the test,
+    where it is another one."""
     descriptions = read_json(descriptions_path)
     described = (part and descriptions[part]) or descriptions
     joints = robot_from_document(described["robot"], described["source"]).joints
@@ -64,47 +86,80 @@ def load_case(descriptions_path: str | Path, measurements_path: str | Path, part
 def step_blocks(diagnosis: Diagnosis) -> Iterator[dict[str, np.ndarray | list[str]]]:
     """Blocks of the steps table."""
     for number, step in enumerate(diagnosis.steps):
-        yield {"step": np.full(len(step.fitted.held), number), **parameter_columns(step.fitted)}
+        yield {
+            "step": np.full(len(step.fitted.held), number),
+            **parameter_columns(step.fitted),
+        }
 
 
 def diagnosis_facts(diagnosis: Diagnosis) -> dict[str, Any]:
-    """What diagnosis.json holds: of each step its model, with the priors under which it was fitted, and its estimate."""
-    return {"document": diagnosis.document, "steps": [_step_facts(step) for step in diagnosis.steps]}
+    """What diagnosis.json holds: of each step its model, with the priors under which it
+    was fitted, and its estimate."""
+    return {
+        "document": diagnosis.document,
+        "steps": [_step_facts(step) for step in diagnosis.steps],
+    }
 
 
 def _step_facts(step: Step) -> dict[str, Any]:
-    effects, estimate = step.fitted.model.effects, step.fitted.estimate
-    parts: dict[str, Any] = {name: getattr(estimate, name).tolist() for name in _PLACEMENTS}
-    parts |= {name: [values.tolist() for values in getattr(estimate, name)] for name in _OF_EFFECTS}
+    effects = step.fitted.model.effects
+    estimate = step.fitted.estimate
+    parts: dict[str, Any] = {
+        name: getattr(estimate, name).tolist() for name in _PLACEMENTS
+    }
+    parts |= {
+        name: [values.tolist() for values in getattr(estimate, name)]
+        for name in _OF_EFFECTS
+    }
     return {
         "name": step.name,
         "kind": step.kind,
         "noise": noise_facts(step.fitted.noise),
         "effects": [effect.key for effect in effects],
-        "priors": [[parameter.prior_std for parameter in effect.parameters] for effect in effects],
-        "estimate": {"sessions": [int(session) for session in estimate.sessions]} | parts,
+        "priors": [
+            [parameter.prior_std for parameter in effect.parameters]
+            for effect in effects
+        ],
+        "estimate": {"sessions": [int(session) for session in estimate.sessions]}
+        | parts,
     }
 
 
-def final_parameters(facts: Mapping[str, Any], columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Parameters of the final model, (N,): `columns` of the steps table, of the last step of diagnosis.json, `facts`."""
-    return {name: values[columns["step"] == len(facts["steps"]) - 1] for name, values in columns.items()}
+def final_parameters(
+    facts: Mapping[str, Any], columns: Mapping[str, np.ndarray]
+) -> dict[str, np.ndarray]:
+    """Parameters of the final model, (N,): `columns` of the steps table, of the last
+    step of diagnosis.json, `facts`."""
+    return {
+        name: values[columns["step"] == len(facts["steps"]) - 1]
+        for name, values in columns.items()
+    }
 
 
 def diagnosis_from(case: Case, facts: Mapping[str, Any]) -> Diagnosis:
-    """A diagnosis from diagnosis.json, `facts`; without the evidence, which only training poses have.
+    """A diagnosis from diagnosis.json, `facts`; without the evidence, which only
+    training poses have.
 
     `case`: of the training poses.
     """
-    measurements, left_out = case.campaign.measurements, rows_left_out(case, facts)
+    measurements = case.campaign.measurements
+    left_out = rows_left_out(case, facts)
     case = case.select(~left_out)
-    steps = tuple(Step(step["name"], step["kind"], step_fit(case, step)) for step in facts["steps"])
-    return Diagnosis(case, steps, None, facts["document"], measurements.select(left_out))
+    steps = tuple(
+        Step(step["name"], step["kind"], step_fit(case, step))
+        for step in facts["steps"]
+    )
+    return Diagnosis(
+        case, steps, None, facts["document"], measurements.select(left_out)
+    )
 
 
 def rows_left_out(case: Case, facts: Mapping[str, Any]) -> np.ndarray:
-    """Which measurements of the training poses a diagnosis left out as gross errors, ndarray of bool (N,)."""
-    left_out = [row for entry in facts["document"]["gross_errors"] for row in entry["rows"]]
+    """Which measurements of the training poses a diagnosis left out as gross errors,
+    ndarray of bool (N,)."""
+    left_out = [
+        row for entry in facts["document"]["gross_errors"] for row in entry["rows"]
+    ]
     return np.isin(case.campaign.measurements.row, left_out)
 
 
@@ -115,8 +170,10 @@ def step_fit(case: Case, step: Mapping[str, Any]) -> Fit:
 
 
 def step_model(case: Case, step: Mapping[str, Any]) -> tuple[Model, Estimate]:
-    """Model of one step of diagnosis.json and its estimate, without fitting it again."""
-    known, stated = {effect.key: effect for effect in case.model.effects} | case.candidates, step["estimate"]
+    """Model of one step of diagnosis.json and its estimate, without fitting it
+    again."""
+    known = {effect.key: effect for effect in case.model.effects} | case.candidates
+    stated = step["estimate"]
     effects = []
     for key, priors in zip(step["effects"], step["priors"], strict=True):
         # A prior that the catalogue does not have is one whose size was estimated.
@@ -125,36 +182,76 @@ def step_model(case: Case, step: Mapping[str, Any]) -> tuple[Model, Estimate]:
             for p, prior in zip(known[key].parameters, priors, strict=True)
         )
         effects.append(replace(known[key], parameters=parameters))
-    parts: dict[str, Any] = {name: np.array(stated[name], float) for name in _PLACEMENTS}
-    parts |= {name: tuple(np.array(values, float) for values in stated[name]) for name in _OF_EFFECTS}
-    return replace(case.model, effects=tuple(effects)), Estimate(tuple(stated["sessions"]), **parts)
+    parts: dict[str, Any] = {
+        name: np.array(stated[name], float) for name in _PLACEMENTS
+    }
+    parts |= {
+        name: tuple(np.array(values, float) for values in stated[name])
+        for name in _OF_EFFECTS
+    }
+    return replace(case.model, effects=tuple(effects)), Estimate(
+        tuple(stated["sessions"]), **parts
+    )
 
 
 def candidate_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Rows of candidates.csv: those tested by falling Bayes factor, then the others with the reason.
+    """Rows of candidates.csv: those tested by falling Bayes factor, then the others
+    with the reason.
 
-    ``log_bayes_factor``: of a candidate alone against the declared model, averaged over its size; ``probability`` that it is in
-    the model; ``chosen``: whether the most probable model has it; ``note``: why it was not tested.
+    ``log_bayes_factor``: of a candidate alone against the declared model, averaged over
+    its size; ``probability`` that it is in the model; ``chosen``: whether the most
+    probable model has it; ``note``: why it was not tested.
     """
-    evidence, candidates = diagnosis.evidence, diagnosis.case.candidates
+    evidence = diagnosis.evidence
+    candidates = diagnosis.case.candidates
     rows: list[tuple[Any, ...]] = []
     untestable = dict.fromkeys(candidates, "the measurements are at fault")
     if evidence:
-        problem, untestable = evidence.linearized.problem, evidence.linearized.untestable
-        factors, inclusion = initial_screening(problem)[1], np.zeros(len(problem.units))
-        for model, probability in zip(evidence.posterior.models, evidence.posterior.probabilities, strict=True):
+        problem = evidence.linearized.problem
+        untestable = evidence.linearized.untestable
+        factors = initial_screening(problem)[1]
+        inclusion = np.zeros(len(problem.units))
+        for model, probability in zip(
+            evidence.posterior.models, evidence.posterior.probabilities, strict=True
+        ):
             inclusion[list(model.units)] += probability
         best = evidence.conclusion.best
-        chosen = set(evidence.posterior.models[best.model].units) if best.named else set()
+        chosen = (
+            set(evidence.posterior.models[best.model].units) if best.named else set()
+        )
         for number in np.argsort(-factors):
             unit = problem.units[number]
             if unit.candidate:
                 shape = unit.shapes[0] if unit.shapes else None
-                rows.append((unit.candidate, shape, factors[number], inclusion[number], number in chosen, ""))
+                rows.append(
+                    (
+                        unit.candidate,
+                        shape,
+                        factors[number],
+                        inclusion[number],
+                        number in chosen,
+                        "",
+                    )
+                )
     tested = {row[0].key for row in rows}
-    rows += [(each, None, None, None, False, untestable[key]) for key, each in candidates.items() if key not in tested]
-    names = ("candidate", "family", "shape", "log_bayes_factor", "probability", "chosen", "note")
-    return [dict(zip(names, (each.key, each.family, *stated), strict=True)) for each, *stated in rows]
+    rows += [
+        (each, None, None, None, False, untestable[key])
+        for key, each in candidates.items()
+        if key not in tested
+    ]
+    names = (
+        "candidate",
+        "family",
+        "shape",
+        "log_bayes_factor",
+        "probability",
+        "chosen",
+        "note",
+    )
+    return [
+        dict(zip(names, (each.key, each.family, *stated), strict=True))
+        for each, *stated in rows
+    ]
 
 
 def parameter_columns(fitted: Fit) -> dict[str, np.ndarray | list[str]]:
@@ -167,17 +264,25 @@ def parameter_columns(fitted: Fit) -> dict[str, np.ndarray | list[str]]:
         "value": _absolute_values(fitted.model, fitted.estimate),
         "std_error": np.sqrt(np.diag(fitted.covariance)),
         "held": fitted.held,
-        "prior_std": np.array([np.nan if p.prior_std is None else p.prior_std for _, p in named]),
+        "prior_std": np.array(
+            [np.nan if p.prior_std is None else p.prior_std for _, p in named]
+        ),
     }
 
 
 def _absolute_values(model: Model, estimate: Estimate) -> np.ndarray:
     parts = []
     if model.fitted_frames:
-        for shift, turn in zip(estimate.frame_position, estimate.frame_rotation, strict=True):
+        for shift, turn in zip(
+            estimate.frame_position, estimate.frame_rotation, strict=True
+        ):
             parts += [shift, Rotation.from_matrix(turn).as_rotvec()]
     for number, fitted in model.fitted_parts:
         turn = Rotation.from_matrix(estimate.target_rotation[number]).as_rotvec()
         parts.append(np.concatenate([estimate.target_offset[number], turn])[fitted])
-    effects = [part for pair in zip(estimate.coefficients, estimate.shapes, strict=True) for part in pair]
+    effects = [
+        part
+        for pair in zip(estimate.coefficients, estimate.shapes, strict=True)
+        for part in pair
+    ]
     return np.concatenate([*parts, *effects]) if parts or effects else np.zeros(0)

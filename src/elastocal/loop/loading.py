@@ -1,4 +1,5 @@
-"""Step 1: a campaign's folder to descriptions and measurements, those to fit apart from those to test."""
+"""Step 1: a campaign's folder to descriptions and measurements, those to fit apart from
+those to test."""
 
 from __future__ import annotations
 
@@ -23,33 +24,59 @@ if TYPE_CHECKING:
 
 def read_campaign(job: Any) -> None:
     """The step of a rule: a campaign's folder as tables."""
-    descriptions, training, held_out = load_campaign(job.params.folder, job.params.robots)
-    for path, part in ((job.output.training, training), (job.output.held_out, held_out)):
+    descriptions, training, held_out = load_campaign(
+        job.params.folder, job.params.robots
+    )
+    for path, part in (
+        (job.output.training, training),
+        (job.output.held_out, held_out),
+    ):
         schema = measurements(part.joint_angles.shape[1])
-        write_table(path, schema, [columns_of(part)], provenance(descriptions, **job.wildcards))
+        write_table(
+            path, schema, [columns_of(part)], provenance(descriptions, **job.wildcards)
+        )
     write_json(job.output.descriptions, descriptions)
 
 
-def load_campaign(folder: str | Path, robots_folder: str | Path) -> tuple[dict[str, Any], Measurements, Measurements]:
-    """Read a campaign, `folder` and `robots_folder` as in `reading.read_campaign`, and part its measurements.
+def load_campaign(
+    folder: str | Path, robots_folder: str | Path
+) -> tuple[dict[str, Any], Measurements, Measurements]:
+    """Read a campaign, `folder` and `robots_folder` as in `reading.read_campaign`, and
+    part its measurements.
 
-    Returns `descriptions`: ``campaign`` and ``robot``, the documents; ``held_out`` with the same of the campaign that holds the
-    test, or None; measurements to fit and to test. Raises `InputError`.
+    Returns `descriptions`: ``campaign`` and ``robot``, the documents; ``held_out`` with
+    the same of the campaign that holds the test, or None; measurements to fit and to
+    test. Raises `InputError`.
     """
     descriptions, campaign = described_campaign(folder, robots_folder)
     training, held_out = split(campaign)
-    test, other = None, reading.held_out_campaign(campaign, folder, robots_folder, effects())
+    test = None
+    other = reading.held_out_campaign(campaign, folder, robots_folder, effects())
     if other is not None:
-        test, _ = described_campaign(f"{folder}/{campaign.holdout['campaign']}", robots_folder)
+        test, _ = described_campaign(
+            f"{folder}/{campaign.holdout['campaign']}", robots_folder
+        )
         held_out = other.measurements
     return descriptions | {"held_out": test}, training, held_out
 
 
-def described_campaign(folder: str | Path, robots_folder: str | Path) -> tuple[dict[str, Any], Campaign]:
-    """A campaign as `load_campaign` reads it, as a whole and without the campaign that holds the test."""
+def described_campaign(
+    folder: str | Path, robots_folder: str | Path
+) -> tuple[dict[str, Any], Campaign]:
+    """A campaign as `load_campaign` reads it, as a whole and without the campaign that
+    holds the test."""
     campaign = reading.read_campaign(folder, robots_folder, effects())
     document, robot_path = reading.read_descriptions(folder, robots_folder)
-    # What a campaign may leave out gets its default here, so that no later step has to know what its absence means.
-    complete = {"compliance": "nominal", "declared": [], "holdout": DEFAULT_HOLDOUT} | document
+    # What a campaign may leave out gets its default here, so that no later step has to
+    # know what its absence means.
+    complete = {
+        "compliance": "nominal",
+        "declared": [],
+        "holdout": DEFAULT_HOLDOUT,
+    } | document
     complete |= {"table": campaign.table, "header_line": campaign.header_line}
-    return {"source": f"{folder}/{DOCUMENT}", "campaign": complete, "robot": read_document(robot_path)}, campaign
+    return {
+        "source": f"{folder}/{DOCUMENT}",
+        "campaign": complete,
+        "robot": read_document(robot_path),
+    }, campaign

@@ -1,6 +1,8 @@
-"""What a campaign can show, before anything is diagnosed: what was read, what is identified and testable, what is suspicious.
+"""What a campaign can show, before anything is diagnosed: what was read, what is
+identified and testable, what is suspicious.
 
-Held-out poses are counted, and their joint angles compared with those fitted; what was measured at them is not looked at.
+Held-out poses are counted, and their joint angles compared with those fitted; what was
+measured at them is not looked at.
 """
 
 from __future__ import annotations
@@ -15,7 +17,12 @@ from elastocal.campaigns.campaign import columns_of
 from elastocal.campaigns.holdout import measured_poses
 from elastocal.counting import counted, first_names
 from elastocal.data_checks.faults import controller_warnings, faults
-from elastocal.diagnosis.gross_errors import entries_of, first_kept, gross_errors, warnings_of
+from elastocal.diagnosis.gross_errors import (
+    entries_of,
+    first_kept,
+    gross_errors,
+    warnings_of,
+)
 from elastocal.diagnosis.linearize import linearized
 from elastocal.diagnosis.misplaced import misplaced
 from elastocal.diagnosis.settings import Settings
@@ -34,20 +41,27 @@ if TYPE_CHECKING:
 
 # Held-out poses of which a 95 % interval of an RMS is wider than a factor of two.
 FEWEST_HELD_OUT = 6
-# Loads whose directions span less than this share of the largest in a second direction pull in one line.
+# Loads whose directions span less than this share of the largest in a second direction
+# pull in one line.
 _ONE_DIRECTION = 0.05
 # A compliance is impossible where it is less than minus so many standard errors.
 _CLEAR = 2.0
 # Parameters that are not identifiable and are named; more would be too many to read.
 _NAMED = 8
-_SOURCES = {"repeats": "repeats", "declared": "the campaign's declaration", "residual": "the residual of the declared model"}
+_SOURCES = {
+    "repeats": "repeats",
+    "declared": "the campaign's declaration",
+    "residual": "the residual of the declared model",
+}
 
 
 @dataclass(frozen=True)
 class Overview:
-    """A campaign in words: `rows` of a table, heading and words; `attention`, sentences on faults and what looks suspicious.
+    """A campaign in words: `rows` of a table, heading and words; `attention`, sentences
+    on faults and what looks suspicious.
 
-    `testable`: number of candidate effects that can be tested. `diagnosable`: whether no fault of the data forbids it.
+    `testable`: number of candidate effects that can be tested. `diagnosable`: whether
+    no fault of the data forbids it.
     """
 
     campaign: str
@@ -58,58 +72,99 @@ class Overview:
 
 
 def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
-    """Look through a campaign; `folder`, `robots_folder` as in `reading.read_campaign`. Raises `InputError`.
+    """Look through a campaign; `folder`, `robots_folder` as in `reading.read_campaign`.
+    Raises `InputError`.
 
-    What is misplaced is not looked for where a compliance comes out negative, for then something is missing in the model.
+    What is misplaced is not looked for where a compliance comes out negative, for then
+    something is missing in the model.
     """
     descriptions, training, held_out = load_campaign(folder, robots_folder)
-    whole, settings = case_from(descriptions, columns_of(training)), Settings()
+    whole = case_from(descriptions, columns_of(training))
+    settings = Settings()
     part = first_kept(whole, settings)
-    errors = gross_errors(part.declared, part.noise, whole.campaign.measurements, part.kept, settings)
-    left_out = entries_of(replace(errors, gross=~part.kept), whole.campaign, held_out=False)
+    errors = gross_errors(
+        part.declared, part.noise, whole.campaign.measurements, part.kept, settings
+    )
+    left_out = entries_of(
+        replace(errors, gross=~part.kept), whole.campaign, held_out=False
+    )
     case, campaign, declared = part.case, part.case.campaign, part.to_all(part.declared)
-    untestable = linearized(part.declared, part.searched, [*case.candidates.values()], settings).untestable
+    untestable = linearized(
+        part.declared, part.searched, [*case.candidates.values()], settings
+    ).untestable
     testable = len(case.candidates) - len(untestable)
-    found, negative = faults(campaign), _negative_springs(declared)
+    found = faults(campaign)
+    negative = _negative_springs(declared)
     diagnosable = not found
     rows = _read(case, training, held_out)
-    rows.append(("noise", f"{1e6 * part.noise.position_m:.0f} µm a coordinate, from {_SOURCES[part.noise.source]}"))
+    rows.append(
+        (
+            "noise",
+            f"{1e6 * part.noise.position_m:.0f} µm a coordinate, from {_SOURCES[part.noise.source]}",
+        )
+    )
     rows += _identified(declared)
     attention = [fault.detail for fault in found]
     if diagnosable and not negative:
-        attention += [each["sentence"] for each in misplaced(_with_base(declared, case), campaign)]
+        attention += [
+            each["sentence"] for each in misplaced(_with_base(declared, case), campaign)
+        ]
     attention += [*controller_warnings(campaign), *part.warnings]
     if negative:
         joints = " and ".join(negative)
-        attention.append(f"the compliance of joint {joints} comes out negative: the declared model lacks something")
+        attention.append(
+            f"the compliance of joint {joints} comes out negative: the declared model lacks something"
+        )
     attention += [
         *warnings_of(left_out),
         *_suspicious(case, declared, training, held_out),
         *repeat_warnings(training, held_out),
     ]
     reasons = Counter(untestable.values()).most_common()
-    rows += [("testable", counted(testable, "candidate effect")), *(("", f"{n} not testable: {why}") for why, n in reasons)]
+    rows += [
+        ("testable", counted(testable, "candidate effect")),
+        *(("", f"{n} not testable: {why}") for why, n in reasons),
+    ]
     return Overview(campaign.name, diagnosable, testable, rows, attention)
 
 
-def _read(case: Case, training: Measurements, held_out: Measurements) -> list[tuple[str, str]]:
+def _read(
+    case: Case, training: Measurements, held_out: Measurements
+) -> list[tuple[str, str]]:
     """What was read."""
-    campaign, states = case.campaign, case.observations.states
-    sessions, most = counted(len(np.unique(states.session)), "session"), int(states.repeats.max())
+    campaign = case.campaign
+    states = case.observations.states
+    sessions = counted(len(np.unique(states.session)), "session")
+    most = int(states.repeats.max())
     force = np.linalg.norm(states.wrench[:, :3], axis=1).max()
     # Numbers of loads are labels; 0 is none.
     loaded = np.unique(states.load[states.load != 0]).size
-    loads = f"{counted(loaded, 'load')} of up to {force:,.0f} N" if loaded else "no load"
+    loads = (
+        f"{counted(loaded, 'load')} of up to {force:,.0f} N" if loaded else "no load"
+    )
     return [
-        ("read", f"{campaign.name}: {campaign.robot.name}, {counted(campaign.robot.joints, 'joint')}"),
-        ("", f"{campaign.measured} of {', '.join(target.name for target in campaign.targets)} in the {campaign.frame} frame"),
-        ("", f"{counted(_poses(training), 'pose')} to fit and {counted(_poses(held_out), 'validation pose')} in {sessions}"),
-        ("", f"{counted(len(training), 'measurement')}, up to {most} of a state, {loads}"),
+        (
+            "read",
+            f"{campaign.name}: {campaign.robot.name}, {counted(campaign.robot.joints, 'joint')}",
+        ),
+        (
+            "",
+            f"{campaign.measured} of {', '.join(target.name for target in campaign.targets)} in the {campaign.frame} frame",
+        ),
+        (
+            "",
+            f"{counted(_poses(training), 'pose')} to fit and {counted(_poses(held_out), 'validation pose')} in {sessions}",
+        ),
+        (
+            "",
+            f"{counted(len(training), 'measurement')}, up to {most} of a state, {loads}",
+        ),
     ]
 
 
 def _identified(declared: Fit) -> list[tuple[str, str]]:
-    """How well the declared model fits, and which of its parameters these poses determine."""
+    """How well the declared model fits, and which of its parameters these poses
+    determine."""
     rms = 1e3 * np.sqrt((declared.residual[:, :3] ** 2).sum(axis=1).mean())
     named = [f"{owner} {parameter.name}" for owner, parameter in declared.parameters]
     held = [name for name, held in zip(named, declared.held, strict=True) if held]
@@ -117,16 +172,24 @@ def _identified(declared: Fit) -> list[tuple[str, str]]:
     count = counted(int((~declared.held).sum()), "parameter")
     return [
         ("declared model", f"residual of {rms:.3f} mm RMS on the fitted poses"),
-        ("identified", f"{count}, effectively {effective_parameters(declared):.0f}{left}"),
+        (
+            "identified",
+            f"{count}, effectively {effective_parameters(declared):.0f}{left}",
+        ),
     ]
 
 
 def _with_base(declared: Fit, case: Case) -> Fit:
-    """The declared model with a base that may stand elsewhere than declared, where one is."""
+    """The declared model with a base that may stand elsewhere than declared, where one
+    is."""
     base = case.candidates.get("base_placement")
     if base is None or case.campaign.frame != "base":
         return declared
-    return fit(replace(declared.model, effects=(*declared.model.effects, base)), case.observations, declared.noise)
+    return fit(
+        replace(declared.model, effects=(*declared.model.effects, base)),
+        case.observations,
+        declared.noise,
+    )
 
 
 def _poses(part: Measurements) -> int:
@@ -134,19 +197,28 @@ def _poses(part: Measurements) -> int:
 
 
 def _negative_springs(declared: Fit) -> list[str]:
-    """Joints whose compliance is negative by more than chance: what the declared model lacks hides behind them."""
+    """Joints whose compliance is negative by more than chance: what the declared model
+    lacks hides behind them."""
     if not declared.model.identifies_compliance:
         return []
     mine = declared.places_of("joint_compliance")
-    errors = np.where(declared.held[mine], np.inf, np.sqrt(np.diag(declared.covariance))[mine])
+    errors = np.where(
+        declared.held[mine], np.inf, np.sqrt(np.diag(declared.covariance))[mine]
+    )
     below = joint_compliances(declared.model, declared.estimate) < -_CLEAR * errors
     return [str(joint + 1) for joint in np.flatnonzero(below)]
 
 
-def _suspicious(case: Case, declared: Fit, training: Measurements, held_out: Measurements) -> list[str]:
+def _suspicious(
+    case: Case, declared: Fit, training: Measurements, held_out: Measurements
+) -> list[str]:
     """What little or one-sided measurements cannot show."""
-    found, states, numbers = [], case.observations.states, declared.residual.size
-    effective, parameters, poses = effective_parameters(declared), int((~declared.held).sum()), _poses(training)
+    found = []
+    states = case.observations.states
+    numbers = declared.residual.size
+    effective = effective_parameters(declared)
+    parameters = int((~declared.held).sum())
+    poses = _poses(training)
     least = int(np.ceil(poses * Settings().numbers_a_parameter * effective / numbers))
     if least > poses:
         found.append(
@@ -155,17 +227,25 @@ def _suspicious(case: Case, declared: Fit, training: Measurements, held_out: Mea
             " orientations too, or declare fewer errors"
         )
     if states.repeats.max() == 1:
-        found.append("no pose is repeated: the noise is what the campaign declares, or what the model leaves")
+        found.append(
+            "no pose is repeated: the noise is what the campaign declares, or what the model leaves"
+        )
     if (judged := _poses(held_out)) < FEWEST_HELD_OUT:
-        found.append(f"{judged} held-out poses say little of the error: {FEWEST_HELD_OUT} or more would")
+        found.append(
+            f"{judged} held-out poses say little of the error: {FEWEST_HELD_OUT} or more would"
+        )
     forces = states.wrench[states.wrench.any(axis=1), :3]
     if len(forces):
         # A single force has a single singular value.
         largest, second = [*np.linalg.svd(forces, compute_uv=False), 0.0][:2]
         if second < _ONE_DIRECTION * largest:
-            found.append("all loads pull along one line: compliances across it are not shown")
+            found.append(
+                "all loads pull along one line: compliances across it are not shown"
+            )
     elif case.campaign.compliance == "identify":
         found.append("no measurement is under a load: compliances are not identifiable")
     if len(np.unique(states.load)) == 2:
-        found.append("one load beside none: what is not linear in the load cannot be distinguished")
+        found.append(
+            "one load beside none: what is not linear in the load cannot be distinguished"
+        )
     return found

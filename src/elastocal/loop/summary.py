@@ -1,4 +1,5 @@
-"""All campaigns on one page: verdicts, and held-out errors before and after; folds of one campaign are pooled."""
+"""All campaigns on one page: verdicts, and held-out errors before and after; folds of
+one campaign are pooled."""
 
 from __future__ import annotations
 
@@ -23,39 +24,72 @@ _STAGES = ("before", "after")
 def summarize_campaigns(job: Any) -> None:
     """The step of a rule: all campaigns of one kind as one table."""
     settings = job.params
-    verdicts = {name: read_json(path) for name, path in zip(settings.campaigns, job.input.verdicts, strict=True)}
+    verdicts = {
+        name: read_json(path)
+        for name, path in zip(settings.campaigns, job.input.verdicts, strict=True)
+    }
     held_out = {
-        name: read_frame(path, residuals(len(verdicts[name]["noise"]["joint_rad"]))).query("held_out and not gross_error")
+        name: read_frame(
+            path, residuals(len(verdicts[name]["noise"]["joint_rad"]))
+        ).query("held_out and not gross_error")
         for name, path in zip(settings.campaigns, job.input.residuals, strict=True)
     }
-    write_csv(job.output.table, campaign_rows(verdicts, held_out, settings.folds, settings.seed))
+    write_csv(
+        job.output.table,
+        campaign_rows(verdicts, held_out, settings.folds, settings.seed),
+    )
 
 
 def campaign_rows(
-    verdicts: Mapping[str, Mapping[str, Any]], residuals: Mapping[str, pd.DataFrame], folds: dict[str, list[str]], seed: int
+    verdicts: Mapping[str, Mapping[str, Any]],
+    residuals: Mapping[str, pd.DataFrame],
+    folds: dict[str, list[str]],
+    seed: int,
 ) -> pd.DataFrame:
-    """One row for each campaign and session, and one for all folds of a campaign together.
+    """One row for each campaign and session, and one for all folds of a campaign
+    together.
 
-    `verdicts`: contents of verdict.json by campaign. `residuals`: held-out rows of residuals.parquet. `folds`: campaigns that
-    hold out the folds of one set of measurements, by a name for all. `seed`: of the bootstrap over poses.
+    `verdicts`: contents of verdict.json by campaign. `residuals`: held-out rows of
+    residuals.parquet. `folds`: campaigns that hold out the folds of one set of
+    measurements, by a name for all. `seed`: of the bootstrap over poses.
     """
     pooled = {name for names in folds.values() for name in names}
     groups = {name: [name] for name in verdicts if name not in pooled} | folds
     rows = []
     for name, members in groups.items():
         held_out = pd.concat([residuals[member] for member in members])
-        stated = pd.Series([verdicts[member]["verdict"] for member in members]).value_counts()
-        named = pd.Series([_effects(verdicts[member]) for member in members]).value_counts()
-        head = {"campaign": name, "verdict": _counted(stated, len(members)), "effects": _counted(named, len(members))}
+        stated = pd.Series(
+            [verdicts[member]["verdict"] for member in members]
+        ).value_counts()
+        named = pd.Series(
+            [_effects(verdicts[member]) for member in members]
+        ).value_counts()
+        head = {
+            "campaign": name,
+            "verdict": _counted(stated, len(members)),
+            "effects": _counted(named, len(members)),
+        }
         session: Any
         for session, part in held_out.groupby("session"):
-            rows.append(head | {"session": session} | _errors(part, stream(seed, name, "summary", session)))
+            rows.append(
+                head
+                | {"session": session}
+                | _errors(part, stream(seed, name, "summary", session))
+            )
     return pd.DataFrame(rows)
 
 
 def _effects(verdict: Mapping[str, Any]) -> str:
-    at = [(effect["name"], ", ".join(map(str, effect["joints"]))) for effect in verdict["effects"]]
-    return " + ".join(f"{name} (joint {joints})" if joints else name for name, joints in at) or "none"
+    at = [
+        (effect["name"], ", ".join(map(str, effect["joints"])))
+        for effect in verdict["effects"]
+    ]
+    return (
+        " + ".join(
+            f"{name} (joint {joints})" if joints else name for name, joints in at
+        )
+        or "none"
+    )
 
 
 def _counted(counts: pd.Series, total: int) -> str:
@@ -70,12 +104,16 @@ def _errors(part: pd.DataFrame, draws: np.random.Generator) -> dict[str, float]:
     columns = [f"{stage}_{axis}" for stage in _STAGES for axis in ("dx", "dy", "dz")]
     mean = part.groupby(state, sort=True)[columns].mean()
     cluster = np.unique(mean.index.get_level_values("pose"), return_inverse=True)[1]
-    errors = [Errors(np.linalg.norm(mean[columns[3 * k : 3 * k + 3]], axis=1), cluster) for k in range(len(_STAGES))]
+    errors = [
+        Errors(np.linalg.norm(mean[columns[3 * k : 3 * k + 3]], axis=1), cluster)
+        for k in range(len(_STAGES))
+    ]
     limits, reductions = intervals(errors, _REPLICATES, draws)
     row: dict[str, float] = {"poses": errors[0].poses}
     for stage, error, limit in zip(_STAGES, errors, limits, strict=True):
         for name, value in summary(error.distance).items():
             row[f"{stage}_{name.removesuffix('_m')}_mm"] = 1e3 * value
         row[f"{stage}_rms_low_mm"], row[f"{stage}_rms_high_mm"] = 1e3 * limit["rms_m"]
-    row["rms_reduction_low"], row["rms_reduction_high"] = reductions[1].low, reductions[1].high
+    row["rms_reduction_low"] = reductions[1].low
+    row["rms_reduction_high"] = reductions[1].high
     return row

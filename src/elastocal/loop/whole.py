@@ -1,5 +1,5 @@
-"""A campaign's folder to its verdict in one call: what the blind proof, benchmarks and notebooks use. The pipeline makes the
-same two calls, with tables between them."""
+"""A campaign's folder to its verdict in one call: what the blind proof, benchmarks and
+notebooks use. The pipeline makes the same two calls, with tables between them."""
 
 from __future__ import annotations
 
@@ -55,7 +55,12 @@ def judge_campaign(job: Any) -> None:
     write_json(job.output.verdict, verdict.document, allow_nan=False)
     write_csv(job.output.before_after, pd.DataFrame(verdict.rows))
     schema = residuals(case.campaign.robot.joints)
-    write_table(job.output.residuals, schema, residual_blocks(found, verdict), provenance(job.params, **job.wildcards))
+    write_table(
+        job.output.residuals,
+        schema,
+        residual_blocks(found, verdict),
+        provenance(job.params, **job.wildcards),
+    )
 
 
 def cases_in(folder: str | Path, robots_folder: str | Path) -> tuple[Case, Case]:
@@ -70,57 +75,100 @@ def cases_in(folder: str | Path, robots_folder: str | Path) -> tuple[Case, Case]
     )
 
 
-def diagnosed(folder: str | Path, robots_folder: str | Path, seed: int, settings: Settings | None = None) -> dict[str, Any]:
+def diagnosed(
+    folder: str | Path,
+    robots_folder: str | Path,
+    seed: int,
+    settings: Settings | None = None,
+) -> dict[str, Any]:
     """Diagnose a campaign and judge it on its held-out poses.
 
     `folder`, `robots_folder`: as in `reading.read_campaign`. Returns as verdict.json.
     """
     training, held_out = cases_in(folder, robots_folder)
-    return judged(diagnose(training, settings or Settings(), seed), held_out, seed).document
+    return judged(
+        diagnose(training, settings or Settings(), seed), held_out, seed
+    ).document
 
 
 def calibrated_by(
-    diagnosis: Diagnosis, held_out: Case, delivered: Corrected | None, physics_only: bool = False
+    diagnosis: Diagnosis,
+    held_out: Case,
+    delivered: Corrected | None,
+    physics_only: bool = False,
 ) -> CalibratedRobot:
-    """The robot that a diagnosis found, with all that is known of its errors: held-out rows without gross ones judge it.
+    """The robot that a diagnosis found, with all that is known of its errors: held-out
+    rows without gross ones judge it.
 
-    `delivered`: of `judge.as_delivered`. `physics_only`: corrected without its regression; where there is one, what the final
-    model leaves is known to be no noise.
+    `delivered`: of `judge.as_delivered`. `physics_only`: corrected without its
+    regression; where there is one, what the final model leaves is known to be no noise.
     """
-    case, final = diagnosis.case, diagnosis.final
+    case = diagnosis.case
+    final = diagnosis.final
     residual = position_residuals(*placed(final, case, held_out), held_out.observations)
-    noise_m, more = final.noise.position_m, None
+    noise_m = final.noise.position_m
+    more = None
     if delivered is not None and delivered.predictor is not None:
         noise_m = diagnosis.document["noise"]["position_m"]
         if not physics_only:
             residual = delivered.residual
-            more = regression_on(case, final.estimate, delivered.predictor, delivered.chosen["spread"]["typical"], noise_m)
-    found = calibrate_on_case(case, final.model, final.estimate, final.covariance, final.noise, more)
+            more = regression_on(
+                case,
+                final.estimate,
+                delivered.predictor,
+                delivered.chosen["spread"]["typical"],
+                noise_m,
+            )
+    found = calibrate_on_case(
+        case, final.model, final.estimate, final.covariance, final.noise, more
+    )
     found = set_form(found, diagnosis.document["other_models_m"] or 0.0)
     return judge_by_held_out(found, held_out, residual, noise_m)
 
 
 def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
-    """The verdict of a diagnosis on held-out poses, with the accuracy of the corrected robot and the cost of each effect.
+    """The verdict of a diagnosis on held-out poses, with the accuracy of the corrected
+    robot and the cost of each effect.
 
-    ``accuracy`` and ``uncorrected_m``, the RMS error without a correction at the same poses, are predicted; ``cost_m`` of an
-    effect is the RMS error over the campaign's poses and loads if it alone were left out of the correction. All are None where
-    the data are at fault, the cost also of an effect that is in no command. ``misplaced``: what was
-    declared wrongly, see there. ``physics``: accuracy and ``uncorrected_m`` of a robot that is corrected without the regression
-    on the remainder; None where there is none.
+    ``accuracy`` and ``uncorrected_m``, the RMS error without a correction at the same
+    poses, are predicted; ``cost_m`` of an effect is the RMS error over the campaign's
+    poses and loads if it alone were left out of the correction. All are None where the
+    data are at fault, the cost also of an effect that is in no command. ``misplaced``:
+    what was declared wrongly, see there. ``physics``: accuracy and ``uncorrected_m`` of
+    a robot that is corrected without the regression on the remainder; None where there
+    is none.
     """
-    verdict, costs = judge(diagnosis, held_out, seed), dict[str, float]()
-    stated: dict[str, Any] = {"accuracy": None, "uncorrected_m": None, "physics": None, "misplaced": []}
+    verdict = judge(diagnosis, held_out, seed)
+    costs = dict[str, float]()
+    stated: dict[str, Any] = {
+        "accuracy": None,
+        "uncorrected_m": None,
+        "physics": None,
+        "misplaced": [],
+    }
     if not data_at_fault(verdict.document):
         found = calibrated_by(diagnosis, verdict.held_out, verdict.delivered)
-        stated |= _accuracy(found) | {"misplaced": misplaced(diagnosis.final, diagnosis.case.campaign)}
+        stated |= _accuracy(found) | {
+            "misplaced": misplaced(diagnosis.final, diagnosis.case.campaign)
+        }
         if found.remainder is not None:
-            stated["physics"] = _accuracy(calibrated_by(diagnosis, verdict.held_out, verdict.delivered, physics_only=True))
+            stated["physics"] = _accuracy(
+                calibrated_by(
+                    diagnosis, verdict.held_out, verdict.delivered, physics_only=True
+                )
+            )
         costs = effect_costs(replace(found, remainder=None), *campaign_poses(found))
-    effects = [effect | {"cost_m": costs.get(effect["name"])} for effect in verdict.document["effects"]]
+    effects = [
+        effect | {"cost_m": costs.get(effect["name"])}
+        for effect in verdict.document["effects"]
+    ]
     return replace(verdict, document=verdict.document | stated | {"effects": effects})
 
 
 def _accuracy(found: CalibratedRobot) -> dict[str, Any]:
-    """Predicted accuracy of a corrected robot, and in the same frame the RMS error of the uncorrected one at the same poses."""
-    return {"accuracy": asdict(campaign_accuracy(found)), "uncorrected_m": uncorrected_m(found, *campaign_poses(found))}
+    """Predicted accuracy of a corrected robot, and in the same frame the RMS error of
+    the uncorrected one at the same poses."""
+    return {
+        "accuracy": asdict(campaign_accuracy(found)),
+        "uncorrected_m": uncorrected_m(found, *campaign_poses(found)),
+    }

@@ -1,4 +1,5 @@
-"""Components of a displacement and of a wrench: name, unit and meaning, as every table and file has them."""
+"""Components of a displacement and of a wrench: name, unit and meaning, as every table
+and file has them."""
 
 COMPONENTS = (
     *((f"d{axis}", "m", f"displacement along base {axis}") for axis in "xyz"),

@@ -1,1 +1,2 @@
-"""What physics leaves: whether it is a function of the joints, and regressions on it."""
+"""What physics leaves: whether it is a function of the joints, and regressions on
+it."""

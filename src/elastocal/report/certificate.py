@@ -1,4 +1,5 @@
-"""What a certificate states, from its contents: sentences and tables of `certificate.txt`, and its pages."""
+"""What a certificate states, from its contents: sentences and tables of
+`certificate.txt`, and its pages."""
 
 from __future__ import annotations
 
@@ -33,18 +34,32 @@ _LISTS = ("misplaced", "identity", "data")
 def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
     """Facts for the pages of a certificate.
 
-    `document`: of `calibrated_files.certificate`. Returns JSON-serialisable; strings ready to print, lists for tables.
+    `document`: of `calibrated_files.certificate`. Returns JSON-serialisable; strings
+    ready to print, lists for tables.
     """
-    spoken = {"accuracy_sentence": accuracy_sentence(Accuracy(**document["accuracy"])), "title": title_of(document)}
+    spoken = {
+        "accuracy_sentence": accuracy_sentence(Accuracy(**document["accuracy"])),
+        "title": title_of(document),
+    }
     stated = sentences("certificate.txt", say.FILTERS, document=document, **spoken)
     budget = []
     for line in document["budget"]:
         below = 0.0 < line["rms_m"] < _NOTHING_M
         hidden = line["name"] == "repeatability" and not line["rms_m"]
-        size = f"below {say.length(_NOTHING_M, 1)}" if below else say.length(line["rms_m"])
-        budget.append([share_name(line["name"]), "hidden by the tracker's noise" if hidden else size])
+        size = (
+            f"below {say.length(_NOTHING_M, 1)}" if below else say.length(line["rms_m"])
+        )
+        budget.append(
+            [
+                share_name(line["name"]),
+                "hidden by the tracker's noise" if hidden else size,
+            ]
+        )
     return {
-        **{name: lines if name in _LISTS else " ".join(lines) for name, lines in stated.items()},
+        **{
+            name: lines if name in _LISTS else " ".join(lines)
+            for name, lines in stated.items()
+        },
         "campaign": document["campaign"],
         "robot": document["robot"],
         "decision": document["conformity"]["decision"],

@@ -1,4 +1,5 @@
-"""The study's configuration: checked as a whole before anything runs, with the robots and strategies that it names."""
+"""The study's configuration: checked as a whole before anything runs, with the robots
+and strategies that it names."""
 
 import re
 from collections.abc import Iterable, Mapping
@@ -22,8 +23,9 @@ _SIMULATED = ("joint_limits_deg", "compliance_urad_per_Nm")
 class Study:
     """A configuration that holds together.
 
-    `robots`, `strategies`: documents by the names of their files. `points`: measuring points that each strategy reads.
-    `end_effectors`: last measuring point of each robot.
+    `robots`, `strategies`: documents by the names of their files. `points`: measuring
+    points that each strategy reads. `end_effectors`: last measuring point of each
+    robot.
     """
 
     robots: dict[str, dict[str, Any]]
@@ -32,27 +34,45 @@ class Study:
     end_effectors: dict[str, str]
 
 
-def check_study(config: Mapping[str, Any], folder: str | Path, source: str = "config.yaml") -> Study:
-    """Read the robots and strategies that a configuration names and check everything against everything.
+def check_study(
+    config: Mapping[str, Any], folder: str | Path, source: str = "config.yaml"
+) -> Study:
+    """Read the robots and strategies that a configuration names and check everything
+    against everything.
 
-    `folder`: holds ``robots/`` and ``strategies/``. `source`: file of the configuration, named in errors. Raises `InputError`:
-    the first fault found.
+    `folder`: holds ``robots/`` and ``strategies/``. `source`: file of the
+    configuration, named in errors. Raises `InputError`: the first fault found.
     """
     check_document(config, "config", source)
-    robots = {name: named_document(folder, "robots", "robot", name, source) for name in config["robots"]}
+    robots = {
+        name: named_document(folder, "robots", "robot", name, source)
+        for name in config["robots"]
+    }
     for name, document in robots.items():
         for key in (key for key in _SIMULATED if key not in document):
             raise InputError(
-                document_path(folder, "robots", name), key, "nothing", "values to simulate with, in a robot of the study"
+                document_path(folder, "robots", name),
+                key,
+                "nothing",
+                "values to simulate with, in a robot of the study",
             )
-    strategies = {name: named_document(folder, "strategies", "strategy", name, source) for name in config["strategies"]}
+    strategies = {
+        name: named_document(folder, "strategies", "strategy", name, source)
+        for name in config["strategies"]
+    }
     named: dict[str, str] = {}
     for name, document in strategies.items():
         if (first := named.setdefault(document["name"], name)) != name:
             place = document_path(folder, "strategies", name)
-            raise InputError(place, "name", f"{document['name']!r}, as of {first}", "a name of its own: tables go by it")
+            raise InputError(
+                place,
+                "name",
+                f"{document['name']!r}, as of {first}",
+                "a name of its own: tables go by it",
+            )
     chains = {
-        name: robot_from_document(document, document_path(folder, "robots", name)).chain for name, document in robots.items()
+        name: robot_from_document(document, document_path(folder, "robots", name)).chain
+        for name, document in robots.items()
     }
     points = {}
     for name, document in strategies.items():
@@ -60,32 +80,57 @@ def check_study(config: Mapping[str, Any], folder: str | Path, source: str = "co
         points[name] = strategy.points
         for chain in chains.values():
             check_strategy(strategy, chain, document_path(folder, "strategies", name))
-        needed = first_solvable_length(strategy, rows_read(config["interpretations"]["measured"]))
+        needed = first_solvable_length(
+            strategy, rows_read(config["interpretations"]["measured"])
+        )
         if config["configurations"] < needed:
             raise InputError(
-                source, "configurations", str(config["configurations"]), f"{needed} or more: {strategy.name} is short"
+                source,
+                "configurations",
+                str(config["configurations"]),
+                f"{needed} or more: {strategy.name} is short",
             )
     if all("links" in document for document in robots.values()):
         raise InputError(
-            source, "robots", f"{config['robots']}, all with links", "at least one robot without links for Tables 3 and 4"
+            source,
+            "robots",
+            f"{config['robots']}, all with links",
+            "at least one robot without links for Tables 3 and 4",
         )
     own = {point.name for chain in chains.values() for point in chain.points}
     for label, names in config["questions"]["point_sets"].items():
         for name in (name for name in names if name not in own):
             # A set may be there for robots that this study leaves out.
             files = Path(folder, "robots").glob("*.yaml")
-            known = sorted({point for file in files for point in _POINT.findall(file.read_text("utf-8"))})
+            known = sorted(
+                {
+                    point
+                    for file in files
+                    for point in _POINT.findall(file.read_text("utf-8"))
+                }
+            )
             if name not in known:
-                raise InputError(source, f"questions.point_sets.{label}", repr(name), ", ".join(known))
+                raise InputError(
+                    source,
+                    f"questions.point_sets.{label}",
+                    repr(name),
+                    ", ".join(known),
+                )
     _check_cells(config, source)
-    return Study(robots, strategies, points, {name: chain.end_effector.name for name, chain in chains.items()})
+    return Study(
+        robots,
+        strategies,
+        points,
+        {name: chain.end_effector.name for name, chain in chains.items()},
+    )
 
 
 def override(config: Mapping[str, Any], entries: Iterable[str]) -> dict[str, Any]:
-    """A configuration with keys changed on the command line, numbers read as in the file.
+    """A configuration with keys changed on the command line, numbers read as in the
+    file.
 
-    `entries`: ``key=value``; a value that is a mapping changes some keys of a mapping. Raises `InputError`: a value that is no
-    YAML.
+    `entries`: ``key=value``; a value that is a mapping changes some keys of a mapping.
+    Raises `InputError`: a value that is no YAML.
     """
     changed = dict(config)
     for key, _, text in (entry.partition("=") for entry in entries):
@@ -100,21 +145,35 @@ def _merge(old: Any, new: Any) -> Any:
 
 
 def rows_read(measured: str) -> int:
-    """Measurements of one point in one configuration: 6 where poses are measured, 3 where positions are."""
+    """Measurements of one point in one configuration: 6 where poses are measured, 3
+    where positions are."""
     return {"pose": 6, "position": 3}[measured]
 
 
 def _check_cells(config: Mapping[str, Any], source: str) -> None:
-    tables, longest = config["tables"], config["configurations"]
+    tables = config["tables"]
+    longest = config["configurations"]
     levels: dict[str, float] = {}
     for level in config["noise_um"]:
         if levels.setdefault(f"{level:g}", level) != level:
-            raise InputError(source, "noise_um", f"{levels[f'{level:g}']} and {level}", "levels that differ in 6 digits")
+            raise InputError(
+                source,
+                "noise_um",
+                f"{levels[f'{level:g}']} and {level}",
+                "levels that differ in 6 digits",
+            )
     for key, name, allowed in (
         ("classical_strategy", "strategies", config["strategies"]),
         ("noise_um", "noise_um", config["noise_um"]),
     ):
         if tables[key] not in allowed:
-            raise InputError(source, f"tables.{key}", repr(tables[key]), f"one of {name} {allowed}")
+            raise InputError(
+                source, f"tables.{key}", repr(tables[key]), f"one of {name} {allowed}"
+            )
     if tables["length"] > longest:
-        raise InputError(source, "tables.length", str(tables["length"]), f"up to configurations = {longest}")
+        raise InputError(
+            source,
+            "tables.length",
+            str(tables["length"]),
+            f"up to configurations = {longest}",
+        )

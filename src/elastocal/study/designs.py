@@ -1,7 +1,7 @@
 """Which configurations (RQ3): random against chosen ones.
 
-Candidates are random configurations with their loads; a design is some of them. Its worth is the error that simulated data sets
-of it leave.
+Candidates are random configurations with their loads; a design is some of them. Its
+worth is the error that simulated data sets of it leave.
 """
 
 from __future__ import annotations
@@ -34,16 +34,37 @@ if TYPE_CHECKING:
 RANDOM = "random"
 SIMULATED_DESIGNS = table(
     "simulated_designs",
-    Column("load", "text", "", "kind of load: random directions, or one direction in every configuration"),
-    Column("design", "text", "", "criterion by which the configurations are chosen, or random"),
+    Column(
+        "load",
+        "text",
+        "",
+        "kind of load: random directions, or one direction in every configuration",
+    ),
+    Column(
+        "design",
+        "text",
+        "",
+        "criterion by which the configurations are chosen, or random",
+    ),
     whole("configurations", "configurations of the design", 1),
-    Column("unobservable", "text", "", "joints that the loads do not move, from 1, with commas between them"),
-    real("rms", "m", "RMS end-effector error over simulated data sets on test configurations"),
+    Column(
+        "unobservable",
+        "text",
+        "",
+        "joints that the loads do not move, from 1, with commas between them",
+    ),
+    real(
+        "rms",
+        "m",
+        "RMS end-effector error over simulated data sets on test configurations",
+    ),
     real("std_error", "m", "Monte Carlo standard error of the same"),
 )
-# Random designs of each size; each has as many noisy data sets as all have together over this.
+# Random designs of each size; each has as many noisy data sets as all have together
+# over this.
 _SIMULATED = 200
-# A joint whose columns are smaller than this share of the largest is not moved by the loads.
+# A joint whose columns are smaller than this share of the largest is not moved by the
+# loads.
 _MOVED = 1e-9
 
 
@@ -51,8 +72,9 @@ _MOVED = 1e-9
 class Candidates:
     """Configurations under loads of one kind, among which is chosen.
 
-    `rows` (N, rows, n): regressors, m per rad/(N m). `deflections` (N, rows): without noise. `observable` (n,): joints that the
-    loads move. `form`: mean squared error over the test configurations as a quadratic form.
+    `rows` (N, rows, n): regressors, m per rad/(N m). `deflections` (N, rows): without
+    noise. `observable` (n,): joints that the loads move. `form`: mean squared error
+    over the test configurations as a quadratic form.
     """
 
     rows: np.ndarray
@@ -62,12 +84,17 @@ class Candidates:
 
 
 def simulated_design_blocks(
-    study: StudyInMemory, candidates: int, sizes: Sequence[int], loads: Mapping[str, Sequence[float] | None]
+    study: StudyInMemory,
+    candidates: int,
+    sizes: Sequence[int],
+    loads: Mapping[str, Sequence[float] | None],
 ) -> Iterator[dict[str, np.ndarray]]:
-    """Errors that designs leave in simulated data sets of their configurations, kind of load by kind.
+    """Errors that designs leave in simulated data sets of their configurations, kind of
+    load by kind.
 
-    `candidates`: how many. `loads`: direction of the force by the name of its kind, base axes; None for one that is random in
-    each configuration. Where the loads do not move a joint, it is left out, and the test configurations have the loads of the
+    `candidates`: how many. `loads`: direction of the force by the name of its kind,
+    base axes; None for one that is random in each configuration. Where the loads do not
+    move a joint, it is left out, and the test configurations have the loads of the
     candidates.
     """
     for load, direction in loads.items():
@@ -77,15 +104,29 @@ def simulated_design_blocks(
         rows = made.rows[..., of] * scale / study.size.noise
         # The form is of the squared error in all compliances and 1.
         rules = {"I": Criterion(made.form[np.ix_(of, of)] * np.outer(scale, scale))}
-        rules |= {kind: criterion(kind, rows[:, :3]) for kind in CRITERIA if kind != "I"}
+        rules |= {
+            kind: criterion(kind, rows[:, :3]) for kind in CRITERIA if kind != "I"
+        }
         found: list[tuple[str, int, Sequence[np.ndarray] | np.ndarray | list[int]]] = []
         for kind, rule in rules.items():
             # A greedy choice of fewer is the beginning of that of more.
             longest = choose_greedily(rows, max(sizes), rule)
-            found += [(kind, size, exchange_candidates(rows, longest[:size], rule)) for size in sizes]
+            found += [
+                (kind, size, exchange_candidates(rows, longest[:size], rule))
+                for size in sizes
+            ]
         draws = stream(study.seed, study.key, f"random designs/{load}", 0)
-        found += [(RANDOM, size, [draws.choice(candidates, size, False) for _ in range(_SIMULATED)]) for size in sizes]
-        errors = np.array([_simulate(study, made, np.atleast_2d(chosen)) for _, _, chosen in found])
+        found += [
+            (
+                RANDOM,
+                size,
+                [draws.choice(candidates, size, False) for _ in range(_SIMULATED)],
+            )
+            for size in sizes
+        ]
+        errors = np.array(
+            [_simulate(study, made, np.atleast_2d(chosen)) for _, _, chosen in found]
+        )
         hidden = ", ".join(str(joint + 1) for joint in np.flatnonzero(~of))
         yield {
             "load": np.full(len(found), load, object),
@@ -96,7 +137,9 @@ def simulated_design_blocks(
         }
 
 
-def _candidates(study: StudyInMemory, count: int, direction: Sequence[float] | None) -> Candidates:
+def _candidates(
+    study: StudyInMemory, count: int, direction: Sequence[float] | None
+) -> Candidates:
     read = study.interpretation
     within = study if direction is None else study.under(direction=tuple(direction))
     drawn = within.experiments([0], count, "candidates of designs")
@@ -104,22 +147,33 @@ def _candidates(study: StudyInMemory, count: int, direction: Sequence[float] | N
     size = np.abs(rows).max(axis=(0, 1))
     observable = size > _MOVED * size.max()
     tests = study.tests() if observable.all() else within.tests()
-    form = make_judge(study.robot, tests, within.deflections(tests), read.wrench_at).form
-    return Candidates(rows, within.deflections(drawn)[0, :, : read.rows], observable, form)
+    form = make_judge(
+        study.robot, tests, within.deflections(tests), read.wrench_at
+    ).form
+    return Candidates(
+        rows, within.deflections(drawn)[0, :, : read.rows], observable, form
+    )
 
 
-def _simulate(study: StudyInMemory, candidates: Candidates, designs: np.ndarray) -> tuple[float, float]:
+def _simulate(
+    study: StudyInMemory, candidates: Candidates, designs: np.ndarray
+) -> tuple[float, float]:
     """RMS error with its standard error of noisy data sets by designs (D, size)."""
     repeats = -(-study.size.data_sets // len(designs))
     draws = stream(study.seed, study.key, f"noise of designs/{designs.shape[1]}", 0)
     of = candidates.observable
     rows = candidates.rows[designs][..., of].reshape(len(designs), -1, of.sum())
     ideal = candidates.deflections[designs].reshape(len(designs), -1, 1)
-    measured = ideal + study.size.noise * draws.standard_normal((*ideal.shape[:2], repeats))
+    measured = ideal + study.size.noise * draws.standard_normal(
+        (*ideal.shape[:2], repeats)
+    )
     across = rows.swapaxes(1, 2)
     error = np.zeros((len(of), len(designs) * repeats))
     estimates = np.linalg.solve(across @ rows, across @ measured)
-    error[of] = np.moveaxis(estimates, 1, 0).reshape(of.sum(), -1) - study.robot.compliance[of][:, None]
+    error[of] = (
+        np.moveaxis(estimates, 1, 0).reshape(of.sum(), -1)
+        - study.robot.compliance[of][:, None]
+    )
     squares = mean_square_errors(candidates.form, error)
     rms = np.sqrt(squares.mean())
     # Data sets of one design go together.
@@ -136,7 +190,9 @@ def simulated_designs_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     frame = below(found)
     names = {"rms": "rms_um", "std_error": "rms_um_std_error"}
     errors = MICRO * frame[[*names]].rename(columns=names)
-    part = frame[["robot", "load", "design", "configurations", "unobservable"]].join(errors)
+    part = frame[["robot", "load", "design", "configurations", "unobservable"]].join(
+        errors
+    )
     size = ["robot", "load", "configurations"]
     random = part[part.design == RANDOM].set_index(size).rms_um.rename("random")
     return part.assign(gain=part.join(random, on=size).random / part.rms_um)

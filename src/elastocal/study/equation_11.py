@@ -1,10 +1,12 @@
 """Equation 11 for every prefix of many data sets in one pass, one strategy at a time.
 
-The least-squares problem of the first k configurations, for every k, is solved by a QR decomposition that takes one
-configuration after the other and all data sets at once. It gives the solution of the normal equations of equation 11 without
-forming them, so that prefixes of one or two configurations keep their digits.
+The least-squares problem of the first k configurations, for every k, is solved by a QR
+decomposition that takes one configuration after the other and all data sets at once. It
+gives the solution of the normal equations of equation 11 without forming them, so that
+prefixes of one or two configurations keep their digits.
 
-Equations and triangles have the data sets on their last axis, so that one step of the algebra runs over all of them.
+Equations and triangles have the data sets on their last axis, so that one step of the
+algebra runs over all of them.
 """
 
 from __future__ import annotations
@@ -16,7 +18,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.io.storage import TableSchema, read_blocks
-from elastocal.mechanics.elastostatics import generalized_forces, loaded_point, regressor
+from elastocal.mechanics.elastostatics import (
+    generalized_forces,
+    loaded_point,
+    regressor,
+)
 from elastocal.mechanics.kinematics import jacobians
 from elastocal.study.jobs import LENGTH, SET, Job, real, table
 from elastocal.study.simulation import (
@@ -34,10 +40,14 @@ if TYPE_CHECKING:
     from elastocal.mechanics.chain import Chain
     from elastocal.study.strategies import Stage, Strategy
 
-# Columns of one pass through the experiments and, for each measuring point, the deflections.
-Blocks = Iterable[tuple[Mapping[str, np.ndarray], Mapping[str, Mapping[str, np.ndarray]]]]
-# Condition numbers come from squares of singular values, so they mean nothing beyond the root of the machine's precision; there
-# the measurements do not determine the compliances.
+# Columns of one pass through the experiments and, for each measuring point, the
+# deflections.
+Blocks = Iterable[
+    tuple[Mapping[str, np.ndarray], Mapping[str, Mapping[str, np.ndarray]]]
+]
+# Condition numbers come from squares of singular values, so they mean nothing beyond
+# the root of the machine's precision; there the measurements do not determine the
+# compliances.
 LARGEST_CONDITION = 1e7
 
 
@@ -45,8 +55,9 @@ LARGEST_CONDITION = 1e7
 class Measurements:
     """What one measuring point contributes.
 
-    `regressor` (rows, n, configurations, sets): matrix A of equation 10, base axes. `deflection` (rows, configurations, sets):
-    measured deflection; rows are three displacements (m), then, where poses are measured, three rotations (rad).
+    `regressor` (rows, n, configurations, sets): matrix A of equation 10, base axes.
+    `deflection` (rows, configurations, sets): measured deflection; rows are three
+    displacements (m), then, where poses are measured, three rotations (rad).
     """
 
     regressor: np.ndarray
@@ -54,11 +65,16 @@ class Measurements:
 
 
 def first_solvable_length(strategy: Strategy, rows: int) -> int:
-    """Smallest number of configurations with at least as many measurements as unknowns in every stage.
+    """Smallest number of configurations with at least as many measurements as unknowns
+    in every stage.
 
-    `rows`: measurements of one point in one configuration: 6 for poses, 3 for positions.
+    `rows`: measurements of one point in one configuration: 6 for poses, 3 for
+    positions.
     """
-    return max(-(-len(stage.identified) // (rows * len(stage.points))) for stage in strategy.stages)
+    return max(
+        -(-len(stage.identified) // (rows * len(stage.points)))
+        for stage in strategy.stages
+    )
 
 
 def estimate_compliance(
@@ -66,9 +82,11 @@ def estimate_compliance(
 ) -> tuple[np.ndarray, list[np.ndarray]]:
     """Solve the stages of a strategy one after the other (equation 11).
 
-    `measurements`: of each measuring point of the strategy. `joints`: n. Returns `compliance` (configurations, n, sets):
-    rad/(N m); meaningless where a prefix is too short, see `first_solvable_length`; `triangles` (configurations, pivots,
-    columns, sets): triangular factor of each stage; columns: joints identified, joints fixed, right-hand side.
+    `measurements`: of each measuring point of the strategy. `joints`: n. Returns
+    `compliance` (configurations, n, sets): rad/(N m); meaningless where a prefix is too
+    short, see `first_solvable_length`; `triangles` (configurations, pivots, columns,
+    sets): triangular factor of each stage; columns: joints identified, joints fixed,
+    right-hand side.
     """
     *_, configurations, sets = next(iter(measurements.values())).regressor.shape
     compliance = np.full((configurations, joints, sets), np.nan)
@@ -77,17 +95,25 @@ def estimate_compliance(
         pivots = len(stage.identified)
         shape = configurations, pivots, pivots + len(stage.fixed) + 1, sets
         triangle = prefix_triangles(_equations(stage, measurements), shape)
-        right = triangle[:, :, -1] - np.einsum("kpfs,kfs->kps", triangle[:, :, pivots:-1], compliance[:, list(stage.fixed)])
-        compliance[:, list(stage.identified)] = _solve(triangle[:, :, :pivots], right[:, :, None])[:, :, 0]
+        right = triangle[:, :, -1] - np.einsum(
+            "kpfs,kfs->kps", triangle[:, :, pivots:-1], compliance[:, list(stage.fixed)]
+        )
+        compliance[:, list(stage.identified)] = _solve(
+            triangle[:, :, :pivots], right[:, :, None]
+        )[:, :, 0]
         triangles.append(triangle)
     return compliance, triangles
 
 
-def undetermined(strategy: Strategy, rows: int, triangles: Iterable[np.ndarray]) -> np.ndarray:
-    """Prefixes (configurations, sets) that do not determine the compliances: too few measurements, or not the right ones.
+def undetermined(
+    strategy: Strategy, rows: int, triangles: Iterable[np.ndarray]
+) -> np.ndarray:
+    """Prefixes (configurations, sets) that do not determine the compliances: too few
+    measurements, or not the right ones.
 
-    `triangles`: from `estimate_compliance`; their condition number is that of the identification Jacobian, whose inverse is an
-    observability index of calibration [1]. Almost all are far below the largest that is allowed, which an upper bound from
+    `triangles`: from `estimate_compliance`; their condition number is that of the
+    identification Jacobian, whose inverse is an observability index of calibration [1].
+    Almost all are far below the largest that is allowed, which an upper bound from
     determinant and Frobenius norm shows [2]; only the others are decomposed.
 
     [1] Driels, M. R. and Pathre, U. S., Significance of observation strategy on the design of robot calibration experiments,
@@ -103,30 +129,39 @@ def undetermined(strategy: Strategy, rows: int, triangles: Iterable[np.ndarray])
         norm = np.sqrt(np.einsum("kpqs,kpqs->ks", square, square) / size)
         with np.errstate(divide="ignore", invalid="ignore"):
             doubtful = ~(2.0 * norm**size / determinant < LARGEST_CONDITION)
-        doubtful[doubtful] = ~(_condition(np.moveaxis(square, -1, 1)[doubtful]) < LARGEST_CONDITION)
+        doubtful[doubtful] = ~(
+            _condition(np.moveaxis(square, -1, 1)[doubtful]) < LARGEST_CONDITION
+        )
         found = found | doubtful
     found[: first_solvable_length(strategy, rows) - 1] = True
     return found
 
 
-def prefix_triangles(equations: Iterable[np.ndarray], shape: tuple[int, ...]) -> np.ndarray:
+def prefix_triangles(
+    equations: Iterable[np.ndarray], shape: tuple[int, ...]
+) -> np.ndarray:
     """Triangular factor of the equations of the first k configurations, for every k.
 
-    `equations`: of one configuration after the other, (rows, columns, sets) each, overwritten: unknowns first, right-hand side
-    last. Returns an array of the given shape (configurations, pivots, columns, sets): the rows of R and, in the columns that
-    are no pivots, Q^T times them.
+    `equations`: of one configuration after the other, (rows, columns, sets) each,
+    overwritten: unknowns first, right-hand side last. Returns an array of the given
+    shape (configurations, pivots, columns, sets): the rows of R and, in the columns
+    that are no pivots, Q^T times them.
 
-    Sequential accumulation [1]: the factor of k configurations on top of the rows of the next one is again reduced to a
-    triangle, by Householder reflections of all data sets at once. numpy's stacked QR calls LAPACK for each small matrix and
-    takes twice as long.
+    Sequential accumulation [1]: the factor of k configurations on top of the rows of
+    the next one is again reduced to a triangle, by Householder reflections of all data
+    sets at once. numpy's stacked QR calls LAPACK for each small matrix and takes twice
+    as long.
 
-    [1] Lawson, C. L. and Hanson, R. J., Solving Least Squares Problems, Prentice-Hall, 1974.
+    [1] Lawson, C. L. and Hanson, R. J., Solving Least Squares Problems, Prentice-Hall,
+    1974.
     """
-    found, before = np.empty(shape), np.zeros(shape[1:])
+    found = np.empty(shape)
+    before = np.zeros(shape[1:])
     for triangle, rows in zip(found, equations, strict=True):
         triangle[:] = before
         for pivot in range(len(triangle)):
-            head, below = triangle[pivot, pivot], rows[:, pivot]
+            head = triangle[pivot, pivot]
+            below = rows[:, pivot]
             products = np.einsum("rs,rcs->cs", below, rows[:, pivot:])
             norm = np.sqrt(head**2 + products[0])
             first = head + np.copysign(norm, head)
@@ -139,27 +174,42 @@ def prefix_triangles(equations: Iterable[np.ndarray], shape: tuple[int, ...]) ->
     return found
 
 
-def _equations(stage: Stage, measurements: Mapping[str, Measurements]) -> Iterator[np.ndarray]:
-    """Equations of a stage, configuration by configuration; columns: joints identified, joints fixed, measured deflection."""
-    order, points = [*stage.identified, *stage.fixed], [measurements[name] for name in stage.points]
+def _equations(
+    stage: Stage, measurements: Mapping[str, Measurements]
+) -> Iterator[np.ndarray]:
+    """Equations of a stage, configuration by configuration; columns: joints identified,
+    joints fixed, measured deflection."""
+    order = [*stage.identified, *stage.fixed]
+    points = [measurements[name] for name in stage.points]
     for k in range(points[0].regressor.shape[2]):
-        rows = [np.concatenate([each.regressor[:, order, k], each.deflection[:, None, k]], axis=1) for each in points]
+        rows = [
+            np.concatenate(
+                [each.regressor[:, order, k], each.deflection[:, None, k]], axis=1
+            )
+            for each in points
+        ]
         yield np.concatenate(rows)
 
 
 def _solve(triangles: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Back substitution for all triangles at once; numpy's solve and inverse would decompose each again.
+    """Back substitution for all triangles at once; numpy's solve and inverse would
+    decompose each again.
 
-    `triangles` (configurations, pivots, pivots, sets). `right` (configurations, pivots, columns, sets). Returns as `right`: not
-    a number where a triangle determines nothing: its condition is at least the largest of the diagonal over its least.
+    `triangles` (configurations, pivots, pivots, sets). `right` (configurations, pivots,
+    columns, sets). Returns as `right`: not a number where a triangle determines
+    nothing: its condition is at least the largest of the diagonal over its least.
     """
     diagonal = np.einsum("kpps->kps", triangles)
     sizes = np.abs(diagonal)
-    determined = sizes.max(axis=1, keepdims=True) < LARGEST_CONDITION * sizes.min(axis=1, keepdims=True)
+    determined = sizes.max(axis=1, keepdims=True) < LARGEST_CONDITION * sizes.min(
+        axis=1, keepdims=True
+    )
     pivots = np.where(determined, diagonal, np.nan)
     solution = np.empty(right.shape)
     for row in reversed(range(pivots.shape[1])):
-        later = np.einsum("kps,kpcs->kcs", triangles[:, row, row + 1 :], solution[:, row + 1 :])
+        later = np.einsum(
+            "kps,kpcs->kcs", triangles[:, row, row + 1 :], solution[:, row + 1 :]
+        )
         solution[:, row] = (right[:, row] - later) / pivots[:, row, None]
     return solution
 
@@ -174,61 +224,111 @@ def _condition(matrices: np.ndarray) -> np.ndarray:
 def identified(joints: int) -> TableSchema:
     """What a strategy identified; one row for each data set and length."""
     compliances = [
-        real(f"compliance_{j}", "rad/(N m)", f"identified compliance of joint {j}", missing=True) for j in range(1, joints + 1)
+        real(
+            f"compliance_{j}",
+            "rad/(N m)",
+            f"identified compliance of joint {j}",
+            missing=True,
+        )
+        for j in range(1, joints + 1)
     ]
     return table("identified", SET, LENGTH, *compliances)
 
 
 def regressors_of(
-    experiments: Experiments, chain: Chain, points: Collection[str], rows: int, wrench_at: str
+    experiments: Experiments,
+    chain: Chain,
+    points: Collection[str],
+    rows: int,
+    wrench_at: str,
 ) -> dict[str, np.ndarray]:
-    """Matrices A of equation 10 (rows, n, configurations, sets) of each measuring point, configuration before data set."""
-    joint_angles, wrench = configuration_first(experiments.joint_angles), configuration_first(experiments.wrench)
-    loaded = {name: loaded_point(chain, chain.point(name), wrench_at) for name in points}
+    """Matrices A of equation 10 (rows, n, configurations, sets) of each measuring
+    point, configuration before data set."""
+    joint_angles = configuration_first(experiments.joint_angles)
+    wrench = configuration_first(experiments.wrench)
+    loaded = {
+        name: loaded_point(chain, chain.point(name), wrench_at) for name in points
+    }
     measured = {name: chain.point(name) for name in points}
-    movements = {point: jacobians(chain, joint_angles, point) for point in {*loaded.values(), *measured.values()}}
-    forces = {point: generalized_forces(movements[point], wrench) for point in {*loaded.values()}}
-    # Nothing else needs the Jacobian of a measured point: its regressor takes its place in memory.
+    movements = {
+        point: jacobians(chain, joint_angles, point)
+        for point in {*loaded.values(), *measured.values()}
+    }
+    forces = {
+        point: generalized_forces(movements[point], wrench)
+        for point in {*loaded.values()}
+    }
+    # Nothing else needs the Jacobian of a measured point: its regressor takes its place
+    # in memory.
     return {
-        name: np.moveaxis(regressor(movements[point], forces[loaded[name]], out=movements[point]), (-2, -1), (0, 1))[:rows]
+        name: np.moveaxis(
+            regressor(movements[point], forces[loaded[name]], out=movements[point]),
+            (-2, -1),
+            (0, 1),
+        )[:rows]
         for name, point in measured.items()
     }
 
 
 def configuration_first(array: np.ndarray) -> np.ndarray:
-    """(sets, configurations, k) to (configurations, sets, k) with memory in the order k, configurations, sets."""
-    return np.moveaxis(np.ascontiguousarray(np.moveaxis(array, (2, 1, 0), (0, 1, 2))), 0, -1)
+    """(sets, configurations, k) to (configurations, sets, k) with memory in the order
+    k, configurations, sets."""
+    return np.moveaxis(
+        np.ascontiguousarray(np.moveaxis(array, (2, 1, 0), (0, 1, 2))), 0, -1
+    )
 
 
 def stacked(matrix: np.ndarray, deflections: np.ndarray) -> Measurements:
-    """A point's matrix A (rows, n, configurations, sets) with its deflections (sets, configurations, 3 or 6)."""
-    return Measurements(matrix, np.moveaxis(configuration_first(deflections)[..., : len(matrix)], -1, 0))
+    """A point's matrix A (rows, n, configurations, sets) with its deflections (sets,
+    configurations, 3 or 6)."""
+    return Measurements(
+        matrix, np.moveaxis(configuration_first(deflections)[..., : len(matrix)], -1, 0)
+    )
 
 
 def identified_blocks(
     blocks: Blocks, chain: Chain, strategy: Strategy, rows: int, wrench_at: str
 ) -> Iterator[dict[str, np.ndarray]]:
-    """Compliances, columns of the identified table; not a number where a prefix does not determine them.
+    """Compliances, columns of the identified table; not a number where a prefix does
+    not determine them.
 
-    `rows`: 6 where poses are measured, 3 where positions are. `wrench_at`: interpretation R6.
+    `rows`: 6 where poses are measured, 3 where positions are. `wrench_at`:
+    interpretation R6.
     """
     for block, deflections in blocks:
-        regressors = regressors_of(to_experiments(block), chain, strategy.points, rows, wrench_at)
-        measurements = {name: stacked(regressors[name], to_deflections(deflections[name])) for name in strategy.points}
-        compliance, triangles = estimate_compliance(strategy, measurements, chain.coordinates)
+        regressors = regressors_of(
+            to_experiments(block), chain, strategy.points, rows, wrench_at
+        )
+        measurements = {
+            name: stacked(regressors[name], to_deflections(deflections[name]))
+            for name in strategy.points
+        }
+        compliance, triangles = estimate_compliance(
+            strategy, measurements, chain.coordinates
+        )
         np.moveaxis(compliance, 1, -1)[undetermined(strategy, rows, triangles)] = np.nan
         columns = prefix_index_columns(data_sets(block), len(compliance))
-        yield columns | {f"compliance_{j + 1}": compliance[:, j].T.ravel() for j in range(chain.coordinates)}
+        yield columns | {
+            f"compliance_{j + 1}": compliance[:, j].T.ravel()
+            for j in range(chain.coordinates)
+        }
 
 
 def read_measured(job: Job, joints: int, points: Iterable[str]) -> Blocks:
-    """Blocks of the experiments of a job with those of what is measured of the same data sets."""
-    found = {name: read_blocks(job.input.measured, DEFLECTIONS, DEFLECTION_COLUMNS, point=name) for name in points}
+    """Blocks of the experiments of a job with those of what is measured of the same
+    data sets."""
+    found = {
+        name: read_blocks(
+            job.input.measured, DEFLECTIONS, DEFLECTION_COLUMNS, point=name
+        )
+        for name in points
+    }
     return paired_blocks(read_blocks(job.input.experiments, experiments(joints)), found)
 
 
 def paired_blocks(
-    experiments: Iterable[Mapping[str, np.ndarray]], deflections: Mapping[str, Iterable[Mapping[str, np.ndarray]]]
+    experiments: Iterable[Mapping[str, np.ndarray]],
+    deflections: Mapping[str, Iterable[Mapping[str, np.ndarray]]],
 ) -> Blocks:
     """Blocks of the experiments with those of each measuring point."""
     for block, *measured in zip(experiments, *deflections.values(), strict=True):

@@ -1,6 +1,8 @@
-"""Data sets and test configurations of a study, drawn and measured in memory: nothing of them is kept.
+"""Data sets and test configurations of a study, drawn and measured in memory: nothing
+of them is kept.
 
-They are the same as those of the pipeline's steps: random streams have names, see `random_streams`.
+They are the same as those of the pipeline's steps: random streams have names, see
+`random_streams`.
 """
 
 from __future__ import annotations
@@ -15,7 +17,13 @@ from elastocal.mechanics.elastostatics import joint_torques, loaded_point, regre
 from elastocal.mechanics.kinematics import jacobians
 from elastocal.mechanics.robot import Robot, with_target_offset
 from elastocal.mechanics.robot_file import robot_from_document
-from elastocal.study.equation_11 import Measurements, estimate_compliance, first_solvable_length, regressors_of, stacked
+from elastocal.study.equation_11 import (
+    Measurements,
+    estimate_compliance,
+    first_solvable_length,
+    regressors_of,
+    stacked,
+)
 from elastocal.study.jobs import origin, settings_of, strategies_of
 from elastocal.study.metrics import Judge, make_judge
 from elastocal.study.simulation import (
@@ -40,8 +48,8 @@ if TYPE_CHECKING:
 class Interpretation:
     """How the paper is read; see `interpretations` in config.yaml.
 
-    `rows`: 6 where poses are measured, 3 where positions are. `wrench_at`: R6. `average`: R7, see
-    `evaluation.average`.
+    `rows`: 6 where poses are measured, 3 where positions are. `wrench_at`: R6.
+    `average`: R7, see `evaluation.average`.
     """
 
     loading: Loading
@@ -52,7 +60,8 @@ class Interpretation:
 
 @dataclass(frozen=True)
 class Size:
-    """How large a study is; `noise`: standard deviation, the same number in m and rad."""
+    """How large a study is; `noise`: standard deviation, the same number in m and
+    rad."""
 
     data_sets: int
     configurations: int
@@ -64,8 +73,9 @@ class Size:
 class StudyInMemory:
     """The study of one robot, and further ones of the same size.
 
-    Studies have numbers; that of the tables is 0. The data sets of one follow on those of the one before, and each has test
-    configurations of its own. `robot`: with the offset of its targets. `key`: name of the robot's file; part of the name of the
+    Studies have numbers; that of the tables is 0. The data sets of one follow on those
+    of the one before, and each has test configurations of its own. `robot`: with the
+    offset of its targets. `key`: name of the robot's file; part of the name of the
     random streams.
     """
 
@@ -76,9 +86,12 @@ class StudyInMemory:
     size: Size
 
     def under(self, **loading: Any) -> StudyInMemory:
-        """The same study where the robot is moved and loaded otherwise, by attributes of `Loading`."""
+        """The same study where the robot is moved and loaded otherwise, by attributes
+        of `Loading`."""
         changed = replace(self.interpretation.loading, **loading)
-        return replace(self, interpretation=replace(self.interpretation, loading=changed))
+        return replace(
+            self, interpretation=replace(self.interpretation, loading=changed)
+        )
 
     def blocks(self, number: int = 0) -> Iterator[np.ndarray]:
         """Numbers of the data sets of a study, block by block, ndarray of int each."""
@@ -86,60 +99,116 @@ class StudyInMemory:
             yield np.array(sets) + number * self.size.data_sets
 
     def experiments(
-        self, sets: Sequence[int] | np.ndarray, configurations: int | None = None, purpose: str = "identification"
+        self,
+        sets: Sequence[int] | np.ndarray,
+        configurations: int | None = None,
+        purpose: str = "identification",
     ) -> Experiments:
-        """Configurations and loads of data sets, as many as in the study where nothing else is said."""
-        robot, count = self.robot, configurations or self.size.configurations
+        """Configurations and loads of data sets, as many as in the study where nothing
+        else is said."""
+        robot = self.robot
+        count = configurations or self.size.configurations
         loading = self.interpretation.loading
-        return random_experiments(robot.chain, robot.joint_limits, self.seed, self.key, loading, purpose, sets, count)
+        return random_experiments(
+            robot.chain,
+            robot.joint_limits,
+            self.seed,
+            self.key,
+            loading,
+            purpose,
+            sets,
+            count,
+        )
 
     def tests(self, number: int = 0) -> Experiments:
         """Test configurations of a study, as one data set."""
         return self.experiments([number], self.size.tests, "test")
 
-    def deflections(self, experiments: Experiments, point: str | None = None) -> np.ndarray:
-        """Deflections (sets, configurations, 6) of a measuring point, of the end-effector where none is named."""
+    def deflections(
+        self, experiments: Experiments, point: str | None = None
+    ) -> np.ndarray:
+        """Deflections (sets, configurations, 6) of a measuring point, of the
+        end-effector where none is named."""
         chain = self.robot.chain
         named = chain.point(point) if point else chain.end_effector
-        return true_deflections(self.robot, experiments, named, self.interpretation.wrench_at)
+        return true_deflections(
+            self.robot, experiments, named, self.interpretation.wrench_at
+        )
 
     def regressor(self, experiments: Experiments) -> np.ndarray:
         """Regressors (sets, configurations, 6, n) of poses of the end-effector."""
-        chain, angles = self.robot.chain, experiments.joint_angles
+        chain = self.robot.chain
+        angles = experiments.joint_angles
         at = loaded_point(chain, chain.end_effector, self.interpretation.wrench_at)
-        return regressor(jacobians(chain, angles, chain.end_effector), joint_torques(chain, angles, experiments.wrench, at))
+        return regressor(
+            jacobians(chain, angles, chain.end_effector),
+            joint_torques(chain, angles, experiments.wrench, at),
+        )
 
     def judge(self, number: int = 0) -> Judge:
         """Score sheet of the test configurations of a study."""
         tests = self.tests(number)
-        return make_judge(self.robot, tests, self.deflections(tests), self.interpretation.wrench_at)
+        return make_judge(
+            self.robot, tests, self.deflections(tests), self.interpretation.wrench_at
+        )
 
-    def measure(self, sets: np.ndarray, points: Sequence[str], repeat: str = "") -> dict[str, Measurements]:
+    def measure(
+        self, sets: np.ndarray, points: Sequence[str], repeat: str = ""
+    ) -> dict[str, Measurements]:
         """What each measuring point contributes to some data sets.
 
-        `sets`: numbers of the data sets. `points`: names of measuring points. `repeat`: part of the name of the noise's stream,
-        by which measurements of the same configurations differ.
+        `sets`: numbers of the data sets. `points`: names of measuring points. `repeat`:
+        part of the name of the noise's stream, by which measurements of the same
+        configurations differ.
         """
-        drawn, read = self.experiments(sets), self.interpretation
-        regressors, found = regressors_of(drawn, self.robot.chain, points, read.rows, read.wrench_at), {}
+        drawn = self.experiments(sets)
+        read = self.interpretation
+        regressors = regressors_of(
+            drawn, self.robot.chain, points, read.rows, read.wrench_at
+        )
+        found = {}
         for name in points:
-            noise = measurement_noise(self.seed, self.key, name + repeat, sets, self.size.configurations)
-            found[name] = stacked(regressors[name], self.deflections(drawn, name) + self.size.noise * noise)
+            noise = measurement_noise(
+                self.seed, self.key, name + repeat, sets, self.size.configurations
+            )
+            found[name] = stacked(
+                regressors[name],
+                self.deflections(drawn, name) + self.size.noise * noise,
+            )
         return found
 
-    def estimate(self, strategy: Strategy, measurements: Mapping[str, Measurements]) -> np.ndarray:
-        """Compliances (lengths, n, sets), rad/(N m), not a number where a length does not determine them."""
+    def estimate(
+        self, strategy: Strategy, measurements: Mapping[str, Measurements]
+    ) -> np.ndarray:
+        """Compliances (lengths, n, sets), rad/(N m), not a number where a length does
+        not determine them."""
         compliance = estimate_compliance(strategy, measurements, self.robot.joints)[0]
-        compliance[: first_solvable_length(strategy, self.interpretation.rows) - 1] = np.nan
+        compliance[: first_solvable_length(strategy, self.interpretation.rows) - 1] = (
+            np.nan
+        )
         return compliance
 
-    def estimates(self, strategies: Sequence[Strategy], number: int = 0) -> dict[str, list[np.ndarray]]:
-        """Compliances (sets, lengths, n) from all data sets of a study, block by block, by the names of strategies.
+    def estimates(
+        self, strategies: Sequence[Strategy], number: int = 0
+    ) -> dict[str, list[np.ndarray]]:
+        """Compliances (sets, lengths, n) from all data sets of a study, block by block,
+        by the names of strategies.
 
-        Strategies that are one estimator under equation 11 are worked out once and share their arrays.
+        Strategies that are one estimator under equation 11 are worked out once and
+        share their arrays.
         """
-        stages = {strategy.name: drop_forgotten_stages(strategy, self.robot.joints).stages for strategy in strategies}
-        points = tuple(dict.fromkeys(name for some in stages.values() for stage in some for name in stage.points))
+        stages = {
+            strategy.name: drop_forgotten_stages(strategy, self.robot.joints).stages
+            for strategy in strategies
+        }
+        points = tuple(
+            dict.fromkeys(
+                name
+                for some in stages.values()
+                for stage in some
+                for name in stage.points
+            )
+        )
         found: dict[tuple[Stage, ...], list[np.ndarray]] = {}
         for sets in self.blocks(number):
             measurements = self.measure(sets, points)
@@ -150,17 +219,24 @@ class StudyInMemory:
 
 
 def study_of(job: Job) -> StudyInMemory:
-    """The study of a rule's robot: its file, the seed, how the paper is read, the study's size (`study` of its parameters)."""
+    """The study of a rule's robot: its file, the seed, how the paper is read, the
+    study's size (`study` of its parameters)."""
     read = job.params.study
-    robot = with_target_offset(robot_from_document(read["robot"]), read["tool_offset_m"])
+    robot = with_target_offset(
+        robot_from_document(read["robot"]), read["tool_offset_m"]
+    )
     conventions = Interpretation(Loading(**read["loading"]), **read["interpretation"])
-    return StudyInMemory(robot, job.wildcards.robot, read["seed"], conventions, Size(**read["size"]))
+    return StudyInMemory(
+        robot, job.wildcards.robot, read["seed"], conventions, Size(**read["size"])
+    )
 
 
 def ask(schema: TableSchema, question: Callable[..., Any]) -> Callable[[Job], None]:
-    """A step of one robot, which fills one table: `question` has its study and, by their names, the rule's parameters.
+    """A step of one robot, which fills one table: `question` has its study and, by
+    their names, the rule's parameters.
 
-    Strategies come as documents. The question returns the columns of the table, or yields those of one block after the other.
+    Strategies come as documents. The question returns the columns of the table, or
+    yields those of one block after the other.
     """
 
     def step(job: Job) -> None:
@@ -168,6 +244,11 @@ def ask(schema: TableSchema, question: Callable[..., Any]) -> Callable[[Job], No
         if "strategies" in settings:
             settings["strategies"] = strategies_of(job)
         found = question(study_of(job), **settings)
-        write_table(job.output[0], schema, [found] if isinstance(found, dict) else found, origin(job))
+        write_table(
+            job.output[0],
+            schema,
+            [found] if isinstance(found, dict) else found,
+            origin(job),
+        )
 
     return step

@@ -1,4 +1,5 @@
-"""What questions of the study share: how they declare tables, the robot of a rule, tables of every robot in frames.
+"""What questions of the study share: how they declare tables, the robot of a rule,
+tables of every robot in frames.
 
 Pandas is imported where a frame is made: most jobs make none.
 """
@@ -21,15 +22,23 @@ if TYPE_CHECKING:
     from elastocal.mechanics.robot import Robot
     from elastocal.study.strategies import Strategy
 
-MICRO, MILLI = 1e6, 1e3
+MICRO = 1e6
+MILLI = 1e3
 
 
 def table(name: str, *columns: Column) -> TableSchema:
-    """A table: its name and its columns with units and meanings, written down beside the function that fills it."""
+    """A table: its name and its columns with units and meanings, written down beside
+    the function that fills it."""
     return TableSchema(name, columns)
 
 
-def real(name: str, unit: str, meaning: str, missing: bool = False, minimum: float | None = None) -> Column:
+def real(
+    name: str,
+    unit: str,
+    meaning: str,
+    missing: bool = False,
+    minimum: float | None = None,
+) -> Column:
     """Numbers; `missing`: some may be not a number or infinite."""
     return Column(name, "float64", unit, meaning, missing, minimum)
 
@@ -45,8 +54,14 @@ def group(name: str, meaning: str) -> Column:
 
 
 SET = whole("data_set", "number of the data set, from 0", 0)
-CONFIGURATION = whole("configuration", "number of the configuration in its data set, from 0", 0)
-LENGTH = whole("length", "data set length ds: how many configurations, from the first, were used", 1)
+CONFIGURATION = whole(
+    "configuration", "number of the configuration in its data set, from 0", 0
+)
+LENGTH = whole(
+    "length",
+    "data set length ds: how many configurations, from the first, were used",
+    1,
+)
 STRATEGY = group("strategy", "name of the strategy; a row group holds one")
 ON_TESTS = "mean square end-effector error on test configurations"
 ERROR = real("mean_square", "m^2", ON_TESTS, missing=True)
@@ -68,7 +83,9 @@ def origin(job: Job) -> dict[str, Any]:
 
 def robot_of(job: Job) -> Robot:
     """The robot of a rule with the offset of its targets (interpretation R5)."""
-    return with_target_offset(robot_from_document(job.params.robot), job.params.tool_offset_m)
+    return with_target_offset(
+        robot_from_document(job.params.robot), job.params.tool_offset_m
+    )
 
 
 def strategies_of(job: Job) -> list[Strategy]:
@@ -76,15 +93,21 @@ def strategies_of(job: Job) -> list[Strategy]:
     return [strategy_from_document(document) for document in job.params.strategies]
 
 
-def frames(job: Job, files: Iterable[str], schema: TableSchema) -> dict[str, pd.DataFrame]:
+def frames(
+    job: Job, files: Iterable[str], schema: TableSchema
+) -> dict[str, pd.DataFrame]:
     """The table of each robot of a rule."""
     from elastocal.io.data_frames import read_frame
 
-    return {robot: read_frame(path, schema) for robot, path in zip(job.params.robots, files, strict=True)}
+    return {
+        robot: read_frame(path, schema)
+        for robot, path in zip(job.params.robots, files, strict=True)
+    }
 
 
 def below(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
-    """The tables of all robots one below the other, with the name of the robot in front."""
+    """The tables of all robots one below the other, with the name of the robot in
+    front."""
     import pandas as pd
 
     return pd.concat(found, names=["robot"]).reset_index("robot").reset_index(drop=True)
@@ -98,23 +121,37 @@ def rows_as_frame(rows: Sequence[Any], columns: Sequence[str] = ()) -> pd.DataFr
 
 
 def add_slugs(frame: pd.DataFrame, slugs: Mapping[str, str]) -> pd.DataFrame:
-    """A table with the names of the strategies' files, `slugs` by the names of strategies, behind these."""
+    """A table with the names of the strategies' files, `slugs` by the names of
+    strategies, behind these."""
     found = frame.copy()
-    found.insert([*frame.columns].index("strategy") + 1, "strategy_file", frame.strategy.map(slugs))
+    found.insert(
+        [*frame.columns].index("strategy") + 1,
+        "strategy_file",
+        frame.strategy.map(slugs),
+    )
     return found
 
 
 def settings_of(job: Job, *others: str) -> dict[str, Any]:
     """Parameters of a rule but for those that are of every rule, and others."""
-    return {name: value for name, value in job.params.items() if name not in (STEP, SOURCES_DIGEST, *others)}
+    return {
+        name: value
+        for name, value in job.params.items()
+        if name not in (STEP, SOURCES_DIGEST, *others)
+    }
 
 
-def tabulate(schema: TableSchema, make: Callable[..., pd.DataFrame]) -> Callable[[Job], None]:
-    """A step of all robots: `make` has the table of each, of the rule's first input, and by their names its parameters."""
+def tabulate(
+    schema: TableSchema, make: Callable[..., pd.DataFrame]
+) -> Callable[[Job], None]:
+    """A step of all robots: `make` has the table of each, of the rule's first input,
+    and by their names its parameters."""
 
     def step(job: Job) -> None:
         files = job.input[next(iter(job.input.keys()))]
-        write_csvs(job, table=make(frames(job, files, schema), **settings_of(job, "robots")))
+        write_csvs(
+            job, table=make(frames(job, files, schema), **settings_of(job, "robots"))
+        )
 
     return step
 

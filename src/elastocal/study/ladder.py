@@ -1,8 +1,11 @@
-"""How many springs pay: from elastic joints alone, link spring by link spring, up to the extended model (RQ1).
+"""How many springs pay: from elastic joints alone, link spring by link spring, up to
+the extended model (RQ1).
 
-A link spring is the compliance of a beam about its own axes: six diagonal elements and the two by which bending and lateral
-deflection go together. All of them enter linearly. Which link comes next, and where to stop, is chosen by cross-validation [1]
-within each data set, by forward selection [2]; configurations that neither has seen judge the result.
+A link spring is the compliance of a beam about its own axes: six diagonal elements and
+the two by which bending and lateral deflection go together. All of them enter linearly.
+Which link comes next, and where to stop, is chosen by cross-validation [1] within each
+data set, by forward selection [2]; configurations that neither has seen judge the
+result.
 
 [1] Stone, M., Cross-validatory choice and assessment of statistical predictions, Journal of the Royal Statistical Society B 36,
     1974.
@@ -18,10 +21,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.io.storage import Column
-from elastocal.mechanics.elastostatics import beam_axes, extended_chain, generalized_forces
+from elastocal.mechanics.elastostatics import (
+    beam_axes,
+    extended_chain,
+    generalized_forces,
+)
 from elastocal.mechanics.kinematics import jacobians
 from elastocal.study.in_memory import ask
-from elastocal.study.jobs import LENGTH, MICRO, ON_TESTS, SET, real, rows_as_frame, table, tabulate, whole
+from elastocal.study.jobs import (
+    LENGTH,
+    MICRO,
+    ON_TESTS,
+    SET,
+    real,
+    rows_as_frame,
+    table,
+    tabulate,
+    whole,
+)
 from elastocal.study.points import mean_of
 from elastocal.study.simulation import measurement_noise
 
@@ -45,10 +62,12 @@ LADDER = table(
 )
 CHOSEN = "by cross-validation"
 FOLDS = 5
-# Elements of the compliance of a beam along x: (row, column) of those that are not zero, each with its mirror image.
+# Elements of the compliance of a beam along x: (row, column) of those that are not
+# zero, each with its mirror image.
 _ELEMENTS = ((0, 0), (1, 1), (2, 2), (3, 3), (4, 4), (5, 5), (1, 5), (2, 4))
-# Share of a column's squares that keeps normal equations well posed where springs do the same, as the torsion of the first link
-# and the first joint: what such springs predict together does not depend on it.
+# Share of a column's squares that keeps normal equations well posed where springs do
+# the same, as the torsion of the first link and the first joint: what such springs
+# predict together does not depend on it.
 _RIDGE = 1e-10
 
 
@@ -65,7 +84,9 @@ class Products:
 
     def squared_error(self, coefficients: np.ndarray) -> np.ndarray:
         """Sum of squares that coefficients (..., K) leave."""
-        quadratic = (coefficients * (self.gram @ coefficients[..., None])[..., 0]).sum(axis=-1)
+        quadratic = (coefficients * (self.gram @ coefficients[..., None])[..., 0]).sum(
+            axis=-1
+        )
         return self.squares - 2.0 * (coefficients * self.along).sum(axis=-1) + quadratic
 
 
@@ -73,9 +94,10 @@ class Products:
 class Ladder:
     """Models of each data set, from no link spring to all.
 
-    `order` (sets, L) of int: links in the order in which they were added. `cross_validated` (sets, L + 1): sum of squares left
-    in the folds that were left out. `coefficients` (sets, L + 1, K): of the model with so many links, fitted to the whole data
-    set.
+    `order` (sets, L) of int: links in the order in which they were added.
+    `cross_validated` (sets, L + 1): sum of squares left in the folds that were left
+    out. `coefficients` (sets, L + 1, K): of the model with so many links, fitted to the
+    whole data set.
     """
 
     order: np.ndarray
@@ -89,52 +111,78 @@ class Ladder:
 
 
 def spring_columns(robot: Robot, experiments: Experiments) -> np.ndarray:
-    """Deflection of the end-effector per unit of each spring element: joints first, then eight for each link.
+    """Deflection of the end-effector per unit of each spring element: joints first,
+    then eight for each link.
 
     `robot`: with links. Returns (sets, configurations, 6, n + 8 L).
     """
-    chain, n = extended_chain(robot), robot.joints
+    chain = extended_chain(robot)
+    n = robot.joints
     jacobian = jacobians(chain, chain.at(experiments.joint_angles), chain.end_effector)
     torques = generalized_forces(jacobian, experiments.wrench)
     columns = [jacobian[..., :n] * torques[..., None, :n]]
     for number, link in enumerate(robot.links):
-        axes, mine = beam_axes(link), slice(n + 6 * number, n + 6 * number + 6)
-        moved, forced = jacobian[..., mine] @ axes, torques[..., mine] @ axes
+        axes = beam_axes(link)
+        mine = slice(n + 6 * number, n + 6 * number + 6)
+        moved = jacobian[..., mine] @ axes
+        forced = torques[..., mine] @ axes
         for i, j in _ELEMENTS:
             column = moved[..., i] * forced[..., None, j]
-            columns.append((column if i == j else column + moved[..., j] * forced[..., None, i])[..., None])
+            columns.append(
+                (column if i == j else column + moved[..., j] * forced[..., None, i])[
+                    ..., None
+                ]
+            )
     return np.concatenate(columns, axis=-1)
 
 
 def products_of(columns: np.ndarray, deflection: np.ndarray) -> Products:
     """Normal equations of each data set.
 
-    `columns` (sets, configurations, rows, K), `deflection` (sets, configurations, rows). Returns of shape (sets,).
+    `columns` (sets, configurations, rows, K), `deflection` (sets, configurations,
+    rows). Returns of shape (sets,).
     """
     left = columns.reshape(len(columns), -1, columns.shape[-1])
     right = deflection.reshape(len(deflection), -1)
     across = left.swapaxes(1, 2)
-    return Products(across @ left, (across @ right[..., None])[..., 0], (right**2).sum(axis=1))
+    return Products(
+        across @ left, (across @ right[..., None])[..., 0], (right**2).sum(axis=1)
+    )
 
 
 def ladder(parts: list[Products], joints: int, links: int) -> Ladder:
-    """Add link springs one by one, in each data set that which cross-validation likes best.
+    """Add link springs one by one, in each data set that which cross-validation likes
+    best.
 
     `parts`: of each fold, of shape (sets,).
     """
-    whole = Products(*(sum(getattr(part, name) for part in parts) for name in ("gram", "along", "squares")))
+    whole = Products(
+        *(
+            sum(getattr(part, name) for part in parts)
+            for name in ("gram", "along", "squares")
+        )
+    )
     sets, size = whole.along.shape
-    each, elements = np.arange(sets), (size - joints) // links
+    each = np.arange(sets)
+    elements = (size - joints) // links
     columns = np.broadcast_to(np.arange(joints), (sets, joints))
     left = np.broadcast_to(np.arange(links), (sets, links))
     order = np.zeros((sets, 0), int)
     scaled = _scaled(whole.gram, whole.along)
-    others = [_scaled(whole.gram - part.gram, whole.along - part.along) for part in parts]
-    scores, fits = [_cross_validate(parts, others, columns)], [_fit(columns, *scaled)]
+    others = [
+        _scaled(whole.gram - part.gram, whole.along - part.along) for part in parts
+    ]
+    scores = [_cross_validate(parts, others, columns)]
+    fits = [_fit(columns, *scaled)]
     for _ in range(links):
-        added = [joints + elements * left[:, [place]] + np.arange(elements) for place in range(left.shape[1])]
+        added = [
+            joints + elements * left[:, [place]] + np.arange(elements)
+            for place in range(left.shape[1])
+        ]
         tried = [np.concatenate([columns, of_link], axis=1) for of_link in added]
-        found = np.stack([_cross_validate(parts, others, some) for some in tried], axis=1)
+        found = np.stack(
+            [_cross_validate(parts, others, some) for some in tried], axis=1
+        )
         best = np.argmin(found, axis=1)
         order = np.concatenate([order, left[each, best][:, None]], axis=1)
         columns = np.stack(tried)[best, each]
@@ -144,43 +192,87 @@ def ladder(parts: list[Products], joints: int, links: int) -> Ladder:
     return Ladder(order, np.stack(scores, axis=1), np.stack(fits, axis=1))
 
 
-def _cross_validate(parts: list[Products], others: list[tuple[np.ndarray, ...]], columns: np.ndarray) -> np.ndarray:
+def _cross_validate(
+    parts: list[Products], others: list[tuple[np.ndarray, ...]], columns: np.ndarray
+) -> np.ndarray:
     """Sum of squares left in each fold by the fit to the others, (sets,)."""
-    return np.sum([part.squared_error(_fit(columns, *rest)) for part, rest in zip(parts, others, strict=True)], axis=0)
+    return np.sum(
+        [
+            part.squared_error(_fit(columns, *rest))
+            for part, rest in zip(parts, others, strict=True)
+        ],
+        axis=0,
+    )
 
 
 def _scaled(gram: np.ndarray, along: np.ndarray) -> tuple[np.ndarray, ...]:
     """Normal equations with columns of length 1, and these lengths (sets, K)."""
     scale = np.sqrt(np.diagonal(gram, axis1=1, axis2=2))
-    return gram / (scale[:, :, None] * scale[:, None, :]) + _RIDGE * np.eye(gram.shape[-1]), along / scale, scale
+    return (
+        gram / (scale[:, :, None] * scale[:, None, :])
+        + _RIDGE * np.eye(gram.shape[-1]),
+        along / scale,
+        scale,
+    )
 
 
-def _fit(columns: np.ndarray, gram: np.ndarray, along: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """Least squares with some columns of each data set, zero for the others, (sets, K); the rest from `_scaled`."""
-    each, found = np.arange(len(columns))[:, None], np.zeros_like(along)
+def _fit(
+    columns: np.ndarray, gram: np.ndarray, along: np.ndarray, scale: np.ndarray
+) -> np.ndarray:
+    """Least squares with some columns of each data set, zero for the others, (sets, K);
+    the rest from `_scaled`."""
+    each = np.arange(len(columns))[:, None]
+    found = np.zeros_like(along)
     chosen = gram[each[..., None], columns[:, :, None], columns[:, None, :]]
-    found[each, columns] = np.linalg.solve(chosen, along[each, columns][..., None])[..., 0] / scale[each, columns]
+    found[each, columns] = (
+        np.linalg.solve(chosen, along[each, columns][..., None])[..., 0]
+        / scale[each, columns]
+    )
     return found
 
 
-def ladder_blocks(study: StudyInMemory, lengths: Sequence[int], noises: Sequence[float]) -> Iterator[dict[str, np.ndarray]]:
-    """Models with more and more link springs, in each data set of the study of the tables.
+def ladder_blocks(
+    study: StudyInMemory, lengths: Sequence[int], noises: Sequence[float]
+) -> Iterator[dict[str, np.ndarray]]:
+    """Models with more and more link springs, in each data set of the study of the
+    tables.
 
-    `study`: of a robot with links; the noise of its size is not looked at. `lengths`: configurations from which to identify.
-    `noises`: standard deviations, the same number in m and rad.
+    `study`: of a robot with links; the noise of its size is not looked at. `lengths`:
+    configurations from which to identify. `noises`: standard deviations, the same
+    number in m and rad.
     """
-    robot, tests = study.robot, study.tests()
-    judged = products_of(spring_columns(robot, tests)[:, :, :3], study.deflections(tests)[..., :3])
-    longest, count = max(lengths), len(robot.links)
+    robot = study.robot
+    tests = study.tests()
+    judged = products_of(
+        spring_columns(robot, tests)[:, :, :3], study.deflections(tests)[..., :3]
+    )
+    longest = max(lengths)
+    count = len(robot.links)
     for sets in study.blocks():
         drawn = study.experiments(sets, longest)
-        columns, ideal = spring_columns(robot, drawn), study.deflections(drawn)
-        normal = measurement_noise(study.seed, study.key, robot.chain.end_effector.name, sets, longest)
-        for noise, length in ((noise, length) for noise in noises for length in lengths):
+        columns = spring_columns(robot, drawn)
+        ideal = study.deflections(drawn)
+        normal = measurement_noise(
+            study.seed, study.key, robot.chain.end_effector.name, sets, longest
+        )
+        for noise, length in (
+            (noise, length) for noise in noises for length in lengths
+        ):
             deflection = ideal + noise * normal
-            folds = [products_of(columns[:, fold:length:FOLDS], deflection[:, fold:length:FOLDS]) for fold in range(FOLDS)]
+            folds = [
+                products_of(
+                    columns[:, fold:length:FOLDS], deflection[:, fold:length:FOLDS]
+                )
+                for fold in range(FOLDS)
+            ]
             found = ladder(folds, robot.joints, count)
-            errors = np.stack([judged.squared_error(some) for some in found.coefficients.swapaxes(0, 1)], axis=1)
+            errors = np.stack(
+                [
+                    judged.squared_error(some)
+                    for some in found.coefficients.swapaxes(0, 1)
+                ],
+                axis=1,
+            )
             yield {
                 "noise": np.full(errors.size, noise),
                 "length": np.full(errors.size, length),
@@ -192,20 +284,25 @@ def ladder_blocks(study: StudyInMemory, lengths: Sequence[int], noises: Sequence
 
 
 def ladder_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
-    """Error of one data set on configurations that it has not seen, by number of link springs, or `CHOSEN`.
+    """Error of one data set on configurations that it has not seen, by number of link
+    springs, or `CHOSEN`.
 
-    `found`: the ladder table of each robot with links. chosen_percent: share of data sets in which cross-validation stops
-    there.
+    `found`: the ladder table of each robot with links. chosen_percent: share of data
+    sets in which cross-validation stops there.
     """
     rows = []
     for robot, frame in found.items():
         for (noise, length), cell in frame.groupby(["noise", "length"]):
-            steps = [(str(number), some) for number, some in cell.groupby("link_springs")]
+            steps = [
+                (str(number), some) for number, some in cell.groupby("link_springs")
+            ]
             for name, some in [*steps, (CHOSEN, cell[cell.chosen])]:
                 rms = mean_of(some.mean_square.to_numpy(), True, MICRO)
                 chosen = 100 * some.chosen.mean() if name != CHOSEN else np.nan
                 noise_um = round(MICRO * float(str(noise)), 6)
-                rows.append((robot, noise_um, length, name, rms.value, rms.std_error(), chosen))
+                rows.append(
+                    (robot, noise_um, length, name, rms.value, rms.std_error(), chosen)
+                )
     head = ("robot", "noise_um", "length", "link_springs")
     return rows_as_frame(rows, (*head, "rms_um", "rms_um_std_error", "chosen_percent"))
 

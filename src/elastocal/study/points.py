@@ -1,9 +1,11 @@
-"""Which points to measure, and what an accuracy costs (RQ2): sets of points over as many measurements and over their costs.
+"""Which points to measure, and what an accuracy costs (RQ2): sets of points over as
+many measurements and over their costs.
 
-One least-squares problem over each set of points. Sets share their configurations and noise, so that they are compared data
-set by data set. In units of one measurement, n configurations with m measurements each cost n (r + m), where
-going to a configuration costs r. A set of points that needs fewer configurations pays from the cost on at which both are equal:
-its break-even.
+One least-squares problem over each set of points. Sets share their configurations and
+noise, so that they are compared data set by data set. In units of one measurement, n
+configurations with m measurements each cost n (r + m), where going to a configuration
+costs r. A set of points that needs fewer configurations pays from the cost on at which
+both are equal: its break-even.
 """
 
 from __future__ import annotations
@@ -14,7 +16,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.study.in_memory import ask
-from elastocal.study.jobs import ERROR, LENGTH, MICRO, SET, Job, frames, group, rows_as_frame, table, write_csvs
+from elastocal.study.jobs import (
+    ERROR,
+    LENGTH,
+    MICRO,
+    SET,
+    Job,
+    frames,
+    group,
+    rows_as_frame,
+    table,
+    write_csvs,
+)
 from elastocal.study.simulation import bootstrap_weights, prefix_index_columns
 from elastocal.study.strategies import Stage, Strategy
 
@@ -35,38 +48,65 @@ BUDGET = table(
     LENGTH,
     ERROR,
 )
-# A point that is measured twice in a configuration has noise of its own the second time.
+# A point that is measured twice in a configuration has noise of its own the second
+# time.
 _AGAIN = "/again"
 # Of a normal distribution: 95 % within.
 QUANTILE = 1.96
 
 
-def budget_blocks(study: StudyInMemory, point_sets: PointSets) -> Iterator[dict[str, np.ndarray | str]]:
+def budget_blocks(
+    study: StudyInMemory, point_sets: PointSets
+) -> Iterator[dict[str, np.ndarray | str]]:
     """Squared error of each data set at every length.
 
-    `point_sets`: measuring points by the names of sets; a point may stand in a set twice. Sets with a point that the robot
-    lacks are left out.
+    `point_sets`: measuring points by the names of sets; a point may stand in a set
+    twice. Sets with a point that the robot lacks are left out.
     """
-    n, judge, there = study.robot.joints, study.judge(), {point.name for point in study.robot.chain.points}
-    point_sets = {label: points for label, points in point_sets.items() if there.issuperset(points)}
-    names = tuple(dict.fromkeys(name for points in point_sets.values() for name in points))
-    twice = tuple(name for name in names if any([*points].count(name) > 1 for points in point_sets.values()))
+    n = study.robot.joints
+    judge = study.judge()
+    there = {point.name for point in study.robot.chain.points}
+    point_sets = {
+        label: points
+        for label, points in point_sets.items()
+        if there.issuperset(points)
+    }
+    names = tuple(
+        dict.fromkeys(name for points in point_sets.values() for name in points)
+    )
+    twice = tuple(
+        name
+        for name in names
+        if any([*points].count(name) > 1 for points in point_sets.values())
+    )
     for sets in study.blocks():
         measurements = study.measure(sets, names)
         again = study.measure(sets, twice, _AGAIN) if twice else {}
         measurements |= {name + _AGAIN: found for name, found in again.items()}
         for label, points in point_sets.items():
-            read = tuple(name + _AGAIN * (name in points[:place]) for place, name in enumerate(points))
-            squares = judge.mean_square(study.estimate(Strategy("", (Stage(read, tuple(range(n))),)), measurements))
-            yield {**prefix_index_columns(sets, len(squares)), "points": label, "mean_square": squares.T.ravel()}
+            read = tuple(
+                name + _AGAIN * (name in points[:place])
+                for place, name in enumerate(points)
+            )
+            squares = judge.mean_square(
+                study.estimate(
+                    Strategy("", (Stage(read, tuple(range(n))),)), measurements
+                )
+            )
+            yield {
+                **prefix_index_columns(sets, len(squares)),
+                "points": label,
+                "mean_square": squares.T.ravel(),
+            }
 
 
 @dataclass(frozen=True)
 class Score:
     """A score over data sets, with what its intervals need.
 
-    `relative` (N,): deviations of its logarithm, of data sets or replicates that all that is compared shares. `spread`: the
-    standard error over the standard deviation of `relative`: 1 over the root of N for data sets, 1 for replicates.
+    `relative` (N,): deviations of its logarithm, of data sets or replicates that all
+    that is compared shares. `spread`: the standard error over the standard deviation of
+    `relative`: 1 over the root of N for data sets, 1 for replicates.
     """
 
     value: float
@@ -85,18 +125,24 @@ class Score:
 
 
 def mean_of(values: np.ndarray, root: bool = False, factor: float = 1.0) -> Score:
-    """Mean of values (N,) over data sets, or its root, times a factor; errors by the delta method."""
+    """Mean of values (N,) over data sets, or its root, times a factor; errors by the
+    delta method."""
     mean = values.mean()
     # The logarithm of a root deviates half as much as that of the mean below it.
     relative = (values / mean - 1) / (2 if root else 1)
-    return Score(factor * float(np.sqrt(mean) if root else mean), relative, 1 / np.sqrt(len(values)))
+    return Score(
+        factor * float(np.sqrt(mean) if root else mean),
+        relative,
+        1 / np.sqrt(len(values)),
+    )
 
 
 def budget_table(found: Frames, point_sets: PointSets, length: int) -> pd.DataFrame:
-    """Error of one data set by set of points: with as many configurations, and with as many measurements.
+    """Error of one data set by set of points: with as many configurations, and with as
+    many measurements.
 
-    `found`: the budget table of each robot. `length`: configurations; the budget is twice as many measurements. Without rows
-    that would take longer data sets.
+    `found`: the budget table of each robot. `length`: configurations; the budget is
+    twice as many measurements. Without rows that would take longer data sets.
     """
     rows = []
     for robot, frame in found.items():
@@ -105,13 +151,23 @@ def budget_table(found: Frames, point_sets: PointSets, length: int) -> pd.DataFr
                 at = _at(frame, points, configurations)
                 if len(at):
                     rms = mean_of(at.mean_square.to_numpy(), True, MICRO)
-                    rows.append((robot, points, len(names), configurations, rms.value, rms.std_error()))
+                    rows.append(
+                        (
+                            robot,
+                            points,
+                            len(names),
+                            configurations,
+                            rms.value,
+                            rms.std_error(),
+                        )
+                    )
     columns = ("robot", "points", "measurements_per_configuration", "configurations")
     return rows_as_frame(rows, (*columns, "rms_um", "std_error_um"))
 
 
 def paired_table(found: Frames, point_sets: PointSets, length: int) -> pd.DataFrame:
-    """Sets of points against the first one, at a budget of twice `length` measurements, paired by data set.
+    """Sets of points against the first one, at a budget of twice `length` measurements,
+    paired by data set.
 
     The ratio has its 95 % interval.
     """
@@ -125,14 +181,31 @@ def paired_table(found: Frames, point_sets: PointSets, length: int) -> pd.DataFr
             ours = _at(frame, points, configurations).mean_square.to_numpy()
             if points == against or not len(ours) or not len(theirs):
                 continue
-            head = (robot, points, against, configurations * len(names), configurations, theirs_at)
+            head = (
+                robot,
+                points,
+                against,
+                configurations * len(names),
+                configurations,
+                theirs_at,
+            )
             rows.append((*head, *mean_of(ours, True).ratio(mean_of(theirs, True))))
-    columns = ("robot", "points", "against", "measurements", "configurations", "configurations_against")
+    columns = (
+        "robot",
+        "points",
+        "against",
+        "measurements",
+        "configurations",
+        "configurations_against",
+    )
     return rows_as_frame(rows, (*columns, "ratio", "ratio_low", "ratio_high"))
 
 
-def lengths_table(found: Frames, point_sets: PointSets, accuracies_um: Sequence[float]) -> pd.DataFrame:
-    """How many random configurations bring the error of one data set to a wanted accuracy for good, with 95 % intervals.
+def lengths_table(
+    found: Frames, point_sets: PointSets, accuracies_um: Sequence[float]
+) -> pd.DataFrame:
+    """How many random configurations bring the error of one data set to a wanted
+    accuracy for good, with 95 % intervals.
 
     Infinite where the longest data set does not reach it.
     """
@@ -142,24 +215,39 @@ def lengths_table(found: Frames, point_sets: PointSets, accuracies_um: Sequence[
             mine = frame[frame.points == points]
             if mine.empty:
                 continue
-            squares = mine.pivot(index="data_set", columns="length", values="mean_square")
+            squares = mine.pivot(
+                index="data_set", columns="length", values="mean_square"
+            )
             lengths = squares.columns.to_numpy()
             rms = np.sqrt(squares.to_numpy().mean(axis=0))
-            error = squares.to_numpy().std(axis=0, ddof=1) / np.sqrt(len(squares)) / (2 * rms)
+            error = (
+                squares.to_numpy().std(axis=0, ddof=1)
+                / np.sqrt(len(squares))
+                / (2 * rms)
+            )
             curves = {
                 "configurations": rms,
                 "configurations_low": rms - QUANTILE * error,
                 "configurations_high": rms + QUANTILE * error,
             }
             for accuracy in accuracies_um:
-                needed = {name: _first(lengths, MICRO * values <= accuracy) for name, values in curves.items()}
+                needed = {
+                    name: _first(lengths, MICRO * values <= accuracy)
+                    for name, values in curves.items()
+                }
                 head = {"robot": robot, "points": points, "accuracy_um": accuracy}
-                rows.append(head | needed | {"measurements": needed["configurations"] * len(names)})
+                rows.append(
+                    head
+                    | needed
+                    | {"measurements": needed["configurations"] * len(names)}
+                )
     return rows_as_frame(rows)
 
 
 def _at(frame: pd.DataFrame, points: str, configurations: int) -> pd.DataFrame:
-    return frame[(frame.points == points) & (frame.length == configurations)].sort_values("data_set")
+    return frame[
+        (frame.points == points) & (frame.length == configurations)
+    ].sort_values("data_set")
 
 
 def _first(lengths: np.ndarray, reached: np.ndarray) -> float:
@@ -170,10 +258,12 @@ def _first(lengths: np.ndarray, reached: np.ndarray) -> float:
 
 
 def configurations_needed(squares: np.ndarray, accuracy: float) -> np.ndarray:
-    """Configurations after which the RMS error stays below an accuracy, a real number by interpolation of its logarithm.
+    """Configurations after which the RMS error stays below an accuracy, a real number
+    by interpolation of its logarithm.
 
-    `squares` (..., lengths): mean square errors for the lengths 1, 2, 3 ... `accuracy`: in the units of their roots. Returns
-    (...): infinite where the longest does not reach it.
+    `squares` (..., lengths): mean square errors for the lengths 1, 2, 3 ... `accuracy`:
+    in the units of their roots. Returns (...): infinite where the longest does not
+    reach it.
     """
     excess = np.log(np.where(np.isnan(squares), np.inf, squares)) - 2 * np.log(accuracy)
     above = excess > 0
@@ -183,16 +273,23 @@ def configurations_needed(squares: np.ndarray, accuracy: float) -> np.ndarray:
     before, after = (np.take_along_axis(excess, start + k, -1)[..., 0] for k in (0, 1))
     with np.errstate(invalid="ignore"):
         share = np.where(np.isinf(before), 1.0, before / (before - after))
-    between = np.exp(np.log1p(start[..., 0]) + share * np.log1p(1.0 / (start[..., 0] + 1.0)))
+    between = np.exp(
+        np.log1p(start[..., 0]) + share * np.log1p(1.0 / (start[..., 0] + 1.0))
+    )
     return np.where(~above.any(axis=-1), 1.0, np.where(reached, between, np.inf))
 
 
 def break_even_table(
-    found: Frames, point_sets: PointSets, accuracies_um: Sequence[float], weights: Mapping[str, np.ndarray]
+    found: Frames,
+    point_sets: PointSets,
+    accuracies_um: Sequence[float],
+    weights: Mapping[str, np.ndarray],
 ) -> pd.DataFrame:
-    """From which cost of a configuration on each set of points is cheaper than the first one, with its 95 % interval.
+    """From which cost of a configuration on each set of points is cheaper than the
+    first one, with its 95 % interval.
 
-    `weights`: bootstrap weights of each robot's data sets. Costs are in measurements; infinite where the set never pays.
+    `weights`: bootstrap weights of each robot's data sets. Costs are in measurements;
+    infinite where the set never pays.
     """
     rows = []
     against = next(iter(point_sets))
@@ -202,25 +299,57 @@ def break_even_table(
             for points, mine in frame.groupby("points")
         }
         shares = weights[robot] / weights[robot].sum(axis=1, keepdims=True)
-        means = {points: shares @ squares[points].to_numpy() for points in point_sets if points in squares}
+        means = {
+            points: shares @ squares[points].to_numpy()
+            for points in point_sets
+            if points in squares
+        }
         for accuracy in accuracies_um:
-            needed = {points: configurations_needed(mean, accuracy / MICRO) for points, mean in means.items()}
-            theirs, m = needed.pop(against, np.full(1, np.inf)), len(point_sets[against])
+            needed = {
+                points: configurations_needed(mean, accuracy / MICRO)
+                for points, mean in means.items()
+            }
+            theirs = needed.pop(against, np.full(1, np.inf))
+            m = len(point_sets[against])
             for points, ours in needed.items():
                 if not (np.isfinite(ours[0]) and np.isfinite(theirs[0])):
                     continue
                 with np.errstate(divide="ignore", invalid="ignore"):
-                    even = (ours * len(point_sets[points]) - theirs * m) / (theirs - ours)
+                    even = (ours * len(point_sets[points]) - theirs * m) / (
+                        theirs - ours
+                    )
                 even = np.where(ours < theirs, np.maximum(even, 0.0), np.inf)
                 ends = np.quantile(even[1:], [0.025, 0.975], method="nearest")
-                rows.append((robot, accuracy, points, against, ours[0], theirs[0], even[0], *ends))
-    columns = ("robot", "accuracy_um", "points", "against", "configurations", "configurations_against")
-    return rows_as_frame(rows, (*columns, "break_even", "break_even_low", "break_even_high"))
+                rows.append(
+                    (
+                        robot,
+                        accuracy,
+                        points,
+                        against,
+                        ours[0],
+                        theirs[0],
+                        even[0],
+                        *ends,
+                    )
+                )
+    columns = (
+        "robot",
+        "accuracy_um",
+        "points",
+        "against",
+        "configurations",
+        "configurations_against",
+    )
+    return rows_as_frame(
+        rows, (*columns, "break_even", "break_even_low", "break_even_high")
+    )
 
 
 def tabulate_budget(job: Job) -> None:
-    """Of all robots: at an equal budget, paired, and how many configurations each set needs."""
-    asked, found = job.params, frames(job, job.input.budgets, BUDGET)
+    """Of all robots: at an equal budget, paired, and how many configurations each set
+    needs."""
+    asked = job.params
+    found = frames(job, job.input.budgets, BUDGET)
     write_csvs(
         job,
         budget=budget_table(found, asked.point_sets, asked.length),
@@ -231,12 +360,21 @@ def tabulate_budget(job: Job) -> None:
 
 def tabulate_costs(job: Job) -> None:
     """Of all robots."""
-    asked, found = job.params, frames(job, job.input.budgets, BUDGET)
+    asked = job.params
+    found = frames(job, job.input.budgets, BUDGET)
     weights = {
-        robot: bootstrap_weights(asked.weights["seed"], robot, sorted(set(frame.data_set)), asked.weights["replicates"])
+        robot: bootstrap_weights(
+            asked.weights["seed"],
+            robot,
+            sorted(set(frame.data_set)),
+            asked.weights["replicates"],
+        )
         for robot, frame in found.items()
     }
-    write_csvs(job, table=break_even_table(found, asked.point_sets, asked.accuracies_um, weights))
+    write_csvs(
+        job,
+        table=break_even_table(found, asked.point_sets, asked.accuracies_um, weights),
+    )
 
 
 compare_point_sets = ask(BUDGET, budget_blocks)

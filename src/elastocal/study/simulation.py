@@ -1,6 +1,8 @@
-"""Data sets as the paper makes them: random configurations and forces, exact deflections, noise; and their tables on disk.
+"""Data sets as the paper makes them: random configurations and forces, exact
+deflections, noise; and their tables on disk.
 
-Arrays have the axes (data set, configuration, ...), and those from tables lie component first in memory.
+Arrays have the axes (data set, configuration, ...), and those from tables lie component
+first in memory.
 """
 
 from __future__ import annotations
@@ -13,7 +15,12 @@ import numpy as np
 from elastocal.io.origin import provenance
 from elastocal.io.storage import TableSchema, read_blocks, write_table
 from elastocal.mechanics.chain import parse_chain
-from elastocal.mechanics.components import COMPONENT_NAMES, COMPONENTS, WRENCH, WRENCH_NAMES
+from elastocal.mechanics.components import (
+    COMPONENT_NAMES,
+    COMPONENTS,
+    WRENCH,
+    WRENCH_NAMES,
+)
 from elastocal.mechanics.elastostatics import (
     exact_deflections,
     extended_chain,
@@ -25,7 +32,17 @@ from elastocal.mechanics.elastostatics import (
 from elastocal.mechanics.kinematics import jacobians, poses
 from elastocal.mechanics.robot_file import joint_limits
 from elastocal.random_streams import draw
-from elastocal.study.jobs import CONFIGURATION, SET, Job, group, origin, real, robot_of, table, whole
+from elastocal.study.jobs import (
+    CONFIGURATION,
+    SET,
+    Job,
+    group,
+    origin,
+    real,
+    robot_of,
+    table,
+    whole,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -43,7 +60,10 @@ DEFLECTIONS = table(
     group("point", "measuring point; a row group holds one"),
     SET,
     CONFIGURATION,
-    *(real(name, unit, f"{meaning}, loaded against unloaded") for name, unit, meaning in COMPONENTS),
+    *(
+        real(name, unit, f"{meaning}, loaded against unloaded")
+        for name, unit, meaning in COMPONENTS
+    ),
 )
 # All that `to_deflections` looks at.
 DEFLECTION_COLUMNS = ("configuration", *COMPONENT_NAMES)
@@ -52,17 +72,26 @@ INITIAL = table(
     "initial",
     SET,
     whole("configurations", "configurations in the data set", 1),
-    real("mean", "m", "mean over the data set of the end-effector's displacement under load", minimum=0),
+    real(
+        "mean",
+        "m",
+        "mean over the data set of the end-effector's displacement under load",
+        minimum=0,
+    ),
     real("mean_square", "m^2", "mean square of the same", minimum=0),
     real("maximum", "m", "largest of the same", minimum=0),
 )
 
 
-DATA_SETS, TESTS = "data sets", "test configurations"
+DATA_SETS = "data sets"
+TESTS = "test configurations"
 REPLICATE = whole("replicate", "number of the bootstrap replicate, from 1", 1)
 WEIGHTS = table(
     "weights",
-    group("members", "what counts: data sets or test configurations; a row group holds one"),
+    group(
+        "members",
+        "what counts: data sets or test configurations; a row group holds one",
+    ),
     whole("number", "number of the data set or test configuration, from 0", 0),
     REPLICATE,
     whole("count", "how often it counts in the replicate", 0),
@@ -72,7 +101,10 @@ WEIGHTS = table(
 def experiments(joints: int) -> TableSchema:
     """Configurations and wrenches; one row for each loaded configuration."""
     angles = [real(f"q{j}", "rad", f"angle of joint {j}") for j in range(1, joints + 1)]
-    wrench = [real(name, unit, f"{meaning}, at the end-effector") for name, unit, meaning in WRENCH]
+    wrench = [
+        real(name, unit, f"{meaning}, at the end-effector")
+        for name, unit, meaning in WRENCH
+    ]
     return table("experiments", SET, CONFIGURATION, *angles, *wrench)
 
 
@@ -80,7 +112,8 @@ def experiments(joints: int) -> TableSchema:
 class Experiments:
     """Loaded configurations of a robot.
 
-    `joint_angles` (sets, configurations, n): rad. `wrench` (sets, configurations, 6): N, N m at the end-effector, base axes.
+    `joint_angles` (sets, configurations, n): rad. `wrench` (sets, configurations, 6):
+    N, N m at the end-effector, base axes.
     """
 
     joint_angles: np.ndarray
@@ -91,8 +124,9 @@ class Experiments:
 class Loading:
     """How the robot is moved and loaded.
 
-    `force_N`: magnitude. `direction`: of the force, base axes; without one it is uniform on the sphere. `offset_m`: from the
-    end-effector to where the force acts. `offset_frame`: axes of the offset (interpretation R4). `joint_range`: joint angles
+    `force_N`: magnitude. `direction`: of the force, base axes; without one it is
+    uniform on the sphere. `offset_m`: from the end-effector to where the force acts.
+    `offset_frame`: axes of the offset (interpretation R4). `joint_range`: joint angles
     uniform in +-pi or within the robot's limits (interpretation R3).
     """
 
@@ -117,51 +151,95 @@ def random_experiments(
 
     Forces have the directions of normal vectors, which are uniform on the sphere [1].
 
-    `limits` (n, 2): joint limits in rad. `key`: name of the robot's file; part of the name of the random streams. `purpose`:
-    part of the name of the random streams: data that identify and data that judge never share one. `configurations`: in each
-    data set; the first k of them do not depend on how many there are.
+    `limits` (n, 2): joint limits in rad. `key`: name of the robot's file; part of the
+    name of the random streams. `purpose`: part of the name of the random streams: data
+    that identify and data that judge never share one. `configurations`: in each data
+    set; the first k of them do not depend on how many there are.
 
     [1] Muller, M. E., A note on a method for generating points uniformly on n-dimensional spheres, Communications of the ACM 2,
         1959.
     """
     n = chain.coordinates
-    turns = draw(seed, key, f"{purpose}/joint angles", data_sets, lambda stream: stream.random((configurations, n)))
-    low, high = limits.T if loading.joint_range == "limits" else (np.full(n, -np.pi), np.full(n, np.pi))
+    turns = draw(
+        seed,
+        key,
+        f"{purpose}/joint angles",
+        data_sets,
+        lambda stream: stream.random((configurations, n)),
+    )
+    low, high = (
+        limits.T
+        if loading.joint_range == "limits"
+        else (np.full(n, -np.pi), np.full(n, np.pi))
+    )
     joint_angles = low + (high - low) * turns
     if loading.direction is None:
-        normal = draw(seed, key, f"{purpose}/force", data_sets, lambda stream: stream.standard_normal((configurations, 3)))
+        normal = draw(
+            seed,
+            key,
+            f"{purpose}/force",
+            data_sets,
+            lambda stream: stream.standard_normal((configurations, 3)),
+        )
     else:
-        normal = np.broadcast_to(np.array(loading.direction, float), (*joint_angles.shape[:-1], 3))
+        normal = np.broadcast_to(
+            np.array(loading.direction, float), (*joint_angles.shape[:-1], 3)
+        )
     force = loading.force_N * normal / np.linalg.norm(normal, axis=-1, keepdims=True)
-    rotation = poses(chain, joint_angles, chain.end_effector)[1] if loading.offset_frame == "tool" else None
-    return Experiments(joint_angles, wrench_of_offset_force(force, loading.offset_m, rotation))
+    rotation = (
+        poses(chain, joint_angles, chain.end_effector)[1]
+        if loading.offset_frame == "tool"
+        else None
+    )
+    return Experiments(
+        joint_angles, wrench_of_offset_force(force, loading.offset_m, rotation)
+    )
 
 
-def true_deflections(robot: Robot, experiments: Experiments, point: MeasuringPoint, wrench_at: str) -> np.ndarray:
-    """Deflection of a measuring point: theta from equation 7, then the exact kinematics of all springs.
+def true_deflections(
+    robot: Robot, experiments: Experiments, point: MeasuringPoint, wrench_at: str
+) -> np.ndarray:
+    """Deflection of a measuring point: theta from equation 7, then the exact kinematics
+    of all springs.
 
-    The virtual joint method, see `mechanics.elastostatics`. `robot`: reduced or, where it has links, extended. `point`: of the
-    robot's chain. `wrench_at`: where the wrench that deflects a partial point is taken to act (interpretation R6). Returns
-    (sets, configurations, 6): m, rad.
+    The virtual joint method, see `mechanics.elastostatics`. `robot`: reduced or, where
+    it has links, extended. `point`: of the robot's chain. `wrench_at`: where the wrench
+    that deflects a partial point is taken to act (interpretation R6). Returns (sets,
+    configurations, 6): m, rad.
     """
     chain = extended_chain(robot)
     unloaded = chain.at(experiments.joint_angles)
     measured = replace(chain.point(point.name), offset_m=point.offset_m)
     jacobian = jacobians(chain, unloaded, loaded_point(chain, measured, wrench_at))
-    springs = generalized_forces(jacobian, experiments.wrench) @ spring_compliance(robot)
+    springs = generalized_forces(jacobian, experiments.wrench) @ spring_compliance(
+        robot
+    )
     return exact_deflections(chain, unloaded, springs, measured)
 
 
 def measurement_noise(
-    seed: int, key: str, point_name: str, data_sets: Sequence[int] | np.ndarray, configurations: int
+    seed: int,
+    key: str,
+    point_name: str,
+    data_sets: Sequence[int] | np.ndarray,
+    configurations: int,
 ) -> np.ndarray:
-    """Standard normal noise (sets, configurations, 6) at one measuring point; times the noise level it is the error.
+    """Standard normal noise (sets, configurations, 6) at one measuring point; times the
+    noise level it is the error.
 
-    The same numbers serve every noise level, so that levels differ by scale alone: common random numbers [1].
+    The same numbers serve every noise level, so that levels differ by scale alone:
+    common random numbers [1].
 
-    [1] Glasserman, P. and Yao, D. D., Some guidelines and guarantees for common random numbers, Management Science 38, 1992.
+    [1] Glasserman, P. and Yao, D. D., Some guidelines and guarantees for common random
+    numbers, Management Science 38, 1992.
     """
-    return draw(seed, key, f"noise/{point_name}", data_sets, lambda stream: stream.standard_normal((configurations, 6)))
+    return draw(
+        seed,
+        key,
+        f"noise/{point_name}",
+        data_sets,
+        lambda stream: stream.standard_normal((configurations, 6)),
+    )
 
 
 def blocks_of_sets(data_sets: int) -> Iterator[range]:
@@ -170,9 +248,15 @@ def blocks_of_sets(data_sets: int) -> Iterator[range]:
         yield range(first, min(first + SETS_PER_BLOCK, data_sets))
 
 
-def prefix_index_columns(sets: Sequence[int] | np.ndarray, lengths: int) -> dict[str, np.ndarray]:
-    """Columns that number the rows of a block with one row for each data set and prefix length."""
-    return {"data_set": np.repeat(np.asarray(sets), lengths), "length": np.tile(np.arange(1, lengths + 1), len(sets))}
+def prefix_index_columns(
+    sets: Sequence[int] | np.ndarray, lengths: int
+) -> dict[str, np.ndarray]:
+    """Columns that number the rows of a block with one row for each data set and prefix
+    length."""
+    return {
+        "data_set": np.repeat(np.asarray(sets), lengths),
+        "length": np.tile(np.arange(1, lengths + 1), len(sets)),
+    }
 
 
 def data_sets(columns: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -181,10 +265,15 @@ def data_sets(columns: Mapping[str, np.ndarray]) -> np.ndarray:
     return numbers[np.flatnonzero(np.diff(numbers, prepend=-1))]
 
 
-def experiment_columns(sets: Sequence[int] | np.ndarray, experiments: Experiments) -> dict[str, np.ndarray]:
+def experiment_columns(
+    sets: Sequence[int] | np.ndarray, experiments: Experiments
+) -> dict[str, np.ndarray]:
     """Block of the experiments table."""
     columns = _index_columns(sets, experiments.joint_angles.shape[1])
-    columns |= {f"q{j + 1}": angle.ravel() for j, angle in enumerate(np.moveaxis(experiments.joint_angles, -1, 0))}
+    columns |= {
+        f"q{j + 1}": angle.ravel()
+        for j, angle in enumerate(np.moveaxis(experiments.joint_angles, -1, 0))
+    }
     return columns | _component_columns(WRENCH_NAMES, experiments.wrench)
 
 
@@ -199,32 +288,44 @@ def to_deflections(columns: Mapping[str, np.ndarray]) -> np.ndarray:
     return _stacked(columns, COMPONENT_NAMES)
 
 
-def _index_columns(sets: Sequence[int] | np.ndarray, configurations: int) -> dict[str, np.ndarray]:
+def _index_columns(
+    sets: Sequence[int] | np.ndarray, configurations: int
+) -> dict[str, np.ndarray]:
     return {
         "data_set": np.repeat(np.asarray(sets), configurations),
         "configuration": np.tile(np.arange(configurations), len(sets)),
     }
 
 
-def _component_columns(names: Sequence[str], values: np.ndarray) -> dict[str, np.ndarray]:
+def _component_columns(
+    names: Sequence[str], values: np.ndarray
+) -> dict[str, np.ndarray]:
     return {name: values[..., k].ravel() for k, name in enumerate(names)}
 
 
 def _stacked(columns: Mapping[str, np.ndarray], names: Sequence[str]) -> np.ndarray:
     configurations = int(columns["configuration"].max()) + 1
-    return np.moveaxis(np.stack([columns[name].reshape(-1, configurations) for name in names]), 0, -1)
+    return np.moveaxis(
+        np.stack([columns[name].reshape(-1, configurations) for name in names]), 0, -1
+    )
 
 
 def ideal_blocks(
     experiments: Iterable[Mapping[str, np.ndarray]], robot: Robot, wrench_at: str
 ) -> Iterator[dict[str, np.ndarray | str]]:
-    """Deflections without noise: of each block of experiments one block for each measuring point."""
+    """Deflections without noise: of each block of experiments one block for each
+    measuring point."""
     for block in experiments:
-        loaded, sets = to_experiments(block), data_sets(block)
+        loaded = to_experiments(block)
+        sets = data_sets(block)
         for point in robot.chain.points:
             deflections = true_deflections(robot, loaded, point, wrench_at)
             numbers = _index_columns(sets, deflections.shape[1])
-            yield {"point": point.name, **numbers, **_component_columns(COMPONENT_NAMES, deflections)}
+            yield {
+                "point": point.name,
+                **numbers,
+                **_component_columns(COMPONENT_NAMES, deflections),
+            }
 
 
 def measured_blocks(
@@ -232,53 +333,93 @@ def measured_blocks(
 ) -> Iterator[dict[str, np.ndarray | str]]:
     """Deflections as measured: ideal plus independent normal noise on every component.
 
-    `key`: name of the robot's file. `noise`: standard deviation, the same number in m and rad.
+    `key`: name of the robot's file. `noise`: standard deviation, the same number in m
+    and rad.
     """
     for block in ideal_blocks:
         point = block["point"][0]
-        normal = measurement_noise(seed, key, point, data_sets(block), int(block["configuration"].max()) + 1)
-        measured = {name: block[name] + noise * normal[..., k].ravel() for k, name in enumerate(COMPONENT_NAMES)}
+        normal = measurement_noise(
+            seed, key, point, data_sets(block), int(block["configuration"].max()) + 1
+        )
+        measured = {
+            name: block[name] + noise * normal[..., k].ravel()
+            for k, name in enumerate(COMPONENT_NAMES)
+        }
         yield block | measured | {"point": point}
 
 
 def bending(displacement: np.ndarray) -> dict[str, np.ndarray]:
-    """How far each data set of displacements (sets, configurations, 3 or more) bends: columns of sizes."""
+    """How far each data set of displacements (sets, configurations, 3 or more) bends:
+    columns of sizes."""
     size = np.linalg.norm(displacement[..., :3], axis=-1)
-    return {"mean": size.mean(axis=1), "mean_square": (size**2).mean(axis=1), "maximum": size.max(axis=1)}
+    return {
+        "mean": size.mean(axis=1),
+        "mean_square": (size**2).mean(axis=1),
+        "maximum": size.max(axis=1),
+    }
 
 
 def find_statistics(frame: pd.DataFrame) -> dict[str, pd.Series]:
-    """Mean, standard deviation and largest of the deflections of each data set, m, of the initial table or that of tubes."""
-    return {"mean": frame["mean"], "std": (frame.mean_square - frame["mean"] ** 2) ** 0.5, "max": frame.maximum}
+    """Mean, standard deviation and largest of the deflections of each data set, m, of
+    the initial table or that of tubes."""
+    return {
+        "mean": frame["mean"],
+        "std": (frame.mean_square - frame["mean"] ** 2) ** 0.5,
+        "max": frame.maximum,
+    }
 
 
-def bootstrap_weights(seed: int, key: str, data_sets: Sequence[int] | np.ndarray, replicates: int) -> np.ndarray:
-    """How often each data set counts in each replicate: once in replicate 0, Poisson(1) times in the others.
+def bootstrap_weights(
+    seed: int, key: str, data_sets: Sequence[int] | np.ndarray, replicates: int
+) -> np.ndarray:
+    """How often each data set counts in each replicate: once in replicate 0, Poisson(1)
+    times in the others.
 
-    The Poisson bootstrap [1], whose independent weights of mean one do not need to know how many data sets there are. They are
-    the same for every noise level and strategy, so that replicates of two of them may be compared one by one.
+    The Poisson bootstrap [1], whose independent weights of mean one do not need to know
+    how many data sets there are. They are the same for every noise level and strategy,
+    so that replicates of two of them may be compared one by one.
 
     `seed`, `key`: as in `random_streams.stream`. Returns (1 + replicates, sets).
 
     [1] Hanley, J. A. and MacGibbon, B., Creating non-parametric bootstrap samples using Poisson frequencies, Computer Methods
         and Programs in Biomedicine 83, 2006.
     """
-    counts = draw(seed, key, "bootstrap", data_sets, lambda stream: stream.poisson(1.0, replicates))
+    counts = draw(
+        seed,
+        key,
+        "bootstrap",
+        data_sets,
+        lambda stream: stream.poisson(1.0, replicates),
+    )
     return np.vstack([np.ones(len(counts)), counts.T])
 
 
-def weight_blocks(key: str, seed: int, data_sets: int, tests: int, replicates: int) -> Iterator[dict[str, np.ndarray | str]]:
-    """How often each data set and each test configuration counts in each bootstrap replicate.
+def weight_blocks(
+    key: str, seed: int, data_sets: int, tests: int, replicates: int
+) -> Iterator[dict[str, np.ndarray | str]]:
+    """How often each data set and each test configuration counts in each bootstrap
+    replicate.
 
-    Yields columns of the weights table: data sets in the blocks of the experiments, then all test configurations.
+    Yields columns of the weights table: data sets in the blocks of the experiments,
+    then all test configurations.
     """
     for sets in blocks_of_sets(data_sets):
-        yield _weight_columns(DATA_SETS, sets, bootstrap_weights(seed, key, sets, replicates)[1:].T)
-    of_tests = draw(seed, key, "bootstrap of tests", [0], lambda stream: stream.poisson(1.0, (replicates, tests)))[0]
+        yield _weight_columns(
+            DATA_SETS, sets, bootstrap_weights(seed, key, sets, replicates)[1:].T
+        )
+    of_tests = draw(
+        seed,
+        key,
+        "bootstrap of tests",
+        [0],
+        lambda stream: stream.poisson(1.0, (replicates, tests)),
+    )[0]
     yield _weight_columns(TESTS, range(tests), of_tests.T)
 
 
-def _weight_columns(members: str, numbers: Sequence[int], counts: np.ndarray) -> dict[str, np.ndarray | str]:
+def _weight_columns(
+    members: str, numbers: Sequence[int], counts: np.ndarray
+) -> dict[str, np.ndarray | str]:
     return {
         "members": members,
         "number": np.repeat(numbers, counts.shape[1]),
@@ -289,38 +430,68 @@ def _weight_columns(members: str, numbers: Sequence[int], counts: np.ndarray) ->
 
 def draw_experiments(job: Job) -> None:
     """Random configurations and loads of one robot."""
-    asked, robot = job.params, job.wildcards.robot
+    asked = job.params
+    robot = job.wildcards.robot
     chain = parse_chain(asked.chain, asked.lengths_m, robot)
-    limits, loading = joint_limits(asked.joint_limits_deg, chain, robot), Loading(**asked.loading)
+    limits = joint_limits(asked.joint_limits_deg, chain, robot)
+    loading = Loading(**asked.loading)
     blocks = (
         experiment_columns(
             sets,
-            random_experiments(chain, limits, asked.seed, robot, loading, asked.purpose, sets, asked.configurations),
+            random_experiments(
+                chain,
+                limits,
+                asked.seed,
+                robot,
+                loading,
+                asked.purpose,
+                sets,
+                asked.configurations,
+            ),
         )
         for sets in blocks_of_sets(asked.data_sets)
     )
-    write_table(job.output.experiments, experiments(chain.coordinates), blocks, provenance(asked))
+    write_table(
+        job.output.experiments,
+        experiments(chain.coordinates),
+        blocks,
+        provenance(asked),
+    )
 
 
 def draw_weights(job: Job) -> None:
-    """Bootstrap weights of one robot, drawn once for all strategies and noise levels."""
+    """Bootstrap weights of one robot, drawn once for all strategies and noise
+    levels."""
     asked = job.params
-    drawn = weight_blocks(job.wildcards.robot, asked.seed, asked.data_sets, asked.tests, asked.replicates)
+    drawn = weight_blocks(
+        job.wildcards.robot, asked.seed, asked.data_sets, asked.tests, asked.replicates
+    )
     write_table(job.output.weights, WEIGHTS, drawn, origin(job))
 
 
 def simulate(job: Job) -> None:
     """Deflections of one robot without noise."""
     robot = robot_of(job)
-    blocks = ideal_blocks(read_blocks(job.input.experiments, experiments(robot.joints)), robot, job.params.wrench_at)
+    blocks = ideal_blocks(
+        read_blocks(job.input.experiments, experiments(robot.joints)),
+        robot,
+        job.params.wrench_at,
+    )
     write_table(job.output.ideal, DEFLECTIONS, blocks, provenance(job.params))
 
 
 def measure(job: Job) -> None:
     """Deflections of one robot as measured at one noise level."""
     ideal = read_blocks(job.input.ideal, DEFLECTIONS)
-    blocks = measured_blocks(ideal, job.wildcards.robot, job.params.seed, 1e-6 * float(job.wildcards.noise))
-    write_table(job.output.measured, DEFLECTIONS, blocks, provenance(job.params, noise_um=job.wildcards.noise))
+    blocks = measured_blocks(
+        ideal, job.wildcards.robot, job.params.seed, 1e-6 * float(job.wildcards.noise)
+    )
+    write_table(
+        job.output.measured,
+        DEFLECTIONS,
+        blocks,
+        provenance(job.params, noise_um=job.wildcards.noise),
+    )
 
 
 def summarize_initial(job: Job) -> None:
@@ -329,7 +500,9 @@ def summarize_initial(job: Job) -> None:
     blocks = (
         {
             "data_set": data_sets(block),
-            "configurations": np.full(len(data_sets(block)), int(block["configuration"].max()) + 1),
+            "configurations": np.full(
+                len(data_sets(block)), int(block["configuration"].max()) + 1
+            ),
             **bending(to_deflections(block)),
         }
         for block in ideal

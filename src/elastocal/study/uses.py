@@ -1,16 +1,22 @@
-"""How to evaluate (RQ4): what strategies leave by several yardsticks, and where these rank them differently, with intervals.
+"""How to evaluate (RQ4): what strategies leave by several yardsticks, and where these
+rank them differently, with intervals.
 
-An accuracy on random configurations says little to whom the robot works in one corner of its space. ISO 9283 [1] has five
-poses in a cube and one orientation; the accuracy of a pose is the distance of the mean of the reached positions from the
-commanded one. A model that corrects the command leaves its own error there, as repeatability averages out.
+An accuracy on random configurations says little to whom the robot works in one corner
+of its space. ISO 9283 [1] has five poses in a cube and one orientation; the accuracy of
+a pose is the distance of the mean of the reached positions from the commanded one. A
+model that corrects the command leaves its own error there, as repeatability averages
+out.
 
-All strategies see the same data sets, so that their scores go up and down together: what counts is the ratio of two of them,
-data set by data set. For a score that is a smooth function of means over data sets its influence values give the variance of
-the logarithm of a ratio (delta method [2]; of a quantile by Bahadur's representation); the paper's scores of averaged models
-have the bootstrap replicates, whose weights all strategies share.
+All strategies see the same data sets, so that their scores go up and down together:
+what counts is the ratio of two of them, data set by data set. For a score that is a
+smooth function of means over data sets its influence values give the variance of the
+logarithm of a ratio (delta method [2]; of a quantile by Bahadur's representation); the
+paper's scores of averaged models have the bootstrap replicates, whose weights all
+strategies share.
 
-[1] ISO 9283:1998, Manipulating industrial robots: Performance criteria and related test methods.
-[2] van der Vaart, A. W., Asymptotic Statistics, chapters 3 and 21, Cambridge University Press, 1998.
+[1] ISO 9283:1998, Manipulating industrial robots: Performance criteria and related test
+methods. [2] van der Vaart, A. W., Asymptotic Statistics, chapters 3 and 21, Cambridge
+University Press, 1998.
 """
 
 from __future__ import annotations
@@ -20,10 +26,24 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.application.inverse_kinematics import SOLVED_M, along_path, find_beyond_limits
+from elastocal.application.inverse_kinematics import (
+    SOLVED_M,
+    along_path,
+    find_beyond_limits,
+)
 from elastocal.study.evaluation import REPLICATES, metrics
 from elastocal.study.in_memory import ask
-from elastocal.study.jobs import MICRO, SET, STRATEGY, Job, frames, real, rows_as_frame, table, write_csvs
+from elastocal.study.jobs import (
+    MICRO,
+    SET,
+    STRATEGY,
+    Job,
+    frames,
+    real,
+    rows_as_frame,
+    table,
+    write_csvs,
+)
 from elastocal.study.metrics import make_judge, position_errors
 from elastocal.study.points import Score, mean_of
 from elastocal.study.simulation import Experiments
@@ -47,10 +67,23 @@ USES = table(
     real("mean", "m", "mean end-effector error on test configurations"),
     real("mean_square", "m^2", "mean square of the same"),
     real("p95", "m", "95th percentile of the same"),
-    real("pooled_p95", "m", "95th percentile over test configurations and data sets, the same in every row"),
-    real("pooled_p95_influence", "m", "influence of the data set on the pooled percentile"),
+    real(
+        "pooled_p95",
+        "m",
+        "95th percentile over test configurations and data sets, the same in every row",
+    ),
+    real(
+        "pooled_p95_influence",
+        "m",
+        "influence of the data set on the pooled percentile",
+    ),
     real("iso_9283", "m", "largest error at the five poses of ISO 9283", missing=True),
-    real("path_mean_square", "m^2", "mean square error along the milling path", missing=True),
+    real(
+        "path_mean_square",
+        "m^2",
+        "mean square error along the milling path",
+        missing=True,
+    ),
     real("path_max", "m", "largest error along the milling path", missing=True),
 )
 REFERENCE = "rms_um"
@@ -85,7 +118,8 @@ _AVERAGED = {
 # Scores of strategies that are one estimator agree to rounding.
 _DIGITS = 6
 # The quantile that is pooled, and over how much about it its density is taken.
-_POOLED, _ABOUT = 0.95, 0.01
+_POOLED = 0.95
+_ABOUT = 0.01
 # Of a diagonal, from its ends: where the outer four poses lie.
 _FROM_ENDS = 0.1
 _PATH_POSES = 50
@@ -93,31 +127,48 @@ _PATH_POSES = 50
 _DOWN = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 
 
-def iso_9283(robot: Robot, centre_m: Sequence[float], edge_m: float, weight_N: float) -> Experiments | None:
+def iso_9283(
+    robot: Robot, centre_m: Sequence[float], edge_m: float, weight_N: float
+) -> Experiments | None:
     """The five poses in the sloped plane of a cube, under a weight.
 
-    `centre_m`: of the cube, base axes. `weight_N`: downwards, at the end-effector. Returns one set of five configurations
-    within the joint limits; None where the robot does not reach them all.
+    `centre_m`: of the cube, base axes. `weight_N`: downwards, at the end-effector.
+    Returns one set of five configurations within the joint limits; None where the robot
+    does not reach them all.
     """
     reach = 0.5 * edge_m * (1 - 2 * _FROM_ENDS)
     corners = np.array([[0, 0, 0], [-1, -1, -1], [-1, 1, -1], [1, 1, 1], [1, -1, 1]])
-    return _find_loaded(robot, np.array(centre_m) + reach * corners, np.tile([0.0, 0.0, -weight_N], (5, 1)))
+    return _find_loaded(
+        robot,
+        np.array(centre_m) + reach * corners,
+        np.tile([0.0, 0.0, -weight_N], (5, 1)),
+    )
 
 
-def milling_path(robot: Robot, centre_m: Sequence[float], length_m: float, cutting_N: float) -> Experiments | None:
-    """A straight level path across, the cutting force half against the feed and half upwards off the part.
+def milling_path(
+    robot: Robot, centre_m: Sequence[float], length_m: float, cutting_N: float
+) -> Experiments | None:
+    """A straight level path across, the cutting force half against the feed and half
+    upwards off the part.
 
-    `robot`, `centre_m`: as in `iso_9283`. Returns one set of configurations within the joint limits; None where the robot does
-    not reach all of the path.
+    `robot`, `centre_m`: as in `iso_9283`. Returns one set of configurations within the
+    joint limits; None where the robot does not reach all of the path.
     """
     along = np.array([0.0, 1.0, 0.0])
-    position = np.array(centre_m) + length_m * np.linspace(-0.5, 0.5, _PATH_POSES)[:, None] * along
+    position = (
+        np.array(centre_m)
+        + length_m * np.linspace(-0.5, 0.5, _PATH_POSES)[:, None] * along
+    )
     force = cutting_N * np.sqrt(0.5) * (np.array([0.0, 0.0, 1.0]) - along)
     return _find_loaded(robot, position, np.tile(force, (_PATH_POSES, 1)))
 
 
-def _find_loaded(robot: Robot, position: np.ndarray, force: np.ndarray) -> Experiments | None:
-    angles, left = along_path(robot, position, np.broadcast_to(_DOWN, (len(position), 3, 3)))
+def _find_loaded(
+    robot: Robot, position: np.ndarray, force: np.ndarray
+) -> Experiments | None:
+    angles, left = along_path(
+        robot, position, np.broadcast_to(_DOWN, (len(position), 3, 3))
+    )
     if (left > SOLVED_M).any() or find_beyond_limits(robot, angles).any():
         return None
     return Experiments(angles[None], np.pad(force, ((0, 0), (0, 3)))[None])
@@ -126,20 +177,34 @@ def _find_loaded(robot: Robot, position: np.ndarray, force: np.ndarray) -> Exper
 def use_blocks(
     study: StudyInMemory, strategies: Sequence[Strategy], uses: Mapping[str, Any]
 ) -> Iterator[dict[str, np.ndarray | str]]:
-    """Errors of the models of all data sets, strategy by strategy, from all configurations of a data set.
+    """Errors of the models of all data sets, strategy by strategy, from all
+    configurations of a data set.
 
-    `uses`: centre_m, edge_m, weight_N, path_m and cutting_N. Not a number for uses out of the robot's reach.
+    `uses`: centre_m, edge_m, weight_N, path_m and cutting_N. Not a number for uses out
+    of the robot's reach.
     """
-    robot, at = study.robot, study.interpretation.wrench_at
+    robot = study.robot
+    at = study.interpretation.wrench_at
     cube = iso_9283(robot, uses["centre_m"], uses["edge_m"], uses["weight_N"])
     path = milling_path(robot, uses["centre_m"], uses["path_m"], uses["cutting_N"])
-    judges = [study.judge(), *(use and make_judge(robot, use, study.deflections(use), at) for use in (cube, path))]
+    judges = [
+        study.judge(),
+        *(
+            use and make_judge(robot, use, study.deflections(use), at)
+            for use in (cube, path)
+        ),
+    ]
     for strategy, blocks in study.estimates(strategies).items():
         models = np.concatenate([block[:, -1] for block in blocks])
         tests, at_cube, on_path = (
-            position_errors(judge, models) if judge else np.full((len(models), 1), np.nan) for judge in judges
+            position_errors(judge, models)
+            if judge
+            else np.full((len(models), 1), np.nan)
+            for judge in judges
         )
-        low, pooled, high = np.quantile(tests, [_POOLED - _ABOUT, _POOLED, _POOLED + _ABOUT])
+        low, pooled, high = np.quantile(
+            tests, [_POOLED - _ABOUT, _POOLED, _POOLED + _ABOUT]
+        )
         slope = (high - low) / (2 * _ABOUT)
         yield {
             "strategy": strategy,
@@ -148,18 +213,22 @@ def use_blocks(
             "mean_square": (tests**2).mean(axis=1),
             "p95": np.quantile(tests, _POOLED, axis=1),
             "pooled_p95": np.full(len(tests), pooled),
-            "pooled_p95_influence": slope * ((tests > pooled).mean(axis=1) - (1 - _POOLED)),
+            "pooled_p95_influence": slope
+            * ((tests > pooled).mean(axis=1) - (1 - _POOLED)),
             "iso_9283": at_cube.max(axis=1),
             "path_mean_square": (on_path**2).mean(axis=1),
             "path_max": on_path.max(axis=1),
         }
 
 
-def scores(uses: pd.DataFrame, metrics: pd.DataFrame, replicates: pd.DataFrame, length: int) -> dict[str, dict[str, Score]]:
+def scores(
+    uses: pd.DataFrame, metrics: pd.DataFrame, replicates: pd.DataFrame, length: int
+) -> dict[str, dict[str, Score]]:
     """Scores of one robot's strategies by every metric.
 
-    `uses`: the uses table. `metrics`, `replicates`: long, of the robot at the noise of the tables. Returns metric, strategy;
-    without metrics at places that the robot does not reach.
+    `uses`: the uses table. `metrics`, `replicates`: long, of the robot at the noise of
+    the tables. Returns metric, strategy; without metrics at places that the robot does
+    not reach.
     """
     found: dict[str, dict[str, Score]] = {}
     for strategy in dict.fromkeys(uses.strategy):
@@ -167,7 +236,9 @@ def scores(uses: pd.DataFrame, metrics: pd.DataFrame, replicates: pd.DataFrame, 
         for name, score in _of_single_sets(mine).items():
             found.setdefault(name, {})[strategy] = score
         at = metrics[(metrics.strategy == strategy) & (metrics.length == length)]
-        drawn = replicates[(replicates.strategy == strategy) & (replicates.length == length)].sort_values("replicate")
+        drawn = replicates[
+            (replicates.strategy == strategy) & (replicates.length == length)
+        ].sort_values("replicate")
         for name, (column, factor) in _AVERAGED.items():
             value = float(at[column].iloc[0])
             relative = drawn[column].to_numpy() / value - 1
@@ -176,7 +247,8 @@ def scores(uses: pd.DataFrame, metrics: pd.DataFrame, replicates: pd.DataFrame, 
 
 
 def ranks_table(found: Scores, classical: str) -> pd.DataFrame:
-    """Every strategy by every metric, its rank, and its ratio to the classical strategy with its 95 % interval.
+    """Every strategy by every metric, its rank, and its ratio to the classical strategy
+    with its 95 % interval.
 
     One estimator under two names has one rank, from 1.
     """
@@ -187,15 +259,28 @@ def ranks_table(found: Scores, classical: str) -> pd.DataFrame:
         for metric, by_strategy in by_metric.items():
             values = np.array([score.value for score in by_strategy.values()])
             places = rankdata(_round(np.abs(values)), method="min")
-            for (strategy, score), rank in zip(by_strategy.items(), places, strict=True):
+            for (strategy, score), rank in zip(
+                by_strategy.items(), places, strict=True
+            ):
                 ratio = score.ratio(by_strategy[classical])
-                rows.append((robot, metric, strategy, score.value, score.std_error(), *ratio, int(rank)))
+                rows.append(
+                    (
+                        robot,
+                        metric,
+                        strategy,
+                        score.value,
+                        score.std_error(),
+                        *ratio,
+                        int(rank),
+                    )
+                )
     head = ("robot", "metric", "strategy", "value", "value_std_error")
     return rows_as_frame(rows, (*head, "ratio", "ratio_low", "ratio_high", "rank"))
 
 
 def pairs_table(found: Scores) -> pd.DataFrame:
-    """Every two different estimators by every metric and by the RMS error of one data set.
+    """Every two different estimators by every metric and by the RMS error of one data
+    set.
 
     reversed: both intervals exclude one, on opposite sides.
     """
@@ -209,11 +294,30 @@ def pairs_table(found: Scores) -> pd.DataFrame:
         names = [*seen.values()]
         for metric, by_strategy in by_metric.items():
             for strategy, other in combinations(names, 2):
-                ratio, by_rms = (some[strategy].ratio(some[other]) for some in (by_strategy, reference))
-                sides = [int(low > 1) - int(high < 1) for _, low, high in (ratio, by_rms)]
-                rows.append((robot, metric, strategy, other, *ratio, *by_rms, sides[0] * sides[1] < 0))
-    columns = [f"{of}ratio{end}" for of in ("", "rms_") for end in ("", "_low", "_high")]
-    return rows_as_frame(rows, ("robot", "metric", "strategy", "other", *columns, "reversed"))
+                ratio, by_rms = (
+                    some[strategy].ratio(some[other])
+                    for some in (by_strategy, reference)
+                )
+                sides = [
+                    int(low > 1) - int(high < 1) for _, low, high in (ratio, by_rms)
+                ]
+                rows.append(
+                    (
+                        robot,
+                        metric,
+                        strategy,
+                        other,
+                        *ratio,
+                        *by_rms,
+                        sides[0] * sides[1] < 0,
+                    )
+                )
+    columns = [
+        f"{of}ratio{end}" for of in ("", "rms_") for end in ("", "_low", "_high")
+    ]
+    return rows_as_frame(
+        rows, ("robot", "metric", "strategy", "other", *columns, "reversed")
+    )
 
 
 def _of_single_sets(mine: pd.DataFrame) -> dict[str, Score]:
@@ -237,12 +341,20 @@ def tabulate_uses(job: Job) -> None:
     from elastocal.io.data_frames import read_long
 
     asked = job.params
-    averaged, drawn = read_long(job.input.metrics, metrics), read_long(job.input.replicates, lambda joints: REPLICATES)
+    averaged = read_long(job.input.metrics, metrics)
+    drawn = read_long(job.input.replicates, lambda joints: REPLICATES)
     found = {
-        robot: scores(frame, averaged[averaged.robot == robot], drawn[drawn.robot == robot], asked.length)
+        robot: scores(
+            frame,
+            averaged[averaged.robot == robot],
+            drawn[drawn.robot == robot],
+            asked.length,
+        )
         for robot, frame in frames(job, job.input.uses, USES).items()
     }
-    write_csvs(job, scores=ranks_table(found, asked.classical), pairs=pairs_table(found))
+    write_csvs(
+        job, scores=ranks_table(found, asked.classical), pairs=pairs_table(found)
+    )
 
 
 judge_in_use = ask(USES, use_blocks)

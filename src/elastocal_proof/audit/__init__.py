@@ -1,1 +1,2 @@
-"""An audit of a finished run: samples of its files worked out again by libraries that share no code with the pipeline."""
+"""An audit of a finished run: samples of its files worked out again by libraries that
+share no code with the pipeline."""

@@ -1,4 +1,5 @@
-"""The analyst's folder, and the sealed ground truth outside of it. A campaign's format is a contract of both sides."""
+"""The analyst's folder, and the sealed ground truth outside of it. A campaign's format
+is a contract of both sides."""
 
 from __future__ import annotations
 
@@ -34,14 +35,19 @@ def campaign_document(name: str, arm: Arm, design: Design) -> dict[str, Any]:
         "robot": ROBOT_FILE,
         "measured": design.measured,
         "frame": design.frame,
-        "targets": {f"{point}": {"point": point, "offset_m": [0, 0, 0]} for point in design.points or arm.points},
+        "targets": {
+            f"{point}": {"point": point, "offset_m": [0, 0, 0]}
+            for point in design.points or arm.points
+        },
         "compliance": "identify",
         "declared": list(design.declared),
         "holdout": {"poses": list(range(design.poses - design.held_out, design.poses))},
         "remainder": "none",
     }
     if design.declared_noise is not None:
-        document["noise"] = dict(zip(("position_m", "orientation_rad"), design.declared_noise, strict=True))
+        document["noise"] = dict(
+            zip(("position_m", "orientation_rad"), design.declared_noise, strict=True)
+        )
     return document
 
 
@@ -55,14 +61,22 @@ def write_blind_campaign(
     declared: Sequence[LinkMass] = (),
     slipped: Slipped | None = None,
 ) -> dict[str, Any]:
-    """Measure, and write what the analyst gets; returns how the data were made, for the ground truth of the case.
+    """Measure, and write what the analyst gets; returns how the data were made, for the
+    ground truth of the case.
 
-    `folder`: the campaign's own. `name`: of the campaign; must not give the ground truth away. `robot_file`: of which the robot
-    is a specimen. `declared`: weights as they are declared to the analyst. `slipped`: what goes wrong in the file.
+    `folder`: the campaign's own. `name`: of the campaign; must not give the ground
+    truth away. `robot_file`: of which the robot is a specimen. `declared`: weights as
+    they are declared to the analyst. `slipped`: what goes wrong in the file.
     """
     table = measured_table(robot, design, schedule)
     table, slips = slipped(table) if slipped else (table, [])
-    write_campaign(folder, campaign_document(name, robot.arm, design), table, robot.arm.joints, "parquet")
+    write_campaign(
+        folder,
+        campaign_document(name, robot.arm, design),
+        table,
+        robot.arm.joints,
+        "parquet",
+    )
     write_robot(folder, robot_file, robot, declared, design.undeclared)
     return {
         "campaign": name,
@@ -72,9 +86,16 @@ def write_blind_campaign(
         "compliance_urad_per_Nm": (1e6 * robot.compliance).tolist(),
         "masses": [asdict(mass) for mass in robot.structure.masses],
         "declared_masses": [asdict(mass) for mass in declared],
-        "noise": {name: getattr(robot.tracker, name) for name in ("sigma_m", "sigma_m_per_m", "sigma_rad")},
+        "noise": {
+            name: getattr(robot.tracker, name)
+            for name in ("sigma_m", "sigma_m_per_m", "sigma_rad")
+        },
         "measurements": len(table["pose"]),
-        "made_with": {"mujoco": mujoco.__version__, "numpy": np.__version__, "python": platform.python_version()},
+        "made_with": {
+            "mujoco": mujoco.__version__,
+            "numpy": np.__version__,
+            "python": platform.python_version(),
+        },
     } | ({"bad_rows": slips} if slipped else {})
 
 
@@ -85,29 +106,51 @@ def write_robot(
     declared: Sequence[LinkMass],
     undeclared: Sequence[str] = (),
 ) -> None:
-    """Write the campaign's own robot file: without masses where none are declared, and without the keys that are undeclared."""
-    arm, nominal = robot.arm, yaml.safe_load(Path(robot_file).read_text(encoding="utf-8"))
+    """Write the campaign's own robot file: without masses where none are declared, and
+    without the keys that are undeclared."""
+    arm = robot.arm
+    nominal = yaml.safe_load(Path(robot_file).read_text(encoding="utf-8"))
     absent = ("masses", "gravity_m_s2", "compensator", "payload_kg", *undeclared)
     document = {key: value for key, value in nominal.items() if key not in absent}
     if declared:
         document["masses"] = [
-            {"link": m.link, "mass_kg": m.mass_kg, "centre_m": [*m.centre_m], "relative_std": m.relative_std} for m in declared
+            {
+                "link": m.link,
+                "mass_kg": m.mass_kg,
+                "centre_m": [*m.centre_m],
+                "relative_std": m.relative_std,
+            }
+            for m in declared
         ]
-    document |= {"gravity_m_s2": list(robot.structure.gravity_m_s2), "payload_kg": round(arm.payload_kg, 1)}
+    document |= {
+        "gravity_m_s2": list(robot.structure.gravity_m_s2),
+        "payload_kg": round(arm.payload_kg, 1),
+    }
     document["gear_ratio"] = list(arm.gear_ratio)
     if arm.compensated:
-        document["compensator"] = nominal.get("compensator", {"joint": 2, "kind": "spring"})
-    write_text(Path(folder) / ROBOT_FILE, yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=120))
+        document["compensator"] = nominal.get(
+            "compensator", {"joint": 2, "kind": "spring"}
+        )
+    write_text(
+        Path(folder) / ROBOT_FILE,
+        yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=120),
+    )
 
 
-def write_truth(path: str | Path, truth: Mapping[str, Any], campaign_folder: str | Path) -> str:
-    """Seal the ground truth of a case as sorted JSON; returns its SHA-256, to be published before any diagnosis.
+def write_truth(
+    path: str | Path, truth: Mapping[str, Any], campaign_folder: str | Path
+) -> str:
+    """Seal the ground truth of a case as sorted JSON; returns its SHA-256, to be
+    published before any diagnosis.
 
     Raises `ValueError`: the file would lie in the campaign's folder.
     """
-    path, folder = Path(path), Path(campaign_folder)
+    path = Path(path)
+    folder = Path(campaign_folder)
     if folder.resolve() in path.resolve().parents:
-        raise ValueError(f"{path}: the ground truth must not lie in the campaign's folder {folder}")
+        raise ValueError(
+            f"{path}: the ground truth must not lie in the campaign's folder {folder}"
+        )
     text = json.dumps(truth, indent=1, sort_keys=True, allow_nan=False) + "\n"
     path.parent.mkdir(parents=True, exist_ok=True)
     write_text(path, text)
@@ -117,12 +160,18 @@ def write_truth(path: str | Path, truth: Mapping[str, Any], campaign_folder: str
 def seal_cases(job: Any) -> None:
     """The commitment that is published before any diagnosis: a line ``sha256  name`` for each ground truth."""
     files = sorted(_sealed_in(job.input.sealed), key=lambda file: file.name)
-    lines = [f"{hashlib.sha256(file.read_bytes()).hexdigest()}  {file.name}\n" for file in files]
+    lines = [
+        f"{hashlib.sha256(file.read_bytes()).hexdigest()}  {file.name}\n"
+        for file in files
+    ]
     write_text(job.output.manifest, "".join(lines))
 
 
-def load_ground_truth(folders: Iterable[str | Path], manifest: str | Path) -> dict[str, dict[str, Any]]:
-    """Sealed documents by the name of the case, in its order, for the scores and the oracle only.
+def load_ground_truth(
+    folders: Iterable[str | Path], manifest: str | Path
+) -> dict[str, dict[str, Any]]:
+    """Sealed documents by the name of the case, in its order, for the scores and the
+    oracle only.
 
     Raises `InputError`: a file is not the one whose hash was published.
     """
@@ -132,7 +181,9 @@ def load_ground_truth(folders: Iterable[str | Path], manifest: str | Path) -> di
     for file in sorted(_sealed_in(folders), key=lambda file: file.name):
         found = hashlib.sha256(file.read_bytes()).hexdigest()
         if published.get(file.name) != found:
-            raise InputError(file, "", f"SHA-256 {found}", f"{published.get(file.name)}, as sealed")
+            raise InputError(
+                file, "", f"SHA-256 {found}", f"{published.get(file.name)}, as sealed"
+            )
         truths[file.stem] = read_json(file)
     return truths
 

@@ -1,4 +1,5 @@
-"""What the verdict on a case is worth, given its ground truth: one row a case, and its intervals of parameters.
+"""What the verdict on a case is worth, given its ground truth: one row a case, and its
+intervals of parameters.
 
 Everything is counted from these rows, by the figures of the plan; see `summary`.
 """
@@ -27,11 +28,14 @@ OTHER = "other"
 COMPLIANCE = "joint_compliance"
 # The effect by which a diagnosis says that the base is not where it is declared.
 _MISPLACED = "base_placement"
-# A scale of the forces is an alias of the compliances, of which weights that are known to a tenth leave next to nothing.
+# A scale of the forces is an alias of the compliances, of which weights that are known
+# to a tenth leave next to nothing.
 _SCALE = "force_scale"
-# Effects that lie wholly within another effect or the joint compliances, by effect and joints of the ground truth, with what it
-# is not distinguishable from. Left out are aliases that a known frame, known targets and points at the elbow and wrist resolve:
-# offset of joint 1 and base, last link and tool, tilt of joint 1 and base, coupling of joints 2 and 3 and upper arm.
+# Effects that lie wholly within another effect or the joint compliances, by effect and
+# joints of the ground truth, with what it is not distinguishable from. Left out are
+# aliases that a known frame, known targets and points at the elbow and wrist resolve:
+# offset of joint 1 and base, last link and tool, tilt of joint 1 and base, coupling of
+# joints 2 and 3 and upper arm.
 EXACT_ALIASES: dict[tuple[str, tuple[int, ...]], str] = {
     (_SCALE, ()): COMPLIANCE,
     ("compensator_torque", (2,)): "transmission_harmonic",
@@ -43,39 +47,61 @@ _CREDIBLE = 0.95
 
 
 def rate(hits: Iterable[bool]) -> dict[str, float]:
-    """A share with its Clopper-Pearson interval [1] of 95 %; without cases not a number, and the interval all there is.
+    """A share with its Clopper-Pearson interval [1] of 95 %; without cases not a
+    number, and the interval all there is.
 
     [1] Clopper, C. J. and Pearson, E. S., The use of confidence or fiducial limits illustrated in the case of the binomial,
         Biometrika 26, 1934.
     """
     hits = [bool(hit) for hit in hits]
-    count, cases = sum(hits), len(hits)
+    count = sum(hits)
+    cases = len(hits)
     low, high = proportion_confint(count, cases, 0.05, "beta") if cases else (0.0, 1.0)
     share = count / cases if cases else float("nan")
-    low, high = 0.0 if count == 0 else float(low), 1.0 if count == cases else float(high)
+    low = 0.0 if count == 0 else float(low)
+    high = 1.0 if count == cases else float(high)
     return {"hits": count, "cases": cases, "rate": share, "low": low, "high": high}
 
 
 def score(
-    plan: Plan, truth: Document, verdict: Document, oracle: Document | None = None, limit: Document | None = None
+    plan: Plan,
+    truth: Document,
+    verdict: Document,
+    oracle: Document | None = None,
+    limit: Document | None = None,
 ) -> dict[str, Any]:
-    """One row of cases.csv: where a case belongs, what was true and found, sizes, errors that were left, what was stated.
+    """One row of cases.csv: where a case belongs, what was true and found, sizes,
+    errors that were left, what was stated.
 
-    `truth`: a sealed document. `verdict`: as verdict.json. `oracle`, `limit`: of `oracle.oracle` and `limit.limit`, where the
-    case has one. ``exact``: the names found are the true ones; ``named_right``: so, and the verdict states no other name beside
-    it; ``holds_truth``: as many effects were found as were made, and each true one is the name of another of them or among its
-    alternatives, which is an assignment problem [1]; ``wrong_name``: one wrong name is stated alone; ``remains``: something
-    repeatable is said to remain; ``exact_alias``: within another effect that the robot can have, by the ground truth alone.
+    `truth`: a sealed document. `verdict`: as verdict.json. `oracle`, `limit`: of
+    `oracle.oracle` and `limit.limit`, where the case has one. ``exact``: the names
+    found are the true ones; ``named_right``: so, and the verdict states no other name
+    beside it; ``holds_truth``: as many effects were found as were made, and each true
+    one is the name of another of them or among its alternatives, which is an assignment
+    problem [1]; ``wrong_name``: one wrong name is stated alone; ``remains``: something
+    repeatable is said to remain; ``exact_alias``: within another effect that the robot
+    can have, by the ground truth alone.
 
-    [1] Kuhn, H. W., The Hungarian method for the assignment problem, Naval Research Logistics Quarterly 2, 1955.
+    [1] Kuhn, H. W., The Hungarian method for the assignment problem, Naval Research
+    Logistics Quarterly 2, 1955.
     """
-    case, defects, (kind, effects) = truth["case"], truth["defects"], _apart_from_setup(truth, verdict)
-    names, true = [effect["name"] for effect in effects], list(case["effects"])
+    case, defects, (kind, effects) = (
+        truth["case"],
+        truth["defects"],
+        _apart_from_setup(truth, verdict),
+    )
+    names = [effect["name"] for effect in effects]
+    true = list(case["effects"])
     claims = bool(true) and kind in (NAMED, CLASS, SEVERAL)
     right = claims and sorted(names) == sorted(true)
-    meant = [{effect["name"], *map(effect_of, effect["alternatives"])} for effect in effects]
+    meant = [
+        {effect["name"], *map(effect_of, effect["alternatives"])} for effect in effects
+    ]
     held = np.array([[name in each for each in meant] for name in true], bool)
-    aliases = [EXACT_ALIASES.get((defect["effect"], tuple(defect["joints"]))) for defect in defects]
+    aliases = [
+        EXACT_ALIASES.get((defect["effect"], tuple(defect["joints"])))
+        for defect in defects
+    ]
     return (
         {
             "case": truth["campaign"],
@@ -90,11 +116,18 @@ def score(
             "detected": kind not in (ADEQUATE, NOT_TESTABLE),
             "exact": right,
             "named_right": right and kind == NAMED,
-            "holds_truth": claims and len(true) == len(names) and bool(held[linear_sum_assignment(~held)].all()),
+            "holds_truth": claims
+            and len(true) == len(names)
+            and bool(held[linear_sum_assignment(~held)].all()),
             "wrong_name": kind == NAMED and names != true,
             "remains": bool((verdict.get("repeatable") or {}).get("remains")),
-            "joints": " + ".join("-".join(map(str, defect["joints"])) for defect in defects),
-            "exact_alias": any(alias and alias not in absent_on(plan, case["robot"]) for alias in aliases),
+            "joints": " + ".join(
+                "-".join(map(str, defect["joints"])) for defect in defects
+            ),
+            "exact_alias": any(
+                alias and alias not in absent_on(plan, case["robot"])
+                for alias in aliases
+            ),
         }
         | _size(truth)
         | _errors(verdict)
@@ -102,19 +135,24 @@ def score(
             "oracle_detected": np.nan if oracle is None else float(oracle["detected"]),
             "oracle_rms_m": np.nan if oracle is None else oracle["heldout"]["rms_m"],
         }
-        | {f"limit_{name}": np.nan if limit is None else float(limit[name]) for name in ("detected", "right")}
+        | {
+            f"limit_{name}": np.nan if limit is None else float(limit[name])
+            for name in ("detected", "right")
+        }
         | stated(truth, verdict)
     )
 
 
 def _wrong_setup(truth: Document) -> set[str]:
-    """Mechanisms of the set-up that a case has beside what it is about: right to find, and no fault not to name."""
+    """Mechanisms of the set-up that a case has beside what it is about: right to find,
+    and no fault not to name."""
     return {_MISPLACED} if "misplaced" in truth else set()
 
 
 def _apart_from_setup(truth: Document, verdict: Document) -> tuple[str, list[Document]]:
     """Verdict and effects without those of the set-up."""
-    kind, effects = verdict["verdict"], list(verdict["effects"])
+    kind = verdict["verdict"]
+    effects = list(verdict["effects"])
     kept = [effect for effect in effects if effect["name"] not in _wrong_setup(truth)]
     if len(kept) == len(effects):
         return kind, effects
@@ -124,7 +162,8 @@ def _apart_from_setup(truth: Document, verdict: Document) -> tuple[str, list[Doc
 
 def _size(truth: Document) -> dict[str, Any]:
     """How large the effects are; for several the squares add up."""
-    defects, by_raw = truth["defects"], any(defect["of"] == "raw" for defect in truth["defects"])
+    defects = truth["defects"]
+    by_raw = any(defect["of"] == "raw" for defect in truth["defects"])
     return {
         # Of what all these effects' levels are the non-centrality.
         "level_of": "raw" if by_raw else "retained",
@@ -136,29 +175,44 @@ def _size(truth: Document) -> dict[str, Any]:
 
 
 def _errors(verdict: Document) -> dict[str, Any]:
-    """Held-out errors, and whether they got worse by more than chance with an effect that was adopted."""
+    """Held-out errors, and whether they got worse by more than chance with an effect
+    that was adopted."""
     # A fault of the data ends a diagnosis before any model is fitted.
-    held = verdict["heldout"] or {"before": {"rms_m": np.nan}, "after": {"rms_m": np.nan}}
-    before, after = held["before"]["rms_m"], held["after"]["rms_m"]
+    held = verdict["heldout"] or {
+        "before": {"rms_m": np.nan},
+        "after": {"rms_m": np.nan},
+    }
+    before = held["before"]["rms_m"]
+    after = held["after"]["rms_m"]
     return {
         "before_rms_m": before,
         "after_rms_m": after,
-        "adopted": bool(verdict["heldout"]) and any(effect.get("adopted", False) for effect in verdict["effects"]),
-        "worse": bool(1.0 - after / before + _STD_ERRORS * held.get("reduction_std_error", np.nan) < 0.0),
+        "adopted": bool(verdict["heldout"])
+        and any(effect.get("adopted", False) for effect in verdict["effects"]),
+        "worse": bool(
+            1.0 - after / before + _STD_ERRORS * held.get("reduction_std_error", np.nan)
+            < 0.0
+        ),
     }
 
 
 def stated(truth: Document, verdict: Document) -> dict[str, Any]:
-    """What was stated of a case in probabilities, and whether it is so; not a number where nothing was, as with faulty data.
+    """What was stated of a case in probabilities, and whether it is so; not a number
+    where nothing was, as with faulty data.
 
-    A hypothesis is a set of mechanisms, as in ``verdict.json``; the empty set is "nothing". ``stated``: probability of the most
-    probable set, ``top``; ``correct``: whether that is the true one; ``held``: whether the smallest set of hypotheses that
+    A hypothesis is a set of mechanisms, as in ``verdict.json``; the empty set is
+    "nothing". ``stated``: probability of the most probable set, ``top``; ``correct``:
+    whether that is the true one; ``held``: whether the smallest set of hypotheses that
     reaches 95 %, or all of them where they do not, holds the true one.
     """
-    ranked = sorted((verdict.get("probabilities") or {"sets": []})["sets"], key=lambda entry: -entry["probability"])
+    ranked = sorted(
+        (verdict.get("probabilities") or {"sets": []})["sets"],
+        key=lambda entry: -entry["probability"],
+    )
     if not ranked:
         return dict.fromkeys(("stated", "top", "correct", "held"), np.nan)
-    reached, top = np.cumsum([entry["probability"] for entry in ranked]), ranked[0]
+    reached = np.cumsum([entry["probability"] for entry in ranked])
+    top = ranked[0]
     believed = ranked[: int(np.searchsorted(reached, _CREDIBLE)) + 1]
     return {
         "stated": top["probability"],
@@ -171,21 +225,28 @@ def stated(truth: Document, verdict: Document) -> dict[str, Any]:
 def is_true(mechanisms: Collection[str], truth: Document) -> bool:
     """Whether a set of mechanisms is what is true of a case.
 
-    Of a mechanism that the catalogue does not have every set that holds "other" is true; one that the joint compliances absorb
-    at any size is as good as nothing, and no measurement could distinguish the two.
+    Of a mechanism that the catalogue does not have every set that holds "other" is
+    true; one that the joint compliances absorb at any size is as good as nothing, and
+    no measurement could distinguish the two.
     """
     effects = truth["case"]["effects"]
     if any(effect.startswith(OUTSIDE) for effect in effects):
         return OTHER in mechanisms
-    absorbed = {defect["effect"] for defect in truth["defects"] if defect["of"] == "raw"}
+    absorbed = {
+        defect["effect"] for defect in truth["defects"] if defect["of"] == "raw"
+    }
     return set(mechanisms) - _wrong_setup(truth) == set(effects) - absorbed
 
 
-def intervals_of(plan: Plan, truth: Document, verdict: Document) -> list[dict[str, Any]]:
-    """Every interval of 95 % of a verdict that has a true value to hold, in the usual setting.
+def intervals_of(
+    plan: Plan, truth: Document, verdict: Document
+) -> list[dict[str, Any]]:
+    """Every interval of 95 % of a verdict that has a true value to hold, in the usual
+    setting.
 
-    Wald intervals, with quantiles of Student's t where the noise has degrees of freedom: of joint compliances, and of
-    parameters of an effect that was found at the right joints. A parameter that the data do not identify has no interval.
+    Wald intervals, with quantiles of Student's t where the noise has degrees of
+    freedom: of joint compliances, and of parameters of an effect that was found at the
+    right joints. A parameter that the data do not identify has no interval.
     """
     case = truth["case"]
     if case["setting"] != "usual":
@@ -193,8 +254,17 @@ def intervals_of(plan: Plan, truth: Document, verdict: Document) -> list[dict[st
     freedom = verdict["noise"]["degrees_of_freedom"]
     width = t_distribution.ppf(0.975, freedom) if freedom else norm.ppf(0.975)
     springs = verdict["compliance_urad_per_Nm"]
-    of_springs = zip(truth["compliance_urad_per_Nm"], springs["after"], springs["std_error"], strict=True)
-    values = [(COMPLIANCE, f"c{j}", true, value, error) for j, (true, value, error) in enumerate(of_springs, 1) if error > 0]
+    of_springs = zip(
+        truth["compliance_urad_per_Nm"],
+        springs["after"],
+        springs["std_error"],
+        strict=True,
+    )
+    values = [
+        (COMPLIANCE, f"c{j}", true, value, error)
+        for j, (true, value, error) in enumerate(of_springs, 1)
+        if error > 0
+    ]
     for defect in truth["defects"]:
         for effect in verdict["effects"]:
             if effect["name"] == defect["effect"]:
@@ -204,20 +274,43 @@ def intervals_of(plan: Plan, truth: Document, verdict: Document) -> list[dict[st
     head |= {"level": max(case["levels"], default=0.0)}
     return [
         head
-        | {"effect": effect, "parameter": name, "true": true, "value": value, "std_error": error}
+        | {
+            "effect": effect,
+            "parameter": name,
+            "true": true,
+            "value": value,
+            "std_error": error,
+        }
         | {"holds": bool(abs(value - true) <= width * error)}
         for effect, name, true, value, error in values
     ]
 
 
-def _comparable(defect: Document, effect: Document) -> list[tuple[str, str, float, float, float]]:
-    """Parameters of an effect that the plant's law has too, where it was found at the right joints."""
+def _comparable(
+    defect: Document, effect: Document
+) -> list[tuple[str, str, float, float, float]]:
+    """Parameters of an effect that the plant's law has too, where it was found at the
+    right joints."""
     found = []
     for parameter in effect["parameters"]:
         key, _, name = parameter["name"].rpartition(" ")
         # Such as ``cross_compliance@2+5[variant]``.
         where = key.partition("[")[0].partition("@")[2]
-        joints: Sequence[int] = [int(joint) for joint in where.split("+")] if where else []
-        if list(joints) == defect["joints"] and name in defect["parameters"] and not parameter["held"]:
-            found.append((defect["effect"], name, defect["parameters"][name], parameter["value"], parameter["std_error"]))
+        joints: Sequence[int] = (
+            [int(joint) for joint in where.split("+")] if where else []
+        )
+        if (
+            list(joints) == defect["joints"]
+            and name in defect["parameters"]
+            and not parameter["held"]
+        ):
+            found.append(
+                (
+                    defect["effect"],
+                    name,
+                    defect["parameters"][name],
+                    parameter["value"],
+                    parameter["std_error"],
+                )
+            )
     return found

@@ -1,4 +1,5 @@
-"""Verdicts on campaigns of the blind proof: the analyst's side, in processes that know neither ground truths nor the plant."""
+"""Verdicts on campaigns of the blind proof: the analyst's side, in processes that know
+neither ground truths nor the plant."""
 
 from __future__ import annotations
 
@@ -12,9 +13,17 @@ from elastocal.loop.whole import diagnosed
 
 def diagnose_cases(job: Any) -> None:
     """Verdicts on a block of blind cases; this process opens no sealed file."""
-    folders = sorted(folder for folder in Path(job.input.blind).iterdir() if folder.is_dir())
+    folders = sorted(
+        folder for folder in Path(job.input.blind).iterdir() if folder.is_dir()
+    )
     verdicts = []
     for number, folder in enumerate(folders, 1):
-        verdicts.append(diagnosed(folder.as_posix(), job.params.robots, job.params.seed))
-        print(f"{job.wildcards.block}: {number} of {len(folders)} cases", file=sys.stderr, flush=True)
+        verdicts.append(
+            diagnosed(folder.as_posix(), job.params.robots, job.params.seed)
+        )
+        print(
+            f"{job.wildcards.block}: {number} of {len(folders)} cases",
+            file=sys.stderr,
+            flush=True,
+        )
     write_json(job.output.verdicts, verdicts, allow_nan=False)

@@ -1,1 +1,2 @@
-"""Figures of blind proof, closed loop and league: tables in, PDF out; computes nothing."""
+"""Figures of blind proof, closed loop and league: tables in, PDF out; computes
+nothing."""

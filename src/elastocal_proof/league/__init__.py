@@ -1,1 +1,2 @@
-"""The league: every method on every public data set, by the same folds; who predicts poses best that it has not seen."""
+"""The league: every method on every public data set, by the same folds; who predicts
+poses best that it has not seen."""

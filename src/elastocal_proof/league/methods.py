@@ -1,4 +1,5 @@
-"""Methods of the league on the same folds: a physical model, and perhaps a regression on what it leaves of poses not seen."""
+"""Methods of the league on the same folds: a physical model, and perhaps a regression
+on what it leaves of poses not seen."""
 
 from __future__ import annotations
 
@@ -33,13 +34,18 @@ from elastocal.validation.placing import placed
 from elastocal_proof.league.schemas import ENTRIES, FOLDS, MECHANISMS
 
 Columns = Mapping[str, np.ndarray]
-RANDOM, BLOCKS, SESSION = "random", "blocks", "session"
-FRAMES, GEOMETRY, DIAGNOSIS = "frames", "geometry", "diagnosis"
+RANDOM = "random"
+BLOCKS = "blocks"
+SESSION = "session"
+FRAMES = "frames"
+GEOMETRY = "geometry"
+DIAGNOSIS = "diagnosis"
 
 
 @dataclass(frozen=True)
 class DataSet:
-    """A data set as its tables hold it: descriptions of the campaign, columns of all measurements (N,), and `dealt` (P,)."""
+    """A data set as its tables hold it: descriptions of the campaign, columns of all
+    measurements (N,), and `dealt` (P,)."""
 
     descriptions: Mapping[str, Any]
     columns: Columns
@@ -47,16 +53,21 @@ class DataSet:
 
     def case(self, chosen: np.ndarray | slice = slice(None)) -> Case:
         """A case of some of the measurements, or of all."""
-        return case_from(self.descriptions, {name: values[chosen] for name, values in self.columns.items()})
+        return case_from(
+            self.descriptions,
+            {name: values[chosen] for name, values in self.columns.items()},
+        )
 
 
 @dataclass(frozen=True)
 class Method:
     """A method of the league.
 
-    `physics`: what is fitted first: frames and targets alone; what the campaign declares too, such as geometry; or what a
-    diagnosis of the training poses finds. `regression`: of `remainder`, fitted to what that leaves. `within_range`: whether it
-    is left out where a pose lies outside the range of those fitted. `words`: what tables and pictures call the method.
+    `physics`: what is fitted first: frames and targets alone; what the campaign
+    declares too, such as geometry; or what a diagnosis of the training poses finds.
+    `regression`: of `remainder`, fitted to what that leaves. `within_range`: whether it
+    is left out where a pose lies outside the range of those fitted. `words`: what
+    tables and pictures call the method.
     """
 
     physics: str
@@ -65,18 +76,27 @@ class Method:
     words: str = ""
 
 
-def load_data_set(descriptions_path: str | Path, measurements_path: str | Path, folds_path: str | Path) -> DataSet:
+def load_data_set(
+    descriptions_path: str | Path, measurements_path: str | Path, folds_path: str | Path
+) -> DataSet:
     """Read a data set from files as `deal_league_folds` wrote them."""
     descriptions = read_json(descriptions_path)
     joints = robot_from_document(descriptions["robot"], descriptions["source"]).joints
-    return DataSet(descriptions, read_table(measurements_path, measurements(joints)), read_table(folds_path, FOLDS))
+    return DataSet(
+        descriptions,
+        read_table(measurements_path, measurements(joints)),
+        read_table(folds_path, FOLDS),
+    )
 
 
-def dealt(seen: Measurements, count: int, draws: np.random.Generator) -> dict[str, np.ndarray]:
-    """Columns (P,) of poses dealt into folds from 1, those of a configuration into one, at random and by blocks of joint space.
+def dealt(
+    seen: Measurements, count: int, draws: np.random.Generator
+) -> dict[str, np.ndarray]:
+    """Columns (P,) of poses dealt into folds from 1, those of a configuration into one,
+    at random and by blocks of joint space.
 
-    Random folds have neighbours among the poses fitted, so they ask how well a method interpolates; blocks of joint space ask
-    how well it extrapolates [1].
+    Random folds have neighbours among the poses fitted, so they ask how well a method
+    interpolates; blocks of joint space ask how well it extrapolates [1].
 
     [1] Roberts, D. R. et al., Cross-validation strategies for data with temporal, spatial, hierarchical, or phylogenetic
         structure, Ecography 40, 2017.
@@ -85,24 +105,40 @@ def dealt(seen: Measurements, count: int, draws: np.random.Generator) -> dict[st
     configuration = configurations(seen.joint_angles, index)
     shuffled = draws.permutation(configuration.max() + 1)[configuration] % count + 1
     blocks = blocks_of_poses(seen.joint_angles, index, count) + 1
-    return {"session": pairs[:, 0], "pose": pairs[:, 1], RANDOM: shuffled, BLOCKS: blocks}
+    return {
+        "session": pairs[:, 0],
+        "pose": pairs[:, 1],
+        RANDOM: shuffled,
+        BLOCKS: blocks,
+    }
 
 
-def rounds(split: str, data: DataSet, others: Sequence[DataSet] = ()) -> Iterator[tuple[int, Case, list[Case]]]:
-    """Number, from 1, training poses, and held-out poses of each fold; of `SESSION` these are the robot's other data sets."""
+def rounds(
+    split: str, data: DataSet, others: Sequence[DataSet] = ()
+) -> Iterator[tuple[int, Case, list[Case]]]:
+    """Number, from 1, training poses, and held-out poses of each fold; of `SESSION`
+    these are the robot's other data sets."""
     if split == SESSION:
         yield 1, data.case(), [other.case() for other in others]
         return
-    fold = np.asarray(data.dealt[split])[measured_poses(measurements_from(data.columns))[1]]
+    fold = np.asarray(data.dealt[split])[
+        measured_poses(measurements_from(data.columns))[1]
+    ]
     for number in np.unique(fold):
         yield int(number), data.case(fold != number), [data.case(fold == number)]
 
 
 def method_from(described: Mapping[str, Any], name: str, source: str) -> Method:
-    """A method as a configuration describes it. Raises `InputError`: a regression that the catalogue does not have."""
+    """A method as a configuration describes it. Raises `InputError`: a regression that
+    the catalogue does not have."""
     method = Method(**described)
     if method.regression is not None and method.regression not in REGRESSIONS:
-        raise InputError(source, f"league.methods.{name}.regression", repr(method.regression), ", ".join(REGRESSIONS))
+        raise InputError(
+            source,
+            f"league.methods.{name}.regression",
+            repr(method.regression),
+            ", ".join(REGRESSIONS),
+        )
     return method
 
 
@@ -112,40 +148,82 @@ def fitted_physics(physics: str, case: Case) -> Fit:
     return fit_declared(model, case.observations, estimated_noise(case)[0])
 
 
-def entered(method: Method, fitted: Fit, case: Case, held_out: Case, split: str, seed: int) -> dict[str, np.ndarray]:
-    """Columns (M,) of what a method, fitted to the poses of a case, predicts of held-out ones.
+def entered(
+    method: Method, fitted: Fit, case: Case, held_out: Case, split: str, seed: int
+) -> dict[str, np.ndarray]:
+    """Columns (M,) of what a method, fitted to the poses of a case, predicts of
+    held-out ones.
 
-    A regression is tuned within the training poses by the same kind of split that judges, see `remainder.corrected`; frames and
-    targets of another campaign are fitted to it, whatever the method. What a method does not state is not a number.
+    A regression is tuned within the training poses by the same kind of split that
+    judges, see `remainder.corrected`; frames and targets of another campaign are fitted
+    to it, whatever the method. What a method does not state is not a number.
     """
-    seen, std = held_out.observations, None
+    seen = held_out.observations
+    std = None
     if method.regression is None:
         residual = position_residuals(*placed(fitted, case, held_out), seen)
     else:
-        blocks, within_range = split != RANDOM, method.within_range
-        found = corrected(fitted, case, held_out, method.regression, blocks=blocks, within_range=within_range, seed=seed)
-        residual, std = found.residual, found.std
-    columns = {name: getattr(seen.states, name)[seen.state] for name in ("session", "pose", "load")}
+        blocks = split != RANDOM
+        within_range = method.within_range
+        found = corrected(
+            fitted,
+            case,
+            held_out,
+            method.regression,
+            blocks=blocks,
+            within_range=within_range,
+            seed=seed,
+        )
+        residual = found.residual
+        std = found.std
+    columns = {
+        name: getattr(seen.states, name)[seen.state]
+        for name in ("session", "pose", "load")
+    }
     columns["target"] = seen.target
-    for head, values in (("d", residual), ("std_", np.full_like(residual, np.nan) if std is None else std)):
-        columns |= {f"{head}{axis}": values[:, number] for number, axis in enumerate("xyz")}
+    for head, values in (
+        ("d", residual),
+        ("std_", np.full_like(residual, np.nan) if std is None else std),
+    ):
+        columns |= {
+            f"{head}{axis}": values[:, number] for number, axis in enumerate("xyz")
+        }
     return columns
 
 
-def mechanism_columns(diagnosis: Diagnosis, fold: int) -> dict[str, np.ndarray | list[str]]:
-    """Columns of the mechanisms table (K,) of one fold; none where the data are at fault.
+def mechanism_columns(
+    diagnosis: Diagnosis, fold: int
+) -> dict[str, np.ndarray | list[str]]:
+    """Columns of the mechanisms table (K,) of one fold; none where the data are at
+    fault.
 
-    The share of a mechanism is the sum of squares that it displaces the measurements by, beyond what geometry and frames take
-    up, over that of the residual which these leave, in units of the noise. Mechanisms that resemble each other share it.
+    The share of a mechanism is the sum of squares that it displaces the measurements
+    by, beyond what geometry and frames take up, over that of the residual which these
+    leave, in units of the noise. Mechanisms that resemble each other share it.
     """
     mechanisms: Mapping[str, float] = {}
     shares: list[float] = []
     if evidence := diagnosis.evidence:
-        mechanisms, best, problem = evidence.conclusion.mechanisms, evidence.conclusion.best, evidence.linearized.problem
-        explained = squares_explained(problem, evidence.posterior.models[best.model]) if best.named else {}
-        shares = [explained.get(name, 0.0) / float(problem.statistics.squares[0]) for name in mechanisms]
-    columns: dict[str, np.ndarray | list[str]] = {"fold": np.full(len(mechanisms), fold), "mechanism": [*mechanisms]}
-    return columns | {"probability": np.array([*mechanisms.values()], float), "share": np.array(shares, float)}
+        mechanisms = evidence.conclusion.mechanisms
+        best = evidence.conclusion.best
+        problem = evidence.linearized.problem
+        explained = (
+            squares_explained(problem, evidence.posterior.models[best.model])
+            if best.named
+            else {}
+        )
+        shares = [
+            explained.get(name, 0.0) / float(problem.statistics.squares[0])
+            for name in mechanisms
+        ]
+    columns: dict[str, np.ndarray | list[str]] = {
+        "fold": np.full(len(mechanisms), fold),
+        "mechanism": [*mechanisms],
+    }
+    return columns | {
+        "probability": np.array([*mechanisms.values()], float),
+        "share": np.array(shares, float),
+    }
 
 
 def deal_league_folds(job: Any) -> None:
@@ -154,33 +232,60 @@ def deal_league_folds(job: Any) -> None:
     seen = campaign.measurements
     origin = provenance(job.params, **job.wildcards)
     draws = stream(job.params.seed, job.wildcards.data, "league folds", 0)
-    write_table(job.output.measurements, measurements(seen.joint_angles.shape[1]), [columns_of(seen)], origin)
+    write_table(
+        job.output.measurements,
+        measurements(seen.joint_angles.shape[1]),
+        [columns_of(seen)],
+        origin,
+    )
     write_table(job.output.folds, FOLDS, [dealt(seen, job.params.folds, draws)], origin)
     write_json(job.output.descriptions, descriptions)
 
 
 def diagnose_league_folds(job: Any) -> None:
-    """What the training poses of each fold lack, by the whole diagnosis: its last step and the mechanisms."""
-    data = load_data_set(job.input.descriptions, job.input.measurements, job.input.folds)
-    facts, mechanisms = {}, []
+    """What the training poses of each fold lack, by the whole diagnosis: its last step
+    and the mechanisms."""
+    data = load_data_set(
+        job.input.descriptions, job.input.measurements, job.input.folds
+    )
+    facts = {}
+    mechanisms = []
     for fold, training, _ in rounds(job.wildcards.split, data):
         found = diagnose(training, Settings(), job.params.seed)
         facts[str(fold)] = diagnosis_facts(found)["steps"][-1]
         mechanisms.append(mechanism_columns(found, fold))
     write_json(job.output.facts, facts)
-    write_table(job.output.mechanisms, MECHANISMS, mechanisms, provenance(job.params, **job.wildcards))
+    write_table(
+        job.output.mechanisms,
+        MECHANISMS,
+        mechanisms,
+        provenance(job.params, **job.wildcards),
+    )
 
 
 def enter_league(job: Any) -> None:
     """What one method predicts of the poses of each fold, which it has not seen."""
-    split, method = job.wildcards.split, method_from(job.params.method, job.wildcards.method, "config.yaml")
+    split = job.wildcards.split
+    method = method_from(job.params.method, job.wildcards.method, "config.yaml")
     steps = read_json(job.input.facts) if method.physics == DIAGNOSIS else {}
-    data, *others = map(load_data_set, job.input.descriptions, job.input.measurements, job.input.folds)
+    data, *others = map(
+        load_data_set, job.input.descriptions, job.input.measurements, job.input.folds
+    )
     blocks = []
     for fold, training, tests in rounds(split, data, others):
-        fitted = step_fit(training, steps[str(fold)]) if steps else fitted_physics(method.physics, training)
+        fitted = (
+            step_fit(training, steps[str(fold)])
+            if steps
+            else fitted_physics(method.physics, training)
+        )
         for number, held_out in enumerate(tests, 1 if others else 0):
-            columns = entered(method, fitted, training, held_out, split, job.params.seed)
+            columns = entered(
+                method, fitted, training, held_out, split, job.params.seed
+            )
             count = len(columns["pose"])
-            blocks.append({"fold": np.full(count, fold), "set": np.full(count, number)} | columns)
-    write_table(job.output.entries, ENTRIES, blocks, provenance(job.params, **job.wildcards))
+            blocks.append(
+                {"fold": np.full(count, fold), "set": np.full(count, number)} | columns
+            )
+    write_table(
+        job.output.entries, ENTRIES, blocks, provenance(job.params, **job.wildcards)
+    )

@@ -1,4 +1,5 @@
-"""The league as tables, with intervals, and as a page of text: errors of every method on poses that it has not seen."""
+"""The league as tables, with intervals, and as a page of text: errors of every method
+on poses that it has not seen."""
 
 from __future__ import annotations
 
@@ -15,7 +16,8 @@ from elastocal.remainder.corrected import NORMAL_WIDTH
 from elastocal.validation.held_out import Errors, intervals, summary
 from elastocal_proof.league.methods import BLOCKS, DIAGNOSIS, RANDOM, SESSION, Method
 
-# A row of the league's table; and rows of the entries table by data set, split and method.
+# A row of the league's table; and rows of the entries table by data set, split and
+# method.
 Row = Mapping[Any, Any]
 Entries = Mapping[tuple[str, str, str], pd.DataFrame]
 _REPLICATES = 1000
@@ -27,126 +29,232 @@ _TITLES = {
 }
 _ERRORS = "RMS in mm with 95 % intervals over poses, then the maximum; the smallest RMS of each row in bold."
 _COVERED = "Share of coordinates inside the 95 % intervals that a method states."
-_FOUND = "Mean over the folds of the random split, the least and the largest in brackets."
+_FOUND = (
+    "Mean over the folds of the random split, the least and the largest in brackets."
+)
 # Mechanisms that are less probable in every fold are not listed.
 _LEAST_PROBABLE = 0.05
 
 
-def league_table(entries: Entries, robots: Mapping[str, Sequence[str]], reference: str, seed: int) -> pd.DataFrame:
-    """One row for each data set, split and method, all of whose methods predict the same poses.
+def league_table(
+    entries: Entries, robots: Mapping[str, Sequence[str]], reference: str, seed: int
+) -> pd.DataFrame:
+    """One row for each data set, split and method, all of whose methods predict the
+    same poses.
 
-    `robots`: data sets by the names of their robots. RMS with 95 % limits by a bootstrap over poses; ``ratio``: RMS over that
-    of the reference, ``ratio_to_best``: over the best of the row's data set and split; ``covered``: coordinates inside the 95 %
-    intervals that the method states.
+    `robots`: data sets by the names of their robots. RMS with 95 % limits by a
+    bootstrap over poses; ``ratio``: RMS over that of the reference, ``ratio_to_best``:
+    over the best of the row's data set and split; ``covered``: coordinates inside the
+    95 % intervals that the method states.
     """
     robot_of = {data: robot for robot, names in robots.items() for data in names}
     rows: list[dict[str, Any]] = []
     for data, split in dict.fromkeys(key[:2] for key in entries):
-        mine = {method: part for (name, way, method), part in entries.items() if (name, way) == (data, split)}
-        distances = [np.linalg.norm(part[["dx", "dy", "dz"]].to_numpy(), axis=1) for part in mine.values()]
+        mine = {
+            method: part
+            for (name, way, method), part in entries.items()
+            if (name, way) == (data, split)
+        }
+        distances = [
+            np.linalg.norm(part[["dx", "dy", "dz"]].to_numpy(), axis=1)
+            for part in mine.values()
+        ]
         poses = [groups_of(part[_POSE].to_numpy())[1] for part in mine.values()]
         errors = [Errors(*each) for each in zip(distances, poses, strict=True)]
         figures = [summary(error.distance) for error in errors]
         rms = [each["rms_m"] for each in figures]
-        places = {"ratio": list(mine).index(reference), "ratio_to_best": int(np.argmin(rms))}
+        places = {
+            "ratio": list(mine).index(reference),
+            "ratio_to_best": int(np.argmin(rms)),
+        }
         drawn = [
-            intervals(errors, _REPLICATES, stream(seed, data, f"league {split}", number), place)
+            intervals(
+                errors,
+                _REPLICATES,
+                stream(seed, data, f"league {split}", number),
+                place,
+            )
             for number, place in enumerate(places.values())
         ]
         for number, (method, part) in enumerate(mine.items()):
             low, high = drawn[0][0][number]["rms_m"]
-            row = {"robot": robot_of[data], "data": data, "split": split, "method": method, "poses": errors[number].poses}
-            metres = {"rms": rms[number], "rms_low": low, "rms_high": high, "max": figures[number]["max_m"]}
+            row = {
+                "robot": robot_of[data],
+                "data": data,
+                "split": split,
+                "method": method,
+                "poses": errors[number].poses,
+            }
+            metres = {
+                "rms": rms[number],
+                "rms_low": low,
+                "rms_high": high,
+                "max": figures[number]["max_m"],
+            }
             row |= {f"{name}_mm": 1e3 * value for name, value in metres.items()}
-            for (name, place), (_, reduction) in zip(places.items(), drawn, strict=True):
-                ends = {f"{name}_low": 1.0 - reduction[number].high, f"{name}_high": 1.0 - reduction[number].low}
+            for (name, place), (_, reduction) in zip(
+                places.items(), drawn, strict=True
+            ):
+                ends = {
+                    f"{name}_low": 1.0 - reduction[number].high,
+                    f"{name}_high": 1.0 - reduction[number].low,
+                }
                 row |= {name: rms[number] / rms[place]} | ends
             rows.append(row | {"covered": _covered(part)})
     return pd.DataFrame(rows)
 
 
-def mechanism_table(found: Mapping[str, pd.DataFrame], robots: Mapping[str, Sequence[str]], folds: int) -> pd.DataFrame:
-    """Mechanisms of each data set over the diagnoses of its folds: mean, least and largest probability and share.
+def mechanism_table(
+    found: Mapping[str, pd.DataFrame], robots: Mapping[str, Sequence[str]], folds: int
+) -> pd.DataFrame:
+    """Mechanisms of each data set over the diagnoses of its folds: mean, least and
+    largest probability and share.
 
-    `found`: rows of the mechanisms table of the random split, by data set. A fold that does not list a mechanism counts as 0.
+    `found`: rows of the mechanisms table of the random split, by data set. A fold that
+    does not list a mechanism counts as 0.
     """
     rows = []
-    for robot, data in ((robot, data) for robot, names in robots.items() for data in names):
+    for robot, data in (
+        (robot, data) for robot, names in robots.items() for data in names
+    ):
         for mechanism, part in found[data].groupby("mechanism", sort=True):
             row = {"robot": robot, "data": data, "mechanism": mechanism}
             for name in ("probability", "share"):
                 values = np.zeros(folds)
                 values[: len(part)] = part[name]
-                row |= {name: values.mean(), f"{name}_low": values.min(), f"{name}_high": values.max()}
+                row |= {
+                    name: values.mean(),
+                    f"{name}_low": values.min(),
+                    f"{name}_high": values.max(),
+                }
             rows.append(row)
     return pd.DataFrame(rows)
 
 
 def _covered(entries: pd.DataFrame) -> float:
-    off, stated = np.abs(entries[["dx", "dy", "dz"]].to_numpy()), entries[["std_x", "std_y", "std_z"]].to_numpy()
-    return float((off < NORMAL_WIDTH * stated).mean()) if np.isfinite(stated).all() else float("nan")
+    off = np.abs(entries[["dx", "dy", "dz"]].to_numpy())
+    stated = entries[["std_x", "std_y", "std_z"]].to_numpy()
+    return (
+        float((off < NORMAL_WIDTH * stated).mean())
+        if np.isfinite(stated).all()
+        else float("nan")
+    )
 
 
 def league_page(
-    table: pd.DataFrame, mechanisms: pd.DataFrame, methods: Mapping[str, Method], missing: Mapping[str, str]
+    table: pd.DataFrame,
+    mechanisms: pd.DataFrame,
+    methods: Mapping[str, Method],
+    missing: Mapping[str, str],
 ) -> str:
-    """Tables of the league as Markdown; `missing`: data sets that were left out, with the file that each lacks."""
+    """Tables of the league as Markdown; `missing`: data sets that were left out, with
+    the file that each lacks."""
     words = {name: method.words or name for name, method in methods.items()}
-    table = table.assign(best=table.groupby(["data", "split"])["rms_mm"].transform("min"))
+    table = table.assign(
+        best=table.groupby(["data", "split"])["rms_mm"].transform("min")
+    )
 
     def error(each: Row) -> str:
-        rms, low, high, most = (_shown(each[key], each["rms_mm"]) for key in ("rms_mm", "rms_low_mm", "rms_high_mm", "max_mm"))
+        rms, low, high, most = (
+            _shown(each[key], each["rms_mm"])
+            for key in ("rms_mm", "rms_low_mm", "rms_high_mm", "max_mm")
+        )
         return f"{f'**{rms}**' if each['rms_mm'] == each['best'] else rms} ({low}–{high}), {most}"
 
-    parts = [f"Left out: {_words(name)}, as {file} is missing." for name, file in missing.items()]
-    parts.append(_lead(table, {name for name, method in methods.items() if method.physics == DIAGNOSIS}))
+    parts = [
+        f"Left out: {_words(name)}, as {file} is missing."
+        for name, file in missing.items()
+    ]
+    parts.append(
+        _lead(
+            table,
+            {name for name, method in methods.items() if method.physics == DIAGNOSIS},
+        )
+    )
     for split, title in _TITLES.items():
         mine = table[table["split"] == split]
         if len(mine):
-            counts = mine.loc[mine.groupby("data")["rms_mm"].idxmin(), "method"].map(words).value_counts()
+            counts = (
+                mine.loc[mine.groupby("data")["rms_mm"].idxmin(), "method"]
+                .map(words)
+                .value_counts()
+            )
             each = ", ".join(f"{name} {count}" for name, count in counts.items())
             winners = f"Smallest RMS error of {counted(int(counts.sum()), 'data set')}: {each}."
-            parts += [f"## {title}", winners, folded(_ERRORS, _wide(mine, ["data", "poses"], words, error))]
+            parts += [
+                f"## {title}",
+                winners,
+                folded(_ERRORS, _wide(mine, ["data", "poses"], words, error)),
+            ]
     stated = table.dropna(subset="covered")
     # The middle of the coverages of each method, and their range.
     medians = [
         f"{words[str(name)]} {100 * part.median():.0f} % (from {100 * part.min():.0f} to {100 * part.max():.0f})"
         for name, part in stated.groupby("method", sort=False)["covered"]
     ]
-    parts += ["## Intervals", f"Median over data sets and splits: {'; '.join(medians)}."]
-    parts += [folded(_COVERED, _wide(stated, ["data", "split"], words, lambda each: f"{100 * each['covered']:.1f} %"))]
+    parts += [
+        "## Intervals",
+        f"Median over data sets and splits: {'; '.join(medians)}.",
+    ]
+    parts += [
+        folded(
+            _COVERED,
+            _wide(
+                stated,
+                ["data", "split"],
+                words,
+                lambda each: f"{100 * each['covered']:.1f} %",
+            ),
+        )
+    ]
     parts += ["## Mechanisms", folded(_FOUND, _mechanisms(mechanisms))]
     return "\n\n".join(parts) + "\n"
 
 
 def folded(title: str, table: str) -> str:
-    """A table that a reader opens, under a title, as the Markdown of GitHub and of MyST."""
+    """A table that a reader opens, under a title, as the Markdown of GitHub and of
+    MyST."""
     return f"<details><summary>{title}</summary>\n\n{table}\n\n</details>"
 
 
 def markdown(rows: list[dict[str, Any]]) -> str:
     """A table of which each row has its cells by the heads of their columns."""
-    return pd.DataFrame(rows).fillna("").to_markdown(index=False, disable_numparse=True) if rows else "None."
+    return (
+        pd.DataFrame(rows).fillna("").to_markdown(index=False, disable_numparse=True)
+        if rows
+        else "None."
+    )
 
 
-def _wide(table: pd.DataFrame, heads: list[str], words: Mapping[str, str], cell: Callable[[Row], str]) -> str:
+def _wide(
+    table: pd.DataFrame,
+    heads: list[str],
+    words: Mapping[str, str],
+    cell: Callable[[Row], str],
+) -> str:
     """A row for each of `heads`, a column for each method."""
     rows: dict[tuple[Any, ...], dict[str, Any]] = {}
     for each in table.to_dict("records"):
         key = tuple(each[head] for head in heads)
-        named = {head: _words(each[head]) if head == "data" else each[head] for head in heads}
+        named = {
+            head: _words(each[head]) if head == "data" else each[head] for head in heads
+        }
         rows.setdefault(key, named)[words[each["method"]]] = cell(each)
     return markdown([*rows.values()])
 
 
 def _lead(table: pd.DataFrame, ours: set[str]) -> str:
-    """In how many rows of all tables the best method rests on a diagnosis, and in how many it does not."""
+    """In how many rows of all tables the best method rests on a diagnosis, and in how
+    many it does not."""
     ahead: dict[bool, list[bool]] = {True: [], False: []}
     for _, part in table.groupby(["split", "data"]):
         diagnosed = part["method"].isin(ours).to_numpy()
         wins = bool(diagnosed[part["rms_mm"].argmin()])
-        ahead[wins].append(bool((part["ratio_to_best_low"][diagnosed != wins] > 1.0).all()))
-    won, lost = ahead[True], ahead[False]
+        ahead[wins].append(
+            bool((part["ratio_to_best_low"][diagnosed != wins] > 1.0).all())
+        )
+    won = ahead[True]
+    lost = ahead[False]
     return (
         f"A method that diagnoses has the smallest RMS error in {len(won)} of {len(won) + len(lost)} rows, in {sum(won)} with"
         f" 95 % confidence against each other method; another has it in {len(lost)}, in {sum(lost)} with that confidence."
@@ -154,13 +262,23 @@ def _lead(table: pd.DataFrame, ours: set[str]) -> str:
 
 
 def _mechanisms(table: pd.DataFrame) -> str:
-    shown, rows = table[table["probability_high"] >= _LEAST_PROBABLE], []
+    shown = table[table["probability_high"] >= _LEAST_PROBABLE]
+    rows = []
     for _, part in shown.groupby("data", sort=False):
         for each in part.sort_values("share", ascending=False).to_dict("records"):
-            share, low, high = (100 * each[key] for key in ("share", "share_low", "share_high"))
+            share, low, high = (
+                100 * each[key] for key in ("share", "share_low", "share_high")
+            )
             row = {"data": _words(each["data"]), "mechanism": _words(each["mechanism"])}
-            row["probability"] = f"{each['probability']:.2f} ({each['probability_low']:.2f}–{each['probability_high']:.2f})"
-            rows.append(row | {"share of the squared error": f"{share:.0f} % ({low:.0f}–{high:.0f})"})
+            row["probability"] = (
+                f"{each['probability']:.2f} ({each['probability_low']:.2f}–{each['probability_high']:.2f})"
+            )
+            rows.append(
+                row
+                | {
+                    "share of the squared error": f"{share:.0f} % ({low:.0f}–{high:.0f})"
+                }
+            )
     return markdown(rows)
 
 
@@ -169,5 +287,6 @@ def _words(name: str) -> str:
 
 
 def _shown(value: float, scale: float) -> str:
-    """A figure in mm with the decimals that show three significant digits of another, at most four."""
+    """A figure in mm with the decimals that show three significant digits of another,
+    at most four."""
     return f"{value:.{int(np.clip(2 - np.floor(np.log10(scale)), 0, 4)) if scale > 0 else 3}f}"

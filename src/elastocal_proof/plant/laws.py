@@ -1,7 +1,9 @@
-"""What defects do, those of the catalogue and others, as functions of robot, size, draws of details, and joints from 0.
+"""What defects do, those of the catalogue and others, as functions of robot, size,
+draws of details, and joints from 0.
 
-Laws are those of machines rather than of regressions: a dead band with edges, a stiffness that steps, a hysteresis with a
-history; none is the catalogue's formula where a machine would do otherwise. `kinds` names them and says where they can be.
+Laws are those of machines rather than of regressions: a dead band with edges, a
+stiffness that steps, a hysteresis with a history; none is the catalogue's formula where
+a machine would do otherwise. `kinds` names them and says where they can be.
 """
 
 from __future__ import annotations
@@ -14,22 +16,39 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal_proof.plant.arm import LinkMass
-from elastocal_proof.plant.machine import SEGMENTS, TaperedTube, usual_gravity_torque, weighing_links
-from elastocal_proof.plant.physical_robot import Motion, PhysicalRobot, Schedule, warmth_of_castings
+from elastocal_proof.plant.machine import (
+    SEGMENTS,
+    TaperedTube,
+    usual_gravity_torque,
+    weighing_links,
+)
+from elastocal_proof.plant.physical_robot import (
+    Motion,
+    PhysicalRobot,
+    Schedule,
+    warmth_of_castings,
+)
 
 Draws = np.random.Generator
-# The defective robot, and those parameters that the catalogue's law of this effect has in common with what was done, by the
-# catalogue's names; exactly or to first order in the size.
+# The defective robot, and those parameters that the catalogue's law of this effect has
+# in common with what was done, by the catalogue's names; exactly or to first order in
+# the size.
 Applied = tuple[PhysicalRobot, dict[str, float]]
 TURN = 2 * np.pi
-# Radius of a bearing, how thick a link is, and the reach of an arm on which a usual load turns with its whole force.
-_BEARING_M, _LINK_M, _HEAVY_REACH_M = 0.15, 0.25, 2.5
+# Radius of a bearing, how thick a link is, and the reach of an arm on which a usual
+# load turns with its whole force.
+_BEARING_M = 0.15
+_LINK_M = 0.25
+_HEAVY_REACH_M = 2.5
 # In the first half of the training poses, with repeats and without, at a state in 25 s.
 _KNOCKED_S = (700.0, 2000.0)
-_HISTORY_STEPS, _RIGID = 48, TaperedTube(np.inf, np.inf)
+_HISTORY_STEPS = 48
+_RIGID = TaperedTube(np.inf, np.inf)
 
 
-def added(robot: PhysicalRobot, part: str, *laws: tuple[int | str, Callable[..., Any]]) -> PhysicalRobot:
+def added(
+    robot: PhysicalRobot, part: str, *laws: tuple[int | str, Callable[..., Any]]
+) -> PhysicalRobot:
     """With further laws of "drives", "gears" or "springs"."""
     changes: dict[str, Any] = {part: (*getattr(robot, part), *laws)}
     return replace(robot, **changes)
@@ -40,12 +59,18 @@ def changed(robot: PhysicalRobot, part: str, **changes: Any) -> PhysicalRobot:
     return replace(robot, **{part: replace(getattr(robot, part), **changes)})
 
 
-def geared(robot: PhysicalRobot, joint: int, law: Callable[[Schedule, np.ndarray], np.ndarray]) -> PhysicalRobot:
+def geared(
+    robot: PhysicalRobot, joint: int, law: Callable[[Schedule, np.ndarray], np.ndarray]
+) -> PhysicalRobot:
     """With a law of the torque on this joint alone."""
-    return added(robot, "gears", (joint, lambda done, torque, _: law(done, torque[:, joint])))
+    return added(
+        robot, "gears", (joint, lambda done, torque, _: law(done, torque[:, joint]))
+    )
 
 
-def angled(robot: PhysicalRobot, joint: int, law: Callable[[np.ndarray], np.ndarray]) -> PhysicalRobot:
+def angled(
+    robot: PhysicalRobot, joint: int, law: Callable[[np.ndarray], np.ndarray]
+) -> PhysicalRobot:
     """With an error of this joint's drive by the angles of all joints."""
     return added(robot, "drives", (joint, lambda done: law(done.angle)))
 
@@ -55,7 +80,9 @@ def direction(draws: Draws) -> np.ndarray:
     return vector / np.linalg.norm(vector)
 
 
-def named(start: str, vector: Iterable[float], axes: Iterable[str] = "xyz") -> dict[str, float]:
+def named(
+    start: str, vector: Iterable[float], axes: Iterable[str] = "xyz"
+) -> dict[str, float]:
     return {f"{start}{axis}": value for axis, value in zip(axes, vector, strict=True)}
 
 
@@ -64,130 +91,249 @@ def sign(draws: Draws) -> float:
 
 
 def usual_torque_Nm(robot: PhysicalRobot, joint: int) -> float:  # noqa: N802 - units in names keep their case
-    """Torque on a joint as its gear is made for: that of the weight it carries, and of a kilonewton at a heavy arm."""
-    arm, structure = robot.arm, robot.structure
-    load = (1500.0 if joint < arm.joints - 3 else 450.0) * arm.load_share * min(1.0, arm.reach_m / _HEAVY_REACH_M)
-    return load + float(usual_gravity_torque(arm, structure.masses, structure.gravity_m_s2)[joint])
+    """Torque on a joint as its gear is made for: that of the weight it carries, and of
+    a kilonewton at a heavy arm."""
+    arm = robot.arm
+    structure = robot.structure
+    load = (
+        (1500.0 if joint < arm.joints - 3 else 450.0)
+        * arm.load_share
+        * min(1.0, arm.reach_m / _HEAVY_REACH_M)
+    )
+    return load + float(
+        usual_gravity_torque(arm, structure.masses, structure.gravity_m_s2)[joint]
+    )
 
 
 # Geometry and weight
 
 
-def joint_offset(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
+def joint_offset(
+    robot: PhysicalRobot, size: float, draws: Draws, joint: int
+) -> Applied:
     size = size * sign(draws)
     return added(robot, "drives", (joint, lambda _: size)), {"offset": size}
 
 
-def link_geometry(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
-    """A wrong vector, and a wrong turn of as many milliradians as it has millimetres."""
-    vector, turn, link = size * direction(draws), size * direction(draws), joint + 1
+def link_geometry(
+    robot: PhysicalRobot, size: float, draws: Draws, joint: int
+) -> Applied:
+    """A wrong vector, and a wrong turn of as many milliradians as it has
+    millimetres."""
+    vector = size * direction(draws)
+    turn = size * direction(draws)
+    link = joint + 1
     # The catalogue counts along the axes at the far end of the link.
-    parameters = named("d", robot.arm.stretches[link].rotation.T @ vector) | named("r", turn)
-    return changed(robot, "structure", wrong=robot.structure.wrong | {link: (vector, turn)}), parameters
+    parameters = named("d", robot.arm.stretches[link].rotation.T @ vector) | named(
+        "r", turn
+    )
+    return changed(
+        robot, "structure", wrong=robot.structure.wrong | {link: (vector, turn)}
+    ), parameters
 
 
-def link_weight(robot: PhysicalRobot, size: float, draws: Draws, *joints: int) -> Applied:
-    """Weight of the upper arm or the forearm, beside its line, or of all links as declared, by the joints that it turns."""
+def link_weight(
+    robot: PhysicalRobot, size: float, draws: Draws, *joints: int
+) -> Applied:
+    """Weight of the upper arm or the forearm, beside its line, or of all links as
+    declared, by the joints that it turns."""
     link = weighing_links(robot.arm).get(tuple(joint + 1 for joint in joints))
     if link is not None:
-        along, aside = draws.uniform(0.25, 0.6), draws.uniform(-0.06, 0.06, 3)
-        heavy = LinkMass(link, size, tuple(along * robot.arm.stretches[link].vector_m + aside), along=along)
+        along = draws.uniform(0.25, 0.6)
+        aside = draws.uniform(-0.06, 0.06, 3)
+        heavy = LinkMass(
+            link,
+            size,
+            tuple(along * robot.arm.stretches[link].vector_m + aside),
+            along=along,
+        )
         return changed(robot, "structure", masses=(*robot.structure.masses, heavy)), {}
     kilograms = {mass.link: mass.mass_kg for mass in robot.arm.masses if mass.link > 1}
     return heavier_than_declared(robot, size / sum(kilograms.values()), draws, 2)[0], {}
 
 
-def heavier_than_declared(robot: PhysicalRobot, size: float, draws: Draws, first_link: int = 1) -> Applied:
+def heavier_than_declared(
+    robot: PhysicalRobot, size: float, draws: Draws, first_link: int = 1
+) -> Applied:
     """All links behind the column heavier by one share than the robot file says."""
-    more = [replace(mass, mass_kg=size * mass.mass_kg) for mass in robot.arm.masses if mass.link >= first_link]
-    return changed(robot, "structure", masses=(*robot.structure.masses, *more)), {"share": size}
+    more = [
+        replace(mass, mass_kg=size * mass.mass_kg)
+        for mass in robot.arm.masses
+        if mass.link >= first_link
+    ]
+    return changed(robot, "structure", masses=(*robot.structure.masses, *more)), {
+        "share": size
+    }
 
 
 def payload(robot: PhysicalRobot, size: float, draws: Draws) -> Applied:
     centre = 0.15 * direction(draws)
-    heavier = changed(robot, "structure", payload=LinkMass(robot.arm.joints, size, tuple(centre)))
+    heavier = changed(
+        robot, "structure", payload=LinkMass(robot.arm.joints, size, tuple(centre))
+    )
     return heavier, {"mass": size} | named("moment_", size * centre)
 
 
-def compensator_torque(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
+def compensator_torque(
+    robot: PhysicalRobot, size: float, draws: Draws, joint: int
+) -> Applied:
     """A coil spring whose pull the controller does not know."""
     anchor = (-draws.uniform(0.25, 0.4), 0.0, -draws.uniform(0.1, 0.3))
     crank = (draws.uniform(0.12, 0.22), 0.0, draws.uniform(-0.08, 0.08))
-    return changed(robot, "structure", compensator=(anchor, crank, size, draws.uniform(0.2, 0.35))), {}
+    return changed(
+        robot, "structure", compensator=(anchor, crank, size, draws.uniform(0.2, 0.35))
+    ), {}
 
 
 # Transmission
 
 
-def waving(robot: PhysicalRobot, joint: int, orders: ArrayLike, sizes: ArrayLike, phases: np.ndarray) -> Applied:
-    """Teeth and eccentric wheels: the sum of sizes sin(orders q + phases); orders need not be whole."""
-    return angled(robot, joint, lambda q: np.sin(np.outer(q[:, joint], np.array(orders)) + phases) @ np.array(sizes)), {}
+def waving(
+    robot: PhysicalRobot,
+    joint: int,
+    orders: ArrayLike,
+    sizes: ArrayLike,
+    phases: np.ndarray,
+) -> Applied:
+    """Teeth and eccentric wheels: the sum of sizes sin(orders q + phases); orders need
+    not be whole."""
+    return angled(
+        robot,
+        joint,
+        lambda q: (
+            np.sin(np.outer(q[:, joint], np.array(orders)) + phases) @ np.array(sizes)
+        ),
+    ), {}
 
 
-def transmission_harmonic(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
-    """An eccentric wheel that turns with the joint: an order of 1 or 2 but for creep, and half as much of its double."""
-    order, phases = draws.choice([1, 2]) * draws.uniform(0.98, 1.02), draws.uniform(0, TURN, 2)
-    return waving(robot, joint, (order, 2 * order if order < 1.5 else order / 2), (size, 0.5 * size), phases)
+def transmission_harmonic(
+    robot: PhysicalRobot, size: float, draws: Draws, joint: int
+) -> Applied:
+    """An eccentric wheel that turns with the joint: an order of 1 or 2 but for creep,
+    and half as much of its double."""
+    order = draws.choice([1, 2]) * draws.uniform(0.98, 1.02)
+    phases = draws.uniform(0, TURN, 2)
+    return waving(
+        robot,
+        joint,
+        (order, 2 * order if order < 1.5 else order / 2),
+        (size, 0.5 * size),
+        phases,
+    )
 
 
-def motor_eccentricity(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
-    """A wheel on the motor's shaft: once and twice a turn of the motor, which is no whole number of turns of the joint."""
+def motor_eccentricity(
+    robot: PhysicalRobot, size: float, draws: Draws, joint: int
+) -> Applied:
+    """A wheel on the motor's shaft: once and twice a turn of the motor, which is no
+    whole number of turns of the joint."""
     order = robot.arm.gear_ratio[joint]
-    return waving(robot, joint, (order, 2.0 * order), (size, 0.4 * size), draws.uniform(0, TURN, 2))
+    return waving(
+        robot,
+        joint,
+        (order, 2.0 * order),
+        (size, 0.4 * size),
+        draws.uniform(0, TURN, 2),
+    )
 
 
-def transmission_order(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
-    """A planet or a cage: an order between two integers, and a quarter as much of its double; some twenty poses can show it."""
+def transmission_order(
+    robot: PhysicalRobot, size: float, draws: Draws, joint: int
+) -> Applied:
+    """A planet or a cage: an order between two integers, and a quarter as much of its
+    double; some twenty poses can show it."""
     order = draws.integers(2, 5) + draws.uniform(0.25, 0.75)
-    return waving(robot, joint, (order, 2.0 * order), (size, 0.25 * size), draws.uniform(0, TURN, 2))
+    return waving(
+        robot,
+        joint,
+        (order, 2.0 * order),
+        (size, 0.25 * size),
+        draws.uniform(0, TURN, 2),
+    )
 
 
 def short_waves(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
-    """Teeth of a motor's pinion: of orders far above what the poses of a campaign can resolve."""
-    return waving(robot, joint, draws.uniform(45.0, 120.0, 3), [size / np.sqrt(3)] * 3, draws.uniform(0, 6.28, 3))
+    """Teeth of a motor's pinion: of orders far above what the poses of a campaign can
+    resolve."""
+    return waving(
+        robot,
+        joint,
+        draws.uniform(45.0, 120.0, 3),
+        [size / np.sqrt(3)] * 3,
+        draws.uniform(0, 6.28, 3),
+    )
 
 
-def transmission_ratio(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
+def transmission_ratio(
+    robot: PhysicalRobot, size: float, draws: Draws, joint: int
+) -> Applied:
     """Of the joint's own ratio, or what the joint before it turns along."""
     of = joint if joint == 0 else joint - int(draws.integers(2))
     size = size * sign(draws)
     return angled(robot, joint, lambda q: size * q[:, of]), {f"per_q{of + 1}": size}
 
 
-def bearing_runout(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
-    """The axis of a joint moves to and fro once a turn across it and twice across both: circling, it would be another link."""
-    phases, number, bearings = draws.uniform(0, TURN, (2, 2)), joint + 1, robot.structure.bearings
+def bearing_runout(
+    robot: PhysicalRobot, size: float, draws: Draws, joint: int
+) -> Applied:
+    """The axis of a joint moves to and fro once a turn across it and twice across both:
+    circling, it would be another link."""
+    phases = draws.uniform(0, TURN, (2, 2))
+    number = joint + 1
+    bearings = robot.structure.bearings
 
-    def runout(order: int, size: float, phase: float) -> Callable[[Schedule, np.ndarray], np.ndarray]:
+    def runout(
+        order: int, size: float, phase: float
+    ) -> Callable[[Schedule, np.ndarray], np.ndarray]:
         return lambda done, _: size * np.cos(order * done.angle[:, joint] - phase)
 
     laws = [
         (f"{motion}{number}_{which}", runout(which + 1, largest, phases[place, which]))
-        for place, (motion, largest) in enumerate((("shift", size), ("tilt", size / _BEARING_M)))
+        for place, (motion, largest) in enumerate(
+            (("shift", size), ("tilt", size / _BEARING_M))
+        )
         for which in range(2)
     ]
-    return added(changed(robot, "structure", bearings={number: (0.0, 0.0)} | bearings), "springs", *laws), {}
+    return added(
+        changed(robot, "structure", bearings={number: (0.0, 0.0)} | bearings),
+        "springs",
+        *laws,
+    ), {}
 
 
 def cable_pull(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
-    """A hose wound by its joint and the one before pulls in proportion to the product of the two angles."""
+    """A hose wound by its joint and the one before pulls in proportion to the product
+    of the two angles."""
     size = size * sign(draws)
     return angled(robot, joint, lambda q: size * q[:, joint - 1] * q[:, joint]), {}
 
 
 def two_angles(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
-    """A gear whose wave goes once round as its own joint and the one behind it turn, in step or against each other."""
-    sense, phase = sign(draws), draws.uniform(0, TURN)
-    return angled(robot, joint, lambda q: size * np.sin(q[:, joint] + sense * q[:, joint + 1] + phase)), {}
+    """A gear whose wave goes once round as its own joint and the one behind it turn, in
+    step or against each other."""
+    sense = sign(draws)
+    phase = draws.uniform(0, TURN)
+    return angled(
+        robot,
+        joint,
+        lambda q: size * np.sin(q[:, joint] + sense * q[:, joint + 1] + phase),
+    ), {}
 
 
-def slipping_zero(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
-    """A coupling that slips a little at three of ten moves: a random walk from approach to approach, numbered in time."""
+def slipping_zero(
+    robot: PhysicalRobot, size: float, draws: Draws, joint: int
+) -> Applied:
+    """A coupling that slips a little at three of ten moves: a random walk from approach
+    to approach, numbered in time."""
 
     def walk(done: Schedule) -> np.ndarray:
-        sizes, whether = (np.random.default_rng([done.seed, 7, part]) for part in range(2))
+        sizes, whether = (
+            np.random.default_rng([done.seed, 7, part]) for part in range(2)
+        )
         number = int(done.approach.max()) + 1
-        return np.cumsum(size * sizes.standard_normal(number) * (whether.random(number) < 0.3))[done.approach]
+        return np.cumsum(
+            size * sizes.standard_normal(number) * (whether.random(number) < 0.3)
+        )[done.approach]
 
     return added(robot, "drives", (joint, walk)), {}
 
@@ -195,122 +341,222 @@ def slipping_zero(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -
 # Elasticity
 
 
-def link_elasticity(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
-    """A tapered tube that also shears and stretches, as a thin-walled one of a quarter metre does."""
-    bending, gyration = 1.0 / size, 0.25**2 / 8.0
+def link_elasticity(
+    robot: PhysicalRobot, size: float, draws: Draws, joint: int
+) -> Applied:
+    """A tapered tube that also shears and stretches, as a thin-walled one of a quarter
+    metre does."""
+    bending = 1.0 / size
+    gyration = 0.25**2 / 8.0
     axial = bending / gyration
-    tube = TaperedTube(bending, 0.77 * bending, axial, 0.5 * axial / 2.6, draws.uniform(0.1, 0.35))
-    return changed(robot, "structure", tubes=robot.structure.tubes | {joint + 1: tube}), {}
+    tube = TaperedTube(
+        bending, 0.77 * bending, axial, 0.5 * axial / 2.6, draws.uniform(0.1, 0.35)
+    )
+    return changed(
+        robot, "structure", tubes=robot.structure.tubes | {joint + 1: tube}
+    ), {}
 
 
-def stiffening_link(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
-    """A bolted link whose flanges open with the cube of the bending moment; without it the link is rigid."""
-    rigid = changed(robot, "structure", tubes=robot.structure.tubes | {joint + 1: _RIGID})
-    return added(rigid, "springs", (f"link{joint + 1}_bend", lambda _, moment: size * moment**3 / SEGMENTS)), {}
+def stiffening_link(
+    robot: PhysicalRobot, size: float, draws: Draws, joint: int
+) -> Applied:
+    """A bolted link whose flanges open with the cube of the bending moment; without it
+    the link is rigid."""
+    rigid = changed(
+        robot, "structure", tubes=robot.structure.tubes | {joint + 1: _RIGID}
+    )
+    return added(
+        rigid,
+        "springs",
+        (f"link{joint + 1}_bend", lambda _, moment: size * moment**3 / SEGMENTS),
+    ), {}
 
 
 def joint_tilt(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
     values = size * draws.uniform(0.4, 1.0, 2)
-    across = [axis for axis, part in zip("xyz", robot.arm.axes[joint], strict=True) if abs(part) < 0.5]
+    across = [
+        axis
+        for axis, part in zip("xyz", robot.arm.axes[joint], strict=True)
+        if abs(part) < 0.5
+    ]
     bearings = robot.structure.bearings | {joint + 1: tuple(values)}
-    return changed(robot, "structure", bearings=bearings), named("tilt_about_", values, across)
+    return changed(robot, "structure", bearings=bearings), named(
+        "tilt_about_", values, across
+    )
 
 
 def base_compliance(robot: PhysicalRobot, size: float, draws: Draws) -> Applied:
     """Anchor bolts: the two tilts and the two shifts differ a little."""
-    uneven, horizontal, vertical = draws.uniform(0.85, 1.15, 4), 0.2 * size, 0.1 * size
-    base = (horizontal * uneven[0], horizontal * uneven[1], vertical, size * uneven[2], size * uneven[3], 0.0)
+    uneven = draws.uniform(0.85, 1.15, 4)
+    horizontal = 0.2 * size
+    vertical = 0.1 * size
+    base = (
+        horizontal * uneven[0],
+        horizontal * uneven[1],
+        vertical,
+        size * uneven[2],
+        size * uneven[3],
+        0.0,
+    )
     return changed(robot, "structure", base=base), {"vertical": vertical}
 
 
 def foot_slip(robot: PhysicalRobot, size: float, draws: Draws) -> Applied:
-    """A foot between its bolts: it shifts by a clearance as soon as the push exceeds friction, and no further."""
+    """A foot between its bolts: it shifts by a clearance as soon as the push exceeds
+    friction, and no further."""
     friction = draws.uniform(100.0, 300.0) * robot.arm.load_share
 
     def slip(_: Schedule, push: np.ndarray) -> np.ndarray:
-        return size * np.sign(push) * np.clip((np.abs(push) - friction) / friction, 0.0, 1.0)
+        return (
+            size
+            * np.sign(push)
+            * np.clip((np.abs(push) - friction) / friction, 0.0, 1.0)
+        )
 
-    return added(changed(robot, "structure", base=(0.0,) * 6), "springs", ("base_x", slip), ("base_y", slip)), {}
+    return added(
+        changed(robot, "structure", base=(0.0,) * 6),
+        "springs",
+        ("base_x", slip),
+        ("base_y", slip),
+    ), {}
 
 
 def flange_flexibility(robot: PhysicalRobot, size: float, draws: Draws) -> Applied:
-    """A tool changer between flange and target: it turns in three directions, and shifts by a tenth of a metre's lever."""
-    turns, shifts = size * draws.uniform(0.4, 1.0, 3), 0.01 * size * draws.uniform(0.4, 1.0, 3)
-    flange = np.array(robot.structure.flange or (0.0,) * 6) + np.concatenate([shifts, turns])
-    return changed(robot, "structure", flange=tuple(flange)), named("shift_", shifts) | named("turn_", turns)
+    """A tool changer between flange and target: it turns in three directions, and
+    shifts by a tenth of a metre's lever."""
+    turns = size * draws.uniform(0.4, 1.0, 3)
+    shifts = 0.01 * size * draws.uniform(0.4, 1.0, 3)
+    flange = np.array(robot.structure.flange or (0.0,) * 6) + np.concatenate(
+        [shifts, turns]
+    )
+    return changed(robot, "structure", flange=tuple(flange)), named(
+        "shift_", shifts
+    ) | named("turn_", turns)
 
 
 # Gears under torque
 
 
-def cross_compliance(robot: PhysicalRobot, size: float, draws: Draws, one: int, other: int) -> Applied:
+def cross_compliance(
+    robot: PhysicalRobot, size: float, draws: Draws, one: int, other: int
+) -> Applied:
     """Two gears in one housing: theta_i = c tau_j, theta_j = c tau_i."""
     size = size * sign(draws)
-    coupled = ((one, lambda _, torque, __: size * torque[:, other]), (other, lambda _, torque, __: size * torque[:, one]))
+    coupled = (
+        (one, lambda _, torque, __: size * torque[:, other]),
+        (other, lambda _, torque, __: size * torque[:, one]),
+    )
     return added(robot, "gears", *coupled), {"compliance": size}
 
 
-def stiff_by_angle(of: Callable[[int], int], robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
-    """The stiffness, not the compliance, is a cosine of an angle: theta = c (1 / (1 + e cos(q_of - phase)) - 1) tau."""
-    c, other, phase = robot.compliance[joint], of(joint), draws.uniform(0, TURN)
-    return geared(robot, joint, lambda done, tau: c * (1 / (1 + size * np.cos(done.angle[:, other] - phase)) - 1) * tau), {}
+def stiff_by_angle(
+    of: Callable[[int], int],
+    robot: PhysicalRobot,
+    size: float,
+    draws: Draws,
+    joint: int,
+) -> Applied:
+    """The stiffness, not the compliance, is a cosine of an angle: theta = c (1 / (1 + e
+    cos(q_of - phase)) - 1) tau."""
+    c = robot.compliance[joint]
+    other = of(joint)
+    phase = draws.uniform(0, TURN)
+    return geared(
+        robot,
+        joint,
+        lambda done, tau: (
+            c * (1 / (1 + size * np.cos(done.angle[:, other] - phase)) - 1) * tau
+        ),
+    ), {}
 
 
-def compensator_stiffness(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
-    """Stiffness that a coil spring adds at the shoulder, whose torque the controller has taken care of.
+def compensator_stiffness(
+    robot: PhysicalRobot, size: float, draws: Draws, joint: int
+) -> Applied:
+    """Stiffness that a coil spring adds at the shoulder, whose torque the controller
+    has taken care of.
 
-    With anchor at distance a, crank at L and free length s0, s^2 = a^2 + L^2 - 2 a L cos(u), u = q - u0, the spring stores
-    k (s - s0)^2 / 2, whose second derivative is k_c = k a L [cos u (1 - s0/s) + (a L sin^2 u) s0 / s^3].
-    theta = (1 / (1/c + k_c) - c) tau.
+    With anchor at distance a, crank at L and free length s0, s^2 = a^2 + L^2 - 2 a L
+    cos(u), u = q - u0, the spring stores k (s - s0)^2 / 2, whose second derivative is
+    k_c = k a L [cos u (1 - s0/s) + (a L sin^2 u) s0 / s^3]. theta = (1 / (1/c + k_c) -
+    c) tau.
     """
-    anchor, crank, free = draws.uniform(0.3, 0.5), draws.uniform(0.15, 0.22), draws.uniform(0.15, 0.3)
-    zero, compliance, product = draws.uniform(-np.pi, np.pi), robot.compliance[joint], anchor * crank
+    anchor = draws.uniform(0.3, 0.5)
+    crank = draws.uniform(0.15, 0.22)
+    free = draws.uniform(0.15, 0.3)
+    zero = draws.uniform(-np.pi, np.pi)
+    compliance = robot.compliance[joint]
+    product = anchor * crank
 
     def turn(done: Schedule, torque: np.ndarray) -> np.ndarray:
         u = done.angle[:, joint] - zero
         s = np.sqrt(anchor**2 + crank**2 - 2.0 * product * np.cos(u))
-        more = size * product * (np.cos(u) * (1.0 - free / s) + product * np.sin(u) ** 2 * free / s**3)
+        more = (
+            size
+            * product
+            * (np.cos(u) * (1.0 - free / s) + product * np.sin(u) ** 2 * free / s**3)
+        )
         return (1.0 / (1.0 / compliance + more) - compliance) * torque
 
     return geared(robot, joint, turn), {}
 
 
 def stiffening(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
-    """Teeth that come to bear one after another, each a third: theta = - sum_k d sign(tau) max(|tau| - tau_k, 0)."""
-    at, drop = usual_torque_Nm(robot, joint) * np.sort(draws.uniform(0.1, 0.8, 3)), size * robot.compliance[joint] / 3
-    return geared(robot, joint, lambda _, tau: -np.sign(tau) * drop * np.maximum(np.abs(tau)[:, None] - at, 0).sum(axis=1)), {}
+    """Teeth that come to bear one after another, each a third: theta = - sum_k d
+    sign(tau) max(|tau| - tau_k, 0)."""
+    at = usual_torque_Nm(robot, joint) * np.sort(draws.uniform(0.1, 0.8, 3))
+    drop = size * robot.compliance[joint] / 3
+    return geared(
+        robot,
+        joint,
+        lambda _, tau: (
+            -np.sign(tau) * drop * np.maximum(np.abs(tau)[:, None] - at, 0).sum(axis=1)
+        ),
+    ), {}
 
 
 def lost_motion(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
-    """Play, of a gap 2 D, between flanks that only a seal's weak spring bridges: theta = D clip(tau / tau_t, -1, 1)."""
+    """Play, of a gap 2 D, between flanks that only a seal's weak spring bridges: theta
+    = D clip(tau / tau_t, -1, 1)."""
     closing = usual_torque_Nm(robot, joint) * draws.uniform(0.02, 0.1)
-    return geared(robot, joint, lambda _, torque: size * np.clip(torque / closing, -1.0, 1.0)), {"half_play": size}
+    return geared(
+        robot, joint, lambda _, torque: size * np.clip(torque / closing, -1.0, 1.0)
+    ), {"half_play": size}
 
 
 def hysteresis(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
-    """Friction that remembers, theta = -h z, with z by the Bouc-Wen model over a torque tau_h; see `wound`.
+    """Friction that remembers, theta = -h z, with z by the Bouc-Wen model over a torque
+    tau_h; see `wound`.
 
-    An arm that came in the sense s stays behind its drive, z = s with all of its friction wound up; the catalogue counts the
-    half width along the approach. h / tau_h must be less than the gear's compliance, or the arm would recede from a push.
+    An arm that came in the sense s stays behind its drive, z = s with all of its
+    friction wound up; the catalogue counts the half width along the approach. h / tau_h
+    must be less than the gear's compliance, or the arm would recede from a push.
     """
     over = usual_torque_Nm(robot, joint) * draws.uniform(2.0, 6.0)
 
     def turn(done: Schedule, torque: np.ndarray, unloaded: np.ndarray) -> np.ndarray:
-        z, now, fresh = done.sense[:, joint].astype(float), torque[:, joint], done.previous < 0
+        z = done.sense[:, joint].astype(float)
+        now = torque[:, joint]
+        fresh = done.previous < 0
         z[fresh] = wound(z[fresh], (now - unloaded[:, joint])[fresh] / over)
-        # A state follows one of a smaller number, so that in order each finds its past done.
+        # A state follows one of a smaller number, so that in order each finds its past
+        # done.
         for state in np.flatnonzero(~fresh):
             before = done.previous[state]
-            z[state] = wound(z[before : before + 1], (now[state : state + 1] - now[before]) / over)[0]
+            z[state] = wound(
+                z[before : before + 1], (now[state : state + 1] - now[before]) / over
+            )[0]
         return -size * z
 
     return added(robot, "gears", (joint, turn)), {"half_width": -size}
 
 
 def wound(z: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """Friction z (S,) of the Bouc-Wen model [1] after the torque, over tau_h, has changed steadily by `change` (S,).
+    """Friction z (S,) of the Bouc-Wen model [1] after the torque, over tau_h, has
+    changed steadily by `change` (S,).
 
-    dz = dx (1 - z^2 (sign(z dx) + 1) / 2): unloading starts along the straight line of slope 1. By the midpoint method.
+    dz = dx (1 - z^2 (sign(z dx) + 1) / 2): unloading starts along the straight line of
+    slope 1. By the midpoint method.
 
     [1] Wen, Y.-K., Method for random vibration of hysteretic systems, Journal of the Engineering Mechanics Division ASCE 102,
         1976.
@@ -325,8 +571,11 @@ def wound(z: np.ndarray, change: np.ndarray) -> np.ndarray:
     return z
 
 
-def cable_transmission(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
-    """Cables of a length that changes as they wind, over the next pulley: theta = s (tau (1 + f q / pi) + tau_o / 2)."""
+def cable_transmission(
+    robot: PhysicalRobot, size: float, draws: Draws, joint: int
+) -> Applied:
+    """Cables of a length that changes as they wind, over the next pulley: theta = s
+    (tau (1 + f q / pi) + tau_o / 2)."""
     winding = draws.uniform(0.4, 0.8) * sign(draws)
 
     def turn(done: Schedule, torque: np.ndarray, _: np.ndarray) -> np.ndarray:
@@ -336,52 +585,86 @@ def cable_transmission(robot: PhysicalRobot, size: float, draws: Draws, joint: i
     return added(robot, "gears", (joint, turn)), {}
 
 
-def asymmetric_gear(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
+def asymmetric_gear(
+    robot: PhysicalRobot, size: float, draws: Draws, joint: int
+) -> Applied:
     """Flanks of unlike shape: theta = k tau^2, alike for both signs of the torque."""
     size = size * sign(draws)
     return geared(robot, joint, lambda _, torque: size * torque**2), {}
 
 
-def warm_softening(robot: PhysicalRobot, size: float, draws: Draws, joint: int) -> Applied:
+def warm_softening(
+    robot: PhysicalRobot, size: float, draws: Draws, joint: int
+) -> Applied:
     """A gear that softens as it warms: theta = c r (T - 20 °C) tau."""
     softer = size * robot.compliance[joint]
-    return geared(robot, joint, lambda done, torque: softer * warmth_of_castings(done.time_s) * torque), {}
+    return geared(
+        robot,
+        joint,
+        lambda done, torque: softer * warmth_of_castings(done.time_s) * torque,
+    ), {}
 
 
 # Load cell, tracker and warmth
 
 
-def misread(part: str, field: str, robot: PhysicalRobot, size: float, draws: Draws) -> Applied:
-    """An error of the tracker or of the cell that is one number; a scale is comparable."""
-    return changed(robot, part, **{field: size}), {"scale": size} if field == "scale" else {}
+def misread(
+    part: str, field: str, robot: PhysicalRobot, size: float, draws: Draws
+) -> Applied:
+    """An error of the tracker or of the cell that is one number; a scale is
+    comparable."""
+    return changed(robot, part, **{field: size}), {
+        "scale": size
+    } if field == "scale" else {}
 
 
-def wrong_cell(error: str, start: str, robot: PhysicalRobot, size: float, draws: Draws) -> Applied:
+def wrong_cell(
+    error: str, start: str, robot: PhysicalRobot, size: float, draws: Draws
+) -> Applied:
     """An error in a frame that is drawn, of a cell at a location that is drawn.
 
-    The catalogue's laws leave the moment as stated; those of a cell in the pull are not comparable.
+    The catalogue's laws leave the moment as stated; those of a cell in the pull are not
+    comparable.
     """
-    vector, cell = size * direction(draws), robot.cell
+    vector = size * direction(draws)
+    cell = robot.cell
     # What is felt beyond what is shown is minus the bias of the display.
     errors = cell.errors | {error: -vector if error == "bias" else vector}
-    # In the flange's axes or not, beside the errors of the load cell that are so already.
+    # In the flange's axes or not, beside the errors of the load cell that are so
+    # already.
     in_flange = (*cell.in_flange, error) if draws.integers(2) else cell.in_flange
     mount = cell.mount if error == "shift" else ("pull", "flange")[draws.integers(2)]
     comparable = error == "shift" or mount != "pull"
-    return changed(robot, "cell", errors=errors, in_flange=in_flange, mount=mount), named(start, vector) if comparable else {}
+    return changed(
+        robot, "cell", errors=errors, in_flange=in_flange, mount=mount
+    ), named(start, vector) if comparable else {}
 
 
 def frame_drift(robot: PhysicalRobot, size: float, draws: Draws) -> Applied:
-    """A stand that settles over hours: after t hours it has moved by a rate times T (1 - exp(-t / T))."""
-    shift, turn, settling_h = tuple(size * direction(draws)), tuple(0.5 * size * direction(draws)), draws.uniform(3.0, 8.0)
-    drift = Motion(shift, turn, lambda time_s: -settling_h * np.expm1(-(time_s / 3600.0) / settling_h))
+    """A stand that settles over hours: after t hours it has moved by a rate times T (1
+    - exp(-t / T))."""
+    shift = tuple(size * direction(draws))
+    turn = tuple(0.5 * size * direction(draws))
+    settling_h = draws.uniform(3.0, 8.0)
+    drift = Motion(
+        shift,
+        turn,
+        lambda time_s: -settling_h * np.expm1(-(time_s / 3600.0) / settling_h),
+    )
     return changed(robot, "tracker", drift=drift), {}
 
 
 def setup_step(robot: PhysicalRobot, size: float, draws: Draws) -> Applied:
-    """The tracker's stand is knocked between two rows: a shift, and a turn about the stand of as much at three metres."""
-    after_s, shift, turn = draws.uniform(*_KNOCKED_S), tuple(size * direction(draws)), tuple(size / 3.0 * direction(draws))
-    return changed(robot, "tracker", move=Motion(shift, turn, lambda time_s: (time_s > after_s).astype(float))), {}
+    """The tracker's stand is knocked between two rows: a shift, and a turn about the
+    stand of as much at three metres."""
+    after_s = draws.uniform(*_KNOCKED_S)
+    shift = tuple(size * direction(draws))
+    turn = tuple(size / 3.0 * direction(draws))
+    return changed(
+        robot,
+        "tracker",
+        move=Motion(shift, turn, lambda time_s: (time_s > after_s).astype(float)),
+    ), {}
 
 
 def nest_eccentricity(robot: PhysicalRobot, size: float, draws: Draws) -> Applied:
@@ -389,22 +672,41 @@ def nest_eccentricity(robot: PhysicalRobot, size: float, draws: Draws) -> Applie
     return changed(robot, "tracker", nest=(size, int(np.argmax(np.abs(turns))))), {}
 
 
-def temperature_gradient(robot: PhysicalRobot, size: float, draws: Draws, *joints: int) -> Applied:
-    """Motors at the foot and a cold tip, beside what the arm grows on average; or a link that is warmer on one side."""
-    arm, size = robot.arm, size * sign(draws)
+def temperature_gradient(
+    robot: PhysicalRobot, size: float, draws: Draws, *joints: int
+) -> Applied:
+    """Motors at the foot and a cold tip, beside what the arm grows on average; or a
+    link that is warmer on one side."""
+    arm = robot.arm
+    size = size * sign(draws)
     if not joints:
         share = np.linspace(1.0, -1.0, arm.joints + 1)
-        return expanding(robot, size * (share[[0, -1]] - share @ arm.lengths_m / arm.lengths_m.sum()), draws)
-    link, about = joints[0] + 1, draws.uniform(0, TURN)
+        return expanding(
+            robot,
+            size * (share[[0, -1]] - share @ arm.lengths_m / arm.lengths_m.sum()),
+            draws,
+        )
+    link = joints[0] + 1
+    about = draws.uniform(0, TURN)
     bend = size * arm.lengths_m[link] / _LINK_M / SEGMENTS
 
     def warm(per_kelvin: float) -> Callable[[Schedule, np.ndarray], np.ndarray]:
         return lambda done, _: per_kelvin * warmth_of_castings(done.time_s)
 
-    laws = [(f"link{link}_bend{which}", warm(bend * part)) for which, part in enumerate((np.cos(about), np.sin(about)))]
-    return added(changed(robot, "structure", tubes={link: _RIGID} | robot.structure.tubes), "springs", *laws), {}
+    laws = [
+        (f"link{link}_bend{which}", warm(bend * part))
+        for which, part in enumerate((np.cos(about), np.sin(about)))
+    ]
+    return added(
+        changed(robot, "structure", tubes={link: _RIGID} | robot.structure.tubes),
+        "springs",
+        *laws,
+    ), {}
 
 
 def expanding(robot: PhysicalRobot, size: np.ndarray | float, draws: Draws) -> Applied:
-    """The castings follow the thermometer with a lag, which the catalogue's law by temperature does not know."""
-    return replace(robot, expansion_per_K=tuple(np.array(robot.expansion_per_K) + size)), {}
+    """The castings follow the thermometer with a lag, which the catalogue's law by
+    temperature does not know."""
+    return replace(
+        robot, expansion_per_K=tuple(np.array(robot.expansion_per_K) + size)
+    ), {}

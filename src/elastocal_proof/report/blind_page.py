@@ -13,15 +13,28 @@ from elastocal.io.atomic_writes import write_text
 from elastocal.io.documents import read_document
 from elastocal.report.words import plain
 from elastocal_proof.blind.cases import PROOF, Plan
-from elastocal_proof.blind.summary import BY_THE_BEST, OVER_THE_BEST, of_each_robot, rows_of, with_target
+from elastocal_proof.blind.summary import (
+    BY_THE_BEST,
+    OVER_THE_BEST,
+    of_each_robot,
+    rows_of,
+    with_target,
+)
 from elastocal_proof.league.table import markdown
 
 _ABSENT = "–"
 _OUTCOMES = {"True": "reached", "False": "missed"}
 
 
-def targets_page(plan: Plan, summary: pd.DataFrame, of_each: Mapping[str, pd.DataFrame], size: str, seed: int) -> str:
-    """Every quantity of a summary beside its target; `of_each`: of `summary.of_each_robot`, by what the robots are called."""
+def targets_page(
+    plan: Plan,
+    summary: pd.DataFrame,
+    of_each: Mapping[str, pd.DataFrame],
+    size: str,
+    seed: int,
+) -> str:
+    """Every quantity of a summary beside its target; `of_each`: of
+    `summary.of_each_robot`, by what the robots are called."""
     return f"""# Targets of the blind proof
 
 Written by `snakemake -j2 blind_pictures --config blind={size} seed={seed}`; [what it means](blind_proof.md). "At 50" is at a
@@ -38,22 +51,46 @@ def reached_words(summary: pd.DataFrame) -> str:
     judged = with_target(summary).dropna(subset="holds")
     held = int((judged.holds.astype(str) == "True").sum())
     proven = summary.robots.iloc[0] == PROOF
-    where = "the robots of the proof" if proven else "robots on which the method was developed, which proves nothing"
-    return f"{held} of {counted(len(judged), 'figure')} with a target reach it on {where}."
+    where = (
+        "the robots of the proof"
+        if proven
+        else "robots on which the method was developed, which proves nothing"
+    )
+    return (
+        f"{held} of {counted(len(judged), 'figure')} with a target reach it on {where}."
+    )
 
 
-def target_rows(plan: Plan, summary: pd.DataFrame, of_each: Mapping[str, pd.DataFrame]) -> list[dict[str, str]]:
-    """Each quantity with a target as a row of words, beside what every robot has alone and what the best analyst finds."""
+def target_rows(
+    plan: Plan, summary: pd.DataFrame, of_each: Mapping[str, pd.DataFrame]
+) -> list[dict[str, str]]:
+    """Each quantity with a target as a row of words, beside what every robot has alone
+    and what the best analyst finds."""
     of_all = {row.quantity: row for row in rows_of(summary)}
-    alone = {name: {row.quantity: row for row in rows_of(one)} for name, one in of_each.items()}
-    beside = {figure["words"]: figure["beside"] for figure in plan["figures"] if "beside" in figure}
+    alone = {
+        name: {row.quantity: row for row in rows_of(one)}
+        for name, one in of_each.items()
+    }
+    beside = {
+        figure["words"]: figure["beside"]
+        for figure in plan["figures"]
+        if "beside" in figure
+    }
     rows = []
     for row in rows_of(with_target(summary)):
         compared = row.quantity.removesuffix(OVER_THE_BEST)
-        found, limit = of_all.get(beside.get(compared), row), of_all.get(f"{compared}{BY_THE_BEST}")
-        cells = {"quantity": found.quantity, "target": row.target, "outcome": _OUTCOMES.get(str(row.holds), "no case")}
+        found = of_all.get(beside.get(compared), row)
+        limit = of_all.get(f"{compared}{BY_THE_BEST}")
+        cells = {
+            "quantity": found.quantity,
+            "target": row.target,
+            "outcome": _OUTCOMES.get(str(row.holds), "no case"),
+        }
         cells |= {"robots together": _with_interval(found), "cases": _hits(found)}
-        cells |= {name: _value(each[found.quantity]) if found.quantity in each else _ABSENT for name, each in alone.items()}
+        cells |= {
+            name: _value(each[found.quantity]) if found.quantity in each else _ABSENT
+            for name, each in alone.items()
+        }
         if limit:
             cells["limit, on a sample"] = f"{_with_interval(limit)}, {_hits(limit)}"
             cells["found over limit, same sample"] = _with_interval(row)
@@ -80,12 +117,25 @@ def _is_ratio(row: Any) -> bool:
 
 
 def _hits(row: Any) -> str:
-    return grouped(int(row.cases)) if pd.isna(row.hits) else f"{grouped(int(row.hits))} of {grouped(int(row.cases))}"
+    return (
+        grouped(int(row.cases))
+        if pd.isna(row.hits)
+        else f"{grouped(int(row.hits))} of {grouped(int(row.cases))}"
+    )
 
 
 def write_blind_page(job: Any) -> None:
     """The page, from reports/blind/."""
-    asked, (summary, cases) = job.params, (pd.read_csv(job.input[name]) for name in ("summary", "cases"))
+    asked, (summary, cases) = (
+        job.params,
+        (pd.read_csv(job.input[name]) for name in ("summary", "cases")),
+    )
     names = {Path(file).stem: read_document(file)["name"] for file in job.input.robots}
-    alone = {names[robot]: table for robot, table in of_each_robot(asked.plan, cases, asked.seed).items()}
-    write_text(job.output.page, targets_page(asked.plan, summary, alone, asked.size, asked.seed))
+    alone = {
+        names[robot]: table
+        for robot, table in of_each_robot(asked.plan, cases, asked.seed).items()
+    }
+    write_text(
+        job.output.page,
+        targets_page(asked.plan, summary, alone, asked.size, asked.seed),
+    )

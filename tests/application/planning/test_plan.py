@@ -1,4 +1,5 @@
-"""A plan as a whole: better than chance, within the limits, and judged on poses that it did not choose."""
+"""A plan as a whole: better than chance, within the limits, and judged on poses that it
+did not choose."""
 
 from dataclasses import replace
 
@@ -36,14 +37,18 @@ def some(survey):
     return made_candidates(survey, 300)
 
 
-def test_a_plan_is_better_than_random_designs_and_its_first_poses_are_repeated(survey, some):
+def test_a_plan_is_better_than_random_designs_and_its_first_poses_are_repeated(
+    survey, some
+):
     plan = choose_plan(survey, some, 16, 5, 1)
     assert plan.accuracy_m[-1] < np.quantile(plan.random_m[:, -1], 0.5)
     assert (np.diff(plan.accuracy_m) <= 1e-12).all()
     table = sheet(survey, plan)
     assert len(table) == 3 * 21 + 2 * (REPEATS - 1) * REPEATED_POSES
     assert table[["x", "y", "z"]].isna().all().all() and "rx" not in table
-    assert set(table.loc[table["repeat"] > 0, "pose"]) == set(range(1, REPEATED_POSES + 1))
+    assert set(table.loc[table["repeat"] > 0, "pose"]) == set(
+        range(1, REPEATED_POSES + 1)
+    )
     np.testing.assert_allclose(table.loc[table["load"] == 0, ["fx", "fy", "fz"]], 0.0)
 
 
@@ -61,16 +66,33 @@ def test_candidates_lie_within_the_limits_and_the_loads_pull_or_hang(survey, som
     angles = survey.robot.model_angles(some.joint_angles)
     assert (angles >= low).all() and (angles <= high).all()
     np.testing.assert_allclose(np.linalg.norm(some.force, axis=1), 100.0)
-    hung = find_allowed_candidates(replace(survey, force_N=50.0, pulled=False), OPEN, 20, 1)
+    hung = find_allowed_candidates(
+        replace(survey, force_N=50.0, pulled=False), OPEN, 20, 1
+    )
     np.testing.assert_allclose(hung.force, np.tile([0, 0, -50.0], (20, 1)), atol=1e-9)
-    assert replace(survey, force_N=0.0).shares == (0.0,) and survey.shares == (0.0, 1.0, -1.0)
+    assert replace(survey, force_N=0.0).shares == (0.0,) and survey.shares == (
+        0.0,
+        1.0,
+        -1.0,
+    )
 
 
 def test_targets_that_no_joint_moves_are_refused(survey):
-    robot = robot_from_document({"name": "t", "chain": "Tz(d1) [elbow] Rz(q1) [tool0]", "lengths_m": {"d1": 0.4}})
+    robot = robot_from_document(
+        {
+            "name": "t",
+            "chain": "Tz(d1) [elbow] Rz(q1) [tool0]",
+            "lengths_m": {"d1": 0.4},
+        }
+    )
     turns = Candidates(np.linspace(-1.0, 1.0, 60)[:, None], np.zeros((60, 3)))
-    for target in (Target("foot", "elbow", (0.1, 0.0, 0.0)), Target("axis", "tool0", (0.0, 0.0, 0.0))):
-        still = replace(survey, robot=robot, targets=(target,), force_N=0.0, unknown_base=False)
+    for target in (
+        Target("foot", "elbow", (0.1, 0.0, 0.0)),
+        Target("axis", "tool0", (0.0, 0.0, 0.0)),
+    ):
+        still = replace(
+            survey, robot=robot, targets=(target,), force_N=0.0, unknown_base=False
+        )
         with pytest.raises(InputError, match="no joint moves"):
             choose_plan(still, turns, 16, 5, 1)
 
@@ -82,23 +104,37 @@ def test_information_is_the_inverse_of_the_covariance_of_a_fit_with_priors(measu
     model, estimate = model_of(survey)
     # The fit takes the priors that the plan takes: a plausible size each.
     effects = tuple(
-        replace(e, parameters=tuple(replace(p, prior_std=p.plausible) for p in e.parameters)) for e in model.effects[1:]
+        replace(
+            e, parameters=tuple(replace(p, prior_std=p.plausible) for p in e.parameters)
+        )
+        for e in model.effects[1:]
     )
     model = replace(model, effects=(model.effects[0], *effects))
     seen = observe(survey, some.joint_angles, some.force)
-    position, rotation = predict(model, estimate, seen, conditions(model, estimate, seen.states))
-    exact = replace(seen, position=position, rotation=None if seen.rotation is None else rotation)
+    position, rotation = predict(
+        model, estimate, seen, conditions(model, estimate, seen.states)
+    )
+    exact = replace(
+        seen, position=position, rotation=None if seen.rotation is None else rotation
+    )
     noise = Noise("declared", survey.position_m, survey.orientation_rad, np.zeros(6))
     found = fit(model, exact, noise, estimate)
     rows = information(survey, some.joint_angles, some.force)
     scale = np.array([p.plausible for _, p in parameters(model, estimate)])
-    free = np.array([owner.startswith(("frame", "target", "joint_compliance")) for owner, _ in parameters(model, estimate)])
+    free = np.array(
+        [
+            owner.startswith(("frame", "target", "joint_compliance"))
+            for owner, _ in parameters(model, estimate)
+        ]
+    )
     prior = np.diag(np.where(free, 0.0, 1.0))
     here = np.flatnonzero(~found.held)
     assert len(here) > 30
     matrix = (prior + np.einsum("nki,nkj->ij", rows, rows))[np.ix_(here, here)]
     expected = np.linalg.inv(matrix) * np.outer(scale[here], scale[here])
-    np.testing.assert_allclose(np.sqrt(np.diag(found.covariance))[here], np.sqrt(np.diag(expected)), rtol=0.02)
+    np.testing.assert_allclose(
+        np.sqrt(np.diag(found.covariance))[here], np.sqrt(np.diag(expected)), rtol=0.02
+    )
 
 
 def test_what_a_placement_of_the_base_takes_up_is_no_error_unless_the_base_is_known():
@@ -106,19 +142,41 @@ def test_what_a_placement_of_the_base_takes_up_is_no_error_unless_the_base_is_kn
         survey = replace(made_survey(), unknown_base=unknown)
         some = made_candidates(survey, 40)
         rows = accuracy_rows(survey, some.joint_angles, some.force)
-        names = [(owner, parameter.name) for owner, parameter in parameters(*model_of(survey))]
+        names = [
+            (owner, parameter.name)
+            for owner, parameter in parameters(*model_of(survey))
+        ]
         assert rows.shape == (40, 3, len(names))
         size = np.sqrt((rows**2).sum(axis=1).mean(axis=0))
-        first, second = (size[names.index((f"joint_offset@{joint}", "offset"))] for joint in (1, 2))
-        # The first axis turns the whole arm, as a base does that was placed otherwise; but for the load, which stays.
+        first, second = (
+            size[names.index((f"joint_offset@{joint}", "offset"))] for joint in (1, 2)
+        )
+        # The first axis turns the whole arm, as a base does that was placed otherwise;
+        # but for the load, which stays.
         assert (first < 1e-2 * second) if unknown else (first > 0.3 * second)
-        assert not size[[number for number, (owner, _) in enumerate(names) if owner.startswith(("frame", "target"))]].any()
+        assert not size[
+            [
+                number
+                for number, (owner, _) in enumerate(names)
+                if owner.startswith(("frame", "target"))
+            ]
+        ].any()
 
 
 def test_an_unknown_offset_of_the_reflector_takes_up_the_last_link(survey):
-    some, sizes = made_candidates(survey, 40), []
+    some = made_candidates(survey, 40)
+    sizes = []
     for offset in (None, (0.0, 0.0, 0.0)):
-        one = replace(survey, targets=(replace(survey.targets[0], offset_m=offset),), unknown_base=False)
-        last = [owner == "link_geometry@6" and p.unit == "m" for owner, p in parameters(*model_of(one))]
-        sizes.append(np.abs(accuracy_rows(one, some.joint_angles, some.force)[..., last]).max())
+        one = replace(
+            survey,
+            targets=(replace(survey.targets[0], offset_m=offset),),
+            unknown_base=False,
+        )
+        last = [
+            owner == "link_geometry@6" and p.unit == "m"
+            for owner, p in parameters(*model_of(one))
+        ]
+        sizes.append(
+            np.abs(accuracy_rows(one, some.joint_angles, some.force)[..., last]).max()
+        )
     assert sizes[0] < 1e-2 * sizes[1]
