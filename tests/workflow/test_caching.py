@@ -15,7 +15,7 @@ from import_closure import closure
 SCRIPTS = sorted(
     path.name
     for path in (REPOSITORY / "workflow" / "scripts").glob("*.py")
-    if path.read_text(encoding="utf-8").splitlines()[-1].startswith("run(")
+    if "\nrun(" in path.read_text(encoding="utf-8")
 )
 RUN_STEP = "run_step.py"
 # Modules of the study, most of which hold a step of a rule, by the script that calls
