@@ -44,7 +44,6 @@ if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Measurements
     from elastocal.diagnosis.settings import Settings
     from elastocal.fitting.least_squares import Fit
-    from elastocal.fitting.model import Case
     from elastocal.fitting.noise import Noise
 
 # Mechanisms that are added one at a time, each by a fit; of more, only the first.

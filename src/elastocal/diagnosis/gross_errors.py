@@ -48,7 +48,6 @@ if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Case, Estimate, Model
-    from elastocal.fitting.noise import Noise
 
 # Shares of the distances from which the scale is estimated: the second sees tails that
 # are heavier than normal ones.

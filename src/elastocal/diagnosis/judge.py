@@ -32,8 +32,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from elastocal.diagnosis.diagnose import Diagnosis, Step
-    from elastocal.fitting.model import Case, Estimate, Model
-    from elastocal.remainder.corrected import Corrected
+    from elastocal.fitting.model import Estimate, Model
 
 _REPLICATES = 1000
 # What warnings of errors that grew are known by.
