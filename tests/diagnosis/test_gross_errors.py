@@ -10,11 +10,11 @@ from made_folders import PLAN, made_folder, made_table
 from scipy.stats import binom, chi2
 
 from elastocal.diagnosis.gross_errors import (
-    beyond_chance,
-    entries_of,
-    first_kept,
-    fitted_to,
-    gross_errors,
+    describe_gross_errors,
+    find_gross_errors,
+    fit_subset,
+    flag_outliers,
+    select_initial_subset,
 )
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.least_squares import fit
@@ -30,12 +30,12 @@ def test_the_distance_of_a_row_is_that_from_a_fit_without_it(cases):
     case, _ = cases
     measurements = case.campaign.measurements
     every = np.ones(len(measurements), bool)
-    whole = fitted_to(case, every, SETTINGS)
-    without = fitted_to(case, np.arange(len(measurements)) != BAD, SETTINGS)
+    whole = fit_subset(case, every, SETTINGS)
+    without = fit_subset(case, np.arange(len(measurements)) != BAD, SETTINGS)
     found = []
     for part in (whole, without):
         found.append(
-            gross_errors(
+            find_gross_errors(
                 part.declared, whole.noise, measurements, part.kept, SETTINGS
             ).distance
         )
@@ -49,7 +49,7 @@ def test_rows_stand_out_by_chance_as_often_as_the_settings_say():
     draws = np.random.default_rng(0)
     distance = np.sqrt(draws.chisquare(3, (count, rows)))
     alarms = sum(
-        beyond_chance(each, 3, np.ones(rows, bool), SETTINGS)[1].any()
+        flag_outliers(each, 3, np.ones(rows, bool), SETTINGS)[1].any()
         for each in distance
     )
     # A rate twice that of the settings would exceed this in all but 1e-6 of such tests.
@@ -58,20 +58,20 @@ def test_rows_stand_out_by_chance_as_often_as_the_settings_say():
 
 def test_a_model_that_does_not_fit_makes_no_row_stand_out():
     distance = 30.0 * np.sqrt(np.random.default_rng(1).chisquare(3, 60))
-    scaled, gross = beyond_chance(distance, 3, np.ones(60, bool), SETTINGS)
+    scaled, gross = flag_outliers(distance, 3, np.ones(60, bool), SETTINGS)
     assert not gross.any() and np.median(scaled) == pytest.approx(
         np.sqrt(chi2.median(3)), rel=0.2
     )
     distance[:3] *= 20.0
     assert np.flatnonzero(
-        beyond_chance(distance, 3, np.ones(60, bool), SETTINGS)[1]
+        flag_outliers(distance, 3, np.ones(60, bool), SETTINGS)[1]
     ).tolist() == [0, 1, 2]
 
 
 def test_where_too_many_rows_stand_out_none_is_a_gross_error():
     distance = np.ones(40)
     distance[:9] = 1e3
-    assert not beyond_chance(distance, 3, np.ones(40, bool), SETTINGS)[1].any()
+    assert not flag_outliers(distance, 3, np.ones(40, bool), SETTINGS)[1].any()
 
 
 def test_sentences_say_what_a_row_reads(cases, diagnosis):
@@ -80,12 +80,12 @@ def test_sentences_say_what_a_row_reads(cases, diagnosis):
     position[4], position[8] = 0.0, position[7]
     measurements = case.campaign.measurements
     every = np.ones(len(position), bool)
-    errors = gross_errors(
+    errors = find_gross_errors(
         diagnosis.final, diagnosis.declared.noise, measurements, every, SETTINGS
     )
     told = {
         entry["rows"][0]: entry["detail"]
-        for entry in entries_of(errors, case.campaign, held_out=False)
+        for entry in describe_gross_errors(errors, case.campaign, held_out=False)
     }
     assert "reads 0, 0, 0" in told[measurements.row[4]]
     assert (
@@ -104,14 +104,14 @@ def test_a_search_looks_at_the_same_poses_whatever_rows_are_left_out_or_come_bac
     case = cases[0]
     settings = replace(SETTINGS, searched_observations=12)
     pose = case.campaign.measurements.pose
-    whole = fitted_to(case, pose >= 0, settings).searched
+    whole = fit_subset(case, pose >= 0, settings).search_sample
     assert 2 < len(whole) < len(case.observations)
     for out in (
         whole.states.pose[:1],
         whole.states.pose[-2:],
         np.setdiff1d(pose, whole.states.pose),
     ):
-        some = fitted_to(case, ~np.isin(pose, out), settings).searched
+        some = fit_subset(case, ~np.isin(pose, out), settings).search_sample
         np.testing.assert_array_equal(
             some.position, whole.position[~np.isin(whole.states.pose, out)[whole.state]]
         )
@@ -120,16 +120,16 @@ def test_a_search_looks_at_the_same_poses_whatever_rows_are_left_out_or_come_bac
 def test_the_last_step_to_all_of_a_long_campaign_leaves_a_tenth_of_a_standard_error_at_most(
     cases, monkeypatch
 ):
-    part = fitted_to(
+    part = fit_subset(
         cases[0],
         cases[0].campaign.measurements.pose >= 0,
         replace(SETTINGS, searched_observations=24),
     )
-    usual = part.to_all(part.declared)
+    usual = part.fit_to_all(part.declared)
     for module in ("fitting.least_squares", "diagnosis.gross_errors"):
         monkeypatch.setattr(f"elastocal.{module}.LONG", 30)
     monkeypatch.setattr("elastocal.fitting.least_squares._STEPPING_STONE", 36)
-    long = part.to_all(part.declared)
+    long = part.fit_to_all(part.declared)
     off, exact = (
         parameter_values(each.model, each.estimate)
         for each in (long, fit(usual.model, part.case.observations, usual.noise))
@@ -147,7 +147,7 @@ def case(cases):
     "shifts", [{BAD: 0.02}, {BAD: 0.02, 3: -0.1}, {0: 1e3, 5: 1.0, 20: 0.03}]
 )
 def test_rows_are_found_beside_an_effect_that_the_model_lacks(case, shifts):
-    kept = first_kept(damaged(case, shifts), SETTINGS).kept
+    kept = select_initial_subset(damaged(case, shifts), SETTINGS).kept
     # A bad repeat takes the others of its state along, until a model says which it is.
     assert not kept[list(shifts)].any() and (~kept).sum() <= 2 * len(shifts)
 
@@ -159,7 +159,7 @@ def test_loads_that_pull_the_fit_to_themselves_are_found_together(case, times):
     wrench = measurements.wrench.copy()
     wrench[bad] *= times
     campaign = replace(case.campaign, measurements=replace(measurements, wrench=wrench))
-    kept = first_kept(
+    kept = select_initial_subset(
         replace(case, campaign=campaign).select(np.ones(len(wrench), bool)), SETTINGS
     ).kept
     assert not kept[bad].any()
@@ -172,7 +172,7 @@ def test_a_repeat_that_is_in_no_average_stays_out(case):
     )
     repeated = [place for place, key in enumerate(state) if state.count(key) > 2][:1]
     assert (
-        not first_kept(damaged(case, dict.fromkeys(repeated, 2.0)), SETTINGS)
+        not select_initial_subset(damaged(case, dict.fromkeys(repeated, 2.0)), SETTINGS)
         .kept[repeated]
         .any()
     )
@@ -193,4 +193,4 @@ def test_no_row_is_a_gross_error_where_all_measurements_of_a_pose_err_together(
     whole, _ = cases_in(
         made_folder(tmp_path / "made", kuka, table=table), config_folder / "robots"
     )
-    assert first_kept(whole, SETTINGS).kept.all()
+    assert select_initial_subset(whole, SETTINGS).kept.all()

@@ -13,12 +13,12 @@ from scipy.optimize import minimize
 from elastocal.diagnosis.evidence import Joint
 from elastocal.diagnosis.linearize import linearized
 from elastocal.diagnosis.refit import (
-    averaged,
-    expected_to_help,
-    fit_with_sizes,
-    selected,
-    squares_beyond,
-    squares_explained,
+    average_models,
+    compute_explained_squares,
+    compute_extra_squares,
+    fit_selected_effects,
+    is_expected_to_help,
+    select_effects,
 )
 from elastocal.diagnosis.search import Model, Posterior, posterior
 from elastocal.diagnosis.settings import Settings
@@ -56,10 +56,12 @@ def test_priors_arrive_in_the_fit(found):
     assert [line.problem.units[number].candidate.key for number in best.units] == [
         "offset@3"
     ]
-    chosen = selected(line, best)
+    chosen = select_effects(line, best)
     (effect, shapes), *others = chosen
     assert not others and shapes.size == 0
-    final = fit_with_sizes(declared, campaign.observations, declared.noise, chosen)
+    final = fit_selected_effects(
+        declared, campaign.observations, declared.noise, chosen
+    )
     priors = {
         owner: parameter.prior_std
         for owner, parameter in final.parameters
@@ -180,7 +182,7 @@ def test_declared_parameters_are_averaged_over_all_models(made):
     found = posterior_of(
         ((0,), [0.3], 0.0, 0.6), ((), [], 0.3, 0.3), ((1, 2), [1.0, 0.1], 0.9, 0.1)
     )
-    result = averaged(line, found, found.models[0], OWNERS)
+    result = average_models(line, found, found.models[0], OWNERS)
     means = []
     variances = []
     for model in found.models:
@@ -217,7 +219,8 @@ def test_coefficients_are_averaged_over_the_models_that_have_them(made):
     alone = posterior_of(best)
     beside = posterior_of(best, ((), [], 0.0, 0.5))
     mine, same = (
-        averaged(line, found, found.models[0], OWNERS) for found in (alone, beside)
+        average_models(line, found, found.models[0], OWNERS)
+        for found in (alone, beside)
     )
     for name in ("0", "1"):
         assert (
@@ -228,12 +231,12 @@ def test_coefficients_are_averaged_over_the_models_that_have_them(made):
         assert same.std_error["a", name] == pytest.approx(mine.std_error["a", name])
     # Beside another unit it may be another size.
     both = posterior_of(best, ((0, 1), [0.3, 1.0], 0.0, 0.5))
-    other = averaged(line, both, both.models[0], OWNERS)
+    other = average_models(line, both, both.models[0], OWNERS)
     assert abs(other.shift["a", "0"]) > 1e-3
     # What the most probable model does not have is not reported, nor is the competitor.
     assert {owner for owner, _ in other.shift} == {"declared", "a"}
     assert {
-        owner for owner, _ in averaged(line, both, both.models[1], OWNERS).shift
+        owner for owner, _ in average_models(line, both, both.models[1], OWNERS).shift
     } == {"declared", "a", "b"}
 
 
@@ -289,7 +292,7 @@ def test_a_model_is_expected_to_help_where_the_expected_square_of_the_error_fall
         + (1 - best) * (other - kept) @ gram @ (other - kept)
         for kept in (mine, 0)
     ]
-    assert expected_to_help(problem, found, found.models[0]) == (
+    assert is_expected_to_help(problem, found, found.models[0]) == (
         squares[0] < squares[1]
     )
 
@@ -313,14 +316,16 @@ def test_squares_beyond_the_others_are_what_is_left_where_the_others_fit_them_wi
         off[others] = -values
         return off @ gram @ off + (values**2).sum() / 0.1**2
 
-    whole, beyond = squares_beyond(problem, model, {"a"})[0]
-    assert whole == pytest.approx(squares_explained(problem, model)["a"], rel=1e-6)
+    whole, beyond = compute_extra_squares(problem, model, {"a"})[0]
+    assert whole == pytest.approx(
+        compute_explained_squares(problem, model)["a"], rel=1e-6
+    )
     assert beyond == pytest.approx(minimize(left, np.zeros(len(others))).fun, rel=1e-6)
     assert 0.0 < beyond < whole
-    assert squares_beyond(problem, Model((0,), 0.0, np.array([0.3]), 0.0), {"a"})[0][
-        1
-    ] == pytest.approx(
-        squares_explained(problem, Model((0,), 0.0, np.array([0.3]), 0.0))["a"]
+    assert compute_extra_squares(
+        problem, Model((0,), 0.0, np.array([0.3]), 0.0), {"a"}
+    )[0][1] == pytest.approx(
+        compute_explained_squares(problem, Model((0,), 0.0, np.array([0.3]), 0.0))["a"]
     )
 
 
@@ -334,7 +339,8 @@ def test_no_effect_is_fitted_under_a_wider_prior_than_it_had_before_the_measurem
     sizes = [0.5 * before, before, SETTINGS.scales[-1]]
     assert before < SETTINGS.scales[-1]
     chosen = [
-        selected(line, replace(best, scales=np.array([size])))[0][0] for size in sizes
+        select_effects(line, replace(best, scales=np.array([size])))[0][0]
+        for size in sizes
     ]
     deviations = [
         candidate.parameters[0].prior_std / unit.sizes[0] for candidate in chosen
