@@ -49,7 +49,10 @@ INTERFACE = {
         "elastocal.validation.held_out": ("position_errors", "intervals")
     },
     "Identify compliances as in the study": {
-        "elastocal.study.equation_11": ("estimate_compliance", "undetermined")
+        "elastocal.study.equation_11": (
+            "estimate_compliance",
+            "find_undetermined_prefixes",
+        )
     },
 }
 

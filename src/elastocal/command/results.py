@@ -325,7 +325,7 @@ def certificate(
     from rich.console import Console
 
     from elastocal.data_checks.protocol import data_at_fault
-    from elastocal.figures.loop import budget_bars
+    from elastocal.figures.loop import draw_budget_bars
     from elastocal.figures.style import save_all
     from elastocal.io.atomic_writes import check_places, write_together
     from elastocal.io.json_files import write_json
@@ -353,7 +353,7 @@ def certificate(
             write_together(place, (PAGES, DOCUMENT)) as partial,
         ):
             names = [row[0] for row in facts["budget"]]
-            budget = budget_bars(
+            budget = draw_budget_bars(
                 document["budget"], names, limit, document["tracker_rms_m"]
             )
             pictures = save_all({"budget": budget}, scratch).values()

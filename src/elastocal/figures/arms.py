@@ -8,8 +8,14 @@ import numpy as np
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
-from elastocal.application.planning.cell import sample_links
-from elastocal.figures.style import PALETTE, STAGES, label_decades, panels, styled
+from elastocal.application.planning.cell import link_points
+from elastocal.figures.style import (
+    PALETTE,
+    STAGES,
+    create_panels,
+    label_decades,
+    styled,
+)
 from elastocal.mechanics.kinematics import poses
 
 if TYPE_CHECKING:
@@ -76,7 +82,7 @@ def draw_arm(axis: Axes, links: np.ndarray, width: float) -> None:
 
 
 @styled
-def arm_with_errors(
+def draw_arm_with_errors(
     robot: Robot, table: Mapping[str, np.ndarray], heldout: Mapping[str, Any]
 ) -> Figure:
     """Two panels, before and after: the arm in one of the held-out poses, and an arrow
@@ -96,7 +102,7 @@ def arm_with_errors(
     # One arm in full, the one that reaches farthest to a side; the others as thin
     # lines.
     links = arms[np.argmax(np.abs(project_view(arms[:, -1])[:, 0]))]
-    figure, axes = panels(1, 2, 78, sharex=True, sharey=True)
+    figure, axes = create_panels(1, 2, 78, sharex=True, sharey=True)
     for axis, (stage, (words, color)) in zip(axes[0], STAGES.items(), strict=True):
         off = np.column_stack([table[f"{stage}_d{each}"][seen] for each in "xyz"])
         for arm in arms:
@@ -133,9 +139,9 @@ def arm_with_errors(
 
 
 @styled
-def plan_picture(robot: Robot, cell: Cell, plan: Plan) -> Figure:
+def draw_plan(robot: Robot, cell: Cell, plan: Plan) -> Figure:
     """Configurations in the cell, and the accuracy against the number of poses."""
-    figure, axes = panels(1, 3, 72)
+    figure, axes = create_panels(1, 3, 72)
     for axis, (words, across, up) in zip(axes[0], _VIEWS, strict=False):
         _view(axis, robot, cell, plan, across, up)
         axis.set_title(words)
@@ -230,7 +236,7 @@ def _curves(axis: Axes, plan: Plan) -> None:
 
 
 @styled
-def pose_pictures(robot: Robot, plan: Plan) -> list[Figure]:
+def draw_poses(robot: Robot, plan: Plan) -> list[Figure]:
     """The robot in every pose of a plan, by its number on the sheet, with the direction
     of the load; one figure a page."""
     angles = robot.model_angles(
@@ -246,7 +252,7 @@ def pose_pictures(robot: Robot, plan: Plan) -> list[Figure]:
     for first in range(0, len(arms), _MOST_ON_PAGE):
         page = range(first, min(first + _MOST_ON_PAGE, len(arms)))
         rows = -(-len(page) // _ACROSS)
-        figure, axes = panels(rows, _ACROSS, 27 * rows)
+        figure, axes = create_panels(rows, _ACROSS, 27 * rows)
         for axis in axes.flat:
             axis.set_axis_off()
         for axis, pose in zip(axes.flat, page, strict=False):

@@ -9,7 +9,7 @@ from elastocal.application.accuracy import Accuracy, format_accuracy
 from elastocal.counting import counted
 from elastocal.report import words as say
 from elastocal.report.loop_facts import title_of
-from elastocal.report.typesetting import sentences
+from elastocal.report.typesetting import render_sentences
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -41,7 +41,9 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
         "accuracy_sentence": format_accuracy(Accuracy(**document["accuracy"])),
         "title": title_of(document),
     }
-    stated = sentences("certificate.txt", say.FILTERS, document=document, **spoken)
+    stated = render_sentences(
+        "certificate.txt", say.FILTERS, document=document, **spoken
+    )
     budget = []
     for line in document["budget"]:
         below = 0.0 < line["rms_m"] < _NOTHING_M

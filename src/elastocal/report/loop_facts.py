@@ -16,7 +16,7 @@ from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.effects.catalogue import effects
 from elastocal.effects.protocol import effect_of
 from elastocal.report import words as say
-from elastocal.report.typesetting import sentences
+from elastocal.report.typesetting import render_sentences
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -101,7 +101,7 @@ def campaign_sentences(
         "new_poses": len({(row["effect"], row["pose"]) for row in experiment}),
         "version": __version__,
     }
-    return sentences(
+    return render_sentences(
         "campaign.txt",
         say.FILTERS,
         verdict={"next_experiment": None, "repeatable": None, **verdict},
