@@ -270,7 +270,7 @@ def diagnose(
     document = _document(case, noise, steps, final, found, known, settings, warnings)
     document |= {
         "contradictions": contradicting,
-        "gross_errors": left_out,
+        "gross_errors": [asdict(error) for error in left_out],
         "repeatable": repeatable and asdict(repeatable),
     }
     document["warnings"] += format_gross_error_warnings(left_out)

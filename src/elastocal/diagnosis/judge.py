@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -14,11 +14,11 @@ from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.gross_errors import (
     OutlierTest,
     describe_gross_errors,
-    estimate_prediction_uncertainty,
     find_held_out_gross_errors,
     format_gross_error_warnings,
 )
 from elastocal.diagnosis.settings import Settings
+from elastocal.diagnosis.studentized_residuals import estimate_prediction_uncertainty
 from elastocal.fitting.model import Case, conditions, measured_in_base, residuals
 from elastocal.fitting.noise import noise_from
 from elastocal.fitting.observations import single_observations, state_clusters
@@ -118,7 +118,7 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
         ],
         "heldout": heldout,
         "remainder": remainder,
-        "gross_errors": [*found["gross_errors"], *left_out],
+        "gross_errors": [*found["gross_errors"], *map(asdict, left_out)],
         "warnings": [
             *found["warnings"],
             *format_gross_error_warnings(left_out),
@@ -174,16 +174,19 @@ def remove_gross_errors(
         return errors, part, poses
     settings = Settings()
     noise = noise_from(diagnosis.document).of_measurements
-    yardstick = estimate_prediction_uncertainty(
+    fitted_uncertainty = estimate_prediction_uncertainty(
         final, noise, diagnosis.case.campaign.measurements
     )
     outside = poses[state_clusters(measurements)]
     for _ in range(settings.gross_error_rounds):
         # Frames of another campaign are fitted to what is kept of it.
-        there = placed(final, diagnosis.case, part)
+        model, estimate = placed(final, diagnosis.case, part)
+        uncertainty = fitted_uncertainty
+        if model is not final.model or estimate is not final.estimate:
+            uncertainty = replace(fitted_uncertainty, parameter_covariance=None)
         last = errors.gross
         errors = find_held_out_gross_errors(
-            final, there, yardstick, held_out, outside, settings
+            model, estimate, uncertainty, held_out, outside, settings
         )
         part = held_out.select(~errors.gross) if errors.gross.any() else held_out
         if (errors.gross == last).all():
