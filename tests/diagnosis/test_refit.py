@@ -10,8 +10,8 @@ from made_problems import made_problem, made_rows, made_unit
 from planted import planted
 from scipy.optimize import minimize
 
-from elastocal.diagnosis.evidence import Joint
-from elastocal.diagnosis.linearize import linearized
+from elastocal.diagnosis.candidate_design import build_candidate_design
+from elastocal.diagnosis.evidence import ModelDensity
 from elastocal.diagnosis.refit import (
     averaged,
     expected_to_help,
@@ -20,7 +20,7 @@ from elastocal.diagnosis.refit import (
     squares_beyond,
     squares_explained,
 )
-from elastocal.diagnosis.search import Model, Posterior, posterior
+from elastocal.diagnosis.search import Posterior, ScoredModel, search_models
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import linearize
@@ -45,17 +45,19 @@ def found(kuka):
         if candidate.effect != "joint_offset"
     ]
     candidates.append(replace(campaign.candidates["joint_offset@3"], effect="offset"))
-    problem = linearized(declared, campaign.observations, candidates, SETTINGS)
-    models = posterior(problem.problem)
+    problem = build_candidate_design(
+        declared, campaign.observations, candidates, SETTINGS
+    )
+    models = search_models(problem.problem)
     return campaign, declared, problem, models
 
 
 def test_priors_arrive_in_the_fit(found):
     campaign, declared, line, models = found
     best = models.models[0]
-    assert [line.problem.units[number].candidate.key for number in best.units] == [
-        "offset@3"
-    ]
+    assert [
+        line.problem.terms[number].candidate.key for number in best.term_indices
+    ] == ["offset@3"]
     chosen = selected(line, best)
     (effect, shapes), *others = chosen
     assert not others and shapes.size == 0
@@ -134,7 +136,7 @@ def test_moments_of_a_unit_are_averaged_over_its_sizes_and_the_pose_error(made):
     problem = line.problem
     unit = UNITS[0]
     base = problem.statistics.log_likelihood + problem.log_pose
-    ((mean, variance),) = Joint(
+    ((mean, variance),) = ModelDensity(
         problem.statistics, [unit], problem.grid, base, np.array([2])
     ).moments()
     weights = []
@@ -169,7 +171,7 @@ def test_moments_of_a_unit_are_averaged_over_its_sizes_and_the_pose_error(made):
 
 def posterior_of(*entries):
     models = tuple(
-        Model(units, 0.0, np.array(scales, float), tau)
+        ScoredModel(units, 0.0, np.array(scales, float), tau)
         for units, scales, tau, _ in entries
     )
     return Posterior(models, np.array([probability for *_, probability in entries]))
@@ -185,10 +187,13 @@ def test_declared_parameters_are_averaged_over_all_models(made):
     variances = []
     for model in found.models:
         columns = np.concatenate(
-            [np.zeros(0, int), *(UNITS[number].columns for number in model.units)]
+            [
+                np.zeros(0, int),
+                *(UNITS[number].columns for number in model.term_indices),
+            ]
         )
         deviations = np.repeat(
-            model.scales, [len(UNITS[number].columns) for number in model.units]
+            model.scales, [len(UNITS[number].columns) for number in model.term_indices]
         )
         mean, covariance = regression(rows, model.pose_error_rad, columns, deviations)
         means.append(mean[:4])
@@ -241,10 +246,14 @@ def most_probable(rows, problem, model):
     """Coefficients of a model, dense: at its sizes, and at the pose error that is then
     most probable."""
     columns = np.concatenate(
-        [np.zeros(0, int), *(problem.units[number].columns for number in model.units)]
+        [
+            np.zeros(0, int),
+            *(problem.terms[number].columns for number in model.term_indices),
+        ]
     )
     deviations = np.repeat(
-        model.scales, [len(problem.units[number].columns) for number in model.units]
+        model.scales,
+        [len(problem.terms[number].columns) for number in model.term_indices],
     )
     W = rows.candidates[:, columns] * deviations
     y = rows.residual - rows.expected
@@ -301,7 +310,7 @@ def test_squares_beyond_the_others_are_what_is_left_where_the_others_fit_them_wi
     nothing else is in the model."""
     rows, _ = made
     problem, _ = made_problem(rows, UNITS, tau=TAU)
-    model = Model((0, 2), 0.0, np.array([0.3, 0.1]), 0.0)
+    model = ScoredModel((0, 2), 0.0, np.array([0.3, 0.1]), 0.0)
     coefficients = most_probable(rows, problem, model)
     gram = projected_gram(rows)
     mine = UNITS[0].columns
@@ -317,10 +326,10 @@ def test_squares_beyond_the_others_are_what_is_left_where_the_others_fit_them_wi
     assert whole == pytest.approx(squares_explained(problem, model)["a"], rel=1e-6)
     assert beyond == pytest.approx(minimize(left, np.zeros(len(others))).fun, rel=1e-6)
     assert 0.0 < beyond < whole
-    assert squares_beyond(problem, Model((0,), 0.0, np.array([0.3]), 0.0), {"a"})[0][
-        1
-    ] == pytest.approx(
-        squares_explained(problem, Model((0,), 0.0, np.array([0.3]), 0.0))["a"]
+    assert squares_beyond(problem, ScoredModel((0,), 0.0, np.array([0.3]), 0.0), {"a"})[
+        0
+    ][1] == pytest.approx(
+        squares_explained(problem, ScoredModel((0,), 0.0, np.array([0.3]), 0.0))["a"]
     )
 
 
@@ -329,7 +338,7 @@ def test_no_effect_is_fitted_under_a_wider_prior_than_it_had_before_the_measurem
 ):
     _, _, line, models = found
     best = models.models[0]
-    unit = line.problem.units[best.units[0]]
+    unit = line.problem.terms[best.term_indices[0]]
     before = line.problem.grid.root_mean_square(unit)
     sizes = [0.5 * before, before, SETTINGS.scales[-1]]
     assert before < SETTINGS.scales[-1]

@@ -22,8 +22,8 @@ from scipy.linalg import solve_triangular
 from scipy.special import chdtri, fdtri, gammaincinv
 
 from elastocal.counting import counted
-from elastocal.diagnosis.evidence import Grid
-from elastocal.diagnosis.linearize import Linearized, linearized
+from elastocal.diagnosis.candidate_design import CandidateDesign, build_candidate_design
+from elastocal.diagnosis.evidence import SizeGrid
 from elastocal.effects.conditions import at_states
 from elastocal.fitting.least_squares import LONG, ON_THE_WAY, evaluated, fit
 from elastocal.fitting.linearization import by_coordinates, linearize
@@ -44,7 +44,7 @@ from elastocal.fitting.observations import (
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
     from elastocal.diagnosis.settings import Settings
-    from elastocal.diagnosis.statistics import Products
+    from elastocal.diagnosis.statistics import CrossProducts
     from elastocal.effects.conditions import Conditions
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Case, Estimate, Model
@@ -522,7 +522,7 @@ def first_kept(case: Case, settings: Settings) -> Kept:
     few[observations.state[measured_in(observations, measurements, pulling)]] = False
     some = select_states(observations, few)
     about = evaluated(part.declared.model, some, part.noise, part.declared.estimate)
-    taken = improbable(linearized(about, some, candidates, settings))
+    taken = improbable(build_candidate_design(about, some, candidates, settings))
     # A repeat far from its others is in no average, and stays what the declared model
     # says of it.
     looked_at = measured_in(measurements, some, np.ones(len(some), bool))
@@ -544,7 +544,7 @@ def extreme_loads(measurements: Measurements, settings: Settings) -> np.ndarray:
     return far & (far.mean() <= settings.gross_error_share)
 
 
-def improbable(line: Linearized) -> np.ndarray:
+def improbable(line: CandidateDesign) -> np.ndarray:
     """Which observations all candidates together do not explain, ndarray of bool (M,).
 
     The whitened residual has the covariance I + X D X' + W S W', with X the declared
@@ -555,18 +555,18 @@ def improbable(line: Linearized) -> np.ndarray:
     products = line.products
     settings = line.settings
     rows = products.rows
-    count = products.declared
+    count = products.declared_count
     observed, own = rows.residual.shape
-    grid = Grid.of_settings(settings)
+    grid = SizeGrid.from_settings(settings)
     kept = np.ones(observed, bool)
     residual = rows.residual.ravel()
     size = np.sqrt(np.exp(grid.log_weights) @ grid.scales**2)
     limit = most_by_chance(observed, own, settings)
     basis, candidates = (
         part.reshape(len(residual), -1)
-        for part in (products.beside[..., :-1], rows.candidates.dense())
+        for part in (products.basis_and_residual[..., :-1], rows.candidates.dense())
     )
-    candidates -= basis @ products.projected[:, :-1]
+    candidates -= basis @ products.projections[:, :-1]
     whole = _Precision(
         (), np.tile(np.eye(own), (observed, 1, 1)), residual, residual
     ).less(basis, np.eye(count))
@@ -583,7 +583,7 @@ def improbable(line: Linearized) -> np.ndarray:
         kept[worst] = False
         some = some.without(np.arange(worst * own, (worst + 1) * own))
     if not kept.all():
-        whole = _with_pose_error(whole, some, products, line.pose_errors_rad)
+        whole = _with_pose_error(whole, some, products, line.candidate_pose_errors_rad)
     while not kept.all():
         out = np.flatnonzero(np.repeat(~kept, own))
         some = whole.without(out)
@@ -652,7 +652,10 @@ class _Precision:
 
 
 def _with_pose_error(
-    whole: _Precision, some: _Precision, products: Products, pose_errors_rad: np.ndarray
+    whole: _Precision,
+    some: _Precision,
+    products: CrossProducts,
+    pose_errors_rad: np.ndarray,
 ) -> _Precision:
     """The inverse covariance with an error common to a pose, of the size that makes
     some of the numbers most probable.
@@ -661,7 +664,7 @@ def _with_pose_error(
     """
     rows = products.rows
     jacobian = np.zeros((*rows.residual.shape, int(rows.pose.max()) + 1, products.axes))
-    for seen, part, _, _ in products.by_pose():
+    for seen, part, _, _ in products.iterate_poses():
         jacobian[np.flatnonzero(seen), :, rows.pose[seen]] = part.jacobian
     jacobian = jacobian.reshape(len(whole.residual), -1)
     of_whole = jacobian - sum(

@@ -21,15 +21,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.diagnosis.evidence import Joint
+from elastocal.diagnosis.evidence import ModelDensity
 from elastocal.diagnosis.search import (
-    UNLIKELY,
-    Model,
+    NEGLIGIBLE_LOG_WEIGHT,
     Posterior,
-    Problem,
-    solve_positive,
+    ScoredModel,
+    SearchProblem,
+    solve_positive_definite,
 )
-from elastocal.diagnosis.statistics import Statistics, normal_equations
+from elastocal.diagnosis.statistics import (
+    SufficientStatistics,
+    assemble_normal_equations,
+)
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.model import parameter_values
 from elastocal.fitting.noise import with_prior
@@ -38,7 +41,7 @@ from elastocal.fitting.normal_equations import whitening
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-    from elastocal.diagnosis.linearize import Linearized
+    from elastocal.diagnosis.candidate_design import CandidateDesign
     from elastocal.effects.protocol import Candidate
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.noise import Noise
@@ -55,13 +58,13 @@ _NOISE_SETTLED = 0.02
 _LEAST_PROBABILITY = 0.002
 
 
-def selected(linearized: Linearized, model: Model) -> Selected:
+def selected(linearized: CandidateDesign, model: ScoredModel) -> Selected:
     """What a model of the posterior is for the exact fit: without the competitor, which
     predicts nothing."""
     problem = linearized.problem
     effects = []
-    for number, scale in zip(model.units, model.scales, strict=True):
-        unit = problem.units[number]
+    for number, scale in zip(model.term_indices, model.scales, strict=True):
+        unit = problem.terms[number]
         if unit.candidate:
             size = min(scale, problem.grid.root_mean_square(unit))
             effects.append(
@@ -111,14 +114,17 @@ def fit_with_sizes(
     )
 
 
-def mean_square_left(problem: Problem, model: Model) -> float:
+def mean_square_left(problem: SearchProblem, model: ScoredModel) -> float:
     """Mean square of the whitened residual that a model leaves, by the linearised
     problem: 1 where noise accounts for it."""
     statistics = problem.statistics
-    columns, coefficients, place = problem.mode_of(model)
+    columns, coefficients, place = problem.find_mode(model)
     return float(
-        (statistics.squares[place] - statistics.along[place, columns] @ coefficients)
-        / statistics.freedom
+        (
+            statistics.residual_squares[place]
+            - statistics.score[place, columns] @ coefficients
+        )
+        / statistics.degrees_of_freedom
     )
 
 
@@ -151,7 +157,7 @@ def noise_beside(fitted: Fit, observations: Observations, pose_rad: float) -> No
 
 
 def remaining_noise(
-    problem: Problem, model: Model, taken: Noise, least: Noise
+    problem: SearchProblem, model: ScoredModel, taken: Noise, least: Noise
 ) -> Noise:
     """Noise as a model leaves it.
 
@@ -181,9 +187,9 @@ class Averaged:
 
 
 def averaged(
-    linearized: Linearized,
+    linearized: CandidateDesign,
     posterior: Posterior,
-    best: Model,
+    best: ScoredModel,
     owners: Sequence[tuple[str, str]],
 ) -> Averaged:
     """Average over the models of a posterior.
@@ -198,10 +204,12 @@ def averaged(
     # that count.
     some = problem.statistics
     base = problem.statistics.log_likelihood + problem.log_pose
-    if best.units:
+    if best.term_indices:
         density = _joint(problem, best, some, base).by_pose_error
         of_models = np.isin(some.pose_error_rad, list(sizes))
-        kept = np.flatnonzero((density > density.max() + UNLIKELY) | of_models)
+        kept = np.flatnonzero(
+            (density > density.max() + NEGLIGIBLE_LOG_WEIGHT) | of_models
+        )
         some = some.at(kept)
         base = base[kept]
     each = [
@@ -230,7 +238,7 @@ def averaged(
     least = np.sqrt(problem.settings.prior_share)
     of_prior = frozenset(
         (unit.candidate.key, parameter.name)
-        for unit in (problem.units[number] for number in best.units)
+        for unit in (problem.terms[number] for number in best.term_indices)
         if unit.candidate
         for parameter, size in zip(
             unit.candidate.parameters,
@@ -242,7 +250,9 @@ def averaged(
     return Averaged(shift, std_error, of_prior)
 
 
-def expected_to_help(problem: Problem, posterior: Posterior, model: Model) -> bool:
+def expected_to_help(
+    problem: SearchProblem, posterior: Posterior, model: ScoredModel
+) -> bool:
     """Whether predictions are expected to be better with a model of the posterior than
     without it, at poses like the measured.
 
@@ -262,7 +272,9 @@ def expected_to_help(problem: Problem, posterior: Posterior, model: Model) -> bo
     return bool(mine @ gram @ (2.0 * mean - mine) > problem.settings.useful * error)
 
 
-def other_predictions(problem: Problem, posterior: Posterior, model: Model) -> float:
+def other_predictions(
+    problem: SearchProblem, posterior: Posterior, model: ScoredModel
+) -> float:
     """How otherwise the models of a posterior predict than one of them: expected sum of
     squares of whitened numbers.
 
@@ -271,9 +283,9 @@ def other_predictions(problem: Problem, posterior: Posterior, model: Model) -> f
     """
     gram = problem.statistics.gram[0]
     mine = _predicted(problem, model)
-    for number in model.units:
-        if problem.units[number].candidate is None:
-            mine[problem.units[number].columns] = 0.0
+    for number in model.term_indices:
+        if problem.terms[number].candidate is None:
+            mine[problem.terms[number].columns] = 0.0
     off = [
         (probability, _predicted(problem, other) - mine)
         for other, probability in _likely(posterior, model)
@@ -283,7 +295,7 @@ def other_predictions(problem: Problem, posterior: Posterior, model: Model) -> f
     )
 
 
-def _likely(posterior: Posterior, best: Model) -> list[tuple[Model, float]]:
+def _likely(posterior: Posterior, best: ScoredModel) -> list[tuple[ScoredModel, float]]:
     """Models that count, and the best, with their probabilities."""
     pairs = zip(posterior.models, posterior.probabilities, strict=True)
     return [
@@ -293,11 +305,11 @@ def _likely(posterior: Posterior, best: Model) -> list[tuple[Model, float]]:
     ]
 
 
-def squares_explained(problem: Problem, model: Model) -> dict[str, float]:
+def squares_explained(problem: SearchProblem, model: ScoredModel) -> dict[str, float]:
     """Sum of squares of the whitened displacements that each mechanism of a model
     makes, dict of str to float."""
     mechanisms = dict.fromkeys(
-        problem.units[number].mechanism for number in model.units
+        problem.terms[number].mechanism for number in model.term_indices
     )
     return {
         mechanism: squares_beyond(problem, model, {mechanism})[0][0]
@@ -306,7 +318,7 @@ def squares_explained(problem: Problem, model: Model) -> dict[str, float]:
 
 
 def squares_beyond(
-    problem: Problem, model: Model, mechanisms: Collection[str]
+    problem: SearchProblem, model: ScoredModel, mechanisms: Collection[str]
 ) -> list[tuple[float, float]]:
     """Sum of squares of the displacements that some mechanisms of a model make, and how
     much of it the others cannot make.
@@ -317,10 +329,10 @@ def squares_beyond(
     """
     coefficients = _predicted(problem, model)
     gram = problem.statistics.gram[0]
-    columns, deviations = problem.columns_of(model.units, model.scales)
-    units = [problem.units[number] for number in model.units]
-    _, mine = problem.columns_of(
-        model.units, [unit.mechanism in mechanisms for unit in units]
+    columns, deviations = problem.scaled_columns(model.term_indices, model.scales)
+    units = [problem.terms[number] for number in model.term_indices]
+    _, mine = problem.scaled_columns(
+        model.term_indices, [unit.mechanism in mechanisms for unit in units]
     )
     found = []
     for inside in (mine, ~mine):
@@ -330,52 +342,59 @@ def squares_beyond(
         whole = float(coefficients[ours] @ made[ours])
         inner = gram[np.ix_(rest, rest)] + np.diag(deviations[~inside] ** -2.0)
         found.append(
-            (whole, whole - float(made[rest] @ solve_positive(inner, made[rest])))
+            (
+                whole,
+                whole - float(made[rest] @ solve_positive_definite(inner, made[rest])),
+            )
         )
     return found
 
 
-def _predicted(problem: Problem, model: Model) -> np.ndarray:
+def _predicted(problem: SearchProblem, model: ScoredModel) -> np.ndarray:
     """Coefficients of all columns in a model at its most probable sizes, in plausible
     sizes, ndarray (K,)."""
     coefficients = np.zeros(problem.statistics.gram.shape[1])
-    columns, mode, _ = problem.mode_of(model)
+    columns, mode, _ = problem.find_mode(model)
     coefficients[columns] = mode
     return coefficients
 
 
 def _moments(
-    linearized: Linearized,
-    model: Model,
+    linearized: CandidateDesign,
+    model: ScoredModel,
     owners: Sequence[tuple[str, str]],
-    joint: Joint,
+    joint: ModelDensity,
 ) -> dict[tuple[str, str], tuple[float, float]]:
     """Mean and variance of every parameter of one model, by owner and name; declared
     ones up to a constant in the mean."""
     products = linearized.products
     problem = linearized.problem
     declared, (columns, deviations) = (
-        products.declared,
-        problem.columns_of(model.units, model.scales),
+        products.declared_count,
+        problem.scaled_columns(model.term_indices, model.scales),
     )
-    equations = normal_equations(products, model.pose_error_rad, columns)
+    equations = assemble_normal_equations(products, model.pose_error_rad, columns)
     information = equations[:-1, :-1]
     places = np.arange(declared, len(equations) - 1)
     information[places, places] += deviations**-2.0
     # Declared parameters from the orthonormal basis, less what the candidates' columns
     # have in it.
-    back = products.into_basis @ np.concatenate(
-        [np.eye(declared), -products.projected[:, columns]], axis=1
+    back = products.basis_transform @ np.concatenate(
+        [np.eye(declared), -products.projections[:, columns]], axis=1
     )
-    solved = solve_positive(information, np.column_stack([back.T, equations[:-1, -1]]))
+    solved = solve_positive_definite(
+        information, np.column_stack([back.T, equations[:-1, -1]])
+    )
     variance = max(mean_square_left(problem, model), 1.0) * (
         back * solved[:, :-1].T
     ).sum(axis=1)
     found = dict(
         zip(owners, zip(back @ solved[:, -1], variance, strict=True), strict=True)
     )
-    for number, (value, spread) in zip(model.units, joint.moments(), strict=True):
-        unit = problem.units[number]
+    for number, (value, spread) in zip(
+        model.term_indices, joint.moments(), strict=True
+    ):
+        unit = problem.terms[number]
         if unit.candidate:
             names = [
                 (unit.candidate.key, parameter.name)
@@ -392,10 +411,13 @@ def _moments(
 
 
 def _joint(
-    problem: Problem, model: Model, statistics: Statistics, base: np.ndarray
-) -> Joint:
+    problem: SearchProblem,
+    model: ScoredModel,
+    statistics: SufficientStatistics,
+    base: np.ndarray,
+) -> ModelDensity:
     """Density under a model, at some sizes of the pose error with what each contributes
     alone."""
     places = np.searchsorted(problem.grid.scales, model.scales)
-    units = [problem.units[number] for number in model.units]
-    return Joint(statistics, units, problem.grid, base, places)
+    units = [problem.terms[number] for number in model.term_indices]
+    return ModelDensity(statistics, units, problem.grid, base, places)

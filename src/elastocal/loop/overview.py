@@ -17,14 +17,14 @@ from elastocal.campaigns.campaign import columns_of
 from elastocal.campaigns.holdout import measured_poses
 from elastocal.counting import counted, first_names
 from elastocal.data_checks.faults import controller_warnings, faults
+from elastocal.diagnosis.candidate_design import build_candidate_design
 from elastocal.diagnosis.gross_errors import (
     entries_of,
     first_kept,
     gross_errors,
     warnings_of,
 )
-from elastocal.diagnosis.linearize import linearized
-from elastocal.diagnosis.misplaced import misplaced
+from elastocal.diagnosis.misplaced import find_misplaced_frames
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.model import case_from, joint_compliances
@@ -89,7 +89,7 @@ def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
         replace(errors, gross=~part.kept), whole.campaign, held_out=False
     )
     case, campaign, declared = part.case, part.case.campaign, part.to_all(part.declared)
-    untestable = linearized(
+    untestable = build_candidate_design(
         part.declared, part.searched, [*case.candidates.values()], settings
     ).untestable
     testable = len(case.candidates) - len(untestable)
@@ -107,7 +107,8 @@ def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
     attention = [fault.detail for fault in found]
     if diagnosable and not negative:
         attention += [
-            each["sentence"] for each in misplaced(_with_base(declared, case), campaign)
+            each["sentence"]
+            for each in find_misplaced_frames(_with_base(declared, case), campaign)
         ]
     attention += [*controller_warnings(campaign), *part.warnings]
     if negative:

@@ -20,7 +20,7 @@ from elastocal.campaigns.campaign import columns_of
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge, residual_blocks
-from elastocal.diagnosis.misplaced import misplaced
+from elastocal.diagnosis.misplaced import find_misplaced_frames
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.model import Case, case_from
 from elastocal.io.json_files import read_json, write_json
@@ -149,7 +149,7 @@ def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     if not data_at_fault(verdict.document):
         found = calibrated_by(diagnosis, verdict.held_out, verdict.delivered)
         stated |= _accuracy(found) | {
-            "misplaced": misplaced(diagnosis.final, diagnosis.case.campaign)
+            "misplaced": find_misplaced_frames(diagnosis.final, diagnosis.case.campaign)
         }
         if found.remainder is not None:
             stated["physics"] = _accuracy(
