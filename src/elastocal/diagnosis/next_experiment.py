@@ -285,7 +285,9 @@ def propose_experiment(
     model = diagnosis.final.model
     states = diagnosis.case.observations.states
     models = [evidence.posterior.models[each.model] for each in kept]
-    factor = float(np.sqrt(max(mean_square_left(linearized.problem, models[0]), 1.0)))
+    factor = float(
+        np.sqrt(max(predict_reduced_chi_square(linearized.problem, models[0]), 1.0))
+    )
     columns = np.unique(
         np.concatenate(
             [
