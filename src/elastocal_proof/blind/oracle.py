@@ -24,13 +24,13 @@ from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from elastocal.diagnosis.linearize import linearized
 from scipy.stats import chi2
 
 from elastocal.diagnosis.candidate_design import build_candidate_design
 from elastocal.diagnosis.diagnose import Step
 from elastocal.diagnosis.evidence import log_sum_exp
 from elastocal.diagnosis.judge import compare_held_out_errors
-from elastocal.diagnosis.linearize import linearized
 from elastocal.diagnosis.refit import fit_selected_effects
 from elastocal.diagnosis.search import initial_screening
 from elastocal.diagnosis.settings import Settings
