@@ -39,8 +39,8 @@ INTERFACE = {
     "Use a calibrated robot": {
         "elastocal.application.calibrated": (
             "calibrate_by_fit",
-            "forward",
-            "pose_sensitivities",
+            "predict_poses",
+            "compute_pose_sensitivities",
         ),
         "elastocal.application.accuracy": ("predict_errors",),
         "elastocal.application.compensation": ("find_joint_targets",),

@@ -275,7 +275,7 @@ def _write(
     are empty, and its pages; its rows."""
     import yaml
 
-    from elastocal.application.planning.plan import campaign_document, sheet
+    from elastocal.application.planning.plan import build_sheet, campaign_document
     from elastocal.campaigns.campaign import DOCUMENT
     from elastocal.campaigns.measurements import CSV
     from elastocal.figures.arms import draw_plan, draw_poses
@@ -287,7 +287,7 @@ def _write(
     from elastocal.report.plan_pages import plan_facts
     from elastocal.report.typesetting import compile_document
 
-    table = sheet(survey, found)
+    table = build_sheet(survey, found)
     names = (ROBOT, CSV, SHEET, PICTURE, DOCUMENT)
     with (
         write_together(folder, names) as partial,

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
-from elastocal.application.planning.cell import link_points
+from elastocal.application.planning.cell import sample_links
 from elastocal.figures.style import (
     PALETTE,
     STAGES,
@@ -96,7 +96,7 @@ def draw_arm_with_errors(
         [table[f"q{joint}"][seen] for joint in range(1, robot.joints + 1)]
     )
     at = np.column_stack([table[axis][seen] for axis in "xyz"])
-    arms = link_points(robot, robot.model_angles(np.unique(angles, axis=0))).transpose(
+    arms = sample_links(robot, robot.model_angles(np.unique(angles, axis=0))).transpose(
         1, 0, 2
     )
     # One arm in full, the one that reaches farthest to a side; the others as thin
@@ -160,7 +160,7 @@ def _view(
         if not len(some.joint_angles):
             continue
         angles = robot.model_angles(some.joint_angles)
-        for arm in link_points(robot, angles).transpose(1, 0, 2):
+        for arm in sample_links(robot, angles).transpose(1, 0, 2):
             axis.plot(arm[:, across], arm[:, up], color="#c8c8c8", lw=0.6, zorder=1)
         at, _ = poses(robot.chain, angles, robot.chain.end_effector)
         axis.plot(
@@ -204,7 +204,7 @@ def _view(
     axis.set_aspect("equal", adjustable="box")
     # Boxes may stand for a floor without an end: the arm says what is shown.
     reach = max(
-        np.abs(link_points(robot, robot.model_angles(plan.fitted.joint_angles))).max(),
+        np.abs(sample_links(robot, robot.model_angles(plan.fitted.joint_angles))).max(),
         0.1,
     )
     shown = (
@@ -243,7 +243,7 @@ def draw_poses(robot: Robot, plan: Plan) -> list[Figure]:
         np.concatenate([plan.fitted.joint_angles, plan.held_out.joint_angles])
     )
     force = np.concatenate([plan.fitted.force, plan.held_out.force])
-    links = link_points(robot, angles).transpose(1, 0, 2)
+    links = sample_links(robot, angles).transpose(1, 0, 2)
     arms = project_view(links)
     pull = project_view(force / max(np.linalg.norm(force, axis=1).max(), 1e-9))
     middle = (arms.max((0, 1)) + arms.min((0, 1))) / 2

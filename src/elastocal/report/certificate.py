@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elastocal.application.accuracy import Accuracy, accuracy_sentence
+from elastocal.application.accuracy import Accuracy, format_accuracy
 from elastocal.counting import counted
 from elastocal.report import words as say
 from elastocal.report.loop_facts import title_of
@@ -38,7 +38,7 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
     ready to print, lists for tables.
     """
     spoken = {
-        "accuracy_sentence": accuracy_sentence(Accuracy(**document["accuracy"])),
+        "accuracy_sentence": format_accuracy(Accuracy(**document["accuracy"])),
         "title": title_of(document),
     }
     stated = render_sentences(

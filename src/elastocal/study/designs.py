@@ -14,8 +14,8 @@ import numpy as np
 from elastocal.application.planning.designs import (
     CRITERIA,
     Criterion,
+    build_criterion,
     choose_greedily,
-    criterion,
     exchange_candidates,
 )
 from elastocal.io.storage import Column
@@ -112,7 +112,7 @@ def evaluate_designs(
         # The form is of the squared error in all compliances and 1.
         rules = {"I": Criterion(made.form[np.ix_(of, of)] * np.outer(scale, scale))}
         rules |= {
-            kind: criterion(kind, rows[:, :3]) for kind in CRITERIA if kind != "I"
+            kind: build_criterion(kind, rows[:, :3]) for kind in CRITERIA if kind != "I"
         }
         found: list[tuple[str, int, Sequence[np.ndarray] | np.ndarray | list[int]]] = []
         for kind, rule in rules.items():

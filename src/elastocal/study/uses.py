@@ -28,8 +28,8 @@ import numpy as np
 
 from elastocal.application.inverse_kinematics import (
     SOLVED_M,
-    along_path,
     find_beyond_limits,
+    solve_path,
 )
 from elastocal.study.evaluation import REPLICATES, make_metrics_schema
 from elastocal.study.in_memory import define_study_step
@@ -170,7 +170,7 @@ def make_milling_path(
 def _find_loaded(
     robot: Robot, position: np.ndarray, force: np.ndarray
 ) -> Experiments | None:
-    angles, left = along_path(
+    angles, left = solve_path(
         robot, position, np.broadcast_to(_DOWN, (len(position), 3, 3))
     )
     if (left > SOLVED_M).any() or find_beyond_limits(robot, angles).any():
