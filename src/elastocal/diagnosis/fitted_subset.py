@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.diagnosis.candidate_design import build_candidate_design
 from elastocal.diagnosis.gross_errors import find_gross_errors
 from elastocal.diagnosis.initial_outliers import find_unexplained_observations
 from elastocal.diagnosis.linearize import linearized

@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from elastocal.diagnosis.evidence import Grid
+from elastocal.diagnosis.candidate_design import CandidateDesign
+from elastocal.diagnosis.evidence import SizeGrid
 from elastocal.diagnosis.gross_errors import compute_critical_distance, flag_outliers
 
 if TYPE_CHECKING:

@@ -14,17 +14,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.campaigns.campaign import columns_of
+from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.holdout import measured_poses
 from elastocal.counting import counted, first_names
 from elastocal.data_checks.faults import controller_warnings, faults
+from elastocal.diagnosis.candidate_design import build_candidate_design
 from elastocal.diagnosis.fitted_subset import select_initial_subset
 from elastocal.diagnosis.gross_errors import (
     describe_gross_errors,
     find_gross_errors,
     format_gross_error_warnings,
 )
-from elastocal.diagnosis.linearize import linearized
-from elastocal.diagnosis.misplaced import misplaced
+from elastocal.diagnosis.misplaced import find_misplaced_frames
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.model import case_from, joint_compliances
@@ -72,13 +73,15 @@ class Overview:
 
 
 def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
-    """Look through a campaign; `folder`, `robots_folder` as in `reading.read_campaign`.
+    """Look through a campaign; `folder`, `robots_folder` as in `read_campaign_folder`.
     Raises `InputError`.
 
     What is misplaced is not looked for where a compliance comes out negative, for then
     something is missing in the model.
     """
-    descriptions, training, held_out = load_campaign(folder, robots_folder)
+    descriptions, training, held_out = load_campaign(
+        read_campaign_folder(folder, robots_folder)
+    )
     whole = case_from(descriptions, columns_of(training))
     settings = Settings()
     part = select_initial_subset(whole, settings)
@@ -93,7 +96,7 @@ def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
         part.case.campaign,
         part.fit_to_all(part.declared),
     )
-    untestable = linearized(
+    untestable = build_candidate_design(
         part.declared, part.search_sample, [*case.candidates.values()], settings
     ).untestable
     testable = len(case.candidates) - len(untestable)
@@ -111,7 +114,8 @@ def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
     attention = [fault.detail for fault in found]
     if diagnosable and not negative:
         attention += [
-            each["sentence"] for each in misplaced(_with_base(declared, case), campaign)
+            each["sentence"]
+            for each in find_misplaced_frames(_with_base(declared, case), campaign)
         ]
     attention += [*controller_warnings(campaign), *part.warnings]
     if negative:
