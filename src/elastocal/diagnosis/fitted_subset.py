@@ -10,7 +10,6 @@ import numpy as np
 from elastocal.diagnosis.candidate_design import build_candidate_design
 from elastocal.diagnosis.gross_errors import find_gross_errors
 from elastocal.diagnosis.initial_outliers import find_unexplained_observations
-from elastocal.diagnosis.linearize import linearized
 from elastocal.fitting.least_squares import LONG, ON_THE_WAY, SETTLED, evaluated, fit
 from elastocal.fitting.noise import estimated_noise, fit_declared
 from elastocal.fitting.observations import (
@@ -158,7 +157,7 @@ def select_initial_subset(case: Case, settings: Settings) -> FittedSubset:
     )
     candidates = list(case.candidates.values())
     unexplained = find_unexplained_observations(
-        linearized(reference, sample, candidates, settings)
+        build_candidate_design(reference, sample, candidates, settings)
     )
     # A repeat far from the others is in no average. The declared model alone has judged
     # it.

@@ -21,12 +21,12 @@ from elastocal.diagnosis.evidence import SizeGrid
 from elastocal.diagnosis.gross_errors import compute_critical_distance, flag_outliers
 
 if TYPE_CHECKING:
-    from elastocal.diagnosis.linearize import Linearized
+    from elastocal.diagnosis.candidate_design import CandidateDesign
     from elastocal.diagnosis.settings import Settings
-    from elastocal.diagnosis.statistics import Products
+    from elastocal.diagnosis.statistics import CrossProducts
 
 
-def find_unexplained_observations(design: Linearized) -> np.ndarray:
+def find_unexplained_observations(design: CandidateDesign) -> np.ndarray:
     """Find the observations that all candidates together do not explain.
 
     The worst observation is deleted until the others agree with each other. Then
@@ -44,7 +44,7 @@ def find_unexplained_observations(design: Linearized) -> np.ndarray:
     if kept.all():
         return ~kept
     precision = _add_pose_error(
-        precision, reduced, design.products, design.pose_errors_rad
+        precision, reduced, design.products, design.candidate_pose_errors_rad
     )
     return ~_readmit_predicted(precision, kept, settings)
 
@@ -118,7 +118,7 @@ class _Precision:
         return np.where(kept, np.sqrt(np.maximum(squares, 0.0)), 0.0)
 
 
-def _compute_precision(design: Linearized) -> _Precision:
+def _compute_precision(design: CandidateDesign) -> _Precision:
     """Inverse covariance of the whitened residuals under all candidates at once.
 
     The covariance is I + X D X' + W S W', with X the sensitivities to the declared
@@ -128,11 +128,11 @@ def _compute_precision(design: Linearized) -> _Precision:
     products = design.products
     rows = products.rows
     declared = products.declared
-    grid = Grid.of_settings(design.settings)
+    grid = Grid.from_settings(design.settings)
     size = np.sqrt(np.exp(grid.log_weights) @ grid.scales**2)
     basis = products.beside[..., :-1].reshape(rows.residual.size, -1)
     candidates = rows.candidates.dense().reshape(rows.residual.size, -1)
-    candidates -= basis @ products.projected[:, :-1]
+    candidates -= basis @ products.projections[:, :-1]
     gram = products.gram[declared:-1, declared:-1]
     precision = _Precision.identity(rows.residual).subtract(basis, np.eye(declared))
     return precision.subtract(
@@ -202,7 +202,7 @@ def _compute_distances_from_kept(precision: _Precision, kept: np.ndarray) -> np.
 def _add_pose_error(
     precision: _Precision,
     reduced: _Precision,
-    products: Products,
+    products: CrossProducts,
     pose_errors_rad: np.ndarray,
 ) -> _Precision:
     """Add the joint error that the observations of a pose have in common.
@@ -231,12 +231,12 @@ def _add_pose_error(
     return precision.subtract(size * weighted, inner)
 
 
-def _build_pose_jacobian(products: Products) -> np.ndarray:
+def _build_pose_jacobian(products: CrossProducts) -> np.ndarray:
     """Jacobian with respect to the joint errors of all poses along their principal
     axes, (n, poses * axes)."""
     rows = products.rows
     poses = int(rows.pose.max()) + 1
     jacobian = np.zeros((*rows.residual.shape, poses, products.axes))
-    for in_batch, batch, _, _ in products.by_pose():
+    for in_batch, batch, _, _ in products.iterate_poses():
         jacobian[np.flatnonzero(in_batch), :, rows.pose[in_batch]] = batch.jacobian
     return jacobian.reshape(rows.residual.size, -1)
