@@ -27,7 +27,7 @@ def directions(declared, observations, candidates):
     line = linearize(
         declared.model, declared.estimate, observations, declared.conditions
     )
-    left = declared.whiten(line.sensitivities).reshape(line.residual.size, -1)
+    left = declared.whitened(line.sensitivities).reshape(line.residual.size, -1)
     basis = np.linalg.qr(left / np.linalg.norm(left, axis=0))[0]
     found = []
     for candidate in candidates:
@@ -37,7 +37,7 @@ def directions(declared, observations, candidates):
             line.coordinate_jacobian,
             observations.state,
         )
-        columns = declared.whiten(made).reshape(line.residual.size, -1)
+        columns = declared.whitened(made).reshape(line.residual.size, -1)
         columns = columns / np.linalg.norm(columns, axis=0)
         for _ in range(2):
             columns = columns - basis @ (basis.T @ columns)

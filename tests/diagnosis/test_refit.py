@@ -67,7 +67,7 @@ def test_priors_arrive_in_the_fit(found):
     about = linearize(
         final.model, final.estimate, campaign.observations, final.conditions
     )
-    left = final.whiten(about.sensitivities).reshape(-1, len(final.parameters))
+    left = final.whitened(about.sensitivities).reshape(-1, len(final.parameters))
     precision = np.array(
         [0.0 if p.prior_std is None else p.prior_std**-2 for _, p in final.parameters]
     )

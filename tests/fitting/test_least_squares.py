@@ -523,5 +523,5 @@ def test_a_fit_of_more_states_than_are_kept_is_the_same_and_keeps_no_jacobian(
     for each in (kept, found):
         ((_, plain, white),) = each.sensitivities(seen)
         np.testing.assert_allclose(
-            white, each.whiten(plain), rtol=0, atol=1e-5 * np.abs(white).max()
+            white, each.whitened(plain), rtol=0, atol=1e-5 * np.abs(white).max()
         )

@@ -47,7 +47,7 @@ def test_chance_is_called_repeatable_no_more_often_than_stated(smooth):
     )
     for seed in range(30):
         noise = draws.normal(0.0, NOISE_M, fitted.residual.shape)
-        step = fitted.covariance @ np.einsum("mrp,mr->p", white, fitted.whiten(noise))
+        step = fitted.covariance @ np.einsum("mrp,mr->p", white, fitted.whitened(noise))
         found = repeatable_part(
             replace(fitted, residual=noise - sensitivities @ step),
             case.observations,

@@ -100,7 +100,7 @@ def test_variances_are_those_without_the_measurements_of_the_pose(rows, fanuc):
         fitted, own, fitted.model, fitted.estimate, other
     )
     line = linearize(fitted.model, fitted.estimate, own, fitted.conditions)
-    white = fitted.whiten(line.sensitivities)
+    white = fitted.whitened(line.sensitivities)
     prior = [p.plausible**-2.0 for _, p in fitted.parameters]
     for pose in range(9):
         rest = white[own.cluster != pose]

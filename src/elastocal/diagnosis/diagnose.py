@@ -264,14 +264,21 @@ def diagnose(
                 kept.noise, found.linearized.pose_std_error_rad
             )
         )
-    left_out = describe_gross_errors(errors, whole, held_out=False)
-    document = _document(case, noise, steps, final, found, known, settings, warnings)
-    document |= {
-        "contradictions": contradicting,
-        "gross_errors": [asdict(error) for error in left_out],
-        "repeatable": repeatable and asdict(repeatable),
-    }
-    document["warnings"] += format_gross_error_warnings(left_out)
+    document = state_training_verdict(
+        TrainingResult(
+            case=case,
+            noise=noise,
+            steps=tuple(steps),
+            full_model=final,
+            evidence=found,
+            faults=known,
+            warnings=tuple(warnings),
+            contradictions=tuple(contradicting),
+            repeatable=repeatable,
+            gross_errors=tuple(describe_gross_errors(errors, whole, held_out=False)),
+        ),
+        settings,
+    )
     return Diagnosis(
         case, tuple(steps), found, document, whole.measurements.select(errors.gross)
     )

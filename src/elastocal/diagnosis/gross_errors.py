@@ -28,6 +28,7 @@ from elastocal.diagnosis.studentized_residuals import (
     chi_quantile,
     examine_residuals,
 )
+from elastocal.verdict import GrossError
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
@@ -70,39 +71,6 @@ class OutlierTest:
         return cls(
             np.zeros((count, components)), np.zeros(count), np.zeros(count, bool)
         )
-
-
-@dataclass(frozen=True)
-class GrossError:
-    """A gross error as verdict.json states it.
-
-    Attributes
-    ----------
-    rows
-        Number of its row in the file.
-    session, pose, load, target
-        Which measurement it is.
-    held_out
-        Whether it is a held-out row.
-    distance_m, turn_rad
-        Length of the position residual and of the orientation residual, which is None
-        if no orientation is measured.
-    standard_deviations
-        Distance from the prediction by the other rows.
-    detail
-        A sentence for the user.
-    """
-
-    rows: list[int]
-    session: int
-    pose: int
-    load: int
-    target: str
-    held_out: bool
-    distance_m: float
-    turn_rad: float | None
-    standard_deviations: float
-    detail: str
 
 
 def flag_outliers(
@@ -285,7 +253,7 @@ def describe_gross_errors(
         turn_rad = float(np.linalg.norm(residual[3:])) if len(residual) > 3 else None
         gross_errors.append(
             GrossError(
-                rows=[int(measurements.row[index])],
+                rows=(int(measurements.row[index]),),
                 session=int(measurements.session[index]),
                 pose=int(measurements.pose[index]),
                 load=int(measurements.load[index]),

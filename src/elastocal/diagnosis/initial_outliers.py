@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from elastocal.diagnosis.candidate_design import CandidateDesign
 from elastocal.diagnosis.evidence import SizeGrid
 from elastocal.diagnosis.gross_errors import compute_critical_distance, flag_outliers
 
@@ -127,10 +126,10 @@ def _compute_precision(design: CandidateDesign) -> _Precision:
     """
     products = design.products
     rows = products.rows
-    declared = products.declared
-    grid = Grid.from_settings(design.settings)
+    declared = products.declared_count
+    grid = SizeGrid.from_settings(design.settings)
     size = np.sqrt(np.exp(grid.log_weights) @ grid.scales**2)
-    basis = products.beside[..., :-1].reshape(rows.residual.size, -1)
+    basis = products.basis_and_residual[..., :-1].reshape(rows.residual.size, -1)
     candidates = rows.candidates.dense().reshape(rows.residual.size, -1)
     candidates -= basis @ products.projections[:, :-1]
     gram = products.gram[declared:-1, declared:-1]

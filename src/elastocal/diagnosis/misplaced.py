@@ -80,7 +80,7 @@ def find_misplaced_frames(fitted: Fit, campaign: Campaign) -> list[dict[str, Any
     wrong_m = max(_WRONG_M, float(np.abs(values[shifts]).max()))
     # What the measurements say, without the prior of the fit, and no more surely than
     # the model explains them.
-    off = fitted.whiten(fitted.residual)
+    off = fitted.whitened(fitted.residual)
     misfit = max(1.0, float((off**2).sum()) / max(off.size - len(free), 1))
     precision = np.linalg.inv(fitted.covariance[np.ix_(free, free)])
     weighted = precision @ values

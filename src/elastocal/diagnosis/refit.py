@@ -119,7 +119,7 @@ def predict_reduced_chi_square(problem: SearchProblem, model: ScoredModel) -> fl
 def compute_reduced_chi_square(fitted: Fit) -> float:
     """The same of an exact fit, over all that is left free, its priors included: 1
     where it left the noise that it has."""
-    white = fitted.whiten(fitted.residual)
+    white = fitted.whitened(fitted.residual)
     squares = (white**2).sum() + (
         (parameter_values(fitted.model, fitted.estimate) / fitted.prior_std) ** 2
     ).sum()
@@ -132,7 +132,7 @@ def limit_pose_error(fitted: Fit, observations: Observations, pose_rad: float) -
     """Noise of measurements that a fit leaves if those of a pose have no more in
     common: by it the mean square stays."""
     noise = replace(fitted.noise, pose_rad=min(fitted.noise.pose_rad, pose_rad))
-    usual = (fitted.whiten(fitted.residual) ** 2).mean()
+    usual = (fitted.whitened(fitted.residual) ** 2).mean()
     residual = fitted.residual * np.sqrt(fitted.weights)[:, None]
     for _ in range(_NOISE_STEPS if fitted.joint_jacobian is not None else 0):
         over = (

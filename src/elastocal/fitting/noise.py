@@ -492,7 +492,9 @@ def most_probable(wide: Fit) -> tuple[float, float]:
     shift = axes.T @ (parameter_values(wide.model, wide.estimate)[mine] / prior)
     seen = 1.0 / left - 1.0
     # Squares of the whitened residual were all of it zero, beside frames and targets.
-    squares = (wide.whiten(wide.residual) ** 2).sum() + ((seen + 2.0) * shift**2).sum()
+    squares = (wide.whitened(wide.residual) ** 2).sum() + (
+        (seen + 2.0) * shift**2
+    ).sum()
     freedom = max(
         wide.weights.sum() * wide.residual.shape[1] - (~wide.held).sum() + len(mine),
         1.0,

@@ -112,7 +112,7 @@ def repeatable_part(
     ]
     followed = np.zeros((count, parameters))
     leverage = np.zeros(count)
-    white_residual = fitted.whiten(fitted.residual)
+    white_residual = fitted.whitened(fitted.residual)
     weight = np.sqrt(fitted.weights)[:, None, None]
     for seen, plain, white in fitted.sensitivities(some):
         mine = group[seen]

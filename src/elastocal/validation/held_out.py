@@ -305,7 +305,7 @@ def left_out_squares(fitted: Fit, observations: Observations) -> np.ndarray:
 
     By the step alone, in closed form, with what is held as in the fit.
     """
-    white = fitted.whiten(fitted.residual)
+    white = fitted.whitened(fitted.residual)
     states = observations.states
     found = []
     configuration = configurations(states.joint_angles, state_clusters(states))[
