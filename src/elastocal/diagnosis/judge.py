@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +22,7 @@ from elastocal.diagnosis.studentized_residuals import estimate_prediction_uncert
 from elastocal.fitting.model import Case, conditions, measured_in_base, residuals
 from elastocal.fitting.noise import noise_from
 from elastocal.fitting.observations import single_observations, state_clusters
+from elastocal.io.typed_json import to_document
 from elastocal.random_streams import stream
 from elastocal.remainder.corrected import Corrected, corrected, remainder_facts
 from elastocal.validation import held_out as figures
@@ -118,7 +119,7 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
         ],
         "heldout": heldout,
         "remainder": remainder,
-        "gross_errors": [*found["gross_errors"], *map(asdict, left_out)],
+        "gross_errors": [*found["gross_errors"], *map(to_document, left_out)],
         "warnings": [
             *found["warnings"],
             *format_gross_error_warnings(left_out),
