@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING
 from elastocal.campaigns import reading
 from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, DOCUMENT, columns_of
 from elastocal.campaigns.holdout import split
-from elastocal.effects.catalogue import effects
+from elastocal.effects.catalogue import list_effects
+from elastocal.errors import InputError
 from elastocal.io.documents import read_document
 from elastocal.io.json_files import write_json
 from elastocal.io.origin import provenance
+from elastocal.io.plugins import REGRESSIONS, plugin_names
 from elastocal.io.storage import write_table
 from elastocal.loop.schemas import measurements
 
@@ -20,6 +22,17 @@ if TYPE_CHECKING:
     from typing import Any
 
     from elastocal.campaigns.campaign import Campaign, Measurements
+
+# What `remainder` of campaign.yaml may be: the choices and the names of this package's
+# regressions, see `remainder.regressions.REGRESSIONS`.
+REMAINDERS = (
+    "auto",
+    "none",
+    "extra_trees",
+    "gaussian_process",
+    "ridge_harmonics",
+    "two_joints",
+)
 
 
 def read_campaign(job: Any) -> None:
@@ -51,7 +64,7 @@ def load_campaign(
     descriptions, campaign = described_campaign(folder, robots_folder)
     training, held_out = split(campaign)
     test = None
-    other = reading.held_out_campaign(campaign, folder, robots_folder, effects())
+    other = reading.held_out_campaign(campaign, folder, robots_folder, list_effects())
     if other is not None:
         test, _ = described_campaign(
             f"{folder}/{campaign.holdout['campaign']}", robots_folder
@@ -65,8 +78,9 @@ def described_campaign(
 ) -> tuple[dict[str, Any], Campaign]:
     """A campaign as `load_campaign` reads it, as a whole and without the campaign that
     holds the test."""
-    campaign = reading.read_campaign(folder, robots_folder, effects())
+    campaign = reading.read_campaign(folder, robots_folder, list_effects())
     document, robot_path = reading.read_descriptions(folder, robots_folder)
+    _check_remainder(document.get("remainder", "auto"), f"{folder}/{DOCUMENT}")
     # What a campaign may leave out gets its default here, so that no later step has to
     # know what its absence means.
     complete = {
@@ -80,3 +94,11 @@ def described_campaign(
         "campaign": complete,
         "robot": read_document(robot_path),
     }, campaign
+
+
+def _check_remainder(name: str, source: str) -> None:
+    """Refuse a regression that neither this package nor a plug-in has."""
+    # Names alone: reading a campaign must not load the regressions themselves.
+    allowed = [*REMAINDERS, *plugin_names(REGRESSIONS)]
+    if name not in allowed:
+        raise InputError(source, "remainder", repr(name), ", ".join(allowed))
