@@ -280,15 +280,20 @@ def sinking_foot(own, sites):
 '''
 
 
+def clear_catalogue():
+    catalogue.list_effects.cache_clear()
+    catalogue.list_bundled_effects.cache_clear()
+
+
 @pytest.fixture
 def one_more_module(tmp_path, monkeypatch):
     (tmp_path / "anything.py").write_text(NEW)
     monkeypatch.setattr(
         elastocal.effects, "__path__", [*elastocal.effects.__path__, str(tmp_path)]
     )
-    catalogue.list_bundled_effects.cache_clear()
+    clear_catalogue()
     yield
-    catalogue.list_bundled_effects.cache_clear()
+    clear_catalogue()
     sys.modules.pop("elastocal.effects.anything", None)
     vars(elastocal.effects).pop("anything", None)
 
