@@ -10,10 +10,10 @@ from made_folders import PLAN, made_folder, made_table
 from scipy.stats import binom, chi2
 
 from elastocal.diagnosis.gross_errors import (
-    beyond_chance,
     entries_of,
     first_kept,
     fitted_to,
+    flag_outliers,
     gross_errors,
 )
 from elastocal.diagnosis.settings import Settings
@@ -49,7 +49,7 @@ def test_rows_stand_out_by_chance_as_often_as_the_settings_say():
     draws = np.random.default_rng(0)
     distance = np.sqrt(draws.chisquare(3, (count, rows)))
     alarms = sum(
-        beyond_chance(each, 3, np.ones(rows, bool), SETTINGS)[1].any()
+        flag_outliers(each, 3, np.ones(rows, bool), SETTINGS)[1].any()
         for each in distance
     )
     # A rate twice that of the settings would exceed this in all but 1e-6 of such tests.
@@ -58,20 +58,20 @@ def test_rows_stand_out_by_chance_as_often_as_the_settings_say():
 
 def test_a_model_that_does_not_fit_makes_no_row_stand_out():
     distance = 30.0 * np.sqrt(np.random.default_rng(1).chisquare(3, 60))
-    scaled, gross = beyond_chance(distance, 3, np.ones(60, bool), SETTINGS)
+    scaled, gross = flag_outliers(distance, 3, np.ones(60, bool), SETTINGS)
     assert not gross.any() and np.median(scaled) == pytest.approx(
         np.sqrt(chi2.median(3)), rel=0.2
     )
     distance[:3] *= 20.0
     assert np.flatnonzero(
-        beyond_chance(distance, 3, np.ones(60, bool), SETTINGS)[1]
+        flag_outliers(distance, 3, np.ones(60, bool), SETTINGS)[1]
     ).tolist() == [0, 1, 2]
 
 
 def test_where_too_many_rows_stand_out_none_is_a_gross_error():
     distance = np.ones(40)
     distance[:9] = 1e3
-    assert not beyond_chance(distance, 3, np.ones(40, bool), SETTINGS)[1].any()
+    assert not flag_outliers(distance, 3, np.ones(40, bool), SETTINGS)[1].any()
 
 
 def test_sentences_say_what_a_row_reads(cases, diagnosis):

@@ -13,8 +13,8 @@ from elastocal.data_checks.faults import compliance_warnings, faults
 from elastocal.data_checks.protocol import Fault
 from elastocal.diagnosis import refit, verdict
 from elastocal.diagnosis.gross_errors import (
-    Deviations,
     Kept,
+    OutlierTest,
     entries_of,
     first_kept,
     fitted_to,
@@ -121,7 +121,7 @@ def diagnose(
     start = None
     most_pose_error_rad = np.inf
     measurements = case.campaign.measurements
-    errors = Deviations.none(len(part.kept), case.model.rows)
+    errors = OutlierTest.none(len(part.kept), case.model.rows)
     good = np.zeros(len(part.kept), bool)
     for number in range(0 if known else settings.gross_error_rounds):
         if not found:

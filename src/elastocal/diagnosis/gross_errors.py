@@ -71,7 +71,7 @@ _MOST_NAMED = 10
 
 
 @dataclass(frozen=True)
-class Deviations:
+class OutlierTest:
     """Rows beside a model.
 
     `residual` (N, rows): m and rad, base axes. `distance` (N,): from what the other
@@ -83,13 +83,13 @@ class Deviations:
     gross: np.ndarray
 
     @classmethod
-    def none(cls, count: int, rows: int) -> Deviations:
+    def none(cls, count: int, rows: int) -> OutlierTest:
         """Of rows that nothing is said of."""
         return cls(np.zeros((count, rows)), np.zeros(count), np.zeros(count, bool))
 
 
 @dataclass(frozen=True)
-class Yardstick:
+class PredictionUncertainty:
     """What rows are judged by: noise of one row, and covariance (P, P) of the
     parameters under it, None where negligible."""
 
@@ -167,14 +167,14 @@ class _Beside:
             )
         return cls(residual, far, sample, closely, parts, noise)
 
-    def yardstick(self, fitted: Fit) -> Yardstick:
+    def yardstick(self, fitted: Fit) -> PredictionUncertainty:
         """As `yardstick_of`, by the sample."""
         free = ~fitted.held
         mine = self.sample[self.closely]
         rows = fitted.model.rows
         negligible = any(by is None for _, by, _, _ in self.parts) or not free.any()
         sizes = np.array([p.plausible for _, p in fitted.parameters])[free]
-        best = (np.inf, Yardstick(self.noise, None))
+        best = (np.inf, PredictionUncertainty(self.noise, None))
         for share in _POSE_SHARES if fitted.noise.pose_rad else (0.0,):
             covariance = None
             white = self._white(share * fitted.noise.pose_rad)
@@ -204,13 +204,15 @@ class _Beside:
             spread = volume + rows * np.log(
                 max(np.median(distance) / np.sqrt(2 * gammaincinv(rows / 2, 0.5)), 1.0)
             )
-            found = Yardstick(
+            found = PredictionUncertainty(
                 replace(self.noise, pose_rad=share * fitted.noise.pose_rad), covariance
             )
             best = min(best, (spread, found), key=lambda each: each[0])
         return best[1]
 
-    def distances(self, yardstick: Yardstick, fitted: np.ndarray) -> np.ndarray:
+    def distances(
+        self, yardstick: PredictionUncertainty, fitted: np.ndarray
+    ) -> np.ndarray:
         """From the prediction by the other rows, in standard deviations, (N,); `far`
         where nothing looks closely.
 
@@ -255,7 +257,9 @@ class _Beside:
         return found
 
 
-def yardstick_of(fitted: Fit, noise: Noise, measurements: Measurements) -> Yardstick:
+def estimate_prediction_uncertainty(
+    fitted: Fit, noise: Noise, measurements: Measurements
+) -> PredictionUncertainty:
     """What the rows that a model was fitted to say of themselves, beside the noise that
     was declared or repeats show.
 
@@ -272,7 +276,7 @@ def yardstick_of(fitted: Fit, noise: Noise, measurements: Measurements) -> Yards
     ).yardstick(fitted)
 
 
-def beyond_chance(
+def flag_outliers(
     distance: np.ndarray, rows: int, kept: np.ndarray, settings: Settings
 ) -> tuple[np.ndarray, np.ndarray]:
     """Distances in units of their scale, and which of them are gross errors, (N,).
@@ -289,11 +293,13 @@ def beyond_chance(
         / np.sqrt(2 * gammaincinv(rows / 2, _SCALE_QUANTILES))[np.isfinite(usual)],
         initial=1.0,
     )
-    inside = distance <= scale * most_by_chance(len(distance), rows, settings)
+    inside = distance <= scale * compute_critical_distance(
+        len(distance), rows, settings
+    )
     if inside.mean() < 1.0 - settings.gross_error_share:
         return distance / scale, np.zeros(len(distance), bool)
     scale = max(1.0, float(np.sqrt((distance[inside] ** 2).mean() / rows)))
-    gross = distance > scale * most_by_chance(
+    gross = distance > scale * compute_critical_distance(
         len(distance), rows, settings, inside.sum() * rows
     )
     return (
@@ -304,7 +310,7 @@ def beyond_chance(
     )
 
 
-def most_by_chance(
+def compute_critical_distance(
     count: int, rows: int, settings: Settings, freedom: float = np.inf
 ) -> float:
     """Standard deviations that the largest of so many good rows exceeds with the
@@ -328,26 +334,26 @@ def gross_errors(
     measurements: Measurements,
     kept: np.ndarray,
     settings: Settings,
-) -> Deviations:
+) -> OutlierTest:
     """Judge the rows of a campaign by a fit to those that are ``kept``, (N,), and the
     noise declared or shown by repeats."""
     rows = _Beside.of(
         fitted.model, fitted.estimate, measurements, noise, kept, kept.sum() <= _MOST
     )
     distance = rows.distances(rows.yardstick(fitted), kept)
-    return Deviations(
-        rows.residual, *beyond_chance(distance, fitted.model.rows, kept, settings)
+    return OutlierTest(
+        rows.residual, *flag_outliers(distance, fitted.model.rows, kept, settings)
     )
 
 
 def held_out_gross_errors(
     fitted: Fit,
     there: tuple[Model, Estimate],
-    yardstick: Yardstick,
+    yardstick: PredictionUncertainty,
     held_out: Case,
     outside: np.ndarray,
     settings: Settings,
-) -> Deviations:
+) -> OutlierTest:
     """Judge held-out rows by the rule of `gross_errors`, in the model and estimate that
     were carried to them.
 
@@ -367,7 +373,7 @@ def held_out_gross_errors(
         every,
         yardstick.covariance is not None,
     )
-    distance, gross = beyond_chance(
+    distance, gross = flag_outliers(
         rows.distances(yardstick, ~every), model.rows, every, settings
     )
     least = settings.extrapolated_error
@@ -377,12 +383,14 @@ def held_out_gross_errors(
             float(np.median(distance[outside]))
             / np.sqrt(2 * gammaincinv(model.rows / 2, 0.5)),
         )
-    far = distance > least * most_by_chance(len(distance), model.rows, settings)
-    return Deviations(rows.residual, distance, gross & (far | ~outside))
+    far = distance > least * compute_critical_distance(
+        len(distance), model.rows, settings
+    )
+    return OutlierTest(rows.residual, distance, gross & (far | ~outside))
 
 
 def entries_of(
-    found: Deviations, campaign: Campaign, held_out: bool
+    found: OutlierTest, campaign: Campaign, held_out: bool
 ) -> list[dict[str, Any]]:
     """Gross errors as verdict.json has them, each with its row, its size and a
     sentence."""
@@ -413,7 +421,7 @@ def warnings_of(entries: list[dict[str, Any]]) -> list[str]:
     return [entry["detail"] for entry in entries[:_MOST_NAMED]] + rest
 
 
-def _sentence(found: Deviations, campaign: Campaign, place: int) -> str:
+def _sentence(found: OutlierTest, campaign: Campaign, place: int) -> str:
     measurements = campaign.measurements
     off = found.residual[place]
     away = 1e3 * float(np.linalg.norm(off[:3]))
@@ -561,7 +569,7 @@ def improbable(line: Linearized) -> np.ndarray:
     kept = np.ones(observed, bool)
     residual = rows.residual.ravel()
     size = np.sqrt(np.exp(grid.log_weights) @ grid.scales**2)
-    limit = most_by_chance(observed, own, settings)
+    limit = compute_critical_distance(observed, own, settings)
     basis, candidates = (
         part.reshape(len(residual), -1)
         for part in (products.beside[..., :-1], rows.candidates.dense())
@@ -596,7 +604,7 @@ def improbable(line: Linearized) -> np.ndarray:
         distance[~kept] = np.sqrt(
             (rest * np.linalg.solve(blocks, rest)).sum(axis=(1, 2))
         )
-        back = ~kept & ~beyond_chance(distance, own, kept, settings)[1]
+        back = ~kept & ~flag_outliers(distance, own, kept, settings)[1]
         if not back.any():
             break
         kept |= back

@@ -12,11 +12,11 @@ from elastocal.campaigns.campaign import NO_REMAINDER, Measurements, residual_co
 from elastocal.counting import counted
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.gross_errors import (
-    Deviations,
+    OutlierTest,
     entries_of,
+    estimate_prediction_uncertainty,
     held_out_gross_errors,
     warnings_of,
-    yardstick_of,
 )
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.model import Case, conditions, measured_in_base, residuals
@@ -155,7 +155,7 @@ def as_delivered(diagnosis: Diagnosis, held_out: Case, seed: int) -> Corrected |
 
 def without_gross_errors(
     diagnosis: Diagnosis, held_out: Case
-) -> tuple[Deviations, Case, np.ndarray]:
+) -> tuple[OutlierTest, Case, np.ndarray]:
     """Held-out rows that the final model does not explain, by the rule of the training
     rows; the case without; and which of its poses lie outside the range of the fitted
     ones, (P,)."""
@@ -163,12 +163,14 @@ def without_gross_errors(
     measurements = held_out.campaign.measurements
     poses = outside_poses(final, diagnosis.case, held_out)
     part = held_out
-    errors = Deviations.none(len(measurements), held_out.model.rows)
+    errors = OutlierTest.none(len(measurements), held_out.model.rows)
     if data_at_fault(diagnosis.document):
         return errors, part, poses
     settings = Settings()
     noise = noise_from(diagnosis.document).of_measurements
-    yardstick = yardstick_of(final, noise, diagnosis.case.campaign.measurements)
+    yardstick = estimate_prediction_uncertainty(
+        final, noise, diagnosis.case.campaign.measurements
+    )
     outside = poses[state_clusters(measurements)]
     for _ in range(settings.gross_error_rounds):
         # Frames of another campaign are fitted to what is kept of it.

@@ -7,15 +7,15 @@ from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 from elastocal.application.accuracy import (
+    build_residual_model,
     calibrate_on_case,
-    campaign_accuracy,
-    campaign_poses,
-    judge_by_held_out,
-    regression_on,
-    set_form,
-    uncorrected_m,
+    compute_uncorrected_rms_m,
+    inflate_to_held_out_errors,
+    predict_campaign_accuracy,
+    select_campaign_commands,
+    set_form_error,
 )
-from elastocal.application.calibrated import effect_costs
+from elastocal.application.calibrated import compute_effect_contributions
 from elastocal.campaigns.campaign import columns_of
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.diagnose import diagnose
@@ -112,7 +112,7 @@ def calibrated_by(
         noise_m = diagnosis.document["noise"]["position_m"]
         if not physics_only:
             residual = delivered.residual
-            more = regression_on(
+            more = build_residual_model(
                 case,
                 final.estimate,
                 delivered.predictor,
@@ -122,8 +122,8 @@ def calibrated_by(
     found = calibrate_on_case(
         case, final.model, final.estimate, final.covariance, final.noise, more
     )
-    found = set_form(found, diagnosis.document["other_models_m"] or 0.0)
-    return judge_by_held_out(found, held_out, residual, noise_m)
+    found = set_form_error(found, diagnosis.document["other_models_m"] or 0.0)
+    return inflate_to_held_out_errors(found, held_out, residual, noise_m)
 
 
 def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
@@ -157,7 +157,9 @@ def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
                     diagnosis, verdict.held_out, verdict.delivered, physics_only=True
                 )
             )
-        costs = effect_costs(replace(found, remainder=None), *campaign_poses(found))
+        costs = compute_effect_contributions(
+            replace(found, remainder=None), *select_campaign_commands(found)
+        )
     effects = [
         effect | {"cost_m": costs.get(effect["name"])}
         for effect in verdict.document["effects"]
@@ -169,6 +171,8 @@ def _accuracy(found: CalibratedRobot) -> dict[str, Any]:
     """Predicted accuracy of a corrected robot, and in the same frame the RMS error of
     the uncorrected one at the same poses."""
     return {
-        "accuracy": asdict(campaign_accuracy(found)),
-        "uncorrected_m": uncorrected_m(found, *campaign_poses(found)),
+        "accuracy": asdict(predict_campaign_accuracy(found)),
+        "uncorrected_m": compute_uncorrected_rms_m(
+            found, *select_campaign_commands(found)
+        ),
     }
