@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import yaml
 
 from elastocal.campaigns.reading import read_robot
-from elastocal.effects.catalogue import effects
+from elastocal.effects.catalogue import list_effects
 from elastocal.figures.effect_signatures import compute_signature, list_candidates
 
 from extensions import with_plain_references

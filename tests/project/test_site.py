@@ -89,7 +89,9 @@ def test_nothing_is_fetched_from_elsewhere(pages):
 
 def test_every_effect_has_a_formula_and_a_picture(pages):
     page = pages[SITE / "reference" / "effects.html"]
-    assert {Path(picture).stem for picture in page.pictures} >= set(list_bundled_effects())
+    assert {Path(picture).stem for picture in page.pictures} >= set(
+        list_bundled_effects()
+    )
     assert page.formulas == len(list_bundled_effects())
     formulas = yaml.safe_load(
         (ROOT / "docs" / "site" / "effect_formulas.yaml").read_text(encoding="utf-8")

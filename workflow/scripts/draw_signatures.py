@@ -5,7 +5,7 @@ from pathlib import Path
 from job import Job, run
 
 from elastocal.campaigns.reading import read_robot
-from elastocal.effects.catalogue import effects
+from elastocal.effects.catalogue import list_effects
 from elastocal.figures.effect_signatures import compute_signature, draw_signature
 from elastocal.figures.style import save_svg
 
