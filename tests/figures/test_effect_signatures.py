@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from analysed_robots import analysed
 
-from elastocal.effects.catalogue import list_effects
+from elastocal.effects.catalogue import list_bundled_effects
 from elastocal.figures.effect_signatures import compute_signature, list_candidates
 
 
