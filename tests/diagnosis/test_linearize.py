@@ -10,7 +10,7 @@ from scipy.stats import chi2, ncx2
 from synthetic import NOISE, made_estimate, made_model, seen_exactly, with_noise
 
 from elastocal.campaigns.campaign import Target
-from elastocal.diagnosis.gross_errors import Kept
+from elastocal.diagnosis.fitted_subset import FittedSubset
 from elastocal.diagnosis.linearize import (
     linearized,
     looked_at_closely,
@@ -211,7 +211,7 @@ def kept(robot, off=0.0, payload_kg=0.0):
     seen = with_noise(seen, np.random.default_rng(6))
     noise = replace(NOISE, joint_rad=np.zeros(6))
     declared = fit(model, seen, noise)
-    return Kept(
+    return FittedSubset(
         Case(None, seen, model, candidates),
         np.ones(len(seen), bool),
         noise,

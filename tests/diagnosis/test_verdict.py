@@ -10,7 +10,7 @@ from made_problems import made_problem, made_rows, made_unit
 from planted import planted
 
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.diagnosis.refit import Averaged, squares_beyond
+from elastocal.diagnosis.model_averaging import ModelAverage, compute_extra_squares
 from elastocal.diagnosis.search import Alarm, Model, Posterior
 from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.verdict import (
@@ -176,7 +176,7 @@ def test_of_a_law_and_a_smooth_error_that_which_adds_little_is_a_part_of_the_oth
     posterior = Posterior(
         (Model((OFFSET_3, OTHER_2), 1.0, np.array(sizes), 0.0),), np.ones(1)
     )
-    (law, law_alone), (unknown, unknown_alone) = squares_beyond(
+    (law, law_alone), (unknown, unknown_alone) = compute_extra_squares(
         PROBLEM, posterior.models[0], {"offset"}
     )
     small = SETTINGS.law_tolerance**2
@@ -349,7 +349,7 @@ def test_parameters_have_their_values_errors_and_priors(found):
     fitted, _ = found
     fitted = with_value(fitted, "joint_offset@3", 3e-4, 2e-5)
     effect = effect_of(fitted, "joint_offset@3")
-    (entry,) = parameter_entries(effect, fitted, Averaged({}, {}))
+    (entry,) = parameter_entries(effect, fitted, ModelAverage({}, {}))
     assert entry == {
         "name": "joint_offset@3 offset",
         "value": pytest.approx(3e-4),
@@ -363,7 +363,7 @@ def test_parameters_have_their_values_errors_and_priors(found):
     # prior alone that says it.
     name = ("joint_offset@3", "offset")
     (entry,) = parameter_entries(
-        effect, fitted, Averaged({name: 1e-5}, {name: 4e-5}, frozenset([name]))
+        effect, fitted, ModelAverage({name: 1e-5}, {name: 4e-5}, frozenset([name]))
     )
     assert (
         entry["value"] == pytest.approx(3.1e-4)
@@ -401,10 +401,10 @@ def test_no_mass_is_told_where_the_compliances_are_not_identified(found):
     fitted, _ = found
     heavy = with_value(fitted, "payload", 24.4, 0.9)
     payload = effect_of(heavy, "payload")
-    assert parameter_entries(payload, heavy, Averaged({}, {}))[0]["unit"] == "kg"
+    assert parameter_entries(payload, heavy, ModelAverage({}, {}))[0]["unit"] == "kg"
     taken = declared_springs(heavy, 1e-6 * np.array([20.0, 8.0, 3.0, 2.0, 2.0, 2.0]))
     # Weight cannot turn the first joint, however soft it is.
-    first, *others = parameter_entries(payload, taken, Averaged({}, {}))
+    first, *others = parameter_entries(payload, taken, ModelAverage({}, {}))
     assert first["name"] == "payload compliance_of_joint_2_times_mass"
     assert (first["value"], first["std_error"]) == pytest.approx(
         (8e-6 * 24.4, 8e-6 * 0.9)

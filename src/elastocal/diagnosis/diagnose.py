@@ -11,16 +11,18 @@ import numpy as np
 from elastocal.counting import counted
 from elastocal.data_checks.faults import compliance_warnings, faults
 from elastocal.data_checks.protocol import Fault
-from elastocal.diagnosis import refit, verdict
+from elastocal.diagnosis import model_averaging, refit, verdict
+from elastocal.diagnosis.fitted_subset import (
+    FittedSubset,
+    fit_subset,
+    sample_for_search,
+    select_initial_subset,
+)
 from elastocal.diagnosis.gross_errors import (
-    Kept,
     OutlierTest,
-    entries_of,
-    first_kept,
-    fitted_to,
-    gross_errors,
-    searched_of,
-    warnings_of,
+    describe_gross_errors,
+    find_gross_errors,
+    format_gross_error_warnings,
 )
 from elastocal.diagnosis.linearize import (
     linearized,
@@ -105,11 +107,13 @@ def diagnose(
     """
     whole = case.campaign
     tell = progress or (lambda line: None)
-    part = first_kept(case, settings)
+    part = select_initial_subset(case, settings)
     known = faults(part.case.campaign)
     if known:
         # Where all measurements mean something else, no single row is wrong.
-        part = fitted_to(case, np.ones(len(case.campaign.measurements), bool), settings)
+        part = fit_subset(
+            case, np.ones(len(case.campaign.measurements), bool), settings
+        )
     else:
         part = with_probable_centres(part, settings)
         case = replace(case, model=part.case.model)
@@ -127,7 +131,7 @@ def diagnose(
         if not found:
             found = _explained(part, settings, seed, tell, start, most_pose_error_rad)
             about = found.fitted
-        errors = gross_errors(about, part.noise, measurements, part.kept, settings)
+        errors = find_gross_errors(about, part.noise, measurements, part.kept, settings)
         # A row that a model without it explains stays, whatever the next model says of
         # it: no set of rows comes back.
         good |= ~part.kept & ~errors.gross
@@ -136,12 +140,12 @@ def diagnose(
             break
         # The model found looks at all rows once more, without these, before another
         # search is made.
-        some = searched_of(case, case.select(remaining), settings)
+        some = sample_for_search(case, case.select(remaining), settings)
         about = fit(about.model, some, about.noise, about.estimate, True, ON_THE_WAY)
-        errors = gross_errors(about, part.noise, measurements, remaining, settings)
+        errors = find_gross_errors(about, part.noise, measurements, remaining, settings)
         good |= ~remaining & ~errors.gross
         last = part
-        part = fitted_to(case, ~errors.gross | good, settings, part)
+        part = fit_subset(case, ~errors.gross | good, settings, part)
         if part is last:
             break
         tell(
@@ -152,7 +156,7 @@ def diagnose(
             if (part.kept != remaining).any():
                 again = fit(
                     about.model,
-                    part.searched,
+                    part.search_sample,
                     about.noise,
                     about.estimate,
                     True,
@@ -182,7 +186,7 @@ def diagnose(
     errors = replace(errors, gross=~part.kept)
     case = part.case
     noise = part.noise
-    declared = part.to_all(part.declared)
+    declared = part.fit_to_all(part.declared)
     bare = fit(
         replace(case.model, effects=()), case.observations, noise, settled=ON_THE_WAY
     )
@@ -197,8 +201,8 @@ def diagnose(
     warnings = [*part.warnings]
     if found:
         final = about
-        if about is not found.fitted or part.searched is not case.observations:
-            final = part.to_all(about)
+        if about is not found.fitted or part.search_sample is not case.observations:
+            final = part.fit_to_all(about)
         named = found.conclusion.best.named
         word = found.conclusion.verdict
         found = replace(
@@ -211,7 +215,7 @@ def diagnose(
             # Under the noise that it leaves itself, for nothing else enters the model
             # that is kept.
             line = found.linearized
-            left = refit.remaining_noise(
+            left = refit.estimate_residual_noise(
                 line.problem, found.posterior.nothing, line.about.noise, declared.noise
             )
             alone = (
@@ -262,14 +266,14 @@ def diagnose(
                 kept.noise, found.linearized.pose_std_error_rad
             )
         )
-    left_out = entries_of(errors, whole, held_out=False)
+    left_out = describe_gross_errors(errors, whole, held_out=False)
     document = _document(case, noise, steps, final, found, known, settings, warnings)
     document |= {
         "contradictions": contradicting,
         "gross_errors": left_out,
         "repeatable": repeatable and asdict(repeatable),
     }
-    document["warnings"] += warnings_of(left_out)
+    document["warnings"] += format_gross_error_warnings(left_out)
     return Diagnosis(
         case, tuple(steps), found, document, whole.measurements.select(errors.gross)
     )
@@ -308,7 +312,7 @@ def _losses(
 
 
 def _explained(
-    part: Kept,
+    part: FittedSubset,
     settings: Settings,
     seed: int,
     tell: Callable[[str], None],
@@ -325,7 +329,7 @@ def _explained(
     on about each model that is new.
     """
     candidates = list(part.case.candidates.values())
-    searched = part.searched
+    searched = part.search_sample
     declared = part.declared
     about, before = start or (declared, None)
     tested: tuple[Fit, Repeatable | None] | None = None
@@ -367,12 +371,14 @@ def _explained(
         tell(
             f"search {round_number + 1} of at most {settings.linearizations}: leading so far, {leading}"
         )
-        noise = refit.remaining_noise(problem.problem, model, taken, declared.noise)
-        about = refit.fit_with_sizes(
+        noise = refit.estimate_residual_noise(
+            problem.problem, model, taken, declared.noise
+        )
+        about = refit.fit_selected_effects(
             declared,
             searched,
             noise,
-            refit.selected(problem, model),
+            refit.select_effects(problem, model),
             near,
             settled=enough,
         )
@@ -381,7 +387,8 @@ def _explained(
         ends = not off and (
             small
             or named == before
-            or abs(refit.mean_square(about) - 1.0) < settings.linear_misfit
+            or abs(refit.compute_reduced_chi_square(about) - 1.0)
+            < settings.linear_misfit
         )
         # What is a function of the joints is no error of poses, and about a model that
         # is new the problem is another one.
@@ -392,7 +399,9 @@ def _explained(
             tested = about, left
         remains = left is not None and left.remains
         settled = ends and not remains
-        adopted = bool(named) and refit.expected_to_help(problem.problem, found, model)
+        adopted = bool(named) and model_averaging.is_expected_to_help(
+            problem.problem, found, model
+        )
         evidence = Evidence(
             problem, found, alarm, conclusion, adopted, settled, about, tested
         )
@@ -401,7 +410,7 @@ def _explained(
         if remains:
             most_pose_error_rad = settings.pose_repeatability_rad
             if large:
-                noise = refit.noise_beside(about, searched, most_pose_error_rad)
+                noise = refit.limit_pose_error(about, searched, most_pose_error_rad)
                 about = fit(about.model, searched, noise, about.estimate, True, enough)
         before = named
         if round_number + 1 < settings.linearizations:
@@ -410,7 +419,7 @@ def _explained(
     return replace(evidence, fitted=about)
 
 
-def _effect_steps(part: Kept, final: Fit, found: Evidence) -> list[Step]:
+def _effect_steps(part: FittedSubset, final: Fit, found: Evidence) -> list[Step]:
     """One step for each mechanism, that which explains most first, each with those
     before it; of many, the rest together.
 
@@ -419,9 +428,11 @@ def _effect_steps(part: Kept, final: Fit, found: Evidence) -> list[Step]:
     model = found.posterior.models[found.conclusion.best.model]
     chosen = [
         (effect, final.values_of(effect.key)[1])
-        for effect, _ in refit.selected(found.linearized, model)
+        for effect, _ in refit.select_effects(found.linearized, model)
     ]
-    explained = refit.squares_explained(found.linearized.problem, model)
+    explained = model_averaging.compute_explained_squares(
+        found.linearized.problem, model
+    )
     names = sorted(found.conclusion.best.named, key=lambda name: -explained[name])
     alone = names[:-1] if len(names) <= _MOST_STEPS else names[:1]
     rest = names[len(alone) :]
@@ -435,9 +446,9 @@ def _effect_steps(part: Kept, final: Fit, found: Evidence) -> list[Step]:
     for number in range(len(alone), 0, -1):
         some = tuple(entry for entry in chosen if entry[0].effect in alone[:number])
         # Errors that a tenth of a standard error in a parameter hardly moves.
-        fitted = refit.fit_with_sizes(
+        fitted = refit.fit_selected_effects(
             part.declared,
-            part.searched,
+            part.search_sample,
             final.noise,
             some,
             steps[0].fitted,
@@ -459,7 +470,7 @@ def _document(
 ) -> dict[str, Any]:
     declared = steps[1].fitted
     final = steps[-1].fitted
-    springs = refit.Averaged({}, {})
+    springs = model_averaging.ModelAverage({}, {})
     tested = set[str]()
     stated: dict[str, Any] = {
         "verdict": verdict.NAMED if len(known) == 1 else verdict.SEVERAL,
@@ -476,25 +487,31 @@ def _document(
         chosen = best if conclusion.best.named else nothing
         kept = chosen if found.adopted else nothing
         owners = [(owner, parameter.name) for owner, parameter in declared.parameters]
-        averages = refit.averaged(found.linearized, found.posterior, chosen, owners)
+        averages = model_averaging.average_models(
+            found.linearized, found.posterior, chosen, owners
+        )
         springs = (
             averages
             if kept is chosen
-            else refit.averaged(found.linearized, found.posterior, nothing, owners)
+            else model_averaging.average_models(
+                found.linearized, found.posterior, nothing, owners
+            )
         )
         entries = verdict.effect_entries(
             found, with_effects, averages, case.observations
         )
         untestable = found.linearized.untestable
-        other = refit.other_predictions(problem, found.posterior, kept)
+        other = model_averaging.compute_between_model_squares(
+            problem, found.posterior, kept
+        )
         tested = {unit.candidate.key for unit in problem.units if unit.candidate}
         stated = {
             "verdict": conclusion.verdict,
             "effects": entries,
             "probabilities": verdict.probability_facts(found),
             "misfit": {
-                "before": refit.mean_square_left(problem, nothing),
-                "after": refit.mean_square_left(problem, best),
+                "before": refit.predict_reduced_chi_square(problem, nothing),
+                "after": refit.predict_reduced_chi_square(problem, best),
             },
             # Root mean square by which positions may be elsewhere by other models than
             # the one that is kept.
@@ -547,7 +564,7 @@ def _document(
 
 
 def _compliances(
-    declared: Fit, final: Fit, springs: refit.Averaged, prior_share: float
+    declared: Fit, final: Fit, springs: model_averaging.ModelAverage, prior_share: float
 ) -> dict[str, list[float]]:
     joints = final.model.sites.joints
     after = joint_compliances(final.model, final.estimate).copy()

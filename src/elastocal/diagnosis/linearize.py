@@ -31,7 +31,7 @@ from elastocal.fitting.observations import Observations, spread_poses
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from elastocal.diagnosis.gross_errors import Kept
+    from elastocal.diagnosis.fitted_subset import FittedSubset
     from elastocal.diagnosis.settings import Settings
     from elastocal.effects.conditions import Conditions
     from elastocal.effects.protocol import Candidate
@@ -426,7 +426,7 @@ def lacking(
     return ""
 
 
-def with_probable_centres(part: Kept, settings: Settings) -> Kept:
+def with_probable_centres(part: FittedSubset, settings: Settings) -> FittedSubset:
     """The kept part of a case, fitted with the prior of its centres of mass that is
     more probable; itself without masses.
 
@@ -441,7 +441,7 @@ def with_probable_centres(part: Kept, settings: Settings) -> Kept:
     stated = with_stated_centres(part.declared.model)
     if stated is part.declared.model:
         return part
-    line = linearized(part.declared, part.searched, (), settings)
+    line = linearized(part.declared, part.search_sample, (), settings)
     lines = [line, line.alike(about=replace(line.about, model=stated))]
     wide, narrow = (
         _log_evidence(each, products_of(each._fitted[0], *each.priors))
@@ -451,7 +451,10 @@ def with_probable_centres(part: Kept, settings: Settings) -> Kept:
     # mechanism explains what it leaves.
     if wide > narrow:
         every = linearized(
-            part.declared, part.searched, list(part.case.candidates.values()), settings
+            part.declared,
+            part.search_sample,
+            list(part.case.candidates.values()),
+            settings,
         )
         lines = [each.alike(tried=every.tried, against=every.against) for each in lines]
         wide, narrow = (
@@ -460,7 +463,7 @@ def with_probable_centres(part: Kept, settings: Settings) -> Kept:
         if wide > narrow:
             return part
     fitted = fit(
-        stated, part.searched, part.noise, part.declared.estimate, reweighted=True
+        stated, part.search_sample, part.noise, part.declared.estimate, reweighted=True
     )
     return replace(
         part,

@@ -24,7 +24,7 @@ import numpy as np
 from scipy.constants import g as standard_gravity
 from scipy.special import ndtr
 
-from elastocal.diagnosis.refit import mean_square_left
+from elastocal.diagnosis.refit import predict_reduced_chi_square
 from elastocal.diagnosis.statistics import normal_equations
 from elastocal.diagnosis.verdict import (
     ADEQUATE,
@@ -278,7 +278,9 @@ def propose(
     model = diagnosis.final.model
     states = diagnosis.case.observations.states
     models = [evidence.posterior.models[each.model] for each in kept]
-    factor = float(np.sqrt(max(mean_square_left(linearized.problem, models[0]), 1.0)))
+    factor = float(
+        np.sqrt(max(predict_reduced_chi_square(linearized.problem, models[0]), 1.0))
+    )
     columns = np.unique(
         np.concatenate(
             [

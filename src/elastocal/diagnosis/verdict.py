@@ -21,8 +21,8 @@ import numpy as np
 from elastocal.counting import plural
 from elastocal.data_checks.protocol import OF_DATA, Fault
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.diagnosis.refit import Averaged, squares_beyond
-from elastocal.effects.catalogue import list_effects
+from elastocal.diagnosis.model_averaging import ModelAverage, compute_extra_squares
+from elastocal.effects.catalogue import effects
 from elastocal.effects.protocol import Candidate, Parameter, Shape
 from elastocal.effects.sizes import lever_m
 from elastocal.fitting.linearization import effect_columns
@@ -249,7 +249,7 @@ def _acting(problem: Problem, model: Model, probability: float) -> set[str]:
         return names
     of_laws = problem.settings.law_tolerance**2
     of_unknown = problem.settings.smooth_tolerance**2
-    (by_laws, beyond_unknown), (by_unknown, beyond_laws) = squares_beyond(
+    (by_laws, beyond_unknown), (by_unknown, beyond_laws) = compute_extra_squares(
         problem, model, known
     )
     if beyond_laws < of_laws * by_laws:
@@ -442,7 +442,7 @@ def probability_facts(found: Evidence) -> dict[str, Any]:
 
 
 def effect_entries(
-    found: Evidence, final: Fit, averages: Averaged, observations: Observations
+    found: Evidence, final: Fit, averages: ModelAverage, observations: Observations
 ) -> list[dict[str, Any]]:
     """Entries of the effects found, those of the most probable mechanisms first.
 
@@ -497,7 +497,7 @@ def effect_entries(
 
 
 def parameter_entries(
-    member: Candidate, final: Fit, averages: Averaged
+    member: Candidate, final: Fit, averages: ModelAverage
 ) -> list[dict[str, Any]]:
     """Parameters and shapes of one candidate in a fit.
 
@@ -521,7 +521,7 @@ def parameter_entries(
             "prior_std": getattr(parameter, "prior_std", None),
             "held": bool(final.held[index]),
             "identifiable": not final.held[index]
-            and (member.key, parameter.name) not in averages.of_prior,
+            and (member.key, parameter.name) not in averages.prior_dominated,
         }
         # Where a shape has no slope, such as the row of a step, a search has chosen it.
         | (

@@ -19,7 +19,7 @@ from elastocal.application.calibrated import compute_effect_contributions
 from elastocal.campaigns.campaign import columns_of
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.diagnose import diagnose
-from elastocal.diagnosis.judge import judge, residual_blocks
+from elastocal.diagnosis.judge import generate_residual_blocks, judge
 from elastocal.diagnosis.misplaced import misplaced
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.model import Case, case_from
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
     from elastocal.application.calibrated import CalibratedRobot
     from elastocal.diagnosis.diagnose import Diagnosis
-    from elastocal.diagnosis.judge import Verdict
+    from elastocal.diagnosis.judge import Judgement
     from elastocal.remainder.corrected import Corrected
 
 
@@ -58,7 +58,7 @@ def judge_campaign(job: Any) -> None:
     write_table(
         job.output.residuals,
         schema,
-        residual_blocks(found, verdict),
+        generate_residual_blocks(found, verdict),
         provenance(job.params, **job.wildcards),
     )
 
@@ -100,7 +100,7 @@ def calibrated_by(
     """The robot that a diagnosis found, with all that is known of its errors: held-out
     rows without gross ones judge it.
 
-    `delivered`: of `judge.as_delivered`. `physics_only`: corrected without its
+    `delivered`: of `judge.apply_regression`. `physics_only`: corrected without its
     regression; where there is one, what the final model leaves is known to be no noise.
     """
     case = diagnosis.case
@@ -126,7 +126,7 @@ def calibrated_by(
     return inflate_to_held_out_errors(found, held_out, residual, noise_m)
 
 
-def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
+def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
     """The verdict of a diagnosis on held-out poses, with the accuracy of the corrected
     robot and the cost of each effect.
 

@@ -30,7 +30,7 @@ from elastocal.application.frames import (
 )
 from elastocal.campaigns.reading import read_robot
 from elastocal.diagnosis.diagnose import diagnose
-from elastocal.diagnosis.judge import as_delivered, without_gross_errors
+from elastocal.diagnosis.judge import apply_regression, remove_gross_errors
 from elastocal.diagnosis.settings import Settings
 from elastocal.effects.catalogue import declared_candidates
 from elastocal.effects.catalogue import list_effects as catalogue
@@ -305,8 +305,8 @@ def closed_loop(
 
 def _corrected(made: Measured, seed: int) -> CalibratedRobot:
     """The robot as the diagnosis corrects it."""
-    part = without_gross_errors(made.found, made.held_out)[1]
-    return calibrated_by(made.found, part, as_delivered(made.found, part, seed))
+    part = remove_gross_errors(made.found, made.held_out)[1]
+    return calibrated_by(made.found, part, apply_regression(made.found, part, seed))
 
 
 def _geometry(case: Case, found: Diagnosis) -> Fit:

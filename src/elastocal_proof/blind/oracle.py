@@ -28,9 +28,9 @@ from scipy.stats import chi2
 
 from elastocal.diagnosis.diagnose import Step
 from elastocal.diagnosis.evidence import log_sum_exp
-from elastocal.diagnosis.judge import heldout_errors
+from elastocal.diagnosis.judge import compare_held_out_errors
 from elastocal.diagnosis.linearize import linearized
-from elastocal.diagnosis.refit import fit_with_sizes
+from elastocal.diagnosis.refit import fit_selected_effects
 from elastocal.diagnosis.search import initial_screening
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.model import Case
@@ -105,7 +105,7 @@ def oracle(
     fitted, members, variants = _with_effects(declared, case, effects)
     p_value = min(variants * _wald(fitted, members), 1.0)
     outside = outside_poses(fitted, case, unseen)
-    _, heldout, _ = heldout_errors(
+    _, heldout, _ = compare_held_out_errors(
         [Step("oracle", "declared", fitted)], case, unseen, outside, seed
     )
     return _outcome(members, p_value, heldout["before"])
@@ -166,7 +166,7 @@ def _with_effects(
         (candidate, np.array(shapes, float)) for _, candidate, shapes in chosen
     )
     return (
-        fit_with_sizes(declared, case.observations, declared.noise, effects_at),
+        fit_selected_effects(declared, case.observations, declared.noise, effects_at),
         members,
         variants,
     )
