@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from elastocal.diagnosis.linearize import linearized
 from planted import planted
 
-from elastocal.diagnosis.linearize import linearized
 from elastocal.diagnosis.refit import fit_selected_effects, select_effects
 from elastocal.diagnosis.search import posterior
 from elastocal.diagnosis.settings import Settings
@@ -34,8 +34,10 @@ def found(kuka):
         if candidate.effect != "joint_offset"
     ]
     candidates.append(replace(campaign.candidates["joint_offset@3"], effect="offset"))
-    problem = linearized(declared, campaign.observations, candidates, SETTINGS)
-    models = posterior(problem.problem)
+    problem = build_candidate_design(
+        declared, campaign.observations, candidates, SETTINGS
+    )
+    models = search_models(problem.problem)
     return campaign, declared, problem, models
 
 
@@ -78,7 +80,7 @@ def test_no_effect_is_fitted_under_a_wider_prior_than_it_had_before_the_measurem
 ):
     _, _, line, models = found
     best = models.models[0]
-    unit = line.problem.units[best.units[0]]
+    unit = line.problem.terms[best.term_indices[0]]
     before = line.problem.grid.root_mean_square(unit)
     sizes = [0.5 * before, before, SETTINGS.scales[-1]]
     assert before < SETTINGS.scales[-1]

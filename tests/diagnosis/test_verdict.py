@@ -65,7 +65,9 @@ def made_posterior(*pairs):
     left = 1.0 - sum(probability for _, probability in pairs)
     listed = sorted([*pairs, ((), left)], key=lambda pair: -pair[1])
     models = tuple(
-        Model(tuple(sorted(units)), float(np.log(p + 1e-12)), np.ones(len(units)), 0.0)
+        ScoredModel(
+            tuple(sorted(units)), float(np.log(p + 1e-12)), np.ones(len(units)), 0.0
+        )
         for units, p in listed
     )
     return Posterior(models, np.array([probability for _, probability in listed]))
@@ -174,7 +176,7 @@ def test_of_a_law_and_a_smooth_error_that_which_adds_little_is_a_part_of_the_oth
     """Little is what laws are allowed to be off: of squares, that part which the other
     cannot make, whatever its size."""
     posterior = Posterior(
-        (Model((OFFSET_3, OTHER_2), 1.0, np.array(sizes), 0.0),), np.ones(1)
+        (ScoredModel((OFFSET_3, OTHER_2), 1.0, np.array(sizes), 0.0),), np.ones(1)
     )
     (law, law_alone), (unknown, unknown_alone) = compute_extra_squares(
         PROBLEM, posterior.models[0], {"offset"}
@@ -189,7 +191,7 @@ def test_of_a_law_and_a_smooth_error_that_which_adds_little_is_a_part_of_the_oth
 
 def test_nothing_is_testable_where_only_the_competitor_is_left():
     units = UNITS[OTHER_1:]
-    problem = replace(PROBLEM, units=units)
+    problem = replace(PROBLEM, terms=units)
     found = concluded(problem, made_posterior(((0,), 0.9)), RAISED)
     assert found.verdict == NOT_TESTABLE and found.best.mechanisms == ()
 
@@ -199,7 +201,7 @@ def test_a_set_up_that_holds_still_is_no_test_of_the_robot():
     tested; with one, it has a name."""
     problem = replace(
         PROBLEM,
-        units=(
+        terms=(
             made_unit("setup_step", (), 0, candidate=OF_THE_SETUP),
             *UNITS[OTHER_1:],
         ),

@@ -24,12 +24,7 @@ from elastocal.diagnosis.gross_errors import (
     find_gross_errors,
     format_gross_error_warnings,
 )
-from elastocal.diagnosis.linearize import (
-    linearized,
-    looked_at_closely,
-    with_probable_centres,
-)
-from elastocal.diagnosis.search import alarm_of, initial_screening, posterior
+from elastocal.diagnosis.search import run_alarm_test, screen_terms, search_models
 from elastocal.diagnosis.verdict import Evidence
 from elastocal.effects.catalogue import list_effects
 from elastocal.fitting.least_squares import ON_THE_WAY, SETTLED, fit
@@ -115,7 +110,7 @@ def diagnose(
             case, np.ones(len(case.campaign.measurements), bool), settings
         )
     else:
-        part = with_probable_centres(part, settings)
+        part = choose_centre_prior(part, settings)
         case = replace(case, model=part.case.model)
     tell(
         f"declared model fitted to {counted(len(part.case.observations), 'measurement')}"
@@ -176,11 +171,11 @@ def diagnose(
                 continue
         # What was linearised about a model found is so again: from the declared one the
         # way is the same and twice as long.
-        relinearized = len(found.linearized.about.model.effects) > len(
+        relinearized = len(found.linearized.reference_fit.model.effects) > len(
             part.declared.model.effects
         )
         start = (about, found.conclusion.best.named) if relinearized else None
-        most_pose_error_rad = found.linearized.most_pose_error_rad
+        most_pose_error_rad = found.linearized.max_pose_error_rad
         # Its statistics make room for those of the next search.
         found = None
     errors = replace(errors, gross=~part.kept)
@@ -340,18 +335,20 @@ def _explained(
             about.model, searched, about.noise, about.estimate, True, ON_THE_WAY
         )
     for round_number in range(1 if start else 0, settings.linearizations):
-        problem = linearized(about, searched, candidates, settings, most_pose_error_rad)
+        problem = build_candidate_design(
+            about, searched, candidates, settings, most_pose_error_rad
+        )
         near = about if before else None
-        nothing, alone = initial_screening(problem.problem)
+        nothing, alone = screen_terms(problem.problem)
         draws = stream(seed, part.case.campaign.name, "null distribution", round_number)
-        alarm = alarm_of(
+        alarm = run_alarm_test(
             problem.problem, problem.products, nothing.pose_error_rad, draws
         )
         # The alarm comes before the measurements choose at which shapes to look more
         # closely: it would no longer be exact.
         if alarm.raised:
-            problem = looked_at_closely(problem, alone)
-        found = posterior(
+            problem = refine_shapes(problem, alone)
+        found = search_models(
             problem.problem, {effect.key for effect in about.model.effects}
         )
         conclusion = verdict.concluded(problem.problem, found, alarm)
@@ -360,7 +357,7 @@ def _explained(
         problem = problem.without_rows
         named = conclusion.best.named
         taken = about.noise
-        model = found.models[conclusion.best.model] if named else found.nothing
+        model = found.models[conclusion.best.model] if named else found.empty_model
         # No verdict yet, and no probability: a later search, or the poses left out, may
         # say otherwise.
         words = [
@@ -482,7 +479,7 @@ def _document(
         problem = found.linearized.problem
         conclusion = found.conclusion
         models = found.posterior.models
-        nothing = found.posterior.nothing
+        nothing = found.posterior.empty_model
         best = models[conclusion.best.model] if conclusion.best.mechanisms else nothing
         chosen = best if conclusion.best.named else nothing
         kept = chosen if found.adopted else nothing
@@ -516,7 +513,7 @@ def _document(
             # Root mean square by which positions may be elsewhere by other models than
             # the one that is kept.
             "other_models_m": float(
-                np.sqrt(3.0 * other / found.linearized.products.freedom)
+                np.sqrt(3.0 * other / found.linearized.products.degrees_of_freedom)
             )
             * noise.position_m,
         }

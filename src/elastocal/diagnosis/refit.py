@@ -51,8 +51,8 @@ def select_effects(linearized: Linearized, model: Model) -> SelectedEffects:
     predicts nothing."""
     problem = linearized.problem
     effects = []
-    for number, scale in zip(model.units, model.scales, strict=True):
-        unit = problem.units[number]
+    for number, scale in zip(model.term_indices, model.scales, strict=True):
+        unit = problem.terms[number]
         if unit.candidate:
             size = min(scale, problem.grid.root_mean_square(unit))
             effects.append(
@@ -106,10 +106,13 @@ def predict_reduced_chi_square(problem: Problem, model: Model) -> float:
     """Mean square of the whitened residual that a model leaves, by the linearised
     problem: 1 where noise accounts for it."""
     statistics = problem.statistics
-    columns, coefficients, place = problem.mode_of(model)
+    columns, coefficients, place = problem.find_mode(model)
     return float(
-        (statistics.squares[place] - statistics.along[place, columns] @ coefficients)
-        / statistics.freedom
+        (
+            statistics.residual_squares[place]
+            - statistics.score[place, columns] @ coefficients
+        )
+        / statistics.degrees_of_freedom
     )
 
 

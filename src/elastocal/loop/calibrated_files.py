@@ -26,7 +26,7 @@ from elastocal.application.accuracy import (
 from elastocal.application.calibrated import compute_effect_contributions
 from elastocal.application.frames import root_mean_square
 from elastocal.campaigns.reading import campaign_files, read_descriptions
-from elastocal.diagnosis.misplaced import point_sentence
+from elastocal.diagnosis.misplaced import describe_reference_point
 from elastocal.errors import InputError
 from elastocal.fitting.noise import noise_from
 from elastocal.io.json_files import read_json
@@ -244,7 +244,7 @@ def certificate(
         "regression": (verdict["remainder"] or {}).get("words", ""),
         "noise_floor_rms_m": heldout["noise_floor_rms_m"],
         "accuracy": asdict(accuracy),
-        "point": point_sentence(found.case.campaign),
+        "point": describe_reference_point(found.case.campaign),
         "misplaced": verdict["misplaced"],
         "worst_pose": {"joints": joints, "error_m": float(prediction.error_m[worst])},
         "conformity": asdict(decision)

@@ -23,8 +23,7 @@ from elastocal.diagnosis.gross_errors import (
     find_gross_errors,
     format_gross_error_warnings,
 )
-from elastocal.diagnosis.linearize import linearized
-from elastocal.diagnosis.misplaced import misplaced
+from elastocal.diagnosis.misplaced import find_misplaced_frames
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.model import case_from, joint_compliances
@@ -111,7 +110,8 @@ def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
     attention = [fault.detail for fault in found]
     if diagnosable and not negative:
         attention += [
-            each["sentence"] for each in misplaced(_with_base(declared, case), campaign)
+            each["sentence"]
+            for each in find_misplaced_frames(_with_base(declared, case), campaign)
         ]
     attention += [*controller_warnings(campaign), *part.warnings]
     if negative:

@@ -24,12 +24,13 @@ from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from elastocal.diagnosis.linearize import linearized
 from scipy.stats import chi2
 
+from elastocal.diagnosis.candidate_design import build_candidate_design
 from elastocal.diagnosis.diagnose import Step
 from elastocal.diagnosis.evidence import log_sum_exp
 from elastocal.diagnosis.judge import compare_held_out_errors
-from elastocal.diagnosis.linearize import linearized
 from elastocal.diagnosis.refit import fit_selected_effects
 from elastocal.diagnosis.search import initial_screening
 from elastocal.diagnosis.settings import Settings
@@ -140,11 +141,13 @@ def _with_effects(
             for members in members_of(effect, joints, case.candidates.values())
             for member in members
         ]
-        problem = linearized(declared, case.observations, listed, settings).problem
-        factors = initial_screening(problem)[1]
+        problem = build_candidate_design(
+            declared, case.observations, listed, settings
+        ).problem
+        factors = screen_terms(problem)[1]
         # Each at the shape that fits best.
         best: dict[str, _Chosen] = {}
-        for number, unit in enumerate(problem.units):
+        for number, unit in enumerate(problem.terms):
             if (
                 unit.candidate
                 and factors[number] > best.get(unit.candidate.key, (-np.inf,))[0]

@@ -213,7 +213,7 @@ def mechanism_columns(
             else {}
         )
         shares = [
-            explained.get(name, 0.0) / float(problem.statistics.squares[0])
+            explained.get(name, 0.0) / float(problem.statistics.residual_squares[0])
             for name in mechanisms
         ]
     columns: dict[str, np.ndarray | list[str]] = {
