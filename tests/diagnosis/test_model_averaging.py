@@ -8,14 +8,14 @@ import pytest
 from made_problems import made_problem, made_rows, made_unit
 from scipy.optimize import minimize
 
-from elastocal.diagnosis.evidence import Joint
+from elastocal.diagnosis.evidence import ModelDensity
 from elastocal.diagnosis.model_averaging import (
     average_models,
     compute_explained_squares,
     compute_extra_squares,
     is_expected_to_help,
 )
-from elastocal.diagnosis.search import Model, Posterior
+from elastocal.diagnosis.search import Posterior, ScoredModel
 from elastocal.diagnosis.settings import Settings
 
 SETTINGS = Settings()
@@ -75,7 +75,7 @@ def test_moments_of_a_unit_are_averaged_over_its_sizes_and_the_pose_error(made):
     problem = line.problem
     unit = UNITS[0]
     base = problem.statistics.log_likelihood + problem.log_pose
-    ((mean, variance),) = Joint(
+    ((mean, variance),) = ModelDensity(
         problem.statistics, [unit], problem.grid, base, np.array([2])
     ).moments()
     weights = []
@@ -110,7 +110,7 @@ def test_moments_of_a_unit_are_averaged_over_its_sizes_and_the_pose_error(made):
 
 def posterior_of(*entries):
     models = tuple(
-        Model(units, 0.0, np.array(scales, float), tau)
+        ScoredModel(units, 0.0, np.array(scales, float), tau)
         for units, scales, tau, _ in entries
     )
     return Posterior(models, np.array([probability for *_, probability in entries]))
@@ -243,7 +243,7 @@ def test_squares_beyond_the_others_are_what_is_left_where_the_others_fit_them_wi
     nothing else is in the model."""
     rows, _ = made
     problem, _ = made_problem(rows, UNITS, tau=TAU)
-    model = Model((0, 2), 0.0, np.array([0.3, 0.1]), 0.0)
+    model = ScoredModel((0, 2), 0.0, np.array([0.3, 0.1]), 0.0)
     coefficients = most_probable(rows, problem, model)
     gram = projected_gram(rows)
     mine = UNITS[0].columns
@@ -262,7 +262,9 @@ def test_squares_beyond_the_others_are_what_is_left_where_the_others_fit_them_wi
     assert beyond == pytest.approx(minimize(left, np.zeros(len(others))).fun, rel=1e-6)
     assert 0.0 < beyond < whole
     assert compute_extra_squares(
-        problem, Model((0,), 0.0, np.array([0.3]), 0.0), {"a"}
+        problem, ScoredModel((0,), 0.0, np.array([0.3]), 0.0), {"a"}
     )[0][1] == pytest.approx(
-        compute_explained_squares(problem, Model((0,), 0.0, np.array([0.3]), 0.0))["a"]
+        compute_explained_squares(
+            problem, ScoredModel((0,), 0.0, np.array([0.3]), 0.0)
+        )["a"]
     )

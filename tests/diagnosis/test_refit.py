@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from elastocal.diagnosis.linearize import linearized
 from planted import planted
 
+from elastocal.diagnosis.candidate_design import build_candidate_design
 from elastocal.diagnosis.refit import fit_selected_effects, select_effects
 from elastocal.diagnosis.search import posterior
 from elastocal.diagnosis.settings import Settings

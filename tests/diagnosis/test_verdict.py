@@ -11,7 +11,7 @@ from planted import planted
 
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.model_averaging import ModelAverage, compute_extra_squares
-from elastocal.diagnosis.search import Alarm, Model, Posterior
+from elastocal.diagnosis.search import Alarm, Posterior, ScoredModel
 from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.verdict import (
     ADEQUATE,

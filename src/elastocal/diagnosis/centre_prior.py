@@ -39,7 +39,7 @@ def choose_centre_prior(part: Kept, settings: Settings) -> Kept:
     stated = apply_stated_centre_prior(part.declared.model)
     if stated is part.declared.model:
         return part
-    line = build_candidate_design(part.declared, part.searched, (), settings)
+    line = build_candidate_design(part.declared, part.search_sample, (), settings)
     lines = [line, line.alike(reference_fit=replace(line.reference_fit, model=stated))]
     wide, narrow = (
         _log_evidence(each, compute_cross_products(each._fitted[0], *each.priors))
@@ -49,7 +49,10 @@ def choose_centre_prior(part: Kept, settings: Settings) -> Kept:
     # mechanism explains what it leaves.
     if wide > narrow:
         every = build_candidate_design(
-            part.declared, part.searched, list(part.case.candidates.values()), settings
+            part.declared,
+            part.search_sample,
+            list(part.case.candidates.values()),
+            settings,
         )
         lines = [each.alike(tried=every.tried, against=every.against) for each in lines]
         wide, narrow = (
@@ -58,7 +61,7 @@ def choose_centre_prior(part: Kept, settings: Settings) -> Kept:
         if wide > narrow:
             return part
     fitted = fit(
-        stated, part.searched, part.noise, part.declared.estimate, reweighted=True
+        stated, part.search_sample, part.noise, part.declared.estimate, reweighted=True
     )
     return replace(
         part,

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.diagnosis.candidate_design import build_candidate_design
 from elastocal.diagnosis.gross_errors import find_gross_errors
 from elastocal.diagnosis.initial_outliers import find_unexplained_observations
-from elastocal.diagnosis.linearize import linearized
 from elastocal.fitting.least_squares import LONG, ON_THE_WAY, evaluated, fit
 from elastocal.fitting.noise import Noise, estimated_noise, fit_declared
 from elastocal.fitting.observations import (
@@ -124,7 +124,9 @@ def select_initial_subset(case: Case, settings: Settings) -> FittedSubset:
     few[observations.state[measured_in(observations, measurements, pulling)]] = False
     some = select_states(observations, few)
     about = evaluated(part.declared.model, some, part.noise, part.declared.estimate)
-    taken = find_unexplained_observations(linearized(about, some, candidates, settings))
+    taken = find_unexplained_observations(
+        build_candidate_design(about, some, candidates, settings)
+    )
     # A repeat far from its others is in no average, and stays what the declared model
     # says of it.
     looked_at = measured_in(measurements, some, np.ones(len(some), bool))

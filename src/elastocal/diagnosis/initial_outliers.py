@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from elastocal.diagnosis.evidence import Grid
+from elastocal.diagnosis.candidate_design import CandidateDesign
+from elastocal.diagnosis.evidence import SizeGrid
 from elastocal.diagnosis.gross_errors import compute_critical_distance, flag_outliers
-from elastocal.diagnosis.linearize import Linearized
 
 if TYPE_CHECKING:
-    from elastocal.diagnosis.statistics import Products
+    from elastocal.diagnosis.statistics import CrossProducts
 
 
-def find_unexplained_observations(line: Linearized) -> np.ndarray:
+def find_unexplained_observations(line: CandidateDesign) -> np.ndarray:
     """Which observations all candidates together do not explain, ndarray of bool (M,).
 
     The whitened residual has the covariance I + X D X' + W S W', with X the declared
@@ -29,7 +29,7 @@ def find_unexplained_observations(line: Linearized) -> np.ndarray:
     rows = products.rows
     count = products.declared
     observed, own = rows.residual.shape
-    grid = Grid.of_settings(settings)
+    grid = SizeGrid.from_settings(settings)
     kept = np.ones(observed, bool)
     residual = rows.residual.ravel()
     size = np.sqrt(np.exp(grid.log_weights) @ grid.scales**2)
@@ -124,7 +124,10 @@ class _Precision:
 
 
 def _with_pose_error(
-    whole: _Precision, some: _Precision, products: Products, pose_errors_rad: np.ndarray
+    whole: _Precision,
+    some: _Precision,
+    products: CrossProducts,
+    pose_errors_rad: np.ndarray,
 ) -> _Precision:
     """The inverse covariance with an error common to a pose, of the size that makes
     some of the numbers most probable.
@@ -133,7 +136,7 @@ def _with_pose_error(
     """
     rows = products.rows
     jacobian = np.zeros((*rows.residual.shape, int(rows.pose.max()) + 1, products.axes))
-    for seen, part, _, _ in products.by_pose():
+    for seen, part, _, _ in products.iterate_poses():
         jacobian[np.flatnonzero(seen), :, rows.pose[seen]] = part.jacobian
     jacobian = jacobian.reshape(len(whole.residual), -1)
     of_whole = jacobian - sum(

@@ -7,21 +7,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.diagnosis.evidence import Joint
+from elastocal.diagnosis.evidence import ModelDensity
 from elastocal.diagnosis.refit import predict_reduced_chi_square
 from elastocal.diagnosis.search import (
-    UNLIKELY,
-    Model,
+    NEGLIGIBLE_LOG_WEIGHT,
     Posterior,
-    Problem,
-    solve_positive,
+    ScoredModel,
+    SearchProblem,
+    solve_positive_definite,
 )
-from elastocal.diagnosis.statistics import Statistics, normal_equations
+from elastocal.diagnosis.statistics import (
+    SufficientStatistics,
+    assemble_normal_equations,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-    from elastocal.diagnosis.linearize import Linearized
+    from elastocal.diagnosis.candidate_design import CandidateDesign
     from elastocal.effects.protocol import Candidate
 
     # Effects with normal priors on their parameters, and values of their shapes.
@@ -46,9 +49,9 @@ class ModelAverage:
 
 
 def average_models(
-    linearized: Linearized,
+    linearized: CandidateDesign,
     posterior: Posterior,
-    best: Model,
+    best: ScoredModel,
     owners: Sequence[tuple[str, str]],
 ) -> ModelAverage:
     """Average over the models of a posterior.
@@ -66,7 +69,9 @@ def average_models(
     if best.units:
         density = _joint(problem, best, some, base).by_pose_error
         of_models = np.isin(some.pose_error_rad, list(sizes))
-        kept = np.flatnonzero((density > density.max() + UNLIKELY) | of_models)
+        kept = np.flatnonzero(
+            (density > density.max() + NEGLIGIBLE_LOG_WEIGHT) | of_models
+        )
         some = some.at(kept)
         base = base[kept]
     each = [
@@ -107,7 +112,9 @@ def average_models(
     return ModelAverage(shift, std_error, of_prior)
 
 
-def is_expected_to_help(problem: Problem, posterior: Posterior, model: Model) -> bool:
+def is_expected_to_help(
+    problem: SearchProblem, posterior: Posterior, model: ScoredModel
+) -> bool:
     """Whether predictions are expected to be better with a model of the posterior than
     without it, at poses like the measured.
 
@@ -128,7 +135,7 @@ def is_expected_to_help(problem: Problem, posterior: Posterior, model: Model) ->
 
 
 def compute_between_model_squares(
-    problem: Problem, posterior: Posterior, model: Model
+    problem: SearchProblem, posterior: Posterior, model: ScoredModel
 ) -> float:
     """How otherwise the models of a posterior predict than one of them: expected sum of
     squares of whitened numbers.
@@ -150,7 +157,7 @@ def compute_between_model_squares(
     )
 
 
-def _likely(posterior: Posterior, best: Model) -> list[tuple[Model, float]]:
+def _likely(posterior: Posterior, best: ScoredModel) -> list[tuple[ScoredModel, float]]:
     """Models that count, and the best, with their probabilities."""
     pairs = zip(posterior.models, posterior.probabilities, strict=True)
     return [
@@ -160,7 +167,9 @@ def _likely(posterior: Posterior, best: Model) -> list[tuple[Model, float]]:
     ]
 
 
-def compute_explained_squares(problem: Problem, model: Model) -> dict[str, float]:
+def compute_explained_squares(
+    problem: SearchProblem, model: ScoredModel
+) -> dict[str, float]:
     """Sum of squares of the whitened displacements that each mechanism of a model
     makes, dict of str to float."""
     mechanisms = dict.fromkeys(
@@ -173,7 +182,7 @@ def compute_explained_squares(problem: Problem, model: Model) -> dict[str, float
 
 
 def compute_extra_squares(
-    problem: Problem, model: Model, mechanisms: Collection[str]
+    problem: SearchProblem, model: ScoredModel, mechanisms: Collection[str]
 ) -> list[tuple[float, float]]:
     """Sum of squares of the displacements that some mechanisms of a model make, and how
     much of it the others cannot make.
@@ -197,25 +206,28 @@ def compute_extra_squares(
         whole = float(coefficients[ours] @ made[ours])
         inner = gram[np.ix_(rest, rest)] + np.diag(deviations[~inside] ** -2.0)
         found.append(
-            (whole, whole - float(made[rest] @ solve_positive(inner, made[rest])))
+            (
+                whole,
+                whole - float(made[rest] @ solve_positive_definite(inner, made[rest])),
+            )
         )
     return found
 
 
-def _predicted(problem: Problem, model: Model) -> np.ndarray:
+def _predicted(problem: SearchProblem, model: ScoredModel) -> np.ndarray:
     """Coefficients of all columns in a model at its most probable sizes, in plausible
     sizes, ndarray (K,)."""
     coefficients = np.zeros(problem.statistics.gram.shape[1])
-    columns, mode, _ = problem.mode_of(model)
+    columns, mode, _ = problem.find_mode(model)
     coefficients[columns] = mode
     return coefficients
 
 
 def _moments(
-    linearized: Linearized,
-    model: Model,
+    linearized: CandidateDesign,
+    model: ScoredModel,
     owners: Sequence[tuple[str, str]],
-    joint: Joint,
+    joint: ModelDensity,
 ) -> dict[tuple[str, str], tuple[float, float]]:
     """Mean and variance of every parameter of one model, by owner and name; declared
     ones up to a constant in the mean."""
@@ -225,16 +237,18 @@ def _moments(
         products.declared,
         problem.columns_of(model.units, model.scales),
     )
-    equations = normal_equations(products, model.pose_error_rad, columns)
+    equations = assemble_normal_equations(products, model.pose_error_rad, columns)
     information = equations[:-1, :-1]
     places = np.arange(declared, len(equations) - 1)
     information[places, places] += deviations**-2.0
     # Declared parameters from the orthonormal basis, less what the candidates' columns
     # have in it.
-    back = products.into_basis @ np.concatenate(
+    back = products.basis_transform @ np.concatenate(
         [np.eye(declared), -products.projected[:, columns]], axis=1
     )
-    solved = solve_positive(information, np.column_stack([back.T, equations[:-1, -1]]))
+    solved = solve_positive_definite(
+        information, np.column_stack([back.T, equations[:-1, -1]])
+    )
     variance = max(predict_reduced_chi_square(problem, model), 1.0) * (
         back * solved[:, :-1].T
     ).sum(axis=1)
@@ -259,10 +273,13 @@ def _moments(
 
 
 def _joint(
-    problem: Problem, model: Model, statistics: Statistics, base: np.ndarray
-) -> Joint:
+    problem: SearchProblem,
+    model: ScoredModel,
+    statistics: SufficientStatistics,
+    base: np.ndarray,
+) -> ModelDensity:
     """Density under a model, at some sizes of the pose error with what each contributes
     alone."""
     places = np.searchsorted(problem.grid.scales, model.scales)
     units = [problem.units[number] for number in model.units]
-    return Joint(statistics, units, problem.grid, base, places)
+    return ModelDensity(statistics, units, problem.grid, base, places)

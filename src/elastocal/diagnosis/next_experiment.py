@@ -24,7 +24,7 @@ import numpy as np
 from scipy.constants import g as standard_gravity
 from scipy.special import ndtr
 
-from elastocal.diagnosis.refit import mean_square_left
+from elastocal.diagnosis.refit import predict_reduced_chi_square
 from elastocal.diagnosis.statistics import assemble_normal_equations
 from elastocal.diagnosis.verdict import (
     ADEQUATE,

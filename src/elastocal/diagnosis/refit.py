@@ -22,8 +22,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.diagnosis.search import (
-    Model,
-    Problem,
+    ScoredModel,
+    SearchProblem,
 )
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.model import parameter_values
@@ -31,7 +31,7 @@ from elastocal.fitting.noise import with_prior
 from elastocal.fitting.normal_equations import whitening
 
 if TYPE_CHECKING:
-    from elastocal.diagnosis.linearize import Linearized
+    from elastocal.diagnosis.candidate_design import CandidateDesign
     from elastocal.effects.protocol import Candidate
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.noise import Noise
@@ -46,7 +46,7 @@ _NOISE_STEPS = 20
 _NOISE_SETTLED = 0.02
 
 
-def select_effects(linearized: Linearized, model: Model) -> SelectedEffects:
+def select_effects(linearized: CandidateDesign, model: ScoredModel) -> SelectedEffects:
     """What a model of the posterior is for the exact fit: without the competitor, which
     predicts nothing."""
     problem = linearized.problem
@@ -102,7 +102,7 @@ def fit_selected_effects(
     )
 
 
-def predict_reduced_chi_square(problem: Problem, model: Model) -> float:
+def predict_reduced_chi_square(problem: SearchProblem, model: ScoredModel) -> float:
     """Mean square of the whitened residual that a model leaves, by the linearised
     problem: 1 where noise accounts for it."""
     statistics = problem.statistics
@@ -145,7 +145,7 @@ def limit_pose_error(fitted: Fit, observations: Observations, pose_rad: float) -
 
 
 def estimate_residual_noise(
-    problem: Problem, model: Model, taken: Noise, least: Noise
+    problem: SearchProblem, model: ScoredModel, taken: Noise, least: Noise
 ) -> Noise:
     """Noise as a model leaves it.
 

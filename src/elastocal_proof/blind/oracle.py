@@ -24,7 +24,6 @@ from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from elastocal.diagnosis.linearize import linearized
 from scipy.stats import chi2
 
 from elastocal.diagnosis.candidate_design import build_candidate_design
@@ -32,7 +31,7 @@ from elastocal.diagnosis.diagnose import Step
 from elastocal.diagnosis.evidence import log_sum_exp
 from elastocal.diagnosis.judge import compare_held_out_errors
 from elastocal.diagnosis.refit import fit_selected_effects
-from elastocal.diagnosis.search import initial_screening
+from elastocal.diagnosis.search import screen_terms
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.model import Case
 from elastocal.fitting.noise import fit_declared, noise_from
