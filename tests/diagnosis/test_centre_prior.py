@@ -9,7 +9,7 @@ from synthetic import NOISE, made_estimate, made_model, seen_exactly, with_noise
 
 from elastocal.campaigns.campaign import Target
 from elastocal.diagnosis.centre_prior import choose_centre_prior
-from elastocal.diagnosis.gross_errors import Kept
+from elastocal.diagnosis.fitted_subset import FittedSubset
 from elastocal.diagnosis.settings import Settings
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.least_squares import fit
@@ -52,7 +52,7 @@ def kept(robot, off=0.0, payload_kg=0.0):
     seen = with_noise(seen, np.random.default_rng(6))
     noise = replace(NOISE, joint_rad=np.zeros(6))
     declared = fit(model, seen, noise)
-    return Kept(
+    return FittedSubset(
         Case(None, seen, model, candidates),
         np.ones(len(seen), bool),
         noise,

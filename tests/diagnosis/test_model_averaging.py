@@ -126,10 +126,13 @@ def test_declared_parameters_are_averaged_over_all_models(made):
     variances = []
     for model in found.models:
         columns = np.concatenate(
-            [np.zeros(0, int), *(UNITS[number].columns for number in model.units)]
+            [
+                np.zeros(0, int),
+                *(UNITS[number].columns for number in model.term_indices),
+            ]
         )
         deviations = np.repeat(
-            model.scales, [len(UNITS[number].columns) for number in model.units]
+            model.scales, [len(UNITS[number].columns) for number in model.term_indices]
         )
         mean, covariance = regression(rows, model.pose_error_rad, columns, deviations)
         means.append(mean[:4])
@@ -183,10 +186,14 @@ def most_probable(rows, problem, model):
     """Coefficients of a model, dense: at its sizes, and at the pose error that is then
     most probable."""
     columns = np.concatenate(
-        [np.zeros(0, int), *(problem.units[number].columns for number in model.units)]
+        [
+            np.zeros(0, int),
+            *(problem.terms[number].columns for number in model.term_indices),
+        ]
     )
     deviations = np.repeat(
-        model.scales, [len(problem.units[number].columns) for number in model.units]
+        model.scales,
+        [len(problem.terms[number].columns) for number in model.term_indices],
     )
     W = rows.candidates[:, columns] * deviations
     y = rows.residual - rows.expected

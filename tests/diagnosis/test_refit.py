@@ -9,7 +9,7 @@ from planted import planted
 
 from elastocal.diagnosis.candidate_design import build_candidate_design
 from elastocal.diagnosis.refit import fit_selected_effects, select_effects
-from elastocal.diagnosis.search import posterior
+from elastocal.diagnosis.search import search_models
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import linearize

@@ -19,12 +19,12 @@ from elastocal.effects.gravity import DECLARED_WEIGHT
 from elastocal.fitting.least_squares import fit
 
 if TYPE_CHECKING:
-    from elastocal.diagnosis.gross_errors import Kept
+    from elastocal.diagnosis.fitted_subset import FittedSubset
     from elastocal.diagnosis.settings import Settings
     from elastocal.fitting.model import Model
 
 
-def choose_centre_prior(part: Kept, settings: Settings) -> Kept:
+def choose_centre_prior(part: FittedSubset, settings: Settings) -> FittedSubset:
     """The kept part of a case, fitted with the prior of its centres of mass that is
     more probable; itself without masses.
 
@@ -49,10 +49,7 @@ def choose_centre_prior(part: Kept, settings: Settings) -> Kept:
     # mechanism explains what it leaves.
     if wide > narrow:
         every = build_candidate_design(
-            part.declared,
-            part.search_sample,
-            list(part.case.candidates.values()),
-            settings,
+            part.declared, part.search_sample, list(part.case.candidates.values()), settings
         )
         lines = [each.alike(tried=every.tried, against=every.against) for each in lines]
         wide, narrow = (

@@ -12,6 +12,8 @@ from elastocal.counting import counted
 from elastocal.data_checks.faults import compliance_warnings, faults
 from elastocal.data_checks.protocol import Fault
 from elastocal.diagnosis import model_averaging, refit, verdict
+from elastocal.diagnosis.candidate_design import build_candidate_design, refine_shapes
+from elastocal.diagnosis.centre_prior import choose_centre_prior
 from elastocal.diagnosis.fitted_subset import (
     FittedSubset,
     fit_subset,
@@ -211,7 +213,10 @@ def diagnose(
             # that is kept.
             line = found.linearized
             left = refit.estimate_residual_noise(
-                line.problem, found.posterior.nothing, line.about.noise, declared.noise
+                line.problem,
+                found.posterior.empty_model,
+                line.reference_fit.noise,
+                declared.noise,
             )
             alone = (
                 fit(
@@ -501,7 +506,7 @@ def _document(
         other = model_averaging.compute_between_model_squares(
             problem, found.posterior, kept
         )
-        tested = {unit.candidate.key for unit in problem.units if unit.candidate}
+        tested = {unit.candidate.key for unit in problem.terms if unit.candidate}
         stated = {
             "verdict": conclusion.verdict,
             "effects": entries,

@@ -27,7 +27,7 @@ def find_unexplained_observations(line: CandidateDesign) -> np.ndarray:
     products = line.products
     settings = line.settings
     rows = products.rows
-    count = products.declared
+    count = products.declared_count
     observed, own = rows.residual.shape
     grid = SizeGrid.from_settings(settings)
     kept = np.ones(observed, bool)
@@ -36,9 +36,9 @@ def find_unexplained_observations(line: CandidateDesign) -> np.ndarray:
     limit = compute_critical_distance(observed, own, settings)
     basis, candidates = (
         part.reshape(len(residual), -1)
-        for part in (products.beside[..., :-1], rows.candidates.dense())
+        for part in (products.basis_and_residual[..., :-1], rows.candidates.dense())
     )
-    candidates -= basis @ products.projected[:, :-1]
+    candidates -= basis @ products.projections[:, :-1]
     whole = _Precision(
         (), np.tile(np.eye(own), (observed, 1, 1)), residual, residual
     ).less(basis, np.eye(count))
@@ -55,7 +55,7 @@ def find_unexplained_observations(line: CandidateDesign) -> np.ndarray:
         kept[worst] = False
         some = some.without(np.arange(worst * own, (worst + 1) * own))
     if not kept.all():
-        whole = _with_pose_error(whole, some, products, line.pose_errors_rad)
+        whole = _with_pose_error(whole, some, products, line.candidate_pose_errors_rad)
     while not kept.all():
         out = np.flatnonzero(np.repeat(~kept, own))
         some = whole.without(out)

@@ -66,7 +66,7 @@ def average_models(
     # that count.
     some = problem.statistics
     base = problem.statistics.log_likelihood + problem.log_pose
-    if best.units:
+    if best.term_indices:
         density = _joint(problem, best, some, base).by_pose_error
         of_models = np.isin(some.pose_error_rad, list(sizes))
         kept = np.flatnonzero(
@@ -100,7 +100,7 @@ def average_models(
     least = np.sqrt(problem.settings.prior_share)
     of_prior = frozenset(
         (unit.candidate.key, parameter.name)
-        for unit in (problem.units[number] for number in best.units)
+        for unit in (problem.terms[number] for number in best.term_indices)
         if unit.candidate
         for parameter, size in zip(
             unit.candidate.parameters,
@@ -145,9 +145,9 @@ def compute_between_model_squares(
     """
     gram = problem.statistics.gram[0]
     mine = _predicted(problem, model)
-    for number in model.units:
-        if problem.units[number].candidate is None:
-            mine[problem.units[number].columns] = 0.0
+    for number in model.term_indices:
+        if problem.terms[number].candidate is None:
+            mine[problem.terms[number].columns] = 0.0
     off = [
         (probability, _predicted(problem, other) - mine)
         for other, probability in _likely(posterior, model)
@@ -173,7 +173,7 @@ def compute_explained_squares(
     """Sum of squares of the whitened displacements that each mechanism of a model
     makes, dict of str to float."""
     mechanisms = dict.fromkeys(
-        problem.units[number].mechanism for number in model.units
+        problem.terms[number].mechanism for number in model.term_indices
     )
     return {
         mechanism: compute_extra_squares(problem, model, {mechanism})[0][0]
@@ -193,10 +193,10 @@ def compute_extra_squares(
     """
     coefficients = _predicted(problem, model)
     gram = problem.statistics.gram[0]
-    columns, deviations = problem.columns_of(model.units, model.scales)
-    units = [problem.units[number] for number in model.units]
-    _, mine = problem.columns_of(
-        model.units, [unit.mechanism in mechanisms for unit in units]
+    columns, deviations = problem.scaled_columns(model.term_indices, model.scales)
+    units = [problem.terms[number] for number in model.term_indices]
+    _, mine = problem.scaled_columns(
+        model.term_indices, [unit.mechanism in mechanisms for unit in units]
     )
     found = []
     for inside in (mine, ~mine):
@@ -234,8 +234,8 @@ def _moments(
     products = linearized.products
     problem = linearized.problem
     declared, (columns, deviations) = (
-        products.declared,
-        problem.columns_of(model.units, model.scales),
+        products.declared_count,
+        problem.scaled_columns(model.term_indices, model.scales),
     )
     equations = assemble_normal_equations(products, model.pose_error_rad, columns)
     information = equations[:-1, :-1]
@@ -244,7 +244,7 @@ def _moments(
     # Declared parameters from the orthonormal basis, less what the candidates' columns
     # have in it.
     back = products.basis_transform @ np.concatenate(
-        [np.eye(declared), -products.projected[:, columns]], axis=1
+        [np.eye(declared), -products.projections[:, columns]], axis=1
     )
     solved = solve_positive_definite(
         information, np.column_stack([back.T, equations[:-1, -1]])
@@ -255,8 +255,10 @@ def _moments(
     found = dict(
         zip(owners, zip(back @ solved[:, -1], variance, strict=True), strict=True)
     )
-    for number, (value, spread) in zip(model.units, joint.moments(), strict=True):
-        unit = problem.units[number]
+    for number, (value, spread) in zip(
+        model.term_indices, joint.moments(), strict=True
+    ):
+        unit = problem.terms[number]
         if unit.candidate:
             names = [
                 (unit.candidate.key, parameter.name)
@@ -281,5 +283,5 @@ def _joint(
     """Density under a model, at some sizes of the pose error with what each contributes
     alone."""
     places = np.searchsorted(problem.grid.scales, model.scales)
-    units = [problem.units[number] for number in model.units]
+    units = [problem.terms[number] for number in model.term_indices]
     return ModelDensity(statistics, units, problem.grid, base, places)

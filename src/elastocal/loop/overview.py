@@ -17,6 +17,7 @@ from elastocal.campaigns.campaign import columns_of
 from elastocal.campaigns.holdout import measured_poses
 from elastocal.counting import counted, first_names
 from elastocal.data_checks.faults import controller_warnings, faults
+from elastocal.diagnosis.candidate_design import build_candidate_design
 from elastocal.diagnosis.fitted_subset import select_initial_subset
 from elastocal.diagnosis.gross_errors import (
     describe_gross_errors,
@@ -92,7 +93,7 @@ def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
         part.case.campaign,
         part.fit_to_all(part.declared),
     )
-    untestable = linearized(
+    untestable = build_candidate_design(
         part.declared, part.search_sample, [*case.candidates.values()], settings
     ).untestable
     testable = len(case.candidates) - len(untestable)
