@@ -49,7 +49,10 @@ def choose_centre_prior(part: FittedSubset, settings: Settings) -> FittedSubset:
     # mechanism explains what it leaves.
     if wide > narrow:
         every = build_candidate_design(
-            part.declared, part.search_sample, list(part.case.candidates.values()), settings
+            part.declared,
+            part.search_sample,
+            list(part.case.candidates.values()),
+            settings,
         )
         lines = [each.alike(tried=every.tried, against=every.against) for each in lines]
         wide, narrow = (
