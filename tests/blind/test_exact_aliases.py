@@ -6,6 +6,7 @@ import pytest
 from analysed_robots import ROBOTS
 
 from elastocal.campaigns.campaign import columns_of
+from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import effect_columns, linearize
 from elastocal.fitting.model import case_from
@@ -64,7 +65,7 @@ def seen(request, tmp_path_factory):
     )
     make_case(made, folder / "blind", folder / "sealed", ROBOTS)
     descriptions, training, _ = load_campaign(
-        (folder / "blind" / made.name).as_posix(), ROBOTS.as_posix()
+        read_campaign_folder(folder / "blind" / made.name, ROBOTS)
     )
     case = case_from(descriptions, columns_of(training))
     declared = fit(case.model, case.observations, estimated_noise(case)[0])
