@@ -9,7 +9,7 @@ from elastocal.campaigns import reading
 from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, columns_of
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.holdout import split
-from elastocal.effects.catalogue import effects
+from elastocal.effects.catalogue import list_effects
 from elastocal.io.json_files import write_json
 from elastocal.io.origin import provenance
 from elastocal.io.plugins import REGRESSIONS, plugin_names
@@ -68,7 +68,7 @@ def load_campaign(
     descriptions, campaign = described_campaign(folder)
     training, held_out = split(campaign)
     held_out_descriptions = None
-    held_out_campaign = reading.read_held_out_campaign(folder, effects())
+    held_out_campaign = reading.read_held_out_campaign(folder, list_effects())
     if folder.held_out_folder is not None and held_out_campaign is not None:
         held_out_descriptions = _descriptions(folder.held_out_folder, held_out_campaign)
         held_out = held_out_campaign.measurements
@@ -78,7 +78,7 @@ def load_campaign(
 def described_campaign(folder: CampaignFolder) -> tuple[dict[str, Any], Campaign]:
     """Read a campaign with its descriptions as `load_campaign`, but undivided and
     without the campaign that validates it."""
-    campaign = reading.read_campaign(folder, effects())
+    campaign = reading.read_campaign(folder, list_effects())
     return _descriptions(folder, campaign), campaign
 
 
