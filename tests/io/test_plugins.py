@@ -87,6 +87,7 @@ from pathlib import Path
 
 import numpy as np
 
+from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.importers import importer
 from elastocal.campaigns.reading import read_campaign, read_robot
 from elastocal.effects.catalogue import candidates_on, list_bundled_effects, list_effects
@@ -103,11 +104,15 @@ source = importer("workshop", config, "a test")
 rows = np.hstack([np.arange(72.0).reshape(12, 6), np.arange(36.0).reshape(12, 3)])
 np.savetxt(folder / "values.txt", rows)
 source.write_campaign([folder / "values.txt"], folder / "campaign", robots, "workshop")
-measurements = read_campaign(folder / "campaign", robots).measurements
+measurements = read_campaign(
+    read_campaign_folder(folder / "campaign", robots)
+).measurements
 document = folder / "campaign" / "campaign.yaml"
 text = document.read_text(encoding="utf-8")
 document.write_text(f"{text}remainder: mean_residual\\n", encoding="utf-8")
-descriptions, _, _ = load_campaign((folder / "campaign").as_posix(), robots)
+descriptions, _, _ = load_campaign(
+    read_campaign_folder(folder / "campaign", robots)
+)
 controller = find_controller("lines")
 turning = (False, False)
 targets = targets_of(np.zeros((1, 2)), turning, axes_of(controller, turning, ""))

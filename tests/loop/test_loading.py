@@ -5,7 +5,8 @@ from made_folders import made_folder
 from support import refused
 
 from elastocal.campaigns.campaign_folder import read_campaign_folder
-from elastocal.loop.loading import load_campaign
+from elastocal.loop.loading import REMAINDERS, load_campaign
+from elastocal.remainder.regressions import REGRESSIONS
 
 
 def test_descriptions_hold_what_a_campaign_may_leave_out(kuka, config_folder, tmp_path):
@@ -36,7 +37,7 @@ def test_a_regression_that_neither_the_package_nor_a_plug_in_has_is_refused(
     document["remainder"] = "tea_leaves"
     path.write_text(yaml.safe_dump(document), encoding="utf-8")
     with refused(path, "remainder", "ridge_harmonics"):
-        load_campaign(folder.as_posix(), config_folder / "robots")
+        load_campaign(read_campaign_folder(folder.as_posix(), config_folder / "robots"))
 
 
 def test_the_names_that_remainder_may_have_are_those_of_the_regressions():

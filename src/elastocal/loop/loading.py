@@ -10,6 +10,7 @@ from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, columns_of
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.holdout import split
 from elastocal.effects.catalogue import list_effects
+from elastocal.errors import InputError
 from elastocal.io.json_files import write_json
 from elastocal.io.origin import provenance
 from elastocal.io.plugins import REGRESSIONS, plugin_names
@@ -83,6 +84,7 @@ def described_campaign(folder: CampaignFolder) -> tuple[dict[str, Any], Campaign
 
 
 def _descriptions(folder: CampaignFolder, campaign: Campaign) -> dict[str, Any]:
+    _check_remainder(folder.document.get("remainder", "auto"), folder.source)
     # Optional keys get their defaults here, so that no later step has to know them.
     defaults = {"compliance": "nominal", "declared": [], "holdout": DEFAULT_HOLDOUT}
     table = {"table": campaign.table, "header_line": campaign.header_line}
@@ -91,3 +93,11 @@ def _descriptions(folder: CampaignFolder, campaign: Campaign) -> dict[str, Any]:
         "campaign": defaults | folder.document | table,
         "robot": folder.robot_document,
     }
+
+
+def _check_remainder(name: str, source: str) -> None:
+    """Refuse a regression that neither this package nor a plug-in has."""
+    # Names alone: reading a campaign must not load the regressions themselves.
+    allowed = [*REMAINDERS, *plugin_names(REGRESSIONS)]
+    if name not in allowed:
+        raise InputError(source, "remainder", repr(name), ", ".join(allowed))
