@@ -8,7 +8,7 @@ from made_folders import made_folder
 from scipy.spatial.transform import Rotation
 
 from elastocal.diagnosis.misplaced import misplaced, point_sentence
-from elastocal.fitting.noise import estimated_noise, fit_declared
+from elastocal.fitting.noise import estimate_noise, fit_declared_model
 from elastocal.loop.overview import overview
 from elastocal.loop.whole import cases_in
 from elastocal.mechanics.kinematics import poses
@@ -72,7 +72,7 @@ def misdeclared_folder(folder, robot, name, place, shift_m, poses_measured=40, s
 def findings(folder):
     case, _ = cases_in(folder, ROBOTS)
     return misplaced(
-        fit_declared(case.model, case.observations, estimated_noise(case)[0]),
+        fit_declared_model(case.model, case.observations, estimate_noise(case)[0]),
         case.campaign,
     )
 

@@ -8,7 +8,7 @@ from elastocal.campaigns.campaign import columns_of
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import residual_blocks
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.model import case_from
+from elastocal.fitting.model import build_case
 from elastocal.io.json_files import write_json
 from elastocal.io.storage import write_table
 from elastocal.loop import diagnosis_tables as tables
@@ -58,7 +58,7 @@ def diagnosed_campaign(top, robot, effects=(), **design):
             {},
         )
     write_json(results / "campaign.json", descriptions)
-    case, unseen = (case_from(descriptions, columns_of(part)) for part in parts)
+    case, unseen = (build_case(descriptions, columns_of(part)) for part in parts)
     found = diagnose(case, Settings(), 1)
     write_json(
         results / "diagnosis.json",

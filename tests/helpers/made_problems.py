@@ -9,7 +9,7 @@ from elastocal.diagnosis.hypotheses import OTHER, OWN, Law, Unit
 from elastocal.diagnosis.search import Problem
 from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.statistics import WhiteRows, products_of, statistics_of
-from elastocal.fitting.linearization import Factored
+from elastocal.fitting.linearization import FactoredSensitivities
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Rows:
         declared, jacobian, candidates = (
             part[:, None] for part in (self.declared, self.jacobian, self.candidates)
         )
-        made = Factored.of(
+        made = FactoredSensitivities.of(
             [{column: np.ones(rows)} for column in range(columns)],
             candidates,
             np.arange(rows),

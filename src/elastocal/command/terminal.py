@@ -30,7 +30,7 @@ _RADIANS = {
     "µrad": 1e-6,
 }
 _QUANTITY = re.compile(r"(\d+(?:\.\d*)?|\.\d+)\s*([a-zµ°]+)")
-# m and rad: no instrument repeats better (`fitting.noise.FINEST`).
+# m and rad: no instrument repeats better (`fitting.noise.FINEST_RESOLUTION`).
 _LEAST = 1e-8
 # Trackers stand at up to a hundred metres, targets within an arm's reach of where they
 # are fixed, as in a campaign.

@@ -30,13 +30,17 @@ from elastocal.diagnosis.linearize import (
 from elastocal.diagnosis.search import alarm_of, initial_screening, posterior
 from elastocal.diagnosis.verdict import Evidence
 from elastocal.effects.catalogue import effects
-from elastocal.fitting.least_squares import ON_THE_WAY, SETTLED, fit
-from elastocal.fitting.model import Case, joint_compliances, parameter_values
-from elastocal.fitting.noise import effective_parameters, noise_facts
+from elastocal.fitting.least_squares import (
+    CONVERGENCE_TOLERANCE,
+    INTERMEDIATE_TOLERANCE,
+    fit_model,
+)
+from elastocal.fitting.model import Case, get_joint_compliances, get_parameter_values
+from elastocal.fitting.noise import count_effective_parameters, serialize_noise
 from elastocal.fitting.observations import Observations
 from elastocal.random_streams import stream
 from elastocal.remainder.repeatable import Repeatable, repeatable_part
-from elastocal.validation.held_out import left_out_squares
+from elastocal.validation.held_out import predict_left_out_squares
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -137,7 +141,9 @@ def diagnose(
         # The model found looks at all rows once more, without these, before another
         # search is made.
         some = searched_of(case, case.select(remaining), settings)
-        about = fit(about.model, some, about.noise, about.estimate, True, ON_THE_WAY)
+        about = fit_model(
+            about.model, some, about.noise, about.estimate, True, INTERMEDIATE_TOLERANCE
+        )
         errors = gross_errors(about, part.noise, measurements, remaining, settings)
         good |= ~remaining & ~errors.gross
         last = part
@@ -147,20 +153,20 @@ def diagnose(
         tell(
             f"{counted((~part.kept).sum(), 'gross error')} in {counted(len(good), 'row')}: once more without"
         )
-        if noise_facts(part.noise) == noise_facts(last.noise):
+        if serialize_noise(part.noise) == serialize_noise(last.noise):
             again = about
             if (part.kept != remaining).any():
-                again = fit(
+                again = fit_model(
                     about.model,
                     part.searched,
                     about.noise,
                     about.estimate,
                     True,
-                    ON_THE_WAY,
+                    INTERMEDIATE_TOLERANCE,
                 )
             moved = np.subtract(
                 *(
-                    parameter_values(each.model, each.estimate)
+                    get_parameter_values(each.model, each.estimate)
                     for each in (again, found.fitted)
                 )
             )
@@ -183,8 +189,11 @@ def diagnose(
     case = part.case
     noise = part.noise
     declared = part.to_all(part.declared)
-    bare = fit(
-        replace(case.model, effects=()), case.observations, noise, settled=ON_THE_WAY
+    bare = fit_model(
+        replace(case.model, effects=()),
+        case.observations,
+        noise,
+        tolerance=INTERMEDIATE_TOLERANCE,
     )
     steps = [
         Step("frames and targets", "frames", bare),
@@ -215,12 +224,12 @@ def diagnose(
                 line.problem, found.posterior.nothing, line.about.noise, declared.noise
             )
             alone = (
-                fit(
+                fit_model(
                     declared.model,
                     case.observations,
                     left,
                     declared.estimate,
-                    reweighted=True,
+                    reweight_first_step=True,
                 )
                 if named
                 else final
@@ -236,7 +245,7 @@ def diagnose(
         if found.adopted:
             steps += _effect_steps(part, final, found)
         elif lost and lost[0]:
-            kept = fit(
+            kept = fit_model(
                 bare.model, case.observations, steps[-1].fitted.noise, bare.estimate
             )
             steps.append(Step("frames and targets, kept", "kept", kept))
@@ -288,11 +297,11 @@ def _losses(
     for fitted, name in zip(
         models, ("declared model", "model with the effects found"), strict=False
     ):
-        effective = effective_parameters(fitted)
+        effective = count_effective_parameters(fitted)
         words = ""
         if fitted.residual.size < settings.numbers_a_parameter * effective:
             mine, others = (
-                left_out_squares(each, observations) for each in (fitted, bare)
+                predict_left_out_squares(each, observations) for each in (fitted, bare)
             )
             off = mine - others
             if off.mean() > off.std(ddof=1) / np.sqrt(len(off)):
@@ -330,10 +339,19 @@ def _explained(
     about, before = start or (declared, None)
     tested: tuple[Fit, Repeatable | None] | None = None
     # The fit to all measurements starts where that to some ends.
-    enough = SETTLED if searched is part.case.observations else ON_THE_WAY
+    enough = (
+        CONVERGENCE_TOLERANCE
+        if searched is part.case.observations
+        else INTERMEDIATE_TOLERANCE
+    )
     if start:
-        about = fit(
-            about.model, searched, about.noise, about.estimate, True, ON_THE_WAY
+        about = fit_model(
+            about.model,
+            searched,
+            about.noise,
+            about.estimate,
+            True,
+            INTERMEDIATE_TOLERANCE,
         )
     for round_number in range(1 if start else 0, settings.linearizations):
         problem = linearized(about, searched, candidates, settings, most_pose_error_rad)
@@ -374,7 +392,7 @@ def _explained(
             noise,
             refit.selected(problem, model),
             near,
-            settled=enough,
+            tolerance=enough,
         )
         off = noise.position_m > settings.relinearize_noise * taken.position_m
         small = not named or alarm.statistic < settings.relinearize_above
@@ -402,7 +420,9 @@ def _explained(
             most_pose_error_rad = settings.pose_repeatability_rad
             if large:
                 noise = refit.noise_beside(about, searched, most_pose_error_rad)
-                about = fit(about.model, searched, noise, about.estimate, True, enough)
+                about = fit_model(
+                    about.model, searched, noise, about.estimate, True, enough
+                )
         before = named
         if round_number + 1 < settings.linearizations:
             # The next problem takes the room of this one.
@@ -418,7 +438,7 @@ def _effect_steps(part: Kept, final: Fit, found: Evidence) -> list[Step]:
     """
     model = found.posterior.models[found.conclusion.best.model]
     chosen = [
-        (effect, final.values_of(effect.key)[1])
+        (effect, final.effect_values(effect.key)[1])
         for effect, _ in refit.selected(found.linearized, model)
     ]
     explained = refit.squares_explained(found.linearized.problem, model)
@@ -441,7 +461,7 @@ def _effect_steps(part: Kept, final: Fit, found: Evidence) -> list[Step]:
             final.noise,
             some,
             steps[0].fitted,
-            settled=ON_THE_WAY,
+            tolerance=INTERMEDIATE_TOLERANCE,
         )
         steps.insert(0, Step(f"with {alone[number - 1]}", "effect", fitted))
     return steps
@@ -521,7 +541,7 @@ def _document(
             )
     return stated | {
         "campaign": case.campaign.name,
-        "noise": noise_facts(noise)
+        "noise": serialize_noise(noise)
         | {
             "pose_rad": final.noise.pose_rad,
             "factor": final.noise.position_m / noise.position_m,
@@ -534,7 +554,9 @@ def _document(
         "held": sorted(
             {
                 f"{o} {p.name}"
-                for (o, p), held in zip(final.parameters, final.held, strict=True)
+                for (o, p), held in zip(
+                    final.parameters, final.unidentifiable, strict=True
+                )
                 if held
             }
         ),
@@ -550,11 +572,11 @@ def _compliances(
     declared: Fit, final: Fit, springs: refit.Averaged, prior_share: float
 ) -> dict[str, list[float]]:
     joints = final.model.sites.joints
-    after = joint_compliances(final.model, final.estimate).copy()
+    after = get_joint_compliances(final.model, final.estimate).copy()
     deviations = np.zeros(joints)
     identified = np.zeros(joints, bool)
     if final.model.identifies_compliance:
-        mine = final.places_of("joint_compliance")
+        mine = final.parameter_indices("joint_compliance")
         names = [
             ("joint_compliance", final.parameters[index][1].name) for index in mine
         ]
@@ -569,11 +591,11 @@ def _compliances(
         # With a prior of the size that such a spring reaches, of which that share would
         # be left.
         plausible = np.array([final.parameters[index][1].plausible for index in mine])
-        identified = ~final.held[mine] & (
+        identified = ~final.unidentifiable[mine] & (
             deviations**2 < prior_share * (deviations**2 + plausible**2)
         )
     found = {
-        "before": joint_compliances(declared.model, declared.estimate),
+        "before": get_joint_compliances(declared.model, declared.estimate),
         "after": after,
         "std_error": deviations,
     }

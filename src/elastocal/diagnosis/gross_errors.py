@@ -25,20 +25,29 @@ from elastocal.counting import counted
 from elastocal.diagnosis.evidence import Grid
 from elastocal.diagnosis.linearize import Linearized, linearized
 from elastocal.effects.conditions import at_states
-from elastocal.fitting.least_squares import LONG, ON_THE_WAY, evaluated, fit
-from elastocal.fitting.linearization import by_coordinates, linearize
-from elastocal.fitting.model import conditions, parameters, residuals
-from elastocal.fitting.noise import Noise, estimated_noise, fit_declared
-from elastocal.fitting.normal_equations import measurement_covariances
+from elastocal.fitting.least_squares import (
+    INTERMEDIATE_TOLERANCE,
+    LARGE_FIT_SIZE,
+    evaluate_as_fit,
+    fit_model,
+)
+from elastocal.fitting.linearization import linearize, linearize_coordinates
+from elastocal.fitting.model import (
+    compute_residuals,
+    evaluate_conditions,
+    list_parameters,
+)
+from elastocal.fitting.noise import Noise, estimate_noise, fit_declared_model
+from elastocal.fitting.normal_equations import compute_measurement_covariances
 from elastocal.fitting.observations import (
     Observations,
-    measured_in,
-    parts_of,
-    sample_of,
+    match_states_and_targets,
+    remove_outlying_repeats,
+    sample_observations,
+    select_spread_poses,
     select_states,
-    single_observations,
-    spread_poses,
-    without_outlying_repeats,
+    separate_measurements,
+    split_into_blocks,
 )
 
 if TYPE_CHECKING:
@@ -128,21 +137,25 @@ class _Beside:
     ) -> _Beside:
         """Of rows that are ``kept``, (N,) of bool; ``unsure``: whether parameters are
         so."""
-        single = single_observations(measurements)
+        single = separate_measurements(measurements)
         sample = kept.copy()
-        sample[kept] = spread_poses(select_states(single, kept), _MOST)
-        near = spread_poses(single, _MOST)
+        sample[kept] = select_spread_poses(select_states(single, kept), _MOST)
+        near = select_spread_poses(single, _MOST)
         residual = np.empty((len(single), model.rows))
-        whole = conditions(model, estimate, single.states) if near.all() else None
+        whole = (
+            evaluate_conditions(model, estimate, single.states) if near.all() else None
+        )
 
         def around(part: Observations, states: slice) -> Conditions:
             """Conditions, found once where all rows are looked at closely."""
             if whole is None:
-                return conditions(model, estimate, part.states)
+                return evaluate_conditions(model, estimate, part.states)
             return whole if len(part) == len(single) else at_states(whole, states)
 
-        for states, seen, part in parts_of(single, 0):
-            residual[seen] = residuals(model, estimate, part, around(part, states))
+        for states, seen, part in split_into_blocks(single, 0):
+            residual[seen] = compute_residuals(
+                model, estimate, part, around(part, states)
+            )
         far = np.linalg.norm(
             residual
             / np.repeat([noise.position_m, noise.orientation_rad], 3)[: model.rows],
@@ -151,12 +164,14 @@ class _Beside:
         closely = near | sample | (far > np.quantile(far[near], _SCALE_QUANTILES[-1]))
         some = select_states(single, closely)
         parts = []
-        for states, seen, part in parts_of(some, len(parameters(model, estimate))):
-            line = (linearize if unsure else by_coordinates)(
+        for states, seen, part in split_into_blocks(
+            some, len(list_parameters(model, estimate))
+        ):
+            line = (linearize if unsure else linearize_coordinates)(
                 model, estimate, part, around(part, states)
             )
             jacobian = line.joint_jacobian
-            own = measurement_covariances(noise, jacobian[:, None], model.rows)
+            own = compute_measurement_covariances(noise, jacobian[:, None], model.rows)
             parts.append(
                 (
                     seen,
@@ -169,7 +184,7 @@ class _Beside:
 
     def yardstick(self, fitted: Fit) -> Yardstick:
         """As `yardstick_of`, by the sample."""
-        free = ~fitted.held
+        free = ~fitted.unidentifiable
         mine = self.sample[self.closely]
         rows = fitted.model.rows
         negligible = any(by is None for _, by, _, _ in self.parts) or not free.any()
@@ -264,7 +279,7 @@ def yardstick_of(fitted: Fit, noise: Noise, measurements: Measurements) -> Yards
     Statistics 1987): the rest may be that of the very errors that are looked for, or of
     a law that is not linear.
     """
-    near = spread_poses(single_observations(measurements), _MOST)
+    near = select_spread_poses(separate_measurements(measurements), _MOST)
     some = measurements.select(near)
     few = len(measurements) <= _MOST
     return _Beside.of(
@@ -452,19 +467,27 @@ class Kept:
         """
         every = self.case.observations
         if self.searched is not every:
-            settled = ON_THE_WAY if len(every) <= LONG else _LAST_STEP
-            return fit(
+            settled = (
+                INTERMEDIATE_TOLERANCE if len(every) <= LARGE_FIT_SIZE else _LAST_STEP
+            )
+            return fit_model(
                 found.model,
                 every,
                 found.noise,
                 found.estimate,
-                reweighted=True,
-                settled=settled,
+                reweight_first_step=True,
+                tolerance=settled,
             )
         return (
             found
             if found is self.declared
-            else fit(found.model, every, found.noise, found.estimate, reweighted=True)
+            else fit_model(
+                found.model,
+                every,
+                found.noise,
+                found.estimate,
+                reweight_first_step=True,
+            )
         )
 
 
@@ -475,10 +498,15 @@ def fitted_to(
     if last is not None and (kept == last.kept).all():
         return last
     part = case if kept.all() else case.select(kept)
-    noise, warnings = estimated_noise(part)
+    noise, warnings = estimate_noise(part)
     searched = searched_of(case, part, settings)
     return Kept(
-        part, kept, noise, warnings, fit_declared(part.model, searched, noise), searched
+        part,
+        kept,
+        noise,
+        warnings,
+        fit_declared_model(part.model, searched, noise),
+        searched,
     )
 
 
@@ -486,7 +514,9 @@ def searched_of(case: Case, part: Case, settings: Settings) -> Observations:
     """What a search looks at of a part of a case: at the same poses whatever is kept,
     so that only gross errors move a fit."""
     most = settings.searched_observations
-    return sample_of(part.observations, most, sample_of(case.observations, most))
+    return sample_observations(
+        part.observations, most, sample_observations(case.observations, most)
+    )
 
 
 def first_kept(case: Case, settings: Settings) -> Kept:
@@ -511,25 +541,35 @@ def first_kept(case: Case, settings: Settings) -> Kept:
             break
     observations = case.observations
     most = settings.gross_start_numbers // case.model.rows
-    few = spread_poses(observations, most)
+    few = select_spread_poses(observations, most)
     if part is whole and not few.all():
         # Nothing stands apart, and there are too many to look more closely.
         return whole
     apart = np.unique(
-        observations.state[measured_in(observations, measurements, ~part.kept)]
+        observations.state[
+            match_states_and_targets(observations, measurements, ~part.kept)
+        ]
     )
     few[apart[np.linspace(0, len(apart) - 1, min(len(apart), most)).astype(int)]] = True
-    few[observations.state[measured_in(observations, measurements, pulling)]] = False
+    few[
+        observations.state[
+            match_states_and_targets(observations, measurements, pulling)
+        ]
+    ] = False
     some = select_states(observations, few)
-    about = evaluated(part.declared.model, some, part.noise, part.declared.estimate)
+    about = evaluate_as_fit(
+        part.declared.model, some, part.noise, part.declared.estimate
+    )
     taken = improbable(linearized(about, some, candidates, settings))
     # A repeat far from its others is in no average, and stays what the declared model
     # says of it.
-    looked_at = measured_in(measurements, some, np.ones(len(some), bool))
-    looked_at &= np.isin(measurements.row, without_outlying_repeats(measurements).row)
+    looked_at = match_states_and_targets(measurements, some, np.ones(len(some), bool))
+    looked_at &= np.isin(measurements.row, remove_outlying_repeats(measurements).row)
     return fitted_to(
         case,
-        ~np.where(looked_at, measured_in(measurements, some, taken), ~part.kept),
+        ~np.where(
+            looked_at, match_states_and_targets(measurements, some, taken), ~part.kept
+        ),
         settings,
         whole,
     )

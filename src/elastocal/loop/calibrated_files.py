@@ -28,7 +28,7 @@ from elastocal.application.frames import root_mean_square
 from elastocal.campaigns.reading import campaign_files, read_descriptions
 from elastocal.diagnosis.misplaced import point_sentence
 from elastocal.errors import InputError
-from elastocal.fitting.noise import noise_from
+from elastocal.fitting.noise import parse_noise
 from elastocal.io.json_files import read_json
 from elastocal.io.origin import configuration_sha256
 from elastocal.io.records import check_sources, checksum, jobs_behind
@@ -37,9 +37,9 @@ from elastocal.remainder.corrected import predictor_of
 from elastocal.validation.conformity import (
     PASS,
     UNDECIDED,
-    joint_ranges,
-    predicted_conformity,
-    shortfalls,
+    decide_conformity,
+    find_joint_ranges,
+    list_shortfalls,
 )
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ class Diagnosed:
             model,
             estimate,
             np.array(self.facts["covariance"]),
-            noise_from(step),
+            parse_noise(step),
             more,
         )
         contradicted = bool(accuracy and accuracy["contradicted"])
@@ -205,8 +205,8 @@ def certificate(
     prediction = predict_errors(calibrated, *poses)
     accuracy = prediction.accuracy(REGION)
     worst = int(np.argmax(prediction.error_m))
-    decision = predicted_conformity(prediction.rms_m, tolerance_m, accepted_risk)
-    missing = shortfalls(heldout["configurations"], states, robot)
+    decision = decide_conformity(prediction.rms_m, tolerance_m, accepted_risk)
+    missing = list_shortfalls(heldout["configurations"], states, robot)
     if not accuracy.fitted:
         missing = [
             "nothing fitted: no error of 0 is predicted of a robot of which nothing was fitted",
@@ -249,7 +249,7 @@ def certificate(
         "worst_pose": {"joints": joints, "error_m": float(prediction.error_m[worst])},
         "conformity": asdict(decision)
         | {"configurations": heldout["configurations"], "shortfalls": missing},
-        "joint_ranges": joint_ranges(states, robot),
+        "joint_ranges": find_joint_ranges(states, robot),
         "budget": [
             {"name": name, "rms_m": rms}
             for name, rms in error_budget(calibrated, *poses).items()

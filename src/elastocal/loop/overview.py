@@ -26,11 +26,11 @@ from elastocal.diagnosis.gross_errors import (
 from elastocal.diagnosis.linearize import linearized
 from elastocal.diagnosis.misplaced import misplaced
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import case_from, joint_compliances
-from elastocal.fitting.noise import effective_parameters
+from elastocal.fitting.least_squares import fit_model
+from elastocal.fitting.model import build_case, get_joint_compliances
+from elastocal.fitting.noise import count_effective_parameters
 from elastocal.loop.loading import load_campaign
-from elastocal.validation.placing import repeat_warnings
+from elastocal.validation.transfer import warn_of_repeated_poses
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -79,7 +79,7 @@ def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
     something is missing in the model.
     """
     descriptions, training, held_out = load_campaign(folder, robots_folder)
-    whole = case_from(descriptions, columns_of(training))
+    whole = build_case(descriptions, columns_of(training))
     settings = Settings()
     part = first_kept(whole, settings)
     errors = gross_errors(
@@ -118,7 +118,7 @@ def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
     attention += [
         *warnings_of(left_out),
         *_suspicious(case, declared, training, held_out),
-        *repeat_warnings(training, held_out),
+        *warn_of_repeated_poses(training, held_out),
     ]
     reasons = Counter(untestable.values()).most_common()
     rows += [
@@ -167,14 +167,16 @@ def _identified(declared: Fit) -> list[tuple[str, str]]:
     determine."""
     rms = 1e3 * np.sqrt((declared.residual[:, :3] ** 2).sum(axis=1).mean())
     named = [f"{owner} {parameter.name}" for owner, parameter in declared.parameters]
-    held = [name for name, held in zip(named, declared.held, strict=True) if held]
+    held = [
+        name for name, held in zip(named, declared.unidentifiable, strict=True) if held
+    ]
     left = f"; not identifiable: {first_names(held, _NAMED)}" if held else ""
-    count = counted(int((~declared.held).sum()), "parameter")
+    count = counted(int((~declared.unidentifiable).sum()), "parameter")
     return [
         ("declared model", f"residual of {rms:.3f} mm RMS on the fitted poses"),
         (
             "identified",
-            f"{count}, effectively {effective_parameters(declared):.0f}{left}",
+            f"{count}, effectively {count_effective_parameters(declared):.0f}{left}",
         ),
     ]
 
@@ -185,7 +187,7 @@ def _with_base(declared: Fit, case: Case) -> Fit:
     base = case.candidates.get("base_placement")
     if base is None or case.campaign.frame != "base":
         return declared
-    return fit(
+    return fit_model(
         replace(declared.model, effects=(*declared.model.effects, base)),
         case.observations,
         declared.noise,
@@ -201,11 +203,13 @@ def _negative_springs(declared: Fit) -> list[str]:
     lacks hides behind them."""
     if not declared.model.identifies_compliance:
         return []
-    mine = declared.places_of("joint_compliance")
+    mine = declared.parameter_indices("joint_compliance")
     errors = np.where(
-        declared.held[mine], np.inf, np.sqrt(np.diag(declared.covariance))[mine]
+        declared.unidentifiable[mine],
+        np.inf,
+        np.sqrt(np.diag(declared.covariance))[mine],
     )
-    below = joint_compliances(declared.model, declared.estimate) < -_CLEAR * errors
+    below = get_joint_compliances(declared.model, declared.estimate) < -_CLEAR * errors
     return [str(joint + 1) for joint in np.flatnonzero(below)]
 
 
@@ -216,8 +220,8 @@ def _suspicious(
     found = []
     states = case.observations.states
     numbers = declared.residual.size
-    effective = effective_parameters(declared)
-    parameters = int((~declared.held).sum())
+    effective = count_effective_parameters(declared)
+    parameters = int((~declared.unidentifiable).sum())
     poses = _poses(training)
     least = int(np.ceil(poses * Settings().numbers_a_parameter * effective / numbers))
     if least > poses:

@@ -46,7 +46,12 @@ from elastocal.effects.elastic import joint_compliance
 from elastocal.effects.gravity import declared_weight
 from elastocal.errors import InputError
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.model import Estimate, Model, conditions, parameters
+from elastocal.fitting.model import (
+    Estimate,
+    Model,
+    evaluate_conditions,
+    list_parameters,
+)
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import Observations, States
 from elastocal.mechanics.components import WRENCH_NAMES
@@ -197,7 +202,7 @@ def information(
     the k numbers measured in each; information is ``rows.T @ rows``.
     """
     model, estimate = model_of(survey)
-    named = parameters(model, estimate)
+    named = list_parameters(model, estimate)
     deviation = np.repeat([survey.position_m, survey.orientation_rad], 3)[: survey.rows]
     scale = (
         np.array([parameter.plausible for _, parameter in named]) / deviation[:, None]
@@ -209,7 +214,7 @@ def information(
         part = slice(start, start + at_once)
         seen = observe(survey, reported_angles[part], force[part])
         line = linearize(
-            model, estimate, seen, conditions(model, estimate, seen.states)
+            model, estimate, seen, evaluate_conditions(model, estimate, seen.states)
         )
         found[part] = (line.sensitivities * scale).reshape(-1, numbers, len(named))
     return found
@@ -230,7 +235,7 @@ def accuracy_rows(
     parameter.
     """
     model, estimate = model_of(survey)
-    count = len(parameters(model, estimate))
+    count = len(list_parameters(model, estimate))
     noise = Noise(
         "declared",
         survey.position_m,
@@ -258,7 +263,7 @@ def accuracy_rows(
     plausible = np.array(
         [
             parameter.plausible
-            for _, parameter in parameters(robot.model, robot.estimate)
+            for _, parameter in list_parameters(robot.model, robot.estimate)
         ]
     )
     found = np.zeros((len(moved), 3, count))
@@ -370,7 +375,7 @@ def choose_plan(
     if count < poses + held_out:
         found = f"{poses + held_out} of {counted(count, 'allowed configuration')}"
         raise InputError("plan", "poses", found, f"at most {count}, or more candidates")
-    listed = parameters(*model_of(survey))
+    listed = list_parameters(*model_of(survey))
     fewest = max(-(-len(listed) // survey.numbers), FEWEST_TRAINING_POSES)
     if poses < fewest:
         found = f"{poses}, which measure {counted(poses * survey.numbers, 'number')} for {counted(len(listed), 'parameter')}"
