@@ -10,16 +10,16 @@ from common import Row, interleaved, load_robot, load_strategy
 from elastocal.mechanics.robot import Robot
 from elastocal.study.equation_11 import (
     Measurements,
+    compute_regressors,
     estimate_compliance,
-    regressors_of,
-    stacked,
+    stack_measurements,
 )
 from elastocal.study.simulation import (
     Loading,
-    blocks_of_sets,
-    measurement_noise,
-    random_experiments,
-    true_deflections,
+    compute_true_deflections,
+    draw_measurement_noise,
+    draw_random_experiments,
+    split_data_sets,
 )
 from elastocal.study.strategies import Strategy
 
@@ -58,7 +58,7 @@ def rows(work: Path, setting: Setting) -> list[Row]:
     joints = robot.joints
     blocks = [
         _measurements(robot, strategy, block, configurations)
-        for block in blocks_of_sets(sets)
+        for block in split_data_sets(sets)
     ]
     systems = [_systems(measurements["6DoF"]) for measurements in blocks]
     order = list(strategy.stages[0].identified)
@@ -104,7 +104,7 @@ def rows(work: Path, setting: Setting) -> list[Row]:
 def _measurements(
     robot: Robot, strategy: Strategy, sets: Sequence[int], configurations: int
 ) -> dict[str, Measurements]:
-    experiments = random_experiments(
+    experiments = draw_random_experiments(
         robot.chain,
         robot.joint_limits,
         1,
@@ -115,12 +115,14 @@ def _measurements(
         configurations,
     )
     point = robot.chain.end_effector
-    noise = NOISE * measurement_noise(1, "kuka", point.name, sets, configurations)
-    measured = true_deflections(robot, experiments, point, "end_effector") + noise
-    matrices = regressors_of(
+    noise = NOISE * draw_measurement_noise(1, "kuka", point.name, sets, configurations)
+    measured = (
+        compute_true_deflections(robot, experiments, point, "end_effector") + noise
+    )
+    matrices = compute_regressors(
         experiments, robot.chain, strategy.points, ROWS, "end_effector"
     )
-    return {point.name: stacked(matrices[point.name], measured)}
+    return {point.name: stack_measurements(matrices[point.name], measured)}
 
 
 def _systems(measurements: Measurements) -> tuple[np.ndarray, np.ndarray]:

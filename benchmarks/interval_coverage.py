@@ -14,8 +14,8 @@ import numpy as np
 from made_errors import KINDS, campaigns_of, true_figures
 from scipy.stats import bootstrap
 
-from elastocal.figures.style import PALETTE, panels, styled
-from elastocal.validation.held_out import PositionErrors, compute_error_intervals
+from elastocal.figures.style import PALETTE, create_panels, styled
+from elastocal.validation.held_out import Errors, intervals
 
 POSES = (9, 18, 36)
 REPLICATES = 999
@@ -58,7 +58,7 @@ def draw(page: Path) -> None:
         for line in page.read_text(encoding="utf-8").splitlines()
         if " / " in line
     ]
-    figure, axes = panels(1, len(KINDS), 58, sharey=True)
+    figure, axes = create_panels(1, len(KINDS), 58, sharey=True)
     for axis, kind in zip(axes[0], KINDS, strict=True):
         rows = [line for line in lines if line[0] == kind]
         values = np.array(

@@ -10,7 +10,7 @@ import yaml
 
 from elastocal.campaigns.reading import read_robot
 from elastocal.effects.catalogue import effects
-from elastocal.figures.effect_signatures import list_candidates, signature
+from elastocal.figures.effect_signatures import compute_signature, list_candidates
 
 from extensions import with_plain_references
 
@@ -124,7 +124,7 @@ def _section(effect: Effect) -> str:
 
 
 def _table(effect: Effect) -> str:
-    candidate = signature(effect.name, ROBOT).candidate
+    candidate = compute_signature(effect.name, ROBOT).candidate
     count = len(list_candidates(effect.name, ROBOT))
     rows = [
         "".join(

@@ -39,8 +39,8 @@ INTERFACE = {
     "Use a calibrated robot": {
         "elastocal.application.calibrated": (
             "calibrate_by_fit",
-            "forward",
-            "pose_sensitivities",
+            "predict_poses",
+            "compute_pose_sensitivities",
         ),
         "elastocal.application.accuracy": ("predict_errors",),
         "elastocal.application.compensation": ("find_joint_targets",),
@@ -49,7 +49,10 @@ INTERFACE = {
         "elastocal.validation.held_out": ("position_errors", "intervals")
     },
     "Identify compliances as in the study": {
-        "elastocal.study.equation_11": ("estimate_compliance", "undetermined")
+        "elastocal.study.equation_11": (
+            "estimate_compliance",
+            "find_undetermined_prefixes",
+        )
     },
 }
 

@@ -13,16 +13,16 @@ from scipy.stats import chi, norm
 from synthetic import made_states
 
 from elastocal.application.accuracy import (
-    accuracy_sentence,
     before_m,
     calibrate_on_case,
-    campaign_accuracy,
-    judge_by_held_out,
+    format_accuracy,
+    inflate_to_held_out_errors,
+    predict_campaign_accuracy,
     predict_errors,
     quantile_of_length,
     scope_of,
 )
-from elastocal.application.calibrated import forward
+from elastocal.application.calibrated import predict_poses
 from elastocal.application.frames import BASE, ROBOT, Scope, subtract_placement
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.least_squares import fit_model
@@ -55,7 +55,7 @@ def test_bounds_hold_95_percent_of_robots_drawn_from_the_covariance(
     angles = calibrated.robot.reported_angles(STATES.joint_angles)
     stated = predict_errors(calibrated, angles, STATES.wrench).accuracy("")
     assert stated.frame == (ROBOT if unknown_base else BASE)
-    position, _ = forward(calibrated, angles)
+    position, _ = predict_poses(calibrated, angles)
     draws = np.random.default_rng(3)
     root = np.linalg.cholesky(calibrated.covariance)
     rms = []
@@ -65,7 +65,7 @@ def test_bounds_hold_95_percent_of_robots_drawn_from_the_covariance(
         other = replace(
             calibrated, estimate=apply_step(calibrated.model, calibrated.estimate, step)
         )
-        off = (forward(other, angles)[0] - position)[..., None]
+        off = (predict_poses(other, angles)[0] - position)[..., None]
         if unknown_base:
             anywhere = Scope(ROBOT, position.mean(axis=0))
             moved = np.concatenate([off, 0 * off], axis=1)
@@ -89,7 +89,7 @@ def test_a_misplaced_base_is_no_error_of_the_uncorrected_robot_where_nobody_know
         turned, estimate=replace(turned.estimate, coefficients=coefficients)
     )
     angles = value.robot.reported_angles(STATES.joint_angles)
-    position, rotation = forward(value, angles)
+    position, rotation = predict_poses(value, angles)
     nominal = Rotation.from_rotvec([0.0, 0.0, -1e-3]).as_matrix()
     off = np.concatenate(
         [position @ nominal.T - position, np.tile([0.0, 0.0, -1e-3], (60, 1))], axis=1
@@ -181,7 +181,7 @@ def test_an_unknown_offset_of_the_target_at_the_end_effector_is_no_error(fanuc):
         known = replace(
             calibrated, scope=scope, covariance=np.diag(variances), fitted=LOADED
         )
-        sizes.append(campaign_accuracy(known).rms_m)
+        sizes.append(predict_campaign_accuracy(known).rms_m)
         assert scope.offset_removed == (stated is None)
     assert sizes[1] < 1e-3 * sizes[0]
 
@@ -203,10 +203,10 @@ def campaign(kuka, tmp_path_factory, config_folder):
 
 
 def judged(calibrated, final, case, held_out):
-    residual = compute_position_residuals(
-        *transfer_fit(final, case, held_out), held_out.observations
+    residual = position_residuals(*placed(final, case, held_out), held_out.observations)
+    return inflate_to_held_out_errors(
+        calibrated, held_out, residual, final.noise.position_m
     )
-    return judge_by_held_out(calibrated, held_out, residual, final.noise.position_m)
 
 
 def test_held_out_poses_that_were_missed_by_more_raise_what_is_predicted_to_that_where_the_noise_is_known(
@@ -219,7 +219,7 @@ def test_held_out_poses_that_were_missed_by_more_raise_what_is_predicted_to_that
         held_out,
         observations=replace(seen, position=seen.position + np.array([1e-3, 0.0, 0.0])),
     )
-    stated = campaign_accuracy(judged(calibrated, final, case, moved))
+    stated = predict_campaign_accuracy(judged(calibrated, final, case, moved))
     assert stated.contradicted and stated.rms_m == pytest.approx(1e-3, rel=0.1)
     unknown = replace(calibrated, noise=replace(calibrated.noise, source="residual"))
     assert judged(unknown, final, case, moved) is unknown
@@ -241,9 +241,9 @@ def test_of_a_robot_of_which_nothing_was_fitted_no_error_of_zero_is_predicted(fa
     calibrated = made_calibrated(fanuc, relative_std=0.0)
     found = predict_errors(calibrated, *np.zeros((2, 3, 6))).accuracy("some poses")
     assert found.rms_m == 0.0 and not found.fitted
-    assert "nothing of the robot was fitted" in accuracy_sentence(
+    assert "nothing of the robot was fitted" in format_accuracy(
         found
-    ) and "0.000" not in accuracy_sentence(found)
+    ) and "0.000" not in format_accuracy(found)
     # What the form of the model leaves open is in every figure.
     contradicted = replace(
         calibrated, scope=replace(calibrated.scope, form_m=1e-3, contradicted=True)
@@ -254,4 +254,4 @@ def test_of_a_robot_of_which_nothing_was_fitted_no_error_of_zero_is_predicted(fa
         stated.rms_m == pytest.approx(1e-3, rel=0.01)
         and min(stated.rms_bound_m, stated.worst_m) > 1e-3
     )
-    assert (open_form.bound_m > 1e-3).all() and "1.000 mm" in accuracy_sentence(stated)
+    assert (open_form.bound_m > 1e-3).all() and "1.000 mm" in format_accuracy(stated)

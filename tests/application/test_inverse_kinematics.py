@@ -12,8 +12,8 @@ from elastocal.application.inverse_kinematics import (
     SOLVED_M,
     _least_motion,
     allowed_steps,
-    along_path,
     find_beyond_limits,
+    solve_path,
 )
 from elastocal.mechanics.kinematics import poses
 
@@ -31,7 +31,7 @@ def test_a_path_about_the_base_does_not_swing_where_a_turn_lies_within_the_limit
     robot = replace(robot, joint_limits=limits)
     angles = np.tile(limits.mean(axis=1) + BENT, (7, 1))
     angles[:, 0] = np.radians(np.linspace(-180.6, -168.6, 7))
-    found, left = along_path(
+    found, left = solve_path(
         robot, *poses(robot.chain, angles, robot.chain.end_effector)
     )
     assert left.max() < SOLVED_M and not find_beyond_limits(robot, found).any()

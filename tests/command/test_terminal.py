@@ -15,8 +15,8 @@ from elastocal.campaigns.reading import campaign_files
 from elastocal.command import terminal as module
 from elastocal.command.terminal import (
     angle_rad,
-    diagnosed_campaign,
     length_m,
+    load_diagnosed_campaign,
     pipeline,
     print_lines,
     robots,
@@ -126,13 +126,13 @@ def test_a_checkout_above_the_working_directory_is_found_before_that_of_the_pack
 
 def test_results_of_another_environment_come_with_a_warning(in_checkout, capsys):
     assert (
-        diagnosed_campaign(in_checkout / "made").name == "made"
+        load_diagnosed_campaign(in_checkout / "made").name == "made"
         and not capsys.readouterr().err
     )
     record_jobs(
         "made", campaign_files("made", ROBOTS), environment(".") | {"numpy": "1.0"}
     )
-    assert diagnosed_campaign(in_checkout / "made").name == "made"
+    assert load_diagnosed_campaign(in_checkout / "made").name == "made"
     here = environment(".")["numpy"]
     assert capsys.readouterr().err == (
         f"warning: {in_checkout}/made was diagnosed with numpy 1.0; here are numpy {here}\n"

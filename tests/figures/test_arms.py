@@ -10,9 +10,9 @@ from made_surveys import OPEN, made_candidates, made_survey
 from elastocal.application.planning.cell import Cell
 from elastocal.application.planning.plan import choose_plan
 from elastocal.figures.arms import (
-    arm_with_errors,
-    plan_picture,
-    pose_pictures,
+    draw_arm_with_errors,
+    draw_plan,
+    draw_poses,
     project_view,
 )
 
@@ -40,7 +40,7 @@ def test_each_panel_has_its_errors_and_their_rms(table):
         "poses": 4,
         "noise_floor_rms_m": 0.105e-3,
     }
-    figure = arm_with_errors(analysed("kuka"), table, heldout)
+    figure = draw_arm_with_errors(analysed("kuka"), table, heldout)
     assert [axis.get_title(loc="left") for axis in figure.axes] == [
         "1.23 mm",
         "0.12 mm",
@@ -66,7 +66,7 @@ def test_views_show_boxes_tracker_and_both_kinds_of_poses():
         np.array([3.0, 1.0, 1.0]),
         0.1,
     )
-    figure = plan_picture(survey.robot, cell, plan)
+    figure = draw_plan(survey.robot, cell, plan)
     assert [axis.get_title() for axis in figure.axes] == [
         "from above",
         "from the side",
@@ -74,7 +74,7 @@ def test_views_show_boxes_tracker_and_both_kinds_of_poses():
     ]
     labels = legend_entries(figure)
     assert labels == ["to fit", "held out", "kept out of", "tracker", "base"]
-    bare = plan_picture(survey.robot, OPEN, plan)
+    bare = draw_plan(survey.robot, OPEN, plan)
     assert legend_entries(bare) == ["to fit", "held out", "base"]
     last = figure.axes[2].lines[-1].get_ydata()[-1]
     np.testing.assert_allclose(last, 1e3 * plan.accuracy_m[-1])
@@ -83,7 +83,7 @@ def test_views_show_boxes_tracker_and_both_kinds_of_poses():
 def test_every_pose_has_a_picture_with_its_number_and_pages_are_full():
     survey = made_survey()
     plan = choose_plan(survey, made_candidates(survey, 300), 55, 4, 1)
-    pages = pose_pictures(survey.robot, plan)
+    pages = draw_poses(survey.robot, plan)
     titles = [
         axis.get_title(loc="left")
         for page in pages

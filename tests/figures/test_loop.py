@@ -12,11 +12,11 @@ from matplotlib.quiver import Quiver, QuiverKey
 
 from elastocal.figures.loop import (
     METRICS,
-    arrows,
-    before_after,
-    budget_bars,
-    campaign_errors,
-    probabilities,
+    draw_before_after,
+    draw_budget_bars,
+    draw_errors_by_campaign,
+    draw_probabilities,
+    draw_residual_arrows,
 )
 
 LONG = (
@@ -45,9 +45,9 @@ def of_the_catalogue():
 
 
 FIGURES = {
-    "arrows": lambda: arrows(residual_table()),
-    "candidates": lambda: probabilities(stated(LONG_SETS), of_the_catalogue()),
-    "before_after": lambda: before_after(
+    "arrows": lambda: draw_residual_arrows(residual_table()),
+    "candidates": lambda: draw_probabilities(stated(LONG_SETS), of_the_catalogue()),
+    "before_after": lambda: draw_before_after(
         step_rows(
             effects=("transmission_harmonic@1[orders 31-36], transmission_ratio@2",)
         ),
@@ -85,7 +85,7 @@ def state_means(table):
 
 def test_arrows_begin_at_their_state_and_are_its_mean_residual_enlarged_as_the_arrow_of_the_scale():
     table = residual_table(poses=20, repeats=3)
-    figure = arrows(table)
+    figure = draw_residual_arrows(table)
     (key,) = figure.findobj(QuiverKey)
     assert key.label == "200 µm"
     place, off = state_means(table)
@@ -110,7 +110,7 @@ def test_where_nothing_changed_the_residuals_are_drawn_once():
     table = residual_table()
     same = table | {f"after_d{axis}": table[f"before_d{axis}"] for axis in "xyz"}
     drawn = [
-        {quiver.get_gid() for quiver in quivers(arrows(each).axes[0])}
+        {quiver.get_gid() for quiver in quivers(draw_residual_arrows(each).axes[0])}
         for each in (table, same)
     ]
     assert drawn == [{"before", "after"}, {"before"}]
@@ -122,7 +122,7 @@ def lines_of(axis, gid):
 
 def test_bars_for_every_model_and_measure_from_top_to_bottom_with_diamonds_for_fitted_poses():
     steps = step_rows()
-    figure = before_after(steps, 5e-5)
+    figure = draw_before_after(steps, 5e-5)
     assert [axis.get_title() for axis in figure.axes] == [
         "mean",
         "RMS",
@@ -163,7 +163,7 @@ def test_bars_for_every_model_and_measure_from_top_to_bottom_with_diamonds_for_f
 
 def test_an_interval_reaches_from_end_to_end_or_is_not_drawn():
     steps = step_rows(effects=())
-    mean, *_, largest = before_after(steps).axes
+    mean, *_, largest = draw_before_after(steps).axes
     for step, (one, other) in zip(steps, lines_of(mean, "interval"), strict=True):
         assert [one[0], other[0]] == pytest.approx(
             [1e6 * step["heldout_mean_m_low"], 1e6 * step["heldout_mean_m_high"]]
@@ -198,7 +198,7 @@ TABLE = pd.DataFrame(
 
 
 def test_each_campaign_has_both_errors_at_their_values():
-    (axis,) = campaign_errors(TABLE).axes
+    (axis,) = draw_errors_by_campaign(TABLE).axes
     assert row_labels(axis) == ["UR10 A, judged on B", "WAM grid"]
     before, after = (container.lines[0].get_xydata() for container in axis.containers)
     np.testing.assert_allclose(before, [[0.4, 1], [2.0, 0]])
@@ -210,7 +210,7 @@ def test_each_campaign_has_both_errors_at_their_values():
     )
     # Sessions of one campaign stand by their poses.
     assert row_labels(
-        campaign_errors(TABLE.assign(campaign="fanuc_joint")).axes[0]
+        draw_errors_by_campaign(TABLE.assign(campaign="fanuc_joint")).axes[0]
     ) == [
         "FANUC joint, 24 poses",
         "FANUC joint, 1 pose",
@@ -218,7 +218,7 @@ def test_each_campaign_has_both_errors_at_their_values():
 
 
 def test_each_hypothesis_has_a_bar_as_long_as_its_probability():
-    figure = probabilities(stated(), candidate_table())
+    figure = draw_probabilities(stated(), candidate_table())
     axis = figure.axes[0]
     assert axis.get_xlabel() == "posterior probability (%)"
     named = [label.get_text().replace("\n", " ") for label in axis.get_yticklabels()]
@@ -235,7 +235,7 @@ def test_each_hypothesis_has_a_bar_as_long_as_its_probability():
         "< 1 %",
         "1 %",
     ]
-    certain = probabilities(
+    certain = draw_probabilities(
         stated([({"lost_motion": ["joint 3"]}, 0.9961), ({}, 0.0039)]),
         candidate_table(count=3),
     ).axes[0]
@@ -244,12 +244,12 @@ def test_each_hypothesis_has_a_bar_as_long_as_its_probability():
 
 def test_of_many_hypotheses_the_leading_have_bars_and_the_rest_has_one():
     sets = [({f"effect_{number}": []}, 0.1) for number in range(10)]
-    axis = probabilities(stated(sets), candidate_table()).axes[0]
+    axis = draw_probabilities(stated(sets), candidate_table()).axes[0]
     assert [bar.get_width() for bar in axis.patches] == pytest.approx([10] * 8 + [20])
 
 
 def test_where_nothing_can_be_tested_the_figure_says_so():
-    figure = probabilities(stated([({}, 1.0)]), candidate_table(count=0, chosen=0))
+    figure = draw_probabilities(stated([({}, 1.0)]), candidate_table(count=0, chosen=0))
     assert texts(figure) == [
         "None of 5 candidate causes can be tested with these measurements."
     ]
@@ -257,7 +257,7 @@ def test_where_nothing_can_be_tested_the_figure_says_so():
 
 def test_the_budget_has_a_bar_for_each_line_that_is_not_zero_the_largest_first_from_zero_on():
     budget = made_document()["budget"]
-    figure = budget_bars(budget, [line["name"] for line in budget], 2e-4, 1.5e-4)
+    figure = draw_budget_bars(budget, [line["name"] for line in budget], 2e-4, 1.5e-4)
     axis = figure.axes[0]
     assert row_labels(axis) == [
         "uncorrected",

@@ -10,7 +10,11 @@ from drawn_figures import texts
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
-from elastocal.figures.schemes import kinematic_scheme, lay_out, spring_scheme
+from elastocal.figures.schemes import (
+    draw_kinematic_scheme,
+    draw_spring_scheme,
+    lay_out_chain,
+)
 from elastocal.io.documents import read_document
 from elastocal.mechanics.robot_file import robot_from_document
 
@@ -72,7 +76,7 @@ def assert_no_overlap(figure):
 def test_no_text_of_a_scheme_hides_another_and_each_joint_length_and_point_has_its_name(
     robot,
 ):
-    figure = kinematic_scheme(robot)
+    figure = draw_kinematic_scheme(robot)
     assert_no_overlap(figure)
     named = {artist.get_gid() for artist in figure.findobj(Text)}
     lengths = sum(t.kind == "T" and bool(t.constant) for t in robot.chain.transforms)
@@ -85,7 +89,7 @@ def test_no_text_of_a_scheme_hides_another_and_each_joint_length_and_point_has_i
 
 @each_robot
 def test_no_text_of_a_spring_scheme_hides_another_and_each_spring_has_its_name(robot):
-    figure = spring_scheme(robot)
+    figure = draw_spring_scheme(robot)
     assert_no_overlap(figure)
     found = texts(figure)
     models = 2 if robot.links else 1
@@ -98,7 +102,7 @@ def test_no_text_of_a_spring_scheme_hides_another_and_each_spring_has_its_name(r
 
 @each_legible
 def test_every_joint_is_drawn_once_on_the_arm_and_apart_from_the_others(robot):
-    layout, _ = lay_out(robot.chain)
+    layout, _ = lay_out_chain(robot.chain)
     assert [number for number, _, _ in layout.joints] == list(
         range(1, robot.joints + 1)
     )

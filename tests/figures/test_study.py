@@ -7,7 +7,11 @@ import pytest
 from drawn_figures import assert_nothing_cut_off, legend_entries, row_labels
 from matplotlib.colors import to_hex
 
-from elastocal.figures.study import noise_impact, scores, stiffness_errors
+from elastocal.figures.study import (
+    draw_noise_impact,
+    draw_scores,
+    draw_stiffness_errors,
+)
 from elastocal.figures.style import PALETTE
 
 LENGTHS = np.arange(1, 6)
@@ -71,7 +75,7 @@ def test_noise_levels_are_lines_in_micrometres_that_are_thick_only_where_they_ar
     frame = pd.concat(
         [frame, metrics_of("kuka", "2DoF+6DoF", 7.0), metrics_of("fanuc", "6DoF", 7.0)]
     )
-    figure = noise_impact(frame, "6DoF", {"kuka": "Kuka"})
+    figure = draw_noise_impact(frame, "6DoF", {"kuka": "Kuka"})
     axis, linear = figure.axes
     assert (axis.get_yscale(), linear.get_yscale()) == ("log", "linear") and len(
         linear.lines
@@ -102,7 +106,7 @@ def test_noise_levels_are_lines_in_micrometres_that_are_thick_only_where_they_ar
 
 
 def test_stiffness_errors_stand_under_both_counts_of_joints_with_their_limit():
-    figure = stiffness_errors(METRICS, PRINTED, "Kuka", "kuka", ORDER, 3.0)
+    figure = draw_stiffness_errors(METRICS, PRINTED, "Kuka", "kuka", ORDER, 3.0)
     whole, first = figure.axes
     for axis, scale in ((whole, 1.0), (first, 0.5)):
         one, other, limit = axis.lines[:3]
@@ -149,7 +153,7 @@ def test_each_printed_figure_of_table_4_stands_among_the_studies_of_its_robot():
     table = pd.DataFrame(
         [*rows, ("fanuc", "n_dev_2_um", 30.0, 110.0, 40.0, 0.18)], columns=columns
     )
-    figure = scores(table.assign(table="4", strategy="6DoF"), TITLES)
+    figure = draw_scores(table.assign(table="4", strategy="6DoF"), TITLES)
     heads = [axis.get_title() for axis in figure.axes[:3]]
     assert heads == ["$k_\\Sigma$ at 20 (%)", "dev at 20 (µm)", "length until 2 µm"]
     assert row_labels(figure.axes[0]) == ["6DoF"]

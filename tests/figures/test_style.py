@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from elastocal.figures.style import WIDTH_MM, note, panels, save, save_svg
+from elastocal.figures.style import WIDTH_MM, create_panels, draw_note, save, save_svg
 from elastocal.io.origin import Origin
 
 
@@ -16,10 +16,10 @@ def save_both(figure, folder, name="figure"):
 
 
 def test_a_figure_has_its_size_in_millimetres_and_a_grid_of_axes_even_for_one():
-    figure, axes = panels(1, 1, 50.8)
+    figure, axes = create_panels(1, 1, 50.8)
     np.testing.assert_allclose(figure.get_size_inches(), [WIDTH_MM / 25.4, 2.0])
     assert axes.shape == (1, 1)
-    figure, axes = panels(2, 3, 60, width_mm=76.2, sharey=True)
+    figure, axes = create_panels(2, 3, 60, width_mm=76.2, sharey=True)
     assert axes.shape == (2, 3) and figure.get_figwidth() == pytest.approx(3.0)
     axes[0, 0].set_ylim(0, 7)
     assert axes[1, 2].get_ylim() == (0, 7)
@@ -29,7 +29,7 @@ def test_the_same_figure_gives_the_same_bytes_without_a_date_and_letters_of_an_s
     tmp_path,
 ):
     for name in "ab":
-        figure, axes = panels(1, 1, 30)
+        figure, axes = create_panels(1, 1, 30)
         axes[0, 0].plot([1, 2], [3, 4])
         axes[0, 0].set_xlabel("angle (°)")
         save_both(figure, tmp_path, name)
@@ -47,7 +47,7 @@ def test_a_figure_names_commit_configuration_and_seed_in_both_files(tmp_path):
     origin = Origin("c0ffee", "d16e57", 7)
     for name, given in (("named", origin), ("again", origin), ("unnamed", None)):
         save(
-            note("Nothing."),
+            draw_note("Nothing."),
             str(tmp_path / f"{name}.pdf"),
             str(tmp_path / f"{name}.png"),
             given,

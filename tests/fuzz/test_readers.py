@@ -17,7 +17,7 @@ from elastocal.campaigns.importers import campaign_sources
 from elastocal.campaigns.reading import campaign_files, read_campaign, read_robot
 from elastocal.io.documents import check_document, read_document
 from elastocal.mechanics.chain import parse_chain
-from elastocal.study.configuration import check_study, override
+from elastocal.study.configuration import check_study, override_entries
 from elastocal.study.strategies import check_strategy, strategy_from_document
 
 CONFIG = REPOSITORY / "config"
@@ -141,7 +141,9 @@ def test_chains(text):
 )
 def test_changes_on_the_command_line(key, text):
     holds(
-        lambda: check_study(override(STUDY, [f"{key}={text}"]), CONFIG, "config.yaml")
+        lambda: check_study(
+            override_entries(STUDY, [f"{key}={text}"]), CONFIG, "config.yaml"
+        )
     )
 
 

@@ -6,7 +6,7 @@ from made_audits import CONFIGURATION
 
 from elastocal.campaigns.campaign import columns_of
 from elastocal.diagnosis.diagnose import diagnose
-from elastocal.diagnosis.judge import residual_blocks
+from elastocal.diagnosis.judge import generate_residual_blocks
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.model import build_case
 from elastocal.io.json_files import write_json
@@ -67,7 +67,7 @@ def diagnosed_campaign(top, robot, effects=(), **design):
     write_table(results / "steps.parquet", schemas.STEPS, tables.step_blocks(found), {})
     # As the next job does: from the files.
     again = tables.diagnosis_from(case, tables.diagnosis_facts(found))
-    blocks = residual_blocks(again, judged(again, unseen, 1))
+    blocks = generate_residual_blocks(again, judged(again, unseen, 1))
     write_table(
         reports / "residuals.parquet", schemas.residuals(arm.joints), blocks, {}
     )

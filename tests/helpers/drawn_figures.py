@@ -6,13 +6,13 @@ import shutil
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
-from elastocal.figures.style import panels
+from elastocal.figures.style import create_panels
 
 
 def empty_pictures(folder, names):
     """A PDF of nothing for each name; their paths."""
     paths = [f"{folder}/{name}.pdf" for name in names]
-    panels(1, 1, 20)[0].savefig(paths[0])
+    create_panels(1, 1, 20)[0].savefig(paths[0])
     for path in paths[1:]:
         shutil.copy(paths[0], path)
     return paths

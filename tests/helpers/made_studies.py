@@ -5,11 +5,11 @@ import numpy as np
 import pandas as pd
 from made_study_blocks import PAPER
 
-from elastocal.study.in_memory import Interpretation, Size, StudyInMemory
+from elastocal.study.in_memory import Interpretation, StudyInMemory, StudySize
 
 LENGTHS = np.arange(1, 101)
 USUAL = Interpretation(PAPER, 6, "end_effector", "stiffness")
-SIZE = Size(data_sets=4, configurations=5, tests=30, noise=1e-5)
+SIZE = StudySize(data_sets=4, configurations=5, tests=30, noise=1e-5)
 
 
 def studies_of(robot="arm", strategy="A", biases=(20.0, 22.0, 24.0)):
@@ -30,7 +30,11 @@ def studies_of(robot="arm", strategy="A", biases=(20.0, 22.0, 24.0)):
 def few_of(robot, key="kuka"):
     """A study of six data sets of 20 configurations."""
     return StudyInMemory(
-        robot, key, 1, USUAL, Size(data_sets=6, configurations=20, tests=30, noise=1e-5)
+        robot,
+        key,
+        1,
+        USUAL,
+        StudySize(data_sets=6, configurations=20, tests=30, noise=1e-5),
     )
 
 

@@ -4,17 +4,17 @@ regressors by pinocchio to judge them by."""
 import numpy as np
 from support import PinocchioPoint, without_tool
 
-from elastocal.study.equation_11 import identified_blocks, paired_blocks
-from elastocal.study.metrics import make_judge
+from elastocal.study.equation_11 import identify_blocks, pair_blocks
+from elastocal.study.metrics import make_validation_set
 from elastocal.study.simulation import (
     Loading,
-    blocks_of_sets,
-    experiment_columns,
-    ideal_blocks,
-    measured_blocks,
-    random_experiments,
-    to_deflections,
-    to_experiments,
+    add_noise_to_blocks,
+    draw_random_experiments,
+    pack_experiments,
+    simulate_blocks,
+    split_data_sets,
+    unpack_deflections,
+    unpack_experiments,
 )
 
 PAPER = Loading(1000.0, (0.0, 0.5, 0.0), "base", "full_turn")
@@ -28,9 +28,11 @@ def experiments_of(
 ):
     """Blocks of the experiments table."""
     drawn = (robot.chain, robot.joint_limits, 1, key, PAPER, purpose)
-    blocks = blocks_of_sets(sets)
+    blocks = split_data_sets(sets)
     return [
-        experiment_columns(numbers, random_experiments(*drawn, numbers, configurations))
+        pack_experiments(
+            numbers, draw_random_experiments(*drawn, numbers, configurations)
+        )
         for numbers in blocks
     ]
 
@@ -44,9 +46,9 @@ def as_read(blocks):
 
 
 def deflections_of(robot, experiments, noise=0.0, at="end_effector", key="kuka"):
-    blocks = as_read(ideal_blocks(experiments, robot, at))
+    blocks = as_read(simulate_blocks(experiments, robot, at))
     if noise:
-        blocks = as_read(measured_blocks(blocks, key, 1, noise))
+        blocks = as_read(add_noise_to_blocks(blocks, key, 1, noise))
     found = {point.name: [] for point in robot.chain.points}
     for block in blocks:
         found[block["point"][0]].append(block)
@@ -55,8 +57,8 @@ def deflections_of(robot, experiments, noise=0.0, at="end_effector", key="kuka")
 
 def identified(robot, strategy, experiments, deflections, rows=6, at="end_effector"):
     needed = {name: deflections[name] for name in strategy.points}
-    blocks = identified_blocks(
-        paired_blocks(experiments, needed), robot.chain, strategy, rows, at
+    blocks = identify_blocks(
+        pair_blocks(experiments, needed), robot.chain, strategy, rows, at
     )
     return joined(list(blocks))
 
@@ -77,7 +79,9 @@ def compliances(table, length):
 def judge(robot, at="end_effector"):
     experiments = experiments_of(robot, 1, CONFIGURATIONS_OF_THE_TEST, purpose="test")
     (seen,) = deflections_of(robot, experiments, at=at)[robot.chain.end_effector.name]
-    return make_judge(robot, to_experiments(experiments[0]), to_deflections(seen), at)
+    return make_validation_set(
+        robot, unpack_experiments(experiments[0]), unpack_deflections(seen), at
+    )
 
 
 def pinocchio_regressors(chain, block, name, at="end_effector", rows=6):

@@ -17,7 +17,7 @@ from elastocal.mechanics.elastostatics import (
 )
 from elastocal.mechanics.kinematics import poses, poses_and_jacobians
 from elastocal.mechanics.robot import Tube
-from elastocal.study.simulation import true_deflections
+from elastocal.study.simulation import compute_true_deflections
 
 
 def test_offset_that_turns_with_the_tool_loads_the_joints_as_a_force_at_that_target(
@@ -118,8 +118,8 @@ def test_tube_compliance_is_that_of_an_integrated_beam(tube, length):
 def test_extended_deflection_is_that_of_joints_and_beams_added_up(kuka_extended):
     loads = random_loads(kuka_extended, 1, 5, force=1.0)
     point = kuka_extended.chain.end_effector
-    found = true_deflections(kuka_extended, loads, point, "end_effector")
-    expected = true_deflections(
+    found = compute_true_deflections(kuka_extended, loads, point, "end_effector")
+    expected = compute_true_deflections(
         replace(kuka_extended, links=()), loads, point, "end_effector"
     )
     end = poses(kuka_extended.chain, loads.joint_angles, point)[0]

@@ -10,8 +10,8 @@ import pandas as pd
 import pytest
 from drawn_figures import empty_pictures
 
-from elastocal.report.study import study_facts
-from elastocal.report.typesetting import compile_document, template
+from elastocal.report.study import collect_study_facts
+from elastocal.report.typesetting import compile_document, load_template
 from elastocal.study.strategies import Stage, Strategy
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden"
@@ -63,7 +63,7 @@ def facts(**changed):
         "path_m": 0.5,
         "cutting_N": 500,
     }
-    found = study_facts(
+    found = collect_study_facts(
         {name: table(name) for name in FILES} | changed,
         names,
         ["kuka"],
@@ -185,7 +185,9 @@ def test_figures_that_differ_are_those_below_the_level_after_correction():
 def test_the_page_has_the_rows_of_each_table():
     def tables_of(stated):
         _, *parts = re.split(
-            r"^## (.*)$", template("study_tables.md").render(stated), flags=re.MULTILINE
+            r"^## (.*)$",
+            load_template("study_tables.md").render(stated),
+            flags=re.MULTILINE,
         )
         rows = {
             title: re.findall(r"^\| (.*) \|$", text, re.MULTILINE)

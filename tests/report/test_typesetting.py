@@ -8,7 +8,7 @@ import typst
 from drawn_figures import empty_pictures
 from jinja2 import UndefinedError
 
-from elastocal.report.typesetting import compile_document, sentences
+from elastocal.report.typesetting import compile_document, render_sentences
 from elastocal.report.words import FILTERS
 
 DOCUMENT = """#set document(date: none)
@@ -69,11 +69,11 @@ def test_a_template_has_paragraphs_and_rows_and_keeps_what_may_not_break(
     made += "## rows\na ¦ {{ b }} ¦\n{# no #}\n\nc ¦ d ¦ e\n"
     (tmp_path / "made.txt").write_text(made, encoding="utf-8")
     monkeypatch.setattr(resources, "files", {"elastocal.report": tmp_path}.__getitem__)
-    said = sentences("made.txt", FILTERS, b="x")
+    said = render_sentences("made.txt", FILTERS, b="x")
     assert said == {
         "one": ["A >\u00a099\u00a0% line."] * 2,
         "rows": [["a", "x", ""], ["c", "d", "e"]],
     }
     # What a template shows and nobody gave is an error and no hole.
     with pytest.raises(UndefinedError, match="b"):
-        sentences("made.txt", FILTERS)
+        render_sentences("made.txt", FILTERS)

@@ -6,7 +6,7 @@ from copy import deepcopy
 import pytest
 from support import changed, refused
 
-from elastocal.study.configuration import check_study, override
+from elastocal.study.configuration import check_study, override_entries
 
 
 def test_the_repository_passes(config, config_folder):
@@ -168,7 +168,7 @@ def test_two_strategies_of_one_name_are_refused(other_config, other_folder):
 
 
 def test_what_the_command_line_changes_is_read_as_in_the_file(config, config_folder):
-    changed = override(
+    changed = override_entries(
         config,
         ["seed=7", "evaluation={studies: 3}", "interpretations={offset_frame: tool}"],
     )
@@ -178,4 +178,4 @@ def test_what_the_command_line_changes_is_read_as_in_the_file(config, config_fol
         "offset_frame": "tool"
     }
     check_study(changed, config_folder, "config.yaml")
-    assert override(config, []) == config
+    assert override_entries(config, []) == config

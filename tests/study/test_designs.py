@@ -3,7 +3,7 @@
 import pandas as pd
 from made_studies import few_of
 
-from elastocal.study.designs import simulated_design_blocks
+from elastocal.study.designs import evaluate_designs
 
 LOADS = {"random": None, "hanging": [0, 0, -1]}
 
@@ -14,7 +14,7 @@ def test_chosen_configurations_leave_less_than_random_ones_and_a_hanging_weight_
     table = pd.concat(
         [
             pd.DataFrame(block)
-            for block in simulated_design_blocks(few_of(kuka), 150, [6, 12], LOADS)
+            for block in evaluate_designs(few_of(kuka), 150, [6, 12], LOADS)
         ]
     )
     for (load, _), cell in table.groupby(["load", "configurations"]):

@@ -19,14 +19,14 @@ from elastocal.mechanics.elastostatics import joint_torques, regressor
 from elastocal.mechanics.kinematics import poses_and_jacobians
 from elastocal.mechanics.robot import with_target_offset
 from elastocal.study.equation_11 import (
-    LARGEST_CONDITION,
+    MAX_CONDITION_NUMBER,
     Measurements,
+    compute_regressors,
     estimate_compliance,
-    first_solvable_length,
-    regressors_of,
-    undetermined,
+    find_first_solvable_length,
+    find_undetermined_prefixes,
 )
-from elastocal.study.simulation import to_experiments, true_deflections
+from elastocal.study.simulation import compute_true_deflections, unpack_experiments
 from elastocal.study.strategies import Stage, Strategy
 
 SETS = 3
@@ -81,7 +81,7 @@ class Data:
         for point in robot.chain.points:
             jacobian = poses_and_jacobians(robot.chain, loads.joint_angles, point)[2]
             self.matrix[point.name] = regressor(jacobian, torques)[..., :rows, :]
-            deflection = true_deflections(robot, loads, point, "end_effector")[
+            deflection = compute_true_deflections(robot, loads, point, "end_effector")[
                 ..., :rows
             ]
             self.measured[point.name] = deflection + 2e-4 * rng.standard_normal(
@@ -179,7 +179,10 @@ def test_first_solvable_length_counts_measurements_against_unknowns_of_a_stage(
     strategy_called, name, poses, positions
 ):
     strategy = strategy_called(name)
-    assert (first_solvable_length(strategy, 6), first_solvable_length(strategy, 3)) == (
+    assert (
+        find_first_solvable_length(strategy, 6),
+        find_first_solvable_length(strategy, 3),
+    ) == (
         poses,
         positions,
     )
@@ -193,7 +196,7 @@ def test_a_prefix_that_has_measurements_enough_but_not_the_right_ones_is_undeter
     strategy = strategies["4-6DoF-after-3DoF"]
     measurements = data_of("kuka", 3, robots).measurements()
     compliance, triangles = estimate_compliance(strategy, measurements, 6)
-    unknown = undetermined(strategy, 3, triangles)
+    unknown = find_undetermined_prefixes(strategy, 3, triangles)
     assert unknown[0].all() and not unknown[1:].any()
     # Nor are its compliances rounding over rounding where no condition is asked for.
     assert np.isnan(compliance[0, 3:]).all()
@@ -210,7 +213,7 @@ def test_undetermined_are_the_prefixes_beyond_the_largest_condition():
     triangles = estimate_compliance(
         strategy, {"A": Measurements(matrix, np.zeros((6, 2, sets)))}, 3
     )[1]
-    found = undetermined(strategy, 6, triangles)
+    found = find_undetermined_prefixes(strategy, 6, triangles)
     for length in (1, 2):
         conditions = np.array(
             [
@@ -220,9 +223,9 @@ def test_undetermined_are_the_prefixes_beyond_the_largest_condition():
                 for s in range(sets)
             ]
         )
-        clear = np.abs(np.log(conditions / LARGEST_CONDITION)) > 0.1
+        clear = np.abs(np.log(conditions / MAX_CONDITION_NUMBER)) > 0.1
         np.testing.assert_array_equal(
-            found[length - 1][clear], (conditions > LARGEST_CONDITION)[clear]
+            found[length - 1][clear], (conditions > MAX_CONDITION_NUMBER)[clear]
         )
         assert 0 < found[length - 1].sum() < sets
 
@@ -247,8 +250,8 @@ def test_nothing_is_identified_before_anything_loads_the_robot_and_everything_af
 def test_regressors_are_those_of_equation_10_by_pinocchio(at, rows):
     robot = robot_of(OTHER_CHAINS["seven joints"])
     (block,) = experiments_of(robot, sets=2, configurations=3)
-    regressors = regressors_of(
-        to_experiments(block), robot.chain, ("elbow", "flange"), rows, at
+    regressors = compute_regressors(
+        unpack_experiments(block), robot.chain, ("elbow", "flange"), rows, at
     )
     assert set(regressors) == {"elbow", "flange"}
     for name, found in regressors.items():

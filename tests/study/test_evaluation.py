@@ -8,19 +8,19 @@ from made_studies import studies_of
 from support import random_loads
 
 from elastocal.study.evaluation import (
-    average,
-    find_length,
-    metrics,
-    metrics_table,
-    over_studies_table,
-    replicates_table,
-    to_weights,
+    average_estimates,
+    build_metrics_table,
+    build_over_studies_table,
+    build_replicates_table,
+    find_length_with_error,
+    make_metrics_schema,
+    unpack_weights,
 )
-from elastocal.study.metrics import make_judge, position_errors
+from elastocal.study.metrics import compute_position_errors, make_validation_set
 from elastocal.study.simulation import (
-    bootstrap_weights,
-    true_deflections,
-    weight_blocks,
+    compute_true_deflections,
+    draw_bootstrap_weights,
+    draw_weight_blocks,
 )
 
 SETS = 60
@@ -33,10 +33,10 @@ METHODS = ("stiffness", "compliance")
 @pytest.fixture(scope="module")
 def judge(kuka):
     loads = random_loads(kuka, 1, TESTS)
-    return make_judge(
+    return make_validation_set(
         kuka,
         loads,
-        true_deflections(kuka, loads, kuka.chain.end_effector, "end_effector"),
+        compute_true_deflections(kuka, loads, kuka.chain.end_effector, "end_effector"),
     )
 
 
@@ -52,13 +52,13 @@ def estimates(kuka):
 
 @pytest.fixture(scope="module")
 def weights():
-    return bootstrap_weights(1, "kuka", range(SETS), REPLICATES)
+    return draw_bootstrap_weights(1, "kuka", range(SETS), REPLICATES)
 
 
 @pytest.fixture(scope="module")
 def counts():
     """How often each test configuration counts."""
-    return to_weights([*weight_blocks("kuka", 1, SETS, TESTS, REPLICATES)][-1])
+    return unpack_weights([*draw_weight_blocks("kuka", 1, SETS, TESTS, REPLICATES)][-1])
 
 
 def blocks_of(estimates, weights, *cuts):
@@ -70,7 +70,7 @@ def blocks_of(estimates, weights, *cuts):
 def test_averages_are_those_written_out_whatever_the_blocks(
     judge, estimates, weights, counts, method
 ):
-    found = average(
+    found = average_estimates(
         iter(blocks_of(estimates, weights, 1, 20, 21)), judge, method, counts
     )
     for replicate in (0, 1, REPLICATES):
@@ -81,9 +81,9 @@ def test_averages_are_those_written_out_whatever_the_blocks(
         }[method](drawn)
         np.testing.assert_allclose(found.compliance[replicate], expected, rtol=1e-12)
         tests = counts[replicate].astype(int)
-        deviation = np.repeat(position_errors(judge, expected), tests, axis=1).mean(
-            axis=1
-        )
+        deviation = np.repeat(
+            compute_position_errors(judge, expected), tests, axis=1
+        ).mean(axis=1)
         np.testing.assert_allclose(
             found.initial_deviation[replicate],
             np.repeat(judge.initial_errors, tests).mean(),
@@ -106,8 +106,10 @@ def test_share_of_nonpositive_compliances_counts_data_sets_and_takes_trust_away(
     spoiled[:3, 1, 4] *= -1
     spoiled[0, 1, 5] = 0.0
     with np.errstate(divide="ignore", invalid="ignore"):
-        averages = average(blocks_of(spoiled, weights, 2), judge, "stiffness", counts)
-        table = metrics_table(averages, judge.reference, (0, 1))
+        averages = average_estimates(
+            blocks_of(spoiled, weights, 2), judge, "stiffness", counts
+        )
+        table = build_metrics_table(averages, judge.reference, (0, 1))
     np.testing.assert_allclose(averages.nonpositive_share, [0, 3 / SETS, 0])
     np.testing.assert_array_equal(table["trustworthy"], [True, False, True])
 
@@ -115,9 +117,11 @@ def test_share_of_nonpositive_compliances_counts_data_sets_and_takes_trust_away(
 def test_metrics_are_equations_13_and_14_of_the_averages(
     judge, estimates, weights, counts
 ):
-    averages = average(blocks_of(estimates, weights), judge, "stiffness", counts)
-    table = metrics_table(averages, judge.reference, (0, 1))
-    assert set(table) == {column.name for column in metrics(6).columns}
+    averages = average_estimates(
+        blocks_of(estimates, weights), judge, "stiffness", counts
+    )
+    table = build_metrics_table(averages, judge.reference, (0, 1))
+    assert set(table) == {column.name for column in make_metrics_schema(6).columns}
     stiffness = (1 / estimates).mean(axis=0)
     delta = 100 * (stiffness * judge.reference - 1)
     np.testing.assert_array_equal(table["length"], [1, 2, 3])
@@ -138,8 +142,10 @@ def test_metrics_are_equations_13_and_14_of_the_averages(
 def test_replicates_are_every_one_but_the_first_and_their_spread_is_the_standard_error(
     judge, estimates, weights, counts
 ):
-    averages = average(blocks_of(estimates, weights), judge, "stiffness", counts)
-    table = replicates_table(averages, judge.reference, (0, 1))
+    averages = average_estimates(
+        blocks_of(estimates, weights), judge, "stiffness", counts
+    )
+    table = build_replicates_table(averages, judge.reference, (0, 1))
     assert len(table["replicate"]) == REPLICATES * LENGTHS
     np.testing.assert_array_equal(
         np.unique(table["replicate"]), np.arange(1, REPLICATES + 1)
@@ -151,7 +157,7 @@ def test_replicates_are_every_one_but_the_first_and_their_spread_is_the_standard
     np.testing.assert_allclose(
         table["k_sigma_fixed_joints"][row], delta[:2].sum(), rtol=1e-9
     )
-    metrics = metrics_table(averages, judge.reference, (0, 1))
+    metrics = build_metrics_table(averages, judge.reference, (0, 1))
     for name in ("k_sigma", "deviation", "initial_deviation"):
         spread = table[name].reshape(REPLICATES, LENGTHS).std(axis=0, ddof=1)
         np.testing.assert_allclose(metrics[f"{name}_std_error"], spread, rtol=1e-12)
@@ -172,7 +178,7 @@ def test_a_length_comes_with_the_spread_of_replicates_that_go_on_beyond_their_cu
 ):
     """As one over the length: from 0.5, 0.75 and 1 at length 3 to 0.25."""
     replicates = np.column_stack([[3.0, 3.0, 2.0], [0.9, 2.6, 0.9], ends])
-    found, error = find_length(np.array([3.0, 0.9, 0.5]), replicates, limit)
+    found, error = find_length_with_error(np.array([3.0, 0.9, 0.5]), replicates, limit)
     assert found == length and error == pytest.approx(np.std(lengths, ddof=1))
 
 
@@ -183,7 +189,7 @@ def test_table_4_over_studies_is_their_median_with_a_spread_that_one_outlier_doe
     )
     for name in ("k_sigma", "k_sigma_fixed_joints", "deviation"):
         frame[f"{name}_mean_compliance"] = frame[name] / 10
-    usual, averaged = over_studies_table(
+    usual, averaged = build_over_studies_table(
         frame, 20, {"k_sigma": 2.0, "deviation": 4.0}
     ).to_dict("records")
     assert [usual["average"], averaged["average"]] == ["stiffness", "compliance"]

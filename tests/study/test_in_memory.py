@@ -5,8 +5,8 @@ from made_studies import SIZE, USUAL
 from made_study_blocks import deflections_of, experiments_of, judge
 
 from elastocal.study.in_memory import StudyInMemory
-from elastocal.study.metrics import position_errors
-from elastocal.study.simulation import to_deflections
+from elastocal.study.metrics import compute_position_errors
+from elastocal.study.simulation import unpack_deflections
 
 
 def study_of(robot):
@@ -26,7 +26,9 @@ def test_measurements_are_those_of_the_pipelines_steps(kuka):
     (block,) = deflections_of(kuka, experiments_of(kuka, 4, 5), SIZE.noise)["3DoF"]
     found = study_of(kuka).measure(np.arange(4), ("3DoF",))["3DoF"]
     np.testing.assert_allclose(
-        np.moveaxis(found.deflection, (0, 1), (2, 1)), to_deflections(block), rtol=1e-12
+        np.moveaxis(found.deflection, (0, 1), (2, 1)),
+        unpack_deflections(block),
+        rtol=1e-12,
     )
 
 
@@ -34,5 +36,7 @@ def test_the_score_sheet_of_the_study_of_the_tables_is_the_pipelines(kuka):
     found = study_of(kuka).judge()
     models = 1.1 * kuka.compliance[None]
     np.testing.assert_allclose(
-        position_errors(found, models), position_errors(judge(kuka), models), rtol=1e-9
+        compute_position_errors(found, models),
+        compute_position_errors(judge(kuka), models),
+        rtol=1e-9,
     )

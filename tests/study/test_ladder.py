@@ -11,15 +11,19 @@ from elastocal.mechanics.elastostatics import (
     spring_compliance,
 )
 from elastocal.mechanics.kinematics import jacobians
-from elastocal.study.ladder import ladder, products_of, spring_columns
-from elastocal.study.simulation import random_experiments, true_deflections
+from elastocal.study.ladder import (
+    build_ladder,
+    compute_spring_columns,
+    form_normal_equations,
+)
+from elastocal.study.simulation import compute_true_deflections, draw_random_experiments
 
 FOLDS = 4
 
 
 @pytest.fixture(scope="module")
 def seen(kuka_extended):
-    drawn = random_experiments(
+    drawn = draw_random_experiments(
         kuka_extended.chain,
         kuka_extended.joint_limits,
         1,
@@ -29,12 +33,12 @@ def seen(kuka_extended):
         range(3),
         24,
     )
-    return drawn, spring_columns(kuka_extended, drawn)
+    return drawn, compute_spring_columns(kuka_extended, drawn)
 
 
 def folds_of(columns, deflection):
     return [
-        products_of(columns[:, fold::FOLDS], deflection[:, fold::FOLDS])
+        form_normal_equations(columns[:, fold::FOLDS], deflection[:, fold::FOLDS])
         for fold in range(FOLDS)
     ]
 
@@ -64,10 +68,10 @@ def test_columns_times_the_true_compliances_are_the_linear_deflection(
 def test_cross_validation_is_that_of_fits_to_all_other_folds(kuka_extended, seen):
     """Joints alone, by numpy's least squares for each fold."""
     drawn, columns = seen
-    deflection = true_deflections(
+    deflection = compute_true_deflections(
         kuka_extended, drawn, kuka_extended.chain.end_effector, "end_effector"
     )
-    found = ladder(folds_of(columns, deflection), 6, len(kuka_extended.links))
+    found = build_ladder(folds_of(columns, deflection), 6, len(kuka_extended.links))
     place = np.arange(24)
     total = 0.0
     for fold in range(FOLDS):
@@ -91,7 +95,7 @@ def test_a_robot_with_one_yielding_link_gets_that_spring_first_and_nothing_of_wo
     weights[:6] = kuka_extended.compliance
     weights[6 + 8 * 2 : 6 + 8 * 3] = 1e-6
     noise = 1e-6 * np.random.default_rng(3).standard_normal(columns.shape[:3])
-    found = ladder(
+    found = build_ladder(
         folds_of(columns, columns @ weights + noise), 6, len(kuka_extended.links)
     )
     assert (found.order[:, 0] == 2).all() and (found.chosen >= 1).all()

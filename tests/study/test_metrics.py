@@ -8,14 +8,14 @@ from support import random_loads, without_tool
 
 from elastocal.mechanics.elastostatics import exact_deflections, joint_torques
 from elastocal.study.metrics import (
-    first_length_below,
-    k_sigma,
-    length_to_reach,
-    make_judge,
-    mean_deviation,
-    position_errors,
+    compute_k_sigma,
+    compute_mean_deviation,
+    compute_position_errors,
+    extrapolate_length,
+    find_first_length_below,
+    make_validation_set,
 )
-from elastocal.study.simulation import true_deflections
+from elastocal.study.simulation import compute_true_deflections
 
 RELATIVE_ERRORS = np.array(
     [
@@ -28,10 +28,12 @@ RELATIVE_ERRORS = np.array(
 
 def judge_of(robot, loads=None):
     loads = random_loads(robot, 1, 40) if loads is None else loads
-    return make_judge(
+    return make_validation_set(
         robot,
         loads,
-        true_deflections(robot, loads, robot.chain.end_effector, "end_effector"),
+        compute_true_deflections(
+            robot, loads, robot.chain.end_effector, "end_effector"
+        ),
     )
 
 
@@ -44,14 +46,14 @@ def exact_errors(robot, loads, compliance):
     predicted = exact_deflections(
         robot.chain, loads.joint_angles, compliance * torques, end
     )
-    truth = true_deflections(robot, loads, end, "end_effector")
+    truth = compute_true_deflections(robot, loads, end, "end_effector")
     return np.linalg.norm((predicted - truth)[..., :3], axis=-1).ravel()
 
 
 def test_position_errors_are_those_of_the_exact_kinematics(robot):
     loads = random_loads(robot, 1, 40)
     models = robot.compliance * (1 + RELATIVE_ERRORS)
-    found = position_errors(judge_of(robot, loads), models)
+    found = compute_position_errors(judge_of(robot, loads), models)
     assert found.shape == (3, 40)
     for model, errors in zip(models[:2], found, strict=False):
         expected = exact_errors(robot, loads, model)
@@ -67,10 +69,10 @@ def test_mean_deviation_counts_each_test_configuration_as_often_as_it_weighs(kuk
     judge = judge_of(kuka)
     models = kuka.compliance * (1 + RELATIVE_ERRORS[[[0, 1], [1, 0]]])
     counts = np.random.default_rng(1).poisson(1.0, (2, 40))
-    found = mean_deviation(judge, models, counts)
+    found = compute_mean_deviation(judge, models, counts)
     for group in range(2):
         expected = np.repeat(
-            position_errors(judge, models[group]), counts[group], axis=1
+            compute_position_errors(judge, models[group]), counts[group], axis=1
         ).mean(axis=1)
         np.testing.assert_allclose(found[group], expected, rtol=1e-12)
 
@@ -78,12 +80,12 @@ def test_mean_deviation_counts_each_test_configuration_as_often_as_it_weighs(kuk
 def test_k_sigma_is_the_signed_sum_over_all_joints_or_some():
     true_compliance = np.array([1.0, 2.0, 4.0])
     compliance = true_compliance / [1.01, 0.97, 1.05]
-    assert k_sigma(compliance, true_compliance) == pytest.approx(3.0, rel=1e-10)
-    assert k_sigma(compliance, true_compliance, [0, 1]) == pytest.approx(
+    assert compute_k_sigma(compliance, true_compliance) == pytest.approx(3.0, rel=1e-10)
+    assert compute_k_sigma(compliance, true_compliance, [0, 1]) == pytest.approx(
         -2.0, rel=1e-10
     )
     np.testing.assert_allclose(
-        k_sigma(np.stack([compliance, true_compliance]), true_compliance),
+        compute_k_sigma(np.stack([compliance, true_compliance]), true_compliance),
         [3.0, 0.0],
         atol=1e-12,
     )
@@ -91,7 +93,7 @@ def test_k_sigma_is_the_signed_sum_over_all_joints_or_some():
 
 def test_what_is_not_determined_counts_as_above_the_limit():
     found = [
-        first_length_below(np.array(values), 1.0)
+        find_first_length_below(np.array(values), 1.0)
         for values in ([np.nan, np.nan, 0.1], [np.nan] * 2, [np.inf, -1.0])
     ]
     assert found == [3, np.inf, 2]
@@ -112,7 +114,7 @@ def test_lengths_follow_a_bias_over_the_length_to_any_limit(bias, limit, sign, l
     assume(abs(crossing - np.round(crossing)) > 1e-9 * crossing)
     whole = max(np.ceil(crossing), 1.0)
     reached = whole <= lengths
-    assert first_length_below(values, limit) == (whole if reached else np.inf)
-    assert length_to_reach(values, limit) == pytest.approx(
+    assert find_first_length_below(values, limit) == (whole if reached else np.inf)
+    assert extrapolate_length(values, limit) == pytest.approx(
         whole if reached else crossing, rel=1e-12
     )

@@ -5,14 +5,14 @@ import pandas as pd
 import pytest
 from made_studies import USUAL
 
-from elastocal.study.in_memory import Size, StudyInMemory
+from elastocal.study.in_memory import StudyInMemory, StudySize
 from elastocal.study.points import (
-    break_even_table,
-    budget_blocks,
-    configurations_needed,
-    lengths_table,
+    build_break_even_table,
+    build_lengths_table,
+    build_paired_table,
+    evaluate_point_sets,
+    interpolate_configurations,
     mean_of,
-    paired_table,
 )
 
 POINT_SETS = {"E": ["E"], "E twice": ["E", "E"], "three": ["A", "B", "E"]}
@@ -43,7 +43,7 @@ def frame_of(scatter=0.2):
 
 def test_pairs_are_compared_data_set_by_data_set():
     """The scatter that both share is in neither interval."""
-    table = paired_table({"arm": frame_of()}, POINT_SETS, 6)
+    table = build_paired_table({"arm": frame_of()}, POINT_SETS, 6)
     assert table.points.tolist() == ["E twice", "three"]
     assert table.measurements.tolist() == [
         12,
@@ -67,7 +67,7 @@ def test_the_interval_of_a_ratio_is_that_of_the_bootstrap_over_data_sets():
 
 
 def test_lengths_are_exact_with_an_interval():
-    table = lengths_table({"arm": frame_of()}, POINT_SETS, [40.0, 1.0])
+    table = build_lengths_table({"arm": frame_of()}, POINT_SETS, [40.0, 1.0])
     row = table[(table.points == "E") & (table.accuracy_um == 40)].iloc[0]
     # 1e-8 / n <= (40e-6)^2 from n = 6.25 on.
     mean = frame_of().query("points == 'E' and length == 1").mean_square.mean()
@@ -79,7 +79,10 @@ def test_lengths_are_exact_with_an_interval():
 def test_a_length_counts_where_the_accuracy_is_kept_for_good():
     frame = frame_of(0.0)
     frame.loc[frame.length == 9, "mean_square"] = 1.0
-    assert lengths_table({"arm": frame}, {"E": ["E"]}, [40.0]).configurations[0] == 10
+    assert (
+        build_lengths_table({"arm": frame}, {"E": ["E"]}, [40.0]).configurations[0]
+        == 10
+    )
 
 
 POINT_SETS_OF_COSTS = {"one": ["A"], "two": ["A", "B"], "useless": ["A", "A"]}
@@ -113,29 +116,29 @@ def weights():
 
 def test_the_length_is_where_the_curve_crosses_the_accuracy():
     squares = (300.0**2) / LONG
-    assert configurations_needed(squares, 60.0) == pytest.approx(25.0)
-    assert configurations_needed(squares, 59.0) == pytest.approx(
+    assert interpolate_configurations(squares, 60.0) == pytest.approx(25.0)
+    assert interpolate_configurations(squares, 59.0) == pytest.approx(
         (300 / 59) ** 2, rel=1e-3
     )
     assert (
-        configurations_needed(squares, 1.0) == np.inf
-        and configurations_needed(squares, 400.0) == 1.0
+        interpolate_configurations(squares, 1.0) == np.inf
+        and interpolate_configurations(squares, 400.0) == 1.0
     )
     # From no estimate at all to one that is better: the first that there is.
-    assert configurations_needed(
+    assert interpolate_configurations(
         np.array([np.nan, 50.0**2, 40.0**2]), 60.0
     ) == pytest.approx(2.0)
 
 
 def test_a_set_pays_from_the_cost_on_at_which_both_cost_the_same(weights):
-    table = break_even_table(
+    table = build_break_even_table(
         {"arm": frame()}, POINT_SETS_OF_COSTS, [60.0], weights
     ).set_index("points")
     # 25 configurations of one measurement, 100/9 of two: 25 (r + 1) = 100/9 (r + 2).
     expected = (200 / 9 - 25) / (25 - 100 / 9)
     assert table.break_even["two"] == pytest.approx(max(expected, 0.0), abs=0.01)
     assert table.break_even["useless"] == np.inf
-    costly = break_even_table(
+    costly = build_break_even_table(
         {"arm": frame((300, 240, 300))}, POINT_SETS_OF_COSTS, [60.0], weights
     ).set_index("points")
     assert costly.break_even["two"] == pytest.approx((32 - 25) / (25 - 16), rel=1e-2)
@@ -147,12 +150,14 @@ def test_a_set_pays_from_the_cost_on_at_which_both_cost_the_same(weights):
 
 
 POINT_SETS_OF_BUDGET = {"6DoF": ["6DoF"], "6DoF twice": ["6DoF", "6DoF"]}
-SIZE = Size(data_sets=40, configurations=6, tests=30, noise=1e-5)
+SIZE = StudySize(data_sets=40, configurations=6, tests=30, noise=1e-5)
 
 
 def test_a_point_measured_twice_has_noise_of_its_own(kuka):
     blocks = list(
-        budget_blocks(StudyInMemory(kuka, "kuka", 1, USUAL, SIZE), POINT_SETS_OF_BUDGET)
+        evaluate_point_sets(
+            StudyInMemory(kuka, "kuka", 1, USUAL, SIZE), POINT_SETS_OF_BUDGET
+        )
     )
     once, twice = (block["mean_square"].reshape(40, 6)[:, 5] for block in blocks[:2])
     # 40 data sets: the mean of the ratio of means, a half, has an error of about 15 %.

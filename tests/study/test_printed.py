@@ -8,7 +8,12 @@ from made_studies import studies_of
 from statsmodels.api import OLS
 from statsmodels.stats.multitest import multipletests
 
-from elastocal.study.printed import Predicted, holm, joint_table, predict_scatter
+from elastocal.study.printed import (
+    StudyScatter,
+    build_joint_table,
+    correct_by_holm,
+    predict_scatter,
+)
 
 VALUES = np.array([1.0, 1.2, 0.8, 1.1, 0.9])
 
@@ -18,14 +23,14 @@ def test_a_p_value_is_that_of_one_more_study():
     (statsmodels)."""
     dummy = np.append(np.zeros(5), 1.0)
     fitted = OLS(np.append(VALUES, 1.5), np.column_stack([np.ones(6), dummy])).fit()
-    assert Predicted(VALUES, False, 0.0).p_value(1.5) == pytest.approx(
+    assert StudyScatter(VALUES, False, 0.0).p_value(1.5) == pytest.approx(
         fitted.pvalues[1], rel=1e-9
     )
-    assert Predicted(VALUES, False, 0.0).p_value(float(VALUES.mean())) == pytest.approx(
-        1.0
-    )
+    assert StudyScatter(VALUES, False, 0.0).p_value(
+        float(VALUES.mean())
+    ) == pytest.approx(1.0)
     # A rounded figure is less certain.
-    assert Predicted(VALUES, False, 2.0).p_value(1.5) > Predicted(
+    assert StudyScatter(VALUES, False, 2.0).p_value(1.5) > StudyScatter(
         VALUES, False, 0.0
     ).p_value(1.5)
 
@@ -59,8 +64,10 @@ def test_what_the_studies_do_not_have_is_not_predicted(robot, strategy, quantity
 def test_holm_corrects_for_those_that_are_there():
     p_values = np.random.default_rng(1).random(9) ** 4
     expected = np.append(multipletests(p_values, method="holm")[1], np.nan)
-    np.testing.assert_allclose(holm(np.append(p_values, np.nan)), expected, rtol=1e-12)
-    assert np.isnan(holm(np.array([np.nan]))).all()
+    np.testing.assert_allclose(
+        correct_by_holm(np.append(p_values, np.nan)), expected, rtol=1e-12
+    )
+    assert np.isnan(correct_by_holm(np.array([np.nan]))).all()
 
 
 BIASES = tuple(20.0 + 0.5 * k for k in range(8))
@@ -79,7 +86,7 @@ def print_figures(k_sigma, dev):
 
 def test_a_paper_like_the_studies_lies_among_them():
     # k_sigma over the fixed joints is half of that over all.
-    fixed, whole = joint_table(
+    fixed, whole = build_joint_table(
         studies_of(biases=BIASES), print_figures(0.5 * 22 / 20, 22 / 20), 20
     ).to_dict("records")
     assert fixed["cells"] == 2 and fixed["below"] == 0 and fixed["studies"] == 8
@@ -88,7 +95,7 @@ def test_a_paper_like_the_studies_lies_among_them():
 
 
 def test_the_p_value_is_a_rank_and_no_smaller_than_one_over_the_studies():
-    (fixed, _) = joint_table(
+    (fixed, _) = build_joint_table(
         studies_of(biases=BIASES), print_figures(5.0, 5.0), 20
     ).to_dict("records")
     assert fixed["below"] == fixed["differ"] == 2 and fixed[

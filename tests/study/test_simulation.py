@@ -19,18 +19,18 @@ from support import OTHER_CHAINS, PinocchioPoint, robot_of, without_tool
 
 from elastocal.mechanics.kinematics import poses
 from elastocal.study import simulation
-from elastocal.study.evaluation import to_weights
+from elastocal.study.evaluation import unpack_weights
 from elastocal.study.simulation import (
     DATA_SETS,
     TESTS,
     Loading,
-    bending,
-    bootstrap_weights,
-    ideal_blocks,
-    measurement_noise,
-    random_experiments,
-    to_deflections,
-    weight_blocks,
+    draw_bootstrap_weights,
+    draw_measurement_noise,
+    draw_random_experiments,
+    draw_weight_blocks,
+    simulate_blocks,
+    summarize_displacements,
+    unpack_deflections,
 )
 
 PAPER = Loading(1000.0, (0.0, 0.5, 0.0), "base", "full_turn")
@@ -45,7 +45,7 @@ def draw(
     data_sets=range(4),
     configurations=5,
 ):
-    return random_experiments(
+    return draw_random_experiments(
         robot.chain,
         robot.joint_limits,
         seed,
@@ -120,7 +120,7 @@ def test_offset_in_the_tool_frame_turns_with_the_tool(kuka):
 
 
 def test_noise_is_standard_normal_and_independent_between_components():
-    noise = measurement_noise(1, "kuka", "6DoF", range(20), 500).reshape(-1, 6)
+    noise = draw_measurement_noise(1, "kuka", "6DoF", range(20), 500).reshape(-1, 6)
     # Of 10,000 it sees 0.035 anywhere with a power of 0.99: a standard deviation off by
     # 16 %.
     for component in noise.T:
@@ -145,7 +145,7 @@ def test_numbers_of_a_data_set_do_not_depend_on_how_many_there_are_or_how_long_t
 def test_ideal_deflections_are_the_poses_by_pinocchio_with_the_joints_yielded(name, at):
     robot = robot_of(OTHER_CHAINS[name])
     experiments = experiments_of(robot, sets=2, configurations=2)
-    found = list(ideal_blocks(experiments, robot, at))
+    found = list(simulate_blocks(experiments, robot, at))
     assert [block["point"] for block in found] == [
         point.name for point in robot.chain.points
     ]
@@ -161,7 +161,7 @@ def test_ideal_deflections_are_the_poses_by_pinocchio_with_the_joints_yielded(na
             robot.chain,
             without_tool(robot.chain.end_effector) if at == "end_effector" else point,
         )
-        found = to_deflections(block).reshape(-1, 6)
+        found = unpack_deflections(block).reshape(-1, 6)
         for q, force, row in zip(angles, wrench, found, strict=True):
             yielded = q + robot.compliance * (loaded.pose_and_jacobian(q)[2].T @ force)
             (before, turned_before), (after, turned_after) = (
@@ -179,14 +179,16 @@ def test_measurements_are_ideal_plus_scaled_noise_of_each_point(kuka):
     for noise in (5e-5, 5e-4):
         measured = deflections_of(kuka, experiments, noise)
         for name in ideal:
-            error = to_deflections(measured[name][0]) - to_deflections(ideal[name][0])
-            expected = noise * measurement_noise(1, "kuka", name, range(5), 4)
+            error = unpack_deflections(measured[name][0]) - unpack_deflections(
+                ideal[name][0]
+            )
+            expected = noise * draw_measurement_noise(1, "kuka", name, range(5), 4)
             np.testing.assert_allclose(error, expected, rtol=0, atol=1e-15)
 
 
 def test_statistics_are_of_the_lengths_of_the_displacements_set_by_set():
     """Lengths 5 and 1; 7 and 13; what follows the displacements does not count."""
-    found = bending(
+    found = summarize_displacements(
         np.pad(
             [[[3.0, 4, 0], [0, 0, 1]], [[2, 3, 6], [0, -5, 12]]],
             ((0, 0), (0, 0), (0, 3)),
@@ -204,15 +206,15 @@ def test_statistics_are_of_the_lengths_of_the_displacements_set_by_set():
 def test_the_weights_table_gives_back_the_weights_whatever_its_blocks(monkeypatch):
     for size in (500, 5, 2):
         monkeypatch.setattr(simulation, "SETS_PER_BLOCK", size)
-        *sets, tests = weight_blocks("kuka", 1, 5, 7, 4)
+        *sets, tests = draw_weight_blocks("kuka", 1, 5, 7, 4)
         assert [block["members"] for block in sets] == [DATA_SETS] * -(
             -5 // size
         ) and tests["members"] == TESTS
         np.testing.assert_array_equal(
-            np.hstack([to_weights(b) for b in sets]),
-            bootstrap_weights(1, "kuka", range(5), 4),
+            np.hstack([unpack_weights(b) for b in sets]),
+            draw_bootstrap_weights(1, "kuka", range(5), 4),
         )
-        assert to_weights(tests).shape == (5, 7)
+        assert unpack_weights(tests).shape == (5, 7)
 
 
 def test_numbers_do_not_depend_on_blocks(kuka, strategies, monkeypatch):

@@ -6,7 +6,7 @@ from support import chain_of, refused
 
 from elastocal.study.strategies import (
     check_strategy,
-    drop_forgotten_stages,
+    drop_superseded_stages,
     strategy_from_document,
 )
 
@@ -43,7 +43,7 @@ def test_fixed_joints_are_those_that_the_last_stage_takes_over_and_each_point_is
 
 def test_a_stage_that_identifies_every_joint_forgets_those_before_it(strategies):
     left = {
-        name: drop_forgotten_stages(strategy, 6).stages
+        name: drop_superseded_stages(strategy, 6).stages
         for name, strategy in strategies.items()
     }
     assert (

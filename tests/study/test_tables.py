@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from made_studies import metrics_of, replicates_of
 
-from elastocal.study.tables import merge_errors, table4, word_value
+from elastocal.study.tables import build_table4, format_value, merge_errors
 
 
 def test_a_length_that_is_not_reached_is_infinite_and_keeps_the_error_of_the_law_it_follows():
-    table = table4(
+    table = build_table4(
         metrics_of("A", 200.0),
         replicates_of("A", 200.0),
         ["arm"],
@@ -30,7 +30,7 @@ def test_a_length_that_is_not_reached_is_infinite_and_keeps_the_error_of_the_law
 def test_lengths_of_table4_are_those_of_its_own_limits_each_between_two_lengths():
     """Biases of 40 % and 20 % over the length fall below 3 % and 40 um below 7 um at
     the next whole length."""
-    table = table4(
+    table = build_table4(
         metrics_of("A", 40.0),
         replicates_of("A", 40.0),
         ["arm"],
@@ -65,4 +65,4 @@ def test_lengths_of_table4_are_those_of_its_own_limits_each_between_two_lengths(
     ],
 )
 def test_values_are_worded_with_two_digits_of_their_error(value, error, text):
-    assert word_value(value, error) == text
+    assert format_value(value, error) == text

@@ -9,11 +9,11 @@ from elastocal.application.inverse_kinematics import find_beyond_limits
 from elastocal.mechanics.kinematics import poses
 from elastocal.study.uses import (
     REFERENCE,
-    iso_9283,
-    milling_path,
-    pairs_table,
-    ranks_table,
-    scores,
+    build_pairs_table,
+    build_ranks_table,
+    make_iso_9283_poses,
+    make_milling_path,
+    score_strategies,
 )
 
 CENTRE = (1.6, 0.0, 1.0)
@@ -32,7 +32,7 @@ def find_positions(robot, use):
 
 
 def test_five_poses_lie_on_the_diagonals_of_a_cube_a_tenth_from_their_ends(robot):
-    use = iso_9283(robot, CENTRE, 1.0, 800.0)
+    use = make_iso_9283_poses(robot, CENTRE, 1.0, 800.0)
     position = find_positions(robot, use) - CENTRE
     np.testing.assert_allclose(position[0], 0, atol=1e-6)
     # Space diagonals of the unit cube have length sqrt 3.
@@ -48,7 +48,7 @@ def test_five_poses_lie_on_the_diagonals_of_a_cube_a_tenth_from_their_ends(robot
 
 
 def test_a_milling_path_is_straight_and_level_with_a_force_against_its_feed(robot):
-    use = milling_path(robot, CENTRE, 0.5, 500.0)
+    use = make_milling_path(robot, CENTRE, 0.5, 500.0)
     position = find_positions(robot, use)
     steps = np.diff(position, axis=0)
     np.testing.assert_allclose(steps, np.tile(steps[0], (len(steps), 1)), atol=1e-6)
@@ -117,7 +117,7 @@ def found():
     uses = pd.concat([uses_of("A", 50.0), uses_of("B", 75.0), uses_of("C", 50.0)])
     both = [average("A", 4.0, 4.0), average("B", 6.0, 2.0), average("C", 4.0, 4.0)]
     metrics, replicates = (pd.concat(parts) for parts in zip(*both, strict=True))
-    return {"arm": scores(uses, metrics, replicates, LENGTH)}
+    return {"arm": score_strategies(uses, metrics, replicates, LENGTH)}
 
 
 def test_scores_are_in_the_units_of_people_with_roots_of_means_of_squares(found):
@@ -138,7 +138,7 @@ def test_scores_are_in_the_units_of_people_with_roots_of_means_of_squares(found)
 
 
 def test_one_estimator_under_two_names_has_one_rank_and_ratio_one(found):
-    table = ranks_table(found, "A").set_index(["metric", "strategy"])
+    table = build_ranks_table(found, "A").set_index(["metric", "strategy"])
     assert table["rank"][REFERENCE].to_dict() == {"A": 1, "B": 3, "C": 1}
     assert table.loc[
         (REFERENCE, "C"), ["ratio", "ratio_low", "ratio_high"]
@@ -151,12 +151,12 @@ def test_one_estimator_under_two_names_has_one_rank_and_ratio_one(found):
 
 
 def test_only_the_metric_that_puts_them_in_the_other_order_reverses(found):
-    table = pairs_table(found)
+    table = build_pairs_table(found)
     assert set(table.strategy) == {"A"} and set(table.other) == {"B"}
     assert table[table.reversed].metric.tolist() == ["k_sigma_percent_fixed_joints"]
 
 
 def test_metrics_at_places_that_a_robot_does_not_reach_are_left_out():
     uses = uses_of("A", 50.0).assign(iso_9283=np.nan)
-    found = scores(uses, *average("A", 4.0, 4.0), LENGTH)
+    found = score_strategies(uses, *average("A", 4.0, 4.0), LENGTH)
     assert "iso_9283_um" not in found and {REFERENCE, "path_rms_um"} < set(found)

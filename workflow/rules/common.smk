@@ -19,7 +19,7 @@ from elastocal.errors import InputError
 from elastocal.io.origin import SOURCES_DIGEST, Origin, configuration_sha256, environment
 from elastocal.io.records import checksum
 from elastocal.report.outcome import outcome
-from elastocal.study.configuration import check_study, rows_read, override
+from elastocal.study.configuration import check_study, count_components, override_entries
 
 ROOT = Path(workflow.basedir)
 sys.path.insert(0, str(ROOT / "workflow" / "rules"))
@@ -80,7 +80,7 @@ CHANGES = [
 ]
 
 try:
-    config.update(override(config, CHANGES))
+    config.update(override_entries(config, CHANGES))
     STUDY = check_study(
         config,
         CONFIG,
@@ -285,7 +285,7 @@ def strategy_document(wildcards):
 def study_in_memory(**size):
     """What a script draws the study of a robot from: the robot, the seed, how the paper is read, the study's size."""
     read = {key: INTERPRETATIONS[key] for key in ("wrench_at", "average")} | {
-        "rows": rows_read(INTERPRETATIONS["measured"])
+        "rows": count_components(INTERPRETATIONS["measured"])
     }
     return lambda wildcards: {
         "robot": robot_document(wildcards),

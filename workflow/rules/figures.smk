@@ -23,13 +23,13 @@ FIGURES = [*PAPER_FIGURES, "scores_against_paper", "ladder", "designs"]
 # Each other figure: its function, file, caption, category, what it shows, tables, settings.
 DRAWN = {
     "draw_noise_impact": (
-        ("noise_impact", "figure4", "figure4", PAPER, "Figure 4: impact of noise"),
+        ("draw_noise_impact", "figure4", "figure4", PAPER, "Figure 4: impact of noise"),
         {"metrics": cells("metrics", REDUCED, NOISE, CLASSICAL)},
         {"strategy": NAMES[CLASSICAL], "titles": REDUCED_TITLES},
     ),
     "draw_scores": (
         (
-            "scores",
+            "draw_scores",
             "scores_against_paper",
             "scores_against_paper",
             PAPER,
@@ -39,12 +39,12 @@ DRAWN = {
         {"titles": REDUCED_TITLES},
     ),
     "draw_ladder": (
-        ("ladder", "ladder", "ladder", ABOUT, "How many springs (RQ1)"),
+        ("draw_ladder", "ladder", "ladder", ABOUT, "How many springs (RQ1)"),
         {"table": rules.tabulate_ladder.output.table},
         {},
     ),
     "draw_designs": (
-        ("designs", "designs", "designs", ABOUT, "Which configurations (RQ3)"),
+        ("draw_designs", "designs", "designs", ABOUT, "Which configurations (RQ3)"),
         {"table": rules.tabulate_simulated_designs.output.table},
         {"titles": REDUCED_TITLES, "accuracy_um": QUESTIONS["accuracies_um"][0]},
     ),
@@ -54,14 +54,14 @@ PANELS = {
     "draw_stiffness_errors": (
         *(
             STIFFNESS_PANELS,
-            "stiffness_errors",
+            "draw_stiffness_errors",
             "figure5_stiffness",
             "stiffness errors of all strategies",
         ),
         {"limit_percent": config["tables"]["k_sigma_limit_percent"]},
     ),
     "draw_deviations": (
-        *(DEVIATION_PANELS, "deviations", "figure5_deviation", "deviation by all strategies"),
+        *(DEVIATION_PANELS, "draw_deviations", "figure5_deviation", "deviation by all strategies"),
         {"limit_um": config["tables"]["deviation_limit_um"]},
     ),
 }
@@ -105,7 +105,7 @@ rule draw_scheme:
     params:
         robot=lambda wildcards: STUDY.robots[SCHEME_ROBOTS[wildcards.scheme]],
         scheme=lambda wildcards: (
-            "spring_scheme" if wildcards.scheme == "figure3" else "kinematic_scheme"
+            "draw_spring_scheme" if wildcards.scheme == "figure3" else "draw_kinematic_scheme"
         ),
     script:
         "../scripts/draw_scheme.py"

@@ -34,7 +34,7 @@ rule identify:
         robot=robot_document,
         strategy=strategy_document,
         seed=config["seed"],
-        rows=rows_read(INTERPRETATIONS["measured"]),
+        rows=count_components(INTERPRETATIONS["measured"]),
         tool_offset_m=INTERPRETATIONS["tool_offset_m"],
         wrench_at=INTERPRETATIONS["wrench_at"],
         average=INTERPRETATIONS["average"],

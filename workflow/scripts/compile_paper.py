@@ -5,15 +5,17 @@ from job import Job, origin_of, run
 import pandas as pd
 
 from elastocal.io.documents import read_document
-from elastocal.report.study import brief_names, paper_rows
+from elastocal.report.study import format_paper_rows, shorten_titles
 from elastocal.report.typesetting import compile_document
 
 
 def compile_paper(job: Job) -> None:
     beside = pd.read_csv(job.input.beside, dtype={"table": str})
     authors = [each["name"] for each in read_document(job.input.citation)["authors"]]
-    rows = paper_rows(
-        beside, brief_names(job.params.names), int(job.params.stated["configurations"])
+    rows = format_paper_rows(
+        beside,
+        shorten_titles(job.params.names),
+        int(job.params.stated["configurations"]),
     )
     facts = job.params.stated | {"rows": rows, "authors": authors}
     compile_document(

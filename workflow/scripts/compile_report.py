@@ -5,7 +5,7 @@ from job import Job, origin_of, run
 import pandas as pd
 
 from elastocal.io.json_files import read_json
-from elastocal.report.study import paper_tables
+from elastocal.report.study import format_paper_tables
 from elastocal.report.typesetting import compile_document
 
 TABLES = ("table1", "table2", "table3", "table4", "interpretations")
@@ -14,7 +14,9 @@ TABLES = ("table1", "table2", "table3", "table4", "interpretations")
 def compile_report(job: Job) -> None:
     facts = read_json(job.input.answers)
     frames = {name: pd.read_csv(job.input[name]) for name in TABLES}
-    tables = paper_tables(frames, facts["names"], int(facts["size"]["configurations"]))
+    tables = format_paper_tables(
+        frames, facts["names"], int(facts["size"]["configurations"])
+    )
     beside = [*job.input.figures, job.input.bibliography]
     compile_document(
         job.output.report,

@@ -5,7 +5,11 @@ from job import Job, origin_of, run
 
 import pandas as pd
 
-from elastocal.figures.loop import arrows, before_after, probabilities
+from elastocal.figures.loop import (
+    draw_before_after,
+    draw_probabilities,
+    draw_residual_arrows,
+)
 from elastocal.figures.style import save
 from elastocal.io.json_files import read_json
 from elastocal.loop.schemas import angles_of, read_residuals, worst_measurement
@@ -21,11 +25,11 @@ def draw_campaign(job: Job) -> None:
     stated = read_json(job.input.diagnosis)["document"]["probabilities"]
     errors = pd.read_csv(job.input.before_after).to_dict("records")
     drawn = {
-        "before_after": before_after(
+        "before_after": draw_before_after(
             errors, read_json(job.input.verdict)["heldout"]["noise_floor_rms_m"]
         ),
-        "arrows": arrows(table, arm),
-        "candidates": probabilities(
+        "arrows": draw_residual_arrows(table, arm),
+        "candidates": draw_probabilities(
             stated, {name: column.to_numpy() for name, column in candidates.items()}
         ),
     }

@@ -2,7 +2,7 @@
 
 from job import Job, origin_of, run
 
-from elastocal.figures.arms import arm_with_errors
+from elastocal.figures.arms import draw_arm_with_errors
 from elastocal.figures.style import save
 from elastocal.io.json_files import read_json
 from elastocal.loop.schemas import read_residuals
@@ -11,7 +11,7 @@ from elastocal.mechanics.robot_file import robot_from_document
 
 def draw_hero(job: Job) -> None:
     robot = robot_from_document(read_json(job.input.descriptions)["robot"])
-    figure = arm_with_errors(
+    figure = draw_arm_with_errors(
         robot,
         read_residuals(job.input.residuals, robot.joints),
         read_json(job.input.verdict)["heldout"],

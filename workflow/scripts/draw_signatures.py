@@ -6,7 +6,7 @@ from job import Job, run
 
 from elastocal.campaigns.reading import read_robot
 from elastocal.effects.catalogue import effects
-from elastocal.figures.effect_signatures import signature, signature_figure
+from elastocal.figures.effect_signatures import compute_signature, draw_signature
 from elastocal.figures.style import save_svg
 
 
@@ -15,7 +15,8 @@ def draw_signatures(job: Job) -> None:
     Path(job.output.figures).mkdir(exist_ok=True)
     for name in effects():
         save_svg(
-            signature_figure(signature(name, robot)), f"{job.output.figures}/{name}.svg"
+            draw_signature(compute_signature(name, robot)),
+            f"{job.output.figures}/{name}.svg",
         )
 
 

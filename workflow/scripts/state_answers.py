@@ -8,7 +8,7 @@ import pandas as pd
 
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.documents import read_document
-from elastocal.report.study import brief_names, study_facts
+from elastocal.report.study import collect_study_facts, shorten_titles
 from elastocal.study.strategies import strategy_from_document
 
 _PLAIN = (
@@ -33,7 +33,7 @@ _TABLES = {name: {} for name in _PLAIN} | {
 
 def state_answers(job: Job) -> None:
     settings = job.params
-    names = brief_names(settings.names)
+    names = shorten_titles(settings.names)
     tables = {
         name: pd.read_csv(getattr(job.input, name), **how)
         for name, how in _TABLES.items()
@@ -43,7 +43,7 @@ def state_answers(job: Job) -> None:
         name: getattr(settings, name)
         for name in ("classical", "best", "accuracy_um", "stated")
     }
-    facts = study_facts(
+    facts = collect_study_facts(
         tables,
         names,
         settings.robots,

@@ -17,8 +17,8 @@ from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.simulation import (
     Experiments,
     Loading,
-    random_experiments,
-    true_deflections,
+    compute_true_deflections,
+    draw_random_experiments,
 )
 
 TABLE_2_MEAN_M = 1.749e-3
@@ -40,7 +40,7 @@ def diameter_for_mean_deflection(
         candidate = replace(
             robot, links=tuple(replace(link, tube=tube) for link in robot.links)
         )
-        deflections = true_deflections(
+        deflections = compute_true_deflections(
             candidate, experiments, robot.chain.end_effector, "end_effector"
         )
         return np.linalg.norm(deflections[..., :3], axis=-1).mean() - target_m
@@ -54,7 +54,7 @@ if __name__ == "__main__":
     measurements = {
         key: config["interpretations"][key] for key in ("offset_frame", "joint_range")
     }
-    experiments = random_experiments(
+    experiments = draw_random_experiments(
         robot.chain,
         robot.joint_limits,
         config["seed"],

@@ -23,11 +23,11 @@ from scipy.special import gammaincinv
 from elastocal.application.calibrated import (
     Remainder,
     calibrate_by_model,
-    forward,
+    compute_nominal_poses,
+    compute_pose_sensitivities,
     move_to_end_effector,
-    nominal_forward,
     observations_of,
-    pose_sensitivities,
+    predict_poses,
     regression_at,
     square_root,
 )
@@ -36,9 +36,9 @@ from elastocal.application.frames import (
     FRAMES,
     ROBOT,
     Scope,
-    find_absorbed,
+    compute_placement_columns,
+    fit_placement,
     free_parts,
-    placement,
     root_mean_square,
 )
 from elastocal.fitting.linearization import linearize
@@ -189,9 +189,12 @@ def predict_errors(
         part = slice(start, start + _AT_ONCE)
         angles = reported_angles[part]
         under = wrench[part]
-        columns = placement(scope, *forward(calibrated, angles, under))
+        columns = compute_placement_columns(
+            scope, *predict_poses(calibrated, angles, under)
+        )
         moved = (
-            pose_sensitivities(calibrated, angles, under) - columns @ scope.absorbed
+            compute_pose_sensitivities(calibrated, angles, under)
+            - columns @ scope.absorbed
         ) @ root
         apart = (
             jacobians(robot.chain, robot.model_angles(angles), robot.chain.end_effector)
@@ -285,18 +288,24 @@ def before_m(
     """
     scope = calibrated.scope
     return np.linalg.norm(
-        (off - placement(scope, position, rotation) @ scope.absorbed_before)[:, :3],
+        (
+            off
+            - compute_placement_columns(scope, position, rotation)
+            @ scope.absorbed_before
+        )[:, :3],
         axis=1,
     )
 
 
-def uncorrected_m(
+def compute_uncorrected_rms_m(
     calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray
 ) -> float:
     """RMS error of the uncorrected robot at commands (N, n) under loads (N, 6), m, in
     the frame of the corrected one."""
-    pose = forward(calibrated, reported_angles, wrench)
-    off = pose_differences(*nominal_forward(calibrated.robot, reported_angles), *pose)
+    pose = predict_poses(calibrated, reported_angles, wrench)
+    off = pose_differences(
+        *compute_nominal_poses(calibrated.robot, reported_angles), *pose
+    )
     return root_mean_square(before_m(calibrated, *pose, off))
 
 
@@ -331,7 +340,7 @@ def calibrate_on_case(
     return replace(found, scope=replace(scope, repeated_freedom=freedom))
 
 
-def regression_on(
+def build_residual_model(
     case: Case, estimate: Estimate, predictor: Predictor, typical: float, noise_m: float
 ) -> Remainder | None:
     """A regression on what a model leaves of a case, for the end effector; none where
@@ -373,22 +382,22 @@ def scope_of(
     turn = bool(there) and all(target.rotation is None for target in there)
     free = free_parts(base, offset, turn and model.rows == 6)
     reported = robot.reported_angles(states.joint_angles)
-    position, rotation = forward(calibrated, reported, states.wrench)
+    position, rotation = predict_poses(calibrated, reported, states.wrench)
     scope = Scope(ROBOT if base else BASE, position.mean(axis=0), offset_removed=offset)
-    columns = placement(scope, position, rotation)
-    before = pose_differences(*nominal_forward(robot, reported), position, rotation)[
-        ..., None
-    ]
+    columns = compute_placement_columns(scope, position, rotation)
+    before = pose_differences(
+        *compute_nominal_poses(robot, reported), position, rotation
+    )[..., None]
 
     def size(fields: np.ndarray) -> tuple[float, float]:
         squares = (
-            (fields - columns @ find_absorbed(columns, fields, free))[:, :3] ** 2
+            (fields - columns @ fit_placement(columns, fields, free))[:, :3] ** 2
         ).sum(axis=(1, 2))
         return float(np.sqrt(squares.mean())), float(np.sqrt(squares.max()))
 
-    sensitivities = pose_sensitivities(calibrated, reported, states.wrench)
+    sensitivities = compute_pose_sensitivities(calibrated, reported, states.wrench)
     absorbed, absorbed_before = (
-        find_absorbed(columns, fields, free) for fields in (sensitivities, before)
+        fit_placement(columns, fields, free) for fields in (sensitivities, before)
     )
     scope = replace(scope, absorbed=absorbed, absorbed_before=absorbed_before[:, 0])
     dropped = tuple(effect.key for effect in model.effects if not is_commanded(effect))
@@ -412,7 +421,9 @@ def scope_of(
     return replace(scope, left_out=dropped, left_out_m=rms, left_out_worst_m=worst)
 
 
-def campaign_poses(calibrated: CalibratedRobot) -> tuple[np.ndarray, np.ndarray]:
+def select_campaign_commands(
+    calibrated: CalibratedRobot,
+) -> tuple[np.ndarray, np.ndarray]:
     """Commands (N, n) and loads (N, 6) of a campaign over which its accuracy is stated:
     all, or evenly some of very many."""
     states = calibrated.states
@@ -424,13 +435,15 @@ def campaign_poses(calibrated: CalibratedRobot) -> tuple[np.ndarray, np.ndarray]
     ]
 
 
-def campaign_accuracy(calibrated: CalibratedRobot) -> Accuracy:
+def predict_campaign_accuracy(calibrated: CalibratedRobot) -> Accuracy:
     """Predicted accuracy over the poses of a campaign: what it says of its robot as a
     whole."""
-    return predict_errors(calibrated, *campaign_poses(calibrated)).accuracy(REGION)
+    return predict_errors(calibrated, *select_campaign_commands(calibrated)).accuracy(
+        REGION
+    )
 
 
-def set_form(
+def set_form_error(
     calibrated: CalibratedRobot, form_m: float, contradicted: bool = False
 ) -> CalibratedRobot:
     """A calibrated robot of which it is known how much the form of its model leaves
@@ -441,7 +454,7 @@ def set_form(
     )
 
 
-def judge_by_held_out(
+def inflate_to_held_out_errors(
     calibrated: CalibratedRobot, held_out: Case, residual: np.ndarray, noise_m: float
 ) -> CalibratedRobot:
     """A calibrated robot whose predicted errors are as large as its held-out poses say,
@@ -476,7 +489,7 @@ def judge_by_held_out(
     if (found.rms_m**2 + drawn < square).mean() <= CONFIDENCE:
         return calibrated
     known = (found.error_m[state] ** 2 - found.form_m[state] ** 2).mean()
-    return set_form(
+    return set_form_error(
         calibrated,
         float(np.sqrt(square - 3.0 * sensor.mean() - known)),
         contradicted=True,
@@ -525,7 +538,7 @@ def _find_left_out(
     )
 
 
-def accuracy_sentence(accuracy: Accuracy) -> str:
+def format_accuracy(accuracy: Accuracy) -> str:
     """One sentence with everything that an accuracy statement has, the same wherever it
     stands."""
     offset = (
@@ -572,7 +585,7 @@ def accuracy_sentence(accuracy: Accuracy) -> str:
     return text
 
 
-def error_rows(verdict: Mapping[str, Any]) -> list[list[str]]:
+def tabulate_errors(verdict: Mapping[str, Any]) -> list[list[str]]:
     """How far the robot is off before and after its correction: one table, the same in
     report and certificate.
 

@@ -159,7 +159,7 @@ def without(calibrated: CalibratedRobot, numbers: set[int]) -> CalibratedRobot:
     )
 
 
-def effect_costs(
+def compute_effect_contributions(
     calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray
 ) -> dict[str, float]:
     """RMS error in m over commands (N, n) under loads (N, 6) if one effect alone were
@@ -168,7 +168,7 @@ def effect_costs(
     Compliances come after effects, and a regression on the remainder last. In the frame
     of the robot's scope: what a new placement of its base takes up is no error there.
     """
-    pose = forward(calibrated, reported_angles, wrench)
+    pose = predict_poses(calibrated, reported_angles, wrench)
     costs = {}
     names = [effect.effect for effect in calibrated.model.effects]
     for name in dict.fromkeys(
@@ -187,7 +187,7 @@ def effect_costs(
                     other.model, nominal_compliance=0.0 * other.model.nominal_compliance
                 ),
             )
-        apart = pose_differences(*pose, *forward(other, reported_angles, wrench))[
+        apart = pose_differences(*pose, *predict_poses(other, reported_angles, wrench))[
             ..., None
         ]
         costs[name] = root_mean_square(
@@ -196,7 +196,7 @@ def effect_costs(
     return costs
 
 
-def forward(
+def predict_poses(
     calibrated: CalibratedRobot,
     reported_angles: np.ndarray,
     wrench: np.ndarray | None = None,
@@ -267,7 +267,7 @@ def come_to_rest(
     return coordinates, *poses(chain, coordinates, chain.end_effector)
 
 
-def nominal_forward(
+def compute_nominal_poses(
     robot: Robot, reported_angles: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Where the end effector of the robot file is, taken as rigid: position (N, 3), m,
@@ -277,7 +277,7 @@ def nominal_forward(
     )
 
 
-def pose_sensitivities(
+def compute_pose_sensitivities(
     calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray
 ) -> np.ndarray:
     """Displacement and rotation of the poses of `forward` by the parameters, ndarray

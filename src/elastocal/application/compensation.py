@@ -23,10 +23,10 @@ from elastocal.application.calibrated import come_to_rest, parts, regressed
 from elastocal.application.inverse_kinematics import (
     SOLVED_M,
     allowed_steps,
-    along_path,
     find_beyond_limits,
     reach_m,
-    refine,
+    solve_path,
+    solve_poses,
 )
 from elastocal.exchange.target_path import OK
 from elastocal.mechanics.kinematics import jacobians, pose_differences
@@ -95,11 +95,11 @@ def find_joint_targets(
     """
     robot = calibrated.robot
     if start is None:
-        nominal, left = along_path(robot, position, rotation)
+        nominal, left = solve_path(robot, position, rotation)
         other = np.zeros(len(position), bool)
     else:
         near = robot.model_angles(start)
-        nominal, left = refine(robot, position, rotation, near)
+        nominal, left = solve_poses(robot, position, rotation, near)
         nominal -= np.where(
             robot.chain.prismatic,
             0.0,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.calibrated import forward, without
+from elastocal.application.calibrated import predict_poses, without
 from elastocal.effects.conditions import MASS_PARAMETERS
 from elastocal.mechanics.chain import Chain, MeasuringPoint, Transform
 
@@ -29,7 +29,7 @@ def find_left_out_m(
     (N,), m; as in `forward`."""
     bare = without(calibrated, set(fold_effects(calibrated).left_out))
     positions = [
-        forward(each, reported_angles, wrench)[0] for each in (calibrated, bare)
+        predict_poses(each, reported_angles, wrench)[0] for each in (calibrated, bare)
     ]
     return np.linalg.norm(positions[0] - positions[1], axis=1)
 

@@ -53,7 +53,9 @@ class Scope:
     repeated_freedom: float = 0.0
 
 
-def placement(scope: Scope, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+def compute_placement_columns(
+    scope: Scope, position: np.ndarray, rotation: np.ndarray
+) -> np.ndarray:
     """Displacement and turn of poses by shift and turn of the base, offset and turn of
     the end effector, (N, 6, 12)."""
     x, y, z = (position - scope.origin).T
@@ -69,7 +71,7 @@ def placement(scope: Scope, position: np.ndarray, rotation: np.ndarray) -> np.nd
     return found
 
 
-def find_absorbed(
+def fit_placement(
     columns: np.ndarray, field: np.ndarray, free: np.ndarray
 ) -> np.ndarray:
     """How much of the free columns of `placement` takes up most of a field (N, 6, K) of
@@ -102,9 +104,9 @@ def subtract_placement(
 ) -> np.ndarray:
     """Displacements (N, 6, K) of poses less what the placement that a scope leaves free
     takes up of each over these poses."""
-    columns = placement(scope, position, rotation)
+    columns = compute_placement_columns(scope, position, rotation)
     free = free_parts(scope.frame == ROBOT, scope.offset_removed)
-    return np.asarray(fields - columns @ find_absorbed(columns, fields, free))
+    return np.asarray(fields - columns @ fit_placement(columns, fields, free))
 
 
 def root_mean_square(lengths: np.ndarray) -> float:

@@ -67,7 +67,7 @@ def reach_m(robot: Robot) -> float:
     )
 
 
-def refine(
+def solve_poses(
     robot: Robot, position: np.ndarray, rotation: np.ndarray, start: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Joint angles by damped least squares from one start for each target.
@@ -151,7 +151,7 @@ def allowed_steps(
     )
 
 
-def along_path(
+def solve_path(
     robot: Robot, position: np.ndarray, rotation: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Joint angles for the poses of a path, within the limits where there are such,
@@ -166,7 +166,7 @@ def along_path(
     )
     drawn[0] = 0.5 * (low + high)
     starts = np.repeat(drawn, len(position), axis=0)
-    found, left = refine(
+    found, left = solve_poses(
         robot,
         np.tile(position, (_STARTS, 1)),
         np.tile(rotation, (_STARTS, 1, 1)),
@@ -214,7 +214,7 @@ def _continued(
             np.repeat(position[[row]], len(good), axis=0),
             np.repeat(rotation[[row]], len(good), axis=0),
         )
-        found, left = refine(robot, *wanted, angles[good, before])
+        found, left = solve_poses(robot, *wanted, angles[good, before])
         kept = good[left <= SOLVED_M]
         angles[kept, row] = found[left <= SOLVED_M]
         error[kept, row] = left[left <= SOLVED_M]

@@ -275,10 +275,10 @@ def _write(
     are empty, and its pages; its rows."""
     import yaml
 
-    from elastocal.application.planning.plan import campaign_document, sheet
+    from elastocal.application.planning.plan import build_sheet, campaign_document
     from elastocal.campaigns.campaign import DOCUMENT
     from elastocal.campaigns.measurements import CSV
-    from elastocal.figures.arms import plan_picture, pose_pictures
+    from elastocal.figures.arms import draw_plan, draw_poses
     from elastocal.figures.style import save_all
     from elastocal.io.atomic_writes import write_text, write_together
     from elastocal.io.data_frames import write_csv
@@ -287,7 +287,7 @@ def _write(
     from elastocal.report.plan_pages import plan_facts
     from elastocal.report.typesetting import compile_document
 
-    table = sheet(survey, found)
+    table = build_sheet(survey, found)
     names = (ROBOT, CSV, SHEET, PICTURE, DOCUMENT)
     with (
         write_together(folder, names) as partial,
@@ -297,10 +297,10 @@ def _write(
         write_csv(partial / CSV, table)
         pages = {
             f"poses{page}": figure
-            for page, figure in enumerate(pose_pictures(survey.robot, found))
+            for page, figure in enumerate(draw_poses(survey.robot, found))
         }
         pictures = save_all(
-            {"overview": plan_picture(survey.robot, cell, found), **pages}, scratch
+            {"overview": draw_plan(survey.robot, cell, found), **pages}, scratch
         )
         facts = plan_facts(survey, found, table, worth)
         compile_document(

@@ -13,8 +13,8 @@ import typer
 from typer import Argument, Option
 
 from elastocal.command.terminal import (
-    diagnosed_campaign,
     length_m,
+    load_diagnosed_campaign,
     print_answer,
     robots,
     workplace,
@@ -90,8 +90,8 @@ def correct(
     from rich.console import Console
 
     from elastocal.application.accuracy import (
-        accuracy_sentence,
         before_m,
+        format_accuracy,
         millimetres,
         predict_errors,
     )
@@ -126,7 +126,7 @@ def correct(
         raise InputError(
             output, "", "no such folder", "a file in a folder that is there"
         )
-    campaign = diagnosed_campaign(folder)
+    campaign = load_diagnosed_campaign(folder)
     calibrated = campaign.calibrated
     robot = calibrated.robot
     named = axes_of(controller, robot.chain.prismatic, axes) if controller else ()
@@ -178,7 +178,7 @@ def correct(
             "the targets" if bounded.all() else "the targets with a bound"
         )
         uncorrected = f"uncorrected they would be missed by {millimetres(root_mean_square(before[bounded]))} RMS"
-        lines += [accuracy_sentence(accuracy), uncorrected]
+        lines += [format_accuracy(accuracy), uncorrected]
     count = counted(len(wanted), "target")
     if calibrated.remainder is not None:
         added = np.linalg.norm(
@@ -325,7 +325,7 @@ def certificate(
     from rich.console import Console
 
     from elastocal.data_checks.protocol import data_at_fault
-    from elastocal.figures.loop import budget_bars
+    from elastocal.figures.loop import draw_budget_bars
     from elastocal.figures.style import save_all
     from elastocal.io.atomic_writes import check_places, write_together
     from elastocal.io.json_files import write_json
@@ -335,7 +335,7 @@ def certificate(
 
     console = Console(stderr=True)
     limit = length_m("--tolerance", tolerance)
-    found = diagnosed_campaign(folder)
+    found = load_diagnosed_campaign(folder)
     place = workplace() / "reports" / "loop" / found.name
     check_places(place / PAGES, place / DOCUMENT, top=workplace() / "reports")
     if data_at_fault(found.verdict):
@@ -353,7 +353,7 @@ def certificate(
             write_together(place, (PAGES, DOCUMENT)) as partial,
         ):
             names = [row[0] for row in facts["budget"]]
-            budget = budget_bars(
+            budget = draw_budget_bars(
                 document["budget"], names, limit, document["tracker_rms_m"]
             )
             pictures = save_all({"budget": budget}, scratch).values()
@@ -398,7 +398,10 @@ def export(
     import yaml
     from rich.console import Console
 
-    from elastocal.application.accuracy import accuracy_sentence, campaign_accuracy
+    from elastocal.application.accuracy import (
+        format_accuracy,
+        predict_campaign_accuracy,
+    )
     from elastocal.application.calibrated import regressed
     from elastocal.application.exported import find_left_out_m, fold_effects
     from elastocal.exchange.urdf_writing import write_calibrated_origins
@@ -410,7 +413,7 @@ def export(
         raise InputError(
             urdf, "", "the file that would be replaced", "a URDF outside of --output"
         )
-    whole = diagnosed_campaign(folder)
+    whole = load_diagnosed_campaign(folder)
     # No file has the regression: what stands in them is of a robot without.
     calibrated = whole.by_physics().calibrated
     states = whole.case.observations.states
@@ -432,7 +435,10 @@ def export(
         lines.append(
             f"! no file holds {names}: {_sizes(find_left_out_m(calibrated, at, under))}"
         )
-    lines += [accuracy_sentence(campaign_accuracy(calibrated)), str(output / ROBOT)]
+    lines += [
+        format_accuracy(predict_campaign_accuracy(calibrated)),
+        str(output / ROBOT),
+    ]
     drop_in = (
         None if urdf is None else write_calibrated_origins(urdf, nominal, folded.robot)
     )

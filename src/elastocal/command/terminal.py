@@ -178,7 +178,7 @@ def _checkout() -> Path | None:
     return None
 
 
-def diagnosed_campaign(folder: Path) -> Diagnosed:
+def load_diagnosed_campaign(folder: Path) -> Diagnosed:
     """A campaign with what its diagnosis found, as `load_diagnosed`; results by other
     libraries or pins come with a warning."""
     from rich.console import Console

@@ -11,23 +11,22 @@ import numpy as np
 from elastocal.counting import counted
 from elastocal.data_checks.faults import compliance_warnings, faults
 from elastocal.data_checks.protocol import Fault
-from elastocal.diagnosis import refit, verdict
+from elastocal.diagnosis import model_averaging, refit, verdict
+from elastocal.diagnosis.candidate_design import build_candidate_design, refine_shapes
+from elastocal.diagnosis.centre_prior import choose_centre_prior
+from elastocal.diagnosis.fitted_subset import (
+    FittedSubset,
+    fit_subset,
+    sample_for_search,
+    select_initial_subset,
+)
 from elastocal.diagnosis.gross_errors import (
-    Deviations,
-    Kept,
-    entries_of,
-    first_kept,
-    fitted_to,
-    gross_errors,
-    searched_of,
-    warnings_of,
+    OutlierTest,
+    describe_gross_errors,
+    find_gross_errors,
+    format_gross_error_warnings,
 )
-from elastocal.diagnosis.linearize import (
-    linearized,
-    looked_at_closely,
-    with_probable_centres,
-)
-from elastocal.diagnosis.search import alarm_of, initial_screening, posterior
+from elastocal.diagnosis.search import run_alarm_test, screen_terms, search_models
 from elastocal.diagnosis.verdict import Evidence
 from elastocal.effects.catalogue import effects
 from elastocal.fitting.least_squares import (
@@ -109,13 +108,15 @@ def diagnose(
     """
     whole = case.campaign
     tell = progress or (lambda line: None)
-    part = first_kept(case, settings)
+    part = select_initial_subset(case, settings)
     known = faults(part.case.campaign)
     if known:
         # Where all measurements mean something else, no single row is wrong.
-        part = fitted_to(case, np.ones(len(case.campaign.measurements), bool), settings)
+        part = fit_subset(
+            case, np.ones(len(case.campaign.measurements), bool), settings
+        )
     else:
-        part = with_probable_centres(part, settings)
+        part = choose_centre_prior(part, settings)
         case = replace(case, model=part.case.model)
     tell(
         f"declared model fitted to {counted(len(part.case.observations), 'measurement')}"
@@ -125,13 +126,13 @@ def diagnose(
     start = None
     most_pose_error_rad = np.inf
     measurements = case.campaign.measurements
-    errors = Deviations.none(len(part.kept), case.model.rows)
+    errors = OutlierTest.none(len(part.kept), case.model.rows)
     good = np.zeros(len(part.kept), bool)
     for number in range(0 if known else settings.gross_error_rounds):
         if not found:
             found = _explained(part, settings, seed, tell, start, most_pose_error_rad)
             about = found.fitted
-        errors = gross_errors(about, part.noise, measurements, part.kept, settings)
+        errors = find_gross_errors(about, part.noise, measurements, part.kept, settings)
         # A row that a model without it explains stays, whatever the next model says of
         # it: no set of rows comes back.
         good |= ~part.kept & ~errors.gross
@@ -140,14 +141,12 @@ def diagnose(
             break
         # The model found looks at all rows once more, without these, before another
         # search is made.
-        some = searched_of(case, case.select(remaining), settings)
-        about = fit_model(
-            about.model, some, about.noise, about.estimate, True, INTERMEDIATE_TOLERANCE
-        )
-        errors = gross_errors(about, part.noise, measurements, remaining, settings)
+        some = sample_for_search(case, case.select(remaining), settings)
+        about = fit(about.model, some, about.noise, about.estimate, True, ON_THE_WAY)
+        errors = find_gross_errors(about, part.noise, measurements, remaining, settings)
         good |= ~remaining & ~errors.gross
         last = part
-        part = fitted_to(case, ~errors.gross | good, settings, part)
+        part = fit_subset(case, ~errors.gross | good, settings, part)
         if part is last:
             break
         tell(
@@ -158,7 +157,7 @@ def diagnose(
             if (part.kept != remaining).any():
                 again = fit_model(
                     about.model,
-                    part.searched,
+                    part.search_sample,
                     about.noise,
                     about.estimate,
                     True,
@@ -178,22 +177,19 @@ def diagnose(
                 continue
         # What was linearised about a model found is so again: from the declared one the
         # way is the same and twice as long.
-        relinearized = len(found.linearized.about.model.effects) > len(
+        relinearized = len(found.linearized.reference_fit.model.effects) > len(
             part.declared.model.effects
         )
         start = (about, found.conclusion.best.named) if relinearized else None
-        most_pose_error_rad = found.linearized.most_pose_error_rad
+        most_pose_error_rad = found.linearized.max_pose_error_rad
         # Its statistics make room for those of the next search.
         found = None
     errors = replace(errors, gross=~part.kept)
     case = part.case
     noise = part.noise
-    declared = part.to_all(part.declared)
-    bare = fit_model(
-        replace(case.model, effects=()),
-        case.observations,
-        noise,
-        tolerance=INTERMEDIATE_TOLERANCE,
+    declared = part.fit_to_all(part.declared)
+    bare = fit(
+        replace(case.model, effects=()), case.observations, noise, settled=ON_THE_WAY
     )
     steps = [
         Step("frames and targets", "frames", bare),
@@ -206,8 +202,8 @@ def diagnose(
     warnings = [*part.warnings]
     if found:
         final = about
-        if about is not found.fitted or part.searched is not case.observations:
-            final = part.to_all(about)
+        if about is not found.fitted or part.search_sample is not case.observations:
+            final = part.fit_to_all(about)
         named = found.conclusion.best.named
         word = found.conclusion.verdict
         found = replace(
@@ -220,8 +216,11 @@ def diagnose(
             # Under the noise that it leaves itself, for nothing else enters the model
             # that is kept.
             line = found.linearized
-            left = refit.remaining_noise(
-                line.problem, found.posterior.nothing, line.about.noise, declared.noise
+            left = refit.estimate_residual_noise(
+                line.problem,
+                found.posterior.empty_model,
+                line.reference_fit.noise,
+                declared.noise,
             )
             alone = (
                 fit_model(
@@ -271,14 +270,14 @@ def diagnose(
                 kept.noise, found.linearized.pose_std_error_rad
             )
         )
-    left_out = entries_of(errors, whole, held_out=False)
+    left_out = describe_gross_errors(errors, whole, held_out=False)
     document = _document(case, noise, steps, final, found, known, settings, warnings)
     document |= {
         "contradictions": contradicting,
         "gross_errors": left_out,
         "repeatable": repeatable and asdict(repeatable),
     }
-    document["warnings"] += warnings_of(left_out)
+    document["warnings"] += format_gross_error_warnings(left_out)
     return Diagnosis(
         case, tuple(steps), found, document, whole.measurements.select(errors.gross)
     )
@@ -317,7 +316,7 @@ def _losses(
 
 
 def _explained(
-    part: Kept,
+    part: FittedSubset,
     settings: Settings,
     seed: int,
     tell: Callable[[str], None],
@@ -334,7 +333,7 @@ def _explained(
     on about each model that is new.
     """
     candidates = list(part.case.candidates.values())
-    searched = part.searched
+    searched = part.search_sample
     declared = part.declared
     about, before = start or (declared, None)
     tested: tuple[Fit, Repeatable | None] | None = None
@@ -354,18 +353,20 @@ def _explained(
             INTERMEDIATE_TOLERANCE,
         )
     for round_number in range(1 if start else 0, settings.linearizations):
-        problem = linearized(about, searched, candidates, settings, most_pose_error_rad)
+        problem = build_candidate_design(
+            about, searched, candidates, settings, most_pose_error_rad
+        )
         near = about if before else None
-        nothing, alone = initial_screening(problem.problem)
+        nothing, alone = screen_terms(problem.problem)
         draws = stream(seed, part.case.campaign.name, "null distribution", round_number)
-        alarm = alarm_of(
+        alarm = run_alarm_test(
             problem.problem, problem.products, nothing.pose_error_rad, draws
         )
         # The alarm comes before the measurements choose at which shapes to look more
         # closely: it would no longer be exact.
         if alarm.raised:
-            problem = looked_at_closely(problem, alone)
-        found = posterior(
+            problem = refine_shapes(problem, alone)
+        found = search_models(
             problem.problem, {effect.key for effect in about.model.effects}
         )
         conclusion = verdict.concluded(problem.problem, found, alarm)
@@ -374,7 +375,7 @@ def _explained(
         problem = problem.without_rows
         named = conclusion.best.named
         taken = about.noise
-        model = found.models[conclusion.best.model] if named else found.nothing
+        model = found.models[conclusion.best.model] if named else found.empty_model
         # No verdict yet, and no probability: a later search, or the poses left out, may
         # say otherwise.
         words = [
@@ -385,12 +386,14 @@ def _explained(
         tell(
             f"search {round_number + 1} of at most {settings.linearizations}: leading so far, {leading}"
         )
-        noise = refit.remaining_noise(problem.problem, model, taken, declared.noise)
-        about = refit.fit_with_sizes(
+        noise = refit.estimate_residual_noise(
+            problem.problem, model, taken, declared.noise
+        )
+        about = refit.fit_selected_effects(
             declared,
             searched,
             noise,
-            refit.selected(problem, model),
+            refit.select_effects(problem, model),
             near,
             tolerance=enough,
         )
@@ -399,7 +402,8 @@ def _explained(
         ends = not off and (
             small
             or named == before
-            or abs(refit.mean_square(about) - 1.0) < settings.linear_misfit
+            or abs(refit.compute_reduced_chi_square(about) - 1.0)
+            < settings.linear_misfit
         )
         # What is a function of the joints is no error of poses, and about a model that
         # is new the problem is another one.
@@ -410,7 +414,9 @@ def _explained(
             tested = about, left
         remains = left is not None and left.remains
         settled = ends and not remains
-        adopted = bool(named) and refit.expected_to_help(problem.problem, found, model)
+        adopted = bool(named) and model_averaging.is_expected_to_help(
+            problem.problem, found, model
+        )
         evidence = Evidence(
             problem, found, alarm, conclusion, adopted, settled, about, tested
         )
@@ -419,10 +425,8 @@ def _explained(
         if remains:
             most_pose_error_rad = settings.pose_repeatability_rad
             if large:
-                noise = refit.noise_beside(about, searched, most_pose_error_rad)
-                about = fit_model(
-                    about.model, searched, noise, about.estimate, True, enough
-                )
+                noise = refit.limit_pose_error(about, searched, most_pose_error_rad)
+                about = fit(about.model, searched, noise, about.estimate, True, enough)
         before = named
         if round_number + 1 < settings.linearizations:
             # The next problem takes the room of this one.
@@ -430,7 +434,7 @@ def _explained(
     return replace(evidence, fitted=about)
 
 
-def _effect_steps(part: Kept, final: Fit, found: Evidence) -> list[Step]:
+def _effect_steps(part: FittedSubset, final: Fit, found: Evidence) -> list[Step]:
     """One step for each mechanism, that which explains most first, each with those
     before it; of many, the rest together.
 
@@ -438,10 +442,12 @@ def _effect_steps(part: Kept, final: Fit, found: Evidence) -> list[Step]:
     """
     model = found.posterior.models[found.conclusion.best.model]
     chosen = [
-        (effect, final.effect_values(effect.key)[1])
-        for effect, _ in refit.selected(found.linearized, model)
+        (effect, final.values_of(effect.key)[1])
+        for effect, _ in refit.select_effects(found.linearized, model)
     ]
-    explained = refit.squares_explained(found.linearized.problem, model)
+    explained = model_averaging.compute_explained_squares(
+        found.linearized.problem, model
+    )
     names = sorted(found.conclusion.best.named, key=lambda name: -explained[name])
     alone = names[:-1] if len(names) <= _MOST_STEPS else names[:1]
     rest = names[len(alone) :]
@@ -455,9 +461,9 @@ def _effect_steps(part: Kept, final: Fit, found: Evidence) -> list[Step]:
     for number in range(len(alone), 0, -1):
         some = tuple(entry for entry in chosen if entry[0].effect in alone[:number])
         # Errors that a tenth of a standard error in a parameter hardly moves.
-        fitted = refit.fit_with_sizes(
+        fitted = refit.fit_selected_effects(
             part.declared,
-            part.searched,
+            part.search_sample,
             final.noise,
             some,
             steps[0].fitted,
@@ -479,7 +485,7 @@ def _document(
 ) -> dict[str, Any]:
     declared = steps[1].fitted
     final = steps[-1].fitted
-    springs = refit.Averaged({}, {})
+    springs = model_averaging.ModelAverage({}, {})
     tested = set[str]()
     stated: dict[str, Any] = {
         "verdict": verdict.NAMED if len(known) == 1 else verdict.SEVERAL,
@@ -491,35 +497,41 @@ def _document(
         problem = found.linearized.problem
         conclusion = found.conclusion
         models = found.posterior.models
-        nothing = found.posterior.nothing
+        nothing = found.posterior.empty_model
         best = models[conclusion.best.model] if conclusion.best.mechanisms else nothing
         chosen = best if conclusion.best.named else nothing
         kept = chosen if found.adopted else nothing
         owners = [(owner, parameter.name) for owner, parameter in declared.parameters]
-        averages = refit.averaged(found.linearized, found.posterior, chosen, owners)
+        averages = model_averaging.average_models(
+            found.linearized, found.posterior, chosen, owners
+        )
         springs = (
             averages
             if kept is chosen
-            else refit.averaged(found.linearized, found.posterior, nothing, owners)
+            else model_averaging.average_models(
+                found.linearized, found.posterior, nothing, owners
+            )
         )
         entries = verdict.effect_entries(
             found, with_effects, averages, case.observations
         )
         untestable = found.linearized.untestable
-        other = refit.other_predictions(problem, found.posterior, kept)
-        tested = {unit.candidate.key for unit in problem.units if unit.candidate}
+        other = model_averaging.compute_between_model_squares(
+            problem, found.posterior, kept
+        )
+        tested = {unit.candidate.key for unit in problem.terms if unit.candidate}
         stated = {
             "verdict": conclusion.verdict,
             "effects": entries,
             "probabilities": verdict.probability_facts(found),
             "misfit": {
-                "before": refit.mean_square_left(problem, nothing),
-                "after": refit.mean_square_left(problem, best),
+                "before": refit.predict_reduced_chi_square(problem, nothing),
+                "after": refit.predict_reduced_chi_square(problem, best),
             },
             # Root mean square by which positions may be elsewhere by other models than
             # the one that is kept.
             "other_models_m": float(
-                np.sqrt(3.0 * other / found.linearized.products.freedom)
+                np.sqrt(3.0 * other / found.linearized.products.degrees_of_freedom)
             )
             * noise.position_m,
         }
@@ -569,7 +581,7 @@ def _document(
 
 
 def _compliances(
-    declared: Fit, final: Fit, springs: refit.Averaged, prior_share: float
+    declared: Fit, final: Fit, springs: model_averaging.ModelAverage, prior_share: float
 ) -> dict[str, list[float]]:
     joints = final.model.sites.joints
     after = get_joint_compliances(final.model, final.estimate).copy()

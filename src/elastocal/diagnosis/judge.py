@@ -12,11 +12,11 @@ from elastocal.campaigns.campaign import NO_REMAINDER, Measurements, residual_co
 from elastocal.counting import counted
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.gross_errors import (
-    Deviations,
-    entries_of,
-    held_out_gross_errors,
-    warnings_of,
-    yardstick_of,
+    OutlierTest,
+    describe_gross_errors,
+    estimate_prediction_uncertainty,
+    find_held_out_gross_errors,
+    format_gross_error_warnings,
 )
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.model import (
@@ -55,7 +55,7 @@ _ERRORS = {
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Judgement:
     """A diagnosis with what held-out poses say of it.
 
     `document`: contents of verdict.json. `rows`: of before_after.csv. `held_out`: what
@@ -72,7 +72,7 @@ class Verdict:
     delivered: Corrected | None
 
 
-def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
+def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
     """Open the held-out poses and state the verdict.
 
     `held_out`: the held-out measurements; of another campaign, whose frames and targets
@@ -80,9 +80,9 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     """
     case = diagnosis.case
     steps = diagnosis.steps
-    errors, part, outside = without_gross_errors(diagnosis, held_out)
-    left_out = entries_of(errors, held_out.campaign, held_out=True)
-    rows, heldout, warnings = heldout_errors(steps, case, part, outside, seed)
+    errors, part, outside = remove_gross_errors(diagnosis, held_out)
+    left_out = describe_gross_errors(errors, held_out.campaign, held_out=True)
+    rows, heldout, warnings = compare_held_out_errors(steps, case, part, outside, seed)
     whole = (
         [
             figures.summarize_errors(error.distance)
@@ -116,7 +116,7 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     }
     found = diagnosis.document
     remainder = None
-    delivered = as_delivered(diagnosis, part, seed)
+    delivered = apply_regression(diagnosis, part, seed)
     if delivered is not None:
         draws = stream(seed, case.campaign.name, "remainder", 0)
         remainder = remainder_facts(
@@ -131,9 +131,13 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
         "heldout": heldout,
         "remainder": remainder,
         "gross_errors": [*found["gross_errors"], *left_out],
-        "warnings": [*found["warnings"], *warnings_of(left_out), *warnings],
+        "warnings": [
+            *found["warnings"],
+            *format_gross_error_warnings(left_out),
+            *warnings,
+        ],
     }
-    return Verdict(
+    return Judgement(
         document,
         rows,
         part,
@@ -143,7 +147,9 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     )
 
 
-def as_delivered(diagnosis: Diagnosis, held_out: Case, seed: int) -> Corrected | None:
+def apply_regression(
+    diagnosis: Diagnosis, held_out: Case, seed: int
+) -> Corrected | None:
     """The final model with the regression that a campaign asks for, on held-out poses
     without gross errors; None for none."""
     campaign = diagnosis.case.campaign
@@ -165,9 +171,9 @@ def as_delivered(diagnosis: Diagnosis, held_out: Case, seed: int) -> Corrected |
     )
 
 
-def without_gross_errors(
+def remove_gross_errors(
     diagnosis: Diagnosis, held_out: Case
-) -> tuple[Deviations, Case, np.ndarray]:
+) -> tuple[OutlierTest, Case, np.ndarray]:
     """Held-out rows that the final model does not explain, by the rule of the training
     rows; the case without; and which of its poses lie outside the range of the fitted
     ones, (P,)."""
@@ -175,18 +181,20 @@ def without_gross_errors(
     measurements = held_out.campaign.measurements
     poses = find_extrapolated_poses(final, diagnosis.case, held_out)
     part = held_out
-    errors = Deviations.none(len(measurements), held_out.model.rows)
+    errors = OutlierTest.none(len(measurements), held_out.model.rows)
     if data_at_fault(diagnosis.document):
         return errors, part, poses
     settings = Settings()
-    noise = parse_noise(diagnosis.document).without_pose_error
-    yardstick = yardstick_of(final, noise, diagnosis.case.campaign.measurements)
-    outside = poses[index_poses(measurements)]
+    noise = noise_from(diagnosis.document).of_measurements
+    yardstick = estimate_prediction_uncertainty(
+        final, noise, diagnosis.case.campaign.measurements
+    )
+    outside = poses[state_clusters(measurements)]
     for _ in range(settings.gross_error_rounds):
         # Frames of another campaign are fitted to what is kept of it.
         there = transfer_fit(final, diagnosis.case, part)
         last = errors.gross
-        errors = held_out_gross_errors(
+        errors = find_held_out_gross_errors(
             final, there, yardstick, held_out, outside, settings
         )
         part = held_out.select(~errors.gross) if errors.gross.any() else held_out
@@ -200,7 +208,7 @@ def without_gross_errors(
     )
 
 
-def heldout_errors(
+def compare_held_out_errors(
     steps: Sequence[Step], case: Case, held_out: Case, outside: np.ndarray, seed: int
 ) -> tuple[list[dict[str, Any]], dict[str, Any], list[str]]:
     """Errors of every step on training and held-out poses.
@@ -306,8 +314,8 @@ def _declared(steps: Sequence[Step]) -> int:
     return next(number for number, step in enumerate(steps) if step.kind == "declared")
 
 
-def residual_blocks(
-    diagnosis: Diagnosis, verdict: Verdict
+def generate_residual_blocks(
+    diagnosis: Diagnosis, verdict: Judgement
 ) -> Iterator[dict[str, np.ndarray]]:
     """Blocks of the residuals table: every measurement before and after, gross errors
     behind the others."""

@@ -8,8 +8,14 @@ import numpy as np
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
-from elastocal.application.planning.cell import link_points
-from elastocal.figures.style import PALETTE, STAGES, label_decades, panels, styled
+from elastocal.application.planning.cell import sample_links
+from elastocal.figures.style import (
+    PALETTE,
+    STAGES,
+    create_panels,
+    label_decades,
+    styled,
+)
 from elastocal.mechanics.kinematics import poses
 
 if TYPE_CHECKING:
@@ -76,7 +82,7 @@ def draw_arm(axis: Axes, links: np.ndarray, width: float) -> None:
 
 
 @styled
-def arm_with_errors(
+def draw_arm_with_errors(
     robot: Robot, table: Mapping[str, np.ndarray], heldout: Mapping[str, Any]
 ) -> Figure:
     """Two panels, before and after: the arm in one of the held-out poses, and an arrow
@@ -90,13 +96,13 @@ def arm_with_errors(
         [table[f"q{joint}"][seen] for joint in range(1, robot.joints + 1)]
     )
     at = np.column_stack([table[axis][seen] for axis in "xyz"])
-    arms = link_points(robot, robot.model_angles(np.unique(angles, axis=0))).transpose(
+    arms = sample_links(robot, robot.model_angles(np.unique(angles, axis=0))).transpose(
         1, 0, 2
     )
     # One arm in full, the one that reaches farthest to a side; the others as thin
     # lines.
     links = arms[np.argmax(np.abs(project_view(arms[:, -1])[:, 0]))]
-    figure, axes = panels(1, 2, 78, sharex=True, sharey=True)
+    figure, axes = create_panels(1, 2, 78, sharex=True, sharey=True)
     for axis, (stage, (words, color)) in zip(axes[0], STAGES.items(), strict=True):
         off = np.column_stack([table[f"{stage}_d{each}"][seen] for each in "xyz"])
         for arm in arms:
@@ -133,9 +139,9 @@ def arm_with_errors(
 
 
 @styled
-def plan_picture(robot: Robot, cell: Cell, plan: Plan) -> Figure:
+def draw_plan(robot: Robot, cell: Cell, plan: Plan) -> Figure:
     """Configurations in the cell, and the accuracy against the number of poses."""
-    figure, axes = panels(1, 3, 72)
+    figure, axes = create_panels(1, 3, 72)
     for axis, (words, across, up) in zip(axes[0], _VIEWS, strict=False):
         _view(axis, robot, cell, plan, across, up)
         axis.set_title(words)
@@ -154,7 +160,7 @@ def _view(
         if not len(some.joint_angles):
             continue
         angles = robot.model_angles(some.joint_angles)
-        for arm in link_points(robot, angles).transpose(1, 0, 2):
+        for arm in sample_links(robot, angles).transpose(1, 0, 2):
             axis.plot(arm[:, across], arm[:, up], color="#c8c8c8", lw=0.6, zorder=1)
         at, _ = poses(robot.chain, angles, robot.chain.end_effector)
         axis.plot(
@@ -198,7 +204,7 @@ def _view(
     axis.set_aspect("equal", adjustable="box")
     # Boxes may stand for a floor without an end: the arm says what is shown.
     reach = max(
-        np.abs(link_points(robot, robot.model_angles(plan.fitted.joint_angles))).max(),
+        np.abs(sample_links(robot, robot.model_angles(plan.fitted.joint_angles))).max(),
         0.1,
     )
     shown = (
@@ -230,14 +236,14 @@ def _curves(axis: Axes, plan: Plan) -> None:
 
 
 @styled
-def pose_pictures(robot: Robot, plan: Plan) -> list[Figure]:
+def draw_poses(robot: Robot, plan: Plan) -> list[Figure]:
     """The robot in every pose of a plan, by its number on the sheet, with the direction
     of the load; one figure a page."""
     angles = robot.model_angles(
         np.concatenate([plan.fitted.joint_angles, plan.held_out.joint_angles])
     )
     force = np.concatenate([plan.fitted.force, plan.held_out.force])
-    links = link_points(robot, angles).transpose(1, 0, 2)
+    links = sample_links(robot, angles).transpose(1, 0, 2)
     arms = project_view(links)
     pull = project_view(force / max(np.linalg.norm(force, axis=1).max(), 1e-9))
     middle = (arms.max((0, 1)) + arms.min((0, 1))) / 2
@@ -246,7 +252,7 @@ def pose_pictures(robot: Robot, plan: Plan) -> list[Figure]:
     for first in range(0, len(arms), _MOST_ON_PAGE):
         page = range(first, min(first + _MOST_ON_PAGE, len(arms)))
         rows = -(-len(page) // _ACROSS)
-        figure, axes = panels(rows, _ACROSS, 27 * rows)
+        figure, axes = create_panels(rows, _ACROSS, 27 * rows)
         for axis in axes.flat:
             axis.set_axis_off()
         for axis, pose in zip(axes.flat, page, strict=False):

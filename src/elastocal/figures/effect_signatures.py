@@ -15,8 +15,8 @@ from matplotlib.lines import Line2D
 from elastocal.effects.catalogue import effects
 from elastocal.effects.conditions import conditions_of
 from elastocal.effects.protocol import Candidate
-from elastocal.figures.style import PALETTE, panels, styled
-from elastocal.fitting.model import sum_displacements
+from elastocal.figures.style import PALETTE, create_panels, styled
+from elastocal.fitting.model import displaced_by
 from elastocal.fitting.observations import States
 from elastocal.mechanics.kinematics import poses
 from elastocal.mechanics.robot import Robot
@@ -65,7 +65,7 @@ class Signature:
     moved: dict[str, np.ndarray]
 
 
-def signature(name: str, robot: Robot) -> Signature:
+def compute_signature(name: str, robot: Robot) -> Signature:
     """The signature of an effect on an arm.
 
     `name`: of an effect of the catalogue. `robot`: with compliances, and with a
@@ -157,12 +157,12 @@ def _sites(name: str, robot: Robot) -> Sites:
 
 
 @styled
-def signature_figure(shown: Signature) -> Figure:
+def draw_signature(shown: Signature) -> Figure:
     """Draw a signature.
 
     Returns three panels on one scale of millimetres: angle of the joint, force, time.
     """
-    figure, axes = panels(1, 3, 58, sharey=True)
+    figure, axes = create_panels(1, 3, 58, sharey=True)
     # All figures alike; to search for a layout takes longer than to draw.
     figure.set_layout_engine(None)
     figure.subplots_adjust(left=0.085, right=0.99, bottom=0.18, top=0.96, wspace=0.08)

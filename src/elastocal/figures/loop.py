@@ -18,10 +18,10 @@ from elastocal.figures.style import (
     MILLI,
     PALETTE,
     STAGES,
+    add_legend_below,
+    create_panels,
+    draw_note,
     label_decades,
-    legend_below,
-    note,
-    panels,
     styled,
 )
 from elastocal.report.words import (
@@ -40,7 +40,7 @@ _CELLS = 18
 _ARROW = 0.13
 
 METRICS = {"mean": "mean", "rms": "RMS", "p95": "95th percentile", "max": "maximum"}
-LOOKS = {
+MODEL_STYLES = {
     "frames": ("#b9b9b9", "frames and targets only"),
     "declared": STAGES["before"][::-1],
     "effect": STAGES["after"][::-1],
@@ -57,7 +57,7 @@ _DIAMOND: dict[str, Any] = {
     "markeredgecolor": "black",
     "markersize": 3.4,
 }
-FAMILIES = dict(
+FAMILY_COLOURS = dict(
     zip(
         ("geometry", "gravity", "transmission", "elastic", "gearbox", "load", "drift"),
         PALETTE,
@@ -94,7 +94,9 @@ _SHARES = {
 
 
 @styled
-def arrows(table: Mapping[str, np.ndarray], arm: np.ndarray | None = None) -> Figure:
+def draw_residual_arrows(
+    table: Mapping[str, np.ndarray], arm: np.ndarray | None = None
+) -> Figure:
     """Residuals as arrows where the measurements were taken, from the side and from
     above.
 
@@ -118,7 +120,7 @@ def arrows(table: Mapping[str, np.ndarray], arm: np.ndarray | None = None) -> Fi
         else None
     )
     views = {"from the side": (0, 2), "from above": (0, 1)}
-    figure, axes = panels(
+    figure, axes = create_panels(
         1, 2, 26 + float(np.clip(66 * extent[1:].max() / extent[0], 40, 56))
     )
     length = _ARROW * extent.max()
@@ -126,7 +128,7 @@ def arrows(table: Mapping[str, np.ndarray], arm: np.ndarray | None = None) -> Fi
         shown = (
             np.arange(len(place))
             if cell_m is None
-            else middle_of_cells(place[:, seen], size, cell_m)
+            else select_median_states(place[:, seen], size, cell_m)
         )
         at = place[shown][:, seen]
         for order, stage in enumerate(stages):
@@ -174,7 +176,7 @@ def arrows(table: Mapping[str, np.ndarray], arm: np.ndarray | None = None) -> Fi
     return figure
 
 
-def middle_of_cells(at: np.ndarray, size: np.ndarray, side: float) -> np.ndarray:
+def select_median_states(at: np.ndarray, size: np.ndarray, side: float) -> np.ndarray:
     """The state of middle size in each cell of a grid.
 
     `at` (N, 2): m. `size` (N,). `side`: m. Returns (cells,) of int: one for each cell
@@ -231,7 +233,7 @@ def _scale_arrow(axis: Axes, largest: float, length: float) -> None:
 
 
 @styled
-def before_after(
+def draw_before_after(
     steps: Sequence[Mapping[str, Any]], noise_floor_m: float | None = None
 ) -> Figure:
     """Bars of the errors on held-out poses, one for each model.
@@ -245,7 +247,7 @@ def before_after(
         for step in steps
     ]
     lines = [label.count("\n") + 1 for label in labels]
-    figure, axes = panels(
+    figure, axes = create_panels(
         1, len(METRICS), 30 + 4.0 * sum(lines) + 4.5 * len(steps), sharey=True
     )
     # Rows as high as their names are long.
@@ -266,7 +268,7 @@ def before_after(
                 scale * step[f"heldout_{metric}_m{end}"]
                 for end in ("", "_low", "_high")
             )
-            axis.barh(row, value, height=0.42, color=LOOKS[step["kind"]][0])
+            axis.barh(row, value, height=0.42, color=MODEL_STYLES[step["kind"]][0])
             axis.plot(
                 [low, high], [row, row], color="black", linewidth=1.1, gid="interval"
             )
@@ -298,7 +300,7 @@ def before_after(
     kinds = {step["kind"] for step in steps}
     handles: list[Artist] = [
         Patch(color=color, label=label)
-        for kind, (color, label) in LOOKS.items()
+        for kind, (color, label) in MODEL_STYLES.items()
         if kind in kinds
     ]
     handles.append(
@@ -321,14 +323,14 @@ def before_after(
 
 
 @styled
-def campaign_errors(table: pd.DataFrame) -> Figure:
+def draw_errors_by_campaign(table: pd.DataFrame) -> Figure:
     """Root mean square errors with their intervals, a line for each campaign.
 
     `table`: ``campaign``, ``poses``, and ``before_rms_mm``, ``before_rms_low_mm``,
     ``before_rms_high_mm``, the same for after: mm.
     """
     rows = np.arange(len(table))[::-1]
-    figure, axes = panels(1, 1, 24 + 6 * len(table))
+    figure, axes = create_panels(1, 1, 24 + 6 * len(table))
     axis = axes[0, 0]
     axis.hlines(
         rows,
@@ -372,12 +374,12 @@ def campaign_errors(table: pd.DataFrame) -> Figure:
     )
     label_decades(axis.xaxis)
     axis.grid(visible=False, axis="y")
-    legend_below(figure, 2)
+    add_legend_below(figure, 2)
     return figure
 
 
 @styled
-def probabilities(
+def draw_probabilities(
     stated: Mapping[str, Any] | None, table: Mapping[str, np.ndarray]
 ) -> Figure:
     """Posterior probabilities of the leading hypotheses, and Bayes factors of the
@@ -393,7 +395,7 @@ def probabilities(
         nothing = (
             f"None of {count} candidate causes can be tested with these measurements."
         )
-        return note(
+        return draw_note(
             "The data are at fault: no cause in the robot was looked for."
             if faulty
             else nothing
@@ -405,11 +407,11 @@ def probabilities(
     if (rest := 1.0 - sum(values)) > 0.001:
         labels = [*labels, _ALL_ELSE]
         values = [*values, rest]
-    names = [short_name(table["candidate"][index]) for index in named]
+    names = [shorten_candidate_name(table["candidate"][index]) for index in named]
     upper = _heights_mm(labels)
     lower = _heights_mm(names)
     sizes = [34 + upper.sum(), 22 + lower.sum()]
-    figure, axes = panels(2, 1, sum(sizes), height_ratios=sizes)
+    figure, axes = create_panels(2, 1, sum(sizes), height_ratios=sizes)
     colours = [PALETTE[0] if label != _ALL_ELSE else "#d9d9d9" for label in labels]
     rows = _label_rows(axes[0, 0], labels, upper)
     axes[0, 0].barh(
@@ -428,8 +430,10 @@ def probabilities(
     )
     axes[0, 0].set_title("What is missing in the declared model", loc="left")
     _factors(axes[1, 0], table, named, _label_rows(axes[1, 0], names, lower))
-    present = [family for family in FAMILIES if family in set(table["family"][named])]
-    handles = [Patch(color=FAMILIES[family], label=family) for family in present]
+    present = [
+        family for family in FAMILY_COLOURS if family in set(table["family"][named])
+    ]
+    handles = [Patch(color=FAMILY_COLOURS[family], label=family) for family in present]
     if table["chosen"].any():
         handles.append(
             Patch(
@@ -451,7 +455,9 @@ def _factors(
     """Bayes factors of single candidates, coloured by family."""
     factors = table["log_bayes_factor"][named]
     chosen = table["chosen"][named].astype(bool)
-    colours = [FAMILIES.get(family, PALETTE[-1]) for family in table["family"][named]]
+    colours = [
+        FAMILY_COLOURS.get(family, PALETTE[-1]) for family in table["family"][named]
+    ]
     axis.barh(rows, factors, color=colours, height=2.6, zorder=2)
     if chosen.any():
         style: dict[str, Any] = {
@@ -513,7 +519,7 @@ def rank_candidates(table: Mapping[str, np.ndarray]) -> np.ndarray:
     return order[np.sort(first)]
 
 
-def short_name(key: str) -> str:
+def shorten_candidate_name(key: str) -> str:
     """A candidate's key as words, in two lines where it is long and cut in the middle
     where it is very long."""
     words = capital(candidate_words(key))
@@ -526,7 +532,7 @@ def short_name(key: str) -> str:
 
 
 @styled
-def budget_bars(
+def draw_budget_bars(
     budget: Sequence[Mapping[str, Any]],
     names: Sequence[str],
     tolerance_m: float,
@@ -543,7 +549,7 @@ def budget_bars(
         (line for line in lines if line[1]["rms_m"] > 0.0),
         key=lambda line: -line[1]["rms_m"],
     )
-    figure, axes = panels(1, 1, 26 + 6.5 * len(shown))
+    figure, axes = create_panels(1, 1, 26 + 6.5 * len(shown))
     axis = axes[0, 0]
     kinds = []
     for row, (_, line) in enumerate(shown):

@@ -88,7 +88,7 @@ class Layout:
     points: list[tuple[str, np.ndarray, np.ndarray]]
 
 
-def lay_out(chain: Chain) -> tuple[Layout, np.ndarray]:
+def lay_out_chain(chain: Chain) -> tuple[Layout, np.ndarray]:
     """A side view with the base's z upwards; what lies across the view recedes
     obliquely.
 
@@ -356,7 +356,7 @@ class _Sheet:
 
 
 @styled
-def kinematic_scheme(robot: Robot) -> Figure:
+def draw_kinematic_scheme(robot: Robot) -> Figure:
     """Equivalent kinematic scheme of a serial robot (the paper's Figure 2), about 160
     mm wide.
 
@@ -364,7 +364,7 @@ def kinematic_scheme(robot: Robot) -> Figure:
     so those of a wrist are seen apart. Artists have a gid: ``joint-1``, ``length-1``,
     ``point-NAME``, ``point-NAME-box``.
     """
-    layout, view = lay_out(robot.chain)
+    layout, view = lay_out_chain(robot.chain)
     ends = np.array(
         [
             np.zeros(2),
@@ -478,7 +478,7 @@ def _draw_base(sheet: _Sheet, view: np.ndarray, left: float) -> None:
 
 
 @styled
-def spring_scheme(robot: Robot) -> Figure:
+def draw_spring_scheme(robot: Robot) -> Figure:
     """Virtual joint model of a robot as a chain of blocks (the paper's Figure 3), about
     160 mm wide.
 

@@ -14,14 +14,14 @@ from matplotlib.ticker import NullLocator
 from elastocal.figures.style import (
     MICRO,
     PALETTE,
+    add_legend_below,
+    choose_line_style,
+    create_panels,
+    draw_note,
     label_decades,
-    legend_below,
-    line_style,
-    note,
-    panels,
     styled,
 )
-from elastocal.study.printed import LEVEL
+from elastocal.study.printed import SIGNIFICANCE_LEVEL
 
 # Of the linear panels of the noise impact: what a reader compares with the wanted
 # accuracy.
@@ -38,7 +38,7 @@ _DESIGNS = {"random": "random", "A": "A-optimal", "D": "D-optimal", "I": "I-opti
 
 
 @styled
-def noise_impact(
+def draw_noise_impact(
     metrics: pd.DataFrame, strategy: str, titles: Mapping[str, str]
 ) -> Figure:
     """Figure 4: deviation of one strategy against the data set length, for each noise
@@ -46,7 +46,7 @@ def noise_impact(
 
     `metrics`: long. `titles`: name of each robot to draw, by its key.
     """
-    figure, axes = panels(2, len(titles), 118, sharex=True, sharey="row")
+    figure, axes = create_panels(2, len(titles), 118, sharex=True, sharey="row")
     for column, (robot, title) in zip(axes.T, titles.items(), strict=True):
         cells = metrics[(metrics.robot == robot) & (metrics.strategy == strategy)]
         for axis in column:
@@ -85,12 +85,12 @@ def noise_impact(
     axes[0, 0].set_ylabel("dev, equation 15 (µm)")
     axes[1, 0].set_ylabel("the same, linear (µm)")
     title = "noise (µm and µrad); bands: a standard error as a factor; thin: some ĉ ≤ 0, or ĉ scatters by over a quarter"
-    legend_below(figure, 5, title)
+    add_legend_below(figure, 5, title)
     return figure
 
 
 @styled
-def stiffness_errors(
+def draw_stiffness_errors(
     metrics: pd.DataFrame,
     printed: pd.DataFrame,
     title: str,
@@ -105,7 +105,7 @@ def stiffness_errors(
     k_sigma are taken to count the joints fixed in the last stage. `order`: strategies.
     `limit_percent`: marked by a line.
     """
-    figure, axes = panels(1, 2, 96, sharey=True)
+    figure, axes = create_panels(1, 2, 96, sharey=True)
     counts = {
         "k_sigma": "all joints (equation 14)",
         "k_sigma_fixed_joints": "joints fixed in the last stage",
@@ -118,12 +118,12 @@ def stiffness_errors(
     figure.suptitle(title, fontsize=9)
     axes[0, 0].set(ylabel=r"$k_\Sigma$ (%)", yscale="log", ylim=(0.3, 40))
     label_decades(axes[0, 0].yaxis)
-    legend_below(figure, 4, _BANDS)
+    add_legend_below(figure, 4, _BANDS)
     return figure
 
 
 @styled
-def deviations(
+def draw_deviations(
     metrics: pd.DataFrame,
     printed: pd.DataFrame,
     title: str,
@@ -136,7 +136,7 @@ def deviations(
     `metrics`: long, of one noise level. `printed`: the printed figures. `order`:
     strategies. `limit_um`: marked by a line.
     """
-    figure, axes = panels(1, 1, 92)
+    figure, axes = create_panels(1, 1, 92)
     axis = axes[0, 0]
     _strategy_lines(axis, metrics, robot, "deviation", MICRO, order)
     _limit(axis, limit_um, "µm")
@@ -149,7 +149,7 @@ def deviations(
         ylim=(0.5, 80),
     )
     label_decades(axis.yaxis)
-    legend_below(figure, 4, _BANDS)
+    add_legend_below(figure, 4, _BANDS)
     return figure
 
 
@@ -167,7 +167,7 @@ def _strategy_lines(
         mine.pivot(index="length", columns="strategy", values=quantity), order
     ):
         cell = mine[mine.strategy == order[index]]
-        style = line_style(index)
+        style = choose_line_style(index)
         value = scale * cell[quantity]
         error = scale * cell[f"{quantity}_std_error"]
         axis.plot(cell.length, value, label=order[index], **style)
@@ -215,7 +215,7 @@ def _printed_marks(
                 if score
                 else (row.value, float(reached[1]) if reached else np.nan)
             )
-            colour = line_style(order.index(str(row.strategy)))["color"]
+            colour = choose_line_style(order.index(str(row.strategy)))["color"]
             axis.plot(
                 *place,
                 "D",
@@ -239,7 +239,7 @@ def _limit(axis: Axes, value: float, unit: str) -> None:
 
 
 @styled
-def scores(comparison: pd.DataFrame, titles: Mapping[str, str]) -> Figure:
+def draw_scores(comparison: pd.DataFrame, titles: Mapping[str, str]) -> Figure:
     """Table 4 among studies of the same size: the paper's figures, and how studies
     scatter.
 
@@ -250,8 +250,8 @@ def scores(comparison: pd.DataFrame, titles: Mapping[str, str]) -> Figure:
     quantities = list(dict.fromkeys(shown.quantity))
     strategies = list(dict.fromkeys(shown.strategy))
     if shown.empty:
-        return note("the paper prints nothing of the robots of this study")
-    figure, axes = panels(
+        return draw_note("the paper prints nothing of the robots of this study")
+    figure, axes = create_panels(
         len(titles), len(quantities), 24 + 38 * len(titles), sharey=True
     )
     for line, (robot, title) in zip(axes, titles.items(), strict=True):
@@ -277,7 +277,7 @@ def scores(comparison: pd.DataFrame, titles: Mapping[str, str]) -> Figure:
                 (False, "white", "paper"),
                 (True, PALETTE[1], "paper, differs (Holm)"),
             ):
-                some = ((cells.p_holm < LEVEL) == differs).to_numpy()
+                some = ((cells.p_holm < SIGNIFICANCE_LEVEL) == differs).to_numpy()
                 at = np.array(rows)[some]
                 axis.plot(
                     cells.paper[some],
@@ -296,23 +296,23 @@ def scores(comparison: pd.DataFrame, titles: Mapping[str, str]) -> Figure:
             axis.grid(visible=False, axis="y")
         line[0].set(yticks=range(len(strategies)), ylabel=title)
         line[0].set_yticklabels(strategies)
-    legend_below(figure, 2)
+    add_legend_below(figure, 2)
     return figure
 
 
 @styled
-def ladder(table: pd.DataFrame) -> Figure:
+def draw_ladder(table: pd.DataFrame) -> Figure:
     """Error of one data set by number of link springs, for each noise and length, of
     the first robot with links.
 
     `table`: from `ladder.ladder_table`.
     """
     if table.empty:
-        return note("no robot of this study has elastic links")
+        return draw_note("no robot of this study has elastic links")
     table = table[table.robot == table.robot.iloc[0]]
     steps = table[table.chosen_percent.notna()]
     noises = list(dict.fromkeys(table.noise_um))
-    figure, axes = panels(1, len(noises), 72, sharey=True)
+    figure, axes = create_panels(1, len(noises), 72, sharey=True)
     for axis, noise in zip(axes[0], noises, strict=True):
         for index, (length, cell) in enumerate(
             steps[steps.noise_um == noise].groupby("length")
@@ -344,12 +344,12 @@ def ladder(table: pd.DataFrame) -> Figure:
         label_decades(axis.yaxis)
     axes[0, 0].set_ylabel("RMS error of one data set (µm)")
     title = "configurations in the data set; discs: share of data sets in which cross-validation stops there"
-    legend_below(figure, 6, title)
+    add_legend_below(figure, 6, title)
     return figure
 
 
 @styled
-def designs(
+def draw_designs(
     table: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float
 ) -> Figure:
     """Error that simulated data sets of random and optimal configurations leave, by
@@ -360,7 +360,7 @@ def designs(
     by a line.
     """
     table = table[table.load == "random"]
-    figure, axes = panels(1, len(titles), 80, sharey=True)
+    figure, axes = create_panels(1, len(titles), 80, sharey=True)
     for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):
         for index, (kind, name) in enumerate(_DESIGNS.items()):
             cell = table[(table.robot == robot) & (table.design == kind)]
@@ -368,7 +368,7 @@ def designs(
                 cell.configurations,
                 cell.rms_um,
                 cell.rms_um_std_error,
-                **line_style(index),
+                **choose_line_style(index),
                 label=name,
             )
         axis.axhline(accuracy_um, color="black", linewidth=0.7)
@@ -380,7 +380,7 @@ def designs(
         axis.xaxis.set_minor_locator(NullLocator())
         label_decades(axis.yaxis)
     axes[0, 0].set_ylabel("RMS error of one data set (µm)")
-    legend_below(
+    add_legend_below(
         figure, 4, f"bars: ± one Monte Carlo standard error; line: {accuracy_um:g} µm"
     )
     return figure

@@ -71,7 +71,7 @@ SETTINGS: dict[RcKeyType, Any] = {
 styled = rc_context(SETTINGS)
 
 
-def panels(
+def create_panels(
     rows: int,
     columns: int,
     height_mm: float,
@@ -86,7 +86,7 @@ def panels(
     return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
 
-def legend_below(figure: Figure, columns: int, title: str | None = None) -> None:
+def add_legend_below(figure: Figure, columns: int, title: str | None = None) -> None:
     """One legend of all panels below them, each entry once."""
     entries = {
         label: one
@@ -102,15 +102,15 @@ def legend_below(figure: Figure, columns: int, title: str | None = None) -> None
     )
 
 
-def note(text: str, height_mm: float = 25) -> Figure:
+def draw_note(text: str, height_mm: float = 25) -> Figure:
     """A figure that says in words why there is nothing to draw."""
-    figure, axes = panels(1, 1, height_mm)
+    figure, axes = create_panels(1, 1, height_mm)
     axes[0, 0].set_axis_off()
     axes[0, 0].text(0.5, 0.5, text, ha="center", va="center")
     return figure
 
 
-def line_style(index: int) -> dict[str, Any]:
+def choose_line_style(index: int) -> dict[str, Any]:
     """Colour and dashes of the strategy with this place in the list; lines that
     coincide remain visible through the gaps."""
     return {
@@ -127,7 +127,7 @@ def label_decades(*axes: Axis) -> None:
         axis.set_minor_formatter(NullFormatter())
 
 
-def ink_on(colour: tuple[float, ...]) -> str:
+def choose_ink(colour: tuple[float, ...]) -> str:
     """Black or white, whichever has the higher contrast on a colour by its relative
     luminance [1].
 

@@ -15,18 +15,18 @@ import numpy as np
 from elastocal import __version__
 from elastocal.application.accuracy import (
     REGION,
+    build_residual_model,
     calibrate_on_case,
-    campaign_poses,
-    error_rows,
+    compute_uncorrected_rms_m,
     predict_errors,
-    regression_on,
-    set_form,
-    uncorrected_m,
+    select_campaign_commands,
+    set_form_error,
+    tabulate_errors,
 )
-from elastocal.application.calibrated import effect_costs
+from elastocal.application.calibrated import compute_effect_contributions
 from elastocal.application.frames import root_mean_square
 from elastocal.campaigns.reading import campaign_files, read_descriptions
-from elastocal.diagnosis.misplaced import point_sentence
+from elastocal.diagnosis.misplaced import describe_reference_point
 from elastocal.errors import InputError
 from elastocal.fitting.noise import parse_noise
 from elastocal.io.json_files import read_json
@@ -77,7 +77,7 @@ class Diagnosed:
         if again and again["regression"]:
             predictor = predictor_of(again, model, estimate, self.case.observations)
             noise_m = self.verdict["noise"]["position_m"]
-            more = regression_on(
+            more = build_residual_model(
                 self.case, estimate, predictor, again["spread"]["typical"], noise_m
             )
         found = calibrate_on_case(
@@ -94,7 +94,7 @@ class Diagnosed:
             if contradicted
             else self.facts["document"].get("other_models_m") or 0.0
         )
-        return set_form(found, form_m, contradicted)
+        return set_form_error(found, form_m, contradicted)
 
     def by_physics(self) -> Diagnosed:
         """The same without the regression on the remainder, as if there were none."""
@@ -201,7 +201,7 @@ def certificate(
     )
     robot = calibrated.robot
     states = found.case.observations.states
-    poses = campaign_poses(calibrated)
+    poses = select_campaign_commands(calibrated)
     prediction = predict_errors(calibrated, *poses)
     accuracy = prediction.accuracy(REGION)
     worst = int(np.argmax(prediction.error_m))
@@ -236,7 +236,7 @@ def certificate(
         "verdict": verdict["verdict"],
         "repeatable": verdict["repeatable"],
         "effects": [effect["name"] for effect in verdict["effects"]],
-        "errors": error_rows(verdict),
+        "errors": tabulate_errors(verdict),
         "validation_rms_m": {
             "uncorrected": heldout["uncalibrated"]["rms_m"],
             "corrected": heldout["delivered"]["rms_m"],
@@ -244,7 +244,7 @@ def certificate(
         "regression": (verdict["remainder"] or {}).get("words", ""),
         "noise_floor_rms_m": heldout["noise_floor_rms_m"],
         "accuracy": asdict(accuracy),
-        "point": point_sentence(found.case.campaign),
+        "point": describe_reference_point(found.case.campaign),
         "misplaced": verdict["misplaced"],
         "worst_pose": {"joints": joints, "error_m": float(prediction.error_m[worst])},
         "conformity": asdict(decision)
@@ -269,7 +269,7 @@ def error_budget(
     leaves, by `accuracy.predict_errors`. Only the last add up: effects may work against
     each other, and loads meet springs.
     """
-    costs = effect_costs(calibrated, reported_angles, wrench)
+    costs = compute_effect_contributions(calibrated, reported_angles, wrench)
     rest = predict_errors(calibrated, reported_angles, wrench, draws=0)
     ends = {
         "left by the regression": root_mean_square(rest.regression_m),
@@ -277,7 +277,7 @@ def error_budget(
         "not commanded": rest.scope.left_out_m,
     }
     return {
-        "uncorrected": uncorrected_m(calibrated, reported_angles, wrench),
+        "uncorrected": compute_uncorrected_rms_m(calibrated, reported_angles, wrench),
         **{
             name: costs[name]
             for name in sorted(costs, key=costs.__getitem__, reverse=True)

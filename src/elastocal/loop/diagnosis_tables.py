@@ -10,8 +10,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.diagnosis.diagnose import Diagnosis, Step, diagnose
-from elastocal.diagnosis.next_experiment import propose
-from elastocal.diagnosis.search import initial_screening
+from elastocal.diagnosis.next_experiment import propose_experiment
+from elastocal.diagnosis.search import screen_terms
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.model import Estimate, build_case, list_parameters
@@ -52,7 +52,7 @@ def diagnose_campaign(job: Any) -> None:
         seed,
         lambda line: print(f"{name}: {line}", file=sys.stderr, flush=True),
     )
-    columns, facts = propose(
+    columns, facts = propose_experiment(
         found, stream(seed, case.campaign.name, "next experiment", 0), job.params.states
     )
     write_csv(job.output.experiment, pd.DataFrame(columns))
@@ -209,18 +209,20 @@ def candidate_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     if evidence:
         problem = evidence.linearized.problem
         untestable = evidence.linearized.untestable
-        factors = initial_screening(problem)[1]
-        inclusion = np.zeros(len(problem.units))
+        factors = screen_terms(problem)[1]
+        inclusion = np.zeros(len(problem.terms))
         for model, probability in zip(
             evidence.posterior.models, evidence.posterior.probabilities, strict=True
         ):
-            inclusion[list(model.units)] += probability
+            inclusion[list(model.term_indices)] += probability
         best = evidence.conclusion.best
         chosen = (
-            set(evidence.posterior.models[best.model].units) if best.named else set()
+            set(evidence.posterior.models[best.model].term_indices)
+            if best.named
+            else set()
         )
         for number in np.argsort(-factors):
-            unit = problem.units[number]
+            unit = problem.terms[number]
             if unit.candidate:
                 shape = unit.shapes[0] if unit.shapes else None
                 rows.append(

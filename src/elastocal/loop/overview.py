@@ -17,14 +17,14 @@ from elastocal.campaigns.campaign import columns_of
 from elastocal.campaigns.holdout import measured_poses
 from elastocal.counting import counted, first_names
 from elastocal.data_checks.faults import controller_warnings, faults
+from elastocal.diagnosis.candidate_design import build_candidate_design
+from elastocal.diagnosis.fitted_subset import select_initial_subset
 from elastocal.diagnosis.gross_errors import (
-    entries_of,
-    first_kept,
-    gross_errors,
-    warnings_of,
+    describe_gross_errors,
+    find_gross_errors,
+    format_gross_error_warnings,
 )
-from elastocal.diagnosis.linearize import linearized
-from elastocal.diagnosis.misplaced import misplaced
+from elastocal.diagnosis.misplaced import find_misplaced_frames
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.model import build_case, get_joint_compliances
@@ -81,16 +81,20 @@ def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
     descriptions, training, held_out = load_campaign(folder, robots_folder)
     whole = build_case(descriptions, columns_of(training))
     settings = Settings()
-    part = first_kept(whole, settings)
-    errors = gross_errors(
+    part = select_initial_subset(whole, settings)
+    errors = find_gross_errors(
         part.declared, part.noise, whole.campaign.measurements, part.kept, settings
     )
-    left_out = entries_of(
+    left_out = describe_gross_errors(
         replace(errors, gross=~part.kept), whole.campaign, held_out=False
     )
-    case, campaign, declared = part.case, part.case.campaign, part.to_all(part.declared)
-    untestable = linearized(
-        part.declared, part.searched, [*case.candidates.values()], settings
+    case, campaign, declared = (
+        part.case,
+        part.case.campaign,
+        part.fit_to_all(part.declared),
+    )
+    untestable = build_candidate_design(
+        part.declared, part.search_sample, [*case.candidates.values()], settings
     ).untestable
     testable = len(case.candidates) - len(untestable)
     found = faults(campaign)
@@ -107,7 +111,8 @@ def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
     attention = [fault.detail for fault in found]
     if diagnosable and not negative:
         attention += [
-            each["sentence"] for each in misplaced(_with_base(declared, case), campaign)
+            each["sentence"]
+            for each in find_misplaced_frames(_with_base(declared, case), campaign)
         ]
     attention += [*controller_warnings(campaign), *part.warnings]
     if negative:
@@ -116,7 +121,7 @@ def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
             f"the compliance of joint {joints} comes out negative: the declared model lacks something"
         )
     attention += [
-        *warnings_of(left_out),
+        *format_gross_error_warnings(left_out),
         *_suspicious(case, declared, training, held_out),
         *warn_of_repeated_poses(training, held_out),
     ]

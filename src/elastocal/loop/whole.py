@@ -7,20 +7,20 @@ from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 from elastocal.application.accuracy import (
+    build_residual_model,
     calibrate_on_case,
-    campaign_accuracy,
-    campaign_poses,
-    judge_by_held_out,
-    regression_on,
-    set_form,
-    uncorrected_m,
+    compute_uncorrected_rms_m,
+    inflate_to_held_out_errors,
+    predict_campaign_accuracy,
+    select_campaign_commands,
+    set_form_error,
 )
-from elastocal.application.calibrated import effect_costs
+from elastocal.application.calibrated import compute_effect_contributions
 from elastocal.campaigns.campaign import columns_of
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.diagnose import diagnose
-from elastocal.diagnosis.judge import judge, residual_blocks
-from elastocal.diagnosis.misplaced import misplaced
+from elastocal.diagnosis.judge import generate_residual_blocks, judge
+from elastocal.diagnosis.misplaced import find_misplaced_frames
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.model import Case, build_case
 from elastocal.io.json_files import read_json, write_json
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
     from elastocal.application.calibrated import CalibratedRobot
     from elastocal.diagnosis.diagnose import Diagnosis
-    from elastocal.diagnosis.judge import Verdict
+    from elastocal.diagnosis.judge import Judgement
     from elastocal.remainder.corrected import Corrected
 
 
@@ -58,7 +58,7 @@ def judge_campaign(job: Any) -> None:
     write_table(
         job.output.residuals,
         schema,
-        residual_blocks(found, verdict),
+        generate_residual_blocks(found, verdict),
         provenance(job.params, **job.wildcards),
     )
 
@@ -100,7 +100,7 @@ def calibrated_by(
     """The robot that a diagnosis found, with all that is known of its errors: held-out
     rows without gross ones judge it.
 
-    `delivered`: of `judge.as_delivered`. `physics_only`: corrected without its
+    `delivered`: of `judge.apply_regression`. `physics_only`: corrected without its
     regression; where there is one, what the final model leaves is known to be no noise.
     """
     case = diagnosis.case
@@ -114,7 +114,7 @@ def calibrated_by(
         noise_m = diagnosis.document["noise"]["position_m"]
         if not physics_only:
             residual = delivered.residual
-            more = regression_on(
+            more = build_residual_model(
                 case,
                 final.estimate,
                 delivered.predictor,
@@ -124,11 +124,11 @@ def calibrated_by(
     found = calibrate_on_case(
         case, final.model, final.estimate, final.covariance, final.noise, more
     )
-    found = set_form(found, diagnosis.document["other_models_m"] or 0.0)
-    return judge_by_held_out(found, held_out, residual, noise_m)
+    found = set_form_error(found, diagnosis.document["other_models_m"] or 0.0)
+    return inflate_to_held_out_errors(found, held_out, residual, noise_m)
 
 
-def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
+def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
     """The verdict of a diagnosis on held-out poses, with the accuracy of the corrected
     robot and the cost of each effect.
 
@@ -151,7 +151,7 @@ def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     if not data_at_fault(verdict.document):
         found = calibrated_by(diagnosis, verdict.held_out, verdict.delivered)
         stated |= _accuracy(found) | {
-            "misplaced": misplaced(diagnosis.final, diagnosis.case.campaign)
+            "misplaced": find_misplaced_frames(diagnosis.final, diagnosis.case.campaign)
         }
         if found.remainder is not None:
             stated["physics"] = _accuracy(
@@ -159,7 +159,9 @@ def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
                     diagnosis, verdict.held_out, verdict.delivered, physics_only=True
                 )
             )
-        costs = effect_costs(replace(found, remainder=None), *campaign_poses(found))
+        costs = compute_effect_contributions(
+            replace(found, remainder=None), *select_campaign_commands(found)
+        )
     effects = [
         effect | {"cost_m": costs.get(effect["name"])}
         for effect in verdict.document["effects"]
@@ -171,6 +173,8 @@ def _accuracy(found: CalibratedRobot) -> dict[str, Any]:
     """Predicted accuracy of a corrected robot, and in the same frame the RMS error of
     the uncorrected one at the same poses."""
     return {
-        "accuracy": asdict(campaign_accuracy(found)),
-        "uncorrected_m": uncorrected_m(found, *campaign_poses(found)),
+        "accuracy": asdict(predict_campaign_accuracy(found)),
+        "uncorrected_m": compute_uncorrected_rms_m(
+            found, *select_campaign_commands(found)
+        ),
     }

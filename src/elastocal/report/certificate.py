@@ -5,11 +5,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elastocal.application.accuracy import Accuracy, accuracy_sentence
+from elastocal.application.accuracy import Accuracy, format_accuracy
 from elastocal.counting import counted
 from elastocal.report import words as say
 from elastocal.report.loop_facts import title_of
-from elastocal.report.typesetting import sentences
+from elastocal.report.typesetting import render_sentences
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -38,10 +38,12 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
     ready to print, lists for tables.
     """
     spoken = {
-        "accuracy_sentence": accuracy_sentence(Accuracy(**document["accuracy"])),
+        "accuracy_sentence": format_accuracy(Accuracy(**document["accuracy"])),
         "title": title_of(document),
     }
-    stated = sentences("certificate.txt", say.FILTERS, document=document, **spoken)
+    stated = render_sentences(
+        "certificate.txt", say.FILTERS, document=document, **spoken
+    )
     budget = []
     for line in document["budget"]:
         below = 0.0 < line["rms_m"] < _NOTHING_M

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal import __version__
-from elastocal.application.accuracy import error_rows
+from elastocal.application.accuracy import tabulate_errors
 from elastocal.counting import counted, grouped, plural
 from elastocal.data_checks.protocol import OF_DATA, data_at_fault
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.effects.catalogue import effects
 from elastocal.effects.protocol import effect_of
 from elastocal.report import words as say
-from elastocal.report.typesetting import sentences
+from elastocal.report.typesetting import render_sentences
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -101,7 +101,7 @@ def campaign_sentences(
         "new_poses": len({(row["effect"], row["pose"]) for row in experiment}),
         "version": __version__,
     }
-    return sentences(
+    return render_sentences(
         "campaign.txt",
         say.FILTERS,
         verdict={"next_experiment": None, "repeatable": None, **verdict},
@@ -151,7 +151,7 @@ def loop_facts(
         "faulty": faulty,
         "headline": dict(stated["headline"]) or None,
         "causes": [] if verdict["verdict"] == "not_testable" else cause_rows(verdict),
-        "errors": error_rows(verdict),
+        "errors": tabulate_errors(verdict),
         "measured": measured_rows(table, descriptions),
         "floor": say.length(heldout["noise_floor_rms_m"]),
         "steps": step_rows(steps, heldout["noise_floor_rms_m"]),

@@ -14,7 +14,7 @@ from elastocal.io.atomic_writes import write_text
 from elastocal.loop.schemas import angles_of, worst_measurement
 from elastocal.mechanics.kinematics import corners, joint_axes
 from elastocal.report import words as say
-from elastocal.report.typesetting import template
+from elastocal.report.typesetting import load_template
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -113,7 +113,7 @@ def write_loop_page(
     # Texts come from files of other people: they are escaped, and nothing in the data
     # can end the script that holds it.
     numbers = json.dumps(data, allow_nan=False).replace("<", "\\u003c")
-    text = template("loop.html", say.FILTERS).render(
+    text = load_template("loop.html", say.FILTERS).render(
         page=page, origin=origin, data=Markup(numbers), script=Markup(script)
     )
     write_text(path, text)

@@ -8,10 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from elastocal.report.typesetting import sentences
+from elastocal.report.typesetting import render_sentences
 from elastocal.study.ladder import CHOSEN
-from elastocal.study.printed import LEVEL
-from elastocal.study.tables import column_head, list_rows, merge_errors, word_value
+from elastocal.study.printed import SIGNIFICANCE_LEVEL
+from elastocal.study.tables import (
+    format_column_head,
+    format_value,
+    list_rows,
+    merge_errors,
+)
 from elastocal.study.uses import METRICS, REFERENCE
 
 if TYPE_CHECKING:
@@ -28,7 +33,7 @@ _LONGEST = 1000
 _CONTINUED = "†"
 
 
-def brief_names(titles: Mapping[str, str]) -> dict[str, str]:
+def shorten_titles(titles: Mapping[str, str]) -> dict[str, str]:
     """Names for cells of tables: the first words of each title that distinguish it from
     others.
 
@@ -56,7 +61,7 @@ def brief_names(titles: Mapping[str, str]) -> dict[str, str]:
     return found
 
 
-def study_facts(
+def collect_study_facts(
     tables: Mapping[str, pd.DataFrame],
     names: Mapping[str, str],
     robots: Sequence[str],
@@ -81,7 +86,7 @@ def study_facts(
     judged = of["comparison"][of["comparison"].p_holm.notna()]
     pairs = of["score_pairs"]
     of |= {
-        "outside": judged[judged.p_value < LEVEL],
+        "outside": judged[judged.p_value < SIGNIFICANCE_LEVEL],
         "printed": of["comparison"][of["comparison"].table == "2"],
         "turned": pairs[pairs.reversed & (pairs.metric != REFERENCE)].assign(
             size=lambda frame: (frame.ratio / frame.rms_ratio).abs()
@@ -118,7 +123,7 @@ def study_facts(
         },
         "stated": {name: f"{value:g}" for name, value in settings["stated"].items()},
         "cells": str(len(judged)),
-        "differ": str(int((judged.p_holm < LEVEL).sum())),
+        "differ": str(int((judged.p_holm < SIGNIFICANCE_LEVEL).sum())),
         "studies": str(int(of["joint"].studies.max())),
         "extended": merge_errors(of["extended"].drop(columns="robot"))
         .to_numpy()
@@ -126,9 +131,9 @@ def study_facts(
         "strategies": [_stages(strategy) for strategy in settings["strategies"]],
     }
     helpers = {
-        "word_value": word_value,
-        "column_head": column_head,
-        "ratio": ratio_words,
+        "format_value": format_value,
+        "format_column_head": format_column_head,
+        "format_ratio": format_ratio,
         "each": each,
         "at": at,
     }
@@ -151,7 +156,7 @@ def study_facts(
         "t": {name: _records(frame) for name, frame in of.items()},
     }
     return (
-        sentences(
+        render_sentences(
             "study.txt",
             classical=settings["classical"],
             **helpers,
@@ -163,7 +168,7 @@ def study_facts(
     )
 
 
-def paper_rows(
+def format_paper_rows(
     beside: pd.DataFrame, names: Mapping[str, str], configurations: int
 ) -> list[dict[str, str]]:
     """Each figure that the paper prints beside ours, in words.
@@ -177,7 +182,7 @@ def paper_rows(
             "table": row["table"],
             "robot": names.get(row["robot"], ""),
             "strategy": row["strategy"] if isinstance(row["strategy"], str) else "",
-            "quantity": column_head(row["quantity"]),
+            "quantity": format_column_head(row["quantity"]),
             "paper": f"{row['paper']:g}",
             "ours": "not studied"
             if np.isnan(row["ours"])
@@ -189,7 +194,7 @@ def paper_rows(
     ]
 
 
-def paper_tables(
+def format_paper_tables(
     frames: Mapping[str, pd.DataFrame], names: Mapping[str, str], configurations: int
 ) -> dict[str, Any]:
     """The paper's tables of one study as rows of cells, heads first; lengths beyond a
@@ -202,7 +207,7 @@ def paper_tables(
             if column.startswith("n_") and not column.endswith("_std_error")
         ]
         beyond = {
-            column_head(column): frame[column].between(
+            format_column_head(column): frame[column].between(
                 configurations, np.inf, "neither"
             )
             for column in lengths
@@ -232,7 +237,7 @@ def _records(frame: pd.DataFrame) -> list[dict[str, Any]]:
     return rows
 
 
-def ratio_words(row: Mapping[str, Any]) -> str:
+def format_ratio(row: Mapping[str, Any]) -> str:
     """A ratio of a row with its interval."""
     return f"{row['ratio']:.3f} ({row['ratio_low']:.3f} to {row['ratio_high']:.3f})"
 
@@ -247,13 +252,13 @@ def _continued(
     """A score with its error; a length beyond a data set, where the curve is continued
     as 1/n, is marked."""
     if not quantity.startswith("n_"):
-        return word_value(value, error)
+        return format_value(value, error)
     if np.isfinite(longest) and value >= longest:
         return f"over {longest:g}{_CONTINUED}"
     text = (
         f"{value:.0f} ± {error:.0f}"
         if np.isfinite(longest)
-        else word_value(value, error)
+        else format_value(value, error)
     )
     return text + (_CONTINUED if np.isfinite(value) and value > configurations else "")
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from elastocal.io.origin import Origin
 
 
-def template(name: str, filters: Mapping[str, Any] | None = None) -> Template:
+def load_template(name: str, filters: Mapping[str, Any] | None = None) -> Template:
     """A template of this package with filters of its own, such as `words.FILTERS`;
     pages (.html) escape what they show."""
     from jinja2 import Environment, FunctionLoader, StrictUndefined
@@ -49,7 +49,7 @@ def template(name: str, filters: Mapping[str, Any] | None = None) -> Template:
     return environment.get_template(name)
 
 
-def sentences(
+def render_sentences(
     name: str, filters: Mapping[str, Any] | None = None, /, **facts: Any
 ) -> dict[str, Any]:
     """What a template of sentences (.txt) says.
@@ -61,7 +61,7 @@ def sentences(
     found: dict[str, Any] = {}
     for marks, head, text in re.findall(
         r"^(##?) (\w+)\n(.*?)(?=^##? \w+\n|\Z)",
-        template(name, filters).render(facts),
+        load_template(name, filters).render(facts),
         re.DOTALL | re.MULTILINE,
     ):
         parts = re.split(r"\n" if len(marks) > 1 else r"\n[ \n]*\n", text)

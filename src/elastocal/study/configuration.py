@@ -10,7 +10,7 @@ from typing import Any
 from elastocal.errors import InputError
 from elastocal.io.documents import check_document, document_path, named_document, parsed
 from elastocal.mechanics.robot_file import robot_from_document
-from elastocal.study.equation_11 import first_solvable_length
+from elastocal.study.equation_11 import find_first_solvable_length
 from elastocal.study.strategies import check_strategy, strategy_from_document
 
 # A measuring point in chain notation.
@@ -80,8 +80,8 @@ def check_study(
         points[name] = strategy.points
         for chain in chains.values():
             check_strategy(strategy, chain, document_path(folder, "strategies", name))
-        needed = first_solvable_length(
-            strategy, rows_read(config["interpretations"]["measured"])
+        needed = find_first_solvable_length(
+            strategy, count_components(config["interpretations"]["measured"])
         )
         if config["configurations"] < needed:
             raise InputError(
@@ -125,7 +125,9 @@ def check_study(
     )
 
 
-def override(config: Mapping[str, Any], entries: Iterable[str]) -> dict[str, Any]:
+def override_entries(
+    config: Mapping[str, Any], entries: Iterable[str]
+) -> dict[str, Any]:
     """A configuration with keys changed on the command line, numbers read as in the
     file.
 
@@ -144,7 +146,7 @@ def _merge(old: Any, new: Any) -> Any:
     return new
 
 
-def rows_read(measured: str) -> int:
+def count_components(measured: str) -> int:
     """Measurements of one point in one configuration: 6 where poses are measured, 3
     where positions are."""
     return {"pose": 6, "position": 3}[measured]

@@ -14,15 +14,22 @@ import numpy as np
 from elastocal.application.planning.designs import (
     CRITERIA,
     Criterion,
+    build_criterion,
     choose_greedily,
-    criterion,
     exchange_candidates,
 )
 from elastocal.io.storage import Column
 from elastocal.random_streams import stream
-from elastocal.study.in_memory import ask
-from elastocal.study.jobs import MICRO, below, real, table, tabulate, whole
-from elastocal.study.metrics import make_judge, mean_square_errors
+from elastocal.study.in_memory import define_study_step
+from elastocal.study.jobs import (
+    MICRO,
+    concatenate_robots,
+    define_table_step,
+    make_integer_column,
+    make_real_column,
+    make_schema,
+)
+from elastocal.study.metrics import evaluate_quadratic_form, make_validation_set
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -32,7 +39,7 @@ if TYPE_CHECKING:
     from elastocal.study.in_memory import StudyInMemory
 
 RANDOM = "random"
-SIMULATED_DESIGNS = table(
+SIMULATED_DESIGNS = make_schema(
     "simulated_designs",
     Column(
         "load",
@@ -46,19 +53,19 @@ SIMULATED_DESIGNS = table(
         "",
         "criterion by which the configurations are chosen, or random",
     ),
-    whole("configurations", "configurations of the design", 1),
+    make_integer_column("configurations", "configurations of the design", 1),
     Column(
         "unobservable",
         "text",
         "",
         "joints that the loads do not move, from 1, with commas between them",
     ),
-    real(
+    make_real_column(
         "rms",
         "m",
         "RMS end-effector error over simulated data sets on test configurations",
     ),
-    real("std_error", "m", "Monte Carlo standard error of the same"),
+    make_real_column("std_error", "m", "Monte Carlo standard error of the same"),
 )
 # Random designs of each size; each has as many noisy data sets as all have together
 # over this.
@@ -83,7 +90,7 @@ class Candidates:
     form: np.ndarray
 
 
-def simulated_design_blocks(
+def evaluate_designs(
     study: StudyInMemory,
     candidates: int,
     sizes: Sequence[int],
@@ -105,7 +112,7 @@ def simulated_design_blocks(
         # The form is of the squared error in all compliances and 1.
         rules = {"I": Criterion(made.form[np.ix_(of, of)] * np.outer(scale, scale))}
         rules |= {
-            kind: criterion(kind, rows[:, :3]) for kind in CRITERIA if kind != "I"
+            kind: build_criterion(kind, rows[:, :3]) for kind in CRITERIA if kind != "I"
         }
         found: list[tuple[str, int, Sequence[np.ndarray] | np.ndarray | list[int]]] = []
         for kind, rule in rules.items():
@@ -147,7 +154,7 @@ def _candidates(
     size = np.abs(rows).max(axis=(0, 1))
     observable = size > _MOVED * size.max()
     tests = study.tests() if observable.all() else within.tests()
-    form = make_judge(
+    form = make_validation_set(
         study.robot, tests, within.deflections(tests), read.wrench_at
     ).form
     return Candidates(
@@ -174,7 +181,7 @@ def _simulate(
         np.moveaxis(estimates, 1, 0).reshape(of.sum(), -1)
         - study.robot.compliance[of][:, None]
     )
-    squares = mean_square_errors(candidates.form, error)
+    squares = evaluate_quadratic_form(candidates.form, error)
     rms = np.sqrt(squares.mean())
     # Data sets of one design go together.
     each = squares.reshape(len(designs), repeats)
@@ -182,12 +189,12 @@ def _simulate(
     return float(rms), float(groups.std(ddof=1) / np.sqrt(len(groups)) / (2 * rms))
 
 
-def simulated_designs_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+def build_designs_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """Simulated errors of random and chosen configurations by the kind of load.
 
     gain: the error of random designs of the size over that of the design.
     """
-    frame = below(found)
+    frame = concatenate_robots(found)
     names = {"rms": "rms_um", "std_error": "rms_um_std_error"}
     errors = MICRO * frame[[*names]].rename(columns=names)
     part = frame[["robot", "load", "design", "configurations", "unobservable"]].join(
@@ -198,5 +205,5 @@ def simulated_designs_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     return part.assign(gain=part.join(random, on=size).random / part.rms_um)
 
 
-simulate_designs = ask(SIMULATED_DESIGNS, simulated_design_blocks)
-tabulate_simulated_designs = tabulate(SIMULATED_DESIGNS, simulated_designs_table)
+simulate_designs = define_study_step(SIMULATED_DESIGNS, evaluate_designs)
+tabulate_simulated_designs = define_table_step(SIMULATED_DESIGNS, build_designs_table)

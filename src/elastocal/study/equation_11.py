@@ -24,16 +24,16 @@ from elastocal.mechanics.elastostatics import (
     regressor,
 )
 from elastocal.mechanics.kinematics import jacobians
-from elastocal.study.jobs import LENGTH, SET, Job, real, table
+from elastocal.study.jobs import DATA_SET, LENGTH, Job, make_real_column, make_schema
 from elastocal.study.simulation import (
     DEFLECTION_COLUMNS,
     DEFLECTIONS,
     Experiments,
-    data_sets,
-    experiments,
-    prefix_index_columns,
-    to_deflections,
-    to_experiments,
+    list_data_sets,
+    make_experiments_schema,
+    make_prefix_index,
+    unpack_deflections,
+    unpack_experiments,
 )
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ Blocks = Iterable[
 # Condition numbers come from squares of singular values, so they mean nothing beyond
 # the root of the machine's precision; there the measurements do not determine the
 # compliances.
-LARGEST_CONDITION = 1e7
+MAX_CONDITION_NUMBER = 1e7
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Measurements:
     deflection: np.ndarray
 
 
-def first_solvable_length(strategy: Strategy, rows: int) -> int:
+def find_first_solvable_length(strategy: Strategy, rows: int) -> int:
     """Smallest number of configurations with at least as many measurements as unknowns
     in every stage.
 
@@ -94,7 +94,7 @@ def estimate_compliance(
     for stage in strategy.stages:
         pivots = len(stage.identified)
         shape = configurations, pivots, pivots + len(stage.fixed) + 1, sets
-        triangle = prefix_triangles(_equations(stage, measurements), shape)
+        triangle = factorize_prefixes(_equations(stage, measurements), shape)
         right = triangle[:, :, -1] - np.einsum(
             "kpfs,kfs->kps", triangle[:, :, pivots:-1], compliance[:, list(stage.fixed)]
         )
@@ -105,7 +105,7 @@ def estimate_compliance(
     return compliance, triangles
 
 
-def undetermined(
+def find_undetermined_prefixes(
     strategy: Strategy, rows: int, triangles: Iterable[np.ndarray]
 ) -> np.ndarray:
     """Prefixes (configurations, sets) that do not determine the compliances: too few
@@ -128,16 +128,16 @@ def undetermined(
         determinant = np.abs(np.einsum("kpps->kps", square).prod(axis=1))
         norm = np.sqrt(np.einsum("kpqs,kpqs->ks", square, square) / size)
         with np.errstate(divide="ignore", invalid="ignore"):
-            doubtful = ~(2.0 * norm**size / determinant < LARGEST_CONDITION)
+            doubtful = ~(2.0 * norm**size / determinant < MAX_CONDITION_NUMBER)
         doubtful[doubtful] = ~(
-            _condition(np.moveaxis(square, -1, 1)[doubtful]) < LARGEST_CONDITION
+            _condition(np.moveaxis(square, -1, 1)[doubtful]) < MAX_CONDITION_NUMBER
         )
         found = found | doubtful
-    found[: first_solvable_length(strategy, rows) - 1] = True
+    found[: find_first_solvable_length(strategy, rows) - 1] = True
     return found
 
 
-def prefix_triangles(
+def factorize_prefixes(
     equations: Iterable[np.ndarray], shape: tuple[int, ...]
 ) -> np.ndarray:
     """Triangular factor of the equations of the first k configurations, for every k.
@@ -201,7 +201,7 @@ def _solve(triangles: np.ndarray, right: np.ndarray) -> np.ndarray:
     """
     diagonal = np.einsum("kpps->kps", triangles)
     sizes = np.abs(diagonal)
-    determined = sizes.max(axis=1, keepdims=True) < LARGEST_CONDITION * sizes.min(
+    determined = sizes.max(axis=1, keepdims=True) < MAX_CONDITION_NUMBER * sizes.min(
         axis=1, keepdims=True
     )
     pivots = np.where(determined, diagonal, np.nan)
@@ -221,10 +221,10 @@ def _condition(matrices: np.ndarray) -> np.ndarray:
         return np.sqrt(eigenvalues[..., -1] / np.maximum(eigenvalues[..., 0], 0.0))
 
 
-def identified(joints: int) -> TableSchema:
+def make_identified_schema(joints: int) -> TableSchema:
     """What a strategy identified; one row for each data set and length."""
     compliances = [
-        real(
+        make_real_column(
             f"compliance_{j}",
             "rad/(N m)",
             f"identified compliance of joint {j}",
@@ -232,10 +232,10 @@ def identified(joints: int) -> TableSchema:
         )
         for j in range(1, joints + 1)
     ]
-    return table("identified", SET, LENGTH, *compliances)
+    return make_schema("identified", DATA_SET, LENGTH, *compliances)
 
 
-def regressors_of(
+def compute_regressors(
     experiments: Experiments,
     chain: Chain,
     points: Collection[str],
@@ -244,8 +244,8 @@ def regressors_of(
 ) -> dict[str, np.ndarray]:
     """Matrices A of equation 10 (rows, n, configurations, sets) of each measuring
     point, configuration before data set."""
-    joint_angles = configuration_first(experiments.joint_angles)
-    wrench = configuration_first(experiments.wrench)
+    joint_angles = order_by_configuration(experiments.joint_angles)
+    wrench = order_by_configuration(experiments.wrench)
     loaded = {
         name: loaded_point(chain, chain.point(name), wrench_at) for name in points
     }
@@ -270,7 +270,7 @@ def regressors_of(
     }
 
 
-def configuration_first(array: np.ndarray) -> np.ndarray:
+def order_by_configuration(array: np.ndarray) -> np.ndarray:
     """(sets, configurations, k) to (configurations, sets, k) with memory in the order
     k, configurations, sets."""
     return np.moveaxis(
@@ -278,15 +278,16 @@ def configuration_first(array: np.ndarray) -> np.ndarray:
     )
 
 
-def stacked(matrix: np.ndarray, deflections: np.ndarray) -> Measurements:
+def stack_measurements(matrix: np.ndarray, deflections: np.ndarray) -> Measurements:
     """A point's matrix A (rows, n, configurations, sets) with its deflections (sets,
     configurations, 3 or 6)."""
     return Measurements(
-        matrix, np.moveaxis(configuration_first(deflections)[..., : len(matrix)], -1, 0)
+        matrix,
+        np.moveaxis(order_by_configuration(deflections)[..., : len(matrix)], -1, 0),
     )
 
 
-def identified_blocks(
+def identify_blocks(
     blocks: Blocks, chain: Chain, strategy: Strategy, rows: int, wrench_at: str
 ) -> Iterator[dict[str, np.ndarray]]:
     """Compliances, columns of the identified table; not a number where a prefix does
@@ -296,25 +297,29 @@ def identified_blocks(
     interpretation R6.
     """
     for block, deflections in blocks:
-        regressors = regressors_of(
-            to_experiments(block), chain, strategy.points, rows, wrench_at
+        regressors = compute_regressors(
+            unpack_experiments(block), chain, strategy.points, rows, wrench_at
         )
         measurements = {
-            name: stacked(regressors[name], to_deflections(deflections[name]))
+            name: stack_measurements(
+                regressors[name], unpack_deflections(deflections[name])
+            )
             for name in strategy.points
         }
         compliance, triangles = estimate_compliance(
             strategy, measurements, chain.coordinates
         )
-        np.moveaxis(compliance, 1, -1)[undetermined(strategy, rows, triangles)] = np.nan
-        columns = prefix_index_columns(data_sets(block), len(compliance))
+        np.moveaxis(compliance, 1, -1)[
+            find_undetermined_prefixes(strategy, rows, triangles)
+        ] = np.nan
+        columns = make_prefix_index(list_data_sets(block), len(compliance))
         yield columns | {
             f"compliance_{j + 1}": compliance[:, j].T.ravel()
             for j in range(chain.coordinates)
         }
 
 
-def read_measured(job: Job, joints: int, points: Iterable[str]) -> Blocks:
+def read_measured_blocks(job: Job, joints: int, points: Iterable[str]) -> Blocks:
     """Blocks of the experiments of a job with those of what is measured of the same
     data sets."""
     found = {
@@ -323,10 +328,12 @@ def read_measured(job: Job, joints: int, points: Iterable[str]) -> Blocks:
         )
         for name in points
     }
-    return paired_blocks(read_blocks(job.input.experiments, experiments(joints)), found)
+    return pair_blocks(
+        read_blocks(job.input.experiments, make_experiments_schema(joints)), found
+    )
 
 
-def paired_blocks(
+def pair_blocks(
     experiments: Iterable[Mapping[str, np.ndarray]],
     deflections: Mapping[str, Iterable[Mapping[str, np.ndarray]]],
 ) -> Blocks:

@@ -21,31 +21,35 @@ from elastocal.io.storage import (
     read_table,
     write_table,
 )
-from elastocal.study.equation_11 import identified, identified_blocks, read_measured
-from elastocal.study.in_memory import study_of
+from elastocal.study.equation_11 import (
+    identify_blocks,
+    make_identified_schema,
+    read_measured_blocks,
+)
+from elastocal.study.in_memory import load_study
 from elastocal.study.jobs import (
     LENGTH,
     MICRO,
     STRATEGY,
     Job,
     add_slugs,
-    origin,
-    real,
-    robot_of,
-    rows_as_frame,
-    strategies_of,
-    table,
-    whole,
+    collect_provenance,
+    load_robot,
+    load_strategies,
+    make_frame,
+    make_integer_column,
+    make_real_column,
+    make_schema,
     write_csvs,
 )
 from elastocal.study.metrics import (
-    Judge,
-    first_length_below,
-    k_sigma,
-    length_to_reach,
-    make_judge,
-    mean_deviation,
-    relative_stiffness_error,
+    ValidationSet,
+    compute_k_sigma,
+    compute_mean_deviation,
+    compute_relative_stiffness_error,
+    extrapolate_length,
+    find_first_length_below,
+    make_validation_set,
 )
 from elastocal.study.simulation import (
     DATA_SETS,
@@ -53,12 +57,12 @@ from elastocal.study.simulation import (
     REPLICATE,
     TESTS,
     WEIGHTS,
-    data_sets,
-    experiments,
-    to_deflections,
-    to_experiments,
+    list_data_sets,
+    make_experiments_schema,
+    unpack_deflections,
+    unpack_experiments,
 )
-from elastocal.study.strategies import drop_forgotten_stages, strategy_from_document
+from elastocal.study.strategies import drop_superseded_stages, strategy_from_document
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -66,7 +70,7 @@ if TYPE_CHECKING:
     from elastocal.study.in_memory import StudyInMemory
     from elastocal.study.strategies import Strategy
 
-LARGEST_TRUSTED_SPREAD = 0.25
+MAX_TRUSTED_SPREAD = 0.25
 # Those of Table 4: name, column, factor, unit, key of the limit.
 _FIGURES = (
     ("k_sigma", "k_sigma", 1.0, "percent", "k_sigma"),
@@ -75,20 +79,22 @@ _FIGURES = (
 )
 
 SCORES = (
-    real("k_sigma", "percent", "as in the metrics", missing=True),
-    real("k_sigma_fixed_joints", "percent", "as in the metrics", missing=True),
-    real("deviation", "m", "as in the metrics", missing=True),
+    make_real_column("k_sigma", "percent", "as in the metrics", missing=True),
+    make_real_column(
+        "k_sigma_fixed_joints", "percent", "as in the metrics", missing=True
+    ),
+    make_real_column("deviation", "m", "as in the metrics", missing=True),
 )
-REPLICATES = table(
+REPLICATES = make_schema(
     "replicates",
     REPLICATE,
     LENGTH,
     *SCORES,
-    real("initial_deviation", "m", "as in the metrics"),
+    make_real_column("initial_deviation", "m", "as in the metrics"),
 )
 
 
-def metrics(joints: int) -> TableSchema:
+def make_metrics_schema(joints: int) -> TableSchema:
     """Equations 12-15, averaged over the data sets; one row for each length."""
     of_stiffness = "the averaged stiffness of joint"
     quantities = [
@@ -125,11 +131,11 @@ def metrics(joints: int) -> TableSchema:
             "mean deflection of the end-effector on the test configurations",
         ),
     ]
-    return table(
+    return make_schema(
         "metrics",
         LENGTH,
         *(
-            real(name + end, unit, words + meaning, missing=True)
+            make_real_column(name + end, unit, words + meaning, missing=True)
             for name, unit, meaning in quantities
             for end, words in (
                 ("", ""),
@@ -139,12 +145,12 @@ def metrics(joints: int) -> TableSchema:
                 ),
             )
         ),
-        real(
+        make_real_column(
             "nonpositive_share",
             "",
             "share of data sets with a compliance that is not positive",
         ),
-        real(
+        make_real_column(
             "relative_spread",
             "",
             "largest standard deviation over mean of an identified compliance",
@@ -159,7 +165,7 @@ def metrics(joints: int) -> TableSchema:
     )
 
 
-def to_weights(columns: Mapping[str, np.ndarray]) -> np.ndarray:
+def unpack_weights(columns: Mapping[str, np.ndarray]) -> np.ndarray:
     """Weights (1 + replicates, members) of a block of the weights table; replicate 0
     counts each member once."""
     counts = columns["count"].reshape(-1, columns["replicate"].max())
@@ -184,9 +190,9 @@ class Averages:
     relative_spread: np.ndarray
 
 
-def average(
+def average_estimates(
     blocks: Iterable[tuple[np.ndarray, np.ndarray]],
-    judge: Judge,
+    judge: ValidationSet,
     method: str,
     test_weights: np.ndarray,
 ) -> Averages:
@@ -217,7 +223,7 @@ def average(
         )
     averaged = sums / total[:, None, None]
     averaged = averaged if method == "compliance" else 1.0 / averaged
-    deviation = mean_deviation(judge, averaged, test_weights)
+    deviation = compute_mean_deviation(judge, averaged, test_weights)
     initial = np.broadcast_to(
         (test_weights @ judge.initial_errors / test_weights.sum(axis=1))[:, None],
         deviation.shape,
@@ -227,7 +233,7 @@ def average(
     return Averages(averaged, deviation, initial, nonpositive / sets, spread)
 
 
-def score_columns(
+def compute_scores(
     compliance: np.ndarray,
     deviation: np.ndarray,
     true_compliance: np.ndarray,
@@ -236,20 +242,20 @@ def score_columns(
     """Scores (..., lengths) of averaged models: `compliance` (..., lengths, n) and
     `deviation` (..., lengths)."""
     return {
-        "k_sigma": k_sigma(compliance, true_compliance),
-        "k_sigma_fixed_joints": k_sigma(
+        "k_sigma": compute_k_sigma(compliance, true_compliance),
+        "k_sigma_fixed_joints": compute_k_sigma(
             compliance, true_compliance, list(fixed_joints)
         ),
         "deviation": deviation,
     }
 
 
-def metrics_table(
+def build_metrics_table(
     averages: Averages, true_compliance: np.ndarray, fixed_joints: Sequence[int]
 ) -> dict[str, np.ndarray]:
     """Columns of the metrics table, one row for each length, from `average`."""
     replicated = {}
-    relative = relative_stiffness_error(averages.compliance, true_compliance)
+    relative = compute_relative_stiffness_error(averages.compliance, true_compliance)
     for j in range(len(true_compliance)):
         replicated[f"compliance_{j + 1}"] = averages.compliance[..., j]
         replicated[f"delta_k_{j + 1}"] = relative[..., j]
@@ -262,12 +268,12 @@ def metrics_table(
     columns["relative_spread"] = averages.relative_spread
     with np.errstate(invalid="ignore"):
         columns["trustworthy"] = (averages.nonpositive_share == 0) & (
-            averages.relative_spread <= LARGEST_TRUSTED_SPREAD
+            averages.relative_spread <= MAX_TRUSTED_SPREAD
         )
     return columns
 
 
-def replicates_table(
+def build_replicates_table(
     averages: Averages, true_compliance: np.ndarray, fixed_joints: Sequence[int]
 ) -> dict[str, np.ndarray]:
     """Columns of the replicates table: the scores of every bootstrap replicate at every
@@ -284,13 +290,13 @@ def replicates_table(
 def _replicated_scores(
     averages: Averages, true_compliance: np.ndarray, fixed_joints: Sequence[int]
 ) -> dict[str, np.ndarray]:
-    scores = score_columns(
+    scores = compute_scores(
         averages.compliance, averages.deviation, true_compliance, fixed_joints
     )
     return scores | {"initial_deviation": averages.initial_deviation}
 
 
-def find_length(
+def find_length_with_error(
     values: np.ndarray, replicate_values: np.ndarray, limit: float
 ) -> tuple[float, float]:
     """First length at which a metric is at most `limit`, infinite where none is, with
@@ -300,26 +306,26 @@ def find_length(
     reach it are continued, see `metrics.length_to_reach`, since leaving them out would
     make the error too small.
     """
-    return float(first_length_below(values, limit)), float(
-        np.std(length_to_reach(replicate_values, limit), ddof=1)
+    return float(find_first_length_below(values, limit)), float(
+        np.std(extrapolate_length(replicate_values, limit), ddof=1)
     )
 
 
-def repeated(joints: int) -> TableSchema:
+def make_repeated_schema(joints: int) -> TableSchema:
     """Scores of further studies of the same size; one row for each study, strategy and
     length."""
     other = (
         "by the mean of the compliances where the metrics have that of the stiffnesses"
     )
-    return table(
+    return make_schema(
         "repeated",
-        whole(
+        make_integer_column(
             "study", "number of the study, from 1; that of the tables is number 0", 1
         ),
         STRATEGY,
         LENGTH,
         *(
-            real(
+            make_real_column(
                 f"compliance_{j}",
                 "rad/(N m)",
                 f"as in the metrics, of joint {j}",
@@ -328,20 +334,22 @@ def repeated(joints: int) -> TableSchema:
             for j in range(1, joints + 1)
         ),
         *SCORES,
-        real(
+        make_real_column(
             "k_sigma_mean_compliance",
             "percent",
             f"sum of delta_k over all joints, {other}",
             missing=True,
         ),
-        real(
+        make_real_column(
             "k_sigma_fixed_joints_mean_compliance",
             "percent",
             f"the same of the fixed joints, {other}",
             missing=True,
         ),
-        real("deviation_mean_compliance", "m", f"deviation {other}", missing=True),
-        real(
+        make_real_column(
+            "deviation_mean_compliance", "m", f"deviation {other}", missing=True
+        ),
+        make_real_column(
             "mean_square",
             "m^2",
             "mean square end-effector error of single data sets",
@@ -350,7 +358,7 @@ def repeated(joints: int) -> TableSchema:
     )
 
 
-def repeated_blocks(
+def evaluate_studies(
     study: StudyInMemory, studies: Iterable[int], strategies: Sequence[Strategy]
 ) -> Iterator[dict[str, np.ndarray | str]]:
     """Scores of studies of these numbers, block by block one strategy in one study."""
@@ -365,10 +373,10 @@ def repeated_blocks(
                 (compliance, np.ones((1, len(compliance))))
                 for compliance in found[strategy.name]
             ]
-            averages = average(blocks, judge, read.average, tests)
-            plain = average(blocks, judge, "compliance", tests)
+            averages = average_estimates(blocks, judge, read.average, tests)
+            plain = average_estimates(blocks, judge, "compliance", tests)
             fixed = strategy.fixed_joints
-            others = score_columns(
+            others = compute_scores(
                 plain.compliance[0], plain.deviation[0], robot.compliance, fixed
             )
             squares = [
@@ -380,7 +388,7 @@ def repeated_blocks(
                     f"compliance_{j + 1}": column
                     for j, column in enumerate(averages.compliance[0].T)
                 },
-                **score_columns(
+                **compute_scores(
                     averages.compliance[0],
                     averages.deviation[0],
                     robot.compliance,
@@ -395,7 +403,7 @@ def repeated_blocks(
             }
 
 
-def over_studies_table(
+def build_over_studies_table(
     studies: pd.DataFrame, length: int, limits: Mapping[str, float]
 ) -> pd.DataFrame:
     """Table 4 over studies, by what is averaged (stiffness or compliance).
@@ -423,7 +431,7 @@ def over_studies_table(
                 row |= _middle(f"{name}_{length}_{unit}", curves[:, length - 1])
                 row |= _middle(
                     f"n_{name}_{limits[key]:g}_{unit}",
-                    length_to_reach(curves, limits[key]),
+                    extrapolate_length(curves, limits[key]),
                 )
             rows.append(
                 row
@@ -432,7 +440,7 @@ def over_studies_table(
                     MICRO * np.sqrt(cell.mean_square[cell.length == length]),
                 )
             )
-    return rows_as_frame(rows)
+    return make_frame(rows)
 
 
 def _middle(name: str, values: np.ndarray | pd.Series) -> dict[str, float]:
@@ -448,20 +456,25 @@ def identify(job: Job) -> None:
     """One strategy for one robot at one noise level: compliances at every prefix
     length, and what they are worth."""
     asked = job.params
-    robot = robot_of(job)
+    robot = load_robot(job)
     n = robot.joints
     strategy = strategy_from_document(asked.strategy)
-    blocks = read_measured(job, n, strategy.points)
-    solved = identified_blocks(
+    blocks = read_measured_blocks(job, n, strategy.points)
+    solved = identify_blocks(
         blocks,
         robot.chain,
-        drop_forgotten_stages(strategy, n),
+        drop_superseded_stages(strategy, n),
         asked.rows,
         asked.wrench_at,
     )
-    write_table(job.output.identified, identified(n), solved, origin(job))
+    write_table(
+        job.output.identified,
+        make_identified_schema(n),
+        solved,
+        collect_provenance(job),
+    )
 
-    tested = read_table(job.input.test_experiments, experiments(n))
+    tested = read_table(job.input.test_experiments, make_experiments_schema(n))
     ideal = read_table(
         job.input.test_ideal, DEFLECTIONS, point=robot.chain.end_effector.name
     )
@@ -470,37 +483,53 @@ def identify(job: Job) -> None:
     columns = [f"compliance_{j + 1}" for j in range(n)]
     estimated = (
         np.stack(
-            [block[name].reshape(len(data_sets(block)), -1) for name in columns],
+            [block[name].reshape(len(list_data_sets(block)), -1) for name in columns],
             axis=-1,
         )
         for block in read_blocks(
-            job.output.identified, identified(n), ["data_set", *columns]
+            job.output.identified, make_identified_schema(n), ["data_set", *columns]
         )
     )
     weights = map(
-        to_weights, read_blocks(job.input.weights, WEIGHTS, counts, members=DATA_SETS)
+        unpack_weights,
+        read_blocks(job.input.weights, WEIGHTS, counts, members=DATA_SETS),
     )
-    of_tests = to_weights(read_table(job.input.weights, WEIGHTS, counts, members=TESTS))
-    judge = make_judge(
-        robot, to_experiments(tested), to_deflections(ideal), asked.wrench_at
+    of_tests = unpack_weights(
+        read_table(job.input.weights, WEIGHTS, counts, members=TESTS)
     )
-    averages = average(
+    judge = make_validation_set(
+        robot, unpack_experiments(tested), unpack_deflections(ideal), asked.wrench_at
+    )
+    averages = average_estimates(
         zip(estimated, weights, strict=True), judge, asked.average, of_tests
     )
     scored = averages, judge.reference, strategy.fixed_joints
-    write_table(job.output.metrics, metrics(n), [metrics_table(*scored)], origin(job))
     write_table(
-        job.output.replicates, REPLICATES, [replicates_table(*scored)], origin(job)
+        job.output.metrics,
+        make_metrics_schema(n),
+        [build_metrics_table(*scored)],
+        collect_provenance(job),
+    )
+    write_table(
+        job.output.replicates,
+        REPLICATES,
+        [build_replicates_table(*scored)],
+        collect_provenance(job),
     )
 
 
 def repeat_studies(job: Job) -> None:
     """Further studies of one robot."""
-    study = study_of(job)
-    blocks = repeated_blocks(
-        study, range(1, job.params.studies + 1), strategies_of(job)
+    study = load_study(job)
+    blocks = evaluate_studies(
+        study, range(1, job.params.studies + 1), load_strategies(job)
     )
-    write_table(job.output.repeated, repeated(study.robot.joints), blocks, origin(job))
+    write_table(
+        job.output.repeated,
+        make_repeated_schema(study.robot.joints),
+        blocks,
+        collect_provenance(job),
+    )
 
 
 def tabulate_studies(job: Job) -> None:
@@ -508,7 +537,7 @@ def tabulate_studies(job: Job) -> None:
     from elastocal.io.data_frames import read_long
 
     asked = job.params
-    found = over_studies_table(
-        read_long(job.input.studies, repeated), asked.length, asked.limits
+    found = build_over_studies_table(
+        read_long(job.input.studies, make_repeated_schema), asked.length, asked.limits
     )
     write_csvs(job, table=add_slugs(found, asked.slugs))

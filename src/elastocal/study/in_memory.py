@@ -19,22 +19,22 @@ from elastocal.mechanics.robot import Robot, with_target_offset
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.equation_11 import (
     Measurements,
+    compute_regressors,
     estimate_compliance,
-    first_solvable_length,
-    regressors_of,
-    stacked,
+    find_first_solvable_length,
+    stack_measurements,
 )
-from elastocal.study.jobs import origin, settings_of, strategies_of
-from elastocal.study.metrics import Judge, make_judge
+from elastocal.study.jobs import collect_provenance, collect_settings, load_strategies
+from elastocal.study.metrics import ValidationSet, make_validation_set
 from elastocal.study.simulation import (
     Experiments,
     Loading,
-    blocks_of_sets,
-    measurement_noise,
-    random_experiments,
-    true_deflections,
+    compute_true_deflections,
+    draw_measurement_noise,
+    draw_random_experiments,
+    split_data_sets,
 )
-from elastocal.study.strategies import Strategy, drop_forgotten_stages
+from elastocal.study.strategies import Strategy, drop_superseded_stages
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -59,7 +59,7 @@ class Interpretation:
 
 
 @dataclass(frozen=True)
-class Size:
+class StudySize:
     """How large a study is; `noise`: standard deviation, the same number in m and
     rad."""
 
@@ -83,7 +83,7 @@ class StudyInMemory:
     key: str
     seed: int
     interpretation: Interpretation
-    size: Size
+    size: StudySize
 
     def under(self, **loading: Any) -> StudyInMemory:
         """The same study where the robot is moved and loaded otherwise, by attributes
@@ -95,7 +95,7 @@ class StudyInMemory:
 
     def blocks(self, number: int = 0) -> Iterator[np.ndarray]:
         """Numbers of the data sets of a study, block by block, ndarray of int each."""
-        for sets in blocks_of_sets(self.size.data_sets):
+        for sets in split_data_sets(self.size.data_sets):
             yield np.array(sets) + number * self.size.data_sets
 
     def experiments(
@@ -109,7 +109,7 @@ class StudyInMemory:
         robot = self.robot
         count = configurations or self.size.configurations
         loading = self.interpretation.loading
-        return random_experiments(
+        return draw_random_experiments(
             robot.chain,
             robot.joint_limits,
             self.seed,
@@ -131,7 +131,7 @@ class StudyInMemory:
         end-effector where none is named."""
         chain = self.robot.chain
         named = chain.point(point) if point else chain.end_effector
-        return true_deflections(
+        return compute_true_deflections(
             self.robot, experiments, named, self.interpretation.wrench_at
         )
 
@@ -145,10 +145,10 @@ class StudyInMemory:
             joint_torques(chain, angles, experiments.wrench, at),
         )
 
-    def judge(self, number: int = 0) -> Judge:
+    def judge(self, number: int = 0) -> ValidationSet:
         """Score sheet of the test configurations of a study."""
         tests = self.tests(number)
-        return make_judge(
+        return make_validation_set(
             self.robot, tests, self.deflections(tests), self.interpretation.wrench_at
         )
 
@@ -163,15 +163,15 @@ class StudyInMemory:
         """
         drawn = self.experiments(sets)
         read = self.interpretation
-        regressors = regressors_of(
+        regressors = compute_regressors(
             drawn, self.robot.chain, points, read.rows, read.wrench_at
         )
         found = {}
         for name in points:
-            noise = measurement_noise(
+            noise = draw_measurement_noise(
                 self.seed, self.key, name + repeat, sets, self.size.configurations
             )
-            found[name] = stacked(
+            found[name] = stack_measurements(
                 regressors[name],
                 self.deflections(drawn, name) + self.size.noise * noise,
             )
@@ -183,9 +183,9 @@ class StudyInMemory:
         """Compliances (lengths, n, sets), rad/(N m), not a number where a length does
         not determine them."""
         compliance = estimate_compliance(strategy, measurements, self.robot.joints)[0]
-        compliance[: first_solvable_length(strategy, self.interpretation.rows) - 1] = (
-            np.nan
-        )
+        compliance[
+            : find_first_solvable_length(strategy, self.interpretation.rows) - 1
+        ] = np.nan
         return compliance
 
     def estimates(
@@ -198,7 +198,7 @@ class StudyInMemory:
         share their arrays.
         """
         stages = {
-            strategy.name: drop_forgotten_stages(strategy, self.robot.joints).stages
+            strategy.name: drop_superseded_stages(strategy, self.robot.joints).stages
             for strategy in strategies
         }
         points = tuple(
@@ -218,7 +218,7 @@ class StudyInMemory:
         return {name: found[estimator] for name, estimator in stages.items()}
 
 
-def study_of(job: Job) -> StudyInMemory:
+def load_study(job: Job) -> StudyInMemory:
     """The study of a rule's robot: its file, the seed, how the paper is read, the
     study's size (`study` of its parameters)."""
     read = job.params.study
@@ -227,11 +227,13 @@ def study_of(job: Job) -> StudyInMemory:
     )
     conventions = Interpretation(Loading(**read["loading"]), **read["interpretation"])
     return StudyInMemory(
-        robot, job.wildcards.robot, read["seed"], conventions, Size(**read["size"])
+        robot, job.wildcards.robot, read["seed"], conventions, StudySize(**read["size"])
     )
 
 
-def ask(schema: TableSchema, question: Callable[..., Any]) -> Callable[[Job], None]:
+def define_study_step(
+    schema: TableSchema, question: Callable[..., Any]
+) -> Callable[[Job], None]:
     """A step of one robot, which fills one table: `question` has its study and, by
     their names, the rule's parameters.
 
@@ -240,15 +242,15 @@ def ask(schema: TableSchema, question: Callable[..., Any]) -> Callable[[Job], No
     """
 
     def step(job: Job) -> None:
-        settings = settings_of(job, "study")
+        settings = collect_settings(job, "study")
         if "strategies" in settings:
-            settings["strategies"] = strategies_of(job)
-        found = question(study_of(job), **settings)
+            settings["strategies"] = load_strategies(job)
+        found = question(load_study(job), **settings)
         write_table(
             job.output[0],
             schema,
             [found] if isinstance(found, dict) else found,
-            origin(job),
+            collect_provenance(job),
         )
 
     return step

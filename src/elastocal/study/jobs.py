@@ -26,13 +26,13 @@ MICRO = 1e6
 MILLI = 1e3
 
 
-def table(name: str, *columns: Column) -> TableSchema:
+def make_schema(name: str, *columns: Column) -> TableSchema:
     """A table: its name and its columns with units and meanings, written down beside
     the function that fills it."""
     return TableSchema(name, columns)
 
 
-def real(
+def make_real_column(
     name: str,
     unit: str,
     meaning: str,
@@ -43,28 +43,28 @@ def real(
     return Column(name, "float64", unit, meaning, missing, minimum)
 
 
-def whole(name: str, meaning: str, minimum: int | None = None) -> Column:
+def make_integer_column(name: str, meaning: str, minimum: int | None = None) -> Column:
     """Counts and numbers of things."""
     return Column(name, "int32", "", meaning, minimum=minimum)
 
 
-def group(name: str, meaning: str) -> Column:
+def make_group_column(name: str, meaning: str) -> Column:
     """A word that is the same in a whole row group."""
     return Column(name, "string", "", meaning)
 
 
-SET = whole("data_set", "number of the data set, from 0", 0)
-CONFIGURATION = whole(
+DATA_SET = make_integer_column("data_set", "number of the data set, from 0", 0)
+CONFIGURATION = make_integer_column(
     "configuration", "number of the configuration in its data set, from 0", 0
 )
-LENGTH = whole(
+LENGTH = make_integer_column(
     "length",
     "data set length ds: how many configurations, from the first, were used",
     1,
 )
-STRATEGY = group("strategy", "name of the strategy; a row group holds one")
-ON_TESTS = "mean square end-effector error on test configurations"
-ERROR = real("mean_square", "m^2", ON_TESTS, missing=True)
+STRATEGY = make_group_column("strategy", "name of the strategy; a row group holds one")
+MEAN_SQUARE_MEANING = "mean square end-effector error on test configurations"
+MEAN_SQUARE = make_real_column("mean_square", "m^2", MEAN_SQUARE_MEANING, missing=True)
 
 
 class Job(Protocol):
@@ -76,24 +76,24 @@ class Job(Protocol):
     wildcards: Any
 
 
-def origin(job: Job) -> dict[str, Any]:
+def collect_provenance(job: Job) -> dict[str, Any]:
     """Provenance of a file of one robot, noise or strategy, which its wildcards are."""
     return provenance(job.params, **dict(job.wildcards))
 
 
-def robot_of(job: Job) -> Robot:
+def load_robot(job: Job) -> Robot:
     """The robot of a rule with the offset of its targets (interpretation R5)."""
     return with_target_offset(
         robot_from_document(job.params.robot), job.params.tool_offset_m
     )
 
 
-def strategies_of(job: Job) -> list[Strategy]:
+def load_strategies(job: Job) -> list[Strategy]:
     """The strategies of a rule, in its order."""
     return [strategy_from_document(document) for document in job.params.strategies]
 
 
-def frames(
+def read_frames(
     job: Job, files: Iterable[str], schema: TableSchema
 ) -> dict[str, pd.DataFrame]:
     """The table of each robot of a rule."""
@@ -105,7 +105,7 @@ def frames(
     }
 
 
-def below(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+def concatenate_robots(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """The tables of all robots one below the other, with the name of the robot in
     front."""
     import pandas as pd
@@ -113,7 +113,7 @@ def below(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     return pd.concat(found, names=["robot"]).reset_index("robot").reset_index(drop=True)
 
 
-def rows_as_frame(rows: Sequence[Any], columns: Sequence[str] = ()) -> pd.DataFrame:
+def make_frame(rows: Sequence[Any], columns: Sequence[str] = ()) -> pd.DataFrame:
     """Rows as a data frame; `columns`: those of a table that may have no rows."""
     import pandas as pd
 
@@ -132,7 +132,7 @@ def add_slugs(frame: pd.DataFrame, slugs: Mapping[str, str]) -> pd.DataFrame:
     return found
 
 
-def settings_of(job: Job, *others: str) -> dict[str, Any]:
+def collect_settings(job: Job, *others: str) -> dict[str, Any]:
     """Parameters of a rule but for those that are of every rule, and others."""
     return {
         name: value
@@ -141,7 +141,7 @@ def settings_of(job: Job, *others: str) -> dict[str, Any]:
     }
 
 
-def tabulate(
+def define_table_step(
     schema: TableSchema, make: Callable[..., pd.DataFrame]
 ) -> Callable[[Job], None]:
     """A step of all robots: `make` has the table of each, of the rule's first input,
@@ -150,13 +150,16 @@ def tabulate(
     def step(job: Job) -> None:
         files = job.input[next(iter(job.input.keys()))]
         write_csvs(
-            job, table=make(frames(job, files, schema), **settings_of(job, "robots"))
+            job,
+            table=make(
+                read_frames(job, files, schema), **collect_settings(job, "robots")
+            ),
         )
 
     return step
 
 
-def read_reference(path: str) -> pd.DataFrame:
+def read_printed_figures(path: str) -> pd.DataFrame:
     """The printed figures."""
     import pandas as pd
 

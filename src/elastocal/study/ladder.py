@@ -27,20 +27,20 @@ from elastocal.mechanics.elastostatics import (
     generalized_forces,
 )
 from elastocal.mechanics.kinematics import jacobians
-from elastocal.study.in_memory import ask
+from elastocal.study.in_memory import define_study_step
 from elastocal.study.jobs import (
+    DATA_SET,
     LENGTH,
+    MEAN_SQUARE_MEANING,
     MICRO,
-    ON_TESTS,
-    SET,
-    real,
-    rows_as_frame,
-    table,
-    tabulate,
-    whole,
+    define_table_step,
+    make_frame,
+    make_integer_column,
+    make_real_column,
+    make_schema,
 )
 from elastocal.study.points import mean_of
-from elastocal.study.simulation import measurement_noise
+from elastocal.study.simulation import draw_measurement_noise
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -51,14 +51,14 @@ if TYPE_CHECKING:
     from elastocal.study.in_memory import StudyInMemory
     from elastocal.study.simulation import Experiments
 
-LADDER = table(
+LADDER = make_schema(
     "ladder",
-    real("noise", "m, rad", "standard deviation of the measurements"),
+    make_real_column("noise", "m, rad", "standard deviation of the measurements"),
     LENGTH,
-    SET,
-    whole("link_springs", "number of link springs in the model", 0),
+    DATA_SET,
+    make_integer_column("link_springs", "number of link springs in the model", 0),
     Column("chosen", "bool", "", "whether cross-validation stops here"),
-    real("mean_square", "m^2", ON_TESTS),
+    make_real_column("mean_square", "m^2", MEAN_SQUARE_MEANING),
 )
 CHOSEN = "by cross-validation"
 FOLDS = 5
@@ -72,7 +72,7 @@ _RIDGE = 1e-10
 
 
 @dataclass(frozen=True)
-class Products:
+class NormalEquations:
     """Normal equations of some measurements, K columns.
 
     `gram` (..., K, K), `along` (..., K), `squares` (...).
@@ -110,7 +110,7 @@ class Ladder:
         return np.argmin(self.cross_validated, axis=1)
 
 
-def spring_columns(robot: Robot, experiments: Experiments) -> np.ndarray:
+def compute_spring_columns(robot: Robot, experiments: Experiments) -> np.ndarray:
     """Deflection of the end-effector per unit of each spring element: joints first,
     then eight for each link.
 
@@ -136,7 +136,9 @@ def spring_columns(robot: Robot, experiments: Experiments) -> np.ndarray:
     return np.concatenate(columns, axis=-1)
 
 
-def products_of(columns: np.ndarray, deflection: np.ndarray) -> Products:
+def form_normal_equations(
+    columns: np.ndarray, deflection: np.ndarray
+) -> NormalEquations:
     """Normal equations of each data set.
 
     `columns` (sets, configurations, rows, K), `deflection` (sets, configurations,
@@ -145,18 +147,18 @@ def products_of(columns: np.ndarray, deflection: np.ndarray) -> Products:
     left = columns.reshape(len(columns), -1, columns.shape[-1])
     right = deflection.reshape(len(deflection), -1)
     across = left.swapaxes(1, 2)
-    return Products(
+    return NormalEquations(
         across @ left, (across @ right[..., None])[..., 0], (right**2).sum(axis=1)
     )
 
 
-def ladder(parts: list[Products], joints: int, links: int) -> Ladder:
+def build_ladder(parts: list[NormalEquations], joints: int, links: int) -> Ladder:
     """Add link springs one by one, in each data set that which cross-validation likes
     best.
 
     `parts`: of each fold, of shape (sets,).
     """
-    whole = Products(
+    whole = NormalEquations(
         *(
             sum(getattr(part, name) for part in parts)
             for name in ("gram", "along", "squares")
@@ -193,7 +195,9 @@ def ladder(parts: list[Products], joints: int, links: int) -> Ladder:
 
 
 def _cross_validate(
-    parts: list[Products], others: list[tuple[np.ndarray, ...]], columns: np.ndarray
+    parts: list[NormalEquations],
+    others: list[tuple[np.ndarray, ...]],
+    columns: np.ndarray,
 ) -> np.ndarray:
     """Sum of squares left in each fold by the fit to the others, (sets,)."""
     return np.sum(
@@ -231,7 +235,7 @@ def _fit(
     return found
 
 
-def ladder_blocks(
+def evaluate_ladder(
     study: StudyInMemory, lengths: Sequence[int], noises: Sequence[float]
 ) -> Iterator[dict[str, np.ndarray]]:
     """Models with more and more link springs, in each data set of the study of the
@@ -243,16 +247,17 @@ def ladder_blocks(
     """
     robot = study.robot
     tests = study.tests()
-    judged = products_of(
-        spring_columns(robot, tests)[:, :, :3], study.deflections(tests)[..., :3]
+    judged = form_normal_equations(
+        compute_spring_columns(robot, tests)[:, :, :3],
+        study.deflections(tests)[..., :3],
     )
     longest = max(lengths)
     count = len(robot.links)
     for sets in study.blocks():
         drawn = study.experiments(sets, longest)
-        columns = spring_columns(robot, drawn)
+        columns = compute_spring_columns(robot, drawn)
         ideal = study.deflections(drawn)
-        normal = measurement_noise(
+        normal = draw_measurement_noise(
             study.seed, study.key, robot.chain.end_effector.name, sets, longest
         )
         for noise, length in (
@@ -260,12 +265,12 @@ def ladder_blocks(
         ):
             deflection = ideal + noise * normal
             folds = [
-                products_of(
+                form_normal_equations(
                     columns[:, fold:length:FOLDS], deflection[:, fold:length:FOLDS]
                 )
                 for fold in range(FOLDS)
             ]
-            found = ladder(folds, robot.joints, count)
+            found = build_ladder(folds, robot.joints, count)
             errors = np.stack(
                 [
                     judged.squared_error(some)
@@ -283,7 +288,7 @@ def ladder_blocks(
             }
 
 
-def ladder_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+def build_ladder_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """Error of one data set on configurations that it has not seen, by number of link
     springs, or `CHOSEN`.
 
@@ -304,8 +309,8 @@ def ladder_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
                     (robot, noise_um, length, name, rms.value, rms.std_error(), chosen)
                 )
     head = ("robot", "noise_um", "length", "link_springs")
-    return rows_as_frame(rows, (*head, "rms_um", "rms_um_std_error", "chosen_percent"))
+    return make_frame(rows, (*head, "rms_um", "rms_um_std_error", "chosen_percent"))
 
 
-climb_ladder = ask(LADDER, ladder_blocks)
-tabulate_ladder = tabulate(LADDER, ladder_table)
+climb_ladder = define_study_step(LADDER, evaluate_ladder)
+tabulate_ladder = define_table_step(LADDER, build_ladder_table)

@@ -29,7 +29,7 @@ MODELS_AT_A_TIME = 400
 
 
 @dataclass(frozen=True)
-class Judge:
+class ValidationSet:
     """Loaded configurations that no identification has seen, ready to score any
     compliances.
 
@@ -55,21 +55,21 @@ class Judge:
     def mean_square(self, compliance: np.ndarray) -> np.ndarray:
         """Mean squared position error (..., models) over the test configurations, m^2,
         of compliances (..., n, models)."""
-        return mean_square_errors(self.form, compliance - self.reference[:, None])
+        return evaluate_quadratic_form(self.form, compliance - self.reference[:, None])
 
 
-def mean_square_errors(form: np.ndarray, error: np.ndarray) -> np.ndarray:
+def evaluate_quadratic_form(form: np.ndarray, error: np.ndarray) -> np.ndarray:
     """A quadratic form in (error, 1) of errors (..., n, models) of compliances."""
     whole = np.concatenate([error, np.ones_like(error[..., :1, :])], axis=-2)
     return (whole * (form @ whole)).sum(axis=-2)
 
 
-def make_judge(
+def make_validation_set(
     robot: Robot,
     experiments: Experiments,
     true_deflection: np.ndarray,
     wrench_at: str = "end_effector",
-) -> Judge:
+) -> ValidationSet:
     """Score sheet of the reduced model on test configurations.
 
     `robot`: its joint compliances are the reference. `true_deflection` (..., 6): of the
@@ -97,10 +97,10 @@ def make_judge(
         first == second, 1.0, 2.0
     )
     initial = np.linalg.norm(true_deflection[..., :3], axis=-1).ravel()
-    return Judge(robot.compliance, forms, initial)
+    return ValidationSet(robot.compliance, forms, initial)
 
 
-def position_errors(judge: Judge, compliance: np.ndarray) -> np.ndarray:
+def compute_position_errors(judge: ValidationSet, compliance: np.ndarray) -> np.ndarray:
     """End-effector position error (models, tests), m, of models (models, n) at every
     test configuration."""
     error = np.column_stack([compliance - judge.reference, np.ones(len(compliance))])
@@ -109,8 +109,8 @@ def position_errors(judge: Judge, compliance: np.ndarray) -> np.ndarray:
     return np.sqrt(np.maximum(squares, 0.0, out=squares), out=squares)
 
 
-def mean_deviation(
-    judge: Judge, compliance: np.ndarray, test_weights: np.ndarray
+def compute_mean_deviation(
+    judge: ValidationSet, compliance: np.ndarray, test_weights: np.ndarray
 ) -> np.ndarray:
     """Equation 15: position error of models, mean over the test configurations.
 
@@ -121,14 +121,14 @@ def mean_deviation(
     means = np.empty((groups, models))
     size = max(1, MODELS_AT_A_TIME // models)
     for part in (slice(start, start + size) for start in range(0, groups, size)):
-        errors = position_errors(judge, compliance[part].reshape(-1, joints)).reshape(
-            -1, models, test_weights.shape[1]
-        )
+        errors = compute_position_errors(
+            judge, compliance[part].reshape(-1, joints)
+        ).reshape(-1, models, test_weights.shape[1])
         means[part] = (errors @ test_weights[part, :, None])[..., 0]
     return means / test_weights.sum(axis=1, keepdims=True)
 
 
-def relative_stiffness_error(
+def compute_relative_stiffness_error(
     compliance: np.ndarray, true_compliance: np.ndarray
 ) -> np.ndarray:
     """Equation 13, (k - k0) / k0 in percent, with k = 1 / c; of compliances (...,
@@ -136,19 +136,19 @@ def relative_stiffness_error(
     return 100.0 * (true_compliance / compliance - 1.0)
 
 
-def k_sigma(
+def compute_k_sigma(
     compliance: np.ndarray,
     true_compliance: np.ndarray,
     joints: Sequence[int] | slice = slice(None),
 ) -> np.ndarray:
     """Equation 14: sum of the relative stiffness errors in percent over joints, or some
     of them (interpretation R10)."""
-    return relative_stiffness_error(compliance, true_compliance)[..., joints].sum(
-        axis=-1
-    )
+    return compute_relative_stiffness_error(compliance, true_compliance)[
+        ..., joints
+    ].sum(axis=-1)
 
 
-def first_length_below(values: np.ndarray, limit: float) -> np.ndarray:
+def find_first_length_below(values: np.ndarray, limit: float) -> np.ndarray:
     """First data set length at which a metric is at most `limit` in absolute value.
 
     `values` (..., lengths): for the lengths 1, 2, 3 ...; not-a-number counts as above.
@@ -158,14 +158,14 @@ def first_length_below(values: np.ndarray, limit: float) -> np.ndarray:
     return np.where(below.any(axis=-1), below.argmax(axis=-1) + 1.0, np.inf)
 
 
-def length_to_reach(values: np.ndarray, limit: float) -> np.ndarray:
+def extrapolate_length(values: np.ndarray, limit: float) -> np.ndarray:
     """Data set length at which a metric comes down to `limit`, past the longest one if
     need be.
 
     As `first_length_below`; where that is infinite, the metric is continued as a bias
     of second order, which falls as 1 / length.
     """
-    first = first_length_below(values, limit)
+    first = find_first_length_below(values, limit)
     longest = values.shape[-1]
     return np.where(
         np.isfinite(first),

@@ -15,20 +15,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.study.in_memory import ask
+from elastocal.study.in_memory import define_study_step
 from elastocal.study.jobs import (
-    ERROR,
+    DATA_SET,
     LENGTH,
+    MEAN_SQUARE,
     MICRO,
-    SET,
     Job,
-    frames,
-    group,
-    rows_as_frame,
-    table,
+    make_frame,
+    make_group_column,
+    make_schema,
+    read_frames,
     write_csvs,
 )
-from elastocal.study.simulation import bootstrap_weights, prefix_index_columns
+from elastocal.study.simulation import draw_bootstrap_weights, make_prefix_index
 from elastocal.study.strategies import Stage, Strategy
 
 if TYPE_CHECKING:
@@ -41,12 +41,12 @@ if TYPE_CHECKING:
     Frames = Mapping[str, pd.DataFrame]
     PointSets = Mapping[str, Sequence[str]]
 
-BUDGET = table(
+BUDGET = make_schema(
     "budget",
-    group("points", "set of measuring points; a row group holds one"),
-    SET,
+    make_group_column("points", "set of measuring points; a row group holds one"),
+    DATA_SET,
     LENGTH,
-    ERROR,
+    MEAN_SQUARE,
 )
 # A point that is measured twice in a configuration has noise of its own the second
 # time.
@@ -55,7 +55,7 @@ _AGAIN = "/again"
 QUANTILE = 1.96
 
 
-def budget_blocks(
+def evaluate_point_sets(
     study: StudyInMemory, point_sets: PointSets
 ) -> Iterator[dict[str, np.ndarray | str]]:
     """Squared error of each data set at every length.
@@ -94,7 +94,7 @@ def budget_blocks(
                 )
             )
             yield {
-                **prefix_index_columns(sets, len(squares)),
+                **make_prefix_index(sets, len(squares)),
                 "points": label,
                 "mean_square": squares.T.ravel(),
             }
@@ -137,7 +137,9 @@ def mean_of(values: np.ndarray, root: bool = False, factor: float = 1.0) -> Scor
     )
 
 
-def budget_table(found: Frames, point_sets: PointSets, length: int) -> pd.DataFrame:
+def build_budget_table(
+    found: Frames, point_sets: PointSets, length: int
+) -> pd.DataFrame:
     """Error of one data set by set of points: with as many configurations, and with as
     many measurements.
 
@@ -162,10 +164,12 @@ def budget_table(found: Frames, point_sets: PointSets, length: int) -> pd.DataFr
                         )
                     )
     columns = ("robot", "points", "measurements_per_configuration", "configurations")
-    return rows_as_frame(rows, (*columns, "rms_um", "std_error_um"))
+    return make_frame(rows, (*columns, "rms_um", "std_error_um"))
 
 
-def paired_table(found: Frames, point_sets: PointSets, length: int) -> pd.DataFrame:
+def build_paired_table(
+    found: Frames, point_sets: PointSets, length: int
+) -> pd.DataFrame:
     """Sets of points against the first one, at a budget of twice `length` measurements,
     paired by data set.
 
@@ -198,10 +202,10 @@ def paired_table(found: Frames, point_sets: PointSets, length: int) -> pd.DataFr
         "configurations",
         "configurations_against",
     )
-    return rows_as_frame(rows, (*columns, "ratio", "ratio_low", "ratio_high"))
+    return make_frame(rows, (*columns, "ratio", "ratio_low", "ratio_high"))
 
 
-def lengths_table(
+def build_lengths_table(
     found: Frames, point_sets: PointSets, accuracies_um: Sequence[float]
 ) -> pd.DataFrame:
     """How many random configurations bring the error of one data set to a wanted
@@ -241,7 +245,7 @@ def lengths_table(
                     | needed
                     | {"measurements": needed["configurations"] * len(names)}
                 )
-    return rows_as_frame(rows)
+    return make_frame(rows)
 
 
 def _at(frame: pd.DataFrame, points: str, configurations: int) -> pd.DataFrame:
@@ -257,7 +261,7 @@ def _first(lengths: np.ndarray, reached: np.ndarray) -> float:
     return float(lengths[place]) if place < len(lengths) else np.inf
 
 
-def configurations_needed(squares: np.ndarray, accuracy: float) -> np.ndarray:
+def interpolate_configurations(squares: np.ndarray, accuracy: float) -> np.ndarray:
     """Configurations after which the RMS error stays below an accuracy, a real number
     by interpolation of its logarithm.
 
@@ -279,7 +283,7 @@ def configurations_needed(squares: np.ndarray, accuracy: float) -> np.ndarray:
     return np.where(~above.any(axis=-1), 1.0, np.where(reached, between, np.inf))
 
 
-def break_even_table(
+def build_break_even_table(
     found: Frames,
     point_sets: PointSets,
     accuracies_um: Sequence[float],
@@ -306,7 +310,7 @@ def break_even_table(
         }
         for accuracy in accuracies_um:
             needed = {
-                points: configurations_needed(mean, accuracy / MICRO)
+                points: interpolate_configurations(mean, accuracy / MICRO)
                 for points, mean in means.items()
             }
             theirs = needed.pop(against, np.full(1, np.inf))
@@ -340,7 +344,7 @@ def break_even_table(
         "configurations",
         "configurations_against",
     )
-    return rows_as_frame(
+    return make_frame(
         rows, (*columns, "break_even", "break_even_low", "break_even_high")
     )
 
@@ -349,21 +353,21 @@ def tabulate_budget(job: Job) -> None:
     """Of all robots: at an equal budget, paired, and how many configurations each set
     needs."""
     asked = job.params
-    found = frames(job, job.input.budgets, BUDGET)
+    found = read_frames(job, job.input.budgets, BUDGET)
     write_csvs(
         job,
-        budget=budget_table(found, asked.point_sets, asked.length),
-        pairs=paired_table(found, asked.point_sets, asked.length),
-        lengths=lengths_table(found, asked.point_sets, asked.accuracies_um),
+        budget=build_budget_table(found, asked.point_sets, asked.length),
+        pairs=build_paired_table(found, asked.point_sets, asked.length),
+        lengths=build_lengths_table(found, asked.point_sets, asked.accuracies_um),
     )
 
 
 def tabulate_costs(job: Job) -> None:
     """Of all robots."""
     asked = job.params
-    found = frames(job, job.input.budgets, BUDGET)
+    found = read_frames(job, job.input.budgets, BUDGET)
     weights = {
-        robot: bootstrap_weights(
+        robot: draw_bootstrap_weights(
             asked.weights["seed"],
             robot,
             sorted(set(frame.data_set)),
@@ -373,8 +377,10 @@ def tabulate_costs(job: Job) -> None:
     }
     write_csvs(
         job,
-        table=break_even_table(found, asked.point_sets, asked.accuracies_um, weights),
+        table=build_break_even_table(
+            found, asked.point_sets, asked.accuracies_um, weights
+        ),
     )
 
 
-compare_point_sets = ask(BUDGET, budget_blocks)
+compare_point_sets = define_study_step(BUDGET, evaluate_point_sets)

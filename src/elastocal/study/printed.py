@@ -31,20 +31,27 @@ import pandas as pd
 from scipy.special import stdtr
 
 from elastocal.io.data_frames import read_long
-from elastocal.study.evaluation import metrics, repeated
-from elastocal.study.jobs import MICRO, MILLI, Job, frames, read_reference, write_csvs
-from elastocal.study.metrics import length_to_reach
-from elastocal.study.simulation import INITIAL, find_statistics
+from elastocal.study.evaluation import make_metrics_schema, make_repeated_schema
+from elastocal.study.jobs import (
+    MICRO,
+    MILLI,
+    Job,
+    read_frames,
+    read_printed_figures,
+    write_csvs,
+)
+from elastocal.study.metrics import extrapolate_length
+from elastocal.study.simulation import INITIAL, compute_statistics
 from elastocal.study.tables import (
     COMPLIANCE,
-    deviation_ratio,
-    read_replicates,
-    share_compensated,
+    compute_deviation_ratio,
+    compute_share_compensated,
+    read_all_replicates,
 )
 
 # A figure differs from the study where its p value, corrected for all figures, is below
 # this.
-LEVEL = 0.05
+SIGNIFICANCE_LEVEL = 0.05
 # Robot and quantity that the study has a parameter for, chosen to meet it.
 FITTED = ("kuka_extended", "deviation_mean")
 # Last printed digit, by the first letters of a quantity.
@@ -133,11 +140,13 @@ class OurResults:
                 "extended", "share_compensated_percent", strategy="6DoF"
             ), "R11, strategy 6DoF"
         if quantity == "share_compensated_joint_elasticity_only":
-            return *share_compensated(*long, "kuka", "6DoF", *at), "kuka, strategy 6DoF"
+            return *compute_share_compensated(
+                *long, "kuka", "6DoF", *at
+            ), "kuka, strategy 6DoF"
         cells = self.tables["table4"].groupby("robot", sort=True)
         best = [rows.iloc[rows[f"dev_{self.length}_um"].argmin()] for _, rows in cells]
         ratios = [
-            deviation_ratio(*long, each.robot, "6DoF", each.strategy, *at)
+            compute_deviation_ratio(*long, each.robot, "6DoF", each.strategy, *at)
             for each in best
         ]
         return *min(
@@ -145,7 +154,7 @@ class OurResults:
         ), "R8: the best strategy of each robot, the smaller robot ratio"
 
 
-def beside_paper(reference: pd.DataFrame, ours: OurResults) -> pd.DataFrame:
+def compare_figures(reference: pd.DataFrame, ours: OurResults) -> pd.DataFrame:
     """One row for each figure that the paper prints.
 
     `reference`: as printed, with a value; empty strings where a figure belongs to none.
@@ -178,7 +187,7 @@ def beside_paper(reference: pd.DataFrame, ours: OurResults) -> pd.DataFrame:
 
 
 @dataclass(frozen=True)
-class Predicted:
+class StudyScatter:
     """How studies of one size scatter in one figure.
 
     `values` (k,): of each study; lengths as logarithms. `digit`: last printed one: a
@@ -222,7 +231,7 @@ def predict_scatter(
     quantity: str,
     length: int,
     fixed_joints: bool = True,
-) -> Predicted | None:
+) -> StudyScatter | None:
     """How one figure of Table 3 or 4 scatters between studies.
 
     `studies`: robot and the columns of `evaluation.repeated`. `quantity`: c1..,
@@ -253,17 +262,17 @@ def predict_scatter(
             else (column, scale)
         )
         values = scale * rows.loc[rows.length == place, column].to_numpy()
-        return Predicted(values, False, digit) if len(values) > 1 else None
+        return StudyScatter(values, False, digit) if len(values) > 1 else None
     curves = rows.pivot(index="study", columns="length", values=column).to_numpy()
     limit = float(quantity.split("_")[-2]) / scale
     return (
-        Predicted(np.log(length_to_reach(curves, limit)), True, digit)
+        StudyScatter(np.log(extrapolate_length(curves, limit)), True, digit)
         if len(curves) > 1
         else None
     )
 
 
-def holm(p_values: np.ndarray) -> np.ndarray:
+def correct_by_holm(p_values: np.ndarray) -> np.ndarray:
     """p values corrected for their number, ndarray (N,); not a number where there is
     none."""
     order = np.argsort(p_values)[: np.count_nonzero(~np.isnan(p_values))]
@@ -274,7 +283,7 @@ def holm(p_values: np.ndarray) -> np.ndarray:
     return found
 
 
-def comparison_table(
+def build_comparison_table(
     beside: pd.DataFrame,
     studies: pd.DataFrame,
     initial: Mapping[str, pd.DataFrame],
@@ -291,7 +300,7 @@ def comparison_table(
 
     def judged(figure: Any) -> tuple[float, float, float]:
         if figure.table == "2" and figure.robot in initial:
-            statistics = find_statistics(initial[figure.robot])
+            statistics = compute_statistics(initial[figure.robot])
             values = (
                 MILLI
                 * statistics[figure.quantity.removeprefix("deviation_")].to_numpy()
@@ -317,12 +326,14 @@ def comparison_table(
     )
     return beside.join(
         found.assign(
-            p_holm=holm(found.p_value.where(beside.table.isin(["3", "4"])).to_numpy())
+            p_holm=correct_by_holm(
+                found.p_value.where(beside.table.isin(["3", "4"])).to_numpy()
+            )
         )
     )
 
 
-def joint_table(
+def build_joint_table(
     studies: pd.DataFrame, reference: pd.DataFrame, length: int
 ) -> pd.DataFrame:
     """The joint test under both counts of joints in k_sigma (R10).
@@ -355,8 +366,15 @@ def joint_table(
         if not len(paper):
             paper = np.full(1, np.nan)
             others = np.full((1, 1), np.nan)
-        row |= {"differ": int((holm(paper) < LEVEL).sum()), "studies": len(others)}
-        row |= _rank("below", int((paper < LEVEL).sum()), (others < LEVEL).sum(axis=1))
+        row |= {
+            "differ": int((correct_by_holm(paper) < SIGNIFICANCE_LEVEL).sum()),
+            "studies": len(others),
+        }
+        row |= _rank(
+            "below",
+            int((paper < SIGNIFICANCE_LEVEL).sum()),
+            (others < SIGNIFICANCE_LEVEL).sum(axis=1),
+        )
         rows.append(
             row
             | _rank(
@@ -368,7 +386,7 @@ def joint_table(
     return pd.DataFrame(rows)
 
 
-def _judge_by_others(scatter: Predicted) -> list[float]:
+def _judge_by_others(scatter: StudyScatter) -> list[float]:
     """p value of each study by the others."""
     some = scatter.values  # noqa: PD011 (of a dataclass)
     printed = np.exp(some) if scatter.logarithmic else some
@@ -393,19 +411,23 @@ def compare_with_paper(job: Job) -> None:
         name: pd.read_csv(job.input[name])
         for name in ("table1", "table2", "table3", "table4", "extended")
     }
-    long = read_long(job.input.metrics, metrics), read_replicates(job)
+    long = read_long(job.input.metrics, make_metrics_schema), read_all_replicates(job)
     ours = OurResults(tables, *long, job.params.noise_um, job.params.length)
-    write_csvs(job, table=beside_paper(read_reference(job.input.reference), ours))
+    write_csvs(
+        job, table=compare_figures(read_printed_figures(job.input.reference), ours)
+    )
 
 
 def compare_with_studies(job: Job) -> None:
     """Every printed figure among further studies, and all at once."""
     beside = pd.read_csv(job.input.beside, dtype={"table": str})
-    initial = frames(job, job.input.initial, INITIAL)
-    studies = read_long(job.input.studies, repeated)
-    joint = joint_table(studies, read_reference(job.input.reference), job.params.length)
+    initial = read_frames(job, job.input.initial, INITIAL)
+    studies = read_long(job.input.studies, make_repeated_schema)
+    joint = build_joint_table(
+        studies, read_printed_figures(job.input.reference), job.params.length
+    )
     write_csvs(
         job,
-        table=comparison_table(beside, studies, initial, job.params.length),
+        table=build_comparison_table(beside, studies, initial, job.params.length),
         joint=joint,
     )

@@ -34,14 +34,14 @@ from elastocal.mechanics.robot_file import joint_limits
 from elastocal.random_streams import draw
 from elastocal.study.jobs import (
     CONFIGURATION,
-    SET,
+    DATA_SET,
     Job,
-    group,
-    origin,
-    real,
-    robot_of,
-    table,
-    whole,
+    collect_provenance,
+    load_robot,
+    make_group_column,
+    make_integer_column,
+    make_real_column,
+    make_schema,
 )
 
 if TYPE_CHECKING:
@@ -55,57 +55,64 @@ if TYPE_CHECKING:
 # What a step holds in memory at a time.
 SETS_PER_BLOCK = 500
 
-DEFLECTIONS = table(
+DEFLECTIONS = make_schema(
     "deflections",
-    group("point", "measuring point; a row group holds one"),
-    SET,
+    make_group_column("point", "measuring point; a row group holds one"),
+    DATA_SET,
     CONFIGURATION,
     *(
-        real(name, unit, f"{meaning}, loaded against unloaded")
+        make_real_column(name, unit, f"{meaning}, loaded against unloaded")
         for name, unit, meaning in COMPONENTS
     ),
 )
 # All that `to_deflections` looks at.
 DEFLECTION_COLUMNS = ("configuration", *COMPONENT_NAMES)
 
-INITIAL = table(
+INITIAL = make_schema(
     "initial",
-    SET,
-    whole("configurations", "configurations in the data set", 1),
-    real(
+    DATA_SET,
+    make_integer_column("configurations", "configurations in the data set", 1),
+    make_real_column(
         "mean",
         "m",
         "mean over the data set of the end-effector's displacement under load",
         minimum=0,
     ),
-    real("mean_square", "m^2", "mean square of the same", minimum=0),
-    real("maximum", "m", "largest of the same", minimum=0),
+    make_real_column("mean_square", "m^2", "mean square of the same", minimum=0),
+    make_real_column("maximum", "m", "largest of the same", minimum=0),
 )
 
 
 DATA_SETS = "data sets"
 TESTS = "test configurations"
-REPLICATE = whole("replicate", "number of the bootstrap replicate, from 1", 1)
-WEIGHTS = table(
+REPLICATE = make_integer_column(
+    "replicate", "number of the bootstrap replicate, from 1", 1
+)
+WEIGHTS = make_schema(
     "weights",
-    group(
+    make_group_column(
         "members",
         "what counts: data sets or test configurations; a row group holds one",
     ),
-    whole("number", "number of the data set or test configuration, from 0", 0),
+    make_integer_column(
+        "number", "number of the data set or test configuration, from 0", 0
+    ),
     REPLICATE,
-    whole("count", "how often it counts in the replicate", 0),
+    make_integer_column("count", "how often it counts in the replicate", 0),
 )
 
 
-def experiments(joints: int) -> TableSchema:
+def make_experiments_schema(joints: int) -> TableSchema:
     """Configurations and wrenches; one row for each loaded configuration."""
-    angles = [real(f"q{j}", "rad", f"angle of joint {j}") for j in range(1, joints + 1)]
+    angles = [
+        make_real_column(f"q{j}", "rad", f"angle of joint {j}")
+        for j in range(1, joints + 1)
+    ]
     wrench = [
-        real(name, unit, f"{meaning}, at the end-effector")
+        make_real_column(name, unit, f"{meaning}, at the end-effector")
         for name, unit, meaning in WRENCH
     ]
-    return table("experiments", SET, CONFIGURATION, *angles, *wrench)
+    return make_schema("experiments", DATA_SET, CONFIGURATION, *angles, *wrench)
 
 
 @dataclass(frozen=True)
@@ -137,7 +144,7 @@ class Loading:
     direction: tuple[float, ...] | None = None
 
 
-def random_experiments(
+def draw_random_experiments(
     chain: Chain,
     limits: np.ndarray,
     seed: int,
@@ -196,7 +203,7 @@ def random_experiments(
     )
 
 
-def true_deflections(
+def compute_true_deflections(
     robot: Robot, experiments: Experiments, point: MeasuringPoint, wrench_at: str
 ) -> np.ndarray:
     """Deflection of a measuring point: theta from equation 7, then the exact kinematics
@@ -217,7 +224,7 @@ def true_deflections(
     return exact_deflections(chain, unloaded, springs, measured)
 
 
-def measurement_noise(
+def draw_measurement_noise(
     seed: int,
     key: str,
     point_name: str,
@@ -242,13 +249,13 @@ def measurement_noise(
     )
 
 
-def blocks_of_sets(data_sets: int) -> Iterator[range]:
+def split_data_sets(data_sets: int) -> Iterator[range]:
     """Numbers of so many data sets, block by block."""
     for first in range(0, data_sets, SETS_PER_BLOCK):
         yield range(first, min(first + SETS_PER_BLOCK, data_sets))
 
 
-def prefix_index_columns(
+def make_prefix_index(
     sets: Sequence[int] | np.ndarray, lengths: int
 ) -> dict[str, np.ndarray]:
     """Columns that number the rows of a block with one row for each data set and prefix
@@ -259,13 +266,13 @@ def prefix_index_columns(
     }
 
 
-def data_sets(columns: Mapping[str, np.ndarray]) -> np.ndarray:
+def list_data_sets(columns: Mapping[str, np.ndarray]) -> np.ndarray:
     """Numbers of the data sets of a block, (sets,), whose rows stand together."""
     numbers = columns["data_set"]
     return numbers[np.flatnonzero(np.diff(numbers, prepend=-1))]
 
 
-def experiment_columns(
+def pack_experiments(
     sets: Sequence[int] | np.ndarray, experiments: Experiments
 ) -> dict[str, np.ndarray]:
     """Block of the experiments table."""
@@ -277,13 +284,13 @@ def experiment_columns(
     return columns | _component_columns(WRENCH_NAMES, experiments.wrench)
 
 
-def to_experiments(columns: Mapping[str, np.ndarray]) -> Experiments:
+def unpack_experiments(columns: Mapping[str, np.ndarray]) -> Experiments:
     """Experiments of a block."""
     angles = [f"q{j + 1}" for j in range(sum(name[0] == "q" for name in columns))]
     return Experiments(_stacked(columns, angles), _stacked(columns, WRENCH_NAMES))
 
 
-def to_deflections(columns: Mapping[str, np.ndarray]) -> np.ndarray:
+def unpack_deflections(columns: Mapping[str, np.ndarray]) -> np.ndarray:
     """Deflections (sets, configurations, 6) of a block."""
     return _stacked(columns, COMPONENT_NAMES)
 
@@ -310,16 +317,16 @@ def _stacked(columns: Mapping[str, np.ndarray], names: Sequence[str]) -> np.ndar
     )
 
 
-def ideal_blocks(
+def simulate_blocks(
     experiments: Iterable[Mapping[str, np.ndarray]], robot: Robot, wrench_at: str
 ) -> Iterator[dict[str, np.ndarray | str]]:
     """Deflections without noise: of each block of experiments one block for each
     measuring point."""
     for block in experiments:
-        loaded = to_experiments(block)
-        sets = data_sets(block)
+        loaded = unpack_experiments(block)
+        sets = list_data_sets(block)
         for point in robot.chain.points:
-            deflections = true_deflections(robot, loaded, point, wrench_at)
+            deflections = compute_true_deflections(robot, loaded, point, wrench_at)
             numbers = _index_columns(sets, deflections.shape[1])
             yield {
                 "point": point.name,
@@ -328,7 +335,7 @@ def ideal_blocks(
             }
 
 
-def measured_blocks(
+def add_noise_to_blocks(
     ideal_blocks: Iterable[dict[str, np.ndarray]], key: str, seed: int, noise: float
 ) -> Iterator[dict[str, np.ndarray | str]]:
     """Deflections as measured: ideal plus independent normal noise on every component.
@@ -338,8 +345,12 @@ def measured_blocks(
     """
     for block in ideal_blocks:
         point = block["point"][0]
-        normal = measurement_noise(
-            seed, key, point, data_sets(block), int(block["configuration"].max()) + 1
+        normal = draw_measurement_noise(
+            seed,
+            key,
+            point,
+            list_data_sets(block),
+            int(block["configuration"].max()) + 1,
         )
         measured = {
             name: block[name] + noise * normal[..., k].ravel()
@@ -348,7 +359,7 @@ def measured_blocks(
         yield block | measured | {"point": point}
 
 
-def bending(displacement: np.ndarray) -> dict[str, np.ndarray]:
+def summarize_displacements(displacement: np.ndarray) -> dict[str, np.ndarray]:
     """How far each data set of displacements (sets, configurations, 3 or more) bends:
     columns of sizes."""
     size = np.linalg.norm(displacement[..., :3], axis=-1)
@@ -359,7 +370,7 @@ def bending(displacement: np.ndarray) -> dict[str, np.ndarray]:
     }
 
 
-def find_statistics(frame: pd.DataFrame) -> dict[str, pd.Series]:
+def compute_statistics(frame: pd.DataFrame) -> dict[str, pd.Series]:
     """Mean, standard deviation and largest of the deflections of each data set, m, of
     the initial table or that of tubes."""
     return {
@@ -369,7 +380,7 @@ def find_statistics(frame: pd.DataFrame) -> dict[str, pd.Series]:
     }
 
 
-def bootstrap_weights(
+def draw_bootstrap_weights(
     seed: int, key: str, data_sets: Sequence[int] | np.ndarray, replicates: int
 ) -> np.ndarray:
     """How often each data set counts in each replicate: once in replicate 0, Poisson(1)
@@ -394,7 +405,7 @@ def bootstrap_weights(
     return np.vstack([np.ones(len(counts)), counts.T])
 
 
-def weight_blocks(
+def draw_weight_blocks(
     key: str, seed: int, data_sets: int, tests: int, replicates: int
 ) -> Iterator[dict[str, np.ndarray | str]]:
     """How often each data set and each test configuration counts in each bootstrap
@@ -403,9 +414,9 @@ def weight_blocks(
     Yields columns of the weights table: data sets in the blocks of the experiments,
     then all test configurations.
     """
-    for sets in blocks_of_sets(data_sets):
+    for sets in split_data_sets(data_sets):
         yield _weight_columns(
-            DATA_SETS, sets, bootstrap_weights(seed, key, sets, replicates)[1:].T
+            DATA_SETS, sets, draw_bootstrap_weights(seed, key, sets, replicates)[1:].T
         )
     of_tests = draw(
         seed,
@@ -436,9 +447,9 @@ def draw_experiments(job: Job) -> None:
     limits = joint_limits(asked.joint_limits_deg, chain, robot)
     loading = Loading(**asked.loading)
     blocks = (
-        experiment_columns(
+        pack_experiments(
             sets,
-            random_experiments(
+            draw_random_experiments(
                 chain,
                 limits,
                 asked.seed,
@@ -449,11 +460,11 @@ def draw_experiments(job: Job) -> None:
                 asked.configurations,
             ),
         )
-        for sets in blocks_of_sets(asked.data_sets)
+        for sets in split_data_sets(asked.data_sets)
     )
     write_table(
         job.output.experiments,
-        experiments(chain.coordinates),
+        make_experiments_schema(chain.coordinates),
         blocks,
         provenance(asked),
     )
@@ -463,17 +474,17 @@ def draw_weights(job: Job) -> None:
     """Bootstrap weights of one robot, drawn once for all strategies and noise
     levels."""
     asked = job.params
-    drawn = weight_blocks(
+    drawn = draw_weight_blocks(
         job.wildcards.robot, asked.seed, asked.data_sets, asked.tests, asked.replicates
     )
-    write_table(job.output.weights, WEIGHTS, drawn, origin(job))
+    write_table(job.output.weights, WEIGHTS, drawn, collect_provenance(job))
 
 
 def simulate(job: Job) -> None:
     """Deflections of one robot without noise."""
-    robot = robot_of(job)
-    blocks = ideal_blocks(
-        read_blocks(job.input.experiments, experiments(robot.joints)),
+    robot = load_robot(job)
+    blocks = simulate_blocks(
+        read_blocks(job.input.experiments, make_experiments_schema(robot.joints)),
         robot,
         job.params.wrench_at,
     )
@@ -483,7 +494,7 @@ def simulate(job: Job) -> None:
 def measure(job: Job) -> None:
     """Deflections of one robot as measured at one noise level."""
     ideal = read_blocks(job.input.ideal, DEFLECTIONS)
-    blocks = measured_blocks(
+    blocks = add_noise_to_blocks(
         ideal, job.wildcards.robot, job.params.seed, 1e-6 * float(job.wildcards.noise)
     )
     write_table(
@@ -499,11 +510,11 @@ def summarize_initial(job: Job) -> None:
     ideal = read_blocks(job.input.ideal, DEFLECTIONS, point=job.params.end_effector)
     blocks = (
         {
-            "data_set": data_sets(block),
+            "data_set": list_data_sets(block),
             "configurations": np.full(
-                len(data_sets(block)), int(block["configuration"].max()) + 1
+                len(list_data_sets(block)), int(block["configuration"].max()) + 1
             ),
-            **bending(to_deflections(block)),
+            **summarize_displacements(unpack_deflections(block)),
         }
         for block in ideal
     )

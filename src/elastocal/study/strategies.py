@@ -74,7 +74,7 @@ def strategy_from_document(document: Mapping[str, Any]) -> Strategy:
     return Strategy(document["name"], tuple(stages))
 
 
-def drop_forgotten_stages(strategy: Strategy, joints: int) -> Strategy:
+def drop_superseded_stages(strategy: Strategy, joints: int) -> Strategy:
     """What of a strategy equation 11 depends on: a stage that identifies every joint
     forgets those before it."""
     first = max(

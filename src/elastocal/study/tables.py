@@ -17,9 +17,17 @@ import pandas as pd
 
 from elastocal.io.data_frames import read_long
 from elastocal.mechanics.robot_file import robot_from_document
-from elastocal.study.evaluation import REPLICATES, find_length, metrics
-from elastocal.study.jobs import MICRO, MILLI, Job, add_slugs, frames, write_csvs
-from elastocal.study.simulation import INITIAL, bootstrap_weights, find_statistics
+from elastocal.study.evaluation import (
+    REPLICATES,
+    find_length_with_error,
+    make_metrics_schema,
+)
+from elastocal.study.jobs import MICRO, MILLI, Job, add_slugs, read_frames, write_csvs
+from elastocal.study.simulation import (
+    INITIAL,
+    compute_statistics,
+    draw_bootstrap_weights,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -32,7 +40,7 @@ if TYPE_CHECKING:
 COMPLIANCE = "compliance_{}_urad_per_Nm"
 
 
-def table1(robots: Mapping[str, Robot]) -> pd.DataFrame:
+def build_table1(robots: Mapping[str, Robot]) -> pd.DataFrame:
     """Joint compliances that the study takes as true, µrad/(N m)."""
     found = {name: MICRO * robot.compliance for name, robot in robots.items()}
     return pd.DataFrame(
@@ -43,7 +51,7 @@ def table1(robots: Mapping[str, Robot]) -> pd.DataFrame:
     )
 
 
-def table2(
+def build_table2(
     initial: Mapping[str, pd.DataFrame], weights: Mapping[str, np.ndarray]
 ) -> pd.DataFrame:
     """End-effector deviation before calibration, over all configurations of all data
@@ -69,7 +77,7 @@ def table2(
                 f"{name}_std_error": float(np.std(values[1:], ddof=1)),
             }
         row["max_mm"] = MILLI * frame.maximum.max()
-        for name, each in find_statistics(frame).items():
+        for name, each in compute_statistics(frame).items():
             row |= {
                 f"{name}_mm_one_set": MILLI * each.mean(),
                 f"{name}_mm_one_set_std": MILLI * each.std(ddof=1),
@@ -78,7 +86,7 @@ def table2(
     return pd.DataFrame(rows)
 
 
-def table3(
+def build_table3(
     metrics: pd.DataFrame,
     robots: Iterable[str],
     strategy: str,
@@ -104,7 +112,7 @@ def table3(
     return pd.DataFrame(rows)
 
 
-def table4(
+def build_table4(
     metrics: pd.DataFrame,
     replicates: pd.DataFrame,
     robots: Sequence[str],
@@ -155,13 +163,15 @@ def table4(
             curves = drawn.pivot(
                 index="replicate", columns="length", values=name
             ).to_numpy()
-            found = find_length(cell[name].to_numpy(), curves, least / factor)
+            found = find_length_with_error(
+                cell[name].to_numpy(), curves, least / factor
+            )
             row |= dict(zip((reached, f"{reached}_std_error"), found, strict=True))
         rows.append(row)
     return pd.DataFrame(rows)
 
 
-def extended_table(
+def build_extended_table(
     metrics: pd.DataFrame,
     replicates: pd.DataFrame,
     robots: Iterable[str],
@@ -175,7 +185,7 @@ def extended_table(
         at = _row_of(_by_length(metrics, robot, noise_um, strategy), length)
         initial = MILLI * at.initial_deviation, MILLI * at.initial_deviation_std_error
         left = MICRO * at.deviation, MICRO * at.deviation_std_error
-        share = share_compensated(
+        share = compute_share_compensated(
             metrics, replicates, robot, strategy, noise_um, length
         )
         rows.append((strategy, *initial, *left, *share, robot))
@@ -188,7 +198,7 @@ def extended_table(
     return pd.DataFrame(rows, columns=names)
 
 
-def share_compensated(
+def compute_share_compensated(
     metrics: pd.DataFrame,
     replicates: pd.DataFrame,
     robot: str,
@@ -209,7 +219,7 @@ def share_compensated(
     )
 
 
-def deviation_ratio(
+def compute_deviation_ratio(
     metrics: pd.DataFrame,
     replicates: pd.DataFrame,
     robot: str,
@@ -247,7 +257,7 @@ def merge_errors(frame: pd.DataFrame, digits: int = 3) -> pd.DataFrame:
             continue
         errors = frame.get(f"{column}_std_error", pd.Series(np.nan, frame.index))
         shown[column] = [
-            word_value(value, error, digits)
+            format_value(value, error, digits)
             for value, error in zip(frame[column], errors, strict=True)
         ]
     return pd.DataFrame(shown)
@@ -259,10 +269,13 @@ def list_rows(frame: pd.DataFrame) -> list[list[str]]:
     shown = merge_errors(
         frame.loc[:, ~frame.columns.str.contains("_one_set|strategy_file")]
     )
-    return [[column_head(name) for name in shown.columns], *shown.to_numpy().tolist()]
+    return [
+        [format_column_head(name) for name in shown.columns],
+        *shown.to_numpy().tolist(),
+    ]
 
 
-def column_head(name: str) -> str:
+def format_column_head(name: str) -> str:
     """Name of a column or a quantity for people, with its unit.
 
     Returns names that are not of the paper's quantities with blanks.
@@ -285,7 +298,7 @@ _HEADS = (
 )
 
 
-def word_value(value: float | str, error: float, digits: int = 3) -> str:
+def format_value(value: float | str, error: float, digits: int = 3) -> str:
     """A value for people, with two digits of its standard error.
 
     `error`: not a number or zero where there is none. `digits`: significant digits of a
@@ -330,7 +343,7 @@ def tabulate_compliances(job: Job) -> None:
     """Table 1."""
     write_csvs(
         job,
-        table=table1(
+        table=build_table1(
             {
                 name: robot_from_document(document, name)
                 for name, document in job.params.robots.items()
@@ -341,33 +354,37 @@ def tabulate_compliances(job: Job) -> None:
 
 def tabulate_initial(job: Job) -> None:
     """Table 2."""
-    initial = frames(job, job.input.initial, INITIAL)
+    initial = read_frames(job, job.input.initial, INITIAL)
     drawn = job.params.seed, job.params.replicates
     weights = {
-        name: bootstrap_weights(drawn[0], name, frame.data_set.to_numpy(), drawn[1])
+        name: draw_bootstrap_weights(
+            drawn[0], name, frame.data_set.to_numpy(), drawn[1]
+        )
         for name, frame in initial.items()
     }
-    write_csvs(job, table=table2(initial, weights))
+    write_csvs(job, table=build_table2(initial, weights))
 
 
 def tabulate_identified(job: Job) -> None:
     """Table 3."""
     asked = job.params
-    frame = read_long(job.input.metrics, metrics)
+    frame = read_long(job.input.metrics, make_metrics_schema)
     write_csvs(
         job,
-        table=table3(frame, asked.robots, asked.strategy, asked.noise_um, asked.length),
+        table=build_table3(
+            frame, asked.robots, asked.strategy, asked.noise_um, asked.length
+        ),
     )
 
 
 def tabulate_strategies(job: Job) -> None:
     """Table 4."""
     asked = job.params
-    long = (read_long(job.input.metrics, metrics), read_replicates(job))
+    long = (read_long(job.input.metrics, make_metrics_schema), read_all_replicates(job))
     write_csvs(
         job,
         table=add_slugs(
-            table4(*long, asked.robots, [*asked.strategies], **asked.cells),
+            build_table4(*long, asked.robots, [*asked.strategies], **asked.cells),
             asked.strategies,
         ),
     )
@@ -376,15 +393,15 @@ def tabulate_strategies(job: Job) -> None:
 def tabulate_extended(job: Job) -> None:
     """Robots with elastic links."""
     asked = job.params
-    long = (read_long(job.input.metrics, metrics), read_replicates(job))
+    long = (read_long(job.input.metrics, make_metrics_schema), read_all_replicates(job))
     write_csvs(
         job,
-        table=extended_table(
+        table=build_extended_table(
             *long, asked.robots, asked.strategies, asked.noise_um, asked.length
         ),
     )
 
 
-def read_replicates(job: Job) -> pd.DataFrame:
+def read_all_replicates(job: Job) -> pd.DataFrame:
     """Bootstrap replicates of the scores of all strategies."""
     return read_long(job.input.replicates, lambda joints: REPLICATES)

@@ -28,23 +28,23 @@ import numpy as np
 
 from elastocal.application.inverse_kinematics import (
     SOLVED_M,
-    along_path,
     find_beyond_limits,
+    solve_path,
 )
-from elastocal.study.evaluation import REPLICATES, metrics
-from elastocal.study.in_memory import ask
+from elastocal.study.evaluation import REPLICATES, make_metrics_schema
+from elastocal.study.in_memory import define_study_step
 from elastocal.study.jobs import (
+    DATA_SET,
     MICRO,
-    SET,
     STRATEGY,
     Job,
-    frames,
-    real,
-    rows_as_frame,
-    table,
+    make_frame,
+    make_real_column,
+    make_schema,
+    read_frames,
     write_csvs,
 )
-from elastocal.study.metrics import make_judge, position_errors
+from elastocal.study.metrics import compute_position_errors, make_validation_set
 from elastocal.study.points import Score, mean_of
 from elastocal.study.simulation import Experiments
 
@@ -60,31 +60,35 @@ if TYPE_CHECKING:
     # Of each robot by metric and strategy.
     Scores = Mapping[str, Mapping[str, Mapping[str, "Score"]]]
 
-USES = table(
+USES = make_schema(
     "uses",
     STRATEGY,
-    SET,
-    real("mean", "m", "mean end-effector error on test configurations"),
-    real("mean_square", "m^2", "mean square of the same"),
-    real("p95", "m", "95th percentile of the same"),
-    real(
+    DATA_SET,
+    make_real_column("mean", "m", "mean end-effector error on test configurations"),
+    make_real_column("mean_square", "m^2", "mean square of the same"),
+    make_real_column("p95", "m", "95th percentile of the same"),
+    make_real_column(
         "pooled_p95",
         "m",
         "95th percentile over test configurations and data sets, the same in every row",
     ),
-    real(
+    make_real_column(
         "pooled_p95_influence",
         "m",
         "influence of the data set on the pooled percentile",
     ),
-    real("iso_9283", "m", "largest error at the five poses of ISO 9283", missing=True),
-    real(
+    make_real_column(
+        "iso_9283", "m", "largest error at the five poses of ISO 9283", missing=True
+    ),
+    make_real_column(
         "path_mean_square",
         "m^2",
         "mean square error along the milling path",
         missing=True,
     ),
-    real("path_max", "m", "largest error along the milling path", missing=True),
+    make_real_column(
+        "path_max", "m", "largest error along the milling path", missing=True
+    ),
 )
 REFERENCE = "rms_um"
 # What is shown of each, in this order.
@@ -127,7 +131,7 @@ _PATH_POSES = 50
 _DOWN = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 
 
-def iso_9283(
+def make_iso_9283_poses(
     robot: Robot, centre_m: Sequence[float], edge_m: float, weight_N: float
 ) -> Experiments | None:
     """The five poses in the sloped plane of a cube, under a weight.
@@ -145,7 +149,7 @@ def iso_9283(
     )
 
 
-def milling_path(
+def make_milling_path(
     robot: Robot, centre_m: Sequence[float], length_m: float, cutting_N: float
 ) -> Experiments | None:
     """A straight level path across, the cutting force half against the feed and half
@@ -166,7 +170,7 @@ def milling_path(
 def _find_loaded(
     robot: Robot, position: np.ndarray, force: np.ndarray
 ) -> Experiments | None:
-    angles, left = along_path(
+    angles, left = solve_path(
         robot, position, np.broadcast_to(_DOWN, (len(position), 3, 3))
     )
     if (left > SOLVED_M).any() or find_beyond_limits(robot, angles).any():
@@ -174,7 +178,7 @@ def _find_loaded(
     return Experiments(angles[None], np.pad(force, ((0, 0), (0, 3)))[None])
 
 
-def use_blocks(
+def evaluate_uses(
     study: StudyInMemory, strategies: Sequence[Strategy], uses: Mapping[str, Any]
 ) -> Iterator[dict[str, np.ndarray | str]]:
     """Errors of the models of all data sets, strategy by strategy, from all
@@ -185,19 +189,21 @@ def use_blocks(
     """
     robot = study.robot
     at = study.interpretation.wrench_at
-    cube = iso_9283(robot, uses["centre_m"], uses["edge_m"], uses["weight_N"])
-    path = milling_path(robot, uses["centre_m"], uses["path_m"], uses["cutting_N"])
+    cube = make_iso_9283_poses(
+        robot, uses["centre_m"], uses["edge_m"], uses["weight_N"]
+    )
+    path = make_milling_path(robot, uses["centre_m"], uses["path_m"], uses["cutting_N"])
     judges = [
         study.judge(),
         *(
-            use and make_judge(robot, use, study.deflections(use), at)
+            use and make_validation_set(robot, use, study.deflections(use), at)
             for use in (cube, path)
         ),
     ]
     for strategy, blocks in study.estimates(strategies).items():
         models = np.concatenate([block[:, -1] for block in blocks])
         tests, at_cube, on_path = (
-            position_errors(judge, models)
+            compute_position_errors(judge, models)
             if judge
             else np.full((len(models), 1), np.nan)
             for judge in judges
@@ -221,7 +227,7 @@ def use_blocks(
         }
 
 
-def scores(
+def score_strategies(
     uses: pd.DataFrame, metrics: pd.DataFrame, replicates: pd.DataFrame, length: int
 ) -> dict[str, dict[str, Score]]:
     """Scores of one robot's strategies by every metric.
@@ -246,7 +252,7 @@ def scores(
     return found
 
 
-def ranks_table(found: Scores, classical: str) -> pd.DataFrame:
+def build_ranks_table(found: Scores, classical: str) -> pd.DataFrame:
     """Every strategy by every metric, its rank, and its ratio to the classical strategy
     with its 95 % interval.
 
@@ -275,10 +281,10 @@ def ranks_table(found: Scores, classical: str) -> pd.DataFrame:
                     )
                 )
     head = ("robot", "metric", "strategy", "value", "value_std_error")
-    return rows_as_frame(rows, (*head, "ratio", "ratio_low", "ratio_high", "rank"))
+    return make_frame(rows, (*head, "ratio", "ratio_low", "ratio_high", "rank"))
 
 
-def pairs_table(found: Scores) -> pd.DataFrame:
+def build_pairs_table(found: Scores) -> pd.DataFrame:
     """Every two different estimators by every metric and by the RMS error of one data
     set.
 
@@ -315,7 +321,7 @@ def pairs_table(found: Scores) -> pd.DataFrame:
     columns = [
         f"{of}ratio{end}" for of in ("", "rms_") for end in ("", "_low", "_high")
     ]
-    return rows_as_frame(
+    return make_frame(
         rows, ("robot", "metric", "strategy", "other", *columns, "reversed")
     )
 
@@ -341,20 +347,22 @@ def tabulate_uses(job: Job) -> None:
     from elastocal.io.data_frames import read_long
 
     asked = job.params
-    averaged = read_long(job.input.metrics, metrics)
+    averaged = read_long(job.input.metrics, make_metrics_schema)
     drawn = read_long(job.input.replicates, lambda joints: REPLICATES)
     found = {
-        robot: scores(
+        robot: score_strategies(
             frame,
             averaged[averaged.robot == robot],
             drawn[drawn.robot == robot],
             asked.length,
         )
-        for robot, frame in frames(job, job.input.uses, USES).items()
+        for robot, frame in read_frames(job, job.input.uses, USES).items()
     }
     write_csvs(
-        job, scores=ranks_table(found, asked.classical), pairs=pairs_table(found)
+        job,
+        scores=build_ranks_table(found, asked.classical),
+        pairs=build_pairs_table(found),
     )
 
 
-judge_in_use = ask(USES, use_blocks)
+judge_in_use = define_study_step(USES, evaluate_uses)

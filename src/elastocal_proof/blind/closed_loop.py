@@ -20,12 +20,17 @@ import pandas as pd
 from statsmodels.stats.proportion import proportion_confint
 
 from elastocal.application.accuracy import predict_errors
-from elastocal.application.calibrated import calibrate_by_fit, nominal_forward
+from elastocal.application.calibrated import calibrate_by_fit, compute_nominal_poses
 from elastocal.application.compensation import find_joint_targets
-from elastocal.application.frames import ROBOT, Scope, find_absorbed, placement
+from elastocal.application.frames import (
+    ROBOT,
+    Scope,
+    compute_placement_columns,
+    fit_placement,
+)
 from elastocal.campaigns.reading import read_robot
 from elastocal.diagnosis.diagnose import diagnose
-from elastocal.diagnosis.judge import as_delivered, without_gross_errors
+from elastocal.diagnosis.judge import apply_regression, remove_gross_errors
 from elastocal.diagnosis.settings import Settings
 from elastocal.effects.catalogue import declared_candidates
 from elastocal.effects.catalogue import effects as catalogue
@@ -239,7 +244,7 @@ def wanted_poses(robot: Robot, plant: PhysicalRobot, seed: int) -> Wanted:
         * (-np.sqrt(0.5) * along + np.sqrt(0.5) * np.array([0.0, 0.0, 1.0]))
     )
     forces = np.concatenate([np.zeros((_POSES, 3)), force * direction, process])
-    random = (*nominal_forward(robot, shown), shown)
+    random = (*compute_nominal_poses(robot, shown), shown)
     position, rotation, start = (
         np.concatenate(both) for both in zip(random, path, strict=True)
     )
@@ -300,8 +305,8 @@ def closed_loop(
 
 def _corrected(made: Measured, seed: int) -> CalibratedRobot:
     """The robot as the diagnosis corrects it."""
-    part = without_gross_errors(made.found, made.held_out)[1]
-    return calibrated_by(made.found, part, as_delivered(made.found, part, seed))
+    part = remove_gross_errors(made.found, made.held_out)[1]
+    return calibrated_by(made.found, part, apply_regression(made.found, part, seed))
 
 
 def _geometry(case: Case, found: Diagnosis) -> Fit:
@@ -389,7 +394,7 @@ def stated_accuracy(
     )
     if frame != "base":
         over = good & (wanted.part != MILLING)
-        columns = placement(
+        columns = compute_placement_columns(
             Scope(ROBOT, wanted.position[over].mean(axis=0)),
             wanted.position,
             wanted.rotation,
@@ -398,7 +403,7 @@ def stated_accuracy(
         off = (
             field
             - columns
-            @ find_absorbed(
+            @ fit_placement(
                 columns[over], field[over], np.repeat([True, True, False, False], 3)
             )
         )[:, :3, 0]

@@ -15,7 +15,14 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import StrMethodFormatter
 
 from elastocal.campaigns.reading import read_robot
-from elastocal.figures.style import PALETTE, ink_on, note, panels, save, styled
+from elastocal.figures.style import (
+    PALETTE,
+    choose_ink,
+    create_panels,
+    draw_note,
+    save,
+    styled,
+)
 from elastocal.io.origin import Origin
 from elastocal_proof.blind.cases import PROOF, TUNED
 from elastocal_proof.blind.summary import rows_of, with_target
@@ -70,7 +77,7 @@ def rates_and_targets(summary: pd.DataFrame) -> Figure:
         1.05 * _PER_CENT * np.nanmax(aimed[~ratio].high.to_numpy(float), initial=0.0),
     )
     heights = [max(len(part), 1) for part in names]
-    figure, axes = panels(2, 1, 32 + 7.4 * sum(heights), height_ratios=heights)
+    figure, axes = create_panels(2, 1, 32 + 7.4 * sum(heights), height_ratios=heights)
     _dots(axes[0, 0], aimed[~ratio], names[0], lambda value: _PER_CENT * value)
     axes[0, 0].set(
         xlim=(-2, largest),
@@ -152,8 +159,8 @@ def reliability_diagram(reliability: pd.DataFrame) -> Figure:
     stated, and numbers of cases."""
     rows = reliability[reliability.group == _ALL]
     if rows.empty:
-        return note("No verdict of this run states a probability.")
-    figure, axes = panels(2, 1, 118, height_ratios=(3, 1), sharex=True)
+        return draw_note("No verdict of this run states a probability.")
+    figure, axes = create_panels(2, 1, 118, height_ratios=(3, 1), sharex=True)
     shares = axes[0, 0]
     counts = axes[1, 0]
     shares.plot([0, 1], [0, 1], color="black", linewidth=0.8, linestyle=":")
@@ -186,7 +193,7 @@ def power_map(rates: pd.DataFrame) -> Figure:
     oracle that knows the effect."""
     single = rates[rates.group == "single"]
     if single.empty:
-        return note("This run has no case with one effect.")
+        return draw_note("This run has no case with one effect.")
     table = single.set_index(["truth", "level"])
     levels = sorted(single.level.unique())
     at_largest = single[single.level == max(levels)].set_index("truth")["named_right"]
@@ -195,7 +202,7 @@ def power_map(rates: pd.DataFrame) -> Figure:
         key=lambda name: (-at_largest[name], name),
     )
     effects += [_ALL] * (_ALL in set(single.truth))
-    figure, axes = panels(1, len(_PANELS), 34 + 4.6 * len(effects), sharey=True)
+    figure, axes = create_panels(1, len(_PANELS), 34 + 4.6 * len(effects), sharey=True)
     for axis, (column, title) in zip(axes[0], _PANELS.items(), strict=True):
         shares = (
             table[column]
@@ -236,7 +243,7 @@ def _heat(axis: Axes, shares: np.ndarray) -> None:
         aspect="auto",
     )
     for row, column in np.argwhere(np.nan_to_num(shares) >= _LEAST_WRITTEN):
-        ink = ink_on(_SHARES(shares[row, column]))
+        ink = choose_ink(_SHARES(shares[row, column]))
         text = f"{_PER_CENT * shares[row, column]:.0f}"
         axis.text(column, row, text, ha="center", va="center", fontsize=6.5, color=ink)
     axis.tick_params(length=0)
@@ -268,7 +275,7 @@ def closed_loop(table: pd.DataFrame, names: Mapping[str, str]) -> Figure:
     `names`: of the robots, by those of their files.
     """
     robots = [robot for robot in dict.fromkeys(table["robot"]) if robot != "all"]
-    figure, axes = panels(1, len(_PARTS), 62, sharey=True, sharex=True)
+    figure, axes = create_panels(1, len(_PARTS), 62, sharey=True, sharex=True)
     for axis, (part, words) in zip(axes[0], _PARTS.items(), strict=True):
         for number, robot in enumerate(robots):
             mine = (

@@ -15,7 +15,7 @@ from matplotlib.ticker import (
 )
 
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.figures.style import PALETTE, note, panels, save, styled
+from elastocal.figures.style import PALETTE, create_panels, draw_note, save, styled
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.io.origin import Origin
@@ -50,7 +50,7 @@ def league_picture(table: pd.DataFrame, methods: Mapping[str, Method]) -> Figure
     for each data set."""
     names = list(dict.fromkeys(table["data"]))
     splits = [split for split in _SPLITS if split in set(table["split"])]
-    figure, axes = panels(1, len(splits), 30 + 11 * len(names), sharey=True)
+    figure, axes = create_panels(1, len(splits), 30 + 11 * len(names), sharey=True)
     for axis, split in zip(axes[0], splits, strict=True):
         for number, (method, described) in enumerate(methods.items()):
             mine = table[(table["split"] == split) & (table["method"] == method)]
@@ -103,7 +103,7 @@ def mechanism_picture(table: pd.DataFrame) -> Figure:
     strongest = table.groupby("mechanism")["probability"].max()
     kept = [name for name in strongest.index if strongest[name] >= _LEAST_PROBABLE]
     if not kept:
-        return note(
+        return draw_note(
             "No data set shows a mechanism of the catalogue with a probability of one half."
         )
     order = (
@@ -114,7 +114,7 @@ def mechanism_picture(table: pd.DataFrame) -> Figure:
         .index
     )
     names = list(dict.fromkeys(table["data"]))
-    figure, axes = panels(1, 1, 34 + 12 * len(order))
+    figure, axes = create_panels(1, 1, 34 + 12 * len(order))
     axis = axes[0, 0]
     shown = table[table["mechanism"].isin(kept)]
     across = [names.index(name) for name in shown["data"]]

@@ -13,7 +13,7 @@ import numpy as np
 from elastocal.campaigns.campaign import Measurements, columns_of, measurements_from
 from elastocal.campaigns.holdout import blocks_of_poses, configurations, measured_poses
 from elastocal.diagnosis.diagnose import Diagnosis, diagnose
-from elastocal.diagnosis.refit import squares_explained
+from elastocal.diagnosis.model_averaging import compute_explained_squares
 from elastocal.diagnosis.settings import Settings
 from elastocal.errors import InputError
 from elastocal.fitting.least_squares import Fit
@@ -210,12 +210,12 @@ def mechanism_columns(
         best = evidence.conclusion.best
         problem = evidence.linearized.problem
         explained = (
-            squares_explained(problem, evidence.posterior.models[best.model])
+            compute_explained_squares(problem, evidence.posterior.models[best.model])
             if best.named
             else {}
         )
         shares = [
-            explained.get(name, 0.0) / float(problem.statistics.squares[0])
+            explained.get(name, 0.0) / float(problem.statistics.residual_squares[0])
             for name in mechanisms
         ]
     columns: dict[str, np.ndarray | list[str]] = {

@@ -10,7 +10,7 @@ from elastocal.application.planning.cell import (
     COLUMN_SHARE,
     Cell,
     find_allowed,
-    link_points,
+    sample_links,
 )
 from elastocal.campaigns.campaign import Target
 from elastocal.mechanics.kinematics import poses
@@ -48,7 +48,7 @@ def test_a_target_behind_the_arm_is_hidden_and_one_before_it_is_seen(survey, ang
         survey.robot.model_angles(angles),
         survey.robot.chain.end_effector,
     )
-    elbow = link_points(survey.robot, survey.robot.model_angles(angles))[8 * 2]
+    elbow = sample_links(survey.robot, survey.robot.model_angles(angles))[8 * 2]
     out = (target - elbow) / np.linalg.norm(target - elbow, axis=1, keepdims=True)
     for number in np.flatnonzero(np.linalg.norm(target - elbow, axis=1) > 0.4)[::60]:
         behind = Cell((), elbow[number] - 3.0 * out[number], 0.08)
@@ -74,7 +74,7 @@ def test_neither_forearm_nor_target_is_below_the_floor_or_in_the_column(name):
     angles = robot.model_angles(reported)
     at, turned = poses(robot.chain, angles, robot.chain.end_effector)
     tip = at + turned @ [0.0, 0.0, 0.2]
-    forearm = link_points(robot, angles, 2)
+    forearm = sample_links(robot, angles, 2)
     low_ones = (tip[:, 2] < 0.0) | (forearm[..., 2] < 0.0).any(axis=0)
     found = find_allowed(Cell((), None, 0.02, 0.0, column), robot, targets, reported)
     assert (
@@ -92,7 +92,7 @@ def test_neither_forearm_nor_target_is_below_the_floor_or_in_the_column(name):
     assert all(
         each.all() for each in find_allowed(free, robot, targets, reported).values()
     )
-    shoulder = link_points(robot, angles, 1)[0, :, 2]
+    shoulder = sample_links(robot, angles, 1)[0, :, 2]
     inside = (
         (np.linalg.norm(forearm[..., :2], axis=-1) < column)
         & (forearm[..., 2] < shoulder)

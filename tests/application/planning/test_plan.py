@@ -12,12 +12,12 @@ from elastocal.application.planning.plan import (
     REPEATS,
     Candidates,
     accuracy_rows,
+    build_sheet,
     choose_plan,
     find_allowed_candidates,
     information,
     model_of,
     observe,
-    sheet,
 )
 from elastocal.campaigns.campaign import Target
 from elastocal.errors import InputError
@@ -43,7 +43,7 @@ def test_a_plan_is_better_than_random_designs_and_its_first_poses_are_repeated(
     plan = choose_plan(survey, some, 16, 5, 1)
     assert plan.accuracy_m[-1] < np.quantile(plan.random_m[:, -1], 0.5)
     assert (np.diff(plan.accuracy_m) <= 1e-12).all()
-    table = sheet(survey, plan)
+    table = build_sheet(survey, plan)
     assert len(table) == 3 * 21 + 2 * (REPEATS - 1) * REPEATED_POSES
     assert table[["x", "y", "z"]].isna().all().all() and "rx" not in table
     assert set(table.loc[table["repeat"] > 0, "pose"]) == set(

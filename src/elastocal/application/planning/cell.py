@@ -59,7 +59,7 @@ def find_allowed(
     """
     angles = robot.model_angles(reported_angles)
     radius = cell.radius_m
-    links = link_points(robot, angles)
+    links = sample_links(robot, angles)
     found = {
         name: np.ones(len(angles), bool)
         for name in ("boxes", "floor", "column", "sight")
@@ -73,7 +73,7 @@ def find_allowed(
     turning = next(
         (joint for joint, slides in enumerate(robot.chain.prismatic) if not slides), 0
     )
-    arm = link_points(robot, angles, min(turning + 2, robot.joints - 1))
+    arm = sample_links(robot, angles, min(turning + 2, robot.joints - 1))
     if (
         cell.column_m
         and turning + 2 < robot.joints
@@ -98,7 +98,7 @@ def find_allowed(
     return found
 
 
-def link_points(robot: Robot, angles: np.ndarray, joint: int = 0) -> np.ndarray:
+def sample_links(robot: Robot, angles: np.ndarray, joint: int = 0) -> np.ndarray:
     """Points along the links from a joint on, from 0. `angles` (N, n): of the chain,
     rad. Returns (K, N, 3): m, base axes."""
     transforms = robot.chain.transforms

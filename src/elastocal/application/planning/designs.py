@@ -68,7 +68,7 @@ class Criterion:
         return np.trace(np.linalg.solve(inner, across), axis1=1, axis2=2)
 
 
-def criterion(kind: str, accuracy_rows: np.ndarray) -> Criterion:
+def build_criterion(kind: str, accuracy_rows: np.ndarray) -> Criterion:
     """One of `CRITERIA`, over sensitivities (N, 3, P) as by `plan.accuracy_rows`."""
     if kind == "D":
         return Criterion(None)

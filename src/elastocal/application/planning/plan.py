@@ -25,8 +25,8 @@ import pandas as pd
 
 from elastocal.application.calibrated import (
     calibrate_by_model,
-    nominal_forward,
-    pose_sensitivities,
+    compute_nominal_poses,
+    compute_pose_sensitivities,
 )
 from elastocal.application.frames import BASE, ROBOT, Scope, subtract_placement
 from elastocal.application.planning.cell import find_allowed
@@ -245,10 +245,10 @@ def accuracy_rows(
     robot = calibrate_by_model(
         survey.robot, model, estimate, np.zeros((count, count)), noise
     )
-    moved = pose_sensitivities(
+    moved = compute_pose_sensitivities(
         robot, reported_angles, np.hstack([force, np.zeros_like(force)])
     )
-    position, rotation = nominal_forward(survey.robot, reported_angles)
+    position, rotation = compute_nominal_poses(survey.robot, reported_angles)
     there = [
         target
         for target in survey.targets
@@ -463,7 +463,7 @@ def accuracy_curve(
     )
 
 
-def sheet(survey: Survey, plan: Plan) -> pd.DataFrame:
+def build_sheet(survey: Survey, plan: Plan) -> pd.DataFrame:
     """Rows of measurements.csv.
 
     Returns ``pose`` (fitted ones first, from 1), ``load`` (0 without), ``repeat``,
