@@ -15,7 +15,7 @@ from made_errors import KINDS, campaigns_of, true_figures
 from scipy.stats import bootstrap
 
 from elastocal.figures.style import PALETTE, create_panels, styled
-from elastocal.validation.held_out import Errors, intervals
+from elastocal.validation.held_out import PositionErrors, compute_error_intervals
 
 POSES = (9, 18, 36)
 REPLICATES = 999

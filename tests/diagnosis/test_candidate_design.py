@@ -14,8 +14,8 @@ from elastocal.diagnosis.candidate_design import (
     refine_shapes,
 )
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import residuals
+from elastocal.fitting.least_squares import fit_model
+from elastocal.fitting.model import compute_residuals
 
 SETTINGS = Settings()
 KEYS = (

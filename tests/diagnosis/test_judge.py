@@ -8,9 +8,9 @@ import pytest
 
 from elastocal.diagnosis.diagnose import Diagnosis, Step
 from elastocal.diagnosis.judge import generate_residual_blocks, judge
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import joint_compliances
-from elastocal.fitting.noise import Noise, noise_facts
+from elastocal.fitting.least_squares import fit_model
+from elastocal.fitting.model import get_joint_compliances
+from elastocal.fitting.noise import Noise, serialize_noise
 from elastocal.mechanics.elastostatics import generalized_forces
 from elastocal.mechanics.kinematics import poses, poses_and_jacobians
 from elastocal.validation.held_out import METRICS

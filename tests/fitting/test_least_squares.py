@@ -195,7 +195,11 @@ def test_a_fit_to_more_than_it_starts_from_is_that_to_all_of_them(long, monkeypa
     noise = GANTRY_NOISES["joints"]
     model, seen, left, right, sigma = linear_problem(noise, 60)
     expected, covariance = generalized_least_squares(left, right, sigma, PRIORS)
-    for name, count in (("START_SAMPLE_SIZE", 20), ("LARGE_FIT_SIZE", long), ("_STEPPING_STONE", 40)):
+    for name, count in (
+        ("START_SAMPLE_SIZE", 20),
+        ("LARGE_FIT_SIZE", long),
+        ("_STEPPING_STONE", 40),
+    ):
         monkeypatch.setattr(f"elastocal.fitting.least_squares.{name}", count)
     fitted_to = []
     usual = least_squares.fit_robustly

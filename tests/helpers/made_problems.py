@@ -13,7 +13,7 @@ from elastocal.diagnosis.statistics import (
     compute_cross_products,
     compute_statistics,
 )
-from elastocal.fitting.linearization import Factored
+from elastocal.fitting.linearization import FactoredSensitivities
 
 
 @dataclass(frozen=True)

@@ -26,10 +26,10 @@ from elastocal.diagnosis.statistics import (
     compute_statistics,
 )
 from elastocal.errors import InputError
-from elastocal.fitting.linearization import Factored, linearize
-from elastocal.fitting.model import nonlinear_parameters, parameter_values
-from elastocal.fitting.normal_equations import whitening
-from elastocal.fitting.observations import Observations, spread_poses
+from elastocal.fitting.linearization import FactoredSensitivities, linearize
+from elastocal.fitting.model import find_nonlinear_parameters, get_parameter_values
+from elastocal.fitting.normal_equations import compute_whitening
+from elastocal.fitting.observations import Observations, select_spread_poses
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -168,7 +168,7 @@ class CandidateDesign:
             [], white(line.coordinate_jacobian), some.state, len(some.states)
         )
         rows = WhitenedRows(
-            white(line.columns.of_columns(~found).dense()),
+            white(line.columns.select_columns(~found).dense()),
             nothing,
             white(residual),
             white(jacobian),

@@ -442,7 +442,7 @@ def _effect_steps(part: FittedSubset, final: Fit, found: Evidence) -> list[Step]
     """
     model = found.posterior.models[found.conclusion.best.model]
     chosen = [
-        (effect, final.values_of(effect.key)[1])
+        (effect, final.effect_values(effect.key)[1])
         for effect, _ in refit.select_effects(found.linearized, model)
     ]
     explained = model_averaging.compute_explained_squares(

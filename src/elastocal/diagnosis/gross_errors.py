@@ -22,16 +22,20 @@ from scipy.special import chdtri, fdtri, gammaincinv
 
 from elastocal.counting import counted
 from elastocal.effects.conditions import at_states
-from elastocal.fitting.linearization import by_coordinates, linearize
-from elastocal.fitting.model import conditions, parameters, residuals
+from elastocal.fitting.linearization import linearize, linearize_coordinates
+from elastocal.fitting.model import (
+    compute_residuals,
+    evaluate_conditions,
+    list_parameters,
+)
 from elastocal.fitting.noise import Noise
-from elastocal.fitting.normal_equations import measurement_covariances
+from elastocal.fitting.normal_equations import compute_measurement_covariances
 from elastocal.fitting.observations import (
     Observations,
-    parts_of,
+    select_spread_poses,
     select_states,
-    single_observations,
-    spread_poses,
+    separate_measurements,
+    split_into_blocks,
 )
 
 if TYPE_CHECKING:

@@ -185,7 +185,7 @@ def remove_gross_errors(
     if data_at_fault(diagnosis.document):
         return errors, part, poses
     settings = Settings()
-    noise = noise_from(diagnosis.document).of_measurements
+    noise = noise_from(diagnosis.document).without_pose_error
     yardstick = estimate_prediction_uncertainty(
         final, noise, diagnosis.case.campaign.measurements
     )

@@ -25,10 +25,10 @@ from elastocal.diagnosis.search import (
     ScoredModel,
     SearchProblem,
 )
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import parameter_values
-from elastocal.fitting.noise import with_prior
-from elastocal.fitting.normal_equations import whitening
+from elastocal.fitting.least_squares import fit_model
+from elastocal.fitting.model import get_parameter_values
+from elastocal.fitting.noise import set_prior_std
+from elastocal.fitting.normal_equations import compute_whitening
 
 if TYPE_CHECKING:
     from elastocal.diagnosis.candidate_design import CandidateDesign

@@ -16,7 +16,7 @@ from elastocal.effects.catalogue import effects
 from elastocal.effects.conditions import conditions_of
 from elastocal.effects.protocol import Candidate
 from elastocal.figures.style import PALETTE, create_panels, styled
-from elastocal.fitting.model import displaced_by
+from elastocal.fitting.model import sum_displacements
 from elastocal.fitting.observations import States
 from elastocal.mechanics.kinematics import poses
 from elastocal.mechanics.robot import Robot
