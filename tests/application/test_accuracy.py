@@ -203,7 +203,9 @@ def campaign(kuka, tmp_path_factory, config_folder):
 
 
 def judged(calibrated, final, case, held_out):
-    residual = position_residuals(*placed(final, case, held_out), held_out.observations)
+    residual = compute_position_residuals(
+        *transfer_fit(final, case, held_out), held_out.observations
+    )
     return inflate_to_held_out_errors(
         calibrated, held_out, residual, final.noise.position_m
     )

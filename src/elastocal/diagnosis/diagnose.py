@@ -142,7 +142,9 @@ def diagnose(
         # The model found looks at all rows once more, without these, before another
         # search is made.
         some = sample_for_search(case, case.select(remaining), settings)
-        about = fit(about.model, some, about.noise, about.estimate, True, ON_THE_WAY)
+        about = fit_model(
+            about.model, some, about.noise, about.estimate, True, INTERMEDIATE_TOLERANCE
+        )
         errors = find_gross_errors(about, part.noise, measurements, remaining, settings)
         good |= ~remaining & ~errors.gross
         last = part
@@ -188,8 +190,11 @@ def diagnose(
     case = part.case
     noise = part.noise
     declared = part.fit_to_all(part.declared)
-    bare = fit(
-        replace(case.model, effects=()), case.observations, noise, settled=ON_THE_WAY
+    bare = fit_model(
+        replace(case.model, effects=()),
+        case.observations,
+        noise,
+        tolerance=INTERMEDIATE_TOLERANCE,
     )
     steps = [
         Step("frames and targets", "frames", bare),
@@ -426,7 +431,9 @@ def _explained(
             most_pose_error_rad = settings.pose_repeatability_rad
             if large:
                 noise = refit.limit_pose_error(about, searched, most_pose_error_rad)
-                about = fit(about.model, searched, noise, about.estimate, True, enough)
+                about = fit_model(
+                    about.model, searched, noise, about.estimate, True, enough
+                )
         before = named
         if round_number + 1 < settings.linearizations:
             # The next problem takes the room of this one.

@@ -68,7 +68,7 @@ class FittedSubset:
                 found.noise,
                 found.estimate,
                 reweight_first_step=True,
-                settled=settled,
+                tolerance=settled,
             )
         return (
             found

@@ -185,11 +185,11 @@ def remove_gross_errors(
     if data_at_fault(diagnosis.document):
         return errors, part, poses
     settings = Settings()
-    noise = noise_from(diagnosis.document).without_pose_error
+    noise = parse_noise(diagnosis.document).without_pose_error
     yardstick = estimate_prediction_uncertainty(
         final, noise, diagnosis.case.campaign.measurements
     )
-    outside = poses[state_clusters(measurements)]
+    outside = poses[index_poses(measurements)]
     for _ in range(settings.gross_error_rounds):
         # Frames of another campaign are fitted to what is kept of it.
         there = transfer_fit(final, diagnosis.case, part)

@@ -155,7 +155,7 @@ class CrossProducts:
                 if poses <= step
                 else self.basis_and_residual[seen]
             )
-            groups = groups_by_size(part.pose)
+            groups = batch_groups_by_size(part.pose)
             jacobian = np.empty((*part.jacobian.shape[:2], axes))
             found = np.empty((min(step, poses - start), axes, width))
             values = np.empty((min(step, poses - start), axes))

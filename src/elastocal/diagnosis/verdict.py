@@ -523,8 +523,8 @@ def parameter_entries(
             ),
             "unit": parameter.unit,
             "prior_std": getattr(parameter, "prior_std", None),
-            "held": bool(final.held[index]),
-            "identifiable": not final.held[index]
+            "held": bool(final.unidentifiable[index]),
+            "identifiable": not final.unidentifiable[index]
             and (member.key, parameter.name) not in averages.prior_dominated,
         }
         # Where a shape has no slope, such as the row of a step, a search has chosen it.

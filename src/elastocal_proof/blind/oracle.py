@@ -104,7 +104,7 @@ def oracle(
     )
     fitted, members, variants = _with_effects(declared, case, effects)
     p_value = min(variants * _wald(fitted, members), 1.0)
-    outside = outside_poses(fitted, case, unseen)
+    outside = find_extrapolated_poses(fitted, case, unseen)
     _, heldout, _ = compare_held_out_errors(
         [Step("oracle", "declared", fitted)], case, unseen, outside, seed
     )
