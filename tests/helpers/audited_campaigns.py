@@ -5,6 +5,7 @@ from analysed_robots import ROBOTS
 from made_audits import CONFIGURATION
 
 from elastocal.campaigns.campaign import columns_of
+from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import generate_residual_blocks
 from elastocal.diagnosis.settings import Settings
@@ -49,7 +50,7 @@ def diagnosed_campaign(top, robot, effects=(), **design):
     reports = top / "reports/loop/cell"
     results.mkdir(parents=True)
     reports.mkdir(parents=True)
-    descriptions, *parts = load_campaign(top / "cell", ROBOTS)
+    descriptions, *parts = load_campaign(read_campaign_folder(top / "cell", ROBOTS))
     for name, part in zip(("training", "held_out"), parts, strict=True):
         write_table(
             results / f"{name}.parquet",

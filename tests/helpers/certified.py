@@ -9,7 +9,7 @@ from analysed_robots import ROBOTS, analysed
 from loop_scripts import ANALYSIS, run_loop
 from made_folders import PLAN, made_folder, made_table
 
-from elastocal.campaigns.reading import campaign_files
+from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.io.origin import Origin, environment
 from elastocal.io.records import JobRecord, input_digests, write_records
 
@@ -55,7 +55,7 @@ def certified_checkout(top, name="made", offset=3e-4, made=None):
         shutil.move(out / file, reports / file)
     (reports / REPORT).write_text("A report.\n", encoding="utf-8")
     with contextlib.chdir(top):
-        record_jobs(name, campaign_files(folder, ROBOTS))
+        record_jobs(name, read_campaign_folder(folder, ROBOTS).files())
     return folder
 
 

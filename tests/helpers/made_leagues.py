@@ -5,6 +5,7 @@ import pandas as pd
 from made_remainders import smoothly_wrong_folder
 
 from elastocal.campaigns.campaign import columns_of
+from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.loop.loading import described_campaign
 from elastocal_proof.league.methods import DataSet, dealt
 
@@ -17,7 +18,9 @@ def made_data_set(folder, robot, robots_folder, poses=24, **changes):
         "declared": ["joint_offset"],
     } | changes
     smoothly_wrong_folder(folder, robot, poses=poses, **changes)
-    descriptions, campaign = described_campaign(folder, robots_folder)
+    descriptions, campaign = described_campaign(
+        read_campaign_folder(folder, robots_folder)
+    )
     seen = campaign.measurements
     return DataSet(
         descriptions, columns_of(seen), dealt(seen, 4, np.random.default_rng(1))

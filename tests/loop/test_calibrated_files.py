@@ -182,9 +182,7 @@ def test_a_certificate_passes_below_and_fails_above_what_is_predicted_if_enough_
         | {"heldout": found.verdict["heldout"] | {"configurations": judged}},
     )
     tolerance_m = share * found.verdict["accuracy"]["rms_m"]
-    conformity = certificate(checkout / "made", ROBOTS, found, tolerance_m, 0.05)[
-        "conformity"
-    ]
+    conformity = certificate(found, tolerance_m, 0.05)["conformity"]
     assert conformity["decision"] == decision
     assert [
         line.startswith("too few: 3 configurations")

@@ -3,6 +3,7 @@
 import yaml
 from made_folders import made_folder
 
+from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.loop.loading import load_campaign
 
 
@@ -14,7 +15,7 @@ def test_descriptions_hold_what_a_campaign_may_leave_out(kuka, config_folder, tm
         document.pop(key, None)
     path.write_text(yaml.safe_dump(document), encoding="utf-8")
     descriptions, _, held_out = load_campaign(
-        folder.as_posix(), config_folder / "robots"
+        read_campaign_folder(folder.as_posix(), config_folder / "robots")
     )
     said = descriptions["campaign"]
     assert (said["declared"], said["compliance"], said["holdout"]) == (

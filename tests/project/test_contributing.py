@@ -11,6 +11,7 @@ import pytest
 from support import refused
 from synthetic import displacements, made_states
 
+from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.importers import importer
 from elastocal.campaigns.reading import read_campaign, read_robot
 from elastocal.effects import catalogue
@@ -112,7 +113,8 @@ def test_the_importer_makes_a_campaign_and_refuses_a_file_of_another_kind(
         "\n".join(["J1;J2;J3;J4;J5;J6;X;Y;Z", *rows]) + "\n", encoding="utf-8"
     )
     mine.write_campaign([path], tmp_path / "mine", robots, "mine")
-    measurements = read_campaign(tmp_path / "mine", robots).measurements
+    folder = read_campaign_folder(tmp_path / "mine", robots)
+    measurements = read_campaign(folder).measurements
     np.testing.assert_allclose(np.degrees(measurements.joint_angles), angles, atol=1e-9)
     np.testing.assert_allclose(1e3 * measurements.position, positions, atol=1e-9)
     path.write_text("J1;J2\n1;2\n", encoding="utf-8")

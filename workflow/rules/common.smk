@@ -14,7 +14,6 @@ from snakemake.io import _IOFile
 from snakemake.iocontainers import Wildcards
 
 from elastocal.campaigns.importers import campaign_sources, importer, named_league, user_campaign
-from elastocal.campaigns.reading import campaign_files
 from elastocal.errors import InputError
 from elastocal.io.origin import SOURCES_DIGEST, Origin, configuration_sha256, environment
 from elastocal.io.records import checksum
@@ -87,7 +86,7 @@ try:
         " with --config ".join(["config.yaml", *(entry.partition("=")[0] for entry in CHANGES)]),
     )
     SOURCES = campaign_sources(config, CONFIG)
-    # Name and folder of the user's own campaign, if there is one.
+    # The user's own campaign by its name, if there is one.
     OWN = user_campaign(config, f"{CONFIG}/robots", "results/loop")
     # Not of the jobs of this run, and not where nothing is written.
     if workflow.is_main_process and not workflow.dryrun:
@@ -312,7 +311,7 @@ def all_cells(robots):
 
 
 def folder_of(campaign):
-    return OWN[campaign] if campaign in OWN else f"data/campaigns/{campaign}"
+    return OWN[campaign].path.as_posix() if campaign in OWN else f"data/campaigns/{campaign}"
 
 
 def files_of(wildcards):
@@ -322,7 +321,7 @@ def files_of(wildcards):
 def files_of_campaign(campaign):
     """Files that a campaign is read from, those of the campaign that holds its test included."""
     if campaign in OWN:
-        return campaign_files(OWN[campaign], f"{CONFIG}/robots")
+        return OWN[campaign].files()
     source = SOURCES[campaign]
     # Who reads the test looks whether the campaign is there that tests this one in turn; two may test each other.
     names = [campaign]

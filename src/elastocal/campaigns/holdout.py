@@ -4,19 +4,16 @@ space: blocks, repeats, range."""
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from elastocal.campaigns.campaign import (
-    DOCUMENT,
     Campaign,
     Measurements,
     groups_of,
     means_of,
 )
-from elastocal.campaigns.measurements import is_file_in
 from elastocal.counting import counted
 from elastocal.errors import InputError
 
@@ -31,7 +28,7 @@ def split(campaign: Campaign) -> tuple[Measurements, Measurements]:
 
     Returns `training`, `held_out`: in the order of the file, on which the choice of
     poses does not depend. Where another campaign is the test, see
-    `reading.held_out_campaign`, all measurements are training.
+    `reading.read_held_out_campaign`, all measurements are training.
     """
     held_out = held_out_mask(
         campaign.holdout,
@@ -42,20 +39,6 @@ def split(campaign: Campaign) -> tuple[Measurements, Measurements]:
     return campaign.measurements.select(~held_out), campaign.measurements.select(
         held_out
     )
-
-
-def other_folder(named: str, folder: Path, source: str) -> Path:
-    """Folder of the campaign that tests the one in `folder`, beside or below it, as
-    ``holdout.campaign`` names it."""
-    other = folder / named
-    allowed = f"a folder beside this one with a {DOCUMENT}, such as ../other"
-    if not is_file_in(other / DOCUMENT, folder.resolve().parent):
-        raise InputError(source, "holdout.campaign", repr(named), allowed)
-    if other.samefile(folder):
-        raise InputError(
-            source, "holdout.campaign", f"{named!r}, the campaign itself", allowed
-        )
-    return other
 
 
 def held_out_mask(

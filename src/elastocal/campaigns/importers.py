@@ -21,9 +21,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy
 
-from elastocal.campaigns.campaign import DOCUMENT
+from elastocal.campaigns.campaign_folder import CampaignFolder, read_campaign_folder
 from elastocal.campaigns.holdout import number_alike
-from elastocal.campaigns.reading import campaign_files, read_descriptions, read_robot
+from elastocal.campaigns.reading import read_robot
 from elastocal.campaigns.writing import write_campaign
 from elastocal.errors import InputError
 from elastocal.io.documents import (
@@ -396,49 +396,53 @@ def named_league(config: Mapping[str, Any]) -> list[str]:
 
 def user_campaign(
     config: Mapping[str, Any], robots_folder: str | Path, results: str | Path
-) -> dict[str, str]:
-    """Folder of a user's own campaign by its name, spelled in one way however it was
-    given; empty where there is none.
+) -> dict[str, CampaignFolder]:
+    """Return the user's own campaign by its name; empty if the configuration has none.
 
-    `config`: ``campaign`` is its folder. `results`: of each campaign by its name. An
-    `InputError` refuses faults of its documents, and a name that a campaign of this
-    project has, or another one whose results are there.
+    The path of the folder is spelled in one way, however the user spelled it.
+
+    Parameters
+    ----------
+    config : configuration; ``campaign`` is the user's folder.
+    robots_folder : folder with the robot files that a campaign may name.
+    results : folder with the results of each campaign in a folder of its name.
+
+    Raises
+    ------
+    InputError
+        If a document of the campaign is faulty, or if its name belongs to a campaign of
+        this project or to another folder whose results are there.
     """
     if not config.get("campaign"):
         return {}
-    # Snakemake takes a folder that is called 2026 for a number, and another spelling of
-    # one folder for another one.
-    place = Path(str(config["campaign"])).resolve()
-    here = Path.cwd()
-    folder = (
-        place.relative_to(here) if place.is_relative_to(here) else place
-    ).as_posix()
-    for path in campaign_files(folder, robots_folder):
-        if set(path) & set("{}"):
-            raise InputError(
-                path,
-                "",
-                "braces",
-                "a path without braces, which Snakemake takes for wildcards",
-            )
-    document, _ = read_descriptions(folder, robots_folder)
-    name = document["campaign"]
-    source = f"{folder}/{DOCUMENT}"
+    # YAML reads a folder named 2026 as a number.
+    path = Path(str(config["campaign"])).resolve()
+    # Snakemake would take another spelling of the same folder for another folder.
+    if path.is_relative_to(Path.cwd()):
+        path = path.relative_to(Path.cwd())
+    folder = read_campaign_folder(path, robots_folder)
+    for file in folder.files():
+        if set(file) & set("{}"):
+            allowed = "a path without braces, which Snakemake takes for wildcards"
+            raise InputError(file, "", "braces", allowed)
+    name = folder.name
     if name in named_campaigns(config):
-        raise InputError(
-            source, "campaign", repr(name), "a name that no campaign of config.yaml has"
-        )
-    try:
-        earlier = Path(read_json(Path(results, name, "campaign.json"))["source"]).parent
-    except (OSError, ValueError, KeyError, TypeError):
-        # No results, or such as do not say of what they are.
-        earlier = None
-    if earlier is not None and earlier.is_dir() and not earlier.samefile(folder):
-        found = f"{name!r}, whose results are of {earlier.as_posix()}"
-        raise InputError(
-            source,
-            "campaign",
-            found,
-            f"another name, or first take away {Path(results, name).as_posix()}",
-        )
+        allowed = "a name that no campaign of config.yaml has"
+        raise InputError(folder.source, "campaign", repr(name), allowed)
+    earlier_path = _folder_of_results(Path(results, name))
+    if earlier_path is not None and not earlier_path.samefile(path):
+        found = f"{name!r}, whose results are of {earlier_path.as_posix()}"
+        allowed = f"another name, or first take away {Path(results, name).as_posix()}"
+        raise InputError(folder.source, "campaign", found, allowed)
     return {name: folder}
+
+
+def _folder_of_results(results: Path) -> Path | None:
+    """Return the campaign's folder whose results lie in a folder; None if there are no
+    results, if they do not name it, or if it no longer exists."""
+    try:
+        source = read_json(results / "campaign.json")["source"]
+        folder = Path(source).parent
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return folder if folder.is_dir() else None

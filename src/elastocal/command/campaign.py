@@ -174,9 +174,9 @@ def diagnose(
                 print_lines([line], console)
     # Where there is nothing to do, Snakemake prints no outcome.
     if current and not run.returncode:
-        from elastocal.campaigns.reading import read_descriptions
+        from elastocal.campaigns.campaign_folder import read_campaign_folder
         from elastocal.report.outcome import outcome
 
-        name = read_descriptions(folder, robots())[0]["campaign"]
+        name = read_campaign_folder(folder, robots()).name
         print_lines(outcome([f"reports/loop/{name}/report.pdf"], place), console)
     raise typer.Exit(run.returncode)

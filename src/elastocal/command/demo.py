@@ -51,8 +51,9 @@ def demo(
     from rich.console import Console
 
     from elastocal.application.frames import root_mean_square
+    from elastocal.campaigns.campaign_folder import read_campaign_folder
     from elastocal.campaigns.measurements import CSV
-    from elastocal.campaigns.reading import read_descriptions, read_robot
+    from elastocal.campaigns.reading import read_robot
     from elastocal_proof.blind.rehearsal import (
         fill_sheet,
         hidden_robot,
@@ -79,7 +80,7 @@ def demo(
 
     run("plan", file, "--folder", folder, *_PLAN.split())
     count = fill_sheet(
-        folder / CSV, read_descriptions(folder, robots())[0], robot, seed
+        folder / CSV, read_campaign_folder(folder, robots()).document, robot, seed
     )
     print_lines(
         [

@@ -198,8 +198,9 @@ def csv(
     from rich.console import Console
 
     from elastocal.campaigns.campaign import DOCUMENT
+    from elastocal.campaigns.campaign_folder import read_campaign_folder
     from elastocal.campaigns.measurements import CSV, PARQUET, write_measurements
-    from elastocal.campaigns.reading import read_descriptions, read_robot
+    from elastocal.campaigns.reading import read_robot
     from elastocal.exchange.measurement_table import (
         ImportOptions,
         read_measurement_table,
@@ -247,9 +248,9 @@ def csv(
     )
     known: set[str] = set()
     if (folder / DOCUMENT).is_file():
-        document, there = read_descriptions(folder, robots())
-        robot = robot or there
-        known = {*document["targets"]}
+        campaign = read_campaign_folder(folder, robots())
+        robot = robot or campaign.robot_file
+        known = {*campaign.document["targets"]}
     found = read_measurement_table(
         file, options, None if robot is None else read_robot(robot)
     )

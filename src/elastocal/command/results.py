@@ -16,7 +16,6 @@ from elastocal.command.terminal import (
     length_m,
     load_diagnosed_campaign,
     print_answer,
-    robots,
     workplace,
 )
 from elastocal.counting import counted, first_names, grouped
@@ -346,7 +345,7 @@ def certificate(
             "a campaign whose data are in order; its report says what is wrong",
         )
     with console.status("working"):
-        document = certified(folder, robots(), found, limit, risk)
+        document = certified(found, limit, risk)
         facts = certificate_facts(document)
         with (
             tempfile.TemporaryDirectory() as scratch,

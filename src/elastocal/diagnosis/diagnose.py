@@ -3,14 +3,13 @@ ones, once, at the end."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from elastocal.counting import counted
-from elastocal.data_checks.faults import compliance_warnings, faults
-from elastocal.data_checks.protocol import Fault
+from elastocal.data_checks.faults import faults
 from elastocal.diagnosis import model_averaging, refit, verdict
 from elastocal.diagnosis.candidate_design import build_candidate_design, refine_shapes
 from elastocal.diagnosis.centre_prior import choose_centre_prior
@@ -24,18 +23,14 @@ from elastocal.diagnosis.gross_errors import (
     OutlierTest,
     describe_gross_errors,
     find_gross_errors,
-    format_gross_error_warnings,
 )
 from elastocal.diagnosis.search import run_alarm_test, screen_terms, search_models
+from elastocal.diagnosis.training_verdict import TrainingResult, state_training_verdict
 from elastocal.diagnosis.verdict import Evidence
 from elastocal.effects.catalogue import effects
-from elastocal.fitting.least_squares import (
-    CONVERGENCE_TOLERANCE,
-    INTERMEDIATE_TOLERANCE,
-    fit_model,
-)
-from elastocal.fitting.model import Case, get_joint_compliances, get_parameter_values
-from elastocal.fitting.noise import count_effective_parameters, serialize_noise
+from elastocal.fitting.least_squares import ON_THE_WAY, SETTLED, fit
+from elastocal.fitting.model import Case, parameter_values
+from elastocal.fitting.noise import effective_parameters, noise_facts
 from elastocal.fitting.observations import Observations
 from elastocal.random_streams import stream
 from elastocal.remainder.repeatable import Repeatable, repeatable_part
@@ -47,7 +42,6 @@ if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Measurements
     from elastocal.diagnosis.settings import Settings
     from elastocal.fitting.least_squares import Fit
-    from elastocal.fitting.noise import Noise
 
 # Mechanisms that are added one at a time, each by a fit; of more, only the first.
 _MOST_STEPS = 4
@@ -275,14 +269,21 @@ def diagnose(
                 kept.noise, found.linearized.pose_std_error_rad
             )
         )
-    left_out = describe_gross_errors(errors, whole, held_out=False)
-    document = _document(case, noise, steps, final, found, known, settings, warnings)
-    document |= {
-        "contradictions": contradicting,
-        "gross_errors": left_out,
-        "repeatable": repeatable and asdict(repeatable),
-    }
-    document["warnings"] += format_gross_error_warnings(left_out)
+    document = state_training_verdict(
+        TrainingResult(
+            case=case,
+            noise=noise,
+            steps=tuple(steps),
+            full_model=final,
+            evidence=found,
+            faults=known,
+            warnings=tuple(warnings),
+            contradictions=tuple(contradicting),
+            repeatable=repeatable,
+            gross_errors=tuple(describe_gross_errors(errors, whole, held_out=False)),
+        ),
+        settings,
+    )
     return Diagnosis(
         case, tuple(steps), found, document, whole.measurements.select(errors.gross)
     )
@@ -478,146 +479,3 @@ def _effect_steps(part: FittedSubset, final: Fit, found: Evidence) -> list[Step]
         )
         steps.insert(0, Step(f"with {alone[number - 1]}", "effect", fitted))
     return steps
-
-
-def _document(
-    case: Case,
-    noise: Noise,
-    steps: Sequence[Step],
-    with_effects: Fit,
-    found: Evidence | None,
-    known: Sequence[Fault],
-    settings: Settings,
-    warnings: Sequence[str],
-) -> dict[str, Any]:
-    declared = steps[1].fitted
-    final = steps[-1].fitted
-    springs = model_averaging.ModelAverage({}, {})
-    tested = set[str]()
-    stated: dict[str, Any] = {
-        "verdict": verdict.NAMED if len(known) == 1 else verdict.SEVERAL,
-        "effects": [verdict.fault_entry(fault) for fault in known],
-    } | dict.fromkeys(("probabilities", "misfit", "other_models_m"))
-    untestable: dict[str, str] = {}
-    remarks = [*warnings]
-    if found:
-        problem = found.linearized.problem
-        conclusion = found.conclusion
-        models = found.posterior.models
-        nothing = found.posterior.empty_model
-        best = models[conclusion.best.model] if conclusion.best.mechanisms else nothing
-        chosen = best if conclusion.best.named else nothing
-        kept = chosen if found.adopted else nothing
-        owners = [(owner, parameter.name) for owner, parameter in declared.parameters]
-        averages = model_averaging.average_models(
-            found.linearized, found.posterior, chosen, owners
-        )
-        springs = (
-            averages
-            if kept is chosen
-            else model_averaging.average_models(
-                found.linearized, found.posterior, nothing, owners
-            )
-        )
-        entries = verdict.effect_entries(
-            found, with_effects, averages, case.observations
-        )
-        untestable = found.linearized.untestable
-        other = model_averaging.compute_between_model_squares(
-            problem, found.posterior, kept
-        )
-        tested = {unit.candidate.key for unit in problem.terms if unit.candidate}
-        stated = {
-            "verdict": conclusion.verdict,
-            "effects": entries,
-            "probabilities": verdict.probability_facts(found),
-            "misfit": {
-                "before": refit.predict_reduced_chi_square(problem, nothing),
-                "after": refit.predict_reduced_chi_square(problem, best),
-            },
-            # Root mean square by which positions may be elsewhere by other models than
-            # the one that is kept.
-            "other_models_m": float(
-                np.sqrt(3.0 * other / found.linearized.products.degrees_of_freedom)
-            )
-            * noise.position_m,
-        }
-        if entries and not found.adopted:
-            remarks.append(
-                "what was found is too uncertain to make predictions better: the model stays as declared"
-            )
-        remarks += verdict.implausible(with_effects, entries)
-        if not found.settled:
-            words = f"the problem was linearised {settings.linearizations} times, and each time another model was found"
-            remarks.append(f"{words}: more may be missing")
-    remarks += compliance_warnings(final) + verdict.scatter_warnings(
-        final.noise, noise, settings.relinearize_noise
-    )
-    for name, fitted in (("declared", declared), ("final", final)):
-        if not fitted.converged:
-            remarks.append(
-                f"the fit of the {name} model did not converge: its parameters are not to be relied on"
-            )
-    return stated | {
-        "campaign": case.campaign.name,
-        "noise": serialize_noise(noise)
-        | {
-            "pose_rad": final.noise.pose_rad,
-            "factor": final.noise.position_m / noise.position_m,
-        },
-        "heldout": None,
-        "kept": steps[-1].kind.replace("kept", "frames"),
-        "compliance_urad_per_Nm": _compliances(
-            declared, final, springs, settings.prior_share
-        ),
-        "held": sorted(
-            {
-                f"{o} {p.name}"
-                for (o, p), held in zip(
-                    final.parameters, final.unidentifiable, strict=True
-                )
-                if held
-            }
-        ),
-        "candidates_tested": len(tested),
-        "untestable": untestable,
-        "converged": {"declared": declared.converged, "final": final.converged},
-        "warnings": list(dict.fromkeys(remarks)),
-        "settings": settings.document(),
-    }
-
-
-def _compliances(
-    declared: Fit, final: Fit, springs: model_averaging.ModelAverage, prior_share: float
-) -> dict[str, list[float]]:
-    joints = final.model.sites.joints
-    after = get_joint_compliances(final.model, final.estimate).copy()
-    deviations = np.zeros(joints)
-    identified = np.zeros(joints, bool)
-    if final.model.identifies_compliance:
-        mine = final.parameter_indices("joint_compliance")
-        names = [
-            ("joint_compliance", final.parameters[index][1].name) for index in mine
-        ]
-        alone = np.sqrt(np.diag(final.covariance))[mine]
-        after += [springs.shift.get(name, 0.0) for name in names]
-        deviations = np.array(
-            [
-                springs.std_error.get(name, error)
-                for name, error in zip(names, alone, strict=True)
-            ]
-        )
-        # With a prior of the size that such a spring reaches, of which that share would
-        # be left.
-        plausible = np.array([final.parameters[index][1].plausible for index in mine])
-        identified = ~final.unidentifiable[mine] & (
-            deviations**2 < prior_share * (deviations**2 + plausible**2)
-        )
-    found = {
-        "before": get_joint_compliances(declared.model, declared.estimate),
-        "after": after,
-        "std_error": deviations,
-    }
-    return {name: (1e6 * values).tolist() for name, values in found.items()} | {
-        "identifiable": identified.tolist()
-    }

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.campaigns.campaign import columns_of
+from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.holdout import measured_poses
 from elastocal.counting import counted, first_names
 from elastocal.data_checks.faults import controller_warnings, faults
@@ -72,14 +73,16 @@ class Overview:
 
 
 def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
-    """Look through a campaign; `folder`, `robots_folder` as in `reading.read_campaign`.
+    """Look through a campaign; `folder`, `robots_folder` as in `read_campaign_folder`.
     Raises `InputError`.
 
     What is misplaced is not looked for where a compliance comes out negative, for then
     something is missing in the model.
     """
-    descriptions, training, held_out = load_campaign(folder, robots_folder)
-    whole = build_case(descriptions, columns_of(training))
+    descriptions, training, held_out = load_campaign(
+        read_campaign_folder(folder, robots_folder)
+    )
+    whole = case_from(descriptions, columns_of(training))
     settings = Settings()
     part = select_initial_subset(whole, settings)
     errors = find_gross_errors(

@@ -17,6 +17,7 @@ from elastocal.application.accuracy import (
 )
 from elastocal.application.calibrated import compute_effect_contributions
 from elastocal.campaigns.campaign import columns_of
+from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import generate_residual_blocks, judge
@@ -66,9 +67,11 @@ def judge_campaign(job: Any) -> None:
 def cases_in(folder: str | Path, robots_folder: str | Path) -> tuple[Case, Case]:
     """Training and held-out cases of a campaign's folder.
 
-    `folder`, `robots_folder`: as in `reading.read_campaign`.
+    `folder`, `robots_folder`: as in `read_campaign_folder`.
     """
-    descriptions, training, held_out = load_campaign(folder, robots_folder)
+    descriptions, training, held_out = load_campaign(
+        read_campaign_folder(folder, robots_folder)
+    )
     return (
         build_case(descriptions, columns_of(training)),
         build_case(descriptions["held_out"] or descriptions, columns_of(held_out)),
@@ -83,7 +86,7 @@ def diagnosed(
 ) -> dict[str, Any]:
     """Diagnose a campaign and judge it on its held-out poses.
 
-    `folder`, `robots_folder`: as in `reading.read_campaign`. Returns as verdict.json.
+    `folder`, `robots_folder`: as in `read_campaign_folder`. Returns as verdict.json.
     """
     training, held_out = cases_in(folder, robots_folder)
     return judged(

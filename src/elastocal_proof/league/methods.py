@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from elastocal.campaigns.campaign import Measurements, columns_of, measurements_from
+from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.holdout import blocks_of_poses, configurations, measured_poses
 from elastocal.diagnosis.diagnose import Diagnosis, diagnose
 from elastocal.diagnosis.model_averaging import compute_explained_squares
@@ -230,7 +231,9 @@ def mechanism_columns(
 
 def deal_league_folds(job: Any) -> None:
     """A data set of the league, checked, with its poses dealt into folds."""
-    descriptions, campaign = described_campaign(job.params.folder, job.params.robots)
+    descriptions, campaign = described_campaign(
+        read_campaign_folder(job.params.folder, job.params.robots)
+    )
     seen = campaign.measurements
     origin = provenance(job.params, **job.wildcards)
     draws = stream(job.params.seed, job.wildcards.data, "league folds", 0)
