@@ -7,10 +7,10 @@ from analysed_robots import ROBOTS
 
 from elastocal.campaigns.campaign import columns_of
 from elastocal.campaigns.campaign_folder import read_campaign_folder
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.linearization import effect_columns, linearize
-from elastocal.fitting.model import case_from
-from elastocal.fitting.noise import estimated_noise
+from elastocal.fitting.least_squares import fit_model
+from elastocal.fitting.linearization import compute_effect_sensitivities, linearize
+from elastocal.fitting.model import build_case
+from elastocal.fitting.noise import estimate_noise
 from elastocal.loop.loading import load_campaign
 from elastocal_proof.blind.cases import Case, make_case
 from elastocal_proof.blind.scores import EXACT_ALIASES
