@@ -182,7 +182,7 @@ def _document(
         "held": sorted(
             {
                 f"{o} {p.name}"
-                for (o, p), held in zip(final.parameters, final.held, strict=True)
+                for (o, p), held in zip(final.parameters, final.unidentifiable, strict=True)
                 if held
             }
         ),
@@ -217,7 +217,7 @@ def _compliances(
         # With a prior of the size that such a spring reaches, of which that share would
         # be left.
         plausible = np.array([final.parameters[index][1].plausible for index in mine])
-        identified = ~final.held[mine] & (
+        identified = ~final.unidentifiable[mine] & (
             deviations**2 < prior_share * (deviations**2 + plausible**2)
         )
     found = {
