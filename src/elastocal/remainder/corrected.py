@@ -21,13 +21,13 @@ from scipy.special import stdtr
 
 from elastocal.campaigns.campaign import BEST_REMAINDER
 from elastocal.campaigns.holdout import blocks_of_poses, configurations
-from elastocal.effects.catalogue import effects, moves_robot
-from elastocal.fitting.least_squares import fit_placement
-from elastocal.fitting.linearization import compute_effect_sensitivities
-from elastocal.fitting.model import evaluate_conditions, locate_targets
-from elastocal.fitting.observations import index_poses, sample_observations
+from elastocal.effects.catalogue import list_effects, moves_robot
+from elastocal.fitting.least_squares import fit_frames
+from elastocal.fitting.linearization import effect_columns
+from elastocal.fitting.model import conditions, target_points
+from elastocal.fitting.observations import sample_of, state_clusters
 from elastocal.mechanics.kinematics import position_jacobians
-from elastocal.remainder.regressions import REGRESSIONS, Inputs, Predictor
+from elastocal.remainder.regressions import Inputs, Predictor, list_regressions
 from elastocal.validation.held_out import (
     PositionErrors,
     compute_error_intervals,
@@ -119,11 +119,10 @@ def corrected(
     `within_range`: whether nothing is corrected beyond the joint angles and loads that
     were fitted.
     """
-    there, (model, estimate) = (
-        held_out.observations,
-        transfer_fit(fitted, case, held_out),
-    )
-    names = [name for name in REGRESSIONS if regression in (name, BEST_REMAINDER)]
+    there, (model, estimate) = held_out.observations, placed(fitted, case, held_out)
+    names = [
+        name for name in list_regressions() if regression in (name, BEST_REMAINDER)
+    ]
     every = case.observations
     some = sample_observations(case.observations, _MOST_TO_CHOOSE)
     inputs = inputs_of(fitted.model, fitted.estimate, some)
@@ -137,7 +136,7 @@ def corrected(
     if chosen["regression"]:
         predictor = predictor_of(chosen, fitted.model, fitted.estimate, every)
         asked = inputs_of(
-            model, estimate, there, REGRESSIONS[chosen["regression"]].by_jacobian
+            model, estimate, there, list_regressions()[chosen["regression"]].by_jacobian
         )
         mean = np.where(outside[:, None] & within_range, 0.0, predictor.mean(asked))
         std = predictor.std(asked)
@@ -218,8 +217,8 @@ def predictor_of(
     observations: Observations,
 ) -> Predictor:
     """`fitted_again`, to what a model leaves of its training poses."""
-    some = sample_observations(observations, _MOST_TO_FIT)
-    by_jacobian = REGRESSIONS[chosen["regression"]].by_jacobian
+    some = sample_of(observations, _MOST_TO_FIT)
+    by_jacobian = list_regressions()[chosen["regression"]].by_jacobian
     return fitted_again(
         chosen,
         inputs_of(model, estimate, some, by_jacobian),
@@ -232,7 +231,7 @@ def fitted_again(
 ) -> Predictor:
     """The regression of facts of `tuned`, fitted to residuals (M, 3), shrunk, with
     intervals as wide as poses left out say."""
-    fitted = REGRESSIONS[chosen["regression"]].fitted
+    fitted = list_regressions()[chosen["regression"]].fitted
     spread = chosen["spread"]
     found = next(fitted(inputs, residual, [chosen["setting"]], chosen["seed"]))
 
@@ -293,7 +292,7 @@ def inputs_of(
     found = [
         (effect, shapes)
         for effect, shapes in every
-        if effect.effect in effects() and is_commanded(effect)
+        if effect.effect in list_effects() and is_commanded(effect)
     ]
     if not found or not by_jacobian:
         return inputs
@@ -394,7 +393,9 @@ def tuned(
     if (count := int(group.max()) + 1) < FEWEST_CONFIGURATIONS:
         return facts
     pairs = [
-        (name, setting) for name in names for setting in REGRESSIONS[name].settings
+        (name, setting)
+        for name in names
+        for setting in list_regressions()[name].settings
     ]
     mine = [fold == number for number in range(len(without))]
     parts = [inputs.select(each) for each in mine]
@@ -407,7 +408,7 @@ def tuned(
         left = without[list(pair)].sum(axis=0) - whole
         rest = ~np.isin(fold, pair)
         some = inputs.select(rest)
-        each = [REGRESSIONS[name] for name in names]
+        each = [list_regressions()[name] for name in names]
         fits = (
             one
             for regression in each
@@ -428,7 +429,7 @@ def tuned(
         if best is not None:
             name, setting = pairs[best]
             predictor = next(
-                REGRESSIONS[name].fitted(
+                list_regressions()[name].fitted(
                     inputs.select(~within), without[number, ~within], [setting], seed
                 )
             )
@@ -447,7 +448,7 @@ def tuned(
     spread = spread_of(np.abs(off - gain["factor"] * predicted), std)
     return facts | {
         "regression": name,
-        "words": REGRESSIONS[name].words,
+        "words": list_regressions()[name].words,
         "setting": dict(setting),
         "spread": spread,
     }
