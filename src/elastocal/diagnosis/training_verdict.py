@@ -182,7 +182,9 @@ def _document(
         "held": sorted(
             {
                 f"{o} {p.name}"
-                for (o, p), held in zip(final.parameters, final.unidentifiable, strict=True)
+                for (o, p), held in zip(
+                    final.parameters, final.unidentifiable, strict=True
+                )
                 if held
             }
         ),

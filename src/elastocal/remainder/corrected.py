@@ -119,7 +119,10 @@ def corrected(
     `within_range`: whether nothing is corrected beyond the joint angles and loads that
     were fitted.
     """
-    there, (model, estimate) = held_out.observations, placed(fitted, case, held_out)
+    there, (model, estimate) = (
+        held_out.observations,
+        transfer_fit(fitted, case, held_out),
+    )
     names = [
         name for name in list_regressions() if regression in (name, BEST_REMAINDER)
     ]
