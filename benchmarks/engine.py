@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from common import ROOT, Row, beside_yardstick, interleaved
 
-from elastocal.campaigns.importers import FOLDER_VARIABLE, importer
+from elastocal.campaigns.importers import FOLDER_VARIABLE, find_importer
 from elastocal.campaigns.writing import write_campaign
 from elastocal.fitting.least_squares import fit_model, register_placement
 from elastocal.fitting.model import list_parameters

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from analysed_robots import ROBOTS
 
-from elastocal.campaigns.campaign import columns_of
+from elastocal.campaigns.campaign import tabulate_measurements
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.linearization import compute_effect_sensitivities, linearize
@@ -67,7 +67,7 @@ def seen(request, tmp_path_factory):
     descriptions, training, _ = load_campaign(
         read_campaign_folder(folder / "blind" / made.name, ROBOTS)
     )
-    case = build_case(descriptions, columns_of(training))
+    case = build_case(descriptions, tabulate_measurements(training))
     declared = fit_model(case.model, case.observations, estimate_noise(case)[0])
     candidates = [c for c in case.candidates.values() if not c.shapes]
     return directions(declared, case.observations, candidates)

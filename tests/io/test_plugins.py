@@ -88,7 +88,7 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.campaigns.campaign_folder import read_campaign_folder
-from elastocal.campaigns.importers import importer
+from elastocal.campaigns.importers import find_importer
 from elastocal.campaigns.reading import read_campaign, read_robot
 from elastocal.effects.catalogue import candidates_on, list_bundled_effects, list_effects
 from elastocal.exchange.controllers import axes_of, find_controller, targets_of

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from elastocal.errors import InputError, closest_first
+from elastocal.errors import InputError, suggest_names
 from elastocal.mechanics.chain import Chain
 from elastocal.mechanics.components import COMPONENT_NAMES, WRENCH_NAMES
 from elastocal.mechanics.robot import Robot

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, DOCUMENT
-from elastocal.campaigns.measurements import CSV, PARQUET, files_there, is_file_in
-from elastocal.errors import InputError, closest_first
+from elastocal.campaigns.measurements import CSV, PARQUET, find_files, is_file_in
+from elastocal.errors import InputError, suggest_names
 from elastocal.io.documents import check_document, read_document
-from elastocal.io.records import checksum
+from elastocal.io.records import compute_sha256
 from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.robot_file import robot_from_document
 

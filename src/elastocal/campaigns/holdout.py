@@ -11,10 +11,10 @@ import numpy as np
 from elastocal.campaigns.campaign import (
     Campaign,
     Measurements,
-    groups_of,
-    means_of,
+    average_by_group,
+    group_equal_rows,
 )
-from elastocal.counting import counted
+from elastocal.counting import format_count
 from elastocal.errors import InputError
 
 # Below these a fit or a test says nothing.

@@ -22,15 +22,15 @@ import numpy as np
 import scipy
 
 from elastocal.campaigns.campaign_folder import CampaignFolder, read_campaign_folder
-from elastocal.campaigns.holdout import number_alike
+from elastocal.campaigns.holdout import number_close_points
 from elastocal.campaigns.reading import read_robot
 from elastocal.campaigns.writing import write_campaign
 from elastocal.errors import InputError
 from elastocal.io.documents import (
     check_document,
     document_path,
-    named_document,
     read_document,
+    read_named_document,
 )
 from elastocal.io.json_files import read_json
 from elastocal.io.plugins import IMPORTERS, load_plugins

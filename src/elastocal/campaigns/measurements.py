@@ -14,12 +14,12 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from elastocal.campaigns.tables import A_HEADER_ALONE, Cells, read_text_table
-from elastocal.counting import counted
-from elastocal.errors import InputError, closest_first
+from elastocal.campaigns.tables import HEADER_WITHOUT_ROWS, Cells, read_text_table
+from elastocal.counting import format_count
+from elastocal.errors import InputError, suggest_names
 from elastocal.io.atomic_writes import atomic_write
 from elastocal.io.storage import Column
-from elastocal.io.texts import kind_of
+from elastocal.io.texts import describe_file_kind
 from elastocal.mechanics.components import WRENCH, WRENCH_NAMES
 
 # A diagnosis of a million measurements takes 2 GB (benchmarks); a tracker's stream is

@@ -18,24 +18,24 @@ from elastocal.campaigns.campaign import (
     Measurements,
     Target,
     assemble_campaign,
-    groups_of,
-    targets_from,
+    group_equal_rows,
+    parse_targets,
 )
 from elastocal.campaigns.campaign_folder import CampaignFolder, read_robot_document
 from elastocal.campaigns.holdout import (
     FEWEST_HELD_OUT_POSES,
     SAME_POSE_RAD,
-    held_out_mask,
-    measured_poses,
+    list_poses,
+    select_held_out,
 )
 from elastocal.campaigns.measurements import (
-    FARTHEST_RAD,
+    LARGEST_ROTATION_RAD,
     ROTATION,
     read_measurements,
 )
 from elastocal.campaigns.tables import Cells
-from elastocal.counting import counted
-from elastocal.errors import InputError, closest_first
+from elastocal.counting import format_count
+from elastocal.errors import InputError, suggest_names
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.robot_file import robot_from_document

@@ -15,7 +15,7 @@ from elastocal.mechanics.elastostatics import (
 )
 from elastocal.mechanics.kinematics import poses_and_jacobians, poses_of_points
 from elastocal.mechanics.robot import Robot
-from elastocal.random_streams import stream
+from elastocal.random_streams import open_stream
 
 
 @dataclass(frozen=True)

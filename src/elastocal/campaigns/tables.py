@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from elastocal.counting import counted
-from elastocal.errors import InputError, closest_first, steering
+from elastocal.counting import format_count
+from elastocal.errors import InputError, find_control_character, suggest_names
 from elastocal.io.texts import (
-    A_NUMBER,
     LARGEST_NUMBER,
-    decoded,
-    plain_number,
+    NUMBER_ALLOWED,
+    decode_text,
+    parse_number,
     read_bytes,
 )
 

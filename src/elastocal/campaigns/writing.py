@@ -14,11 +14,11 @@ from elastocal.campaigns.measurements import (
     CSV,
     PARQUET,
     check_column_names,
-    file_columns,
+    describe_columns,
     write_measurements,
 )
 from elastocal.io.atomic_writes import write_text, write_together
-from elastocal.io.documents import check_document, one_line, read_schema
+from elastocal.io.documents import check_document, format_one_line, read_schema
 from elastocal.mechanics.robot import Robot
 
 

@@ -19,8 +19,8 @@ from elastocal.command.terminal import (
     robots,
     workplace,
 )
-from elastocal.counting import counted
-from elastocal.errors import InputError, steering
+from elastocal.counting import format_count
+from elastocal.errors import InputError, find_control_character
 
 _ROBOT = "robot.yaml"
 # Snakemake prints the second before its logger begins.
@@ -47,9 +47,12 @@ def init(
     from rich.console import Console
 
     from elastocal.campaigns.campaign import DOCUMENT
-    from elastocal.campaigns.measurements import CSV, PARQUET, described_by
+    from elastocal.campaigns.measurements import CSV, PARQUET, read_measured_targets
     from elastocal.campaigns.reading import read_robot
-    from elastocal.campaigns.writing import campaign_template, sheet_template
+    from elastocal.campaigns.writing import (
+        format_campaign_template,
+        format_sheet_header,
+    )
     from elastocal.io.atomic_writes import check_places, write_text, write_together
     from elastocal.io.documents import LARGEST_BYTES
     from elastocal.io.texts import read_text

@@ -15,7 +15,7 @@ from elastocal.command.terminal import (
     robots,
     workplace,
 )
-from elastocal.counting import counted
+from elastocal.counting import format_count
 
 # Fewer candidates than a real plan takes, for a demonstration of a minute.
 _PLAN = (

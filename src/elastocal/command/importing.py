@@ -10,7 +10,7 @@ import typer
 from typer import Argument, Option
 
 from elastocal.command.terminal import MOST_ROWS, example, print_lines, robots
-from elastocal.counting import counted
+from elastocal.counting import format_count
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from elastocal.command.importing import importing
 from elastocal.command.plan import plan
 from elastocal.command.results import certificate, correct, export
 from elastocal.command.terminal import example
-from elastocal.errors import InputError, fault_of_machine
+from elastocal.errors import InputError, describe_system_fault
 
 # Each subcommand with an example, in the order in which a calibration needs them;
 # `import` is a group of its own.

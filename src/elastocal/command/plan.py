@@ -20,8 +20,8 @@ from elastocal.command.terminal import (
     numbers,
     print_answer,
 )
-from elastocal.counting import counted
-from elastocal.errors import InputError, text_fault
+from elastocal.counting import format_count
+from elastocal.errors import InputError, find_text_fault
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -134,7 +134,7 @@ def plan(
     )
     from elastocal.campaigns.measurements import CSV
     from elastocal.campaigns.reading import read_robot
-    from elastocal.io.texts import kind_of
+    from elastocal.io.texts import describe_file_kind
 
     arm, console, (_, position_m, orientation_rad) = (
         read_robot(robot),

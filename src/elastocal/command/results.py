@@ -18,7 +18,7 @@ from elastocal.command.terminal import (
     print_answer,
     workplace,
 )
-from elastocal.counting import counted, first_names, grouped
+from elastocal.counting import format_count, format_integer, list_first
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from elastocal.errors import InputError, escaped
+from elastocal.errors import InputError, escape_control_characters
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.constants import g, pound_force
 
-from elastocal.campaigns.campaign import groups_of
+from elastocal.campaigns.campaign import group_equal_rows
 from elastocal.data_checks.hypotheses import other_interpretations
 from elastocal.data_checks.placement import (
     IMPLAUSIBLE_M,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import chdtri
 
-from elastocal.campaigns.campaign import groups_of
+from elastocal.campaigns.campaign import group_equal_rows
 from elastocal.fitting.least_squares import compute_nominal_poses, register_to_poses
 from elastocal.fitting.model import build_declared_model, transform_to_base
 from elastocal.fitting.observations import select_states, separate_measurements

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.counting import counted
+from elastocal.counting import format_count
 from elastocal.data_checks.faults import faults
 from elastocal.diagnosis import model_averaging, refit, verdict
 from elastocal.diagnosis.candidate_design import build_candidate_design, refine_shapes
@@ -28,11 +28,15 @@ from elastocal.diagnosis.search import run_alarm_test, screen_terms, search_mode
 from elastocal.diagnosis.training_verdict import TrainingResult, state_training_verdict
 from elastocal.diagnosis.verdict import Evidence
 from elastocal.effects.catalogue import list_effects
-from elastocal.fitting.least_squares import ON_THE_WAY, SETTLED, fit
-from elastocal.fitting.model import Case, parameter_values
-from elastocal.fitting.noise import effective_parameters, noise_facts
+from elastocal.fitting.least_squares import (
+    CONVERGENCE_TOLERANCE,
+    INTERMEDIATE_TOLERANCE,
+    fit_model,
+)
+from elastocal.fitting.model import Case, get_parameter_values
+from elastocal.fitting.noise import count_effective_parameters, serialize_noise
 from elastocal.fitting.observations import Observations
-from elastocal.random_streams import stream
+from elastocal.random_streams import open_stream
 from elastocal.remainder.repeatable import Repeatable, repeatable_part
 from elastocal.validation.held_out import predict_left_out_squares
 

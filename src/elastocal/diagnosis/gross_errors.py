@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.special import chdtri, fdtri, gammaincinv
 
-from elastocal.counting import counted
+from elastocal.counting import format_count
 from elastocal.effects.conditions import at_states
 from elastocal.fitting.linearization import linearize, linearize_coordinates
 from elastocal.fitting.model import (

@@ -32,7 +32,7 @@ import numpy as np
 from scipy.special import gammaln, logit, logsumexp
 
 from elastocal.effects.protocol import Candidate
-from elastocal.random_streams import stream
+from elastocal.random_streams import open_stream
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.campaigns.campaign import NO_REMAINDER, Measurements, residual_columns
-from elastocal.counting import counted
+from elastocal.campaigns.campaign import NO_REMAINDER, Measurements, tabulate_residuals
+from elastocal.counting import format_count
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.gross_errors import (
     OutlierTest,
@@ -27,7 +27,7 @@ from elastocal.fitting.model import (
 )
 from elastocal.fitting.noise import parse_noise
 from elastocal.fitting.observations import index_poses, separate_measurements
-from elastocal.random_streams import stream
+from elastocal.random_streams import open_stream
 from elastocal.remainder.corrected import Corrected, corrected, remainder_facts
 from elastocal.validation import held_out as figures
 from elastocal.validation.conformity import count_configurations, find_joint_ranges

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.counting import plural
+from elastocal.counting import pluralize
 from elastocal.data_checks.protocol import OF_DATA, Fault
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.model_averaging import ModelAverage, compute_extra_squares

@@ -11,7 +11,7 @@ import elastocal.effects
 from elastocal.effects.protocol import Effect, require_unique
 from elastocal.errors import InputError
 from elastocal.io import plugins
-from elastocal.io.modules import module_names
+from elastocal.io.modules import list_modules
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -17,7 +17,7 @@ from scipy import constants
 from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.tables import TextTable
-from elastocal.errors import InputError, closest_first
+from elastocal.errors import InputError, suggest_names
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 

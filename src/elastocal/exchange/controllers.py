@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from elastocal.counting import counted
-from elastocal.errors import InputError, printable
+from elastocal.counting import format_count
+from elastocal.errors import InputError, format_printable
 from elastocal.io import plugins
 
 

@@ -36,8 +36,8 @@ from typing import Any
 import numpy as np
 
 from elastocal.campaigns.tables import Dialect, read_text_table
-from elastocal.counting import counted
-from elastocal.errors import InputError, closest_first
+from elastocal.counting import format_count
+from elastocal.errors import InputError, suggest_names
 from elastocal.exchange.column_names import ANGLE, LENGTH, UNITS, read_units, split_unit
 from elastocal.exchange.robot_text import (
     MOST_TURNS,
@@ -50,7 +50,7 @@ from elastocal.exchange.robot_text import (
     word,
 )
 from elastocal.io.documents import read_document
-from elastocal.io.texts import A_NUMBER, plain_number
+from elastocal.io.texts import NUMBER_ALLOWED, parse_number
 
 _KINDS = {"theta_offset": ANGLE, "d": LENGTH, "a": LENGTH, "alpha": ANGLE}
 _NEEDED = ("d", "a", "alpha")

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from elastocal.campaigns.holdout import number_alike
-from elastocal.campaigns.measurements import file_columns
+from elastocal.campaigns.holdout import number_close_points
+from elastocal.campaigns.measurements import describe_columns
 from elastocal.campaigns.tables import Cells, Dialect, TextTable, read_text_table
-from elastocal.counting import counted
-from elastocal.errors import InputError, closest_first, text_fault
+from elastocal.counting import format_count
+from elastocal.errors import InputError, find_text_fault, suggest_names
 from elastocal.exchange.column_names import (
     HOMOGENEOUS_MATRICES,
     POSITION,
@@ -39,7 +39,7 @@ from elastocal.exchange.column_names import (
     rotation_vectors,
     scales_of,
 )
-from elastocal.io.texts import plain_number
+from elastocal.io.texts import parse_number
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 

@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.counting import counted
-from elastocal.errors import InputError, reason_of
+from elastocal.counting import format_count
+from elastocal.errors import InputError, describe_os_error
 from elastocal.io.atomic_writes import check_places, write_text
-from elastocal.io.documents import check_document, one_line
+from elastocal.io.documents import check_document, format_one_line
 from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.robot_file import robot_from_document
 

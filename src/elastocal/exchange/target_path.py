@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.campaigns.measurements import FARTHEST_RAD
+from elastocal.campaigns.measurements import LARGEST_ROTATION_RAD
 from elastocal.campaigns.reading import find_degrees
 from elastocal.campaigns.tables import Dialect, read_text_table
-from elastocal.errors import InputError, closest_first
+from elastocal.errors import InputError, suggest_names
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 

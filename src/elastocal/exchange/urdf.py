@@ -23,8 +23,8 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from elastocal.counting import first_names
-from elastocal.errors import InputError, closest_first
+from elastocal.counting import list_first
+from elastocal.errors import InputError, suggest_names
 from elastocal.exchange.robot_text import (
     Imported,
     check_imported,
@@ -34,7 +34,7 @@ from elastocal.exchange.robot_text import (
     origin_transform,
     point_name,
 )
-from elastocal.io.texts import LARGEST_NUMBER, plain_number, read_bytes
+from elastocal.io.texts import LARGEST_NUMBER, parse_number, read_bytes
 from elastocal.mechanics.robot import STANDARD_GRAVITY, UNLIMITED_DEG
 
 # The longest public descriptions, of humanoids with hands, have less than a megabyte.

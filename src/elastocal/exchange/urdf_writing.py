@@ -15,7 +15,7 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from elastocal.counting import counted
+from elastocal.counting import format_count
 from elastocal.errors import InputError
 from elastocal.exchange.robot_text import (
     elementary,

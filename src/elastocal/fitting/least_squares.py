@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 from scipy.special import gammaincinv
 
-from elastocal.campaigns.campaign import NOT_TURNED
+from elastocal.campaigns.campaign import NO_ROTATION
 from elastocal.effects.conditions import at_states
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import (

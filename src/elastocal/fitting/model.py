@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.campaigns.campaign import Campaign, assemble_campaign, measurements_from
+from elastocal.campaigns.campaign import Campaign, assemble_campaign, build_measurements
 from elastocal.effects.catalogue import candidates_on, declared_candidates
 from elastocal.effects.conditions import (
     MASS_PARAMETERS,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.campaigns.campaign import groups_of, means_of
+from elastocal.campaigns.campaign import average_by_group, group_equal_rows
 
 if TYPE_CHECKING:
     from typing import Any

@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from elastocal.errors import InputError
-from elastocal.io.texts import kind_of
+from elastocal.io.texts import describe_file_kind
 
 _PARTIAL = re.compile(r"\.[0-9a-f]{16}\.partial$")
 

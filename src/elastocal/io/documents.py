@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 
 import yaml
 
-from elastocal.errors import InputError, closest, closest_first, text_fault
+from elastocal.errors import InputError, find_text_fault, suggest_name, suggest_names
 from elastocal.io.texts import read_text
 
 # Far above what people write by hand (no schema goes deeper than 7), and read in

@@ -7,7 +7,7 @@ import re
 import stat
 from pathlib import Path
 
-from elastocal.errors import InputError, reason_of
+from elastocal.errors import InputError, describe_os_error
 
 # Python also takes 1_0 for 10, other scripts' digits, and words for what is no number.
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)

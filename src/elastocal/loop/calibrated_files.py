@@ -31,7 +31,7 @@ from elastocal.errors import InputError
 from elastocal.fitting.noise import parse_noise
 from elastocal.io.json_files import read_json
 from elastocal.io.origin import configuration_sha256
-from elastocal.io.records import check_sources, jobs_behind
+from elastocal.io.records import check_sources, trace_jobs
 from elastocal.loop.diagnosis_tables import load_case, rows_left_out, step_model
 from elastocal.remainder.corrected import predictor_of
 from elastocal.validation.conformity import (

@@ -17,11 +17,11 @@ from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.model import Estimate, build_case, list_parameters
 from elastocal.fitting.noise import parse_noise, serialize_noise
 from elastocal.io.json_files import read_json, write_json
-from elastocal.io.origin import provenance
+from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import read_table, write_table
 from elastocal.loop.schemas import STEPS, measurements
 from elastocal.mechanics.robot_file import robot_from_document
-from elastocal.random_streams import stream
+from elastocal.random_streams import open_stream
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

@@ -6,13 +6,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from elastocal.campaigns import reading
-from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, columns_of
+from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, tabulate_measurements
 from elastocal.campaigns.campaign_folder import read_campaign_folder
-from elastocal.campaigns.holdout import split
+from elastocal.campaigns.holdout import split_poses
 from elastocal.effects.catalogue import list_effects
 from elastocal.errors import InputError
 from elastocal.io.json_files import write_json
-from elastocal.io.origin import provenance
+from elastocal.io.origin import describe_provenance
 from elastocal.io.plugins import REGRESSIONS, plugin_names
 from elastocal.io.storage import write_table
 from elastocal.loop.schemas import measurements

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.campaigns.campaign import columns_of
+from elastocal.campaigns.campaign import tabulate_measurements
 from elastocal.campaigns.campaign_folder import read_campaign_folder
-from elastocal.campaigns.holdout import measured_poses
-from elastocal.counting import counted, first_names
+from elastocal.campaigns.holdout import list_poses
+from elastocal.counting import format_count, list_first
 from elastocal.data_checks.faults import controller_warnings, faults
 from elastocal.diagnosis.candidate_design import build_candidate_design
 from elastocal.diagnosis.fitted_subset import select_initial_subset

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.campaigns.measurements import file_columns
+from elastocal.campaigns.measurements import describe_columns
 from elastocal.io.storage import Column, TableSchema, read_table
 from elastocal.mechanics.components import COMPONENTS, WRENCH_NAMES
 

@@ -11,7 +11,7 @@ import pandas as pd
 from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.io.json_files import read_json
 from elastocal.loop.schemas import residuals
-from elastocal.random_streams import stream
+from elastocal.random_streams import open_stream
 from elastocal.validation.held_out import (
     PositionErrors,
     compute_error_intervals,

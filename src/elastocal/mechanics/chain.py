@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.errors import InputError, text_fault
+from elastocal.errors import InputError, find_text_fault
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.counting import counted
+from elastocal.counting import format_count
 from elastocal.errors import InputError
 from elastocal.mechanics.chain import notation, parse_chain
 from elastocal.mechanics.robot import (

@@ -20,12 +20,12 @@ import numpy as np
 from scipy.special import stdtr
 
 from elastocal.campaigns.campaign import BEST_REMAINDER
-from elastocal.campaigns.holdout import blocks_of_poses, configurations
+from elastocal.campaigns.holdout import number_configurations, partition_poses
 from elastocal.effects.catalogue import list_effects, moves_robot
-from elastocal.fitting.least_squares import fit_frames
-from elastocal.fitting.linearization import effect_columns
-from elastocal.fitting.model import conditions, target_points
-from elastocal.fitting.observations import sample_of, state_clusters
+from elastocal.fitting.least_squares import fit_placement
+from elastocal.fitting.linearization import compute_effect_sensitivities
+from elastocal.fitting.model import evaluate_conditions, locate_targets
+from elastocal.fitting.observations import index_poses, sample_observations
 from elastocal.mechanics.kinematics import position_jacobians
 from elastocal.remainder.regressions import Inputs, Predictor, list_regressions
 from elastocal.validation.held_out import (

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.linalg import lapack
 
-from elastocal.fitting.normal_equations import inverse_by_factor
+from elastocal.fitting.normal_equations import invert_cholesky_factor
 from elastocal.io import plugins
 from elastocal.io.plugins import load_plugins
 

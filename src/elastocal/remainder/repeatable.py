@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.campaigns.holdout import SAME_POSE_RAD, configurations
+from elastocal.campaigns.holdout import SAME_POSE_RAD, number_configurations
 from elastocal.fitting.least_squares import INTERMEDIATE_TOLERANCE, fit_model
 from elastocal.fitting.observations import index_poses, sample_observations
 from elastocal.remainder.corrected import (

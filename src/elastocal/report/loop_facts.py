@@ -10,7 +10,7 @@ import numpy as np
 
 from elastocal import __version__
 from elastocal.application.accuracy import tabulate_errors
-from elastocal.counting import counted, grouped, plural
+from elastocal.counting import format_count, format_integer, pluralize
 from elastocal.data_checks.protocol import OF_DATA, data_at_fault
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.effects.catalogue import list_effects

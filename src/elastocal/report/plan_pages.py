@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elastocal.campaigns.measurements import SHOWN
-from elastocal.counting import counted
+from elastocal.campaigns.measurements import DISPLAY_UNITS
+from elastocal.counting import format_count
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

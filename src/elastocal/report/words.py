@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal import counting
-from elastocal.counting import plural
+from elastocal.counting import pluralize
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.effects.catalogue import list_effects
 from elastocal.effects.protocol import effect_of

@@ -8,7 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from elastocal.errors import InputError
-from elastocal.io.documents import check_document, document_path, named_document, parsed
+from elastocal.io.documents import (
+    check_document,
+    document_path,
+    parse_yaml,
+    read_named_document,
+)
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.equation_11 import find_first_solvable_length
 from elastocal.study.strategies import check_strategy, strategy_from_document

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.io.origin import provenance
+from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import TableSchema, read_blocks, write_table
 from elastocal.mechanics.chain import parse_chain
 from elastocal.mechanics.components import (
@@ -31,7 +31,7 @@ from elastocal.mechanics.elastostatics import (
 )
 from elastocal.mechanics.kinematics import jacobians, poses
 from elastocal.mechanics.robot_file import joint_limits
-from elastocal.random_streams import draw
+from elastocal.random_streams import draw_data_sets
 from elastocal.study.jobs import (
     CONFIGURATION,
     DATA_SET,

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.campaigns.holdout import configurations
-from elastocal.counting import counted
+from elastocal.campaigns.holdout import number_configurations
+from elastocal.counting import format_count
 from elastocal.fitting.observations import index_poses
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import stdtrit
 
-from elastocal.campaigns.holdout import configurations
+from elastocal.campaigns.holdout import number_configurations
 from elastocal.fitting.least_squares import (
     INTERMEDIATE_TOLERANCE,
     fit_model,

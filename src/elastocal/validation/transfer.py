@@ -10,8 +10,8 @@ import numpy as np
 from scipy.linalg import blas
 from scipy.spatial.transform import Rotation
 
-from elastocal.campaigns.holdout import beyond_range, find_repeated
-from elastocal.counting import counted
+from elastocal.campaigns.holdout import find_poses_beyond_range, find_repeated
+from elastocal.counting import format_count
 from elastocal.effects.protocol import LOADED_JOINTS
 from elastocal.fitting.least_squares import evaluate_as_fit, fit_placement
 from elastocal.fitting.linearization import linearize

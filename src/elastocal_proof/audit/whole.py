@@ -17,7 +17,7 @@ import pyarrow.parquet as pq
 from jinja2 import Environment
 
 from elastocal import __version__
-from elastocal.io.records import RECORDS, recorded
+from elastocal.io.records import RECORDS, list_recorded_files
 from elastocal_proof.audit import campaigns, fits, study
 from elastocal_proof.audit.audited import Audited, Finding, require
 

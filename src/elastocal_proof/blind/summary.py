@@ -12,7 +12,7 @@ from scipy.stats import bootstrap
 
 from elastocal.io.data_frames import write_csv
 from elastocal.io.json_files import read_json
-from elastocal.random_streams import stream
+from elastocal.random_streams import open_stream
 from elastocal_proof.blind.cases import PROOF, TUNED, Plan
 from elastocal_proof.blind.folders import load_ground_truth
 from elastocal_proof.blind.scores import intervals_of, rate, score

@@ -10,9 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from elastocal.campaigns.campaign import Measurements, columns_of, measurements_from
+from elastocal.campaigns.campaign import (
+    Measurements,
+    build_measurements,
+    tabulate_measurements,
+)
 from elastocal.campaigns.campaign_folder import read_campaign_folder
-from elastocal.campaigns.holdout import blocks_of_poses, configurations, measured_poses
+from elastocal.campaigns.holdout import (
+    list_poses,
+    number_configurations,
+    partition_poses,
+)
 from elastocal.diagnosis.diagnose import Diagnosis, diagnose
 from elastocal.diagnosis.model_averaging import compute_explained_squares
 from elastocal.diagnosis.settings import Settings
@@ -21,13 +29,13 @@ from elastocal.fitting.least_squares import Fit
 from elastocal.fitting.model import Case, build_case
 from elastocal.fitting.noise import estimate_noise, fit_declared_model
 from elastocal.io.json_files import read_json, write_json
-from elastocal.io.origin import provenance
+from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import read_table, write_table
 from elastocal.loop.diagnosis_tables import diagnosis_facts, step_fit
 from elastocal.loop.loading import described_campaign
 from elastocal.loop.schemas import measurements
 from elastocal.mechanics.robot_file import robot_from_document
-from elastocal.random_streams import stream
+from elastocal.random_streams import open_stream
 from elastocal.remainder.corrected import corrected
 from elastocal.remainder.regressions import REGRESSIONS
 from elastocal.validation.held_out import compute_position_residuals

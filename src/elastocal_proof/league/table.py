@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from elastocal.campaigns.campaign import groups_of
-from elastocal.counting import counted
-from elastocal.random_streams import stream
+from elastocal.campaigns.campaign import group_equal_rows
+from elastocal.counting import format_count
+from elastocal.random_streams import open_stream
 from elastocal.remainder.corrected import NORMAL_WIDTH
 from elastocal.validation.held_out import (
     PositionErrors,

@@ -39,8 +39,8 @@ from elastocal.application.planning.designs import (
 )
 from elastocal.campaigns.campaign import Target
 from elastocal.campaigns.holdout import FEWEST_TRAINING_POSES
-from elastocal.campaigns.measurements import SHOWN, TICK
-from elastocal.counting import counted
+from elastocal.campaigns.measurements import DISPLAY_UNITS, TICK_COLUMN
+from elastocal.counting import format_count
 from elastocal.effects.catalogue import declared_candidates
 from elastocal.effects.elastic import joint_compliance
 from elastocal.effects.gravity import declared_weight
