@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.counting import counted
+from elastocal.counting import format_count
 from elastocal.data_checks.faults import faults
 from elastocal.diagnosis import model_averaging, refit, verdict
 from elastocal.diagnosis.candidate_design import build_candidate_design, refine_shapes
@@ -32,7 +32,7 @@ from elastocal.fitting.least_squares import ON_THE_WAY, SETTLED, fit
 from elastocal.fitting.model import Case, parameter_values
 from elastocal.fitting.noise import effective_parameters, noise_facts
 from elastocal.fitting.observations import Observations
-from elastocal.random_streams import stream
+from elastocal.random_streams import open_stream
 from elastocal.remainder.repeatable import Repeatable, repeatable_part
 from elastocal.validation.held_out import left_out_squares
 
@@ -113,7 +113,7 @@ def diagnose(
         part = choose_centre_prior(part, settings)
         case = replace(case, model=part.case.model)
     tell(
-        f"declared model fitted to {counted(len(part.case.observations), 'measurement')}"
+        f"declared model fitted to {format_count(len(part.case.observations), 'measurement')}"
     )
     found: Evidence | None = None
     about = part.declared
@@ -144,7 +144,7 @@ def diagnose(
         if part is last:
             break
         tell(
-            f"{counted((~part.kept).sum(), 'gross error')} in {counted(len(good), 'row')}: once more without"
+            f"{format_count((~part.kept).sum(), 'gross error')} in {format_count(len(good), 'row')}: once more without"
         )
         if noise_facts(part.noise) == noise_facts(last.noise):
             again = about
@@ -350,7 +350,9 @@ def _explained(
         )
         near = about if before else None
         nothing, alone = screen_terms(problem.problem)
-        draws = stream(seed, part.case.campaign.name, "null distribution", round_number)
+        draws = open_stream(
+            seed, part.case.campaign.name, "null distribution", round_number
+        )
         alarm = run_alarm_test(
             problem.problem, problem.products, nothing.pose_error_rad, draws
         )

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.special import chdtri, fdtri, gammaincinv
 
-from elastocal.counting import counted
+from elastocal.counting import format_count
 from elastocal.effects.conditions import at_states
 from elastocal.fitting.linearization import by_coordinates, linearize
 from elastocal.fitting.model import conditions, parameters, residuals
@@ -406,7 +406,7 @@ def describe_gross_errors(
 def format_gross_error_warnings(entries: list[dict[str, Any]]) -> list[str]:
     """A sentence for each of the first gross errors, and how many more there are."""
     more = len(entries) - _MOST_NAMED
-    rest = [f"{counted(more, 'further row')} left out"] if more > 0 else []
+    rest = [f"{format_count(more, 'further row')} left out"] if more > 0 else []
     return [entry["detail"] for entry in entries[:_MOST_NAMED]] + rest
 
 

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.counting import plural
+from elastocal.counting import pluralize
 from elastocal.data_checks.protocol import OF_DATA, Fault
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.model_averaging import ModelAverage, compute_extra_squares
@@ -397,7 +397,7 @@ def location_words(mechanism: str, location: Sequence[int | str]) -> str:
     )
     # Numbers count joints, or links, which begin at the joint of the same number.
     part = getattr(effects().get(mechanism), "part", "joint")
-    where = f"{plural(part, len(joints))} {' and '.join(joints)}" if joints else ""
+    where = f"{pluralize(part, len(joints))} {' and '.join(joints)}" if joints else ""
     return " ".join(filter(None, [where, *names])) or (
         "base" if mechanism == OTHER else ""
     )

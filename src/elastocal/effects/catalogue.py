@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import elastocal.effects
 from elastocal.effects.protocol import Effect, require_unique
 from elastocal.errors import InputError
-from elastocal.io.modules import module_names
+from elastocal.io.modules import list_modules
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -24,7 +24,7 @@ def effects() -> dict[str, Effect]:
     """Effects of the catalogue by their names, sorted."""
     modules = [
         import_module(f"elastocal.effects.{name}")
-        for name in module_names(elastocal.effects)
+        for name in list_modules(elastocal.effects)
     ]
     found = {
         id(each): each

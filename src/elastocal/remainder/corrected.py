@@ -20,7 +20,7 @@ import numpy as np
 from scipy.special import stdtr
 
 from elastocal.campaigns.campaign import BEST_REMAINDER
-from elastocal.campaigns.holdout import blocks_of_poses, configurations
+from elastocal.campaigns.holdout import number_configurations, partition_poses
 from elastocal.effects.catalogue import effects, moves_robot
 from elastocal.fitting.least_squares import fit_frames
 from elastocal.fitting.linearization import effect_columns
@@ -187,13 +187,13 @@ def _chosen(
     model = fitted.model
     pose = state_clusters(states)
     each = observations.cluster
-    configuration = configurations(states.joint_angles, pose)
+    configuration = number_configurations(states.joint_angles, pose)
     count = min(_FOLDS, configuration.max() + 1)
     shuffled = (
         np.random.default_rng(seed).permutation(configuration.max() + 1)[configuration]
         % count
     )
-    fold = blocks_of_poses(states.joint_angles, pose, count) if blocks else shuffled
+    fold = partition_poses(states.joint_angles, pose, count) if blocks else shuffled
     without = np.stack(
         [
             position_residuals(model, other, observations)
