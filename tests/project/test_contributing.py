@@ -81,7 +81,7 @@ def test_the_effect_is_whole_and_displaces_what_its_formula_says(module, kuka):
     effect = module("An effect").hoses
     assert (
         isinstance(effect, Effect)
-        and effect.name not in catalogue.effects()
+        and effect.name not in catalogue.list_effects()
         and "k q^3" in effect.doc
     )
     sites = sites_of(kuka)

@@ -33,6 +33,7 @@ from elastocal.io.documents import (
     read_named_document,
 )
 from elastocal.io.json_files import read_json
+from elastocal.io.plugins import IMPORTERS, load_plugins
 
 # Names a folder that already has the files, for machines without a network.
 FOLDER_VARIABLE = "ELASTOCAL_DATA"
@@ -339,12 +340,18 @@ def read_importers(path: Path) -> dict[str, Importer]:
 
 
 def find_importer(name: str, config: str | Path, source: str | Path) -> Importer:
-    """An importer of the folder ``config``; an InputError that names `source`, the file
-    that names it, refuses another name."""
-    known = read_importers(Path(config) / "public_data.yaml")
-    if name not in known:
-        raise InputError(source, "importer", repr(name), ", ".join(known))
-    return known[name]
+    """An importer of the folder ``config``, or one that an installed package offers.
+
+    Raises `InputError`, which names `source`, the file that asks for the importer:
+    there is no importer of this name.
+    """
+    importers = read_importers(Path(config) / "public_data.yaml")
+    if name not in importers:
+        # Look for plug-ins only now: each start of Snakemake asks for importers.
+        importers = importers | load_plugins(IMPORTERS, Importer, importers)
+    if name not in importers:
+        raise InputError(source, "importer", repr(name), ", ".join(importers))
+    return importers[name]
 
 
 def read_campaign_sources(

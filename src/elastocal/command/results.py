@@ -100,7 +100,7 @@ def correct(
     from elastocal.exchange.controllers import (
         axes_of,
         check_name,
-        controller_of,
+        find_controller,
         targets_of,
     )
     from elastocal.exchange.target_path import NO_BOUND, OK, read_target_path_of
@@ -108,7 +108,7 @@ def correct(
     from elastocal.io.data_frames import write_csv
 
     console = Console(stderr=True)
-    controller = controller_of(language, "") if language else None
+    controller = find_controller(language) if language else None
     if output.suffix != ".csv":
         raise InputError(
             "--output",

@@ -27,7 +27,7 @@ from elastocal.diagnosis.gross_errors import (
 from elastocal.diagnosis.search import run_alarm_test, screen_terms, search_models
 from elastocal.diagnosis.training_verdict import TrainingResult, state_training_verdict
 from elastocal.diagnosis.verdict import Evidence
-from elastocal.effects.catalogue import effects
+from elastocal.effects.catalogue import list_effects
 from elastocal.fitting.least_squares import ON_THE_WAY, SETTLED, fit
 from elastocal.fitting.model import Case, parameter_values
 from elastocal.fitting.noise import effective_parameters, noise_facts
@@ -373,7 +373,7 @@ def _explained(
         # No verdict yet, and no probability: a later search, or the poses left out, may
         # say otherwise.
         words = [
-            getattr(effects().get(name), "words", "an unknown mechanism")
+            getattr(list_effects().get(name), "words", "an unknown mechanism")
             for name in conclusion.best.mechanisms
         ]
         leading = " with ".join(words) or "nothing is missing"

@@ -22,7 +22,7 @@ from elastocal.counting import pluralize
 from elastocal.data_checks.protocol import OF_DATA, Fault
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.model_averaging import ModelAverage, compute_extra_squares
-from elastocal.effects.catalogue import effects
+from elastocal.effects.catalogue import list_effects
 from elastocal.effects.protocol import Candidate, Parameter, Shape
 from elastocal.effects.sizes import lever_m
 from elastocal.fitting.linearization import effect_columns
@@ -396,8 +396,8 @@ def location_words(mechanism: str, location: Sequence[int | str]) -> str:
         for named in (False, True)
     )
     # Numbers count joints, or links, which begin at the joint of the same number.
-    part = getattr(effects().get(mechanism), "part", "joint")
-    where = f"{pluralize(part, len(joints))} {' and '.join(joints)}" if joints else ""
+    part = getattr(list_effects().get(mechanism), "part", "joint")
+    where = f"{plural(part, len(joints))} {' and '.join(joints)}" if joints else ""
     return " ".join(filter(None, [where, *names])) or (
         "base" if mechanism == OTHER else ""
     )

@@ -18,6 +18,7 @@ import numpy as np
 
 from elastocal.counting import format_count
 from elastocal.errors import InputError, format_printable
+from elastocal.io import plugins
 
 
 @dataclass(frozen=True)
@@ -194,7 +195,7 @@ _TP_AXES = tuple(f"J{axis}" for axis in range(1, 7))
 _TP_EXTERNAL = tuple(f"E{axis}" for axis in range(1, 4))
 _UR_AXES = ("base", "shoulder", "elbow", "wrist1", "wrist2", "wrist3")
 _NAMED = "letters, digits and underscores that begin with"
-_ALL = (
+_CONTROLLERS = (
     Controller(
         "krl", "KUKA KRL", ".src", tuple(f"A{axis}" for axis in range(1, 7)), tuple(f"E{axis}" for axis in range(1, 7)),
         r"[A-Za-z_]\w{0,23}", f"up to 24 {_NAMED} no digit", _krl,
@@ -212,19 +213,24 @@ _ALL = (
         r"[A-Za-z_]\w*", f"{_NAMED} no digit", _urscript,
     ),
 )  # fmt: skip
-CONTROLLERS = {each.name: each for each in _ALL}
+CONTROLLERS = {controller.name: controller for controller in _CONTROLLERS}
 
 
-def controller_of(name: str, suffix: str) -> Controller | None:
-    """The language of a name; without one that of a file's suffix, None where it is
-    none's. An unknown name is refused."""
-    if name and name not in CONTROLLERS:
-        raise InputError("--format", "", repr(name), " | ".join(CONTROLLERS))
-    return (
-        CONTROLLERS[name]
-        if name
-        else next((each for each in _ALL if suffix.lower() == each.suffix), None)
+def list_controllers() -> dict[str, Controller]:
+    """Languages of this package, and those that installed packages offer, by name."""
+    return CONTROLLERS | plugins.load_plugins(
+        plugins.CONTROLLERS, Controller, CONTROLLERS
     )
+
+
+def find_controller(name: str) -> Controller:
+    """Find a language by its name; `InputError`: there is no such language."""
+    if name in CONTROLLERS:
+        return CONTROLLERS[name]
+    controllers = list_controllers()
+    if name not in controllers:
+        raise InputError("--format", "", repr(name), " | ".join(controllers))
+    return controllers[name]
 
 
 def check_name(controller: Controller, path: Path) -> str:

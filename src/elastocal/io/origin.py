@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from elastocal import __version__
+from elastocal.io.plugins import plugin_versions
 
 # Parameters of rules that tell Snakemake of edited sources, and a job what to call:
 # nothing of what was configured.
@@ -57,13 +58,13 @@ def configuration_sha256(configuration: Any) -> str:
 
 
 def environment(folder: str | Path) -> dict[str, str]:
-    """Versions of the installed libraries, and the SHA-256 of the pins in the folder of
-    the Snakefile, where it has some."""
+    """Versions of the installed libraries and of packages with plug-ins, and the
+    SHA-256 of the pins in the folder of the Snakefile if it has some."""
     lock = Path(folder, _LOCK)
     pinned = (
         {_LOCK: hashlib.sha256(lock.read_bytes()).hexdigest()} if lock.is_file() else {}
     )
-    return {name: version(name) for name in _LIBRARIES} | pinned
+    return {name: version(name) for name in _LIBRARIES} | plugin_versions() | pinned
 
 
 def describe_provenance(settings: Any, **more: Any) -> dict[str, Any]:

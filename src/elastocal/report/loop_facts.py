@@ -13,7 +13,7 @@ from elastocal.application.accuracy import tabulate_errors
 from elastocal.counting import format_count, format_integer, pluralize
 from elastocal.data_checks.protocol import OF_DATA, data_at_fault
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.effects.catalogue import effects
+from elastocal.effects.catalogue import list_effects
 from elastocal.effects.protocol import effect_of
 from elastocal.report import words as say
 from elastocal.report.typesetting import render_sentences
@@ -170,7 +170,7 @@ def cost_words(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> str:
     were left out of the correction."""
     cost = effect["cost_m"]
     if cost is None:
-        known = effects().get(effect["name"])
+        known = list_effects().get(effect["name"])
         moves = known is None or known.moves_robot
         return (
             "in no command"
@@ -332,7 +332,7 @@ def _with_interval(step: Mapping[str, Any]) -> str:
 def description(effect: str) -> str:
     """What an effect of the catalogue is, in the first line of its docstring, without
     the formula."""
-    known = effects().get(effect)
+    known = list_effects().get(effect)
     summary = known.doc.split("\n")[0] if known and known.doc else say.words(effect)
     return re.sub(r", \w+\([^,]*=.*$", "", summary.split(":")[0]).rstrip(".")
 

@@ -33,7 +33,7 @@ from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import apply_regression, remove_gross_errors
 from elastocal.diagnosis.settings import Settings
 from elastocal.effects.catalogue import declared_candidates
-from elastocal.effects.catalogue import effects as catalogue
+from elastocal.effects.catalogue import list_effects as catalogue
 from elastocal.exchange.target_path import OK
 from elastocal.fitting.model import declared_model
 from elastocal.fitting.noise import fit_declared
