@@ -20,7 +20,7 @@ import numpy as np
 from scipy.special import stdtr
 
 from elastocal.campaigns.campaign import BEST_REMAINDER
-from elastocal.campaigns.holdout import partition_poses, number_configurations
+from elastocal.campaigns.holdout import number_configurations, partition_poses
 from elastocal.effects.catalogue import list_effects, moves_robot
 from elastocal.fitting.least_squares import fit_frames
 from elastocal.fitting.linearization import effect_columns
