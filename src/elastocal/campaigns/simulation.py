@@ -53,7 +53,7 @@ def draw_measurements(
     `name`: of the campaign; part of the name of the random stream. Returns columns of a
     file of measurements.
     """
-    draws = stream(seed, name, "campaign", 0)
+    draws = open_stream(seed, name, "campaign", 0)
     low, high = robot.joint_limits.T
     angles = low + (high - low) * draws.random((plan.poses, robot.joints))
     direction = draws.standard_normal((plan.poses, 3))

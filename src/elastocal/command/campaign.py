@@ -72,12 +72,14 @@ def init(
         )
     arm, (targets, measured) = (
         read_robot(robot or folder / _ROBOT),
-        described_by(folder),
+        read_measured_targets(folder),
     )
     files = {} if robot is None else {_ROBOT: read_text(robot, LARGEST_BYTES)}
     if not (folder / CSV).exists() and not (folder / PARQUET).exists():
-        files[CSV] = sheet_template(arm.joints)
-    files[DOCUMENT] = campaign_template(folder.resolve().name, arm, targets, measured)
+        files[CSV] = format_sheet_header(arm.joints)
+    files[DOCUMENT] = format_campaign_template(
+        folder.resolve().name, arm, targets, measured
+    )
     with write_together(folder, files) as partial:
         for name, text in files.items():
             write_text(partial / name, text)
@@ -106,11 +108,11 @@ def check(folder: Annotated[Path, Argument(help="Folder of the campaign.")]) -> 
     answer = f"{found.campaign} cannot be diagnosed: the data are at fault"
     if found.diagnosable:
         more = (
-            f"; {counted(len(found.attention), 'remark')} below"
+            f"; {format_count(len(found.attention), 'remark')} below"
             if found.attention
             else ""
         )
-        answer = f"{found.campaign} can be diagnosed: {counted(found.testable, 'candidate effect')} can be tested{more}"
+        answer = f"{found.campaign} can be diagnosed: {format_count(found.testable, 'candidate effect')} can be tested{more}"
     details = [
         *(f"{name:<16}{words}" for name, words in found.rows),
         *(f"! {sentence}" for sentence in found.attention),
@@ -143,7 +145,7 @@ def diagnose(
     # Braces are wildcards to Snakemake, the others mapping and comment of YAML.
     if mark := next(
         (mark for mark in ("{", "}", ": ", " #") if mark in campaign),
-        steering(campaign),
+        find_control_character(campaign),
     ):
         raise InputError(
             folder,

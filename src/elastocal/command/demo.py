@@ -85,7 +85,7 @@ def demo(
     print_lines(
         [
             "",
-            f"# The simulated robot is measured: {counted(count, 'measurement')} in {folder / CSV}",
+            f"# The simulated robot is measured: {format_count(count, 'measurement')} in {folder / CSV}",
         ],
         console,
     )

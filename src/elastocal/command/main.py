@@ -84,4 +84,4 @@ def main() -> None:
     except InputError as error:
         sys.exit(str(error))
     except (OSError, MemoryError, ImportError) as error:
-        sys.exit(str(fault_of_machine(error)))
+        sys.exit(str(describe_system_fault(error)))

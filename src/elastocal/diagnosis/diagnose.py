@@ -117,7 +117,7 @@ def diagnose(
         part = choose_centre_prior(part, settings)
         case = replace(case, model=part.case.model)
     tell(
-        f"declared model fitted to {counted(len(part.case.observations), 'measurement')}"
+        f"declared model fitted to {format_count(len(part.case.observations), 'measurement')}"
     )
     found: Evidence | None = None
     about = part.declared
@@ -150,7 +150,7 @@ def diagnose(
         if part is last:
             break
         tell(
-            f"{counted((~part.kept).sum(), 'gross error')} in {counted(len(good), 'row')}: once more without"
+            f"{format_count((~part.kept).sum(), 'gross error')} in {format_count(len(good), 'row')}: once more without"
         )
         if serialize_noise(part.noise) == serialize_noise(last.noise):
             again = about
@@ -368,7 +368,9 @@ def _explained(
         )
         near = about if before else None
         nothing, alone = screen_terms(problem.problem)
-        draws = stream(seed, part.case.campaign.name, "null distribution", round_number)
+        draws = open_stream(
+            seed, part.case.campaign.name, "null distribution", round_number
+        )
         alarm = run_alarm_test(
             problem.problem, problem.products, nothing.pose_error_rad, draws
         )

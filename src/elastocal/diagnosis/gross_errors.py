@@ -416,7 +416,7 @@ def describe_gross_errors(
 def format_gross_error_warnings(entries: list[dict[str, Any]]) -> list[str]:
     """A sentence for each of the first gross errors, and how many more there are."""
     more = len(entries) - _MOST_NAMED
-    rest = [f"{counted(more, 'further row')} left out"] if more > 0 else []
+    rest = [f"{format_count(more, 'further row')} left out"] if more > 0 else []
     return [entry["detail"] for entry in entries[:_MOST_NAMED]] + rest
 
 

@@ -306,7 +306,7 @@ def build_discrepancies(campaign: Conditions, features: int) -> list[Discrepancy
         }
         if any(each(campaign).size for each in inputs.values()):
             name = f"{cause}{words}"
-            draws = stream(
+            draws = open_stream(
                 _SEED,
                 f"other {name}",
                 "random Fourier features",

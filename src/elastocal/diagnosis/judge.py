@@ -19,14 +19,9 @@ from elastocal.diagnosis.gross_errors import (
     format_gross_error_warnings,
 )
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.model import (
-    Case,
-    compute_residuals,
-    evaluate_conditions,
-    transform_to_base,
-)
-from elastocal.fitting.noise import parse_noise
-from elastocal.fitting.observations import index_poses, separate_measurements
+from elastocal.fitting.model import Case, conditions, measured_in_base, residuals
+from elastocal.fitting.noise import noise_from
+from elastocal.fitting.observations import single_observations, state_clusters
 from elastocal.random_streams import open_stream
 from elastocal.remainder.corrected import Corrected, corrected, remainder_facts
 from elastocal.validation import held_out as figures
@@ -102,7 +97,7 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
         {"before": whole[_declared(steps)], "after": whole[-1]} if left_out else None
     )
     if left_out:
-        gross = counted(len(left_out), "gross error")
+        gross = format_count(len(left_out), "gross error")
         sizes = [1e3 * each["rms_m"] for each in (whole[-1], heldout["after"])]
         words = "with all rows the RMS is {:.3g} mm instead of {:.3g} mm".format(*sizes)
         warnings.append(f"held-out errors are without {gross}: {words}")
@@ -118,7 +113,7 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
     remainder = None
     delivered = apply_regression(diagnosis, part, seed)
     if delivered is not None:
-        draws = stream(seed, case.campaign.name, "remainder", 0)
+        draws = open_stream(seed, case.campaign.name, "remainder", 0)
         remainder = remainder_facts(
             delivered, diagnosis.declared, diagnosis.final, case, part, draws
         )
@@ -219,14 +214,12 @@ def compare_held_out_errors(
     there, errors = _errors(steps, case, held_out)
     before = _declared(steps)
     after = len(steps) - 1
-    draws = stream(seed, case.campaign.name, "held-out poses", 0)
-    limits, reductions = figures.compute_error_intervals(
-        errors, _REPLICATES, draws, before
-    )
-    of_calibration = figures.compute_error_intervals(
-        [errors[0], errors[after]], _REPLICATES, draws
-    )[1][1]
-    floor = figures.compute_noise_floor(
+    draws = open_stream(seed, case.campaign.name, "held-out poses", 0)
+    limits, reductions = figures.intervals(errors, _REPLICATES, draws, before)
+    of_calibration = figures.intervals([errors[0], errors[after]], _REPLICATES, draws)[
+        1
+    ][1]
+    floor = figures.noise_floor(
         steps[after].fitted, held_out.observations, *there[after]
     )
     rows = []
@@ -284,7 +277,7 @@ def compare_held_out_errors(
         "outside_range": by_range,
     }
     if count := by_range["poses"]:
-        lie = f"{count} of {counted(len(outside), 'validation pose')} {'lies' if count == 1 else 'lie'}"
+        lie = f"{count} of {format_count(len(outside), 'validation pose')} {'lies' if count == 1 else 'lie'}"
         warnings.append(
             f"{lie} outside the range of the fitted poses: errors there are extrapolated"
         )
@@ -346,7 +339,7 @@ def generate_residual_blocks(
                 )
                 for stage, each in zip(("before", "after"), there, strict=True)
             }
-            position = transform_to_base(there[-1][1], observations)[0]
-            yield residual_columns(
+            position = measured_in_base(there[-1][1], observations)[0]
+            yield tabulate_residuals(
                 some, unseen, some is left_out, beyond, position, off
             )

@@ -397,7 +397,7 @@ def location_words(mechanism: str, location: Sequence[int | str]) -> str:
     )
     # Numbers count joints, or links, which begin at the joint of the same number.
     part = getattr(list_effects().get(mechanism), "part", "joint")
-    where = f"{plural(part, len(joints))} {' and '.join(joints)}" if joints else ""
+    where = f"{pluralize(part, len(joints))} {' and '.join(joints)}" if joints else ""
     return " ".join(filter(None, [where, *names])) or (
         "base" if mechanism == OTHER else ""
     )

@@ -36,7 +36,7 @@ def list_bundled_effects() -> dict[str, Effect]:
     """Effects of the modules of this package, by name, sorted."""
     modules = [
         import_module(f"elastocal.effects.{name}")
-        for name in module_names(elastocal.effects)
+        for name in list_modules(elastocal.effects)
     ]
     # A module that imports an effect of another one does not define it again.
     effects = {

@@ -275,7 +275,7 @@ def find_columns(
                 text.path,
                 "header",
                 f"no column {header!r}",
-                closest_first(header, list(text.columns)),
+                suggest_names(header, list(text.columns)),
             )
     of_joints = {
         _simplify(called): f"q{joint}"

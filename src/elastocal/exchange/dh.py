@@ -175,7 +175,7 @@ def _read_table(
     for header in text.columns:
         name, stated = (header, None) if header in _WORDS else split_unit(header)
         if name not in (*_KINDS, *_WORDS):
-            allowed = f"{closest_first(header, _USUAL)}; import dh --ignore {header!r} leaves it out"
+            allowed = f"{suggest_names(header, _USUAL)}; import dh --ignore {header!r} leaves it out"
             raise InputError(source, "header", repr(header), allowed)
         if name in headers:
             raise InputError(source, "header", f"{name} twice", "each column once")
@@ -195,7 +195,7 @@ def _read_table(
         raise InputError(
             source,
             "",
-            counted(len(text.lines), "row"),
+            format_count(len(text.lines), "row"),
             f"at most {_MOST_ROWS}, one for each joint",
         )
     read = text.cells(
@@ -349,8 +349,10 @@ def _robot_from_kinematics(path: str | Path, name: str | None) -> Imported:
             raise InputError(source, where, found or "nothing", ", ".join(_KEYS))
         values: list[float] = []
         for key in _KEYS:
-            if (value := plain_number(str(origin[key]))) is None:
-                raise InputError(source, f"{where}.{key}", repr(origin[key]), A_NUMBER)
+            if (value := parse_number(str(origin[key]))) is None:
+                raise InputError(
+                    source, f"{where}.{key}", repr(origin[key]), NUMBER_ALLOWED
+                )
             values.append(value)
         words += [
             *displacement_words(origin_transform(values[:3], values[3:])),

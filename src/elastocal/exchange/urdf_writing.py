@@ -102,7 +102,7 @@ def _ends_of(urdf: Urdf, robot: Robot, source: str) -> tuple[str, str]:
                 tuple(each.name for each in found.joints),
             ) and _is_same(chain, robot.chain):
                 return joint.parent, tip
-    wanted_joints = ", ".join(names or ()) or counted(robot.joints, "joint")
+    wanted_joints = ", ".join(names or ()) or format_count(robot.joints, "joint")
     raise InputError(
         source,
         "",

@@ -527,7 +527,7 @@ def register_to_poses(
         if np.abs(offsets - before).max() < _SETTLED_M:
             break
     turns = Rotation.from_rotvec(
-        [target.rotation or NOT_TURNED for target in model.targets]
+        [target.rotation or NO_ROTATION for target in model.targets]
     ).as_matrix()
     if observations.rotation is not None:
         turned = (

@@ -532,7 +532,7 @@ def build_case(
     source = descriptions["source"]
     robot = robot_from_document(descriptions["robot"], source)
     campaign = assemble_campaign(
-        descriptions["campaign"], robot, measurements_from(columns), source
+        descriptions["campaign"], robot, build_measurements(columns), source
     )
     sites = sites_of(campaign.robot)
     model = build_declared_model(

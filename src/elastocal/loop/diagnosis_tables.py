@@ -53,7 +53,9 @@ def diagnose_campaign(job: Any) -> None:
         lambda line: print(f"{name}: {line}", file=sys.stderr, flush=True),
     )
     columns, facts = propose_experiment(
-        found, stream(seed, case.campaign.name, "next experiment", 0), job.params.states
+        found,
+        open_stream(seed, case.campaign.name, "next experiment", 0),
+        job.params.states,
     )
     write_csv(job.output.experiment, pd.DataFrame(columns))
     found = replace(found, document=found.document | {"next_experiment": facts})
@@ -66,7 +68,7 @@ def diagnose_campaign(job: Any) -> None:
         job.output.steps,
         STEPS,
         step_blocks(found),
-        provenance(job.params, **job.wildcards),
+        describe_provenance(job.params, **job.wildcards),
     )
 
 

@@ -45,7 +45,10 @@ def read_campaign(job: Any) -> None:
     ):
         schema = measurements(part.joint_angles.shape[1])
         write_table(
-            path, schema, [columns_of(part)], provenance(descriptions, **job.wildcards)
+            path,
+            schema,
+            [tabulate_measurements(part)],
+            describe_provenance(descriptions, **job.wildcards),
         )
     write_json(job.output.descriptions, descriptions)
 
@@ -67,7 +70,7 @@ def load_campaign(
         As `reading.read_campaign` and `reading.read_held_out_campaign`.
     """
     descriptions, campaign = described_campaign(folder)
-    training, held_out = split(campaign)
+    training, held_out = split_poses(campaign)
     held_out_descriptions = None
     held_out_campaign = reading.read_held_out_campaign(folder, list_effects())
     if folder.held_out_folder is not None and held_out_campaign is not None:

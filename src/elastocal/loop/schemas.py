@@ -26,7 +26,7 @@ def _columns(joints: int) -> dict[str, Column]:
     angles as the chain counts them."""
     found = {
         name: replace(c, missing=name.startswith(_OPTIONAL))
-        for name, c in file_columns(joints).items()
+        for name, c in describe_columns(joints).items()
     }
     found |= {
         name: replace(found[name], meaning=f"angle of joint {name[1:]} of the chain")

@@ -60,7 +60,7 @@ def judge_campaign(job: Any) -> None:
         job.output.residuals,
         schema,
         generate_residual_blocks(found, verdict),
-        provenance(job.params, **job.wildcards),
+        describe_provenance(job.params, **job.wildcards),
     )
 
 
@@ -73,8 +73,10 @@ def cases_in(folder: str | Path, robots_folder: str | Path) -> tuple[Case, Case]
         read_campaign_folder(folder, robots_folder)
     )
     return (
-        build_case(descriptions, columns_of(training)),
-        build_case(descriptions["held_out"] or descriptions, columns_of(held_out)),
+        case_from(descriptions, tabulate_measurements(training)),
+        case_from(
+            descriptions["held_out"] or descriptions, tabulate_measurements(held_out)
+        ),
     )
 
 

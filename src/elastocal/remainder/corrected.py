@@ -196,13 +196,13 @@ def _chosen(
     model = fitted.model
     pose = index_poses(states)
     each = observations.cluster
-    configuration = configurations(states.joint_angles, pose)
+    configuration = number_configurations(states.joint_angles, pose)
     count = min(_FOLDS, configuration.max() + 1)
     shuffled = (
         np.random.default_rng(seed).permutation(configuration.max() + 1)[configuration]
         % count
     )
-    fold = blocks_of_poses(states.joint_angles, pose, count) if blocks else shuffled
+    fold = partition_poses(states.joint_angles, pose, count) if blocks else shuffled
     without = np.stack(
         [
             compute_position_residuals(model, other, observations)

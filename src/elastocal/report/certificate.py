@@ -68,7 +68,7 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
         "errors": document["errors"],
         "floor": say.length(document["noise_floor_rms_m"]),
         "budget": budget,
-        "budget_states": counted(document["budget_states"], "state"),
+        "budget_states": format_count(document["budget_states"], "state"),
     }
 
 

@@ -125,7 +125,9 @@ def at_joints(effect: str, joints: Collection[int]) -> str:
     """Where an effect acts: " of joint 3", or nothing where it is no joint's."""
     part = getattr(list_effects().get(effect), "part", "joint")
     return (
-        f" of {plural(part, len(joints))} {listed(map(str, joints))}" if joints else ""
+        f" of {pluralize(part, len(joints))} {listed(map(str, joints))}"
+        if joints
+        else ""
     )
 
 

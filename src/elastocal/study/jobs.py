@@ -78,7 +78,7 @@ class Job(Protocol):
 
 def collect_provenance(job: Job) -> dict[str, Any]:
     """Provenance of a file of one robot, noise or strategy, which its wildcards are."""
-    return provenance(job.params, **dict(job.wildcards))
+    return describe_provenance(job.params, **dict(job.wildcards))
 
 
 def load_robot(job: Job) -> Robot:

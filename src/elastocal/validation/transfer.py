@@ -127,7 +127,7 @@ def find_extrapolated_poses(fitted: Fit, case: Case, held_out: Case) -> np.ndarr
     has to extrapolate.
 
     Either a joint stands beyond the fitted poses by more than chance explains, see
-    `holdout.beyond_range`; or the model predicts the position less surely than it would
+    `holdout.find_poses_beyond_range`; or the model predicts the position less surely than it would
     have predicted any pose it was fitted to, had that pose been left out. The second
     finds what ranges joint by joint miss: corners between the poses, loads, times and
     temperatures beyond those fitted. Poses drawn like the fitted ones pass that maximum
@@ -156,7 +156,7 @@ def warn_of_repeated_poses(
     again = find_repeated(_angles_of_poses(fitted_states), _angles_of_poses(states))
     if not again.any():
         return []
-    many = counted(len(again), "validation pose")
+    many = format_count(len(again), "validation pose")
     count = f"{again.sum()} of {many}" if not again.all() else f"all {many}"
     return [
         f"{count} repeat configurations that were fitted: these errors say nothing of other poses"

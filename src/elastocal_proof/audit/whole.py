@@ -48,7 +48,7 @@ def audit(run: Audited, only: Collection[str] | None = None) -> list[Finding]:
     column, does not hold.
     """
     found = []
-    for file, digest in recorded(run.folder).items():
+    for file, digest in list_recorded_files(run.folder).items():
         # What an audit itself wrote is not audited.
         if file in only if only is not None else not file.startswith("reports/audit."):
             found.append(replace(intact(run, file, digest), file=file))

@@ -110,10 +110,10 @@ def dealt(
     [1] Roberts, D. R. et al., Cross-validation strategies for data with temporal, spatial, hierarchical, or phylogenetic
         structure, Ecography 40, 2017.
     """
-    pairs, index = measured_poses(seen)
-    configuration = configurations(seen.joint_angles, index)
+    pairs, index = list_poses(seen)
+    configuration = number_configurations(seen.joint_angles, index)
     shuffled = draws.permutation(configuration.max() + 1)[configuration] % count + 1
-    blocks = blocks_of_poses(seen.joint_angles, index, count) + 1
+    blocks = partition_poses(seen.joint_angles, index, count) + 1
     return {
         "session": pairs[:, 0],
         "pose": pairs[:, 1],
@@ -131,7 +131,7 @@ def rounds(
         yield 1, data.case(), [other.case() for other in others]
         return
     fold = np.asarray(data.dealt[split])[
-        measured_poses(measurements_from(data.columns))[1]
+        list_poses(build_measurements(data.columns))[1]
     ]
     for number in np.unique(fold):
         yield int(number), data.case(fold != number), [data.case(fold == number)]
@@ -243,12 +243,12 @@ def deal_league_folds(job: Any) -> None:
         read_campaign_folder(job.params.folder, job.params.robots)
     )
     seen = campaign.measurements
-    origin = provenance(job.params, **job.wildcards)
-    draws = stream(job.params.seed, job.wildcards.data, "league folds", 0)
+    origin = describe_provenance(job.params, **job.wildcards)
+    draws = open_stream(job.params.seed, job.wildcards.data, "league folds", 0)
     write_table(
         job.output.measurements,
         measurements(seen.joint_angles.shape[1]),
-        [columns_of(seen)],
+        [tabulate_measurements(seen)],
         origin,
     )
     write_table(job.output.folds, FOLDS, [dealt(seen, job.params.folds, draws)], origin)
@@ -272,7 +272,7 @@ def diagnose_league_folds(job: Any) -> None:
         job.output.mechanisms,
         MECHANISMS,
         mechanisms,
-        provenance(job.params, **job.wildcards),
+        describe_provenance(job.params, **job.wildcards),
     )
 
 
@@ -300,5 +300,8 @@ def enter_league(job: Any) -> None:
                 {"fold": np.full(count, fold), "set": np.full(count, number)} | columns
             )
     write_table(
-        job.output.entries, ENTRIES, blocks, provenance(job.params, **job.wildcards)
+        job.output.entries,
+        ENTRIES,
+        blocks,
+        describe_provenance(job.params, **job.wildcards),
     )

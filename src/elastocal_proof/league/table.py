@@ -63,9 +63,9 @@ def league_table(
             np.linalg.norm(part[["dx", "dy", "dz"]].to_numpy(), axis=1)
             for part in mine.values()
         ]
-        poses = [groups_of(part[_POSE].to_numpy())[1] for part in mine.values()]
-        errors = [PositionErrors(*each) for each in zip(distances, poses, strict=True)]
-        figures = [summarize_errors(error.distance) for error in errors]
+        poses = [group_equal_rows(part[_POSE].to_numpy())[1] for part in mine.values()]
+        errors = [Errors(*each) for each in zip(distances, poses, strict=True)]
+        figures = [summary(error.distance) for error in errors]
         rms = [each["rms_m"] for each in figures]
         places = {
             "ratio": list(mine).index(reference),
@@ -75,7 +75,7 @@ def league_table(
             compute_error_intervals(
                 errors,
                 _REPLICATES,
-                stream(seed, data, f"league {split}", number),
+                open_stream(seed, data, f"league {split}", number),
                 place,
             )
             for number, place in enumerate(places.values())
@@ -184,7 +184,7 @@ def league_page(
                 .value_counts()
             )
             each = ", ".join(f"{name} {count}" for name, count in counts.items())
-            winners = f"Smallest RMS error of {counted(int(counts.sum()), 'data set')}: {each}."
+            winners = f"Smallest RMS error of {format_count(int(counts.sum()), 'data set')}: {each}."
             parts += [
                 f"## {title}",
                 winners,

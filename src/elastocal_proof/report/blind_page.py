@@ -116,7 +116,7 @@ def _is_ratio(row: Any) -> bool:
 
 def _hits(row: Any) -> str:
     return (
-        grouped(int(row.cases))
+        format_integer(int(row.cases))
         if pd.isna(row.hits)
         else f"{format_integer(int(row.hits))} of {format_integer(int(row.cases))}"
     )
