@@ -67,8 +67,8 @@ def seen(request, tmp_path_factory):
     descriptions, training, _ = load_campaign(
         read_campaign_folder(folder / "blind" / made.name, ROBOTS)
     )
-    case = case_from(descriptions, tabulate_measurements(training))
-    declared = fit(case.model, case.observations, estimated_noise(case)[0])
+    case = build_case(descriptions, tabulate_measurements(training))
+    declared = fit_model(case.model, case.observations, estimate_noise(case)[0])
     candidates = [c for c in case.candidates.values() if not c.shapes]
     return directions(declared, case.observations, candidates)
 

@@ -60,7 +60,7 @@ def diagnosed_campaign(top, robot, effects=(), **design):
         )
     write_json(results / "campaign.json", descriptions)
     case, unseen = (
-        case_from(descriptions, tabulate_measurements(part)) for part in parts
+        build_case(descriptions, tabulate_measurements(part)) for part in parts
     )
     found = diagnose(case, Settings(), 1)
     write_json(

@@ -222,7 +222,7 @@ def deflections(campaign: Campaign) -> tuple[np.ndarray, np.ndarray] | None:
         regressor(jacobian, each) @ campaign.robot.compliance for each in torques
     ]
     group = group_equal_rows(
-        np.column_stack([state_clusters(measurements), measurements.target])
+        np.column_stack([index_poses(measurements), measurements.target])
     )[1]
     rows = np.stack([whole.measured[0] - whole.predicted, *expected], axis=-1)
     mean = np.zeros((group.max() + 1, *rows.shape[1:]))

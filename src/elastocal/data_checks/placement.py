@@ -11,9 +11,9 @@ import numpy as np
 from scipy.special import chdtri
 
 from elastocal.campaigns.campaign import group_equal_rows
-from elastocal.fitting.least_squares import nominal_poses, registered_to
-from elastocal.fitting.model import declared_model, measured_in_base
-from elastocal.fitting.observations import select_states, single_observations
+from elastocal.fitting.least_squares import compute_nominal_poses, register_to_poses
+from elastocal.fitting.model import build_declared_model, transform_to_base
+from elastocal.fitting.observations import select_states, separate_measurements
 from elastocal.mechanics.kinematics import rotation_vectors
 
 if TYPE_CHECKING:

@@ -19,9 +19,14 @@ from elastocal.diagnosis.gross_errors import (
     format_gross_error_warnings,
 )
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.model import Case, conditions, measured_in_base, residuals
-from elastocal.fitting.noise import noise_from
-from elastocal.fitting.observations import single_observations, state_clusters
+from elastocal.fitting.model import (
+    Case,
+    compute_residuals,
+    evaluate_conditions,
+    transform_to_base,
+)
+from elastocal.fitting.noise import parse_noise
+from elastocal.fitting.observations import index_poses, separate_measurements
 from elastocal.random_streams import open_stream
 from elastocal.remainder.corrected import Corrected, corrected, remainder_facts
 from elastocal.validation import held_out as figures
@@ -339,7 +344,7 @@ def generate_residual_blocks(
                 )
                 for stage, each in zip(("before", "after"), there, strict=True)
             }
-            position = measured_in_base(there[-1][1], observations)[0]
+            position = transform_to_base(there[-1][1], observations)[0]
             yield tabulate_residuals(
                 some, unseen, some is left_out, beyond, position, off
             )

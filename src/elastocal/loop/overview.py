@@ -82,7 +82,7 @@ def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
     descriptions, training, held_out = load_campaign(
         read_campaign_folder(folder, robots_folder)
     )
-    whole = case_from(descriptions, tabulate_measurements(training))
+    whole = build_case(descriptions, tabulate_measurements(training))
     settings = Settings()
     part = select_initial_subset(whole, settings)
     errors = find_gross_errors(

@@ -12,7 +12,11 @@ from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.io.json_files import read_json
 from elastocal.loop.schemas import residuals
 from elastocal.random_streams import open_stream
-from elastocal.validation.held_out import Errors, intervals, summary
+from elastocal.validation.held_out import (
+    PositionErrors,
+    compute_error_intervals,
+    summarize_errors,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -73,8 +73,8 @@ def cases_in(folder: str | Path, robots_folder: str | Path) -> tuple[Case, Case]
         read_campaign_folder(folder, robots_folder)
     )
     return (
-        case_from(descriptions, tabulate_measurements(training)),
-        case_from(
+        build_case(descriptions, tabulate_measurements(training)),
+        build_case(
             descriptions["held_out"] or descriptions, tabulate_measurements(held_out)
         ),
     )

@@ -220,7 +220,7 @@ def predictor_of(
     observations: Observations,
 ) -> Predictor:
     """`fitted_again`, to what a model leaves of its training poses."""
-    some = sample_of(observations, _MOST_TO_FIT)
+    some = sample_observations(observations, _MOST_TO_FIT)
     by_jacobian = list_regressions()[chosen["regression"]].by_jacobian
     return fitted_again(
         chosen,

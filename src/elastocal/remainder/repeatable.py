@@ -26,8 +26,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.campaigns.holdout import SAME_POSE_RAD, number_configurations
-from elastocal.fitting.least_squares import ON_THE_WAY, fit
-from elastocal.fitting.observations import sample_of, state_clusters
+from elastocal.fitting.least_squares import INTERMEDIATE_TOLERANCE, fit_model
+from elastocal.fitting.observations import index_poses, sample_observations
 from elastocal.remainder.corrected import (
     FEWEST_CONFIGURATIONS,
     gain_of,
@@ -92,9 +92,9 @@ def repeatable_part(
             reweight_first_step=True,
             tolerance=INTERMEDIATE_TOLERANCE,
         )
-    group = number_configurations(
-        some.states.joint_angles, state_clusters(some.states)
-    )[some.cluster]
+    group = number_configurations(some.states.joint_angles, index_poses(some.states))[
+        some.cluster
+    ]
     count = int(group.max()) + 1
     draws = np.random.default_rng(seed)
     if count < FEWEST_CONFIGURATIONS:

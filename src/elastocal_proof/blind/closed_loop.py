@@ -44,7 +44,7 @@ from elastocal.io.storage import write_table
 from elastocal.loop.whole import calibrated_by, cases_in
 from elastocal.mechanics.kinematics import jacobians, pose_differences
 from elastocal.random_streams import open_stream as analysis_stream
-from elastocal.validation.conformity import predicted_conformity
+from elastocal.validation.conformity import decide_conformity
 from elastocal_proof.blind import schemas
 from elastocal_proof.blind.folders import write_blind_campaign
 from elastocal_proof.blind.rehearsal import (

@@ -64,8 +64,8 @@ def league_table(
             for part in mine.values()
         ]
         poses = [group_equal_rows(part[_POSE].to_numpy())[1] for part in mine.values()]
-        errors = [Errors(*each) for each in zip(distances, poses, strict=True)]
-        figures = [summary(error.distance) for error in errors]
+        errors = [PositionErrors(*each) for each in zip(distances, poses, strict=True)]
+        figures = [summarize_errors(error.distance) for error in errors]
         rms = [each["rms_m"] for each in figures]
         places = {
             "ratio": list(mine).index(reference),
