@@ -177,9 +177,9 @@ def _identified(declared: Fit) -> list[tuple[str, str]]:
     determine."""
     rms = 1e3 * np.sqrt((declared.residual[:, :3] ** 2).sum(axis=1).mean())
     named = [f"{owner} {parameter.name}" for owner, parameter in declared.parameters]
-    held = [name for name, held in zip(named, declared.held, strict=True) if held]
+    held = [name for name, held in zip(named, declared.unidentifiable, strict=True) if held]
     left = f"; not identifiable: {list_first(held, _NAMED)}" if held else ""
-    count = format_count(int((~declared.held).sum()), "parameter")
+    count = format_count(int((~declared.unidentifiable).sum()), "parameter")
     return [
         ("declared model", f"residual of {rms:.3f} mm RMS on the fitted poses"),
         (

@@ -32,7 +32,7 @@ UNDECIDED = "undecided"
 
 def count_configurations(states: States | Measurements) -> int:
     """How many configurations states or measurements are of."""
-    return int(configurations(states.joint_angles, index_poses(states)).max()) + 1
+    return int(number_configurations(states.joint_angles, index_poses(states)).max()) + 1
 
 
 def find_joint_ranges(states: States, robot: Robot) -> list[dict[str, Any]]:
@@ -57,7 +57,7 @@ def list_shortfalls(judged: int, fitted: States, robot: Robot) -> list[str]:
     found = []
     if judged < MIN_CONFIGURATIONS:
         found.append(
-            f"too few: {counted(judged, 'configuration')}, where at least {MIN_CONFIGURATIONS} must judge"
+            f"too few: {format_count(judged, 'configuration')}, where at least {MIN_CONFIGURATIONS} must judge"
         )
     moved = np.ptp(fitted.joint_angles, axis=0)
     rails = np.array(robot.chain.prismatic)

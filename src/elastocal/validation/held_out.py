@@ -316,7 +316,7 @@ def predict_left_out_squares(fitted: Fit, observations: Observations) -> np.ndar
     white = fitted.whiten(fitted.residual)
     states = observations.states
     found = []
-    configuration = configurations(states.joint_angles, index_poses(states))[
+    configuration = number_configurations(states.joint_angles, index_poses(states))[
         observations.cluster
     ]
     plain, whitened = (

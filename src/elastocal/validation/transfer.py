@@ -177,7 +177,7 @@ def find_beyond_campaign(
     nothing loads the robot. Returns (N,) of bool: by the joint angles as in
     `outside_poses`, or by its loads.
     """
-    outside = beyond_range(_angles_of_poses(fitted_states), joint_angles)
+    outside = find_poses_beyond_range(_angles_of_poses(fitted_states), joint_angles)
     return (
         outside
         if wrench is None
