@@ -100,7 +100,7 @@ from elastocal.remainder.regressions import Inputs, list_regressions
 config, folder = map(Path, sys.argv[1:])
 robots = config / "robots"
 candidates = candidates_on(sites_of(read_robot(robots / "ur10.yaml")))
-source = importer("workshop", config, "a test")
+source = find_importer("workshop", config, "a test")
 rows = np.hstack([np.arange(72.0).reshape(12, 6), np.arange(36.0).reshape(12, 3)])
 np.savetxt(folder / "values.txt", rows)
 source.write_campaign([folder / "values.txt"], folder / "campaign", robots, "workshop")
