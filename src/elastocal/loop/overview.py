@@ -177,7 +177,9 @@ def _identified(declared: Fit) -> list[tuple[str, str]]:
     determine."""
     rms = 1e3 * np.sqrt((declared.residual[:, :3] ** 2).sum(axis=1).mean())
     named = [f"{owner} {parameter.name}" for owner, parameter in declared.parameters]
-    held = [name for name, held in zip(named, declared.unidentifiable, strict=True) if held]
+    held = [
+        name for name, held in zip(named, declared.unidentifiable, strict=True) if held
+    ]
     left = f"; not identifiable: {list_first(held, _NAMED)}" if held else ""
     count = format_count(int((~declared.unidentifiable).sum()), "parameter")
     return [

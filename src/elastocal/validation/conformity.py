@@ -32,7 +32,9 @@ UNDECIDED = "undecided"
 
 def count_configurations(states: States | Measurements) -> int:
     """How many configurations states or measurements are of."""
-    return int(number_configurations(states.joint_angles, index_poses(states)).max()) + 1
+    return (
+        int(number_configurations(states.joint_angles, index_poses(states)).max()) + 1
+    )
 
 
 def find_joint_ranges(states: States, robot: Robot) -> list[dict[str, Any]]:
