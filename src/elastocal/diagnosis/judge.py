@@ -220,11 +220,11 @@ def compare_held_out_errors(
     before = _declared(steps)
     after = len(steps) - 1
     draws = open_stream(seed, case.campaign.name, "held-out poses", 0)
-    limits, reductions = figures.intervals(errors, _REPLICATES, draws, before)
-    of_calibration = figures.intervals([errors[0], errors[after]], _REPLICATES, draws)[
+    limits, reductions = figures.compute_error_intervals(errors, _REPLICATES, draws, before)
+    of_calibration = figures.compute_error_intervals([errors[0], errors[after]], _REPLICATES, draws)[
         1
     ][1]
-    floor = figures.noise_floor(
+    floor = figures.compute_noise_floor(
         steps[after].fitted, held_out.observations, *there[after]
     )
     rows = []
