@@ -220,10 +220,12 @@ def compare_held_out_errors(
     before = _declared(steps)
     after = len(steps) - 1
     draws = open_stream(seed, case.campaign.name, "held-out poses", 0)
-    limits, reductions = figures.compute_error_intervals(errors, _REPLICATES, draws, before)
-    of_calibration = figures.compute_error_intervals([errors[0], errors[after]], _REPLICATES, draws)[
-        1
-    ][1]
+    limits, reductions = figures.compute_error_intervals(
+        errors, _REPLICATES, draws, before
+    )
+    of_calibration = figures.compute_error_intervals(
+        [errors[0], errors[after]], _REPLICATES, draws
+    )[1][1]
     floor = figures.compute_noise_floor(
         steps[after].fitted, held_out.observations, *there[after]
     )
