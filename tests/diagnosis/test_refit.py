@@ -11,7 +11,7 @@ from elastocal.diagnosis.candidate_design import build_candidate_design
 from elastocal.diagnosis.refit import fit_selected_effects, select_effects
 from elastocal.diagnosis.search import search_models
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.least_squares import fit
+from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.linearization import linearize
 
 SETTINGS = Settings()

@@ -16,8 +16,6 @@ from elastocal.fitting.observations import (
     measured_in,
     sample_of,
     select_states,
-    spread_poses,
-    without_outlying_repeats,
 )
 
 if TYPE_CHECKING:
