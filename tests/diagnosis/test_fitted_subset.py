@@ -10,8 +10,8 @@ from made_folders import PLAN, made_folder, made_table
 
 from elastocal.diagnosis.fitted_subset import fit_subset, select_initial_subset
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import parameter_values
+from elastocal.fitting.least_squares import fit_model
+from elastocal.fitting.model import get_parameter_values
 from elastocal.loop.whole import cases_in
 
 SETTINGS = Settings()
@@ -50,9 +50,9 @@ def test_the_last_step_of_a_long_campaign_leaves_at_most_a_tenth_of_a_standard_e
         monkeypatch.setattr(f"elastocal.{module}.LARGE_FIT_SIZE", 30)
     monkeypatch.setattr("elastocal.fitting.least_squares._STEPPING_STONE", 36)
     one_step = subset.fit_to_all(subset.declared)
-    exact = fit(converged.model, subset.case.observations, converged.noise)
+    exact = fit_model(converged.model, subset.case.observations, converged.noise)
     after_one_step, after_convergence, at_optimum = (
-        parameter_values(fitted.model, fitted.estimate)
+        get_parameter_values(fitted.model, fitted.estimate)
         for fitted in (one_step, converged, exact)
     )
     std_error = np.sqrt(np.diag(converged.covariance))

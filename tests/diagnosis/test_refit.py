@@ -66,7 +66,7 @@ def test_the_exact_fit_has_the_priors_of_the_selection(search):
     linear_model = linearize(
         final.model, final.estimate, campaign.observations, final.conditions
     )
-    sensitivities = final.whitened(linear_model.sensitivities)
+    sensitivities = final.whiten(linear_model.sensitivities)
     rows = sensitivities.reshape(-1, len(final.parameters))
     prior_precision = np.array(
         [0.0 if p.prior_std is None else p.prior_std**-2 for _, p in final.parameters]

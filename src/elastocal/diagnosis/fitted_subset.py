@@ -10,11 +10,17 @@ import numpy as np
 from elastocal.diagnosis.candidate_design import build_candidate_design
 from elastocal.diagnosis.gross_errors import find_gross_errors
 from elastocal.diagnosis.initial_outliers import find_unexplained_observations
-from elastocal.fitting.least_squares import LONG, ON_THE_WAY, SETTLED, evaluated, fit
-from elastocal.fitting.noise import estimated_noise, fit_declared
+from elastocal.fitting.least_squares import (
+    CONVERGENCE_TOLERANCE,
+    INTERMEDIATE_TOLERANCE,
+    LARGE_FIT_SIZE,
+    evaluate_as_fit,
+    fit_model,
+)
+from elastocal.fitting.noise import estimate_noise, fit_declared_model
 from elastocal.fitting.observations import (
-    measured_in,
-    sample_of,
+    match_states_and_targets,
+    sample_observations,
     select_states,
 )
 
@@ -69,19 +75,19 @@ class FittedSubset:
         .. [1] Bickel, One-step Huber estimates in the linear model, JASA 70, 1975.
         """
         observations = self.case.observations
-        tolerance = SETTLED
+        tolerance = CONVERGENCE_TOLERANCE
         if self.search_sample is not observations:
-            tolerance = ON_THE_WAY
-            if len(observations) > LONG:
+            tolerance = INTERMEDIATE_TOLERANCE
+            if len(observations) > LARGE_FIT_SIZE:
                 tolerance = _LONG_FIT_TOLERANCE
         elif fitted is self.declared:
             return fitted
-        return fit(
+        return fit_model(
             fitted.model,
             observations,
             fitted.noise,
             fitted.estimate,
-            reweighted=True,
+            reweight_first_step=True,
             settled=tolerance,
         )
 
@@ -108,9 +114,9 @@ def fit_subset(
     if previous is not None and (kept == previous.kept).all():
         return previous
     subset = case if kept.all() else case.select(kept)
-    noise, warnings = estimated_noise(subset)
+    noise, warnings = estimate_noise(subset)
     sample = sample_for_search(case, subset, settings)
-    declared = fit_declared(subset.model, sample, noise)
+    declared = fit_declared_model(subset.model, sample, noise)
     return FittedSubset(subset, kept, noise, warnings, declared, sample)
 
 
@@ -121,7 +127,9 @@ def sample_for_search(case: Case, subset: Case, settings: Settings) -> Observati
     fits to subsets differ by nothing but the gross errors.
     """
     size = settings.searched_observations
-    return sample_of(subset.observations, size, sample_of(case.observations, size))
+    return sample_observations(
+        subset.observations, size, sample_observations(case.observations, size)
+    )
 
 
 def select_initial_subset(case: Case, settings: Settings) -> FittedSubset:
@@ -150,7 +158,7 @@ def select_initial_subset(case: Case, settings: Settings) -> FittedSubset:
     examined[left_out[np.linspace(0, len(left_out) - 1, count).astype(int)]] = True
     examined[_find_states(case, extreme)] = False
     sample = select_states(case.observations, examined)
-    reference = evaluated(
+    reference = evaluate_as_fit(
         subset.declared.model, sample, subset.noise, subset.declared.estimate
     )
     candidates = list(case.candidates.values())
@@ -159,11 +167,15 @@ def select_initial_subset(case: Case, settings: Settings) -> FittedSubset:
     )
     # A repeat far from the others is in no average. The declared model alone has judged
     # it.
-    in_sample = measured_in(measurements, sample, np.ones(len(sample), bool))
+    in_sample = match_states_and_targets(
+        measurements, sample, np.ones(len(sample), bool)
+    )
     inliers = without_outlying_repeats(measurements)
     tested = in_sample & np.isin(measurements.row, inliers.row)
     gross = np.where(
-        tested, measured_in(measurements, sample, unexplained), ~subset.kept
+        tested,
+        match_states_and_targets(measurements, sample, unexplained),
+        ~subset.kept,
     )
     return fit_subset(case, ~gross, settings, start)
 
@@ -171,7 +183,7 @@ def select_initial_subset(case: Case, settings: Settings) -> FittedSubset:
 def _find_states(case: Case, rows: np.ndarray) -> np.ndarray:
     """States in which some rows, (N,) of bool, were measured, rising, (k,) of int."""
     observations = case.observations
-    measured = measured_in(observations, case.campaign.measurements, rows)
+    measured = match_states_and_targets(observations, case.campaign.measurements, rows)
     return np.unique(observations.state[measured])
 
 

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import chdtri, fdtri
 
-from elastocal.counting import counted
+from elastocal.counting import format_count
 from elastocal.diagnosis.studentized_residuals import (
     MAX_SAMPLE_SIZE,
     PredictionUncertainty,
@@ -273,7 +273,7 @@ def format_gross_error_warnings(gross_errors: list[GrossError]) -> list[str]:
     sentences = [error.detail for error in gross_errors[:_MAX_WARNINGS]]
     remaining = len(gross_errors) - len(sentences)
     if remaining:
-        sentences.append(f"{counted(remaining, 'further row')} left out")
+        sentences.append(f"{format_count(remaining, 'further row')} left out")
     return sentences
 
 

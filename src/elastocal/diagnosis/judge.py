@@ -19,11 +19,16 @@ from elastocal.diagnosis.gross_errors import (
 )
 from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.studentized_residuals import estimate_prediction_uncertainty
-from elastocal.fitting.model import Case, conditions, measured_in_base, residuals
-from elastocal.fitting.noise import noise_from
-from elastocal.fitting.observations import single_observations, state_clusters
+from elastocal.fitting.model import (
+    Case,
+    compute_residuals,
+    evaluate_conditions,
+    transform_to_base,
+)
+from elastocal.fitting.noise import parse_noise
+from elastocal.fitting.observations import index_poses, separate_measurements
 from elastocal.io.typed_json import to_document
-from elastocal.random_streams import stream
+from elastocal.random_streams import open_stream
 from elastocal.remainder.corrected import Corrected, corrected, remainder_facts
 from elastocal.validation import held_out as figures
 from elastocal.validation.conformity import count_configurations, find_joint_ranges
@@ -181,7 +186,7 @@ def remove_gross_errors(
     if data_at_fault(diagnosis.document):
         return errors, part, poses
     settings = Settings()
-    noise = noise_from(diagnosis.document).of_measurements
+    noise = parse_noise(diagnosis.document).without_pose_error
     fitted_uncertainty = estimate_prediction_uncertainty(
         final, noise, diagnosis.case.campaign.measurements
     )

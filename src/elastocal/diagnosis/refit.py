@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.fitting.least_squares import SETTLED, fit
-from elastocal.fitting.model import parameter_values
-from elastocal.fitting.noise import with_prior
-from elastocal.fitting.normal_equations import whitening
+from elastocal.fitting.least_squares import CONVERGENCE_TOLERANCE, fit_model
+from elastocal.fitting.model import get_parameter_values
+from elastocal.fitting.noise import set_prior_std
+from elastocal.fitting.normal_equations import compute_whitening
 
 if TYPE_CHECKING:
     from elastocal.diagnosis.candidate_design import CandidateDesign
@@ -51,7 +51,7 @@ def select_effects(design: CandidateDesign, model: ScoredModel) -> SelectedEffec
         if term.candidate is None:
             continue
         size = min(scale, problem.grid.root_mean_square(term))
-        effect = with_prior(term.candidate, size * term.sizes)
+        effect = set_prior_std(term.candidate, size * term.sizes)
         effects.append((effect, np.array(term.shapes, float)))
     return tuple(effects)
 
@@ -62,7 +62,7 @@ def fit_selected_effects(
     noise: Noise,
     effects: SelectedEffects,
     near: Fit | None = None,
-    settled: float = SETTLED,
+    settled: float = CONVERGENCE_TOLERANCE,
 ) -> Fit:
     """Fit the declared model with selected effects.
 
@@ -90,16 +90,16 @@ def fit_selected_effects(
     if near is not None:
         keys_near = {effect.key for effect in near.model.effects}
         coefficients = tuple(
-            near.values_of(effect.key)[0] if effect.key in keys_near else values
+            near.effect_values(effect.key)[0] if effect.key in keys_near else values
             for effect, values in zip(model.effects, start.coefficients, strict=True)
         )
         start = replace(near.estimate, coefficients=coefficients, shapes=shapes)
-    return fit(
+    return fit_model(
         model,
         observations,
         noise,
         start,
-        reweighted=near is not None,
+        reweight_first_step=near is not None,
         settled=settled,
     )
 
@@ -119,8 +119,8 @@ def predict_reduced_chi_square(problem: SearchProblem, model: ScoredModel) -> fl
 def compute_reduced_chi_square(fitted: Fit) -> float:
     """Compute the mean square of the whitened residual of an exact fit and of its
     priors, per degree of freedom; it is 1 if the noise of the fit accounts for it."""
-    white = fitted.whitened(fitted.residual)
-    values = parameter_values(fitted.model, fitted.estimate)
+    white = fitted.whiten(fitted.residual)
+    values = get_parameter_values(fitted.model, fitted.estimate)
     squares = (white**2).sum() + ((values / fitted.prior_std) ** 2).sum()
     free_without_prior = np.isinf(fitted.prior_std) & ~fitted.held
     return float(squares / (white.size - free_without_prior.sum()))
@@ -147,10 +147,10 @@ def limit_pose_error(fitted: Fit, observations: Observations, pose_rad: float) -
     jacobian = fitted.joint_jacobian
     if jacobian is None:
         return noise
-    mean_square = (fitted.whitened(fitted.residual) ** 2).mean()
+    mean_square = (fitted.whiten(fitted.residual) ** 2).mean()
     residual = fitted.residual * np.sqrt(fitted.weights)[:, None]
     for _ in range(_MAX_NOISE_STEPS):
-        white = whitening(observations, jacobian, noise).apply(residual)
+        white = compute_whitening(observations, jacobian, noise).apply(residual)
         excess = (white**2).mean() / mean_square
         noise = noise.scaled(float(np.sqrt(excess)))
         if excess < 1.0 + _NOISE_TOLERANCE:

@@ -18,14 +18,18 @@ import numpy as np
 from scipy.special import gammaincinv
 
 from elastocal.effects.conditions import at_states
-from elastocal.fitting.linearization import by_coordinates, linearize
-from elastocal.fitting.model import conditions, parameters, residuals
-from elastocal.fitting.normal_equations import measurement_covariances
+from elastocal.fitting.linearization import linearize, linearize_coordinates
+from elastocal.fitting.model import (
+    compute_residuals,
+    evaluate_conditions,
+    list_parameters,
+)
+from elastocal.fitting.normal_equations import compute_measurement_covariances
 from elastocal.fitting.observations import (
-    parts_of,
+    select_spread_poses,
     select_states,
-    single_observations,
-    spread_poses,
+    separate_measurements,
+    split_into_blocks,
 )
 
 if TYPE_CHECKING:
@@ -293,25 +297,29 @@ def examine_residuals(
         Whether to provide for the covariance of the parameters, which is negligible
         after a fit to many rows.
     """
-    observations = single_observations(measurements)
+    observations = separate_measurements(measurements)
     in_sample = kept.copy()
-    in_sample[kept] = spread_poses(select_states(observations, kept), MAX_SAMPLE_SIZE)
-    spread = spread_poses(observations, MAX_SAMPLE_SIZE)
+    in_sample[kept] = select_spread_poses(
+        select_states(observations, kept), MAX_SAMPLE_SIZE
+    )
+    spread = select_spread_poses(observations, MAX_SAMPLE_SIZE)
     # If every row is examined, both passes share the conditions of all rows.
     shared = None
     if spread.all():
-        shared = conditions(model, estimate, observations.states)
+        shared = evaluate_conditions(model, estimate, observations.states)
     residual = np.empty((len(observations), model.rows))
-    for states, rows, part in parts_of(observations, 0):
+    for states, rows, part in split_into_blocks(observations, 0):
         around = _conditions_at(model, estimate, part, shared, states)
-        residual[rows] = residuals(model, estimate, part, around)
+        residual[rows] = compute_residuals(model, estimate, part, around)
     sensor_distance = np.linalg.norm(residual / noise.sensor_std(model.rows), axis=1)
     limit = np.quantile(sensor_distance[spread], _EXAMINED_QUANTILE)
     examined = spread | in_sample | (sensor_distance > limit)
     blocks = []
-    linearized = linearize if include_parameters else by_coordinates
-    columns = len(parameters(model, estimate))
-    for states, rows, part in parts_of(select_states(observations, examined), columns):
+    linearized = linearize if include_parameters else linearize_coordinates
+    columns = len(list_parameters(model, estimate))
+    for states, rows, part in split_into_blocks(
+        select_states(observations, examined), columns
+    ):
         around = _conditions_at(model, estimate, part, shared, states)
         linear_model = linearized(model, estimate, part, around)
         jacobian = linear_model.joint_jacobian
@@ -319,7 +327,7 @@ def examine_residuals(
             _RowBlock(
                 rows,
                 linear_model.sensitivities if include_parameters else None,
-                measurement_covariances(noise, jacobian[:, None], model.rows),
+                compute_measurement_covariances(noise, jacobian[:, None], model.rows),
                 jacobian @ jacobian.transpose(0, 2, 1),
             )
         )
@@ -337,7 +345,7 @@ def _conditions_at(
 ) -> Conditions:
     """Conditions of a part of the observations: its `states` of the shared ones."""
     if shared is None:
-        return conditions(model, estimate, part.states)
+        return evaluate_conditions(model, estimate, part.states)
     if len(part.states) == len(shared.joint_angles):
         return shared
     return at_states(shared, states)
@@ -357,7 +365,7 @@ def estimate_prediction_uncertainty(
     measurements
         Rows that the model was fitted to.
     """
-    sampled = spread_poses(single_observations(measurements), MAX_SAMPLE_SIZE)
+    sampled = select_spread_poses(separate_measurements(measurements), MAX_SAMPLE_SIZE)
     return examine_residuals(
         fitted.model,
         fitted.estimate,
