@@ -27,7 +27,7 @@ def search(kuka):
     declared_effect = campaign.candidates["joint_offset@2"]
     model = campaign.declared.model.with_effects([declared_effect])
     start = campaign.declared.estimate.with_effects([declared_effect])
-    declared = fit(model, campaign.observations, campaign.declared.noise, start)
+    declared = fit_model(model, campaign.observations, campaign.declared.noise, start)
     candidates = [
         candidate
         for candidate in campaign.all_candidates

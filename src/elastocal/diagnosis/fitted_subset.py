@@ -20,7 +20,9 @@ from elastocal.fitting.least_squares import (
 from elastocal.fitting.noise import estimate_noise, fit_declared_model
 from elastocal.fitting.observations import (
     match_states_and_targets,
+    remove_outlying_repeats,
     sample_observations,
+    select_spread_poses,
     select_states,
 )
 
@@ -88,7 +90,7 @@ class FittedSubset:
             fitted.noise,
             fitted.estimate,
             reweight_first_step=True,
-            settled=tolerance,
+            tolerance=tolerance,
         )
 
 
@@ -148,7 +150,7 @@ def select_initial_subset(case: Case, settings: Settings) -> FittedSubset:
     start = fit_subset(case, ~extreme, settings)
     subset = _leave_out_unpredicted(case, start, settings)
     limit = settings.gross_start_numbers // case.model.rows
-    examined = spread_poses(case.observations, limit)
+    examined = select_spread_poses(case.observations, limit)
     if subset is start and not examined.all():
         # No row stands out against the declared model, and the campaign is too long to
         # test every observation against all candidates.
@@ -170,7 +172,7 @@ def select_initial_subset(case: Case, settings: Settings) -> FittedSubset:
     in_sample = match_states_and_targets(
         measurements, sample, np.ones(len(sample), bool)
     )
-    inliers = without_outlying_repeats(measurements)
+    inliers = remove_outlying_repeats(measurements)
     tested = in_sample & np.isin(measurements.row, inliers.row)
     gross = np.where(
         tested,

@@ -193,7 +193,7 @@ def remove_gross_errors(
     outside = poses[index_poses(measurements)]
     for _ in range(settings.gross_error_rounds):
         # Frames of another campaign are fitted to what is kept of it.
-        model, estimate = placed(final, diagnosis.case, part)
+        model, estimate = transfer_fit(final, diagnosis.case, part)
         uncertainty = fitted_uncertainty
         if model is not final.model or estimate is not final.estimate:
             uncertainty = replace(fitted_uncertainty, parameter_covariance=None)

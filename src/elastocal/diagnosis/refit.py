@@ -62,7 +62,7 @@ def fit_selected_effects(
     noise: Noise,
     effects: SelectedEffects,
     near: Fit | None = None,
-    settled: float = CONVERGENCE_TOLERANCE,
+    tolerance: float = CONVERGENCE_TOLERANCE,
 ) -> Fit:
     """Fit the declared model with selected effects.
 
@@ -79,7 +79,7 @@ def fit_selected_effects(
     near
         A fit with other effects, if there is one. The iteration starts from its
         estimate, with its values of the effects that both models have.
-    settled
+    tolerance
         Convergence tolerance, in standard errors.
     """
     candidates = [candidate for candidate, _ in effects]
@@ -100,7 +100,7 @@ def fit_selected_effects(
         noise,
         start,
         reweight_first_step=near is not None,
-        settled=settled,
+        tolerance=tolerance,
     )
 
 
@@ -122,7 +122,7 @@ def compute_reduced_chi_square(fitted: Fit) -> float:
     white = fitted.whiten(fitted.residual)
     values = get_parameter_values(fitted.model, fitted.estimate)
     squares = (white**2).sum() + ((values / fitted.prior_std) ** 2).sum()
-    free_without_prior = np.isinf(fitted.prior_std) & ~fitted.held
+    free_without_prior = np.isinf(fitted.prior_std) & ~fitted.unidentifiable
     return float(squares / (white.size - free_without_prior.sum()))
 
 

@@ -185,7 +185,7 @@ class StudentizedResiduals:
     ) -> np.ndarray | None:
         """Covariance of the parameters by the sampled rows, (P, P), in units of their
         plausible sizes while it is inverted; None if it is negligible."""
-        free = ~fitted.held
+        free = ~fitted.unidentifiable
         if not free.any():
             return None
         in_sample = self.in_sample[self.examined]

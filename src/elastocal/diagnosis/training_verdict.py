@@ -12,6 +12,7 @@ from elastocal.diagnosis import model_averaging, refit, verdict
 from elastocal.diagnosis.gross_errors import format_gross_error_warnings
 from elastocal.fitting.model import get_joint_compliances
 from elastocal.fitting.noise import serialize_noise
+from elastocal.io.typed_json import to_document
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
