@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from elastocal.diagnosis.diagnose import Diagnosis, Step
-from elastocal.diagnosis.judge import judge, residual_blocks
+from elastocal.diagnosis.judge import generate_residual_blocks, judge
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.model import joint_compliances
 from elastocal.fitting.noise import Noise, noise_facts
@@ -72,7 +72,7 @@ def judged(steps, case, held_out):
 
 
 def blocks_of(diagnosis, held_out):
-    return list(residual_blocks(diagnosis, judge(diagnosis, held_out, 1)))
+    return list(generate_residual_blocks(diagnosis, judge(diagnosis, held_out, 1)))
 
 
 def about_errors(found):

@@ -10,8 +10,8 @@ from made_problems import made_problem, made_rows, made_unit
 from planted import planted
 
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.diagnosis.refit import Averaged, squares_beyond
-from elastocal.diagnosis.search import Alarm, Model, Posterior
+from elastocal.diagnosis.model_averaging import ModelAverage, compute_extra_squares
+from elastocal.diagnosis.search import Alarm, Posterior, ScoredModel
 from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.verdict import (
     ADEQUATE,
@@ -65,7 +65,9 @@ def made_posterior(*pairs):
     left = 1.0 - sum(probability for _, probability in pairs)
     listed = sorted([*pairs, ((), left)], key=lambda pair: -pair[1])
     models = tuple(
-        Model(tuple(sorted(units)), float(np.log(p + 1e-12)), np.ones(len(units)), 0.0)
+        ScoredModel(
+            tuple(sorted(units)), float(np.log(p + 1e-12)), np.ones(len(units)), 0.0
+        )
         for units, p in listed
     )
     return Posterior(models, np.array([probability for _, probability in listed]))
@@ -174,9 +176,9 @@ def test_of_a_law_and_a_smooth_error_that_which_adds_little_is_a_part_of_the_oth
     """Little is what laws are allowed to be off: of squares, that part which the other
     cannot make, whatever its size."""
     posterior = Posterior(
-        (Model((OFFSET_3, OTHER_2), 1.0, np.array(sizes), 0.0),), np.ones(1)
+        (ScoredModel((OFFSET_3, OTHER_2), 1.0, np.array(sizes), 0.0),), np.ones(1)
     )
-    (law, law_alone), (unknown, unknown_alone) = squares_beyond(
+    (law, law_alone), (unknown, unknown_alone) = compute_extra_squares(
         PROBLEM, posterior.models[0], {"offset"}
     )
     small = SETTINGS.law_tolerance**2
@@ -189,7 +191,7 @@ def test_of_a_law_and_a_smooth_error_that_which_adds_little_is_a_part_of_the_oth
 
 def test_nothing_is_testable_where_only_the_competitor_is_left():
     units = UNITS[OTHER_1:]
-    problem = replace(PROBLEM, units=units)
+    problem = replace(PROBLEM, terms=units)
     found = concluded(problem, made_posterior(((0,), 0.9)), RAISED)
     assert found.verdict == NOT_TESTABLE and found.best.mechanisms == ()
 
@@ -199,7 +201,7 @@ def test_a_set_up_that_holds_still_is_no_test_of_the_robot():
     tested; with one, it has a name."""
     problem = replace(
         PROBLEM,
-        units=(
+        terms=(
             made_unit("setup_step", (), 0, candidate=OF_THE_SETUP),
             *UNITS[OTHER_1:],
         ),
@@ -349,7 +351,7 @@ def test_parameters_have_their_values_errors_and_priors(found):
     fitted, _ = found
     fitted = with_value(fitted, "joint_offset@3", 3e-4, 2e-5)
     effect = effect_of(fitted, "joint_offset@3")
-    (entry,) = parameter_entries(effect, fitted, Averaged({}, {}))
+    (entry,) = parameter_entries(effect, fitted, ModelAverage({}, {}))
     assert entry == {
         "name": "joint_offset@3 offset",
         "value": pytest.approx(3e-4),
@@ -363,7 +365,7 @@ def test_parameters_have_their_values_errors_and_priors(found):
     # prior alone that says it.
     name = ("joint_offset@3", "offset")
     (entry,) = parameter_entries(
-        effect, fitted, Averaged({name: 1e-5}, {name: 4e-5}, frozenset([name]))
+        effect, fitted, ModelAverage({name: 1e-5}, {name: 4e-5}, frozenset([name]))
     )
     assert (
         entry["value"] == pytest.approx(3.1e-4)
@@ -401,10 +403,10 @@ def test_no_mass_is_told_where_the_compliances_are_not_identified(found):
     fitted, _ = found
     heavy = with_value(fitted, "payload", 24.4, 0.9)
     payload = effect_of(heavy, "payload")
-    assert parameter_entries(payload, heavy, Averaged({}, {}))[0]["unit"] == "kg"
+    assert parameter_entries(payload, heavy, ModelAverage({}, {}))[0]["unit"] == "kg"
     taken = declared_springs(heavy, 1e-6 * np.array([20.0, 8.0, 3.0, 2.0, 2.0, 2.0]))
     # Weight cannot turn the first joint, however soft it is.
-    first, *others = parameter_entries(payload, taken, Averaged({}, {}))
+    first, *others = parameter_entries(payload, taken, ModelAverage({}, {}))
     assert first["name"] == "payload compliance_of_joint_2_times_mass"
     assert (first["value"], first["std_error"]) == pytest.approx(
         (8e-6 * 24.4, 8e-6 * 0.9)

@@ -27,7 +27,7 @@ from elastocal.application.compensation import (
 )
 from elastocal.application.frames import root_mean_square
 from elastocal.application.statements import format_accuracy, format_millimetres
-from elastocal.counting import counted, first_names, grouped
+from elastocal.counting import format_count, format_integer, list_first
 from elastocal.errors import InputError
 from elastocal.exchange.target_path import NO_BOUND, OK, TargetPath
 from elastocal.mechanics.components import WRENCH_NAMES
@@ -82,7 +82,7 @@ class CorrectedPath:
     @property
     def count(self) -> str:
         """Number of targets in words."""
-        return counted(len(self.wanted), "target")
+        return format_count(len(self.wanted), "target")
 
 
 def correct_path(
@@ -159,7 +159,7 @@ def _check_reached(
         raise InputError(
             source,
             "",
-            first_names(failures, _LINES_NAMED),
+            list_first(failures, _LINES_NAMED),
             "poses that the robot reaches within its limits,"
             " in the posture that q1..qn state if any",
         )
@@ -182,7 +182,7 @@ def _describe_large_steps(
                 f"{line} turns by {math.degrees(step.size):.1f} degrees,"
                 f" {math.degrees(step.allowed):.1f} allowed"
             )
-    return first_names(sentences, most)
+    return list_first(sentences, most)
 
 
 def tabulate_targets(path: CorrectedPath) -> pd.DataFrame:
@@ -258,7 +258,7 @@ def describe_regression(path: CorrectedPath, regression: str) -> str:
         size = f"{format_millimetres(rms)} RMS"
     return (
         f"a {regression} on what the model leaves corrects"
-        f" {grouped((lengths_m > 0.0).sum())} of {path.count} by {size}"
+        f" {format_integer((lengths_m > 0.0).sum())} of {path.count} by {size}"
     )
 
 
@@ -272,13 +272,13 @@ def describe_path_warnings(path: CorrectedPath) -> list[str]:
         )
     if not path.has_bound.all():
         warnings.append(
-            f"no bound is stated for {grouped((~path.has_bound).sum())} of"
+            f"no bound is stated for {format_integer((~path.has_bound).sum())} of"
             f" {path.count}: beyond {LOAD_FACTOR_WITH_BOUND:g} times the measured loads"
             " or outside the fitted range of joints"
         )
     if path.is_extrapolated.any():
         warnings.append(
-            f"{grouped(path.is_extrapolated.sum())} of {path.count} lie beyond the poses"
+            f"{format_integer(path.is_extrapolated.sum())} of {path.count} lie beyond the poses"
             " or loads of the campaign: their predicted errors are extrapolated"
         )
     return warnings

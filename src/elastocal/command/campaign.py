@@ -19,8 +19,8 @@ from elastocal.command.terminal import (
     print_answer,
     print_lines,
 )
-from elastocal.counting import counted
-from elastocal.errors import InputError, steering
+from elastocal.counting import format_count
+from elastocal.errors import InputError, find_control_character
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -53,9 +53,12 @@ def init(
     from rich.console import Console
 
     from elastocal.campaigns.campaign import DOCUMENT
-    from elastocal.campaigns.measurements import CSV, PARQUET, described_by
+    from elastocal.campaigns.measurements import CSV, PARQUET, read_measured_targets
     from elastocal.campaigns.reading import read_robot
-    from elastocal.campaigns.writing import campaign_template, sheet_template
+    from elastocal.campaigns.writing import (
+        format_campaign_template,
+        format_sheet_header,
+    )
     from elastocal.io.atomic_writes import check_places, write_text, write_together
     from elastocal.io.documents import LARGEST_BYTES
     from elastocal.io.texts import read_text
@@ -63,13 +66,15 @@ def init(
     check_places(*(folder / name for name in (_ROBOT, DOCUMENT, CSV, PARQUET)))
     _check_new_campaign(folder / DOCUMENT, folder / _ROBOT, robot)
     arm = read_robot(robot or folder / _ROBOT)
-    targets, measured = described_by(folder)
+    targets, measured = read_measured_targets(folder)
     files = {}
     if robot is not None:
         files[_ROBOT] = read_text(robot, LARGEST_BYTES)
     if not (folder / CSV).exists() and not (folder / PARQUET).exists():
-        files[CSV] = sheet_template(arm.joints)
-    files[DOCUMENT] = campaign_template(folder.resolve().name, arm, targets, measured)
+        files[CSV] = format_sheet_header(arm.joints)
+    files[DOCUMENT] = format_campaign_template(
+        folder.resolve().name, arm, targets, measured
+    )
     with write_together(folder, files) as partial:
         for name, text in files.items():
             write_text(partial / name, text)
@@ -110,10 +115,10 @@ def check(folder: Annotated[Path, Argument(help="Folder of the campaign.")]) -> 
 
     report = overview(folder, find_robots_folder())
     if report.diagnosable:
-        testable = counted(report.testable, "candidate effect")
+        testable = format_count(report.testable, "candidate effect")
         answer = f"{report.campaign} can be diagnosed: {testable} can be tested"
         if report.attention:
-            answer += f"; {counted(len(report.attention), 'remark')} below"
+            answer += f"; {format_count(len(report.attention), 'remark')} below"
         next_step = f"elastocal diagnose {folder}"
     else:
         answer = f"{report.campaign} cannot be diagnosed: the data are at fault"
@@ -170,7 +175,7 @@ def diagnose(
 def _check_path(folder: Path, path: str) -> None:
     """Refuse a path with characters that mean something else to Snakemake."""
     marks = [mark for mark in _REFUSED_IN_PATHS if mark in path]
-    mark = marks[0] if marks else steering(path)
+    mark = marks[0] if marks else find_control_character(path)
     if mark:
         raise InputError(
             folder,
@@ -182,8 +187,8 @@ def _check_path(folder: Path, path: str) -> None:
 
 def _print_outcome(folder: Path, workplace: Path, console: Console) -> None:
     """Print the outcome of a diagnosis that is up to date."""
-    from elastocal.campaigns.reading import read_descriptions
+    from elastocal.campaigns.campaign_folder import read_campaign_folder
     from elastocal.report.outcome import outcome
 
-    name = read_descriptions(folder, find_robots_folder())[0]["campaign"]
+    name = read_campaign_folder(folder, find_robots_folder()).name
     print_lines(outcome([f"reports/loop/{name}/report.pdf"], workplace), console)

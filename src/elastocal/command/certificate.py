@@ -10,7 +10,6 @@ import typer
 from typer import Argument, Option
 
 from elastocal.command.terminal import (
-    find_robots_folder,
     find_workplace,
     load_diagnosed_campaign,
     parse_length_m,
@@ -63,9 +62,7 @@ def certificate(
             "a campaign whose data are in order; its report says what is wrong",
         )
     with console.status("working"):
-        document = calibrated_files.certificate(
-            folder, find_robots_folder(), campaign, tolerance_m, risk
-        )
+        document = calibrated_files.certificate(campaign, tolerance_m, risk)
         facts = certificate_facts(document)
         _write_certificate(report, document, facts)
     passed = facts["decision"] == "pass"

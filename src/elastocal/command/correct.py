@@ -140,9 +140,9 @@ class _Program:
 
 def _plan_program(output: Path, language: str, axes: str) -> _Program | None:
     """Refuse options that do not go together; None if no program is wanted."""
-    from elastocal.exchange.controllers import check_name, controller_of
+    from elastocal.exchange.controllers import check_name, find_controller
 
-    controller = controller_of(language, "") if language else None
+    controller = find_controller(language) if language else None
     if output.suffix != ".csv":
         raise InputError(
             "--output",

@@ -15,7 +15,7 @@ from elastocal.command.terminal import (
     print_answer,
     print_lines,
 )
-from elastocal.counting import counted
+from elastocal.counting import format_count
 
 # Fewer candidates than a real plan takes, for a demonstration of a minute.
 _PLAN = (
@@ -55,8 +55,9 @@ def demo(
     from rich.console import Console
 
     from elastocal.application.frames import root_mean_square
+    from elastocal.campaigns.campaign_folder import read_campaign_folder
     from elastocal.campaigns.measurements import CSV
-    from elastocal.campaigns.reading import read_descriptions, read_robot
+    from elastocal.campaigns.reading import read_robot
     from elastocal_proof.blind.rehearsal import (
         fill_sheet,
         hidden_robot,
@@ -82,8 +83,8 @@ def demo(
             raise typer.Exit(code)
 
     run("plan", robot_file, "--folder", folder, *_PLAN.split())
-    document = read_descriptions(folder, find_robots_folder())[0]
-    count = counted(fill_sheet(folder / CSV, document, robot, seed), "measurement")
+    document = read_campaign_folder(folder, find_robots_folder()).document
+    count = format_count(fill_sheet(folder / CSV, document, robot, seed), "measurement")
     note = f"# The simulated robot is measured: {count} in {folder / CSV}"
     print_lines(["", note], console)
     run("check", folder)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from typer import Argument, Option
 
 from elastocal.command.terminal import load_diagnosed_campaign, print_answer
-from elastocal.counting import counted
+from elastocal.counting import format_count
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
@@ -151,7 +151,7 @@ def _write_robot(path: Path, folded: FoldedRobot, campaign: str) -> None:
 
 def _describe_urdf(corrected: CorrectedUrdf, deviation_m: float) -> list[str]:
     """Say what was changed in the user's URDF, and how far it is from the robot file."""
-    changed = counted(corrected.changed, "joint origin")
+    changed = format_count(corrected.changed, "joint origin")
     sentences = [
         f"{URDF}: {changed} changed, nothing else;"
         " put it where the old one is, beside its meshes"

@@ -15,7 +15,7 @@ from elastocal.command.terminal import (
     format_example,
     print_lines,
 )
-from elastocal.counting import counted
+from elastocal.counting import format_count
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
@@ -203,7 +203,7 @@ def csv(
     Columns are found by their usual names (q1 or J1 or Axis 1, x, y, z, qw .. qz, r11
     .. r33, t11 .. t34, fx .. mz, pose, load, repeat, target, time) or as the robot's
     file calls its joints, units by brackets or endings ("X [mm]", x_mm). What is
-    ambiguous is asked for. Poses, loads and repeats are counted where no column numbers
+    ambiguous is asked for. Poses, loads and repeats are format_count where no column numbers
     them. The end of the output states what was read, how, and what was left out.
     """
     from rich.console import Console
@@ -330,12 +330,12 @@ def _parse_targets(texts: list[str]) -> tuple[str | None, dict[str, list[str]]]:
 def _read_declared(folder: Path) -> tuple[set[str], Path | None]:
     """Read the targets and the robot file of a campaign.yaml that is there already."""
     from elastocal.campaigns.campaign import DOCUMENT
-    from elastocal.campaigns.reading import read_descriptions
+    from elastocal.campaigns.campaign_folder import read_campaign_folder
 
     if not (folder / DOCUMENT).is_file():
         return set(), None
-    document, robot_file = read_descriptions(folder, find_robots_folder())
-    return {*document["targets"]}, robot_file
+    campaign = read_campaign_folder(folder, find_robots_folder())
+    return {*campaign.document["targets"]}, campaign.robot_file
 
 
 def _describe_import(imported: ImportedMeasurements) -> list[str]:
@@ -351,10 +351,10 @@ def _describe_import(imported: ImportedMeasurements) -> list[str]:
         readings.append(f"{name} from {column!r}{unit}")
     skipped = []
     if imported.skipped:
-        skipped.append(f"{counted(imported.skipped, 'row')} without a position")
+        skipped.append(f"{format_count(imported.skipped, 'row')} without a position")
     lists = {
         "left out": skipped,
-        "counted, as no column has it": [
+        "format_count, as no column has it": [
             name for name in ("pose", "load", "repeat") if name not in columns
         ],
         "taken for zero, as no column has it": [
@@ -384,6 +384,6 @@ def _describe_size(imported: ImportedMeasurements) -> str:
     poses = len(np.unique(np.column_stack([session, pose]), axis=0))
     targets = ", ".join(sorted(set(imported.table["target"].tolist())))
     return (
-        f"{counted(len(pose), 'measurement')} of {targets}"
-        f" at {counted(poses, 'pose')}, {counted(imported.joints, 'joint')}"
+        f"{format_count(len(pose), 'measurement')} of {targets}"
+        f" at {format_count(poses, 'pose')}, {format_count(imported.joints, 'joint')}"
     )

@@ -18,7 +18,7 @@ from elastocal.command.export import export
 from elastocal.command.importing import importing
 from elastocal.command.plan import plan
 from elastocal.command.terminal import format_example
-from elastocal.errors import InputError, fault_of_machine
+from elastocal.errors import InputError, describe_system_fault
 
 # Each subcommand with the words of an example, in the order in which a calibration needs
 # them; `import` is a group of its own.
@@ -86,4 +86,4 @@ def main() -> None:
     except InputError as error:
         sys.exit(str(error))
     except (OSError, MemoryError, ImportError) as error:
-        sys.exit(str(fault_of_machine(error)))
+        sys.exit(str(describe_system_fault(error)))

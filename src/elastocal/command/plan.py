@@ -21,8 +21,8 @@ from elastocal.command.terminal import (
     parse_numbers,
     print_answer,
 )
-from elastocal.counting import counted
-from elastocal.errors import InputError, text_fault
+from elastocal.counting import format_count
+from elastocal.errors import InputError, find_text_fault
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -160,9 +160,9 @@ def plan(
     sentences = _describe_plan(survey, chosen, sensor)
     rows = _write_campaign(folder, robot, _PlannedCell(survey, cell, chosen), sentences)
     print_answer(
-        f"{counted(poses, 'pose')} to fit and {held_out} held out, of"
+        f"{format_count(poses, 'pose')} to fit and {held_out} held out, of"
         f" {len(candidates.joint_angles):,} that the cell allows:"
-        f" {counted(rows, 'measurement')}",
+        f" {format_count(rows, 'measurement')}",
         [*sentences, f"sheet to print: {folder / SHEET}"],
         f"measure, fill in {folder / CSV}, then elastocal check {folder}",
         console,
@@ -199,10 +199,10 @@ def _choose_sensor(
 
 def _check_new_folder(folder: Path) -> None:
     """Refuse a folder that exists."""
-    from elastocal.io.texts import kind_of
+    from elastocal.io.texts import describe_file_kind
 
     if os.path.lexists(folder):
-        kind = kind_of(os.lstat(folder).st_mode)
+        kind = describe_file_kind(os.lstat(folder).st_mode)
         raise InputError(folder, "", f"{kind} that is there", "a new one")
 
 
@@ -278,7 +278,7 @@ def _split_target(text: str, points: list[str]) -> tuple[str, str, str | None]:
             f"a name of {len(name)} characters",
             f"1 to {_LONGEST_NAME}, such as A:{point}",
         )
-    if fault := text_fault(name):
+    if fault := find_text_fault(name):
         raise InputError("--target", "", *fault)
     return name, point, offset
 

@@ -8,21 +8,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.campaigns.campaign import NO_REMAINDER, Measurements, residual_columns
-from elastocal.counting import counted
+from elastocal.campaigns.campaign import NO_REMAINDER, Measurements, tabulate_residuals
+from elastocal.counting import format_count
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.gross_errors import (
     OutlierTest,
-    entries_of,
+    describe_gross_errors,
     estimate_prediction_uncertainty,
-    held_out_gross_errors,
-    warnings_of,
+    find_held_out_gross_errors,
+    format_gross_error_warnings,
 )
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.model import Case, conditions, measured_in_base, residuals
 from elastocal.fitting.noise import noise_from
 from elastocal.fitting.observations import single_observations, state_clusters
-from elastocal.random_streams import stream
+from elastocal.random_streams import open_stream
 from elastocal.remainder.corrected import Corrected, corrected, remainder_facts
 from elastocal.validation import held_out as figures
 from elastocal.validation.conformity import count_configurations, joint_ranges
@@ -46,7 +46,7 @@ _ERRORS = {
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Judgement:
     """A diagnosis with what held-out poses say of it.
 
     `document`: contents of verdict.json. `rows`: of before_after.csv. `held_out`: what
@@ -63,7 +63,7 @@ class Verdict:
     delivered: Corrected | None
 
 
-def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
+def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
     """Open the held-out poses and state the verdict.
 
     `held_out`: the held-out measurements; of another campaign, whose frames and targets
@@ -71,9 +71,9 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     """
     case = diagnosis.case
     steps = diagnosis.steps
-    errors, part, outside = without_gross_errors(diagnosis, held_out)
-    left_out = entries_of(errors, held_out.campaign, held_out=True)
-    rows, heldout, warnings = heldout_errors(steps, case, part, outside, seed)
+    errors, part, outside = remove_gross_errors(diagnosis, held_out)
+    left_out = describe_gross_errors(errors, held_out.campaign, held_out=True)
+    rows, heldout, warnings = compare_held_out_errors(steps, case, part, outside, seed)
     whole = (
         [figures.summary(error.distance) for error in _errors(steps, case, held_out)[1]]
         if left_out
@@ -90,7 +90,7 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
         {"before": whole[_declared(steps)], "after": whole[-1]} if left_out else None
     )
     if left_out:
-        gross = counted(len(left_out), "gross error")
+        gross = format_count(len(left_out), "gross error")
         sizes = [1e3 * each["rms_m"] for each in (whole[-1], heldout["after"])]
         words = "with all rows the RMS is {:.3g} mm instead of {:.3g} mm".format(*sizes)
         warnings.append(f"held-out errors are without {gross}: {words}")
@@ -104,9 +104,9 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     }
     found = diagnosis.document
     remainder = None
-    delivered = as_delivered(diagnosis, part, seed)
+    delivered = apply_regression(diagnosis, part, seed)
     if delivered is not None:
-        draws = stream(seed, case.campaign.name, "remainder", 0)
+        draws = open_stream(seed, case.campaign.name, "remainder", 0)
         remainder = remainder_facts(
             delivered, diagnosis.declared, diagnosis.final, case, part, draws
         )
@@ -119,9 +119,13 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
         "heldout": heldout,
         "remainder": remainder,
         "gross_errors": [*found["gross_errors"], *left_out],
-        "warnings": [*found["warnings"], *warnings_of(left_out), *warnings],
+        "warnings": [
+            *found["warnings"],
+            *format_gross_error_warnings(left_out),
+            *warnings,
+        ],
     }
-    return Verdict(
+    return Judgement(
         document,
         rows,
         part,
@@ -131,7 +135,9 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     )
 
 
-def as_delivered(diagnosis: Diagnosis, held_out: Case, seed: int) -> Corrected | None:
+def apply_regression(
+    diagnosis: Diagnosis, held_out: Case, seed: int
+) -> Corrected | None:
     """The final model with the regression that a campaign asks for, on held-out poses
     without gross errors; None for none."""
     campaign = diagnosis.case.campaign
@@ -153,7 +159,7 @@ def as_delivered(diagnosis: Diagnosis, held_out: Case, seed: int) -> Corrected |
     )
 
 
-def without_gross_errors(
+def remove_gross_errors(
     diagnosis: Diagnosis, held_out: Case
 ) -> tuple[OutlierTest, Case, np.ndarray]:
     """Held-out rows that the final model does not explain, by the rule of the training
@@ -176,7 +182,7 @@ def without_gross_errors(
         # Frames of another campaign are fitted to what is kept of it.
         there = placed(final, diagnosis.case, part)
         last = errors.gross
-        errors = held_out_gross_errors(
+        errors = find_held_out_gross_errors(
             final, there, yardstick, held_out, outside, settings
         )
         part = held_out.select(~errors.gross) if errors.gross.any() else held_out
@@ -190,7 +196,7 @@ def without_gross_errors(
     )
 
 
-def heldout_errors(
+def compare_held_out_errors(
     steps: Sequence[Step], case: Case, held_out: Case, outside: np.ndarray, seed: int
 ) -> tuple[list[dict[str, Any]], dict[str, Any], list[str]]:
     """Errors of every step on training and held-out poses.
@@ -201,7 +207,7 @@ def heldout_errors(
     there, errors = _errors(steps, case, held_out)
     before = _declared(steps)
     after = len(steps) - 1
-    draws = stream(seed, case.campaign.name, "held-out poses", 0)
+    draws = open_stream(seed, case.campaign.name, "held-out poses", 0)
     limits, reductions = figures.intervals(errors, _REPLICATES, draws, before)
     of_calibration = figures.intervals([errors[0], errors[after]], _REPLICATES, draws)[
         1
@@ -262,7 +268,7 @@ def heldout_errors(
         "outside_range": by_range,
     }
     if count := by_range["poses"]:
-        lie = f"{count} of {counted(len(outside), 'validation pose')} {'lies' if count == 1 else 'lie'}"
+        lie = f"{count} of {format_count(len(outside), 'validation pose')} {'lies' if count == 1 else 'lie'}"
         warnings.append(
             f"{lie} outside the range of the fitted poses: errors there are extrapolated"
         )
@@ -290,8 +296,8 @@ def _declared(steps: Sequence[Step]) -> int:
     return next(number for number, step in enumerate(steps) if step.kind == "declared")
 
 
-def residual_blocks(
-    diagnosis: Diagnosis, verdict: Verdict
+def generate_residual_blocks(
+    diagnosis: Diagnosis, verdict: Judgement
 ) -> Iterator[dict[str, np.ndarray]]:
     """Blocks of the residuals table: every measurement before and after, gross errors
     behind the others."""
@@ -323,6 +329,6 @@ def residual_blocks(
                 for stage, each in zip(("before", "after"), there, strict=True)
             }
             position = measured_in_base(there[-1][1], observations)[0]
-            yield residual_columns(
+            yield tabulate_residuals(
                 some, unseen, some is left_out, beyond, position, off
             )

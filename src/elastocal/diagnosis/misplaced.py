@@ -47,7 +47,7 @@ _LINK = "link_geometry"
 _OFFSET = "joint_offset"
 
 
-def misplaced(fitted: Fit, campaign: Campaign) -> list[dict[str, Any]]:
+def find_misplaced_frames(fitted: Fit, campaign: Campaign) -> list[dict[str, Any]]:
     """Findings, the surest first.
 
     Returns of each ``place``: "tool", "base" or "link 3"; ``alternatives``, which say
@@ -166,7 +166,7 @@ def misplaced(fitted: Fit, campaign: Campaign) -> list[dict[str, Any]]:
     return found
 
 
-def point_sentence(campaign: Campaign) -> str:
+def describe_reference_point(campaign: Campaign) -> str:
     """Of which point a corrected robot is known: that of its end effector, as the
     targets on it were declared."""
     end = campaign.robot.chain.end_effector.name

@@ -27,13 +27,13 @@ from elastocal.application.scope import (
     set_form_error,
 )
 from elastocal.application.statements import tabulate_errors
-from elastocal.campaigns.reading import campaign_files, read_descriptions
-from elastocal.diagnosis.misplaced import point_sentence
+from elastocal.campaigns.campaign_folder import CampaignFolder, read_campaign_folder
+from elastocal.diagnosis.misplaced import describe_reference_point
 from elastocal.errors import InputError
 from elastocal.fitting.noise import noise_from
 from elastocal.io.json_files import read_json
 from elastocal.io.origin import configuration_sha256
-from elastocal.io.records import check_sources, checksum, jobs_behind
+from elastocal.io.records import check_sources, trace_jobs
 from elastocal.loop.diagnosis_tables import load_case, rows_left_out, step_model
 from elastocal.remainder.corrected import predictor_of
 from elastocal.validation.conformity import (
@@ -55,17 +55,22 @@ if TYPE_CHECKING:
 class Diagnosed:
     """A campaign and what its diagnosis found.
 
-    `name`: of the campaign. `case`: of the training poses, without their gross errors.
+    `folder`: of the campaign. `case`: of the training poses, without their gross errors.
     `facts`, `verdict`: contents of diagnosis.json and verdict.json. `origin`:
     ``commit`` of the jobs that made them, ``code_sha256`` and ``data_sha256`` of all
     that they read of the program and of the campaign, ``environment``.
     """
 
-    name: str
+    folder: CampaignFolder
     case: Case
     facts: dict[str, Any]
     verdict: dict[str, Any]
     origin: dict[str, Any]
+
+    @property
+    def name(self) -> str:
+        """Name of the campaign."""
+        return self.folder.name
 
     @cached_property
     def calibrated(self) -> CalibratedRobot:
@@ -115,11 +120,12 @@ def load_diagnosed(
     """A campaign that was diagnosed, of which nothing has changed since, in the folder
     that holds results/ and reports/.
 
-    An InputError refuses what is not as `jobs_behind` asks of all jobs behind its
+    An InputError refuses what is not as `trace_jobs` asks of all jobs behind its
     report or `check_sources` of those behind its verdict, and other files of the
     campaign than were read.
     """
-    name = read_descriptions(folder, robots_folder)[0]["campaign"]
+    campaign_folder = read_campaign_folder(folder, robots_folder)
+    name = campaign_folder.name
     results = f"results/loop/{name}"
     reports = f"reports/loop/{name}"
     tables = Path(top, results)
@@ -128,8 +134,8 @@ def load_diagnosed(
     if not verdict.exists() and not (tables / "diagnosis.json").exists():
         raise InputError(folder, "", f"no diagnosis of it in {tables}", fresh)
     # The report has all other files behind it.
-    jobs_behind([f"{reports}/report.html"], top)
-    jobs = jobs_behind([f"{reports}/verdict.json"], top)
+    trace_jobs([f"{reports}/report.html"], top)
+    jobs = trace_jobs([f"{reports}/verdict.json"], top)
     check_sources(jobs, top, f"results of this version: {fresh}")
     reader = next(job for job in jobs if f"{results}/campaign.json" in job.outputs)
     # The user's files may have moved since.
@@ -138,8 +144,7 @@ def load_diagnosed(
         for file in reader.own or reader.made_inputs
     }
     now = {
-        (Path(file).name, checksum(file))
-        for file in campaign_files(folder, robots_folder)
+        (Path(file).name, digest) for file, digest in campaign_folder.digests.items()
     }
     if (
         not data
@@ -170,7 +175,7 @@ def load_diagnosed(
         },
     }
     return Diagnosed(
-        name,
+        campaign_folder,
         case.select(~rows_left_out(case, facts)),
         facts,
         read_json(verdict),
@@ -183,19 +188,14 @@ def _listed(values: Iterable[str]) -> str:
 
 
 def certificate(
-    folder: str | Path,
-    robots_folder: str | Path,
-    found: Diagnosed,
-    tolerance_m: float,
-    accepted_risk: float,
+    found: Diagnosed, tolerance_m: float, accepted_risk: float
 ) -> dict[str, Any]:
     """Contents of a certificate: all of the corrected robot is predicted, at the poses
     and loads of the campaign.
 
-    `folder`, `robots_folder`: as in `reading.read_campaign`. `found`: the campaign.
-    Returns JSON-serialisable.
+    `found`: the campaign. Returns JSON-serialisable.
     """
-    document = read_descriptions(folder, robots_folder)[0]
+    document = found.folder.document
     calibrated, verdict, heldout = (
         found.calibrated,
         found.verdict,
@@ -232,8 +232,7 @@ def certificate(
         "version": __version__,
         "origin": found.origin,
         "files": {
-            Path(file).name: checksum(file)
-            for file in campaign_files(folder, robots_folder)
+            Path(file).name: digest for file, digest in found.folder.digests.items()
         },
         "verdict": verdict["verdict"],
         "repeatable": verdict["repeatable"],
@@ -246,7 +245,7 @@ def certificate(
         "regression": (verdict["remainder"] or {}).get("words", ""),
         "noise_floor_rms_m": heldout["noise_floor_rms_m"],
         "accuracy": asdict(accuracy),
-        "point": point_sentence(found.case.campaign),
+        "point": describe_reference_point(found.case.campaign),
         "misplaced": verdict["misplaced"],
         "worst_pose": {"joints": joints, "error_m": float(prediction.error_m[worst])},
         "conformity": asdict(decision)

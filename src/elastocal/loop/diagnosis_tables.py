@@ -10,18 +10,18 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.diagnosis.diagnose import Diagnosis, Step, diagnose
-from elastocal.diagnosis.next_experiment import propose
-from elastocal.diagnosis.search import initial_screening
+from elastocal.diagnosis.next_experiment import propose_experiment
+from elastocal.diagnosis.search import screen_terms
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.model import Estimate, case_from, parameters
 from elastocal.fitting.noise import noise_facts, noise_from
 from elastocal.io.json_files import read_json, write_json
-from elastocal.io.origin import provenance
+from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import read_table, write_table
 from elastocal.loop.schemas import STEPS, measurements
 from elastocal.mechanics.robot_file import robot_from_document
-from elastocal.random_streams import stream
+from elastocal.random_streams import open_stream
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -52,8 +52,10 @@ def diagnose_campaign(job: Any) -> None:
         seed,
         lambda line: print(f"{name}: {line}", file=sys.stderr, flush=True),
     )
-    columns, facts = propose(
-        found, stream(seed, case.campaign.name, "next experiment", 0), job.params.states
+    columns, facts = propose_experiment(
+        found,
+        open_stream(seed, case.campaign.name, "next experiment", 0),
+        job.params.states,
     )
     write_csv(job.output.experiment, pd.DataFrame(columns))
     found = replace(found, document=found.document | {"next_experiment": facts})
@@ -66,7 +68,7 @@ def diagnose_campaign(job: Any) -> None:
         job.output.steps,
         STEPS,
         step_blocks(found),
-        provenance(job.params, **job.wildcards),
+        describe_provenance(job.params, **job.wildcards),
     )
 
 
@@ -209,18 +211,20 @@ def candidate_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     if evidence:
         problem = evidence.linearized.problem
         untestable = evidence.linearized.untestable
-        factors = initial_screening(problem)[1]
-        inclusion = np.zeros(len(problem.units))
+        factors = screen_terms(problem)[1]
+        inclusion = np.zeros(len(problem.terms))
         for model, probability in zip(
             evidence.posterior.models, evidence.posterior.probabilities, strict=True
         ):
-            inclusion[list(model.units)] += probability
+            inclusion[list(model.term_indices)] += probability
         best = evidence.conclusion.best
         chosen = (
-            set(evidence.posterior.models[best.model].units) if best.named else set()
+            set(evidence.posterior.models[best.model].term_indices)
+            if best.named
+            else set()
         )
         for number in np.argsort(-factors):
-            unit = problem.units[number]
+            unit = problem.terms[number]
             if unit.candidate:
                 shape = unit.shapes[0] if unit.shapes else None
                 rows.append(

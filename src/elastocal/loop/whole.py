@@ -18,15 +18,16 @@ from elastocal.application.scope import (
     calibrate_on_case,
     set_form_error,
 )
-from elastocal.campaigns.campaign import columns_of
+from elastocal.campaigns.campaign import tabulate_measurements
+from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.diagnose import diagnose
-from elastocal.diagnosis.judge import judge, residual_blocks
-from elastocal.diagnosis.misplaced import misplaced
+from elastocal.diagnosis.judge import generate_residual_blocks, judge
+from elastocal.diagnosis.misplaced import find_misplaced_frames
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.model import Case, case_from
 from elastocal.io.json_files import read_json, write_json
-from elastocal.io.origin import provenance
+from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import write_table
 from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop.loading import load_campaign
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
 
     from elastocal.application.calibrated import CalibratedRobot
     from elastocal.diagnosis.diagnose import Diagnosis
-    from elastocal.diagnosis.judge import Verdict
+    from elastocal.diagnosis.judge import Judgement
     from elastocal.remainder.corrected import Corrected
 
 
@@ -60,20 +61,24 @@ def judge_campaign(job: Any) -> None:
     write_table(
         job.output.residuals,
         schema,
-        residual_blocks(found, verdict),
-        provenance(job.params, **job.wildcards),
+        generate_residual_blocks(found, verdict),
+        describe_provenance(job.params, **job.wildcards),
     )
 
 
 def cases_in(folder: str | Path, robots_folder: str | Path) -> tuple[Case, Case]:
     """Training and held-out cases of a campaign's folder.
 
-    `folder`, `robots_folder`: as in `reading.read_campaign`.
+    `folder`, `robots_folder`: as in `read_campaign_folder`.
     """
-    descriptions, training, held_out = load_campaign(folder, robots_folder)
+    descriptions, training, held_out = load_campaign(
+        read_campaign_folder(folder, robots_folder)
+    )
     return (
-        case_from(descriptions, columns_of(training)),
-        case_from(descriptions["held_out"] or descriptions, columns_of(held_out)),
+        case_from(descriptions, tabulate_measurements(training)),
+        case_from(
+            descriptions["held_out"] or descriptions, tabulate_measurements(held_out)
+        ),
     )
 
 
@@ -85,7 +90,7 @@ def diagnosed(
 ) -> dict[str, Any]:
     """Diagnose a campaign and judge it on its held-out poses.
 
-    `folder`, `robots_folder`: as in `reading.read_campaign`. Returns as verdict.json.
+    `folder`, `robots_folder`: as in `read_campaign_folder`. Returns as verdict.json.
     """
     training, held_out = cases_in(folder, robots_folder)
     return judged(
@@ -102,7 +107,7 @@ def calibrated_by(
     """The robot that a diagnosis found, with all that is known of its errors: held-out
     rows without gross ones judge it.
 
-    `delivered`: of `judge.as_delivered`. `physics_only`: corrected without its
+    `delivered`: of `judge.apply_regression`. `physics_only`: corrected without its
     regression; where there is one, what the final model leaves is known to be no noise.
     """
     case = diagnosis.case
@@ -128,7 +133,7 @@ def calibrated_by(
     return inflate_to_held_out_errors(found, held_out, residual, noise_m)
 
 
-def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
+def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
     """The verdict of a diagnosis on held-out poses, with the accuracy of the corrected
     robot and the cost of each effect.
 
@@ -151,7 +156,7 @@ def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     if not data_at_fault(verdict.document):
         found = calibrated_by(diagnosis, verdict.held_out, verdict.delivered)
         stated |= _accuracy(found) | {
-            "misplaced": misplaced(diagnosis.final, diagnosis.case.campaign)
+            "misplaced": find_misplaced_frames(diagnosis.final, diagnosis.case.campaign)
         }
         if found.residual_model is not None:
             stated["physics"] = _accuracy(

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.campaigns.holdout import SAME_POSE_RAD, configurations
+from elastocal.campaigns.holdout import SAME_POSE_RAD, number_configurations
 from elastocal.fitting.least_squares import ON_THE_WAY, fit
 from elastocal.fitting.observations import sample_of, state_clusters
 from elastocal.remainder.corrected import (
@@ -92,9 +92,9 @@ def repeatable_part(
             reweighted=True,
             settled=ON_THE_WAY,
         )
-    group = configurations(some.states.joint_angles, state_clusters(some.states))[
-        some.cluster
-    ]
+    group = number_configurations(
+        some.states.joint_angles, state_clusters(some.states)
+    )[some.cluster]
     count = int(group.max()) + 1
     draws = np.random.default_rng(seed)
     if count < FEWEST_CONFIGURATIONS:

@@ -26,12 +26,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.stats import chi2
 
+from elastocal.diagnosis.candidate_design import build_candidate_design
 from elastocal.diagnosis.diagnose import Step
 from elastocal.diagnosis.evidence import log_sum_exp
-from elastocal.diagnosis.judge import heldout_errors
-from elastocal.diagnosis.linearize import linearized
-from elastocal.diagnosis.refit import fit_with_sizes
-from elastocal.diagnosis.search import initial_screening
+from elastocal.diagnosis.judge import compare_held_out_errors
+from elastocal.diagnosis.refit import fit_selected_effects
+from elastocal.diagnosis.search import screen_terms
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.model import Case
 from elastocal.fitting.noise import fit_declared, noise_from
@@ -105,7 +105,7 @@ def oracle(
     fitted, members, variants = _with_effects(declared, case, effects)
     p_value = min(variants * _wald(fitted, members), 1.0)
     outside = outside_poses(fitted, case, unseen)
-    _, heldout, _ = heldout_errors(
+    _, heldout, _ = compare_held_out_errors(
         [Step("oracle", "declared", fitted)], case, unseen, outside, seed
     )
     return _outcome(members, p_value, heldout["before"])
@@ -140,11 +140,13 @@ def _with_effects(
             for members in members_of(effect, joints, case.candidates.values())
             for member in members
         ]
-        problem = linearized(declared, case.observations, listed, settings).problem
-        factors = initial_screening(problem)[1]
+        problem = build_candidate_design(
+            declared, case.observations, listed, settings
+        ).problem
+        factors = screen_terms(problem)[1]
         # Each at the shape that fits best.
         best: dict[str, _Chosen] = {}
-        for number, unit in enumerate(problem.units):
+        for number, unit in enumerate(problem.terms):
             if (
                 unit.candidate
                 and factors[number] > best.get(unit.candidate.key, (-np.inf,))[0]
@@ -166,7 +168,7 @@ def _with_effects(
         (candidate, np.array(shapes, float)) for _, candidate, shapes in chosen
     )
     return (
-        fit_with_sizes(declared, case.observations, declared.noise, effects_at),
+        fit_selected_effects(declared, case.observations, declared.noise, effects_at),
         members,
         variants,
     )

@@ -22,7 +22,7 @@ from elastocal.application.planning.survey import (
     declare_model,
 )
 from elastocal.campaigns.holdout import FEWEST_TRAINING_POSES
-from elastocal.counting import counted
+from elastocal.counting import format_count
 from elastocal.errors import InputError
 from elastocal.fitting.model import parameters
 
@@ -115,7 +115,7 @@ def find_allowed_candidates(
     allowed = np.flatnonzero(np.all(list(checks.values()), axis=0))[:count]
     if not len(allowed):
         strictest = min(checks, key=lambda name: checks[name].mean())
-        total = counted(len(reported), "configuration")
+        total = format_count(len(reported), "configuration")
         raise InputError(
             "plan",
             strictest,
@@ -182,7 +182,7 @@ def _check_counts(
 ) -> None:
     """Refuse more poses than candidates, and fewer than the parameters need."""
     if candidates < poses + held_out:
-        total = counted(candidates, "allowed configuration")
+        total = format_count(candidates, "allowed configuration")
         raise InputError(
             "plan",
             "poses",
@@ -192,12 +192,12 @@ def _check_counts(
     needed = -(-parameter_count // survey.numbers)
     fewest = max(needed, FEWEST_TRAINING_POSES)
     if poses < fewest:
-        numbers = counted(poses * survey.numbers, "number")
+        numbers = format_count(poses * survey.numbers, "number")
         raise InputError(
             "plan",
             "poses",
             f"{poses}, which measure {numbers} for"
-            f" {counted(parameter_count, 'parameter')}",
+            f" {format_count(parameter_count, 'parameter')}",
             f"at least {fewest}",
         )
 

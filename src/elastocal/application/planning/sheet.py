@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from elastocal.application.planning.survey import GEOMETRY
-from elastocal.campaigns.measurements import SHOWN, TICK
+from elastocal.campaigns.measurements import DISPLAY_UNITS, TICK_COLUMN
 from elastocal.mechanics.components import WRENCH_NAMES
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def build_sheet(survey: Survey, plan: Plan) -> pd.DataFrame:
                         "load": load,
                         "repeat": repeat,
                         "target": target.name,
-                        TICK: "",
+                        TICK_COLUMN: "",
                     }
                     rows.append(row | joint_cells | wrench_cells)
     empty = ["x", "y", "z"]
@@ -70,9 +70,9 @@ def _format_joints(survey: Survey, angles: np.ndarray) -> dict[str, float]:
     joints = zip(angles, survey.robot.chain.prismatic, strict=True)
     for number, (angle, is_prismatic) in enumerate(joints, 1):
         unit = "mm" if is_prismatic else "deg"
-        value = round(angle / SHOWN[unit], 3) + 0.0
+        value = round(angle / DISPLAY_UNITS[unit], 3) + 0.0
         shown[f"q{number}_{unit}"] = value
-        exact[f"q{number}"] = value * SHOWN[unit]
+        exact[f"q{number}"] = value * DISPLAY_UNITS[unit]
     return shown | exact
 
 
