@@ -29,11 +29,15 @@ from elastocal.application.frames import (
 )
 from elastocal.campaigns.campaign import Target
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.model import conditions, displaced_coordinates, parameters
+from elastocal.fitting.model import (
+    compute_displaced_coordinates,
+    evaluate_conditions,
+    list_parameters,
+)
 from elastocal.fitting.observations import Observations, States, select_states
 from elastocal.mechanics.kinematics import pose_differences, poses
 from elastocal.remainder.corrected import beyond_regressed, inputs_of, is_commanded
-from elastocal.validation.placing import beyond_campaign, beyond_loads
+from elastocal.validation.transfer import find_beyond_campaign, find_larger_loads
 
 if TYPE_CHECKING:
     from elastocal.fitting.least_squares import Fit
@@ -131,7 +135,9 @@ def calibrate_by_model(
         number for number, effect in enumerate(model.effects) if is_commanded(effect)
     ]
     keys = {model.effects[number].key for number in kept}
-    rows = np.flatnonzero([owner in keys for owner, _ in parameters(model, estimate)])
+    rows = np.flatnonzero(
+        [owner in keys for owner, _ in list_parameters(model, estimate)]
+    )
     end_model, end_estimate = move_to_end_effector(model, estimate)
     end_model = replace(
         end_model, effects=tuple(model.effects[number] for number in kept)
@@ -306,7 +312,7 @@ def find_equilibrium(
     calibrated, reported_angles, wrench : as in `predict_poses`.
     nearby_coordinates : (N, C) coordinates of nearly the same states, at which the loads
         are evaluated. None evaluates the loads at the deflected pose, by the fixed-point
-        iteration of `model.conditions`.
+        iteration of `model.evaluate_conditions`.
 
     Returns
     -------
@@ -315,8 +321,8 @@ def find_equilibrium(
     model = calibrated.model
     estimate = calibrated.estimate
     states = build_states(calibrated, reported_angles, wrench)
-    around = conditions(model, estimate, states, nearby_coordinates)
-    coordinates = displaced_coordinates(model, estimate, around)
+    around = evaluate_conditions(model, estimate, states, nearby_coordinates)
+    coordinates = compute_displaced_coordinates(model, estimate, around)
     chain = model.sites.chain
     return coordinates, *poses(chain, coordinates, chain.end_effector)
 
@@ -348,7 +354,7 @@ def compute_pose_sensitivities(
     sensitivities = np.zeros((count, 6, len(calibrated.covariance)))
     for chunk in split_into_chunks(count):
         states = build_states(calibrated, reported_angles[chunk], wrench[chunk])
-        around = conditions(model, estimate, states)
+        around = evaluate_conditions(model, estimate, states)
         linearization = linearize(model, estimate, build_observations(states), around)
         sensitivities[chunk] = linearization.sensitivities
     return sensitivities
@@ -366,8 +372,8 @@ def find_extrapolated(
     larger than `load_factor` times the fitted ones.
     """
     angles = calibrated.robot.model_angles(reported_angles)
-    joints = beyond_campaign(calibrated.states, angles, None)
-    return joints, beyond_loads(calibrated.states, wrench, load_factor)
+    joints = find_beyond_campaign(calibrated.states, angles, None)
+    return joints, find_larger_loads(calibrated.states, wrench, load_factor)
 
 
 def build_states(

@@ -28,8 +28,12 @@ from elastocal.application.frames import (
     select_free_parameters,
 )
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.model import conditions, displaced_coordinates, parameters
-from elastocal.fitting.noise import hidden_repeatability
+from elastocal.fitting.model import (
+    compute_displaced_coordinates,
+    evaluate_conditions,
+    list_parameters,
+)
+from elastocal.fitting.noise import estimate_joint_repeatability
 from elastocal.mechanics.kinematics import pose_differences, poses
 from elastocal.remainder.corrected import is_commanded
 
@@ -61,7 +65,7 @@ def calibrate_on_case(
     ----------
     case : the measurements that were fitted.
     model, estimate : fitted model.
-    covariance : (P, P) covariance of all its `parameters`.
+    covariance : (P, P) covariance of all its `list_parameters`.
     noise : of the campaign.
     residual_model : result of `build_residual_model`.
     """
@@ -69,7 +73,7 @@ def calibrate_on_case(
     states = case.observations.states
     dof = 0.0
     if noise.source == "repeats" and not noise.joint_rad.any():
-        repeatability_rad, dof = hidden_repeatability(
+        repeatability_rad, dof = estimate_joint_repeatability(
             model, estimate, case.campaign.measurements
         )
         noise = replace(noise, joint_rad=np.full(robot.joints, repeatability_rad))
@@ -230,21 +234,21 @@ def _compute_left_out_fields(
     chain = model.sites.chain
     end_poses = []
     for values in (end_estimate, zero_coefficients(end_estimate, left_out)):
-        coordinates = displaced_coordinates(
-            end_model, values, conditions(end_model, values, states)
+        coordinates = compute_displaced_coordinates(
+            end_model, values, evaluate_conditions(end_model, values, states)
         )
         end_poses.append(poses(chain, coordinates, chain.end_effector))
     displacement = pose_differences(*end_poses[0], *end_poses[1])
     keys = {model.effects[number].key for number in left_out}
     columns = np.array(
-        [owner in keys for owner, _ in parameters(end_model, end_estimate)]
+        [owner in keys for owner, _ in list_parameters(end_model, end_estimate)]
     )
-    rows = np.array([owner in keys for owner, _ in parameters(model, estimate)])
+    rows = np.array([owner in keys for owner, _ in list_parameters(model, estimate)])
     sensitivities = linearize(
         end_model,
         end_estimate,
         build_observations(states),
-        conditions(end_model, end_estimate, states),
+        evaluate_conditions(end_model, end_estimate, states),
     ).sensitivities[..., columns]
     spread = sensitivities @ factor_covariance(covariance[np.ix_(rows, rows)])
     return np.concatenate([displacement[..., None], spread], axis=2)

@@ -25,15 +25,15 @@ from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import generate_residual_blocks, judge
 from elastocal.diagnosis.misplaced import find_misplaced_frames
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.model import Case, case_from
+from elastocal.fitting.model import Case, build_case
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import write_table
 from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop.loading import load_campaign
 from elastocal.loop.schemas import residuals
-from elastocal.validation.held_out import position_residuals
-from elastocal.validation.placing import placed
+from elastocal.validation.held_out import compute_position_residuals
+from elastocal.validation.transfer import transfer_fit
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -75,8 +75,8 @@ def cases_in(folder: str | Path, robots_folder: str | Path) -> tuple[Case, Case]
         read_campaign_folder(folder, robots_folder)
     )
     return (
-        case_from(descriptions, tabulate_measurements(training)),
-        case_from(
+        build_case(descriptions, tabulate_measurements(training)),
+        build_case(
             descriptions["held_out"] or descriptions, tabulate_measurements(held_out)
         ),
     )
@@ -112,7 +112,9 @@ def calibrated_by(
     """
     case = diagnosis.case
     final = diagnosis.final
-    residual = position_residuals(*placed(final, case, held_out), held_out.observations)
+    residual = compute_position_residuals(
+        *transfer_fit(final, case, held_out), held_out.observations
+    )
     noise_m = final.noise.position_m
     more = None
     if delivered is not None and delivered.predictor is not None:

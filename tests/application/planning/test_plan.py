@@ -25,8 +25,8 @@ from elastocal.application.planning.survey import (
 )
 from elastocal.campaigns.campaign import Target
 from elastocal.errors import InputError
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import conditions, parameters, predict
+from elastocal.fitting.least_squares import fit_model
+from elastocal.fitting.model import evaluate_conditions, list_parameters, predict
 from elastocal.fitting.noise import Noise
 from elastocal.mechanics.robot_file import robot_from_document
 
@@ -116,7 +116,7 @@ def test_information_is_the_inverse_of_the_covariance_of_a_fit_with_priors(measu
     model = replace(model, effects=(model.effects[0], *effects))
     seen = build_observations(survey, some.joint_angles, some.force)
     position, rotation = predict(
-        model, estimate, seen, conditions(model, estimate, seen.states)
+        model, estimate, seen, evaluate_conditions(model, estimate, seen.states)
     )
     exact = replace(
         seen, position=position, rotation=None if seen.rotation is None else rotation
@@ -128,11 +128,11 @@ def test_information_is_the_inverse_of_the_covariance_of_a_fit_with_priors(measu
     free = np.array(
         [
             owner.startswith(("frame", "target", "joint_compliance"))
-            for owner, _ in parameters(model, estimate)
+            for owner, _ in list_parameters(model, estimate)
         ]
     )
     prior = np.diag(np.where(free, 0.0, 1.0))
-    here = np.flatnonzero(~found.held)
+    here = np.flatnonzero(~found.unidentifiable)
     assert len(here) > 30
     matrix = (prior + np.einsum("nki,nkj->ij", rows, rows))[np.ix_(here, here)]
     expected = np.linalg.inv(matrix) * np.outer(scale[here], scale[here])

@@ -24,7 +24,7 @@ from elastocal.application.planning.survey import (
 from elastocal.campaigns.holdout import FEWEST_TRAINING_POSES
 from elastocal.counting import format_count
 from elastocal.errors import InputError
-from elastocal.fitting.model import parameters
+from elastocal.fitting.model import list_parameters
 
 if TYPE_CHECKING:
     from elastocal.application.planning.cell import Cell
@@ -77,7 +77,7 @@ class Plan:
     fitted : configurations for the fit, in the order of a short tour.
     held_out : random configurations that judge the result.
     accuracy_m : (poses,) RMS error of the end effector over the workspace by the
-        uncertainty of the parameters, as `accuracy` counts it, with the first 1, 2, ..
+        uncertainty of the list_parameters, as `accuracy` counts it, with the first 1, 2, ..
         of the fitted configurations, best first.
     random_m : (designs, poses) the same for random configurations.
     """
@@ -142,11 +142,11 @@ def choose_plan(
     ------
     InputError
         There are fewer candidates than poses; the poses measure fewer numbers than there
-        are parameters, or are fewer than a campaign needs; or no joint moves a target.
+        are list_parameters, or are fewer than a campaign needs; or no joint moves a target.
     """
     count = len(candidates.joint_angles)
     stream = np.random.default_rng(seed)
-    owners = [owner for owner, _ in parameters(*declare_model(survey))]
+    owners = [owner for owner, _ in list_parameters(*declare_model(survey))]
     _check_counts(survey, len(owners), count, poses, held_out)
     rows = compute_information_rows(survey, candidates.joint_angles, candidates.force)
     _check_sensitivity(rows, owners)
@@ -180,7 +180,7 @@ def choose_plan(
 def _check_counts(
     survey: Survey, parameter_count: int, candidates: int, poses: int, held_out: int
 ) -> None:
-    """Refuse more poses than candidates, and fewer than the parameters need."""
+    """Refuse more poses than candidates, and fewer than the list_parameters need."""
     if candidates < poses + held_out:
         total = format_count(candidates, "allowed configuration")
         raise InputError(

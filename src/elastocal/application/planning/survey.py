@@ -1,5 +1,5 @@
 """What is measured in each configuration, how accurately, and what it says about the
-parameters of the robot.
+list_parameters of the robot.
 
 The model is the one that a campaign declares: offsets of the joints, lengths and angles
 of the links, joint compliances if loads are measured, errors of declared masses, and the
@@ -35,7 +35,12 @@ from elastocal.effects.catalogue import declared_candidates
 from elastocal.effects.elastic import joint_compliance
 from elastocal.effects.gravity import declared_weight
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.model import Estimate, Model, conditions, parameters
+from elastocal.fitting.model import (
+    Estimate,
+    Model,
+    evaluate_conditions,
+    list_parameters,
+)
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import Observations, States
 from elastocal.mechanics.sites import sites_of
@@ -189,18 +194,20 @@ def compute_information_rows(
     Returns
     -------
     (N, k, P) derivatives of the k numbers that are measured in each configuration, over
-    their standard deviations, by the `parameters` of the model in units of their
+    their standard deviations, by the `list_parameters` of the model in units of their
     plausible sizes. The information matrix is ``rows.T @ rows``.
     """
     model, estimate = declare_model(survey)
-    plausible = [parameter.plausible for _, parameter in parameters(model, estimate)]
+    plausible = [
+        parameter.plausible for _, parameter in list_parameters(model, estimate)
+    ]
     std = np.repeat([survey.position_m, survey.orientation_rad], 3)[: survey.rows]
     scale = np.array(plausible) / std[:, None]
     count = len(reported_angles)
     rows = np.empty((count, survey.numbers, len(plausible)))
     for chunk in split_into_chunks(count, max(_CHUNK // len(survey.shares), 1)):
         observations = build_observations(survey, reported_angles[chunk], force[chunk])
-        around = conditions(model, estimate, observations.states)
+        around = evaluate_conditions(model, estimate, observations.states)
         linearization = linearize(model, estimate, observations, around)
         scaled = linearization.sensitivities * scale
         rows[chunk] = scaled.reshape(-1, survey.numbers, len(plausible))
@@ -224,11 +231,11 @@ def compute_accuracy_rows(
 
     Returns
     -------
-    (N, 3, P) derivatives by the parameters in units of their plausible sizes, m.
+    (N, 3, P) derivatives by the list_parameters in units of their plausible sizes, m.
     """
     robot = survey.robot
     model, estimate = declare_model(survey)
-    count = len(parameters(model, estimate))
+    count = len(list_parameters(model, estimate))
     noise = Noise(
         "declared", survey.position_m, survey.orientation_rad, np.zeros(robot.joints)
     )
@@ -243,11 +250,11 @@ def compute_accuracy_rows(
         position.mean(axis=0),
         offset_removed=is_offset_fitted(survey.targets, robot.chain.end_effector.name),
     )
-    commanded = parameters(calibrated.model, calibrated.estimate)
+    commanded = list_parameters(calibrated.model, calibrated.estimate)
     plausible = np.array([parameter.plausible for _, parameter in commanded])
     residual = subtract_placement(scope, position, rotation, sensitivities * plausible)
     rows = np.zeros((len(sensitivities), 3, count))
-    # The parameters of base and targets come first.
+    # The list_parameters of base and targets come first.
     rows[..., -len(plausible) :] = residual[:, :3]
     return rows
 
