@@ -15,20 +15,22 @@ import numpy as np
 from elastocal import __version__
 from elastocal.application.accuracy import (
     REGION,
-    build_residual_model,
-    calibrate_on_case,
     compute_uncorrected_rms_m,
     predict_errors,
     select_campaign_commands,
-    set_form_error,
-    tabulate_errors,
 )
 from elastocal.application.calibrated import compute_effect_contributions
 from elastocal.application.frames import root_mean_square
+from elastocal.application.scope import (
+    build_residual_model,
+    calibrate_on_case,
+    set_form_error,
+)
+from elastocal.application.statements import tabulate_errors
 from elastocal.campaigns.campaign_folder import CampaignFolder, read_campaign_folder
 from elastocal.diagnosis.misplaced import describe_reference_point
 from elastocal.errors import InputError
-from elastocal.fitting.noise import noise_from
+from elastocal.fitting.noise import parse_noise
 from elastocal.io.json_files import read_json
 from elastocal.io.origin import configuration_sha256
 from elastocal.io.records import check_sources, trace_jobs
@@ -37,9 +39,9 @@ from elastocal.remainder.corrected import predictor_of
 from elastocal.validation.conformity import (
     PASS,
     UNDECIDED,
-    joint_ranges,
-    predicted_conformity,
-    shortfalls,
+    decide_conformity,
+    find_joint_ranges,
+    list_shortfalls,
 )
 
 if TYPE_CHECKING:
@@ -90,7 +92,7 @@ class Diagnosed:
             model,
             estimate,
             np.array(self.facts["covariance"]),
-            noise_from(step),
+            parse_noise(step),
             more,
         )
         contradicted = bool(accuracy and accuracy["contradicted"])
@@ -99,7 +101,7 @@ class Diagnosed:
             if contradicted
             else self.facts["document"].get("other_models_m") or 0.0
         )
-        return set_form_error(found, form_m, contradicted)
+        return set_form_error(found, form_m, contradicted=contradicted)
 
     def by_physics(self) -> Diagnosed:
         """The same without the regression on the remainder, as if there were none."""
@@ -203,10 +205,10 @@ def certificate(
     states = found.case.observations.states
     poses = select_campaign_commands(calibrated)
     prediction = predict_errors(calibrated, *poses)
-    accuracy = prediction.accuracy(REGION)
+    accuracy = prediction.summarize(REGION)
     worst = int(np.argmax(prediction.error_m))
-    decision = predicted_conformity(prediction.rms_m, tolerance_m, accepted_risk)
-    missing = shortfalls(heldout["configurations"], states, robot)
+    decision = decide_conformity(prediction.rms_m, tolerance_m, accepted_risk)
+    missing = list_shortfalls(heldout["configurations"], states, robot)
     if not accuracy.fitted:
         missing = [
             "nothing fitted: no error of 0 is predicted of a robot of which nothing was fitted",
@@ -248,7 +250,7 @@ def certificate(
         "worst_pose": {"joints": joints, "error_m": float(prediction.error_m[worst])},
         "conformity": asdict(decision)
         | {"configurations": heldout["configurations"], "shortfalls": missing},
-        "joint_ranges": joint_ranges(states, robot),
+        "joint_ranges": find_joint_ranges(states, robot),
         "budget": [
             {"name": name, "rms_m": rms}
             for name, rms in error_budget(calibrated, *poses).items()

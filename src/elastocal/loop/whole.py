@@ -7,15 +7,17 @@ from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 from elastocal.application.accuracy import (
-    build_residual_model,
-    calibrate_on_case,
     compute_uncorrected_rms_m,
     inflate_to_held_out_errors,
     predict_campaign_accuracy,
     select_campaign_commands,
-    set_form_error,
 )
 from elastocal.application.calibrated import compute_effect_contributions
+from elastocal.application.scope import (
+    build_residual_model,
+    calibrate_on_case,
+    set_form_error,
+)
 from elastocal.campaigns.campaign import tabulate_measurements
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.data_checks.protocol import data_at_fault
@@ -23,15 +25,15 @@ from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import generate_residual_blocks, judge
 from elastocal.diagnosis.misplaced import find_misplaced_frames
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.model import Case, case_from
+from elastocal.fitting.model import Case, build_case
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import write_table
 from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop.loading import load_campaign
 from elastocal.loop.schemas import residuals
-from elastocal.validation.held_out import position_residuals
-from elastocal.validation.placing import placed
+from elastocal.validation.held_out import compute_position_residuals
+from elastocal.validation.transfer import transfer_fit
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -73,8 +75,8 @@ def cases_in(folder: str | Path, robots_folder: str | Path) -> tuple[Case, Case]
         read_campaign_folder(folder, robots_folder)
     )
     return (
-        case_from(descriptions, tabulate_measurements(training)),
-        case_from(
+        build_case(descriptions, tabulate_measurements(training)),
+        build_case(
             descriptions["held_out"] or descriptions, tabulate_measurements(held_out)
         ),
     )
@@ -110,7 +112,9 @@ def calibrated_by(
     """
     case = diagnosis.case
     final = diagnosis.final
-    residual = position_residuals(*placed(final, case, held_out), held_out.observations)
+    residual = compute_position_residuals(
+        *transfer_fit(final, case, held_out), held_out.observations
+    )
     noise_m = final.noise.position_m
     more = None
     if delivered is not None and delivered.predictor is not None:
@@ -156,14 +160,14 @@ def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
         stated |= _accuracy(found) | {
             "misplaced": find_misplaced_frames(diagnosis.final, diagnosis.case.campaign)
         }
-        if found.remainder is not None:
+        if found.residual_model is not None:
             stated["physics"] = _accuracy(
                 calibrated_by(
                     diagnosis, verdict.held_out, verdict.delivered, physics_only=True
                 )
             )
         costs = compute_effect_contributions(
-            replace(found, remainder=None), *select_campaign_commands(found)
+            replace(found, residual_model=None), *select_campaign_commands(found)
         )
     effects = [
         effect | {"cost_m": costs.get(effect["name"])}
