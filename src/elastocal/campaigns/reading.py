@@ -38,7 +38,6 @@ from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.robot_file import robot_from_document
 
-
 # A joint angle this far beyond the limits is not the angle of a joint at its limit.
 _BEYOND_LIMITS_RAD = 0.5
 # A wrong unit affects a whole file. If at most this share of the rows is implausible,
