@@ -23,7 +23,7 @@ from remainder_rates import (
     measured_cases,
 )
 
-from elastocal.application.calibrated import CalibratedRobot, nominal_forward
+from elastocal.application.calibrated import CalibratedRobot, compute_nominal_poses
 from elastocal.application.compensation import find_joint_targets
 from elastocal.application.frames import root_mean_square, subtract_placement
 from elastocal.campaigns.reading import read_robot
@@ -68,13 +68,15 @@ def closed(poses: int, size: float, seed: int) -> dict[str, float]:
     found = diagnose(case, Settings(), seed)
     verdict = judge(found, held_out, seed)
     wanted = robot.reported_angles(surveyed(HELD_OUT, 1)[1])
-    position, rotation = nominal_forward(robot, wanted)
+    position, rotation = compute_nominal_poses(robot, wanted)
 
     def missed(calibrated: CalibratedRobot, commands: np.ndarray) -> float:
         """In the frame of the correction, of poses that are measured at some
         commands."""
         true = robot.model_angles(commands)
-        reached, _ = nominal_forward(robot, robot.reported_angles(true + off(true)))
+        reached, _ = compute_nominal_poses(
+            robot, robot.reported_angles(true + off(true))
+        )
         field = (reached + draws.normal(0.0, NOISE_M, reached.shape) - position)[
             ..., None
         ]

@@ -25,8 +25,8 @@ INTERFACE = {
         "elastocal.campaigns.simulation": ("Plan", "draw_measurements")
     },
     "Plan measurements": {
+        "elastocal.application.planning.survey": ("Survey",),
         "elastocal.application.planning.plan": (
-            "Survey",
             "find_allowed_candidates",
             "choose_plan",
         ),
@@ -39,11 +39,12 @@ INTERFACE = {
     "Use a calibrated robot": {
         "elastocal.application.calibrated": (
             "calibrate_by_fit",
-            "forward",
-            "pose_sensitivities",
+            "predict_poses",
+            "compute_pose_sensitivities",
         ),
         "elastocal.application.accuracy": ("predict_errors",),
         "elastocal.application.compensation": ("find_joint_targets",),
+        "elastocal.application.path_correction": ("correct_path",),
     },
     "Judge predictions": {
         "elastocal.validation.held_out": ("position_errors", "intervals")

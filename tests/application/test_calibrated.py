@@ -11,10 +11,10 @@ from synthetic import NOISE, made_states
 
 from elastocal.application.calibrated import (
     calibrate_by_model,
-    forward,
-    pose_sensitivities,
+    compute_pose_sensitivities,
+    predict_poses,
 )
-from elastocal.fitting.model import stepped
+from elastocal.fitting.model import apply_step
 from elastocal.mechanics.kinematics import pose_differences
 from elastocal.mechanics.robot import Mass
 
@@ -62,7 +62,7 @@ def test_spring_and_weight_of_one_joint_are_in_equilibrium():
     )
     found = made_calibrated(robot, identified=False, size=0.0)
     for q, force in ((0.3, 0.0), (-0.7, 300.0)):
-        position, rotation = forward(
+        position, rotation = predict_poses(
             found, np.array([[q]]), np.array([[0, 0, force, 0, 0, 0.0]])
         )
         at = q
@@ -86,14 +86,16 @@ def test_sensitivities_are_the_derivatives_of_the_poses_by_every_parameter(fanuc
         fanuc, *USUAL, "transmission_harmonic@2[orders 1-2]", relative_std=0.01
     )
     states = made_states(6, 2, seed=4)
-    middle = forward(found, states.joint_angles, states.wrench)
-    sensitivities = pose_sensitivities(found, states.joint_angles, states.wrench)
+    middle = predict_poses(found, states.joint_angles, states.wrench)
+    sensitivities = compute_pose_sensitivities(
+        found, states.joint_angles, states.wrench
+    )
     for place, size in enumerate(np.sqrt(np.diag(found.covariance))):
         step = np.zeros(len(found.covariance))
         step[place] = 1e-2 * size
-        moved = replace(found, estimate=stepped(found.model, found.estimate, step))
+        moved = replace(found, estimate=apply_step(found.model, found.estimate, step))
         off = pose_differences(
-            *forward(moved, states.joint_angles, states.wrench), *middle
+            *predict_poses(moved, states.joint_angles, states.wrench), *middle
         )
         np.testing.assert_allclose(
             off,

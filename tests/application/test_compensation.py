@@ -9,7 +9,7 @@ from analysed_robots import analysed
 from made_calibrated import USUAL, made_calibrated
 
 from elastocal.application.accuracy import predict_errors
-from elastocal.application.calibrated import come_to_rest, nominal_forward
+from elastocal.application.calibrated import compute_nominal_poses, find_equilibrium
 from elastocal.application.compensation import (
     OK,
     OTHER_POSTURE,
@@ -17,7 +17,7 @@ from elastocal.application.compensation import (
     SINGULAR,
     UNREACHABLE,
     find_joint_targets,
-    large_steps,
+    find_large_steps,
 )
 from elastocal.mechanics.kinematics import jacobians, pose_differences
 
@@ -50,9 +50,9 @@ def draw_states(calibrated, count, force=100.0):
 
 def settle(robot, angles, wrench):
     """As `forward`, with the loads found again until the arm has come to rest."""
-    found = come_to_rest(robot, angles, wrench)
+    found = find_equilibrium(robot, angles, wrench)
     for _ in range(6):
-        found = come_to_rest(robot, angles, wrench, found[0])
+        found = find_equilibrium(robot, angles, wrench, found[0])
     return found[1:]
 
 
@@ -60,7 +60,7 @@ def settle(robot, angles, wrench):
 def test_corrected_targets_bring_the_robot_to_the_wanted_poses(name):
     robot = make_robot(name, *EFFECTS)
     angles, wrench = draw_states(robot, 150)
-    position, rotation = nominal_forward(robot.robot, angles)
+    position, rotation = compute_nominal_poses(robot.robot, angles)
     found = find_joint_targets(robot, position, rotation, wrench, angles)
     good = found.status == OK
     assert good.mean() > 0.9
@@ -90,7 +90,7 @@ def test_what_cannot_be_corrected_is_named():
     # The axes of joints 4 and 6 in one line.
     angles[2, 4] = 0.0
     reported = robot.robot.reported_angles(angles)
-    position, rotation = nominal_forward(robot.robot, reported)
+    position, rotation = compute_nominal_poses(robot.robot, reported)
     position[3] *= 5.0
     found = find_joint_targets(
         robot, position, rotation, np.zeros((len(position), 6)), reported
@@ -108,7 +108,7 @@ def test_a_stated_posture_and_its_turn_are_kept_or_refused(name):
     angles = np.tile(robot.robot.joint_limits.mean(axis=1) + BENT, (7, 1))
     angles[:, 0] = np.radians(np.linspace(-180.6, -168.6, 7))
     angles = robot.robot.reported_angles(angles)
-    position, rotation = nominal_forward(robot.robot, angles)
+    position, rotation = compute_nominal_poses(robot.robot, angles)
     found = find_joint_targets(
         robot,
         position,
@@ -147,7 +147,7 @@ def test_a_posture_behind_a_singular_one_is_another_however_near():
     stated[:, 4] = np.radians([15.0, -1.0])
     found = find_joint_targets(
         robot,
-        *nominal_forward(robot.robot, reported),
+        *compute_nominal_poses(robot.robot, reported),
         np.zeros((len(reported), 6)),
         robot.robot.reported_angles(stated),
     )
@@ -169,7 +169,7 @@ def test_random_paths_never_swing(name):
         walk = draws.uniform(-half, half) + np.cumsum(
             draws.normal(0.0, 0.06, (10, len(half))), axis=0
         )
-        position, rotation = nominal_forward(
+        position, rotation = compute_nominal_poses(
             robot.robot, robot.robot.reported_angles(walk.clip(-half, half))
         )
         found = find_joint_targets(
@@ -177,7 +177,7 @@ def test_random_paths_never_swing(name):
         )
         good = found.status == OK
         whole += good.all()
-        assert not large_steps(
+        assert not find_large_steps(
             robot.robot, position[good], rotation[good], found.joint_angles[good]
         )
     assert whole >= 4

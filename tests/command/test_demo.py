@@ -2,6 +2,7 @@
 goes the whole way with them."""
 
 import shlex
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -27,7 +28,7 @@ def test_what_is_printed_is_what_is_run_until_a_step_fails(
         return 3 if args[0] == fails else 0
 
     monkeypatch.setattr(main.InOrder, "main", main_of_the_rest)
-    monkeypatch.setattr(demo, "workplace", lambda: tmp_path)
+    monkeypatch.setattr(demo, "find_workplace", lambda: tmp_path)
     missed = {
         name: np.full(3, off)
         for name, off in (
@@ -45,7 +46,8 @@ def test_what_is_printed_is_what_is_run_until_a_step_fails(
             f"elastocal_proof.blind.rehearsal.{name}", lambda *_, result=result: result
         )
     monkeypatch.setattr(
-        "elastocal.campaigns.reading.read_descriptions", lambda *_: ({}, "")
+        "elastocal.campaigns.campaign_folder.read_campaign_folder",
+        lambda *_: SimpleNamespace(document={}),
     )
     result = elastocal("demo", tmp_path / "cell")
     assert (

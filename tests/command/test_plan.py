@@ -6,7 +6,7 @@ import pytest
 import yaml
 from analysed_robots import ROBOTS, analysed
 
-from elastocal.application.calibrated import nominal_forward
+from elastocal.application.calibrated import compute_nominal_poses
 
 PLAN = (
     "plan",
@@ -40,7 +40,7 @@ def planned(elastocal, tmp_path):
 def heights(table):
     """Of the end effector over the base plane at each row of a plan, m."""
     robot = analysed("ur10")
-    return nominal_forward(
+    return compute_nominal_poses(
         robot, table[[f"q{joint}" for joint in range(1, 7)]].to_numpy()
     )[0][:, 2]
 
@@ -72,7 +72,7 @@ def test_a_plan_is_a_folder_to_fill_in_with_its_pages(
     assert "found nothing" in refusal("check", tmp_path / "cell")
     assert "a folder that is there" in refusal(*PLAN, "--folder", tmp_path)
     # Once it is filled in it can be checked.
-    at = nominal_forward(
+    at = compute_nominal_poses(
         analysed("ur10"), sheet[[f"q{joint}" for joint in range(1, 7)]].to_numpy()
     )[0]
     at += 3e-5 * np.random.default_rng(1).standard_normal(at.shape)

@@ -8,7 +8,7 @@ import pytest
 from analysed_robots import ROBOTS, analysed
 from made_folders import PLAN, made_folder, made_table
 
-from elastocal.application.calibrated import nominal_forward
+from elastocal.application.calibrated import compute_nominal_poses
 from elastocal.campaigns.writing import write_campaign
 from elastocal.exchange.measurement_table import ImportOptions, read_measurement_table
 from elastocal.loop.whole import cases_in, diagnosed
@@ -48,7 +48,7 @@ def verdict_on(folder, damage=(), **changes):
     robot = analysed("ur10")
     draws = np.random.default_rng(33)
     shown = draws.uniform(-2.0, 2.0, (POSES, robot.joints))
-    at = nominal_forward(
+    at = compute_nominal_poses(
         robot, robot.reported_angles(robot.model_angles(shown) + OFFSETS)
     )[0]
     table = {

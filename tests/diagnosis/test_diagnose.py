@@ -9,10 +9,10 @@ from made_folders import PLAN, made_folder, made_table
 
 from elastocal.data_checks.protocol import Fault
 from elastocal.diagnosis import diagnose as module
-from elastocal.diagnosis import refit
+from elastocal.diagnosis import model_averaging
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
-from elastocal.diagnosis.next_experiment import propose
+from elastocal.diagnosis.next_experiment import propose_experiment
 from elastocal.diagnosis.settings import Settings
 from elastocal.loop.whole import cases_in
 
@@ -201,7 +201,7 @@ def test_an_effect_that_is_not_expected_to_help_is_named_and_the_model_stays_as_
     cases, kuka, monkeypatch
 ):
     monkeypatch.setattr(
-        refit, "expected_to_help", lambda problem, posterior, model: False
+        model_averaging, "is_expected_to_help", lambda problem, posterior, model: False
     )
     diagnosis = diagnose(cases[0], Settings(), 1)
     held_out = cases[1]
@@ -229,4 +229,6 @@ def test_an_effect_that_is_not_expected_to_help_is_named_and_the_model_stays_as_
         and verdict["effects"][0]["heldout_gain"] is None
     )
     # And the next experiment can be planned.
-    assert propose(diagnosis, np.random.default_rng(0))[1]["best"] == ["joint_offset"]
+    assert propose_experiment(diagnosis, np.random.default_rng(0))[1]["best"] == [
+        "joint_offset"
+    ]

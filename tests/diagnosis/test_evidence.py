@@ -12,19 +12,19 @@ from scipy.special import logsumexp
 from scipy.stats import multivariate_normal, norm
 
 from elastocal.diagnosis.evidence import (
-    Grid,
-    Joint,
-    evaluate,
+    ModelDensity,
+    SizeGrid,
+    compute_pose_error_log_prior,
+    evaluate_model,
     log_likelihood,
-    pose_weights,
 )
 from elastocal.diagnosis.settings import Settings
-from elastocal.diagnosis.statistics import statistics_of
+from elastocal.diagnosis.statistics import compute_statistics
 
 TAU = np.array([0.0, 0.3, 0.9])
 SETTINGS = Settings()
-GRID = Grid.of_settings(SETTINGS)
-LOG_POSE = pose_weights(TAU, SETTINGS)
+GRID = SizeGrid.from_settings(SETTINGS)
+LOG_POSE = compute_pose_error_log_prior(TAU, SETTINGS)
 # Residuals of a little less than the noise, so that its size is at its floor and
 # everything is normal.
 QUIET = 0.5
@@ -77,14 +77,14 @@ def brute_log_bayes_factor(rows, units, grid=GRID):
 
 
 def evaluated(rows, units, start=None):
-    statistics = statistics_of(rows.products, TAU)
+    statistics = compute_statistics(rows.products, TAU)
     start = [SETTINGS.scale_center] * len(units) if start is None else start
-    return evaluate(statistics, units, GRID, LOG_POSE, start)
+    return evaluate_model(statistics, units, GRID, LOG_POSE, start)
 
 
 def part_of_grid(kept):
     """A grid of some of the sizes alone."""
-    return Grid(
+    return SizeGrid(
         GRID.scales[kept], GRID.log_weights[kept] - logsumexp(GRID.log_weights[kept])
     )
 
@@ -108,8 +108,8 @@ def test_evidence_is_that_of_all_combinations_of_sizes(signal, chosen):
     given the measurements."""
     rows = quiet(3, SIGNALS[signal])
     units = [UNITS[number] for number in chosen]
-    statistics = statistics_of(rows.products, TAU)
-    assert (statistics.squares < statistics.freedom).all(), (
+    statistics = compute_statistics(rows.products, TAU)
+    assert (statistics.residual_squares < statistics.degrees_of_freedom).all(), (
         "the case must be quiet for the reference to be normal"
     )
     expected = brute_log_bayes_factor(rows, units)
@@ -164,10 +164,10 @@ def test_half_normal_priors_are_exact_of_one_coefficient_and_taken_one_by_one_of
     rows = quiet(12, size * np.bincount(columns, signs, 6))
     scale = 0.3 if len(columns) == 1 else 0.1
     unit = replace(made_unit("b", (1,), columns), signs=np.array(signs))
-    one = statistics_of(rows.products, [0.3])
-    grid = Grid(np.array([scale]), np.zeros(1))
+    one = compute_statistics(rows.products, [0.3])
+    grid = SizeGrid(np.array([scale]), np.zeros(1))
     found = [
-        evaluate(one, units, grid, np.zeros(1), [scale] * len(units))
+        evaluate_model(one, units, grid, np.zeros(1), [scale] * len(units))
         for units in ([unit], [])
     ]
     expected = half_normal_evidence(rows, 0.3, columns, signs, scale)
@@ -196,19 +196,21 @@ def test_evidence_is_averaged_over_the_sizes_that_a_unit_may_have():
 def test_moments_have_the_noise_that_a_model_leaves_where_that_is_more_than_was_taken():
     rows = quiet(1, SIGNALS["b"])
     rows = replace(rows, residual=rows.expected + 9.0 * (rows.residual - rows.expected))
-    one = statistics_of(rows.products, [0.3])
+    one = compute_statistics(rows.products, [0.3])
     scale = 0.3
-    joint = Joint(
+    joint = ModelDensity(
         one,
         UNITS[:1],
-        Grid(np.array([scale]), np.zeros(1)),
+        SizeGrid(np.array([scale]), np.zeros(1)),
         np.zeros(1),
         np.zeros(1, int),
     )
     ((_, variance),) = joint.moments()
     inner = one.between(np.arange(2), np.arange(2))[0] + np.eye(2) / scale**2
-    left = one.squares[0] - one.along[0, :2] @ np.linalg.solve(inner, one.along[0, :2])
-    assert left > 2.0 * one.freedom
+    left = one.residual_squares[0] - one.score[0, :2] @ np.linalg.solve(
+        inner, one.score[0, :2]
+    )
+    assert left > 2.0 * one.degrees_of_freedom
     np.testing.assert_allclose(
-        variance, left / one.freedom * np.diag(np.linalg.inv(inner))
+        variance, left / one.degrees_of_freedom * np.diag(np.linalg.inv(inner))
     )

@@ -1,25 +1,18 @@
 """Rows that no model explains: their distances are those of a fit without them, and
 their number is that of chance."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from bad_rows import damaged
-from made_folders import PLAN, made_folder, made_table
 from scipy.stats import binom, chi2
 
+from elastocal.diagnosis.fitted_subset import fit_subset
 from elastocal.diagnosis.gross_errors import (
-    entries_of,
-    first_kept,
-    fitted_to,
+    describe_gross_errors,
+    find_gross_errors,
     flag_outliers,
-    gross_errors,
 )
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import parameter_values
-from elastocal.loop.whole import cases_in
 
 SETTINGS = Settings()
 NOISE_M = 6e-5
@@ -30,12 +23,12 @@ def test_the_distance_of_a_row_is_that_from_a_fit_without_it(cases):
     case, _ = cases
     measurements = case.campaign.measurements
     every = np.ones(len(measurements), bool)
-    whole = fitted_to(case, every, SETTINGS)
-    without = fitted_to(case, np.arange(len(measurements)) != BAD, SETTINGS)
+    whole = fit_subset(case, every, SETTINGS)
+    without = fit_subset(case, np.arange(len(measurements)) != BAD, SETTINGS)
     found = []
     for part in (whole, without):
         found.append(
-            gross_errors(
+            find_gross_errors(
                 part.declared, whole.noise, measurements, part.kept, SETTINGS
             ).distance
         )
@@ -80,12 +73,12 @@ def test_sentences_say_what_a_row_reads(cases, diagnosis):
     position[4], position[8] = 0.0, position[7]
     measurements = case.campaign.measurements
     every = np.ones(len(position), bool)
-    errors = gross_errors(
+    errors = find_gross_errors(
         diagnosis.final, diagnosis.declared.noise, measurements, every, SETTINGS
     )
     told = {
         entry["rows"][0]: entry["detail"]
-        for entry in entries_of(errors, case.campaign, held_out=False)
+        for entry in describe_gross_errors(errors, case.campaign, held_out=False)
     }
     assert "reads 0, 0, 0" in told[measurements.row[4]]
     assert (
@@ -96,101 +89,3 @@ def test_sentences_say_what_a_row_reads(cases, diagnosis):
 
 SETTINGS = Settings()
 BAD = 11
-
-
-def test_a_search_looks_at_the_same_poses_whatever_rows_are_left_out_or_come_back(
-    cases,
-):
-    case = cases[0]
-    settings = replace(SETTINGS, searched_observations=12)
-    pose = case.campaign.measurements.pose
-    whole = fitted_to(case, pose >= 0, settings).searched
-    assert 2 < len(whole) < len(case.observations)
-    for out in (
-        whole.states.pose[:1],
-        whole.states.pose[-2:],
-        np.setdiff1d(pose, whole.states.pose),
-    ):
-        some = fitted_to(case, ~np.isin(pose, out), settings).searched
-        np.testing.assert_array_equal(
-            some.position, whole.position[~np.isin(whole.states.pose, out)[whole.state]]
-        )
-
-
-def test_the_last_step_to_all_of_a_long_campaign_leaves_a_tenth_of_a_standard_error_at_most(
-    cases, monkeypatch
-):
-    part = fitted_to(
-        cases[0],
-        cases[0].campaign.measurements.pose >= 0,
-        replace(SETTINGS, searched_observations=24),
-    )
-    usual = part.to_all(part.declared)
-    for module in ("fitting.least_squares", "diagnosis.gross_errors"):
-        monkeypatch.setattr(f"elastocal.{module}.LONG", 30)
-    monkeypatch.setattr("elastocal.fitting.least_squares._STEPPING_STONE", 36)
-    long = part.to_all(part.declared)
-    off, exact = (
-        parameter_values(each.model, each.estimate)
-        for each in (long, fit(usual.model, part.case.observations, usual.noise))
-    )
-    assert (off != parameter_values(usual.model, usual.estimate)).any()
-    assert (np.abs(off - exact) <= 0.1 * np.sqrt(np.diag(usual.covariance))).all()
-
-
-@pytest.fixture
-def case(cases):
-    return cases[0]
-
-
-@pytest.mark.parametrize(
-    "shifts", [{BAD: 0.02}, {BAD: 0.02, 3: -0.1}, {0: 1e3, 5: 1.0, 20: 0.03}]
-)
-def test_rows_are_found_beside_an_effect_that_the_model_lacks(case, shifts):
-    kept = first_kept(damaged(case, shifts), SETTINGS).kept
-    # A bad repeat takes the others of its state along, until a model says which it is.
-    assert not kept[list(shifts)].any() and (~kept).sum() <= 2 * len(shifts)
-
-
-@pytest.mark.parametrize("times", [-4.0, 30.0, 300.0])
-def test_loads_that_pull_the_fit_to_themselves_are_found_together(case, times):
-    measurements = case.campaign.measurements
-    bad = np.flatnonzero(measurements.wrench.any(axis=1))[[1, 6, 9]]
-    wrench = measurements.wrench.copy()
-    wrench[bad] *= times
-    campaign = replace(case.campaign, measurements=replace(measurements, wrench=wrench))
-    kept = first_kept(
-        replace(case, campaign=campaign).select(np.ones(len(wrench), bool)), SETTINGS
-    ).kept
-    assert not kept[bad].any()
-
-
-def test_a_repeat_that_is_in_no_average_stays_out(case):
-    measurements = case.campaign.measurements
-    state = list(
-        zip(measurements.pose, measurements.load, measurements.target, strict=True)
-    )
-    repeated = [place for place, key in enumerate(state) if state.count(key) > 2][:1]
-    assert (
-        not first_kept(damaged(case, dict.fromkeys(repeated, 2.0)), SETTINGS)
-        .kept[repeated]
-        .any()
-    )
-
-
-@pytest.mark.parametrize("error_rad", [3e-4, 1e-3])
-def test_no_row_is_a_gross_error_where_all_measurements_of_a_pose_err_together(
-    error_rad, kuka, config_folder, tmp_path
-):
-    table = made_table(kuka, "made", plan=replace(PLAN, poses=40))
-    drawn = error_rad * np.random.default_rng(0).standard_normal(
-        (max(table["pose"]) + 1, 6)
-    )
-    table |= {
-        f"q{joint}": table[f"q{joint}"] + drawn[table["pose"], joint - 1]
-        for joint in range(1, 7)
-    }
-    whole, _ = cases_in(
-        made_folder(tmp_path / "made", kuka, table=table), config_folder / "robots"
-    )
-    assert first_kept(whole, SETTINGS).kept.all()

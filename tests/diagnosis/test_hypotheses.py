@@ -20,10 +20,10 @@ from elastocal.diagnosis.hypotheses import (
     PLACE,
     TIME,
     UNDER_LOAD,
-    Law,
-    laws_of,
-    prior_of,
-    units_of,
+    Discrepancy,
+    build_discrepancies,
+    build_model_prior,
+    build_terms,
 )
 from elastocal.diagnosis.settings import Settings
 from elastocal.effects.catalogue import candidates_on
@@ -43,7 +43,7 @@ UNITS = (
 def test_the_number_of_locations_is_geometric_and_all_sets_of_so_many_are_equally_likely():
     """Given that a mechanism is there; laws share a location. And what a unit adds is
     the difference of both models."""
-    prior = prior_of(
+    prior = build_model_prior(
         [*UNITS, made_unit(OTHER, (1,), 5), made_unit(OTHER, (1,), 6, law=NEIGHBOURS)],
         SETTINGS,
     )
@@ -52,9 +52,9 @@ def test_the_number_of_locations_is_geometric_and_all_sets_of_so_many_are_equall
         for model in combinations(UNITS, size):
             places = tuple(sorted({unit.location for unit in model}))
             if len(places) == size:
-                odds = prior.log_odds_of(model)
+                odds = prior.compute_log_odds(model)
                 by_places[places] = by_places.get(places, 0.0) + np.exp(odds)
-                smaller = prior.log_odds_of(model[:-1])
+                smaller = prior.compute_log_odds(model[:-1])
                 assert prior.added(model[-1], size - 1) == pytest.approx(odds - smaller)
     there = SETTINGS.mechanism_probability / (1 - SETTINGS.mechanism_probability)
     expected = {
@@ -65,7 +65,7 @@ def test_the_number_of_locations_is_geometric_and_all_sets_of_so_many_are_equall
     # Laws of the competitor have places of their own, and its own probability.
     other = [made_unit(OTHER, (1,), 5), made_unit(OTHER, (1,), 6, law=NEIGHBOURS)]
     odds = SETTINGS.other_probability / (1 - SETTINGS.other_probability)
-    assert np.exp(prior.log_odds_of(other)) == pytest.approx(odds / 3)
+    assert np.exp(prior.compute_log_odds(other)) == pytest.approx(odds / 3)
 
 
 @pytest.fixture(scope="module")
@@ -83,16 +83,16 @@ def test_units_of_the_catalogue_have_columns_of_their_own_that_share_out_all(cat
         for c in catalogue
     ]
     at_joints = [
-        Law((joint,), cause, 1.0, (), 40)
+        Discrepancy((joint,), cause, 1.0, (), 40)
         for joint, cause in ((1, OWN), (1, NEIGHBOURS), (2, OWN))
     ]
     laws = [
         at_joints[0],
         at_joints[1],
-        Law((), f"{FORCE} shift", 1.0, (), 24),
+        Discrepancy((), f"{FORCE} shift", 1.0, (), 24),
         at_joints[2],
     ]
-    units = units_of(tried, laws, SETTINGS)
+    units = build_terms(tried, laws, SETTINGS)
     columns = np.concatenate([unit.columns for unit in units])
     np.testing.assert_array_equal(np.sort(columns), np.arange(len(columns)))
     against = [unit for unit in units if unit.mechanism == OTHER]
@@ -140,7 +140,7 @@ def around(count=60, force=500.0, **changes):
 
 def displacements(states, law, campaign=None):
     """By the law of a location and name, drawn for a campaign."""
-    laws = laws_of(states if campaign is None else campaign, FEATURES)
+    laws = build_discrepancies(states if campaign is None else campaign, FEATURES)
     return next(
         each for each in laws if (each.location, each.name) == law
     ).displacement(states)
@@ -152,13 +152,17 @@ def waves(found):
 
 def test_it_acts_by_each_law_at_every_joint_and_at_the_base():
     expected = [((joint,), name) for joint in range(1, 8) for name in OF_JOINTS]
-    assert [(law.location, law.name) for law in laws_of(around(), FEATURES)] == [
+    assert [
+        (law.location, law.name) for law in build_discrepancies(around(), FEATURES)
+    ] == [
         *expected,
         *AT_THE_BASE,
     ]
     # What does not bear a load cannot yield to it.
     unloaded = [
-        law.name for law in laws_of(around(force=0.0), FEATURES) if law.location
+        law.name
+        for law in build_discrepancies(around(force=0.0), FEATURES)
+        if law.location
     ]
     assert unloaded == 7 * [OWN, NEIGHBOURS, TIME]
 
@@ -274,7 +278,7 @@ def test_plausible_sizes_fall_with_the_order_of_a_harmonic_and_signs_are_those_o
         for c in catalogue
         if c.effect in ("transmission_harmonic", "stiffening", "base_compliance")
     ]
-    units = units_of(
+    units = build_terms(
         [(c, [tuple(shape.start for shape in c.shapes)]) for c in chosen], [], SETTINGS
     )
     for unit, candidate in zip(units, chosen, strict=True):

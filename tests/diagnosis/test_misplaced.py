@@ -7,8 +7,11 @@ from analysed_robots import ROBOTS, analysed
 from made_folders import made_folder
 from scipy.spatial.transform import Rotation
 
-from elastocal.diagnosis.misplaced import misplaced, point_sentence
-from elastocal.fitting.noise import estimated_noise, fit_declared
+from elastocal.diagnosis.misplaced import (
+    describe_reference_point,
+    find_misplaced_frames,
+)
+from elastocal.fitting.noise import estimate_noise, fit_declared_model
 from elastocal.loop.overview import overview
 from elastocal.loop.whole import cases_in
 from elastocal.mechanics.kinematics import poses
@@ -71,8 +74,8 @@ def misdeclared_folder(folder, robot, name, place, shift_m, poses_measured=40, s
 
 def findings(folder):
     case, _ = cases_in(folder, ROBOTS)
-    return misplaced(
-        fit_declared(case.model, case.observations, estimated_noise(case)[0]),
+    return find_misplaced_frames(
+        fit_declared_model(case.model, case.observations, estimate_noise(case)[0]),
         case.campaign,
     )
 
@@ -135,6 +138,6 @@ def test_the_point_is_named_with_what_was_declared_of_its_target(tmp_path):
     case, _ = cases_in(
         misdeclared_folder(tmp_path / "made", analysed("kuka"), "kuka", "", 0.0), ROBOTS
     )
-    assert "6DoF" in point_sentence(
+    assert "6DoF" in describe_reference_point(
         case.campaign
-    ) and "(100.0, 0.0, 50.0) mm" in point_sentence(case.campaign)
+    ) and "(100.0, 0.0, 50.0) mm" in describe_reference_point(case.campaign)

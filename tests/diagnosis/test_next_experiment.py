@@ -10,23 +10,23 @@ import pytest
 from made_problems import made_problem, made_rows, made_unit
 from planted import planted, two_loads_a_pose
 
-from elastocal.diagnosis.linearize import linearized
+from elastocal.diagnosis.candidate_design import build_candidate_design
 from elastocal.diagnosis.next_experiment import (
     DATA_AT_FAULT,
     NOT_DISTINGUISHABLE,
     NOTHING_AMBIGUOUS,
-    Pair,
-    best_of,
-    drawn,
-    observations_at,
-    posteriors_of,
-    propose,
-    resolved,
-    whitened_rows,
+    HypothesisPair,
+    build_planned_observations,
+    compute_coefficient_posteriors,
+    compute_resolution_probability,
+    compute_whitened_rows,
+    draw_candidate_experiments,
+    propose_experiment,
+    select_experiments,
 )
-from elastocal.diagnosis.search import Alarm, Model, posterior
+from elastocal.diagnosis.search import Alarm, ScoredModel, search_models
 from elastocal.diagnosis.settings import Settings
-from elastocal.diagnosis.verdict import concluded
+from elastocal.diagnosis.verdict import conclude
 
 SETTINGS = Settings(pose_steps=(0.0, 2.0), other_features=6)
 RAISED = Alarm(0.002, 10.0, True)
@@ -36,14 +36,14 @@ ELASTIC = ("link_elasticity", "base_compliance", "joint_tilt")
 def diagnosed(campaign, robot, keys):
     """A diagnosis in which only some candidates compete."""
     robot = replace(robot, joint_limits=np.clip(robot.joint_limits, -2.0, 2.0))
-    line = linearized(
+    line = build_candidate_design(
         campaign.declared,
         campaign.observations,
         [campaign.candidates[key] for key in keys],
         SETTINGS,
     )
-    found = posterior(line.problem)
-    conclusion = concluded(line.problem, found, RAISED)
+    found = search_models(line.problem)
+    conclusion = conclude(line.problem, found, RAISED)
     evidence = SimpleNamespace(
         linearized=line, posterior=found, alarm=RAISED, conclusion=conclusion
     )
@@ -68,7 +68,7 @@ def ambiguous(kuka):
 
 
 def test_the_proposal_is_within_reach_in_the_angles_of_the_controller(ambiguous, kuka):
-    columns, facts = propose(ambiguous, np.random.default_rng(0))
+    columns, facts = propose_experiment(ambiguous, np.random.default_rng(0))
     assert (np.diff(columns["separation"]) > 0).all() and (
         np.diff(columns["resolved"]) > 0
     ).all()
@@ -85,7 +85,7 @@ def test_the_proposal_is_within_reach_in_the_angles_of_the_controller(ambiguous,
         observations=ambiguous.case.observations,
         campaign=SimpleNamespace(robot=reporting),
     )
-    reported, same = propose(
+    reported, same = propose_experiment(
         SimpleNamespace(**vars(ambiguous) | {"case": case}), np.random.default_rng(0)
     )
     np.testing.assert_allclose(reported["q3"], columns["q3"] - 0.1)
@@ -105,7 +105,7 @@ def test_of_an_exact_alias_no_pose_is_asked_for(kuka):
     diagnosis = diagnosed(
         campaign, kuka, ["compensator_torque@2", "transmission_harmonic@2[orders 1-2]"]
     )
-    columns, facts = propose(diagnosis, np.random.default_rng(0), 4)
+    columns, facts = propose_experiment(diagnosis, np.random.default_rng(0), 4)
     assert {
         *facts["best"],
         *(name for each in facts["indistinguishable"] for name in each),
@@ -132,7 +132,7 @@ def test_an_alias_does_not_keep_the_others_from_being_distinguished(kuka):
     ]
     candidates = campaign.candidates | {each.key: each for each in alias}
     keys = [*keys_like(campaign, *ELASTIC), *(each.key for each in alias)]
-    columns, facts = propose(
+    columns, facts = propose_experiment(
         diagnosed(replace(campaign, candidates=candidates), kuka, keys),
         np.random.default_rng(0),
         6,
@@ -149,10 +149,14 @@ def test_nothing_is_proposed_where_nothing_is_ambiguous(kuka):
     campaign = planted(kuka, {"joint_offset@3": (2e-3,)}, poses=40)
     diagnosis = diagnosed(campaign, kuka, ["joint_offset@3", "payload"])
     assert (
-        propose(diagnosis, np.random.default_rng(0))[1]["reason"] == NOTHING_AMBIGUOUS
+        propose_experiment(diagnosis, np.random.default_rng(0))[1]["reason"]
+        == NOTHING_AMBIGUOUS
     )
     quiet = SimpleNamespace(**vars(diagnosis) | {"evidence": None})
-    assert propose(quiet, np.random.default_rng(0))[1]["reason"] == DATA_AT_FAULT
+    assert (
+        propose_experiment(quiet, np.random.default_rng(0))[1]["reason"]
+        == DATA_AT_FAULT
+    )
 
 
 def test_an_entry_is_read_at_every_target_without_its_load_and_under_it_and_errs_together(
@@ -161,13 +165,13 @@ def test_an_entry_is_read_at_every_target_without_its_load_and_under_it_and_errs
     states = replace(two_loads_a_pose(6, 6, 1), temperature_c=None)
     campaign = planted(kuka, {}, states=states)
     keys = keys_like(campaign, "lost_motion@2", "joint_tilt@3", "payload")
-    line = linearized(
+    line = build_candidate_design(
         campaign.declared,
         campaign.observations,
         [campaign.candidates[key] for key in keys],
         SETTINGS,
     )
-    seen = observations_at(
+    seen = build_planned_observations(
         campaign.declared.model, states, states.joint_angles[::2], states.wrench[1::2]
     )
     np.testing.assert_array_equal(seen.states.wrench, states.wrench)
@@ -179,15 +183,19 @@ def test_an_entry_is_read_at_every_target_without_its_load_and_under_it_and_errs
     )
     assert set(seen.states.time_s) == {states.time_s[-1]}
     columns = np.concatenate(
-        [unit.columns for unit in line.units if unit.mechanism == "joint_tilt"]
+        [unit.columns for unit in line.terms if unit.mechanism == "joint_tilt"]
     )
-    own, together = (whitened_rows(line, seen, columns, tau) for tau in (0.0, 2e-4))
+    own, together = (
+        compute_whitened_rows(line, seen, columns, tau) for tau in (0.0, 2e-4)
+    )
     # Sensitivities to the declared parameters as where the campaign was measured: its
     # own approach aside, by which none goes.
     np.testing.assert_allclose(
-        own[..., : line.products.declared].reshape(-1, line.products.declared),
-        (line.rows.declared @ line.products.into_basis).reshape(
-            -1, line.products.declared
+        own[..., : line.products.declared_count].reshape(
+            -1, line.products.declared_count
+        ),
+        (line.rows.declared @ line.products.basis_transform).reshape(
+            -1, line.products.declared_count
         ),
         rtol=1e-6,
         atol=1e-6,
@@ -211,13 +219,15 @@ def test_entries_have_the_campaigns_loads_as_large_as_may_be(kuka):
         states, wrench=size[:, None] * np.array([0.0, 0.0, 1.0, 0.0, 0.5, 0.0])
     )
     # The weight of the rated payload, at the lever of the campaign's loads.
-    _, wrench = drawn(loaded, replace(kuka, payload_kg=200.0), 40, draws)
+    _, wrench = draw_candidate_experiments(
+        loaded, replace(kuka, payload_kg=200.0), 40, draws
+    )
     np.testing.assert_allclose(
         wrench, np.tile(200.0 * 9.80665 * np.array([0, 0, 1, 0, 0.5, 0]), (40, 1))
     )
-    assert not drawn(replace(states, wrench=0.0 * states.wrench), kuka, 3, draws)[
-        1
-    ].any()
+    assert not draw_candidate_experiments(
+        replace(states, wrench=0.0 * states.wrench), kuka, 3, draws
+    )[1].any()
 
 
 UNITS = (
@@ -238,18 +248,20 @@ def test_posteriors_are_those_of_dense_generalized_least_squares_at_the_pose_err
     so leaves the means."""
     rows = made_rows(1, prior=0.5)
     problem, products = made_problem(rows, UNITS, tau=np.array([0.0, 0.4]))
-    leading = Model((0, 2), 0.5, np.array([0.5, 2.0]), 0.4)
-    other = Model((1,), 1.0, np.array([1.5]), 0.0)
+    leading = ScoredModel((0, 2), 0.5, np.array([0.5, 2.0]), 0.4)
+    other = ScoredModel((1,), 1.0, np.array([1.5]), 0.0)
     line = SimpleNamespace(problem=problem, products=products)
     covariance = rows.marginal_covariance(0.4)
     declared = rows.declared.shape[1]
     models = [leading, other]
     for (found, spread), model in zip(
-        posteriors_of(line, COLUMNS, models, factor), models, strict=True
+        compute_coefficient_posteriors(line, COLUMNS, models, factor),
+        models,
+        strict=True,
     ):
-        columns = np.concatenate([UNITS[n].columns for n in model.units])
+        columns = np.concatenate([UNITS[n].columns for n in model.term_indices])
         deviation = np.repeat(
-            model.scales, [len(UNITS[n].columns) for n in model.units]
+            model.scales, [len(UNITS[n].columns) for n in model.term_indices]
         )
         W = rows.candidates[:, columns]
         precision = W.T @ np.linalg.solve(covariance, W) + np.diag(deviation**-2.0)
@@ -292,7 +304,7 @@ def test_experiments_in_turn_separate_as_both_together_by_eight_bhattacharyya_di
         - 2 * log_dets[1]
         - 2 * log_dets[2]
     )
-    pairs = Pair.of(one, other)
+    pairs = HypothesisPair.of(one, other)
     assert pairs.gained(rows[None])[0] == pytest.approx(expected)
     assert pairs.after(A[0]).after(A[1]).separation == pytest.approx(expected)
 
@@ -300,9 +312,9 @@ def test_experiments_in_turn_separate_as_both_together_by_eight_bhattacharyya_di
 def test_the_experiments_chosen_separate_the_nearest_by_more_than_random_ones():
     rng = np.random.default_rng(1)
     first, second, third = (*made_pair(rng), made_pair(rng)[1])
-    pairs = [Pair.of(first, second), Pair.of(first, third)]
+    pairs = [HypothesisPair.of(first, second), HypothesisPair.of(first, third)]
     rows = 0.3 * rng.standard_normal((40, 3, 5))
-    chosen, separations = best_of(pairs, np.ones(2), rows, 4)
+    chosen, separations = select_experiments(pairs, np.ones(2), rows, 4)
     assert len(set(chosen)) == 4 and (np.diff(separations, axis=0) > 0).all()
     np.testing.assert_allclose(
         separations[-1],
@@ -317,7 +329,12 @@ def test_the_experiments_chosen_separate_the_nearest_by_more_than_random_ones():
 
 
 def test_a_separation_of_16_gives_the_right_one_odds_of_19_to_1_in_nine_cases_of_ten():
-    assert resolved(16.0) == pytest.approx(0.9, abs=0.005) and resolved(0.0) < 1e-9
+    assert (
+        compute_resolution_probability(16.0) == pytest.approx(0.9, abs=0.005)
+        and compute_resolution_probability(0.0) < 1e-9
+    )
     # Log Bayes factors of two predictions of the same covariance.
     factors = 16.0 / 2 + 4.0 * np.random.default_rng(0).standard_normal(100_000)
-    assert (factors > np.log(19.0)).mean() == pytest.approx(resolved(16.0), abs=0.005)
+    assert (factors > np.log(19.0)).mean() == pytest.approx(
+        compute_resolution_probability(16.0), abs=0.005
+    )

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from made_problems import made_problem, made_rows, made_unit
 
-from elastocal.diagnosis.evidence import evaluate, log_sum_exp
+from elastocal.diagnosis.evidence import evaluate_model, log_sum_exp
 from elastocal.diagnosis.hypotheses import NEIGHBOURS, OTHER
-from elastocal.diagnosis.search import alarm_of, posterior
+from elastocal.diagnosis.search import run_alarm_test, search_models
 from elastocal.diagnosis.settings import Settings
 
 TAU = [0.0, 0.3, 0.9]
@@ -66,19 +66,19 @@ def cancelling(size, units):
 def enumerated(problem):
     """Posterior probability of every model, each evaluated in full."""
     odds = {}
-    for size in range(len(problem.units) + 1):
-        for model in combinations(range(len(problem.units)), size):
-            units = [problem.units[number] for number in model]
+    for size in range(len(problem.terms) + 1):
+        for model in combinations(range(len(problem.terms)), size):
+            units = [problem.terms[number] for number in model]
             if len({unit.place for unit in units}) < size:
                 continue
-            found = evaluate(
+            found = evaluate_model(
                 problem.statistics,
                 units,
                 problem.grid,
                 problem.log_pose,
                 np.full(size, 0.1),
             )
-            odds[model] = found.log_evidence + problem.prior.log_odds_of(units)
+            odds[model] = found.log_evidence + problem.prior.compute_log_odds(units)
     values = np.array(list(odds.values()))
     return dict(zip(odds, np.exp(values - log_sum_exp(values)), strict=True))
 
@@ -90,10 +90,14 @@ def test_posterior_is_that_of_all_models(signal, seed):
     together."""
     problem = problem_of(signal, seed)
     expected = enumerated(problem)
-    found = posterior(problem)
+    found = search_models(problem)
     assert found.probabilities.sum() == pytest.approx(1.0)
     mine = dict(
-        zip((model.units for model in found.models), found.probabilities, strict=True)
+        zip(
+            (model.term_indices for model in found.models),
+            found.probabilities,
+            strict=True,
+        )
     )
     assert len(mine) == len(found.models)
     assert all(
@@ -116,7 +120,9 @@ def test_laws_of_the_competitor_at_one_location_join_in_one_model():
     rows = replace(
         rows, residual=rows.residual + 0.8 * rows.candidates[:, :4].sum(axis=1)
     )
-    assert posterior(made_problem(rows, laws, tau=TAU)[0]).models[0].units == (0, 1)
+    assert search_models(made_problem(rows, laws, tau=TAU)[0]).models[
+        0
+    ].term_indices == (0, 1)
 
 
 def test_a_search_that_knows_a_good_model_finds_it_whatever_leads_there():
@@ -128,10 +134,13 @@ def test_a_search_that_knows_a_good_model_finds_it_whatever_leads_there():
     problem = cancelling(
         1.5, [*units, made_unit("d", (1,), 3), made_unit("e", (1,), 4)]
     )
-    best = max(posterior(problem, keys).models[0].log_odds for keys in ((), ("a",)))
+    best = max(search_models(problem, keys).models[0].log_odds for keys in ((), ("a",)))
     # What is known and not tested is no matter.
-    found = posterior(problem, {"a", "b", "c", "gone"})
-    assert found.models[0].units == (0, 1, 2) and found.models[0].log_odds > best + 5
+    found = search_models(problem, {"a", "b", "c", "gone"})
+    assert (
+        found.models[0].term_indices == (0, 1, 2)
+        and found.models[0].log_odds > best + 5
+    )
 
 
 ALARM_UNITS = (
@@ -155,7 +164,8 @@ def signalled(size):
 def test_statistic_rises_and_p_value_falls_with_the_size_of_what_is_missing():
     sizes = [0.0, 0.3, 0.6, 1.2, 2.4]
     found = [
-        alarm_of(*signalled(size), 0.0, np.random.default_rng(6)) for size in sizes
+        run_alarm_test(*signalled(size), 0.0, np.random.default_rng(6))
+        for size in sizes
     ]
     assert (np.diff([one.statistic for one in found[1:]]) > 0).all() and found[
         -1
@@ -175,13 +185,13 @@ def test_statistic_is_the_log_of_the_prior_weighted_bayes_factors(smallest):
     problem, products = signalled(0.3)
     problem = replace(
         problem,
-        units=(
-            *problem.units[:2],
-            replace(problem.units[2], smallest=smallest),
-            *problem.units[3:],
+        terms=(
+            *problem.terms[:2],
+            replace(problem.terms[2], smallest=smallest),
+            *problem.terms[3:],
         ),
     )
-    found = alarm_of(problem, products, 0.0, np.random.default_rng(7))
+    found = run_alarm_test(problem, products, 0.0, np.random.default_rng(7))
     # The sizes of the pose error that draws at zero can make likely: zero and the two
     # next.
     some = problem.statistics.at(np.arange(3))
@@ -192,13 +202,13 @@ def test_statistic_is_the_log_of_the_prior_weighted_bayes_factors(smallest):
             signs=np.zeros(len(unit.columns), int),
             smallest=max(unit.smallest - 1, 0),
         )
-        for unit in problem.units
+        for unit in problem.terms
     ]
-    nothing = evaluate(some, [], problem.grid, log_pose, []).log_evidence
+    nothing = evaluate_model(some, [], problem.grid, log_pose, []).log_evidence
     total = [
-        evaluate(some, [unit], problem.grid, log_pose, [0.1]).log_evidence
+        evaluate_model(some, [unit], problem.grid, log_pose, [0.1]).log_evidence
         - nothing
-        + problem.prior.log_odds_of([unit])
+        + problem.prior.compute_log_odds([unit])
         for unit in unsigned
     ]
     assert found.statistic == pytest.approx(log_sum_exp(np.array(total)), abs=1e-6)
@@ -226,7 +236,7 @@ def test_a_mechanism_counts_at_all_its_locations_at_once_too():
         made_unit("payload", (), 4, candidate=candidates[""]),
     )
     problem, products = made_problem(made_rows(5, candidates=8), units)
-    found = alarm_of(problem, products, 0.0, np.random.default_rng(7))
+    found = run_alarm_test(problem, products, 0.0, np.random.default_rng(7))
     some = problem.statistics.at(np.arange(3))
     log_pose = problem.log_pose[:3]
     grid = problem.grid
@@ -240,11 +250,11 @@ def test_a_mechanism_counts_at_all_its_locations_at_once_too():
     tested = [
         (replace(unit, smallest=max(unit.smallest - 1, 0)), [unit]) for unit in units
     ] + [(whole, list(units[:2]))]
-    nothing = evaluate(some, [], grid, log_pose, []).log_evidence
+    nothing = evaluate_model(some, [], grid, log_pose, []).log_evidence
     total = [
-        evaluate(some, [unit], grid, log_pose, [0.1]).log_evidence
+        evaluate_model(some, [unit], grid, log_pose, [0.1]).log_evidence
         - nothing
-        + problem.prior.log_odds_of(members)
+        + problem.prior.compute_log_odds(members)
         for unit, members in tested
     ]
     # One choice among the variants, not one at each location.

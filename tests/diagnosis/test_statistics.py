@@ -8,7 +8,7 @@ import pytest
 from made_problems import made_rows
 
 from elastocal.diagnosis import statistics
-from elastocal.diagnosis.statistics import null_draws, statistics_of
+from elastocal.diagnosis.statistics import compute_statistics, simulate_null_statistics
 
 TAU = np.array([0.0, 0.1, 0.7, 5.0])
 CASES = {
@@ -45,7 +45,7 @@ def test_statistics_are_those_of_dense_generalized_least_squares(
     monkeypatch.setattr(statistics, "_AT_ONCE", at_once)
     monkeypatch.setattr(statistics, "_COLUMNS_A_ROW", columns_a_row)
     rows = made_rows(1, **CASES[case])
-    found = statistics_of(rows.products, TAU)
+    found = compute_statistics(rows.products, TAU)
     gram, along, squares, logs = (
         np.array(part) for part in zip(*(dense(rows, tau) for tau in TAU), strict=True)
     )
@@ -61,9 +61,9 @@ def test_statistics_are_those_of_dense_generalized_least_squares(
             between, expected, rtol=1e-9, atol=1e-9 * np.abs(gram).max()
         )
     np.testing.assert_allclose(
-        found.along, along, rtol=1e-9, atol=1e-9 * np.abs(along).max()
+        found.score, along, rtol=1e-9, atol=1e-9 * np.abs(along).max()
     )
-    np.testing.assert_allclose(found.squares, squares, rtol=1e-9)
+    np.testing.assert_allclose(found.residual_squares, squares, rtol=1e-9)
     # Up to a constant that does not depend on tau.
     np.testing.assert_allclose(
         np.diff(found.log_likelihood), np.diff(logs), rtol=1e-9, atol=1e-9
@@ -95,7 +95,7 @@ def test_badly_scaled_and_nearly_collinear_columns_cost_no_precision():
         prior_std=np.array([1e12, 1e12, 1e-2, 1e4]),
         candidates=X @ rng.standard_normal((4, 3)) + 1e-3 * own,
     )
-    found = statistics_of(rows.products, [0.0])
+    found = compute_statistics(rows.products, [0.0])
     augmented = np.concatenate([rows.declared, np.diag(1 / rows.prior_std)]).astype(
         np.longdouble
     )
@@ -113,9 +113,9 @@ def test_badly_scaled_and_nearly_collinear_columns_cost_no_precision():
         found.gram[0], exact[:3, :3], rtol=1e-7, atol=1e-7 * np.abs(exact[:3, :3]).max()
     )
     np.testing.assert_allclose(
-        found.along[0], exact[:3, 3], rtol=1e-7, atol=1e-7 * np.abs(exact[:3, 3]).max()
+        found.score[0], exact[:3, 3], rtol=1e-7, atol=1e-7 * np.abs(exact[:3, 3]).max()
     )
-    np.testing.assert_allclose(found.squares[0], exact[3, 3], rtol=1e-9)
+    np.testing.assert_allclose(found.residual_squares[0], exact[3, 3], rtol=1e-9)
 
 
 # Moments are compared at 5 standard errors: each test fails by chance once in some ten
@@ -135,7 +135,7 @@ def test_null_draws_have_the_moments_of_simulated_measurements(
     Sigma M Sigma)."""
     monkeypatch.setattr(statistics, "_AT_ONCE", at_once)
     rows = made_rows(9, **CASES[case])
-    along, squares = null_draws(
+    along, squares = simulate_null_statistics(
         rows.products, tau, TAU, DRAWS, np.random.default_rng(10)
     )
     covariance = rows.covariance(tau)

@@ -5,11 +5,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from elastocal.diagnosis.hypotheses import OTHER, OWN, Law, Unit
-from elastocal.diagnosis.search import Problem
+from elastocal.diagnosis.hypotheses import OTHER, OWN, Discrepancy, ModelTerm
+from elastocal.diagnosis.search import SearchProblem
 from elastocal.diagnosis.settings import Settings
-from elastocal.diagnosis.statistics import WhiteRows, products_of, statistics_of
-from elastocal.fitting.linearization import Factored
+from elastocal.diagnosis.statistics import (
+    WhitenedRows,
+    compute_cross_products,
+    compute_statistics,
+)
+from elastocal.fitting.linearization import FactoredSensitivities
 
 
 @dataclass(frozen=True)
@@ -35,17 +39,17 @@ class Rows:
         declared, jacobian, candidates = (
             part[:, None] for part in (self.declared, self.jacobian, self.candidates)
         )
-        made = Factored.of(
+        made = FactoredSensitivities.of(
             [{column: np.ones(rows)} for column in range(columns)],
             candidates,
             np.arange(rows),
             rows,
         )
-        return WhiteRows(declared, made, self.residual[:, None], jacobian, self.pose)
+        return WhitenedRows(declared, made, self.residual[:, None], jacobian, self.pose)
 
     @property
     def products(self):
-        return products_of(self.white(), self.prior_std, self.present)
+        return compute_cross_products(self.white(), self.prior_std, self.present)
 
     def covariance(self, tau):
         """Sigma = I + tau^2 J J', dense."""
@@ -113,8 +117,12 @@ def made_unit(
     """A unit of some columns, each of plausible size one."""
     columns = np.atleast_1d(columns)
     signs = np.full(len(columns), signs, int)
-    other = Law(location, law, 1.0, (), len(columns)) if mechanism == OTHER else None
-    return Unit(
+    other = (
+        Discrepancy(location, law, 1.0, (), len(columns))
+        if mechanism == OTHER
+        else None
+    )
+    return ModelTerm(
         mechanism,
         location,
         candidate,
@@ -142,4 +150,6 @@ def made_problem(rows, units, settings=None, tau=None):
         )
         tau = np.array(settings.pose_steps) / np.sqrt(information)
     tau = np.asarray(tau, float)
-    return Problem(statistics_of(products, tau), tuple(units), settings), products
+    return SearchProblem(
+        compute_statistics(products, tau), tuple(units), settings
+    ), products

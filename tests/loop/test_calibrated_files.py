@@ -20,11 +20,15 @@ from made_calibrated import USUAL, made_calibrated
 from made_remainders import NOISE_M
 from support import refused
 
-from elastocal.application.accuracy import campaign_accuracy
-from elastocal.application.calibrated import calibrate_by_fit, forward, nominal_forward
+from elastocal.application.accuracy import predict_campaign_accuracy
+from elastocal.application.calibrated import (
+    calibrate_by_fit,
+    compute_nominal_poses,
+    predict_poses,
+)
 from elastocal.io.json_files import read_json
 from elastocal.io.origin import environment
-from elastocal.io.records import checksum
+from elastocal.io.records import compute_sha256
 from elastocal.loop.calibrated_files import certificate, error_budget, load_diagnosed
 from elastocal.loop.diagnosis_tables import diagnosis_from
 
@@ -70,7 +74,7 @@ def test_the_regression_comes_back_and_physics_alone_has_its_own_accuracy(
     heldout = whole.verdict["heldout"]
     assert heldout["delivered"]["rms_m"] < 0.6 * heldout["after"]["rms_m"]
     assert (
-        physics.calibrated.remainder is None
+        physics.calibrated.residual_model is None
         and physics.verdict["heldout"]["delivered"] == heldout["after"]
     )
     assert (
@@ -79,7 +83,7 @@ def test_the_regression_comes_back_and_physics_alone_has_its_own_accuracy(
         != stated["accuracy"]
     )
     for found in (whole, physics):
-        again = campaign_accuracy(found.calibrated)
+        again = predict_campaign_accuracy(found.calibrated)
         assert again.rms_m == pytest.approx(
             found.verdict["accuracy"]["rms_m"], rel=1e-3
         )
@@ -112,7 +116,7 @@ def test_it_says_what_code_data_and_environment_made_it(checkout):
     files["kuka.yaml"] = hashlib.sha256((ROBOTS / "kuka.yaml").read_bytes()).hexdigest()
     assert origin == {
         "commit": "c0ffee",
-        "code_sha256": digest({ENGINE: checksum(checkout / ENGINE)}),
+        "code_sha256": digest({ENGINE: compute_sha256(checkout / ENGINE)}),
         "data_sha256": digest(sorted(files.items())),
         "environment": environment(checkout),
     }
@@ -178,9 +182,7 @@ def test_a_certificate_passes_below_and_fails_above_what_is_predicted_if_enough_
         | {"heldout": found.verdict["heldout"] | {"configurations": judged}},
     )
     tolerance_m = share * found.verdict["accuracy"]["rms_m"]
-    conformity = certificate(checkout / "made", ROBOTS, found, tolerance_m, 0.05)[
-        "conformity"
-    ]
+    conformity = certificate(found, tolerance_m, 0.05)["conformity"]
     assert conformity["decision"] == decision
     assert [
         line.startswith("too few: 3 configurations")
@@ -204,9 +206,12 @@ def test_each_line_of_the_budget_is_what_the_robot_misses_without_that_effect(
     fanuc, states
 ):
     calibrated = made_calibrated(fanuc, *USUAL)
-    found, (whole, _) = error_budget(calibrated, *states), forward(calibrated, *states)
+    found, (whole, _) = (
+        error_budget(calibrated, *states),
+        predict_poses(calibrated, *states),
+    )
     assert found["uncorrected"] == pytest.approx(
-        rms(whole, nominal_forward(fanuc, states[0])[0])
+        rms(whole, compute_nominal_poses(fanuc, states[0])[0])
     )
     for name in ("joint_offset", "link_geometry", "joint_compliance", "link_weight"):
         values = tuple(
@@ -218,7 +223,9 @@ def test_each_line_of_the_budget_is_what_the_robot_misses_without_that_effect(
         without = replace(
             calibrated, estimate=replace(calibrated.estimate, coefficients=values)
         )
-        assert found[name] == pytest.approx(rms(whole, forward(without, *states)[0]))
+        assert found[name] == pytest.approx(
+            rms(whole, predict_poses(without, *states)[0])
+        )
     names = list(found)
     assert names[0] == "uncorrected" and names[-2:] == [
         "uncertainty of the parameters",
@@ -233,7 +240,7 @@ def test_springs_of_the_robot_file_cost_what_they_give_under_load(fanuc, states)
     rigid = replace(
         calibrated, model=replace(calibrated.model, nominal_compliance=np.zeros(6))
     )
-    expected = rms(*(forward(each, *states)[0] for each in (calibrated, rigid)))
+    expected = rms(*(predict_poses(each, *states)[0] for each in (calibrated, rigid)))
     assert (
         error_budget(calibrated, *states)["joint_compliance"] == pytest.approx(expected)
         and expected > 1e-5

@@ -18,7 +18,7 @@ from made_urdf import joint, link, written
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
-from elastocal.application.calibrated import nominal_forward
+from elastocal.application.calibrated import compute_nominal_poses
 from elastocal.command.main import app
 from elastocal.errors import InputError
 from elastocal.figures import style
@@ -108,7 +108,7 @@ def checkout(checkout):
         + [0.0, 0.2, 0.1, 0.3, 0.7, 0.0]
         + 0.2 * np.linspace(0, 1, 8)[:, None]
     )
-    position, rotation = nominal_forward(robot, angles)
+    position, rotation = compute_nominal_poses(robot, angles)
     pose = np.column_stack([position, Rotation.from_matrix(rotation).as_rotvec()])
     pd.DataFrame(pose, columns=["x", "y", "z", "rx", "ry", "rz"]).to_csv(
         top / "path.csv", index=False

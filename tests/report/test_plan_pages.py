@@ -7,7 +7,8 @@ import numpy as np
 from drawn_figures import empty_pictures
 from made_surveys import made_candidates, made_survey
 
-from elastocal.application.planning.plan import choose_plan, sheet
+from elastocal.application.planning.plan import choose_plan
+from elastocal.application.planning.sheet import build_sheet
 from elastocal.campaigns.campaign import Target
 from elastocal.report.plan_pages import plan_facts
 from elastocal.report.typesetting import compile_document
@@ -16,7 +17,7 @@ from elastocal.report.typesetting import compile_document
 def made():
     survey = made_survey()
     plan = choose_plan(survey, made_candidates(survey, 300), 14, 4, 1)
-    return survey, plan, sheet(survey, plan)
+    return survey, plan, build_sheet(survey, plan)
 
 
 def test_a_row_has_the_angles_in_degrees_and_as_many_boxes_as_measurements():

@@ -14,7 +14,7 @@ from study_folder import Study
 from typer.testing import CliRunner
 
 from elastocal.command.main import app
-from elastocal.command.terminal import diagnosed_campaign
+from elastocal.command.terminal import load_diagnosed_campaign
 from elastocal.errors import InputError
 
 CELL = "cells/made"
@@ -140,7 +140,7 @@ def test_each_file_behind_a_report_that_was_changed_is_found_by_every_command(
         "config",
     } and len(files) > 35
     monkeypatch.chdir(cell.folder)
-    assert diagnosed_campaign(Path(CELL)).name == "made"
+    assert load_diagnosed_campaign(Path(CELL)).name == "made"
     for number, name in enumerate(files):
         path = cell.path(name)
         before = path.read_bytes()

@@ -32,9 +32,9 @@ from scipy.special import log_ndtr
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from elastocal.diagnosis.hypotheses import Unit
+    from elastocal.diagnosis.hypotheses import ModelTerm
     from elastocal.diagnosis.settings import Settings
-    from elastocal.diagnosis.statistics import Statistics
+    from elastocal.diagnosis.statistics import SufficientStatistics
 
 
 def log_sum_exp(
@@ -53,7 +53,7 @@ def log_sum_exp(
 
 
 @dataclass(frozen=True)
-class Grid:
+class SizeGrid:
     """Sizes that are averaged over, with the logarithms of their weights. `scales`,
     `log_weights` (S,)."""
 
@@ -61,14 +61,14 @@ class Grid:
     log_weights: np.ndarray
 
     @classmethod
-    def of_settings(cls, settings: Settings) -> Grid:
+    def from_settings(cls, settings: Settings) -> SizeGrid:
         """Sizes whose logarithms have normal pieces below and above the most likely
         size."""
         off = np.log(np.asarray(settings.scales) / settings.scale_center)
         log_weights = -0.5 * (off / np.where(off < 0, *settings.scale_spread)) ** 2
         return cls(np.array(settings.scales), log_weights - log_sum_exp(log_weights))
 
-    def of(self, unit: Unit) -> np.ndarray:
+    def of(self, unit: ModelTerm) -> np.ndarray:
         """Logarithms of the weights for one unit: sizes from its smallest to its
         largest share them, ndarray (S,)."""
         return self.between(unit.smallest, unit.largest)
@@ -77,7 +77,7 @@ class Grid:
         """The same by the places of both sizes."""
         return self._between[smallest, largest]
 
-    def root_mean_square(self, unit: Unit) -> float:
+    def root_mean_square(self, unit: ModelTerm) -> float:
         """Standard deviation of a coefficient of a unit before the measurements, over
         all its sizes, in plausible sizes."""
         return float(np.sqrt(np.exp(self.of(unit)) @ self.scales**2))
@@ -92,7 +92,9 @@ class Grid:
             return weights - log_sum_exp(weights, axis=2)[..., None]
 
 
-def pose_weights(pose_error_rad: np.ndarray, settings: Settings) -> np.ndarray:
+def compute_pose_error_log_prior(
+    pose_error_rad: np.ndarray, settings: Settings
+) -> np.ndarray:
     """Logarithms of the prior weights of sizes of the pose error, one of which is zero,
     (T,)."""
     there = pose_error_rad > 0
@@ -107,7 +109,7 @@ def log_likelihood(squares: np.ndarray, freedom: int) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Blocks:
+class TermBlock:
     """Units of one width d: their `numbers` (U,), `columns` (U, d), and W'MW of the
     columns of each, `gram` (T, U, d, d)."""
 
@@ -116,7 +118,9 @@ class Blocks:
     gram: np.ndarray
 
     @classmethod
-    def of(cls, statistics: Statistics, units: Sequence[Unit]) -> list[Blocks]:
+    def of(
+        cls, statistics: SufficientStatistics, units: Sequence[ModelTerm]
+    ) -> list[TermBlock]:
         """Units in the order of their widths."""
         width = np.array([len(unit.columns) for unit in units], int)
         found = []
@@ -126,9 +130,9 @@ class Blocks:
             found.append(cls(numbers, columns, statistics.between(columns, columns)))
         return found
 
-    def at(self, chosen: np.ndarray | slice) -> Blocks:
+    def at(self, chosen: np.ndarray | slice) -> TermBlock:
         """The same at some of the sizes of the pose error only."""
-        found = Blocks(self.numbers, self.columns, self.gram[chosen])
+        found = TermBlock(self.numbers, self.columns, self.gram[chosen])
         vars(found)["axes"] = tuple(part[chosen] for part in self.axes)
         return found
 
@@ -145,7 +149,7 @@ class Blocks:
 
 
 def _with_priors(
-    statistics: Statistics, columns: np.ndarray, deviations: np.ndarray
+    statistics: SufficientStatistics, columns: np.ndarray, deviations: np.ndarray
 ) -> np.ndarray:
     """I + D^1/2 G D^1/2 of some columns, ndarray (T, D, D)."""
     inner = statistics.between(columns, columns)
@@ -155,12 +159,12 @@ def _with_priors(
     return inner
 
 
-def added_evidence(
-    statistics: Statistics,
+def evaluate_extensions(
+    statistics: SufficientStatistics,
     base: np.ndarray,
     given: tuple[np.ndarray, np.ndarray],
-    blocks: Sequence[Blocks],
-    grid: Grid,
+    blocks: Sequence[TermBlock],
+    grid: SizeGrid,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Log evidence of a model, and of the same with each single unit added, at every
     size of that unit.
@@ -174,7 +178,7 @@ def added_evidence(
     # Rows of W'MW of these columns, and of W'My, divided by the factor: what they take
     # from all others.
     right = deviations[:, None] * np.concatenate(
-        [statistics.between(columns), statistics.along[:, columns, None]], axis=2
+        [statistics.between(columns), statistics.score[:, columns, None]], axis=2
     )
     if len(columns):
         pairs = zip(factor, right, strict=True)
@@ -183,8 +187,8 @@ def added_evidence(
         )
     cross = right[..., :-1]
     fitted = right[..., -1]
-    along_all = statistics.along - (fitted[:, None] @ cross)[:, 0]
-    squares = statistics.squares - (fitted**2).sum(axis=1)
+    along_all = statistics.score - (fitted[:, None] @ cross)[:, 0]
+    squares = statistics.residual_squares - (fitted**2).sum(axis=1)
     log_occam = base - np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
     found = np.empty(
         (len(base), sum(len(each.numbers) for each in blocks), len(grid.scales))
@@ -204,13 +208,15 @@ def added_evidence(
         widened = 1.0 + values[..., None] * variances
         gains = (turned[..., None] * (variances / widened)).sum(axis=2)
         occam = -0.5 * np.log(widened).sum(axis=2)
-        likelihood = log_likelihood(squares[:, None, None] - gains, statistics.freedom)
+        likelihood = log_likelihood(
+            squares[:, None, None] - gains, statistics.degrees_of_freedom
+        )
         found[:, each.numbers] = log_occam[:, None, None] + occam + likelihood
-    return log_occam + log_likelihood(squares, statistics.freedom), found
+    return log_occam + log_likelihood(squares, statistics.degrees_of_freedom), found
 
 
 @dataclass(frozen=True)
-class Evaluated:
+class ModelEvidence:
     """A model with its evidence, averaged over sizes and tau.
 
     `scales` (m,): most probable size of each unit. `log_pose` (T,): log posterior
@@ -224,13 +230,13 @@ class Evaluated:
     without: np.ndarray
 
 
-def evaluate(
-    statistics: Statistics,
-    units: Sequence[Unit],
-    grid: Grid,
+def evaluate_model(
+    statistics: SufficientStatistics,
+    units: Sequence[ModelTerm],
+    grid: SizeGrid,
     log_pose: np.ndarray,
     start: Iterable[float],
-) -> Evaluated:
+) -> ModelEvidence:
     """Evidence of one model, averaged over the sizes of its units.
 
     The sum over all combinations of sizes is taken as the product of the sums over each
@@ -248,7 +254,7 @@ def evaluate(
         for size, u in zip(start, units, strict=True)
     ]
     places = np.array([np.argmin(distances) for distances in off], int)
-    present = Joint(
+    present = ModelDensity(
         statistics, units, grid, statistics.log_likelihood + log_pose, places
     )
     profiles = present.profiles()
@@ -259,7 +265,7 @@ def evaluate(
     sums = log_sum_exp(profiles[:, 1:], axis=1) - profiles[numbers, 1 + present.places]
     log_posterior = present.by_pose_error - log_sum_exp(present.by_pose_error)
     without = profiles[:, 0] - sums + sums.sum()
-    return Evaluated(
+    return ModelEvidence(
         float(present.log_density + sums.sum()), present.scales, log_posterior, without
     )
 
@@ -271,8 +277,8 @@ _FEWER = 4
 
 
 def _ascended(
-    statistics: Statistics, present: Joint, profiles: np.ndarray
-) -> Joint | None:
+    statistics: SufficientStatistics, present: ModelDensity, profiles: np.ndarray
+) -> ModelDensity | None:
     """A step of the ascent: as many units as raise the density, those that gain most
     first; None at the mode.
 
@@ -287,7 +293,9 @@ def _ascended(
     while count:
         places = present.places.copy()
         places[order[:count]] = best[order[:count]]
-        moved = Joint(statistics, present.units, present.grid, present.base, places)
+        moved = ModelDensity(
+            statistics, present.terms, present.grid, present.base, places
+        )
         if moved.log_density > present.log_density:
             return moved
         count = 0 if count == 1 else max(count // _FEWER, 1)
@@ -316,7 +324,7 @@ def _inverses(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return found, log_dets
 
 
-class Joint:
+class ModelDensity:
     """Density of the measurements under one model with one size for each unit.
 
     `base` (T,): what each tau contributes alone, with its prior. `places` (m,) of int:
@@ -325,17 +333,17 @@ class Joint:
 
     def __init__(
         self,
-        statistics: Statistics,
-        units: Sequence[Unit],
-        grid: Grid,
+        statistics: SufficientStatistics,
+        units: Sequence[ModelTerm],
+        grid: SizeGrid,
         base: np.ndarray,
         places: np.ndarray,
     ) -> None:
-        self.units = units
+        self.terms = units
         self.grid = grid
         self.base = base
         self.places = places
-        self.freedom = statistics.freedom
+        self.freedom = statistics.degrees_of_freedom
         self.weights = np.array([grid.of(unit) for unit in units]).reshape(
             len(units), len(grid.scales)
         )
@@ -350,9 +358,9 @@ class Joint:
         self.covariance, self.log_det = _inverses(
             _with_priors(statistics, columns, deviations)
         )
-        along = deviations * statistics.along[:, columns]
+        along = deviations * statistics.score[:, columns]
         self.mean = (self.covariance @ along[..., None])[..., 0]
-        self.squares = statistics.squares - (along * self.mean).sum(axis=1)
+        self.squares = statistics.residual_squares - (along * self.mean).sum(axis=1)
         values = (
             self.base - 0.5 * self.log_det + log_likelihood(self.squares, self.freedom)
         )
@@ -371,7 +379,7 @@ class Joint:
     def profiles(self) -> np.ndarray:
         """Log density over the sizes of each unit, the others as they are, for size
         zero first, ndarray (m, 1 + S)."""
-        found = np.empty((len(self.units), 1 + len(self.grid.scales)))
+        found = np.empty((len(self.terms), 1 + len(self.grid.scales)))
         for numbers, density, _, _ in self._over_sizes():
             found[numbers] = log_sum_exp(density, axis=1).T
         return found
@@ -391,7 +399,7 @@ class Joint:
             found |= dict(
                 zip(numbers.tolist(), zip(centers, spreads, strict=True), strict=True)
             )
-        return [found[number] for number in range(len(self.units))]
+        return [found[number] for number in range(len(self.terms))]
 
     def _over_sizes(
         self,
@@ -432,7 +440,7 @@ class Joint:
             along = (sizes * turned / widened)[1:]
             widths_left = (sizes / widened)[1:]
             for place, number in enumerate(numbers.tolist()):
-                signs = self.units[number].signs
+                signs = self.terms[number].signs
                 if signs.any():
                     seen = _turned_back(
                         vectors[:, place], along[:, :, place], widths_left[:, :, place]

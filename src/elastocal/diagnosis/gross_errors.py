@@ -18,33 +18,29 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.linalg import solve_triangular
 from scipy.special import chdtri, fdtri, gammaincinv
 
-from elastocal.counting import counted
-from elastocal.diagnosis.evidence import Grid
-from elastocal.diagnosis.linearize import Linearized, linearized
+from elastocal.counting import format_count
 from elastocal.effects.conditions import at_states
-from elastocal.fitting.least_squares import LONG, ON_THE_WAY, evaluated, fit
-from elastocal.fitting.linearization import by_coordinates, linearize
-from elastocal.fitting.model import conditions, parameters, residuals
-from elastocal.fitting.noise import Noise, estimated_noise, fit_declared
-from elastocal.fitting.normal_equations import measurement_covariances
+from elastocal.fitting.linearization import linearize, linearize_coordinates
+from elastocal.fitting.model import (
+    compute_residuals,
+    evaluate_conditions,
+    list_parameters,
+)
+from elastocal.fitting.noise import Noise
+from elastocal.fitting.normal_equations import compute_measurement_covariances
 from elastocal.fitting.observations import (
     Observations,
-    measured_in,
-    parts_of,
-    sample_of,
+    select_spread_poses,
     select_states,
-    single_observations,
-    spread_poses,
-    without_outlying_repeats,
+    separate_measurements,
+    split_into_blocks,
 )
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
     from elastocal.diagnosis.settings import Settings
-    from elastocal.diagnosis.statistics import Products
     from elastocal.effects.conditions import Conditions
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Case, Estimate, Model
@@ -62,9 +58,6 @@ _POSE_SHARES = (0.0, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)
 _MOST = 4_000
 # Extrapolated rows of which the usual error is known.
 _FEWEST_TO_COMPARE = 5
-# Standard errors of the last step by all measurements of a long campaign: what it
-# leaves is a tenth of it, or less.
-_LAST_STEP = 1.0
 # Gross errors that have a sentence each among the warnings; the table of residuals has
 # all.
 _MOST_NAMED = 10
@@ -128,21 +121,25 @@ class _Beside:
     ) -> _Beside:
         """Of rows that are ``kept``, (N,) of bool; ``unsure``: whether parameters are
         so."""
-        single = single_observations(measurements)
+        single = separate_measurements(measurements)
         sample = kept.copy()
-        sample[kept] = spread_poses(select_states(single, kept), _MOST)
-        near = spread_poses(single, _MOST)
+        sample[kept] = select_spread_poses(select_states(single, kept), _MOST)
+        near = select_spread_poses(single, _MOST)
         residual = np.empty((len(single), model.rows))
-        whole = conditions(model, estimate, single.states) if near.all() else None
+        whole = (
+            evaluate_conditions(model, estimate, single.states) if near.all() else None
+        )
 
         def around(part: Observations, states: slice) -> Conditions:
             """Conditions, found once where all rows are looked at closely."""
             if whole is None:
-                return conditions(model, estimate, part.states)
+                return evaluate_conditions(model, estimate, part.states)
             return whole if len(part) == len(single) else at_states(whole, states)
 
-        for states, seen, part in parts_of(single, 0):
-            residual[seen] = residuals(model, estimate, part, around(part, states))
+        for states, seen, part in split_into_blocks(single, 0):
+            residual[seen] = compute_residuals(
+                model, estimate, part, around(part, states)
+            )
         far = np.linalg.norm(
             residual
             / np.repeat([noise.position_m, noise.orientation_rad], 3)[: model.rows],
@@ -151,12 +148,14 @@ class _Beside:
         closely = near | sample | (far > np.quantile(far[near], _SCALE_QUANTILES[-1]))
         some = select_states(single, closely)
         parts = []
-        for states, seen, part in parts_of(some, len(parameters(model, estimate))):
-            line = (linearize if unsure else by_coordinates)(
+        for states, seen, part in split_into_blocks(
+            some, len(list_parameters(model, estimate))
+        ):
+            line = (linearize if unsure else linearize_coordinates)(
                 model, estimate, part, around(part, states)
             )
             jacobian = line.joint_jacobian
-            own = measurement_covariances(noise, jacobian[:, None], model.rows)
+            own = compute_measurement_covariances(noise, jacobian[:, None], model.rows)
             parts.append(
                 (
                     seen,
@@ -169,7 +168,7 @@ class _Beside:
 
     def yardstick(self, fitted: Fit) -> PredictionUncertainty:
         """As `yardstick_of`, by the sample."""
-        free = ~fitted.held
+        free = ~fitted.unidentifiable
         mine = self.sample[self.closely]
         rows = fitted.model.rows
         negligible = any(by is None for _, by, _, _ in self.parts) or not free.any()
@@ -268,7 +267,7 @@ def estimate_prediction_uncertainty(
     Statistics 1987): the rest may be that of the very errors that are looked for, or of
     a law that is not linear.
     """
-    near = spread_poses(single_observations(measurements), _MOST)
+    near = select_spread_poses(separate_measurements(measurements), _MOST)
     some = measurements.select(near)
     few = len(measurements) <= _MOST
     return _Beside.of(
@@ -328,7 +327,7 @@ def compute_critical_distance(
     )
 
 
-def gross_errors(
+def find_gross_errors(
     fitted: Fit,
     noise: Noise,
     measurements: Measurements,
@@ -346,7 +345,7 @@ def gross_errors(
     )
 
 
-def held_out_gross_errors(
+def find_held_out_gross_errors(
     fitted: Fit,
     there: tuple[Model, Estimate],
     yardstick: PredictionUncertainty,
@@ -389,7 +388,7 @@ def held_out_gross_errors(
     return OutlierTest(rows.residual, distance, gross & (far | ~outside))
 
 
-def entries_of(
+def describe_gross_errors(
     found: OutlierTest, campaign: Campaign, held_out: bool
 ) -> list[dict[str, Any]]:
     """Gross errors as verdict.json has them, each with its row, its size and a
@@ -414,10 +413,10 @@ def entries_of(
     ]
 
 
-def warnings_of(entries: list[dict[str, Any]]) -> list[str]:
+def format_gross_error_warnings(entries: list[dict[str, Any]]) -> list[str]:
     """A sentence for each of the first gross errors, and how many more there are."""
     more = len(entries) - _MOST_NAMED
-    rest = [f"{counted(more, 'further row')} left out"] if more > 0 else []
+    rest = [f"{format_count(more, 'further row')} left out"] if more > 0 else []
     return [entry["detail"] for entry in entries[:_MOST_NAMED]] + rest
 
 
@@ -436,254 +435,3 @@ def _sentence(found: OutlierTest, campaign: Campaign, place: int) -> str:
     )
     reason = reason if measurements.position[place].any() else ", reads 0, 0, 0"
     return f"{campaign.place_of(int(measurements.row[place]))}: {size} off{reason}, left out"
-
-
-@dataclass(frozen=True)
-class Kept:
-    """The part of a case that is fitted, ``kept`` of all its measurements (N,), with
-    its noise, and its declared model fitted to what is `searched`: observations that a
-    search looks at, no more than so many."""
-
-    case: Case
-    kept: np.ndarray
-    noise: Noise
-    warnings: list[str]
-    declared: Fit
-    searched: Observations
-
-    def to_all(self, found: Fit) -> Fit:
-        """A model that is fitted to what is searched, fitted to all that is kept.
-
-        From an estimate that some measurements lead to, a step or two by all of them
-        are as good as the fit's end (one-step M-estimators; Bickel, One-step Huber
-        estimates in the linear model, JASA 1975).
-        """
-        every = self.case.observations
-        if self.searched is not every:
-            settled = ON_THE_WAY if len(every) <= LONG else _LAST_STEP
-            return fit(
-                found.model,
-                every,
-                found.noise,
-                found.estimate,
-                reweighted=True,
-                settled=settled,
-            )
-        return (
-            found
-            if found is self.declared
-            else fit(found.model, every, found.noise, found.estimate, reweighted=True)
-        )
-
-
-def fitted_to(
-    case: Case, kept: np.ndarray, settings: Settings, last: Kept | None = None
-) -> Kept:
-    """The part of a case that is kept, or the last one where that is the same."""
-    if last is not None and (kept == last.kept).all():
-        return last
-    part = case if kept.all() else case.select(kept)
-    noise, warnings = estimated_noise(part)
-    searched = searched_of(case, part, settings)
-    return Kept(
-        part, kept, noise, warnings, fit_declared(part.model, searched, noise), searched
-    )
-
-
-def searched_of(case: Case, part: Case, settings: Settings) -> Observations:
-    """What a search looks at of a part of a case: at the same poses whatever is kept,
-    so that only gross errors move a fit."""
-    most = settings.searched_observations
-    return sample_of(part.observations, most, sample_of(case.observations, most))
-
-
-def first_kept(case: Case, settings: Settings) -> Kept:
-    """The part of a case that its declared model, or all candidates together, might
-    explain.
-
-    Rows under far larger loads than most are judged by the others alone: they would
-    pull any fit to themselves (bad leverage points; Rousseeuw and Leroy, Robust
-    Regression and Outlier Detection, 1987).
-    """
-    measurements = case.campaign.measurements
-    candidates = list(case.candidates.values())
-    pulling = extreme_loads(measurements, settings)
-    whole = part = fitted_to(case, ~pulling, settings)
-    for _ in range(settings.gross_error_rounds):
-        errors = gross_errors(
-            part.declared, part.noise, measurements, part.kept, settings
-        )
-        last = part
-        part = fitted_to(case, ~errors.gross, settings, part)
-        if part is last:
-            break
-    observations = case.observations
-    most = settings.gross_start_numbers // case.model.rows
-    few = spread_poses(observations, most)
-    if part is whole and not few.all():
-        # Nothing stands apart, and there are too many to look more closely.
-        return whole
-    apart = np.unique(
-        observations.state[measured_in(observations, measurements, ~part.kept)]
-    )
-    few[apart[np.linspace(0, len(apart) - 1, min(len(apart), most)).astype(int)]] = True
-    few[observations.state[measured_in(observations, measurements, pulling)]] = False
-    some = select_states(observations, few)
-    about = evaluated(part.declared.model, some, part.noise, part.declared.estimate)
-    taken = improbable(linearized(about, some, candidates, settings))
-    # A repeat far from its others is in no average, and stays what the declared model
-    # says of it.
-    looked_at = measured_in(measurements, some, np.ones(len(some), bool))
-    looked_at &= np.isin(measurements.row, without_outlying_repeats(measurements).row)
-    return fitted_to(
-        case,
-        ~np.where(looked_at, measured_in(measurements, some, taken), ~part.kept),
-        settings,
-        whole,
-    )
-
-
-def extreme_loads(measurements: Measurements, settings: Settings) -> np.ndarray:
-    """Which rows are under a force far beyond that of most loaded ones, if these are
-    few, ndarray of bool (N,)."""
-    force = np.linalg.norm(measurements.wrench[:, :3], axis=1)
-    usual = np.quantile(force[force > 0], 0.75) if force.any() else np.inf
-    far = force > settings.extreme_load * usual
-    return far & (far.mean() <= settings.gross_error_share)
-
-
-def improbable(line: Linearized) -> np.ndarray:
-    """Which observations all candidates together do not explain, ndarray of bool (M,).
-
-    The whitened residual has the covariance I + X D X' + W S W', with X the declared
-    sensitivities, D their priors, W those of all candidates, S their mean square size.
-    The worst are taken out until what is left agrees; then those that it predicts come
-    back.
-    """
-    products = line.products
-    settings = line.settings
-    rows = products.rows
-    count = products.declared
-    observed, own = rows.residual.shape
-    grid = Grid.of_settings(settings)
-    kept = np.ones(observed, bool)
-    residual = rows.residual.ravel()
-    size = np.sqrt(np.exp(grid.log_weights) @ grid.scales**2)
-    limit = compute_critical_distance(observed, own, settings)
-    basis, candidates = (
-        part.reshape(len(residual), -1)
-        for part in (products.beside[..., :-1], rows.candidates.dense())
-    )
-    candidates -= basis @ products.projected[:, :-1]
-    whole = _Precision(
-        (), np.tile(np.eye(own), (observed, 1, 1)), residual, residual
-    ).less(basis, np.eye(count))
-    whole = whole.less(
-        size * candidates,
-        np.eye(candidates.shape[1]) + size**2 * products.gram[count:-1, count:-1],
-    )
-    some = whole
-    while kept.mean() > 1.0 - settings.gross_error_share:
-        distance = some.distances(kept)
-        worst = int(np.argmax(distance))
-        if distance[worst] <= limit:
-            break
-        kept[worst] = False
-        some = some.without(np.arange(worst * own, (worst + 1) * own))
-    if not kept.all():
-        whole = _with_pose_error(whole, some, products, line.pose_errors_rad)
-    while not kept.all():
-        out = np.flatnonzero(np.repeat(~kept, own))
-        some = whole.without(out)
-        distance = some.distances(kept)
-        variance = np.linalg.inv(whole.between(out)[out])
-        rest = (variance @ whole.along[out]).reshape(-1, own, 1)
-        blocks = variance.reshape(len(rest), own, len(rest), own)[
-            np.arange(len(rest)), :, np.arange(len(rest))
-        ]
-        distance[~kept] = np.sqrt(
-            (rest * np.linalg.solve(blocks, rest)).sum(axis=(1, 2))
-        )
-        back = ~kept & ~flag_outliers(distance, own, kept, settings)[1]
-        if not back.any():
-            break
-        kept |= back
-    return ~kept
-
-
-@dataclass(frozen=True)
-class _Precision:
-    """Inverse covariance I - F F' of the n numbers of M observations: what is added to
-    a covariance, or is taken out of the observations, adds some columns to F
-    (Woodbury's identity).
-
-    `factors` (n, ...): F, some columns after the other. `blocks` (M, own, own): on the
-    diagonal, of each observation. `residual`, `along` (n,): what the inverse is times
-    the residual. Zero of observations that are taken out.
-    """
-
-    factors: tuple[np.ndarray, ...]
-    blocks: np.ndarray
-    residual: np.ndarray
-    along: np.ndarray
-
-    def less(self, left: np.ndarray, inner: np.ndarray) -> _Precision:
-        """This less left inner^-1 left', `left` (n, q), `inner` (q, q)."""
-        factor = solve_triangular(np.linalg.cholesky(inner), left.T, lower=True).T
-        each = factor.reshape(*self.blocks.shape[:2], -1)
-        blocks = self.blocks - each @ each.swapaxes(1, 2)
-        along = self.along - factor @ (factor.T @ self.residual)
-        return replace(
-            self, factors=(*self.factors, factor), blocks=blocks, along=along
-        )
-
-    def between(self, some: np.ndarray) -> np.ndarray:
-        """Some columns, ndarray (n, q)."""
-        found = -sum(factor @ factor[some].T for factor in self.factors)
-        found[some, np.arange(len(some))] += 1.0
-        return found
-
-    def without(self, out: np.ndarray) -> _Precision:
-        """Of the numbers without some."""
-        columns = self.between(out)
-        return self.less(columns, columns[out])
-
-    def distances(self, kept: np.ndarray) -> np.ndarray:
-        """Length of the deletion residual of each observation that is kept, 0 of
-        others, (M,)."""
-        blocks = np.where(
-            kept[:, None, None], self.blocks, np.eye(self.blocks.shape[1])
-        )
-        along = self.along.reshape(*self.blocks.shape[:2], 1)
-        squares = (along * np.linalg.solve(blocks, along)).sum(axis=(1, 2))
-        return np.where(kept, np.sqrt(np.maximum(squares, 0.0)), 0.0)
-
-
-def _with_pose_error(
-    whole: _Precision, some: _Precision, products: Products, pose_errors_rad: np.ndarray
-) -> _Precision:
-    """The inverse covariance with an error common to a pose, of the size that makes
-    some of the numbers most probable.
-
-    `some`: the same without those that are taken out.
-    """
-    rows = products.rows
-    jacobian = np.zeros((*rows.residual.shape, int(rows.pose.max()) + 1, products.axes))
-    for seen, part, _, _ in products.by_pose():
-        jacobian[np.flatnonzero(seen), :, rows.pose[seen]] = part.jacobian
-    jacobian = jacobian.reshape(len(whole.residual), -1)
-    of_whole = jacobian - sum(
-        factor @ (factor.T @ jacobian) for factor in whole.factors
-    )
-    of_some = of_whole - sum(
-        factor @ (factor.T @ jacobian) for factor in some.factors[len(whole.factors) :]
-    )
-    inner = jacobian.T @ of_some
-    along = jacobian.T @ some.along
-    unit = np.eye(jacobian.shape[1])
-    best = (-np.inf, 0.0)
-    for tau in pose_errors_rad.tolist():
-        root = np.linalg.cholesky(unit + tau**2 * inner)
-        gained = 0.5 * (tau * solve_triangular(root, along, lower=True)) ** 2
-        best = max(best, (float(gained.sum() - np.log(np.diag(root)).sum()), tau))
-    return whole.less(best[1] * of_whole, unit + best[1] ** 2 * jacobian.T @ of_whole)

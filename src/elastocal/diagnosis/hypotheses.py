@@ -32,7 +32,7 @@ import numpy as np
 from scipy.special import gammaln, logit, logsumexp
 
 from elastocal.effects.protocol import Candidate
-from elastocal.random_streams import stream
+from elastocal.random_streams import open_stream
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -69,7 +69,7 @@ _SEED = 2007
 
 
 @dataclass(frozen=True)
-class Law:
+class Discrepancy:
     """Random displacements by one cause at one location, in the shape of a candidate:
     per unit of their coefficients.
 
@@ -96,7 +96,7 @@ class Law:
 
 
 @dataclass(frozen=True)
-class Unit:
+class ModelTerm:
     """One law at one location: a candidate, or a law of `OTHER`.
 
     `location`: where it acts; equal for variants of one mechanism at one location.
@@ -116,7 +116,7 @@ class Unit:
     sizes: np.ndarray
     signs: np.ndarray
     log_prior: float = 0.0
-    law: Law | None = None
+    law: Discrepancy | None = None
     smallest: int = 0
     largest: int = -1
 
@@ -128,7 +128,7 @@ class Unit:
 
 
 @dataclass(frozen=True)
-class Prior:
+class ModelPrior:
     """Prior probability of every model: a set of units.
 
     A mechanism is there with a small probability; given that, the number of its
@@ -141,7 +141,7 @@ class Prior:
 
     log_odds: dict[str, np.ndarray]
 
-    def log_odds_of(self, units: Iterable[Unit]) -> float:
+    def compute_log_odds(self, units: Iterable[ModelTerm]) -> float:
         """Logarithm of the prior odds of a model against "nothing"."""
         units = list(units)
         counts = Counter(unit.mechanism for unit in units)
@@ -153,14 +153,14 @@ class Prior:
             )
         )
 
-    def added(self, unit: Unit, count: int) -> float:
+    def added(self, unit: ModelTerm, count: int) -> float:
         """Change of the log prior odds when a unit joins a model that has its mechanism
         at `count` locations."""
         odds = self.log_odds[unit.mechanism]
         return unit.log_prior + float(odds[count + 1] - odds[count])
 
 
-def prior_of(units: Sequence[Unit], settings: Settings) -> Prior:
+def build_model_prior(units: Sequence[ModelTerm], settings: Settings) -> ModelPrior:
     """Prior of all models that units can form."""
     special = {
         "link_weight": settings.gravity_probability,
@@ -181,18 +181,18 @@ def prior_of(units: Sequence[Unit], settings: Settings) -> Prior:
         found[mechanism] = np.append(
             0.0, there + geometric - logsumexp(geometric) - sets
         )
-    return Prior(found)
+    return ModelPrior(found)
 
 
-def units_of(
+def build_terms(
     tried: Iterable[tuple[Candidate, Sequence[tuple[float, ...]]]],
-    laws: Sequence[Law],
+    laws: Sequence[Discrepancy],
     settings: Settings,
-) -> tuple[Unit, ...]:
+) -> tuple[ModelTerm, ...]:
     """Units of candidates, with values of their shapes, and of the competitor's laws,
     in the order of their columns."""
     start = 0
-    units = list[Unit]()
+    units = list[ModelTerm]()
     tried = list(tried)
     variants = Counter((candidate.effect, candidate.location) for candidate, _ in tried)
     for candidate, values in tried:
@@ -224,7 +224,7 @@ def units_of(
             columns = np.arange(start, start + len(sizes))
             where = candidate.effect, candidate.location
             units.append(
-                Unit(
+                ModelTerm(
                     *where,
                     candidate,
                     shapes,
@@ -248,7 +248,7 @@ def units_of(
             np.zeros(law.features, int),
         )
         units.append(
-            Unit(
+            ModelTerm(
                 OTHER,
                 law.location,
                 None,
@@ -263,7 +263,7 @@ def units_of(
     return tuple(units)
 
 
-def laws_of(campaign: Conditions, features: int) -> list[Law]:
+def build_discrepancies(campaign: Conditions, features: int) -> list[Discrepancy]:
     """Laws of which a campaign has inputs, at each joint and at the base.
 
     `campaign`: over whose states displacements are the principal ones, and of whose
@@ -306,7 +306,7 @@ def laws_of(campaign: Conditions, features: int) -> list[Law]:
         }
         if any(each(campaign).size for each in inputs.values()):
             name = f"{cause}{words}"
-            draws = stream(
+            draws = open_stream(
                 _SEED,
                 f"other {name}",
                 "random Fourier features",
@@ -329,7 +329,9 @@ def laws_of(campaign: Conditions, features: int) -> list[Law]:
                 for loaded, count in counts.items()
             )
             found.append(
-                Law(location, name, size, parts, sum(counts.values()) * len(inputs))
+                Discrepancy(
+                    location, name, size, parts, sum(counts.values()) * len(inputs)
+                )
             )
     return found
 

@@ -24,8 +24,8 @@ import numpy as np
 from scipy.constants import g as standard_gravity
 from scipy.special import ndtr
 
-from elastocal.diagnosis.refit import mean_square_left
-from elastocal.diagnosis.statistics import normal_equations
+from elastocal.diagnosis.refit import predict_reduced_chi_square
+from elastocal.diagnosis.statistics import assemble_normal_equations
 from elastocal.diagnosis.verdict import (
     ADEQUATE,
     NAMED,
@@ -33,16 +33,16 @@ from elastocal.diagnosis.verdict import (
     Evidence,
     Hypothesis,
 )
-from elastocal.fitting.model import conditions
+from elastocal.fitting.model import evaluate_conditions
 from elastocal.fitting.observations import Observations, States
 from elastocal.mechanics.components import WRENCH_NAMES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from elastocal.diagnosis.candidate_design import CandidateDesign
     from elastocal.diagnosis.diagnose import Diagnosis
-    from elastocal.diagnosis.linearize import Linearized
-    from elastocal.diagnosis.search import Model
+    from elastocal.diagnosis.search import ScoredModel
     from elastocal.fitting.model import Model as FittedModel
     from elastocal.mechanics.robot import Robot
 
@@ -62,7 +62,7 @@ _MOST_POSES = 100
 _SURE_ODDS = 19.0
 
 
-def drawn(
+def draw_candidate_experiments(
     states: States, robot: Robot, count: int, stream: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
     """Random joint angles (E, n), rad, within reach, and the heavier loads of a
@@ -78,7 +78,7 @@ def drawn(
     return angles, states.wrench[chosen] * (largest / size[chosen])[:, None]
 
 
-def observations_at(
+def build_planned_observations(
     model: FittedModel, own: States, angles: np.ndarray, wrench: np.ndarray
 ) -> Observations:
     """Entries as observations with zeros measured, those of an entry together, joints
@@ -117,26 +117,26 @@ def observations_at(
     )
 
 
-def whitened_rows(
-    linearized: Linearized,
+def compute_whitened_rows(
+    linearized: CandidateDesign,
     observations: Observations,
     columns: np.ndarray,
     pose_error_rad: float,
 ) -> np.ndarray:
     """Sensitivities of entries to declared parameters and some columns, in those of
     `products`, over the noise, (E, R, U)."""
-    about = linearized.about
+    about = linearized.reference_fit
     products = linearized.products
     # Nothing comes after the last row of the campaign but these.
-    around = conditions(about.model, about.estimate, observations.states)
+    around = evaluate_conditions(about.model, about.estimate, observations.states)
     around = replace(around, progress=np.ones(len(observations.states)))
     about = replace(about, weights=np.ones(len(observations)))
     seen = replace(
-        linearized, about=about, observations=observations, around=around
+        linearized, reference_fit=about, observations=observations, around=around
     ).rows
-    basis = seen.declared @ products.into_basis
+    basis = seen.declared @ products.basis_transform
     beside = (
-        seen.candidates.dense()[..., columns] - basis @ products.projected[:, columns]
+        seen.candidates.dense()[..., columns] - basis @ products.projections[:, columns]
     )
     entries = seen.pose.max() + 1
     rows = np.concatenate([basis, beside], axis=-1).reshape(
@@ -149,8 +149,11 @@ def whitened_rows(
     return np.linalg.solve(np.linalg.cholesky(covariance), rows)
 
 
-def posteriors_of(
-    linearized: Linearized, columns: np.ndarray, models: Sequence[Model], factor: float
+def compute_coefficient_posteriors(
+    linearized: CandidateDesign,
+    columns: np.ndarray,
+    models: Sequence[ScoredModel],
+    factor: float,
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Mean (U,) and covariance (U, U) of declared parameters and columns under each
     model; zero for what it does not have.
@@ -158,15 +161,19 @@ def posteriors_of(
     At the pose error of the first one, in units of `factor` times the noise taken.
     Half-normal priors count as normal ones.
     """
-    count = linearized.products.declared
+    count = linearized.products.declared_count
     found = []
     declared = np.arange(count)
     total = (
-        normal_equations(linearized.products, models[0].pose_error_rad, columns)
+        assemble_normal_equations(
+            linearized.products, models[0].pose_error_rad, columns
+        )
         / factor**2
     )
     for model in models:
-        mine, deviations = linearized.problem.columns_of(model.units, model.scales)
+        mine, deviations = linearized.problem.scaled_columns(
+            model.term_indices, model.scales
+        )
         at = np.append(declared, count + np.searchsorted(columns, mine))
         precision = total[np.ix_(at, at)] + np.diag(
             np.append(0.0 * declared, (factor * deviations) ** -2)
@@ -178,7 +185,7 @@ def posteriors_of(
 
 
 @dataclass(frozen=True)
-class Pair:
+class HypothesisPair:
     """Two hypotheses after some experiments.
 
     `apart` (U,): difference of their means. `covariances` (3, U, U): the mean of both,
@@ -192,7 +199,7 @@ class Pair:
     @classmethod
     def of(
         cls, one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray]
-    ) -> Pair:
+    ) -> HypothesisPair:
         """Of two normal distributions of the coefficients."""
         return cls(
             one[0] - other[0], np.array([(one[1] + other[1]) / 2, one[1], other[1]])
@@ -208,20 +215,20 @@ class Pair:
         squares = (off * np.linalg.solve(predicted[0], off)).sum(axis=(1, 2))
         return squares + np.array([4.0, -2.0, -2.0]) @ np.linalg.slogdet(predicted)[1]
 
-    def after(self, rows: np.ndarray) -> Pair:
+    def after(self, rows: np.ndarray) -> HypothesisPair:
         """Both after one experiment (R, U), on average over what it may measure."""
         seen = rows @ self.covariances
         gain = np.linalg.solve(np.eye(len(rows)) + seen @ rows.T, seen).swapaxes(1, 2)
         separation = self.separation + float(self.gained(rows[None])[0])
-        return Pair(
+        return HypothesisPair(
             self.apart - gain[0] @ (rows @ self.apart),
             self.covariances - gain @ seen,
             separation,
         )
 
 
-def best_of(
-    pairs: Sequence[Pair], weights: np.ndarray, rows: np.ndarray, count: int
+def select_experiments(
+    pairs: Sequence[HypothesisPair], weights: np.ndarray, rows: np.ndarray, count: int
 ) -> tuple[list[int], np.ndarray]:
     """So many experiments, each the best after those before it, and the separation of
     each pair after each, (count, pairs).
@@ -243,7 +250,7 @@ def best_of(
     return chosen, np.array(separations)
 
 
-def resolved(separation: np.ndarray | float) -> np.ndarray:
+def compute_resolution_probability(separation: np.ndarray | float) -> np.ndarray:
     """Probability that the right one of two hypotheses gets odds of 19:1 from even
     ones: the log Bayes factor is normal with this variance and half of it as its mean,
     where both predict as surely."""
@@ -251,7 +258,7 @@ def resolved(separation: np.ndarray | float) -> np.ndarray:
     return np.asarray(ndtr((0.5 * size - np.log(_SURE_ODDS)) / np.sqrt(size)))
 
 
-def propose(
+def propose_experiment(
     diagnosis: Diagnosis, stream: np.random.Generator, poses: int = 10
 ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """Choose the poses and loads that most probably resolve what a diagnosis leaves
@@ -278,33 +285,42 @@ def propose(
     model = diagnosis.final.model
     states = diagnosis.case.observations.states
     models = [evidence.posterior.models[each.model] for each in kept]
-    factor = float(np.sqrt(max(mean_square_left(linearized.problem, models[0]), 1.0)))
+    factor = float(
+        np.sqrt(max(predict_reduced_chi_square(linearized.problem, models[0]), 1.0))
+    )
     columns = np.unique(
         np.concatenate(
             [
-                linearized.problem.columns_of(each.units, each.scales)[0]
+                linearized.problem.scaled_columns(each.term_indices, each.scales)[0]
                 for each in models
             ]
         )
     )
-    angles, wrench = drawn(states, campaign.robot, _DRAWN, stream)
+    angles, wrench = draw_candidate_experiments(states, campaign.robot, _DRAWN, stream)
     rows = (
-        whitened_rows(
+        compute_whitened_rows(
             linearized,
-            observations_at(model, states, angles, wrench),
+            build_planned_observations(model, states, angles, wrench),
             columns,
             models[0].pose_error_rad,
         )
         / factor
     )
-    leading, *following = posteriors_of(linearized, columns, models, factor)
-    pairs = [Pair.of(leading, each) for each in following]
+    leading, *following = compute_coefficient_posteriors(
+        linearized, columns, models, factor
+    )
+    pairs = [HypothesisPair.of(leading, each) for each in following]
     probabilities = np.array([each.probability for each in others])
-    chosen, separations = best_of(
+    chosen, separations = select_experiments(
         pairs, np.sqrt(kept[0].probability * probabilities), rows, poses
     )
     whole = np.sqrt(_MOST_POSES / poses) * rows[chosen].reshape(1, -1, rows.shape[-1])
-    reached = np.array([bool(resolved(pair.gained(whole)[0]) >= 0.5) for pair in pairs])
+    reached = np.array(
+        [
+            bool(compute_resolution_probability(pair.gained(whole)[0]) >= 0.5)
+            for pair in pairs
+        ]
+    )
     unreachable = [
         each.mechanisms
         for each, within in zip(others, reached, strict=True)
@@ -348,7 +364,7 @@ def _stated(
         },
         **dict(zip(WRENCH_NAMES, wrench.T, strict=True)),
         "separation": separation,
-        "resolved": resolved(separation),
+        "resolved": compute_resolution_probability(separation),
     }
     last = {
         name: float(columns[name][-1]) if count else None

@@ -32,17 +32,26 @@ import numpy as np
 from scipy.linalg import lapack
 
 from elastocal.diagnosis.evidence import (
-    Blocks,
-    Evaluated,
-    Grid,
-    added_evidence,
-    evaluate,
+    ModelEvidence,
+    SizeGrid,
+    TermBlock,
+    compute_pose_error_log_prior,
+    evaluate_extensions,
+    evaluate_model,
     log_likelihood,
     log_sum_exp,
-    pose_weights,
 )
-from elastocal.diagnosis.hypotheses import OTHER, Prior, Unit, prior_of
-from elastocal.diagnosis.statistics import Products, Statistics, null_draws
+from elastocal.diagnosis.hypotheses import (
+    OTHER,
+    ModelPrior,
+    ModelTerm,
+    build_model_prior,
+)
+from elastocal.diagnosis.statistics import (
+    CrossProducts,
+    SufficientStatistics,
+    simulate_null_statistics,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Sequence
@@ -55,7 +64,7 @@ _NEGLIGIBLE = 9.0
 _BETTER = 0.1
 # Sizes of the pose error with less than this, in log probability, under all of so many
 # good single units are left out.
-UNLIKELY = -9.0
+NEGLIGIBLE_LOG_WEIGHT = -9.0
 _TELLING_UNITS = 10
 # Sizes with less than this under the best model met so far are left out from there on:
 # what comes near to that model differs from it by a few units, which over a hundred
@@ -73,62 +82,64 @@ _BEYOND_DRAWS = 1e4
 
 
 @dataclass(frozen=True)
-class Problem:
+class SearchProblem:
     """Everything that a search needs."""
 
-    statistics: Statistics
-    units: tuple[Unit, ...]
+    statistics: SufficientStatistics
+    terms: tuple[ModelTerm, ...]
     settings: Settings
 
     @cached_property
-    def prior(self) -> Prior:
+    def prior(self) -> ModelPrior:
         """Of all models that the units can form."""
-        return prior_of(self.units, self.settings)
+        return build_model_prior(self.terms, self.settings)
 
     @cached_property
-    def grid(self) -> Grid:
+    def grid(self) -> SizeGrid:
         """Sizes of a unit."""
-        return Grid.of_settings(self.settings)
+        return SizeGrid.from_settings(self.settings)
 
     @cached_property
-    def blocks(self) -> list[Blocks]:
+    def blocks(self) -> list[TermBlock]:
         """Of all units."""
-        return Blocks.of(self.statistics, self.units)
+        return TermBlock.of(self.statistics, self.terms)
 
     @property
     def log_pose(self) -> np.ndarray:
         """Logarithm of the prior weight of each size of the pose error, ndarray
         (T,)."""
-        return pose_weights(self.statistics.pose_error_rad, self.settings)
+        return compute_pose_error_log_prior(
+            self.statistics.pose_error_rad, self.settings
+        )
 
     @cached_property
     def started(self) -> _Searcher:
         """A search that has met the declared model and each unit alone."""
         return _Searcher(self)
 
-    def columns_of(
+    def scaled_columns(
         self, numbers: Sequence[int], scales: Sequence[float] | np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Columns of some units of given sizes, (D,), and the prior standard deviation
         of each, in plausible sizes."""
-        columns = [self.units[number].columns for number in numbers]
+        columns = [self.terms[number].columns for number in numbers]
         return np.concatenate([np.zeros(0, int), *columns]), np.repeat(
             scales, [len(each) for each in columns]
         )
 
-    def mode_of(self, model: Model) -> tuple[np.ndarray, np.ndarray, int]:
+    def find_mode(self, model: ScoredModel) -> tuple[np.ndarray, np.ndarray, int]:
         """Columns of a model (D,), their most probable coefficients at its sizes, and
         the place of its pose error."""
-        columns, deviations = self.columns_of(model.units, model.scales)
+        columns, deviations = self.scaled_columns(model.term_indices, model.scales)
         place = self.statistics.nearest(model.pose_error_rad)
         gram = self.statistics.at(slice(place, place + 1)).between(columns, columns)[0]
         inner = deviations[:, None] * gram * deviations + np.eye(len(columns))
-        along = deviations * self.statistics.along[place, columns]
-        return columns, deviations * solve_positive(inner, along), place
+        along = deviations * self.statistics.score[place, columns]
+        return columns, deviations * solve_positive_definite(inner, along), place
 
 
 @dataclass(frozen=True)
-class Model:
+class ScoredModel:
     """One set of units, rising, with its posterior log odds against the declared model
     alone.
 
@@ -136,7 +147,7 @@ class Model:
     common to the measurements of a pose.
     """
 
-    units: tuple[int, ...]
+    term_indices: tuple[int, ...]
     log_odds: float
     scales: np.ndarray
     pose_error_rad: float
@@ -147,33 +158,33 @@ class Posterior:
     """Models in the order of their probability. `probabilities` (M,): "Nothing" among
     them."""
 
-    models: tuple[Model, ...]
+    models: tuple[ScoredModel, ...]
     probabilities: np.ndarray
 
     @property
-    def nothing(self) -> Model:
+    def empty_model(self) -> ScoredModel:
         """The declared model alone."""
-        return next(model for model in self.models if not model.units)
+        return next(model for model in self.models if not model.term_indices)
 
 
-def solve_positive(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+def solve_positive_definite(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Solution of equations with a symmetric positive matrix, by Cholesky's factor; of
     none, at which LAPACK balks, nothing."""
     return lapack.dposv(matrix, right)[1] if len(matrix) else right
 
 
-def initial_screening(problem: Problem) -> tuple[Model, np.ndarray]:
+def screen_terms(problem: SearchProblem) -> tuple[ScoredModel, np.ndarray]:
     """The declared model alone, and each unit alone against it. Returns
     `log_bayes_factors` (number of units,)."""
-    met = [problem.started.met[number,] for number in range(len(problem.units))]
+    met = [problem.started.met[number,] for number in range(len(problem.terms))]
     return problem.started.measured[()], np.array(met) - problem.started.first
 
 
-def posterior(problem: Problem, known: Collection[str] = ()) -> Posterior:
+def search_models(problem: SearchProblem, known: Collection[str] = ()) -> Posterior:
     """Search the models. `known`: keys of the candidates of a good model, from which
     the search starts, too."""
     searcher = problem.started.again()
-    units = problem.units
+    units = problem.terms
     # Each mechanism at all its locations, and the model that is known, each with the
     # best variant at each place.
     mechanisms = dict.fromkeys(
@@ -201,7 +212,9 @@ def posterior(problem: Problem, known: Collection[str] = ()) -> Posterior:
     return searcher.weigh()
 
 
-def pose_errors_within_reach(statistics: Statistics, settings: Settings) -> np.ndarray:
+def select_pose_errors(
+    statistics: SufficientStatistics, settings: Settings
+) -> np.ndarray:
     """Which sizes of the pose error "nothing" makes likely, or smaller, (T,) of bool:
     what a model adds leaves no more to it.
 
@@ -210,9 +223,9 @@ def pose_errors_within_reach(statistics: Statistics, settings: Settings) -> np.n
 
     `statistics`: of the declared model alone.
     """
-    weights = Problem(statistics, (), settings).started.empty.log_pose
+    weights = SearchProblem(statistics, (), settings).started.empty.log_pose
     largest = max(
-        np.flatnonzero(weights > weights.max() + UNLIKELY)[-1],
+        np.flatnonzero(weights > weights.max() + NEGLIGIBLE_LOG_WEIGHT)[-1],
         np.argmax(weights) + _REACH,
     )
     return np.arange(len(weights)) <= largest
@@ -222,24 +235,24 @@ class _Searcher:
     """Models met so far with their approximate log odds, and the sizes at which they
     were met."""
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: SearchProblem) -> None:
         self.problem, self.grid = problem, problem.grid
         self.statistics = problem.statistics
         self.log_pose = problem.log_pose
         self.blocks = problem.blocks
-        self.weights = np.array([self.grid.of(unit) for unit in problem.units]).reshape(
+        self.weights = np.array([self.grid.of(unit) for unit in problem.terms]).reshape(
             -1, len(self.grid.scales)
         )
-        self.first = np.array([problem.prior.added(unit, 0) for unit in problem.units])
+        self.first = np.array([problem.prior.added(unit, 0) for unit in problem.terms])
         numbers: dict[object, int] = {}
         self.places = np.array(
-            [numbers.setdefault(unit.place, len(numbers)) for unit in problem.units],
+            [numbers.setdefault(unit.place, len(numbers)) for unit in problem.terms],
             int,
         )
         self.empty = self.evaluated((), ())
         self.met: dict[tuple[int, ...], float] = {(): 0.0}
         self.sizes: dict[tuple[int, ...], tuple[float, ...]] = {(): ()}
-        self.measured: dict[tuple[int, ...], Model] = {}
+        self.measured: dict[tuple[int, ...], ScoredModel] = {}
         self.extended: set[tuple[int, ...]] = set()
         self.extend(())
         self.measure(())
@@ -256,11 +269,13 @@ class _Searcher:
         )
         return found
 
-    def evaluated(self, model: tuple[int, ...], start: Iterable[float]) -> Evaluated:
+    def evaluated(
+        self, model: tuple[int, ...], start: Iterable[float]
+    ) -> ModelEvidence:
         """Evidence of a model in full."""
-        return evaluate(
+        return evaluate_model(
             self.statistics,
-            [self.problem.units[n] for n in model],
+            [self.problem.terms[n] for n in model],
             self.grid,
             self.log_pose,
             start,
@@ -271,14 +286,14 @@ class _Searcher:
         if len(model) >= self.problem.settings.largest_model:
             return
         self.extended.add(model)
-        units = self.problem.units
+        units = self.problem.terms
         sizes = self.sizes[model]
         open_units = np.flatnonzero(~np.isin(self.places, self.places[list(model)]))
         if not len(open_units):
             return
         base = self.statistics.log_likelihood + self.log_pose
-        given = self.problem.columns_of(model, sizes)
-        before, by_pose_error = added_evidence(
+        given = self.problem.scaled_columns(model, sizes)
+        before, by_pose_error = evaluate_extensions(
             self.statistics, base, given, self.blocks, self.grid
         )
         by_pose_error += self.weights
@@ -293,7 +308,9 @@ class _Searcher:
             weights = np.column_stack(
                 [weights - log_sum_exp(weights, axis=0), self.empty.log_pose]
             )
-            self.keep_pose_errors(np.flatnonzero((weights > UNLIKELY).any(axis=1)))
+            self.keep_pose_errors(
+                np.flatnonzero((weights > NEGLIGIBLE_LOG_WEIGHT).any(axis=1))
+            )
             self.empty = self.evaluated((), self.empty.scales)
         # What the sizes already in the model are worth as they are, against their
         # average: the same for all extensions.
@@ -321,16 +338,16 @@ class _Searcher:
             self.log_pose = self.log_pose[kept]
             self.blocks = [each.at(kept) for each in self.blocks]
 
-    def measure(self, model: tuple[int, ...]) -> Model:
+    def measure(self, model: tuple[int, ...]) -> ScoredModel:
         """Meet a model as it is, in full, and what it would be without each of its
         units."""
         found = self.evaluated(
             model,
             self.sizes.get(model, (self.problem.settings.scale_center,) * len(model)),
         )
-        units = self.problem.units
+        units = self.problem.terms
         prior = self.problem.prior
-        whole = prior.log_odds_of(units[n] for n in model)
+        whole = prior.compute_log_odds(units[n] for n in model)
         counts = Counter(units[n].mechanism for n in model)
         odds = found.log_evidence - self.empty.log_evidence + whole
         self.met[model] = odds
@@ -338,7 +355,7 @@ class _Searcher:
         pose_error_rad = float(
             self.statistics.pose_error_rad[np.argmax(found.log_pose)]
         )
-        self.measured[model] = Model(model, odds, found.scales, pose_error_rad)
+        self.measured[model] = ScoredModel(model, odds, found.scales, pose_error_rad)
         if odds == max(self.met.values()):
             self.keep_pose_errors(np.flatnonzero(found.log_pose > _OUT_OF_QUESTION))
         for place, number in enumerate(model):
@@ -359,7 +376,7 @@ class _Searcher:
         """Of some units the best at each place, rising."""
         best: dict[tuple[str, tuple[int | str, ...], str], tuple[int]] = {}
         for number in numbers:
-            place = self.problem.units[number].place
+            place = self.problem.terms[number].place
             best[place] = max(
                 best.get(place, (number,)), (number,), key=self.met.__getitem__
             )
@@ -424,9 +441,9 @@ class Alarm:
     raised: bool
 
 
-def alarm_of(
-    problem: Problem,
-    products: Products,
+def run_alarm_test(
+    problem: SearchProblem,
+    products: CrossProducts,
     pose_error_rad: float,
     stream: np.random.Generator,
 ) -> Alarm:
@@ -446,17 +463,18 @@ def alarm_of(
         (statistics.log_likelihood + problem.log_pose)[chosen],
     )
     tested, log_priors = _alternatives(problem)
-    of_others = Blocks.of(statistics, tested[len(problem.units) :])
+    of_others = TermBlock.of(statistics, tested[len(problem.terms) :])
     blocks = [each.at(chosen) for each in problem.blocks]
     blocks += [
-        replace(each, numbers=each.numbers + len(problem.units)) for each in of_others
+        replace(each, numbers=each.numbers + len(problem.terms)) for each in of_others
     ]
 
     def average_bayes_factors(along: np.ndarray, squares: np.ndarray) -> np.ndarray:
         """Logarithms of N sets of measurements, ndarray (N,). `along` (T, K, N),
         `squares` (T, N)."""
         nothing = log_sum_exp(
-            base[:, None] + log_likelihood(squares, statistics.freedom), axis=0
+            base[:, None] + log_likelihood(squares, statistics.degrees_of_freedom),
+            axis=0,
         )
         total = np.full(len(nothing), -np.inf)
         variances = problem.grid.scales**2
@@ -485,18 +503,21 @@ def alarm_of(
                     + np.array(weights)
                 )
                 known += log_priors[block.numbers[some], None]
-                terms = log_likelihood(left, statistics.freedom) + known[..., None]
+                terms = (
+                    log_likelihood(left, statistics.degrees_of_freedom)
+                    + known[..., None]
+                )
                 total = np.logaddexp(total, log_sum_exp(terms, axis=(0, 1, 2)))
         return total - nothing
 
     statistic = float(
-        average_bayes_factors(statistics.along[..., None], statistics.squares[:, None])[
-            0
-        ]
+        average_bayes_factors(
+            statistics.score[..., None], statistics.residual_squares[:, None]
+        )[0]
     )
     reached = 0
     if statistic <= np.log(_BEYOND_DRAWS * (1 + settings.alarm_draws)):
-        drawn = null_draws(
+        drawn = simulate_null_statistics(
             products,
             pose_error_rad,
             statistics.pose_error_rad,
@@ -508,14 +529,14 @@ def alarm_of(
     return Alarm(p_value, statistic, p_value <= settings.alarm_level)
 
 
-def _alternatives(problem: Problem) -> tuple[list[Unit], np.ndarray]:
+def _alternatives(problem: SearchProblem) -> tuple[list[ModelTerm], np.ndarray]:
     """Every unit, and every mechanism with one law at all its locations in one size;
     with their log prior odds."""
     prior = problem.prior
-    alternatives = list(problem.units)
+    alternatives = list(problem.terms)
     log_priors = problem.started.first.tolist()
-    laws: dict[tuple[str, str, tuple[float, ...]], list[Unit]] = {}
-    for unit in problem.units:
+    laws: dict[tuple[str, str, tuple[float, ...]], list[ModelTerm]] = {}
+    for unit in problem.terms:
         if unit.candidate:
             laws.setdefault(
                 (unit.mechanism, unit.candidate.detail, unit.shapes), []
@@ -526,6 +547,6 @@ def _alternatives(problem: Problem) -> tuple[list[Unit], np.ndarray]:
             smallest = min(unit.smallest for unit in units)
             alternatives.append(replace(units[0], columns=columns, smallest=smallest))
             log_priors.append(
-                prior.log_odds_of(units) - (len(units) - 1) * units[0].log_prior
+                prior.compute_log_odds(units) - (len(units) - 1) * units[0].log_prior
             )
     return alternatives, np.array(log_priors)

@@ -24,12 +24,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from elastocal.fitting.observations import groups_by_size
+from elastocal.fitting.observations import batch_groups_by_size
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from elastocal.fitting.linearization import Factored
+    from elastocal.fitting.linearization import FactoredSensitivities
 
 # Products of one pose with all columns that are in memory at once.
 _AT_ONCE = 1_000_000
@@ -41,7 +41,7 @@ _COLUMNS_A_ROW = 4
 
 
 @dataclass(frozen=True)
-class WhiteRows:
+class WhitenedRows:
     """Whitened rows of M observations in some whole poses.
 
     `declared` (M, rows, P): sensitivities to the declared parameters. `candidates`:
@@ -51,17 +51,17 @@ class WhiteRows:
     """
 
     declared: np.ndarray
-    candidates: Factored
+    candidates: FactoredSensitivities
     residual: np.ndarray
     jacobian: np.ndarray
     pose: np.ndarray
 
-    def at(self, seen: np.ndarray) -> WhiteRows:
+    def at(self, seen: np.ndarray) -> WhitenedRows:
         """Those of some whole poses, ndarray of bool (M,), which are numbered anew."""
         if seen.all():
             return self
         pose = np.unique(self.pose[seen], return_inverse=True)[1]
-        return WhiteRows(
+        return WhitenedRows(
             self.declared[seen],
             self.candidates.at(seen),
             self.residual[seen],
@@ -71,7 +71,7 @@ class WhiteRows:
 
 
 @dataclass(frozen=True)
-class Products:
+class CrossProducts:
     """What `statistics_of` makes `Statistics` of, at any size of the pose error, and
     `null_draws` simulated ones.
 
@@ -84,42 +84,42 @@ class Products:
     is left of all other columns and the residual, as of `Statistics`.
     """
 
-    rows: WhiteRows
-    beside: np.ndarray
-    declared: int
+    rows: WhitenedRows
+    basis_and_residual: np.ndarray
+    declared_count: int
     gram: np.ndarray
-    freedom: int
-    into_basis: np.ndarray
-    projected: np.ndarray
+    degrees_of_freedom: int
+    basis_transform: np.ndarray
+    projections: np.ndarray
     inside: np.ndarray
     met: dict[float, tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = field(
         default_factory=dict, repr=False
     )
 
     @property
-    def without_candidates(self) -> Products:
+    def without_candidates(self) -> CrossProducts:
         """Of the declared model alone."""
-        kept = np.append(np.arange(self.declared), -1)
+        kept = np.append(np.arange(self.declared_count), -1)
         rows = replace(
             self.rows,
-            candidates=self.rows.candidates.of_columns(
+            candidates=self.rows.candidates.select_columns(
                 np.zeros(len(self.inside), bool)
             ),
         )
         some: dict[str, Any] = {
             "gram": self.gram[np.ix_(kept, kept)],
-            "projected": self.projected[:, -1:],
+            "projections": self.projections[:, -1:],
         }
         return replace(self, rows=rows, inside=self.inside[:0], met={}, **some)
 
     @property
-    def without_rows(self) -> Products:
+    def without_rows(self) -> CrossProducts:
         """Without what grows with the measurements; normal equations at other sizes
         than those met are lost with it."""
         return replace(
             self,
-            rows=self.rows.at(np.zeros(len(self.beside), bool)),
-            beside=self.beside[:0],
+            rows=self.rows.at(np.zeros(len(self.basis_and_residual), bool)),
+            basis_and_residual=self.basis_and_residual[:0],
         )
 
     @property
@@ -132,7 +132,9 @@ class Products:
             int(np.bincount(rows.pose).max()) * rows.jacobian.shape[1],
         )
 
-    def by_pose(self) -> Iterator[tuple[np.ndarray, WhiteRows, np.ndarray, np.ndarray]]:
+    def iterate_poses(
+        self,
+    ) -> Iterator[tuple[np.ndarray, WhitenedRows, np.ndarray, np.ndarray]]:
         """B_p (G, a, P + K + 1) along principal axes of C_p, and its eigenvalues (G,
         a), of some poses at a time.
 
@@ -140,7 +142,7 @@ class Products:
         axes.
         """
         rows = self.rows
-        count = self.declared
+        count = self.declared_count
         axes = self.axes
         width = self.gram.shape[0]
         poses = int(rows.pose.max()) + 1
@@ -148,8 +150,12 @@ class Products:
         for start in range(0, poses, step):
             seen = (rows.pose >= start) & (rows.pose < start + step)
             part = rows.at(seen)
-            beside = self.beside if poses <= step else self.beside[seen]
-            groups = groups_by_size(part.pose)
+            beside = (
+                self.basis_and_residual
+                if poses <= step
+                else self.basis_and_residual[seen]
+            )
+            groups = batch_groups_by_size(part.pose)
             jacobian = np.empty((*part.jacobian.shape[:2], axes))
             found = np.empty((min(step, poses - start), axes, width))
             values = np.empty((min(step, poses - start), axes))
@@ -164,16 +170,16 @@ class Products:
                 together = turned.transpose(0, 2, 1) @ beside[members].reshape(flat)
                 found[mine, :, :count] = together[..., :-1]
                 found[mine, :, -1] = together[..., -1]
-            found[..., count:-1] = part.candidates.times_by_pose(jacobian, part.pose)
+            found[..., count:-1] = part.candidates.multiply_by_pose(jacobian, part.pose)
             every = found.reshape(-1, width)
-            every[:, count:] -= every[:, :count] @ self.projected
+            every[:, count:] -= every[:, :count] @ self.projections
             found[..., count:-1][..., self.inside] = 0.0
             yield seen, replace(part, jacobian=jacobian), found, np.maximum(values, 0.0)
 
 
-def products_of(
-    rows: WhiteRows, prior_std: np.ndarray, present: np.ndarray
-) -> Products:
+def compute_cross_products(
+    rows: WhitenedRows, prior_std: np.ndarray, present: np.ndarray
+) -> CrossProducts:
     """Gather the products of whitened rows.
 
     `prior_std` (P,): standard deviation of the prior of each declared parameter; wide
@@ -215,11 +221,13 @@ def products_of(
     gram[-1, -1] = left @ left
     freedom = max(round(len(declared) - (seen**2).sum()), 1)
     into_basis = np.linalg.inv(triangle) / norms[:, None]
-    return Products(rows, beside, count, gram, freedom, into_basis, projected, inside)
+    return CrossProducts(
+        rows, beside, count, gram, freedom, into_basis, projected, inside
+    )
 
 
 @dataclass(frozen=True)
-class Statistics:
+class SufficientStatistics:
     """Sufficient statistics at T sizes of the pose error, for K columns.
 
     `pose_error_rad` (T,): tau. `gram` (T or 1, K, K), `taken` (T, K, R): W'MW is the
@@ -232,12 +240,12 @@ class Statistics:
     pose_error_rad: np.ndarray
     gram: np.ndarray
     taken: np.ndarray
-    along: np.ndarray
-    squares: np.ndarray
+    score: np.ndarray
+    residual_squares: np.ndarray
     log_likelihood: np.ndarray
-    freedom: int
+    degrees_of_freedom: int
 
-    def at(self, chosen: np.ndarray | slice) -> Statistics:
+    def at(self, chosen: np.ndarray | slice) -> SufficientStatistics:
         """The same at some of the sizes of the pose error only; those beside each other
         are not copied."""
         if (
@@ -249,7 +257,7 @@ class Statistics:
         of_each = {
             name: each
             for name, each in vars(self).items()
-            if name != "freedom" and len(each) == len(self.squares)
+            if name != "degrees_of_freedom" and len(each) == len(self.residual_squares)
         }
         return replace(self, **{name: each[chosen] for name, each in of_each.items()})
 
@@ -276,9 +284,11 @@ class Statistics:
         return found - taken @ others.swapaxes(-1, -2)
 
 
-def statistics_of(products: Products, pose_error_rad: np.ndarray) -> Statistics:
+def compute_statistics(
+    products: CrossProducts, pose_error_rad: np.ndarray
+) -> SufficientStatistics:
     """Sufficient statistics at some sizes of the pose error (T,)."""
-    count = products.declared
+    count = products.declared_count
     sizes = np.asarray(pose_error_rad)
     # Without a pose error declared columns are orthonormal, and the others have nothing
     # in them.
@@ -290,7 +300,7 @@ def statistics_of(products: Products, pose_error_rad: np.ndarray) -> Statistics:
     taken = np.zeros((len(sizes), rest.shape[1], few * (rows + count)))
     start = 0
     log_dets = np.zeros(len(sizes))
-    for _, _, found, values in products.by_pose() if sizes.any() else ():
+    for _, _, found, values in products.iterate_poses() if sizes.any() else ():
         part = slice(start, start := start + values.size)
         for number in np.flatnonzero(sizes).tolist():
             tau = sizes[number]
@@ -321,22 +331,24 @@ def statistics_of(products: Products, pose_error_rad: np.ndarray) -> Statistics:
         )
     logs = -0.5 * log_dets - np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
     last = rest[:, -1] - (taken @ taken[:, -1, :, None])[..., 0]
-    return Statistics(
+    return SufficientStatistics(
         sizes,
         rest[:, :-1, :-1],
         taken[:, :-1],
         last[:, :-1],
         last[:, -1],
         logs,
-        products.freedom,
+        products.degrees_of_freedom,
     )
 
 
-def normal_equations(products: Products, tau: float, columns: np.ndarray) -> np.ndarray:
+def assemble_normal_equations(
+    products: CrossProducts, tau: float, columns: np.ndarray
+) -> np.ndarray:
     """Z'Sigma(tau)^-1 Z of declared columns, some of the others (D,) and the residual,
     ndarray (P + D + 1, P + D + 1)."""
     if tau not in products.met:
-        statistics_of(products, np.array([tau]))
+        compute_statistics(products, np.array([tau]))
     some, (factor, fitted, rest, taken) = np.append(columns, -1), products.met[tau]
     fitted = fitted[:, some]
     taken = taken[some]
@@ -349,8 +361,8 @@ def normal_equations(products: Products, tau: float, columns: np.ndarray) -> np.
     )
 
 
-def null_draws(
-    products: Products,
+def simulate_null_statistics(
+    products: CrossProducts,
     tau: float,
     pose_error_rad: np.ndarray,
     count: int,
@@ -364,25 +376,27 @@ def null_draws(
     `Statistics`, for N draws of unit variance.
     """
     rows = products.rows
-    declared = products.declared
+    declared = products.declared_count
     joints = rows.jacobian.shape[2]
     sizes = np.asarray(pose_error_rad)
     white = stream.standard_normal((*rows.residual.shape, count))
-    fitted = np.tensordot(products.beside[..., :-1], white, ((0, 1), (0, 1)))
+    fitted = np.tensordot(
+        products.basis_and_residual[..., :-1], white, ((0, 1), (0, 1))
+    )
     along = np.concatenate(
-        [fitted, rows.candidates.times(white) - products.projected[:, :-1].T @ fitted]
+        [fitted, rows.candidates.times(white) - products.projections[:, :-1].T @ fitted]
     )
     squares = (white**2).sum(axis=(0, 1))
     known = np.tile(products.gram[:declared, :-1], (len(sizes), 1, 1))
     taken = np.zeros((len(sizes), *along.shape))
     off = np.zeros((len(sizes), count))
-    for chosen, part, each, values in products.by_pose():
+    for chosen, part, each, values in products.iterate_poses():
         flat = each.reshape(-1, each.shape[2])[:, :-1]
         values = values.reshape(-1, 1)
         drawn = white[chosen]
         by_pose = np.empty((*each.shape[:2], count))
         axes = each.shape[1]
-        for members in groups_by_size(part.pose):
+        for members in batch_groups_by_size(part.pose):
             turned = (
                 part.jacobian[members]
                 .reshape(len(members), -1, axes)

@@ -18,21 +18,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.counting import plural
+from elastocal.counting import pluralize
 from elastocal.data_checks.protocol import OF_DATA, Fault
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.diagnosis.refit import Averaged, squares_beyond
-from elastocal.effects.catalogue import effects
+from elastocal.diagnosis.model_averaging import ModelAverage, compute_extra_squares
+from elastocal.effects.catalogue import list_effects
 from elastocal.effects.protocol import Candidate, Parameter, Shape
 from elastocal.effects.sizes import lever_m
-from elastocal.fitting.linearization import effect_columns
-from elastocal.fitting.model import joint_compliances
+from elastocal.fitting.linearization import compute_effect_sensitivities
+from elastocal.fitting.model import get_joint_compliances
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
-    from elastocal.diagnosis.linearize import Linearized
-    from elastocal.diagnosis.search import Alarm, Model, Posterior, Problem
+    from elastocal.diagnosis.candidate_design import CandidateDesign
+    from elastocal.diagnosis.search import Alarm, Posterior, ScoredModel, SearchProblem
     from elastocal.diagnosis.settings import Settings
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.noise import Noise
@@ -107,7 +107,7 @@ class Evidence:
     looks at. `tested`: the last fit asked for what it leaves, and that.
     """
 
-    linearized: Linearized
+    linearized: CandidateDesign
     posterior: Posterior
     alarm: Alarm
     conclusion: Conclusion
@@ -117,7 +117,7 @@ class Evidence:
     tested: tuple[Fit, Repeatable | None] | None
 
 
-def concluded(problem: Problem, posterior: Posterior, alarm: Alarm) -> Conclusion:
+def concluded(problem: SearchProblem, posterior: Posterior, alarm: Alarm) -> Conclusion:
     """State the verdict: adequate without an alarm; named: one mechanism alone; class:
     one, but which remains ambiguous, or whether a related one acts; several;
     unexplained: what the catalogue does not have, or no model explains better than
@@ -132,7 +132,7 @@ def concluded(problem: Problem, posterior: Posterior, alarm: Alarm) -> Conclusio
         # Their sum may exceed one by rounding.
         mechanisms[name] = min(mechanisms.get(name, 0.0) + probability, 1.0)
     mechanisms = dict(sorted(mechanisms.items(), key=lambda entry: -entry[1]))
-    families = {unit.candidate.family for unit in problem.units if unit.candidate}
+    families = {unit.candidate.family for unit in problem.terms if unit.candidate}
     if not families or not (families - {_OF_THE_SETUP} or alarm.raised):
         return Conclusion(NOT_TESTABLE, hypotheses, nothing, {}, mechanisms, None)
     if not alarm.raised:
@@ -219,7 +219,9 @@ def _least_expected_loss(
     return alone < classes.min(), worth if none > min(alone, classes.min()) else ()
 
 
-def hypotheses_of(problem: Problem, posterior: Posterior) -> tuple[Hypothesis, ...]:
+def hypotheses_of(
+    problem: SearchProblem, posterior: Posterior
+) -> tuple[Hypothesis, ...]:
     """Probability of each set of mechanisms, the most probable first; "nothing" is
     always among them."""
     found: dict[tuple[str, ...], tuple[float, int]] = {(): (0.0, -1)}
@@ -235,7 +237,7 @@ def hypotheses_of(problem: Problem, posterior: Posterior) -> tuple[Hypothesis, .
     )
 
 
-def _acting(problem: Problem, model: Model, probability: float) -> set[str]:
+def _acting(problem: SearchProblem, model: ScoredModel, probability: float) -> set[str]:
     """What a model says that acts: its mechanisms, and something unknown beside a
     smooth error.
 
@@ -243,13 +245,13 @@ def _acting(problem: Problem, model: Model, probability: float) -> set[str]:
     makes displacements that the other cannot make, but within the tolerance of laws.
     Nothing related to a mechanism acts where the smooth error is far larger.
     """
-    names = {problem.units[unit].mechanism for unit in model.units}
+    names = {problem.terms[unit].mechanism for unit in model.term_indices}
     known = names - {OTHER}
     if not known or known == names or probability <= _TELLING:
         return names
     of_laws = problem.settings.law_tolerance**2
     of_unknown = problem.settings.smooth_tolerance**2
-    (by_laws, beyond_unknown), (by_unknown, beyond_laws) = squares_beyond(
+    (by_laws, beyond_unknown), (by_unknown, beyond_laws) = compute_extra_squares(
         problem, model, known
     )
     if beyond_laws < of_laws * by_laws:
@@ -261,20 +263,22 @@ def _acting(problem: Problem, model: Model, probability: float) -> set[str]:
     )
 
 
-def locations_of(problem: Problem, model: Model, mechanism: str) -> list[Location]:
+def locations_of(
+    problem: SearchProblem, model: ScoredModel, mechanism: str
+) -> list[Location]:
     """Where a mechanism acts in a model, in the order of the units: that of a set
     differs from one process to the next."""
     return list(
         dict.fromkeys(
-            problem.units[n].location
-            for n in model.units
-            if problem.units[n].mechanism == mechanism
+            problem.terms[n].location
+            for n in model.term_indices
+            if problem.terms[n].mechanism == mechanism
         )
     )
 
 
 def location_probabilities(
-    problem: Problem, posterior: Posterior, mechanism: str
+    problem: SearchProblem, posterior: Posterior, mechanism: str
 ) -> dict[Location, float]:
     """Probability of each location of a mechanism, given that it is there."""
     total = 0.0
@@ -338,9 +342,9 @@ def contradictions(final: Fit, measured: Noise, settings: Settings) -> list[str]
     )
     found += pose_error_warnings(final.noise, settings.largest_pose_error_rad)
     if final.model.identifies_compliance:
-        compliance = joint_compliances(final.model, final.estimate)
+        compliance = get_joint_compliances(final.model, final.estimate)
         deviation = np.sqrt(np.diag(final.covariance))[
-            final.places_of("joint_compliance")
+            final.parameter_indices("joint_compliance")
         ]
         found += [
             f"the compliance of joint {joint + 1} is negative by {-compliance[joint] / deviation[joint]:.1f} standard errors"
@@ -392,8 +396,8 @@ def location_words(mechanism: str, location: Sequence[int | str]) -> str:
         for named in (False, True)
     )
     # Numbers count joints, or links, which begin at the joint of the same number.
-    part = getattr(effects().get(mechanism), "part", "joint")
-    where = f"{plural(part, len(joints))} {' and '.join(joints)}" if joints else ""
+    part = getattr(list_effects().get(mechanism), "part", "joint")
+    where = f"{pluralize(part, len(joints))} {' and '.join(joints)}" if joints else ""
     return " ".join(filter(None, [where, *names])) or (
         "base" if mechanism == OTHER else ""
     )
@@ -442,7 +446,7 @@ def probability_facts(found: Evidence) -> dict[str, Any]:
 
 
 def effect_entries(
-    found: Evidence, final: Fit, averages: Averaged, observations: Observations
+    found: Evidence, final: Fit, averages: ModelAverage, observations: Observations
 ) -> list[dict[str, Any]]:
     """Entries of the effects found, those of the most probable mechanisms first.
 
@@ -452,11 +456,11 @@ def effect_entries(
     problem = found.linearized.problem
     conclusion = found.conclusion
     numbers = (
-        found.posterior.models[conclusion.best.model].units
+        found.posterior.models[conclusion.best.model].term_indices
         if conclusion.best.named
         else ()
     )
-    units = [problem.units[number] for number in numbers]
+    units = [problem.terms[number] for number in numbers]
     entries = []
     for name in sorted(
         conclusion.best.named, key=lambda name: -conclusion.mechanisms[name]
@@ -497,7 +501,7 @@ def effect_entries(
 
 
 def parameter_entries(
-    member: Candidate, final: Fit, averages: Averaged
+    member: Candidate, final: Fit, averages: ModelAverage
 ) -> list[dict[str, Any]]:
     """Parameters and shapes of one candidate in a fit.
 
@@ -505,8 +509,8 @@ def parameter_entries(
     with that of the joint that it turns most, which measurements tell.
     """
     effect = next(effect for effect in final.model.effects if effect.key == member.key)
-    mine = final.places_of(member.key)
-    values = np.concatenate(final.values_of(member.key))
+    mine = final.parameter_indices(member.key)
+    values = np.concatenate(final.effect_values(member.key))
     unknowns: list[Parameter | Shape] = [*effect.parameters, *effect.shapes]
     entries = [
         {
@@ -519,9 +523,9 @@ def parameter_entries(
             ),
             "unit": parameter.unit,
             "prior_std": getattr(parameter, "prior_std", None),
-            "held": bool(final.held[index]),
-            "identifiable": not final.held[index]
-            and (member.key, parameter.name) not in averages.of_prior,
+            "held": bool(final.unidentifiable[index]),
+            "identifiable": not final.unidentifiable[index]
+            and (member.key, parameter.name) not in averages.prior_dominated,
         }
         # Where a shape has no slope, such as the row of a step, a search has chosen it.
         | (
@@ -584,11 +588,11 @@ def sag_entries(
         return []
     jacobian = final.joint_jacobian[:, :3]
     laws = [(member.displacement, ()) for member in members]
-    around = final.conditions_of(observations.states)
-    columns = effect_columns(laws, around, jacobian, observations.state)
-    mine = np.concatenate([final.places_of(member.key) for member in members])
+    around = final.get_conditions(observations.states)
+    columns = compute_effect_sensitivities(laws, around, jacobian, observations.state)
+    mine = np.concatenate([final.parameter_indices(member.key) for member in members])
     sag = columns @ np.concatenate(
-        [final.values_of(member.key)[0] for member in members]
+        [final.effect_values(member.key)[0] for member in members]
     )
     most = int(np.argmax((sag**2).sum(axis=1)))
     size = float(np.linalg.norm(sag[most]))
@@ -637,9 +641,9 @@ def _estimates(
 ) -> Iterator[tuple[float, float, Parameter, bool]]:
     """Value, standard error and kind of each parameter of an effect, its shapes aside,
     and whether it is too large."""
-    errors = np.sqrt(np.diag(final.covariance)[final.places_of(effect.key)])
+    errors = np.sqrt(np.diag(final.covariance)[final.parameter_indices(effect.key)])
     for value, error, parameter in zip(
-        final.values_of(effect.key)[0], errors, effect.parameters, strict=False
+        final.effect_values(effect.key)[0], errors, effect.parameters, strict=False
     ):
         yield (
             value,

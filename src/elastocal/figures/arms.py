@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
-from elastocal.application.planning.cell import link_points
+from elastocal.application.planning.cell import sample_links
 from elastocal.figures.style import (
     MILLI,
     PALETTE,

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from elastocal.effects.catalogue import effects
+from elastocal.effects.catalogue import list_effects
 from elastocal.effects.conditions import conditions_of
 from elastocal.effects.protocol import Candidate
 from elastocal.figures.style import MILLI, PALETTE, create_panels, styled

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from elastocal.counting import counted, first_names
+from elastocal.counting import format_count, list_first
 from elastocal.figures.style import (
     MILLI,
     PALETTE,

@@ -15,31 +15,33 @@ import numpy as np
 from elastocal import __version__
 from elastocal.application.accuracy import (
     REGION,
-    calibrate_on_case,
-    campaign_poses,
-    error_rows,
+    compute_uncorrected_rms_m,
     predict_errors,
-    regression_on,
-    set_form,
-    uncorrected_m,
+    select_campaign_commands,
 )
-from elastocal.application.calibrated import effect_costs
+from elastocal.application.calibrated import compute_effect_contributions
 from elastocal.application.frames import root_mean_square
-from elastocal.campaigns.reading import campaign_files, read_descriptions
-from elastocal.diagnosis.misplaced import point_sentence
+from elastocal.application.scope import (
+    build_residual_model,
+    calibrate_on_case,
+    set_form_error,
+)
+from elastocal.application.statements import tabulate_errors
+from elastocal.campaigns.campaign_folder import CampaignFolder, read_campaign_folder
+from elastocal.diagnosis.misplaced import describe_reference_point
 from elastocal.errors import InputError
-from elastocal.fitting.noise import noise_from
+from elastocal.fitting.noise import parse_noise
 from elastocal.io.json_files import read_json
 from elastocal.io.origin import configuration_sha256
-from elastocal.io.records import check_sources, checksum, jobs_behind
+from elastocal.io.records import check_sources, trace_jobs
 from elastocal.loop.diagnosis_tables import load_case, rows_left_out, step_model
 from elastocal.remainder.corrected import predictor_of
 from elastocal.validation.conformity import (
     PASS,
     UNDECIDED,
-    joint_ranges,
-    predicted_conformity,
-    shortfalls,
+    decide_conformity,
+    find_joint_ranges,
+    list_shortfalls,
 )
 
 if TYPE_CHECKING:
@@ -53,17 +55,22 @@ if TYPE_CHECKING:
 class Diagnosed:
     """A campaign and what its diagnosis found.
 
-    `name`: of the campaign. `case`: of the training poses, without their gross errors.
+    `folder`: of the campaign. `case`: of the training poses, without their gross errors.
     `facts`, `verdict`: contents of diagnosis.json and verdict.json. `origin`:
     ``commit`` of the jobs that made them, ``code_sha256`` and ``data_sha256`` of all
     that they read of the program and of the campaign, ``environment``.
     """
 
-    name: str
+    folder: CampaignFolder
     case: Case
     facts: dict[str, Any]
     verdict: dict[str, Any]
     origin: dict[str, Any]
+
+    @property
+    def name(self) -> str:
+        """Name of the campaign."""
+        return self.folder.name
 
     @cached_property
     def calibrated(self) -> CalibratedRobot:
@@ -77,7 +84,7 @@ class Diagnosed:
         if again and again["regression"]:
             predictor = predictor_of(again, model, estimate, self.case.observations)
             noise_m = self.verdict["noise"]["position_m"]
-            more = regression_on(
+            more = build_residual_model(
                 self.case, estimate, predictor, again["spread"]["typical"], noise_m
             )
         found = calibrate_on_case(
@@ -85,7 +92,7 @@ class Diagnosed:
             model,
             estimate,
             np.array(self.facts["covariance"]),
-            noise_from(step),
+            parse_noise(step),
             more,
         )
         contradicted = bool(accuracy and accuracy["contradicted"])
@@ -94,7 +101,7 @@ class Diagnosed:
             if contradicted
             else self.facts["document"].get("other_models_m") or 0.0
         )
-        return set_form(found, form_m, contradicted)
+        return set_form_error(found, form_m, contradicted=contradicted)
 
     def by_physics(self) -> Diagnosed:
         """The same without the regression on the remainder, as if there were none."""
@@ -113,11 +120,12 @@ def load_diagnosed(
     """A campaign that was diagnosed, of which nothing has changed since, in the folder
     that holds results/ and reports/.
 
-    An InputError refuses what is not as `jobs_behind` asks of all jobs behind its
+    An InputError refuses what is not as `trace_jobs` asks of all jobs behind its
     report or `check_sources` of those behind its verdict, and other files of the
     campaign than were read.
     """
-    name = read_descriptions(folder, robots_folder)[0]["campaign"]
+    campaign_folder = read_campaign_folder(folder, robots_folder)
+    name = campaign_folder.name
     results = f"results/loop/{name}"
     reports = f"reports/loop/{name}"
     tables = Path(top, results)
@@ -126,8 +134,8 @@ def load_diagnosed(
     if not verdict.exists() and not (tables / "diagnosis.json").exists():
         raise InputError(folder, "", f"no diagnosis of it in {tables}", fresh)
     # The report has all other files behind it.
-    jobs_behind([f"{reports}/report.html"], top)
-    jobs = jobs_behind([f"{reports}/verdict.json"], top)
+    trace_jobs([f"{reports}/report.html"], top)
+    jobs = trace_jobs([f"{reports}/verdict.json"], top)
     check_sources(jobs, top, f"results of this version: {fresh}")
     reader = next(job for job in jobs if f"{results}/campaign.json" in job.outputs)
     # The user's files may have moved since.
@@ -136,8 +144,7 @@ def load_diagnosed(
         for file in reader.own or reader.made_inputs
     }
     now = {
-        (Path(file).name, checksum(file))
-        for file in campaign_files(folder, robots_folder)
+        (Path(file).name, digest) for file, digest in campaign_folder.digests.items()
     }
     if (
         not data
@@ -168,7 +175,7 @@ def load_diagnosed(
         },
     }
     return Diagnosed(
-        name,
+        campaign_folder,
         case.select(~rows_left_out(case, facts)),
         facts,
         read_json(verdict),
@@ -181,19 +188,14 @@ def _listed(values: Iterable[str]) -> str:
 
 
 def certificate(
-    folder: str | Path,
-    robots_folder: str | Path,
-    found: Diagnosed,
-    tolerance_m: float,
-    accepted_risk: float,
+    found: Diagnosed, tolerance_m: float, accepted_risk: float
 ) -> dict[str, Any]:
     """Contents of a certificate: all of the corrected robot is predicted, at the poses
     and loads of the campaign.
 
-    `folder`, `robots_folder`: as in `reading.read_campaign`. `found`: the campaign.
-    Returns JSON-serialisable.
+    `found`: the campaign. Returns JSON-serialisable.
     """
-    document = read_descriptions(folder, robots_folder)[0]
+    document = found.folder.document
     calibrated, verdict, heldout = (
         found.calibrated,
         found.verdict,
@@ -201,12 +203,12 @@ def certificate(
     )
     robot = calibrated.robot
     states = found.case.observations.states
-    poses = campaign_poses(calibrated)
+    poses = select_campaign_commands(calibrated)
     prediction = predict_errors(calibrated, *poses)
-    accuracy = prediction.accuracy(REGION)
+    accuracy = prediction.summarize(REGION)
     worst = int(np.argmax(prediction.error_m))
-    decision = predicted_conformity(prediction.rms_m, tolerance_m, accepted_risk)
-    missing = shortfalls(heldout["configurations"], states, robot)
+    decision = decide_conformity(prediction.rms_m, tolerance_m, accepted_risk)
+    missing = list_shortfalls(heldout["configurations"], states, robot)
     if not accuracy.fitted:
         missing = [
             "nothing fitted: no error of 0 is predicted of a robot of which nothing was fitted",
@@ -230,13 +232,12 @@ def certificate(
         "version": __version__,
         "origin": found.origin,
         "files": {
-            Path(file).name: checksum(file)
-            for file in campaign_files(folder, robots_folder)
+            Path(file).name: digest for file, digest in found.folder.digests.items()
         },
         "verdict": verdict["verdict"],
         "repeatable": verdict["repeatable"],
         "effects": [effect["name"] for effect in verdict["effects"]],
-        "errors": error_rows(verdict),
+        "errors": tabulate_errors(verdict),
         "validation_rms_m": {
             "uncorrected": heldout["uncalibrated"]["rms_m"],
             "corrected": heldout["delivered"]["rms_m"],
@@ -244,12 +245,12 @@ def certificate(
         "regression": (verdict["remainder"] or {}).get("words", ""),
         "noise_floor_rms_m": heldout["noise_floor_rms_m"],
         "accuracy": asdict(accuracy),
-        "point": point_sentence(found.case.campaign),
+        "point": describe_reference_point(found.case.campaign),
         "misplaced": verdict["misplaced"],
         "worst_pose": {"joints": joints, "error_m": float(prediction.error_m[worst])},
         "conformity": asdict(decision)
         | {"configurations": heldout["configurations"], "shortfalls": missing},
-        "joint_ranges": joint_ranges(states, robot),
+        "joint_ranges": find_joint_ranges(states, robot),
         "budget": [
             {"name": name, "rms_m": rms}
             for name, rms in error_budget(calibrated, *poses).items()
@@ -269,7 +270,7 @@ def error_budget(
     leaves, by `accuracy.predict_errors`. Only the last add up: effects may work against
     each other, and loads meet springs.
     """
-    costs = effect_costs(calibrated, reported_angles, wrench)
+    costs = compute_effect_contributions(calibrated, reported_angles, wrench)
     rest = predict_errors(calibrated, reported_angles, wrench, draws=0)
     ends = {
         "left by the regression": root_mean_square(rest.regression_m),
@@ -277,7 +278,7 @@ def error_budget(
         "not commanded": rest.scope.left_out_m,
     }
     return {
-        "uncorrected": uncorrected_m(calibrated, reported_angles, wrench),
+        "uncorrected": compute_uncorrected_rms_m(calibrated, reported_angles, wrench),
         **{
             name: costs[name]
             for name in sorted(costs, key=costs.__getitem__, reverse=True)

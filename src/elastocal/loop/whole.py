@@ -7,37 +7,40 @@ from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 from elastocal.application.accuracy import (
-    calibrate_on_case,
-    campaign_accuracy,
-    campaign_poses,
-    judge_by_held_out,
-    regression_on,
-    set_form,
-    uncorrected_m,
+    compute_uncorrected_rms_m,
+    inflate_to_held_out_errors,
+    predict_campaign_accuracy,
+    select_campaign_commands,
 )
-from elastocal.application.calibrated import effect_costs
-from elastocal.campaigns.campaign import columns_of
+from elastocal.application.calibrated import compute_effect_contributions
+from elastocal.application.scope import (
+    build_residual_model,
+    calibrate_on_case,
+    set_form_error,
+)
+from elastocal.campaigns.campaign import tabulate_measurements
+from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.diagnose import diagnose
-from elastocal.diagnosis.judge import judge, residual_blocks
-from elastocal.diagnosis.misplaced import misplaced
+from elastocal.diagnosis.judge import generate_residual_blocks, judge
+from elastocal.diagnosis.misplaced import find_misplaced_frames
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.model import Case, case_from
+from elastocal.fitting.model import Case, build_case
 from elastocal.io.json_files import read_json, write_json
-from elastocal.io.origin import provenance
+from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import write_table
 from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop.loading import load_campaign
 from elastocal.loop.schemas import residuals
-from elastocal.validation.held_out import position_residuals
-from elastocal.validation.placing import placed
+from elastocal.validation.held_out import compute_position_residuals
+from elastocal.validation.transfer import transfer_fit
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from elastocal.application.calibrated import CalibratedRobot
     from elastocal.diagnosis.diagnose import Diagnosis
-    from elastocal.diagnosis.judge import Verdict
+    from elastocal.diagnosis.judge import Judgement
     from elastocal.remainder.corrected import Corrected
 
 
@@ -58,20 +61,24 @@ def judge_campaign(job: Any) -> None:
     write_table(
         job.output.residuals,
         schema,
-        residual_blocks(found, verdict),
-        provenance(job.params, **job.wildcards),
+        generate_residual_blocks(found, verdict),
+        describe_provenance(job.params, **job.wildcards),
     )
 
 
 def cases_in(folder: str | Path, robots_folder: str | Path) -> tuple[Case, Case]:
     """Training and held-out cases of a campaign's folder.
 
-    `folder`, `robots_folder`: as in `reading.read_campaign`.
+    `folder`, `robots_folder`: as in `read_campaign_folder`.
     """
-    descriptions, training, held_out = load_campaign(folder, robots_folder)
+    descriptions, training, held_out = load_campaign(
+        read_campaign_folder(folder, robots_folder)
+    )
     return (
-        case_from(descriptions, columns_of(training)),
-        case_from(descriptions["held_out"] or descriptions, columns_of(held_out)),
+        build_case(descriptions, tabulate_measurements(training)),
+        build_case(
+            descriptions["held_out"] or descriptions, tabulate_measurements(held_out)
+        ),
     )
 
 
@@ -83,7 +90,7 @@ def diagnosed(
 ) -> dict[str, Any]:
     """Diagnose a campaign and judge it on its held-out poses.
 
-    `folder`, `robots_folder`: as in `reading.read_campaign`. Returns as verdict.json.
+    `folder`, `robots_folder`: as in `read_campaign_folder`. Returns as verdict.json.
     """
     training, held_out = cases_in(folder, robots_folder)
     return judged(
@@ -100,19 +107,21 @@ def calibrated_by(
     """The robot that a diagnosis found, with all that is known of its errors: held-out
     rows without gross ones judge it.
 
-    `delivered`: of `judge.as_delivered`. `physics_only`: corrected without its
+    `delivered`: of `judge.apply_regression`. `physics_only`: corrected without its
     regression; where there is one, what the final model leaves is known to be no noise.
     """
     case = diagnosis.case
     final = diagnosis.final
-    residual = position_residuals(*placed(final, case, held_out), held_out.observations)
+    residual = compute_position_residuals(
+        *transfer_fit(final, case, held_out), held_out.observations
+    )
     noise_m = final.noise.position_m
     more = None
     if delivered is not None and delivered.predictor is not None:
         noise_m = diagnosis.document["noise"]["position_m"]
         if not physics_only:
             residual = delivered.residual
-            more = regression_on(
+            more = build_residual_model(
                 case,
                 final.estimate,
                 delivered.predictor,
@@ -122,11 +131,11 @@ def calibrated_by(
     found = calibrate_on_case(
         case, final.model, final.estimate, final.covariance, final.noise, more
     )
-    found = set_form(found, diagnosis.document["other_models_m"] or 0.0)
-    return judge_by_held_out(found, held_out, residual, noise_m)
+    found = set_form_error(found, diagnosis.document["other_models_m"] or 0.0)
+    return inflate_to_held_out_errors(found, held_out, residual, noise_m)
 
 
-def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
+def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
     """The verdict of a diagnosis on held-out poses, with the accuracy of the corrected
     robot and the cost of each effect.
 
@@ -149,15 +158,17 @@ def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     if not data_at_fault(verdict.document):
         found = calibrated_by(diagnosis, verdict.held_out, verdict.delivered)
         stated |= _accuracy(found) | {
-            "misplaced": misplaced(diagnosis.final, diagnosis.case.campaign)
+            "misplaced": find_misplaced_frames(diagnosis.final, diagnosis.case.campaign)
         }
-        if found.remainder is not None:
+        if found.residual_model is not None:
             stated["physics"] = _accuracy(
                 calibrated_by(
                     diagnosis, verdict.held_out, verdict.delivered, physics_only=True
                 )
             )
-        costs = effect_costs(replace(found, remainder=None), *campaign_poses(found))
+        costs = compute_effect_contributions(
+            replace(found, residual_model=None), *select_campaign_commands(found)
+        )
     effects = [
         effect | {"cost_m": costs.get(effect["name"])}
         for effect in verdict.document["effects"]
@@ -169,6 +180,8 @@ def _accuracy(found: CalibratedRobot) -> dict[str, Any]:
     """Predicted accuracy of a corrected robot, and in the same frame the RMS error of
     the uncorrected one at the same poses."""
     return {
-        "accuracy": asdict(campaign_accuracy(found)),
-        "uncorrected_m": uncorrected_m(found, *campaign_poses(found)),
+        "accuracy": asdict(predict_campaign_accuracy(found)),
+        "uncorrected_m": compute_uncorrected_rms_m(
+            found, *select_campaign_commands(found)
+        ),
     }

@@ -5,8 +5,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elastocal.application.accuracy import Accuracy, accuracy_sentence
-from elastocal.counting import counted
+from elastocal.application.accuracy import Accuracy
+from elastocal.application.statements import format_accuracy
+from elastocal.counting import format_count
 from elastocal.report import words as say
 from elastocal.report.loop_facts import title_of
 from elastocal.report.typesetting import render_sentences
@@ -38,7 +39,7 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
     ready to print, lists for tables.
     """
     spoken = {
-        "accuracy_sentence": accuracy_sentence(Accuracy(**document["accuracy"])),
+        "accuracy_sentence": format_accuracy(Accuracy(**document["accuracy"])),
         "title": title_of(document),
     }
     stated = render_sentences(
@@ -68,7 +69,7 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
         "errors": document["errors"],
         "floor": say.length(document["noise_floor_rms_m"]),
         "budget": budget,
-        "budget_states": counted(document["budget_states"], "state"),
+        "budget_states": format_count(document["budget_states"], "state"),
     }
 
 

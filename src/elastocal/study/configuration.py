@@ -65,7 +65,7 @@ def check_study(
     """
     check_document(config, "config", source)
     robots = {
-        name: named_document(folder, "robots", "robot", name, source)
+        name: read_named_document(folder, "robots", "robot", name, source)
         for name in config["robots"]
     }
     for name, robot in robots.items():

@@ -14,12 +14,12 @@ import numpy as np
 from elastocal.application.planning.designs import (
     CRITERIA,
     Criterion,
+    build_criterion,
     choose_greedily,
-    criterion,
     exchange_candidates,
 )
 from elastocal.io.storage import Column
-from elastocal.random_streams import stream
+from elastocal.random_streams import open_stream
 from elastocal.study.in_memory import define_study_step
 from elastocal.study.jobs import (
     MICRO,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Protocol
 
-from elastocal.io.origin import SOURCES_DIGEST, STEP, provenance
+from elastocal.io.origin import SOURCES_DIGEST, STEP, describe_provenance
 from elastocal.io.storage import Column, TableSchema
 from elastocal.mechanics.robot import with_target_offset
 from elastocal.mechanics.robot_file import robot_from_document

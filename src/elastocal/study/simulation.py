@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.io.origin import provenance
+from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import TableSchema, read_blocks, write_table
 from elastocal.mechanics.chain import parse_chain
 from elastocal.mechanics.components import (
@@ -31,7 +31,7 @@ from elastocal.mechanics.elastostatics import (
 )
 from elastocal.mechanics.kinematics import jacobians, poses
 from elastocal.mechanics.robot_file import joint_limits
-from elastocal.random_streams import draw
+from elastocal.random_streams import draw_data_sets
 from elastocal.study.jobs import (
     CONFIGURATION,
     DATA_SET,
@@ -224,7 +224,7 @@ def draw_random_experiments(
     low, high = design.ranges
     joint_angles = low + (high - low) * shares
     if loading.direction is None:
-        normal = draw(
+        normal = draw_data_sets(
             seed,
             design.key,
             f"{purpose}/force",
@@ -290,7 +290,7 @@ def draw_measurement_noise(
     [1] Glasserman, P. and Yao, D. D., Some guidelines and guarantees for common random
     numbers, Management Science 38, 1992.
     """
-    return draw(
+    return draw_data_sets(
         seed,
         key,
         f"noise/{point_name}",
@@ -473,7 +473,7 @@ def draw_bootstrap_weights(
     [1] Hanley, J. A. and MacGibbon, B., Creating non-parametric bootstrap samples using
     Poisson frequencies, Computer Methods and Programs in Biomedicine 83, 2006.
     """
-    counts = draw(
+    counts = draw_data_sets(
         seed,
         key,
         "bootstrap",

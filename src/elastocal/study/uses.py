@@ -31,8 +31,8 @@ import numpy as np
 
 from elastocal.application.inverse_kinematics import (
     SOLVED_M,
-    along_path,
     find_beyond_limits,
+    solve_path,
 )
 from elastocal.study.evaluation import REPLICATES, make_metrics_schema
 from elastocal.study.in_memory import define_study_step

@@ -20,26 +20,31 @@ import pandas as pd
 from statsmodels.stats.proportion import proportion_confint
 
 from elastocal.application.accuracy import predict_errors
-from elastocal.application.calibrated import calibrate_by_fit, nominal_forward
+from elastocal.application.calibrated import calibrate_by_fit, compute_nominal_poses
 from elastocal.application.compensation import find_joint_targets
-from elastocal.application.frames import ROBOT, Scope, find_absorbed, placement
+from elastocal.application.frames import (
+    ROBOT,
+    Scope,
+    compute_placement_columns,
+    fit_placement,
+)
 from elastocal.campaigns.reading import read_robot
 from elastocal.diagnosis.diagnose import diagnose
-from elastocal.diagnosis.judge import as_delivered, without_gross_errors
+from elastocal.diagnosis.judge import apply_regression, remove_gross_errors
 from elastocal.diagnosis.settings import Settings
 from elastocal.effects.catalogue import declared_candidates
-from elastocal.effects.catalogue import effects as catalogue
+from elastocal.effects.catalogue import list_effects as catalogue
 from elastocal.exchange.target_path import OK
-from elastocal.fitting.model import declared_model
-from elastocal.fitting.noise import fit_declared
+from elastocal.fitting.model import build_declared_model
+from elastocal.fitting.noise import fit_declared_model
 from elastocal.fitting.observations import select_states
 from elastocal.io.data_frames import read_frame, write_csv
-from elastocal.io.origin import provenance
+from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import write_table
 from elastocal.loop.whole import calibrated_by, cases_in
 from elastocal.mechanics.kinematics import jacobians, pose_differences
-from elastocal.random_streams import stream as analysis_stream
-from elastocal.validation.conformity import predicted_conformity
+from elastocal.random_streams import open_stream as analysis_stream
+from elastocal.validation.conformity import decide_conformity
 from elastocal_proof.blind import schemas
 from elastocal_proof.blind.folders import write_blind_campaign
 from elastocal_proof.blind.rehearsal import (
@@ -239,7 +244,7 @@ def wanted_poses(robot: Robot, plant: PhysicalRobot, seed: int) -> Wanted:
         * (-np.sqrt(0.5) * along + np.sqrt(0.5) * np.array([0.0, 0.0, 1.0]))
     )
     forces = np.concatenate([np.zeros((_POSES, 3)), force * direction, process])
-    random = (*nominal_forward(robot, shown), shown)
+    random = (*compute_nominal_poses(robot, shown), shown)
     position, rotation, start = (
         np.concatenate(both) for both in zip(random, path, strict=True)
     )
@@ -300,8 +305,8 @@ def closed_loop(
 
 def _corrected(made: Measured, seed: int) -> CalibratedRobot:
     """The robot as the diagnosis corrects it."""
-    part = without_gross_errors(made.found, made.held_out)[1]
-    return calibrated_by(made.found, part, as_delivered(made.found, part, seed))
+    part = remove_gross_errors(made.found, made.held_out)[1]
+    return calibrated_by(made.found, part, apply_regression(made.found, part, seed))
 
 
 def _geometry(case: Case, found: Diagnosis) -> Fit:
@@ -311,12 +316,12 @@ def _geometry(case: Case, found: Diagnosis) -> Fit:
     rigid = replace(
         campaign.robot, masses=(), compliance=np.zeros(campaign.robot.joints)
     )
-    bare = declared_model(replace(campaign, robot=rigid, compliance="nominal"))
+    bare = build_declared_model(replace(campaign, robot=rigid, compliance="nominal"))
     model = bare.with_effects(
         declared_candidates(campaign.declared, bare.sites, "closed loop")
     )
     unloaded = np.asarray(~case.observations.states.wrench.any(axis=1))
-    return fit_declared(
+    return fit_declared_model(
         model, select_states(case.observations, unloaded), found.declared.noise
     )
 
@@ -389,7 +394,7 @@ def stated_accuracy(
     )
     if frame != "base":
         over = good & (wanted.part != MILLING)
-        columns = placement(
+        columns = compute_placement_columns(
             Scope(ROBOT, wanted.position[over].mean(axis=0)),
             wanted.position,
             wanted.rotation,
@@ -398,7 +403,7 @@ def stated_accuracy(
         off = (
             field
             - columns
-            @ find_absorbed(
+            @ fit_placement(
                 columns[over], field[over], np.repeat([True, True, False, False], 3)
             )
         )[:, :3, 0]
@@ -409,9 +414,9 @@ def stated_accuracy(
         prediction = predict_errors(
             calibrated, targets.joint_angles[mine], wanted.wrench[mine]
         )
-        stated = prediction.accuracy(part)
+        stated = prediction.summarize(part)
         distance = np.linalg.norm(off[mine], axis=1)
-        decided = predicted_conformity(prediction.rms_m, tolerance, _RISK)
+        decided = decide_conformity(prediction.rms_m, tolerance, _RISK)
         rows.append(
             {
                 "robot": robot_file.stem,
@@ -443,7 +448,7 @@ def close_loop(job: Any) -> None:
         job.output.moved,
         schemas.closed_loop(read_robot(robot).joints),
         blocks,
-        provenance(asked, **job.wildcards),
+        describe_provenance(asked, **job.wildcards),
     )
 
 

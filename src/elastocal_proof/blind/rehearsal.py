@@ -16,11 +16,11 @@ import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation
 
-from elastocal.application.calibrated import nominal_forward
+from elastocal.application.calibrated import compute_nominal_poses
 from elastocal.application.inverse_kinematics import (
     SOLVED_M,
     find_beyond_limits,
-    refine,
+    solve_poses,
 )
 from elastocal.campaigns.reading import read_robot
 from elastocal.campaigns.tables import LARGEST_BYTES
@@ -321,10 +321,10 @@ def bow(
         heading = draws.uniform(0.0, 2.0 * np.pi)
         ahead = np.array([np.cos(heading), np.sin(heading), 0.0])
         aside = np.array([-np.sin(heading), np.cos(heading), 0.0])
-        at, turned = nominal_forward(robot, robot.reported_angles(middle))
+        at, turned = compute_nominal_poses(robot, robot.reported_angles(middle))
         position = at + length_m * (share * ahead + share**2 * aside)
         rotation = np.broadcast_to(turned, (count, 3, 3))
-        angles, left = refine(
+        angles, left = solve_poses(
             robot, position, rotation, np.repeat(middle, count, axis=0)
         )
         smooth = np.abs(np.diff(angles, axis=0)).max() < 0.1

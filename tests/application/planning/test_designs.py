@@ -8,10 +8,10 @@ from made_surveys import made_rows
 
 from elastocal.application.planning.designs import (
     CRITERIA,
+    build_criterion,
     choose_greedily,
-    criterion,
+    compute_information_matrix,
     exchange_candidates,
-    matrix_of,
 )
 
 ROWS = made_rows()
@@ -26,7 +26,7 @@ def test_an_unknown_base_under_opposite_pulls_leaves_the_prior_its_1(kind):
     scale = np.array([3e4, 3e4, 3e4, 10.0, 1.0])
     ends = draws.standard_normal((2, 30, 3, 5)) * scale
     rows = np.concatenate([ends[0], 0.5 * (ends[0] + ends[1]), ends[1]], axis=1)
-    rule = criterion(kind, PLACES)
+    rule = build_criterion(kind, PLACES)
     expected = [
         rule.value(np.eye(5) + row.T @ row) - rule.value(np.eye(5)) for row in rows
     ]
@@ -40,11 +40,14 @@ def test_an_unknown_base_under_opposite_pulls_leaves_the_prior_its_1(kind):
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_the_exchange_is_near_the_best_of_all_subsets(kind, seed):
     rows = made_rows(12, 3, 5, seed)
-    rule = criterion(kind, PLACES)
+    rule = build_criterion(kind, PLACES)
     found = rule.value(
-        matrix_of(rows, exchange_candidates(rows, choose_greedily(rows, 4, rule), rule))
+        compute_information_matrix(
+            rows, exchange_candidates(rows, choose_greedily(rows, 4, rule), rule)
+        )
     )
     values = [
-        rule.value(matrix_of(rows, list(some))) for some in combinations(range(12), 4)
+        rule.value(compute_information_matrix(rows, list(some)))
+        for some in combinations(range(12), 4)
     ]
     assert found >= max(values) - 0.02 * (max(values) - np.median(values))

@@ -10,33 +10,34 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.special import chdtri
 
-from elastocal.diagnosis.evidence import Blocks, log_sum_exp
-from elastocal.diagnosis.hypotheses import Law, Unit, laws_of, units_of
-from elastocal.diagnosis.search import Problem, pose_errors_within_reach
-from elastocal.diagnosis.statistics import (
-    Products,
-    Statistics,
-    WhiteRows,
-    products_of,
-    statistics_of,
+from elastocal.diagnosis.evidence import TermBlock
+from elastocal.diagnosis.hypotheses import (
+    Discrepancy,
+    ModelTerm,
+    build_discrepancies,
+    build_terms,
 )
-from elastocal.effects.gravity import DECLARED_WEIGHT
+from elastocal.diagnosis.search import SearchProblem, select_pose_errors
+from elastocal.diagnosis.statistics import (
+    CrossProducts,
+    SufficientStatistics,
+    WhitenedRows,
+    compute_cross_products,
+    compute_statistics,
+)
 from elastocal.errors import InputError
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.linearization import Factored, linearize
-from elastocal.fitting.model import nonlinear_parameters, parameter_values
-from elastocal.fitting.normal_equations import whitening
-from elastocal.fitting.observations import Observations, spread_poses
+from elastocal.fitting.linearization import FactoredSensitivities, linearize
+from elastocal.fitting.model import find_nonlinear_parameters, get_parameter_values
+from elastocal.fitting.normal_equations import compute_whitening
+from elastocal.fitting.observations import Observations, select_spread_poses
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from elastocal.diagnosis.gross_errors import Kept
     from elastocal.diagnosis.settings import Settings
     from elastocal.effects.conditions import Conditions
     from elastocal.effects.protocol import Candidate
     from elastocal.fitting.least_squares import Fit
-    from elastocal.fitting.model import Model
 
     Shapes = tuple[float, ...]
 
@@ -65,7 +66,7 @@ _SAMPLE_ROWS = 1500
 
 
 @dataclass(frozen=True)
-class Linearized:
+class CandidateDesign:
     """A model about a fit, and everything that it might lack; what asks for more work
     is done when it is first asked for.
 
@@ -77,17 +78,17 @@ class Linearized:
     units here. `against`: laws of the competitor.
     """
 
-    about: Fit
+    reference_fit: Fit
     observations: Observations
     settings: Settings
     around: Conditions
     tried: dict[str, tuple[Candidate, list[Shapes]]]
     lacking: dict[str, str]
     candidates: frozenset[str]
-    against: list[Law]
-    most_pose_error_rad: float
+    against: list[Discrepancy]
+    max_pose_error_rad: float
 
-    def alike(self, **changes: Any) -> Linearized:
+    def alike(self, **changes: Any) -> CandidateDesign:
         """The same but for what does not change the whitened rows of the fit, which are
         not made again."""
         found = replace(self, **changes)
@@ -95,7 +96,7 @@ class Linearized:
         return found
 
     @property
-    def without_rows(self) -> Linearized:
+    def without_rows(self) -> CandidateDesign:
         """The same where nothing but the statistics and what goes with them is needed
         any more."""
         found = replace(self)
@@ -104,15 +105,15 @@ class Linearized:
         return found
 
     @cached_property
-    def units(self) -> tuple[Unit, ...]:
+    def terms(self) -> tuple[ModelTerm, ...]:
         """Of candidates and competitors, in the order of their columns."""
-        return units_of(self.tried.values(), self.against, self.settings)
+        return build_terms(self.tried.values(), self.against, self.settings)
 
     @property
     def priors(self) -> tuple[np.ndarray, np.ndarray]:
         """Standard deviation of the prior of each declared parameter, wide where it has
         none, and its present value, (P,)."""
-        pairs = zip(self.about.parameters, self._values, strict=True)
+        pairs = zip(self.reference_fit.parameters, self._values, strict=True)
         kept = [
             (p, value) for (owner, p), value in pairs if owner not in self.candidates
         ]
@@ -130,28 +131,28 @@ class Linearized:
     def _values(self) -> np.ndarray:
         """Of all parameters of the fit in which the prediction is linear; zero for
         shapes, (P,)."""
-        model = self.about.model
-        estimate = self.about.estimate
+        model = self.reference_fit.model
+        estimate = self.reference_fit.estimate
         return np.where(
-            nonlinear_parameters(model, estimate),
+            find_nonlinear_parameters(model, estimate),
             0.0,
-            parameter_values(model, estimate),
+            get_parameter_values(model, estimate),
         )
 
     @cached_property
-    def _fitted(self) -> tuple[WhiteRows, Conditions]:
+    def _fitted(self) -> tuple[WhitenedRows, Conditions]:
         """Whitened rows without candidates, but for the Jacobian of the coordinates,
         and where the robot has yielded to.
 
         What errs together is of one state, and a candidate displaces states: the
         Jacobian is whitened, not every column.
         """
-        fitted = self.about
+        fitted = self.reference_fit
         some = self.observations
         line = linearize(fitted.model, fitted.estimate, some, self.around)
         jacobian = line.joint_jacobian
         root = np.sqrt(fitted.weights)
-        whitener = whitening(some, jacobian, fitted.noise.of_measurements)
+        whitener = compute_whitening(some, jacobian, fitted.noise.without_pose_error)
 
         def white(values: np.ndarray) -> np.ndarray:
             return whitener.apply(values * root.reshape(-1, *[1] * (values.ndim - 1)))
@@ -160,13 +161,14 @@ class Linearized:
             [owner for owner, _ in fitted.parameters], list(self.candidates)
         )
         residual = (
-            line.residual + line.columns.of_columns(found).dense() @ self._values[found]
+            line.residual
+            + line.columns.select_columns(found).dense() @ self._values[found]
         )
-        nothing = Factored.of(
+        nothing = FactoredSensitivities.of(
             [], white(line.coordinate_jacobian), some.state, len(some.states)
         )
-        rows = WhiteRows(
-            white(line.columns.of_columns(~found).dense()),
+        rows = WhitenedRows(
+            white(line.columns.select_columns(~found).dense()),
             nothing,
             white(residual),
             white(jacobian),
@@ -175,7 +177,7 @@ class Linearized:
         return rows, line.conditions
 
     @property
-    def rows(self) -> WhiteRows:
+    def rows(self) -> WhitenedRows:
         """Whitened rows, candidates in the order of the units."""
         rows, conditions = self._fitted
         tried = [
@@ -191,20 +193,20 @@ class Linearized:
         laws += [
             law for against in self.against for law in against.displacement(conditions)
         ]
-        sizes = np.concatenate([unit.sizes for unit in self.units])
+        sizes = np.concatenate([unit.sizes for unit in self.terms])
         jacobian = rows.candidates.jacobian
         state = rows.candidates.state
         return replace(
             rows,
-            candidates=Factored.of(
+            candidates=FactoredSensitivities.of(
                 laws, jacobian, state, len(self.observations.states), sizes
             ),
         )
 
     @cached_property
-    def products(self) -> Products:
+    def products(self) -> CrossProducts:
         """Of the rows."""
-        return products_of(self.rows, *self.priors)
+        return compute_cross_products(self.rows, *self.priors)
 
     @cached_property
     def pose_std_error_rad(self) -> float:
@@ -225,79 +227,83 @@ class Linearized:
         return 1.0 / np.sqrt(shown)
 
     @property
-    def pose_errors_rad(self) -> np.ndarray:
+    def candidate_pose_errors_rad(self) -> np.ndarray:
         """Sizes of the pose error that are thought of, zero first."""
         return np.unique(
             np.minimum(
                 self.pose_std_error_rad * np.array(self.settings.pose_steps),
-                self.most_pose_error_rad,
+                self.max_pose_error_rad,
             )
         )
 
     @cached_property
-    def problem(self) -> Problem:
+    def problem(self) -> SearchProblem:
         """What is searched. Columns of units that could not be seen stay in the
         statistics, where nothing refers to them."""
-        grid = self.pose_errors_rad
+        grid = self.candidate_pose_errors_rad
         products = self.products
         settings = self.settings
         grid = grid[
-            pose_errors_within_reach(
-                statistics_of(products.without_candidates, grid), settings
+            select_pose_errors(
+                compute_statistics(products.without_candidates, grid), settings
             )
         ]
         if products.rows.residual.size > _MANY_ROWS:
-            some = spread_poses(
+            some = select_spread_poses(
                 self.observations, _SAMPLE_ROWS // self.observations.rows
             )[self.observations.state]
-            sample = products_of(products.rows.at(some), *self.priors)
+            sample = compute_cross_products(products.rows.at(some), *self.priors)
             # Zero, to which Gram matrices refer, always.
             grid = np.union1d(
                 0.0,
-                Problem(
-                    statistics_of(sample, grid), self.units, settings
+                SearchProblem(
+                    compute_statistics(sample, grid), self.terms, settings
                 ).started.statistics.pose_error_rad,
             )
-        statistics = statistics_of(products, grid)
-        smallest = smallest_shown(statistics, self.units, settings)
-        pairs = zip(self.units, smallest.tolist(), strict=True)
+        statistics = compute_statistics(products, grid)
+        smallest = find_smallest_detectable_sizes(statistics, self.terms, settings)
+        pairs = zip(self.terms, smallest.tolist(), strict=True)
         shown = tuple(
             replace(unit, smallest=number)
             for unit, number in pairs
             if number <= unit.largest
         )
-        return Problem(statistics, shown, settings)
+        return SearchProblem(statistics, shown, settings)
 
     @property
     def untestable(self) -> dict[str, str]:
         """Why a candidate is not tested."""
         small = set(self.tried) - {
-            unit.candidate.key for unit in self.problem.units if unit.candidate
+            unit.candidate.key for unit in self.problem.terms if unit.candidate
         }
         return self.lacking | dict.fromkeys(
             sorted(small), "too small to be seen at any size that such an effect has"
         )
 
 
-def linearized(
+def build_candidate_design(
     fitted: Fit,
     observations: Observations,
     candidates: Sequence[Candidate],
     settings: Settings,
-    most_pose_error_rad: float = np.inf,
-) -> Linearized:
+    max_pose_error_rad: float = np.inf,
+) -> CandidateDesign:
     """Gather what the measurements say of a fit to them and of all candidates."""
-    around = fitted.conditions_of(observations.states)
-    there = fitted.model.offered(observations.states)
+    around = fitted.get_conditions(observations.states)
+    there = fitted.model.available_inputs(observations.states)
     why = {
-        candidate.key: lacking(candidate, there, observations.states.joint_angles)
+        candidate.key: explain_untestable(
+            candidate, there, observations.states.joint_angles
+        )
         for candidate in candidates
     }
-    tried = {c.key: (c, shapes_tried(c, fitted)) for c in candidates if not why[c.key]}
+    tried = {
+        c.key: (c, choose_shape_values(c, fitted)) for c in candidates if not why[c.key]
+    }
     # Beside no candidate nothing competes.
-    against = laws_of(around, settings.other_features) if candidates else []
+    against = build_discrepancies(around, settings.other_features) if candidates else []
     missing = {key: reason for key, reason in why.items() if reason}
-    return Linearized(
+    return CandidateDesign(
         fitted,
         observations,
         settings,
@@ -306,12 +312,12 @@ def linearized(
         missing,
         frozenset(why),
         against,
-        most_pose_error_rad,
+        max_pose_error_rad,
     )
 
 
-def smallest_shown(
-    statistics: Statistics, units: Sequence[Unit], settings: Settings
+def find_smallest_detectable_sizes(
+    statistics: SufficientStatistics, units: Sequence[ModelTerm], settings: Settings
 ) -> np.ndarray:
     """The smallest size at which each unit would be found with a power of one half,
     were it the only candidate.
@@ -323,14 +329,14 @@ def smallest_shown(
     """
     critical = chdtri(1, settings.alarm_level / max(len(units), 1))
     largest = np.zeros(len(units))
-    for block in Blocks.of(statistics.at(slice(1)), units):
+    for block in TermBlock.of(statistics.at(slice(1)), units):
         largest[block.numbers] = block.axes[0][0].max(axis=1)
     return np.searchsorted(
         np.array(settings.scales) ** 2, critical / np.maximum(largest, 1e-9 * critical)
     )
 
 
-def shapes_tried(candidate: Candidate, fitted: Fit) -> list[Shapes]:
+def choose_shape_values(candidate: Candidate, fitted: Fit) -> list[Shapes]:
     """Values of the shape of a candidate over its range, list of tuple.
 
     Where the fit has the candidate, its value alone; or, where a search must try many
@@ -342,7 +348,7 @@ def shapes_tried(candidate: Candidate, fitted: Fit) -> list[Shapes]:
     (shape,) = candidate.shapes
     values = shape.values(_SHAPES_TRIED)
     if candidate.key in {effect.key for effect in fitted.model.effects}:
-        (value,) = fitted.values_of(candidate.key)[1].tolist()
+        (value,) = fitted.effect_values(candidate.key)[1].tolist()
         reach = _CLOSER_STILL * np.diff(values[:2]).sum()
         values = np.array([value])
         if shape.tried > 1:
@@ -351,14 +357,14 @@ def shapes_tried(candidate: Candidate, fitted: Fit) -> list[Shapes]:
     return [(float(value),) for value in values]
 
 
-def looked_at_closely(line: Linearized, alone: np.ndarray) -> Linearized:
+def refine_shapes(line: CandidateDesign, alone: np.ndarray) -> CandidateDesign:
     """The same with more shapes of the best candidates, closer to each other about the
     best value of each.
 
     `alone` (number of units,): log Bayes factor of each unit alone. Returns itself
     where no shape matters.
     """
-    units = line.problem.units
+    units = line.problem.terms
     tried = dict(line.tried)
     odds = alone + line.problem.started.first
     near = (
@@ -401,7 +407,7 @@ def looked_at_closely(line: Linearized, alone: np.ndarray) -> Linearized:
     return line if tried == line.tried else line.alike(tried=tried)
 
 
-def lacking(
+def explain_untestable(
     candidate: Candidate, there: frozenset[str], joint_angles: np.ndarray
 ) -> str:
     """Why measurements at some joint angles (S, n) cannot test a candidate at all;
@@ -424,82 +430,3 @@ def lacking(
                 else "too few different angles of a joint"
             )
     return ""
-
-
-def with_probable_centres(part: Kept, settings: Settings) -> Kept:
-    """The kept part of a case, fitted with the prior of its centres of mass that is
-    more probable; itself without masses.
-
-    Most robot files state centres of mass as well as masses; of some nobody ever asked.
-    Priors as wide as the links' girth for all robots would hide a payload, narrow ones
-    would take a centre off its link for one. So both are hypotheses, equally probable
-    beforehand, and the measurements choose by the evidence of each, whatever single
-    mechanism may be beside it.
-
-    `part`: with the wide prior.
-    """
-    stated = with_stated_centres(part.declared.model)
-    if stated is part.declared.model:
-        return part
-    line = linearized(part.declared, part.searched, (), settings)
-    lines = [line, line.alike(about=replace(line.about, model=stated))]
-    wide, narrow = (
-        _log_evidence(each, products_of(each._fitted[0], *each.priors))
-        for each in lines
-    )
-    # A prior that is better without any mechanism is not worse with one, for a
-    # mechanism explains what it leaves.
-    if wide > narrow:
-        every = linearized(
-            part.declared, part.searched, list(part.case.candidates.values()), settings
-        )
-        lines = [each.alike(tried=every.tried, against=every.against) for each in lines]
-        wide, narrow = (
-            _log_evidence(each, each.products, each.problem) for each in lines
-        )
-        if wide > narrow:
-            return part
-    fitted = fit(
-        stated, part.searched, part.noise, part.declared.estimate, reweighted=True
-    )
-    return replace(
-        part,
-        case=replace(part.case, model=with_stated_centres(part.case.model)),
-        declared=fitted,
-    )
-
-
-def with_stated_centres(model: Model) -> Model:
-    """A declared model whose first moments are known as well as the robot file says;
-    itself without declared masses."""
-    weight = next(
-        (effect for effect in model.effects if effect.effect == DECLARED_WEIGHT), None
-    )
-    if weight is None:
-        return model
-    stated = replace(
-        weight,
-        parameters=tuple(replace(p, prior_std=p.plausible) for p in weight.parameters),
-    )
-    return replace(
-        model,
-        effects=tuple(
-            stated if effect is weight else effect for effect in model.effects
-        ),
-    )
-
-
-def _log_evidence(
-    line: Linearized, products: Products, problem: Problem | None = None
-) -> float:
-    """Of the measurements, up to what any prior of the declared parameters shares; with
-    none or one mechanism of a problem."""
-    if problem is None:
-        problem = Problem(
-            statistics_of(products, line.pose_errors_rad), (), line.settings
-        )
-    of_declared = (
-        np.linalg.slogdet(products.into_basis)[1] - np.log(line.priors[0]).sum()
-    )
-    met = np.array(list(problem.started.met.values()))
-    return float(of_declared + problem.started.empty.log_evidence + log_sum_exp(met))

@@ -5,23 +5,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import planted, two_loads_a_pose
+from planted import planted
 from scipy.stats import chi2, ncx2
-from synthetic import NOISE, made_estimate, made_model, seen_exactly, with_noise
 
-from elastocal.campaigns.campaign import Target
-from elastocal.diagnosis.gross_errors import Kept
-from elastocal.diagnosis.linearize import (
-    linearized,
-    looked_at_closely,
-    smallest_shown,
-    with_probable_centres,
+from elastocal.diagnosis.candidate_design import (
+    build_candidate_design,
+    find_smallest_detectable_sizes,
+    refine_shapes,
 )
 from elastocal.diagnosis.settings import Settings
-from elastocal.effects.catalogue import candidates_on
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import Case, residuals
-from elastocal.mechanics.robot import Mass
+from elastocal.fitting.least_squares import fit_model
+from elastocal.fitting.model import compute_residuals
 
 SETTINGS = Settings()
 KEYS = (
@@ -43,7 +37,7 @@ def campaign(kuka):
 def problem_of(campaign, fitted=None, keys=KEYS, settings=SETTINGS):
     fitted = fitted or campaign.declared
     candidates = [campaign.candidates[key] for key in keys]
-    return linearized(fitted, campaign.observations, candidates, settings)
+    return build_candidate_design(fitted, campaign.observations, candidates, settings)
 
 
 def with_effect(campaign, key, values):
@@ -57,7 +51,7 @@ def with_effect(campaign, key, values):
 def unit_of(found, key):
     return next(
         unit
-        for unit in found.problem.units
+        for unit in found.problem.terms
         if unit.candidate and unit.candidate.key == key
     )
 
@@ -74,17 +68,17 @@ def test_a_column_is_the_change_of_the_exact_prediction_at_the_plausible_size(
     step = np.zeros(len(unit.columns))
     step[0] = 1e-3
     model, moved = with_effect(campaign, key, step * unit.sizes)
-    off = residuals(model, moved, campaign.observations, fitted.conditions)
+    off = compute_residuals(model, moved, campaign.observations, fitted.conditions)
     # Robust weights of the fit stay as they are.
     pushed = replace(fitted, estimate=fitted.estimate)
     observations = replace(
         campaign.observations,
         position=campaign.observations.position + (fitted.residual - off),
     )
-    after = linearized(
+    after = build_candidate_design(
         pushed, observations, [campaign.candidates[k] for k in KEYS], SETTINGS
     )
-    change = after.problem.statistics.along[0] - found.problem.statistics.along[0]
+    change = after.problem.statistics.score[0] - found.problem.statistics.score[0]
     expected = found.problem.statistics.gram[0][:, unit.columns] @ step
     np.testing.assert_allclose(change, expected, atol=2e-3 * np.abs(expected).max())
 
@@ -96,16 +90,16 @@ def test_a_problem_about_a_model_with_an_effect_is_the_one_about_the_model_witho
     is given back to the measurements."""
     model, start = with_effect(campaign, "joint_offset@3", [0.0])
     noise = campaign.declared.noise
-    fitted = fit(model, campaign.observations, noise, start)
-    assert abs(fitted.values_of("joint_offset@3")[0][0]) > 4e-4
+    fitted = fit_model(model, campaign.observations, noise, start)
+    assert abs(fitted.effect_values("joint_offset@3")[0][0]) > 4e-4
     keys = ("joint_offset@2", "joint_offset@3", "joint_offset@4")
     one = problem_of(
         campaign, replace(campaign.declared, weights=fitted.weights), keys
     ).problem.statistics
     other = problem_of(campaign, fitted, keys).problem.statistics
     np.testing.assert_allclose(other.gram[0][:3, :3], one.gram[0][:3, :3], rtol=1e-2)
-    np.testing.assert_allclose(other.along[0][:3], one.along[0][:3], rtol=1e-2)
-    assert one.along[0][1] / np.sqrt(one.gram[0][1, 1]) > 20
+    np.testing.assert_allclose(other.score[0][:3], one.score[0][:3], rtol=1e-2)
+    assert one.score[0][1] / np.sqrt(one.gram[0][1, 1]) > 20
 
 
 def test_the_smallest_size_is_the_first_that_would_be_found_with_a_power_of_a_half(
@@ -116,7 +110,7 @@ def test_the_smallest_size_is_the_first_that_would_be_found_with_a_power_of_a_ha
     problem = problem_of(campaign).problem
     gram = problem.statistics.gram.copy()
     scales = SETTINGS.scales
-    units = [unit for unit in problem.units if unit.candidate]
+    units = [unit for unit in problem.terms if unit.candidate]
     critical = chi2.isf(SETTINGS.alarm_level / len(units), 1)
     assert ncx2.sf(critical, 1, critical) == pytest.approx(0.5, abs=0.01)
     largest = np.linalg.eigvalsh(gram[0][np.ix_(units[0].columns, units[0].columns)])[
@@ -127,7 +121,7 @@ def test_the_smallest_size_is_the_first_that_would_be_found_with_a_power_of_a_ha
             scaled = replace(
                 problem.statistics, gram=gram * factor * critical / largest / scale**2
             )
-            assert smallest_shown(scaled, units, SETTINGS)[0] == shown
+            assert find_smallest_detectable_sizes(scaled, units, SETTINGS)[0] == shown
 
 
 def test_the_shapes_of_the_best_candidates_are_looked_at_more_closely_about_the_best_value_of_each(
@@ -150,15 +144,15 @@ def test_the_shapes_of_the_best_candidates_are_looked_at_more_closely_about_the_
         ("thermal_growth[time]", 1): 28.0,
         ("joint_offset@3", 0): 29.0,
     }
-    alone = np.zeros(len(problem.problem.units))
+    alone = np.zeros(len(problem.problem.terms))
     for (key, place), size in sizes.items():
         numbers = [
             n
-            for n, unit in enumerate(problem.problem.units)
+            for n, unit in enumerate(problem.problem.terms)
             if unit.candidate and unit.candidate.key == key
         ]
         alone[numbers[place]] = size
-    tried = looked_at_closely(problem, alone).tried
+    tried = refine_shapes(problem, alone).tried
     found = {
         key: [value for (value,) in values]
         for key, (_, values) in tried.items()
@@ -173,71 +167,3 @@ def test_the_shapes_of_the_best_candidates_are_looked_at_more_closely_about_the_
     np.testing.assert_allclose(
         found["thermal_growth[time]"], np.geomspace(lags[1], lags[3], 9)
     )
-
-
-MASSES = (
-    Mass(1, 280.0, (0.1, 0.02, -0.10), 0.1),
-    Mass(2, 190.0, (0.52, 0.05, 0.0), 0.1),
-    Mass(3, 220.0, (0.35, -0.04, 0.2), 0.1),
-)
-TARGETS = (
-    Target("elbow", "3DoF", (0.0, 0.1, 0.05)),
-    Target("hand", "6DoF", (0.1, 0.05, 0.02)),
-)
-
-
-def kept(robot, off=0.0, payload_kg=0.0):
-    """Two loads a pose of a robot whose moments are off by `off` standard deviations of
-    the wide prior."""
-    model = made_model(
-        robot,
-        TARGETS,
-        fitted_frames=False,
-        compliance=robot.compliance,
-        identified=True,
-    )
-    candidates = candidates_on(model.sites)
-    weight = model.effects[1]
-    true = made_estimate(model, size=0.0).with_effects([candidates["payload[mass]"]])
-    moved = [
-        off * p.prior_std * (-1) ** n * p.name.startswith("moment")
-        for n, p in enumerate(weight.parameters)
-    ]
-    true = replace(
-        true, coefficients=(robot.compliance, np.array(moved), np.array([payload_kg]))
-    )
-    states = two_loads_a_pose(6, 30, 5)
-    seen = seen_exactly(model.with_effects([candidates["payload[mass]"]]), true, states)
-    seen = with_noise(seen, np.random.default_rng(6))
-    noise = replace(NOISE, joint_rad=np.zeros(6))
-    declared = fit(model, seen, noise)
-    return Kept(
-        Case(None, seen, model, candidates),
-        np.ones(len(seen), bool),
-        noise,
-        [],
-        declared,
-        seen,
-    )
-
-
-@pytest.mark.parametrize(
-    ("off", "payload_kg", "stays_wide"),
-    [(0.0, 0.0, False), (1.0, 0.0, True), (0.0, 20.0, False)],
-)
-def test_the_prior_is_that_which_the_measurements_make_more_probable(
-    fanuc, off, payload_kg, stays_wide
-):
-    part = kept(replace(fanuc, masses=MASSES, payload_kg=165.0), off, payload_kg)
-    found = with_probable_centres(part, Settings())
-    assert (found is part) == stays_wide
-    deviations = [
-        p.prior_std
-        for effect in found.declared.model.effects[1:2]
-        for p in effect.parameters
-    ]
-    assert (
-        deviations[1] == pytest.approx(28.0 * np.linalg.norm(MASSES[0].centre_m))
-        or stays_wide
-    )
-    assert found.case.model.effects[1] == found.declared.model.effects[1]

@@ -19,9 +19,11 @@ from made_urdf import joint, link
 from made_urdf import robot as made
 from scipy.spatial.transform import Rotation
 
-from elastocal.application.accuracy import error_rows
-from elastocal.application.calibrated import forward, nominal_forward
-from elastocal.campaigns.reading import campaign_files, read_robot
+from elastocal.application.calibrated import compute_nominal_poses, predict_poses
+from elastocal.application.statements import tabulate_errors
+from elastocal.campaigns import campaign_folder
+from elastocal.campaigns.campaign_folder import read_campaign_folder
+from elastocal.campaigns.reading import read_robot
 from elastocal.exchange.urdf import robot_from_urdf
 from elastocal.loop.calibrated_files import load_diagnosed
 from elastocal.mechanics.kinematics import poses
@@ -31,7 +33,7 @@ BENT = np.array([0.0, 0.2, 0.1, 0.3, 0.7, 0.0])
 
 def path_of(angles, folder, **more):
     """Wanted poses: where joint angles put the rigid robot."""
-    position, rotation = nominal_forward(analysed("kuka"), angles)
+    position, rotation = compute_nominal_poses(analysed("kuka"), angles)
     pose = np.column_stack([position, Rotation.from_matrix(rotation).as_rotvec()])
     table = pd.DataFrame(pose, columns=["x", "y", "z", "rx", "ry", "rz"]).assign(**more)
     table.to_csv(folder / "path.csv", index=False)
@@ -66,6 +68,21 @@ def words(in_checkout, path, output):
     return "correct", in_checkout / "made", path, "--output", output
 
 
+def test_correct_reads_the_documents_of_a_campaign_once(
+    elastocal, words, checkout, monkeypatch
+):
+    read_files = []
+    read_document = campaign_folder.read_document
+
+    def read_and_note(path):
+        read_files.append(Path(path).name)
+        return read_document(path)
+
+    monkeypatch.setattr(campaign_folder, "read_document", read_and_note)
+    assert elastocal(*words).exit_code == 0
+    assert read_files == ["campaign.yaml"]
+
+
 def test_the_regression_corrects_what_physics_does_not_have(
     elastocal, regressed_checkout, monkeypatch, tmp_path
 ):
@@ -77,16 +94,19 @@ def test_the_regression_corrects_what_physics_does_not_have(
     commands = robot.reported_angles(
         0.5 * (states.joint_angles[1:61] + states.joint_angles[:60])
     )
-    position, _ = nominal_forward(robot, commands)
+    position, _ = compute_nominal_poses(robot, commands)
     path = path_of(commands, tmp_path, **columns_of(commands))
     result = elastocal(
         "correct", "smooth", path, "--output", tmp_path / "t.csv", "--allow-large-steps"
     )
     assert result.exit_code == 0 and "Gaussian process" in result.stderr
     there = pd.read_csv(tmp_path / "t.csv")[[f"q{j}" for j in range(1, 7)]].to_numpy()
-    np.testing.assert_allclose(forward(found.calibrated, there)[0], position, atol=1e-8)
+    np.testing.assert_allclose(
+        predict_poses(found.calibrated, there)[0], position, atol=1e-8
+    )
     assert (
-        np.abs(forward(found.by_physics().calibrated, there)[0] - position).max() > 1e-5
+        np.abs(predict_poses(found.by_physics().calibrated, there)[0] - position).max()
+        > 1e-5
     )
 
 
@@ -103,11 +123,11 @@ def test_the_targets_bring_the_diagnosed_robot_to_the_wanted_poses_and_a_program
     targets = pd.read_csv(output)
     commands = targets[[f"q{j}" for j in range(1, 7)]].to_numpy()
     robot = load_diagnosed(checkout / "made", ROBOTS, checkout).calibrated
-    wanted, _ = nominal_forward(robot.robot, angles)
-    np.testing.assert_allclose(forward(robot, commands)[0], wanted, atol=1e-7)
+    wanted, _ = compute_nominal_poses(robot.robot, angles)
+    np.testing.assert_allclose(predict_poses(robot, commands)[0], wanted, atol=1e-7)
     missed = np.linalg.norm(
         wanted
-        - forward(
+        - predict_poses(
             robot, targets[[f"q{j}_uncorrected" for j in range(1, 7)]].to_numpy()
         )[0],
         axis=1,
@@ -235,7 +255,7 @@ def test_a_certificate_states_the_campaign_and_correct_its_targets(
         and document["point"] in lines[2]
         and lines[3].endswith(".pdf")
     )
-    rows = error_rows(json.loads(VERDICT.read_text()))
+    rows = tabulate_errors(json.loads(VERDICT.read_text()))
     assert document["errors"] == rows and len(rows) == 2
     assert (
         document["budget"][0]["name"] == "uncorrected"
@@ -296,7 +316,7 @@ def test_what_is_misplaced_is_said_and_data_at_fault_get_no_certificate(
     verdict = json.loads(VERDICT.read_text())
     sentence = "reflector or tool sits 5.0 mm from where it is declared"
     VERDICT.write_text(json.dumps(verdict | {"misplaced": [{"sentence": sentence}]}))
-    record_jobs("made", campaign_files("made", ROBOTS))
+    record_jobs("made", read_campaign_folder("made", ROBOTS).files())
     for words in (
         ("certificate", "made", "--tolerance", "0.5mm"),
         ("correct", "made", path, "--output", "t.csv"),
@@ -309,7 +329,7 @@ def test_what_is_misplaced_is_said_and_data_at_fault_get_no_certificate(
             | {"effects": [{"family": "data", "name": "wrong_sign"}], "accuracy": None}
         )
     )
-    record_jobs("made", campaign_files("made", ROBOTS))
+    record_jobs("made", read_campaign_folder("made", ROBOTS).files())
     assert "data at fault" in refusal("certificate", "made", "--tolerance", "0.5mm")
 
 
