@@ -32,7 +32,8 @@ def experiments_of(
     blocks = split_data_sets(sets)
     return [
         pack_experiments(
-            numbers, draw_random_experiments(design, 1, purpose, numbers, configurations)
+            numbers,
+            draw_random_experiments(design, 1, purpose, numbers, configurations),
         )
         for numbers in blocks
     ]

@@ -16,7 +16,7 @@ from elastocal.effects.catalogue import list_effects
 from elastocal.effects.conditions import conditions_of
 from elastocal.effects.protocol import Candidate
 from elastocal.figures.style import MILLI, PALETTE, create_panels, styled
-from elastocal.fitting.model import displaced_by
+from elastocal.fitting.model import sum_displacements
 from elastocal.fitting.observations import States
 from elastocal.mechanics.kinematics import poses
 from elastocal.mechanics.robot import Robot
@@ -175,7 +175,7 @@ def _compute_displacement(
     shapes = [shape.start for shape in candidate.shapes]
     commanded = sites.chain.at(experiment.joint_angles)
     displaced = commanded.copy()
-    shifts = displaced_by([(candidate, sizes, shapes)], conditions)
+    shifts = sum_displacements([(candidate, sizes, shapes)], conditions)
     for coordinate, shift in shifts.items():
         displaced[:, coordinate] += shift
     reflector = replace(sites.chain.end_effector, offset_m=_REFLECTOR_M)

@@ -8,7 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from elastocal.errors import InputError
-from elastocal.io.documents import check_document, document_path, named_document, parsed
+from elastocal.io.documents import (
+    check_document,
+    document_path,
+    parse_yaml,
+    read_named_document,
+)
 from elastocal.mechanics.chain import Chain
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.equation_11 import find_first_solvable_length
@@ -71,7 +76,7 @@ def check_study(
     for name, robot in robots.items():
         _check_simulation_keys(robot, document_path(folder, "robots", name))
     documents = {
-        name: named_document(folder, "strategies", "strategy", name, source)
+        name: read_named_document(folder, "strategies", "strategy", name, source)
         for name in config["strategies"]
     }
     _check_distinct_names(documents, folder)
@@ -190,7 +195,7 @@ def override_entries(
     changed = dict(config)
     for entry in entries:
         key, _, text = entry.partition("=")
-        changed[key] = _merge(changed.get(key), parsed(text, f"--config {key}"))
+        changed[key] = _merge(changed.get(key), parse_yaml(text, f"--config {key}"))
     return changed
 
 

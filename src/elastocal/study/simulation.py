@@ -459,7 +459,7 @@ def draw_bootstrap_weights(
     Parameters
     ----------
     seed, key
-        As in `random_streams.stream`.
+        As in `random_streams.open_stream`.
     data_sets
         Numbers of the data sets.
     replicates : int
