@@ -149,7 +149,7 @@ def draw_arm_with_errors(
 
 def _compute_links(robot: Robot, angles: np.ndarray) -> np.ndarray:
     """Points (poses, N, 3) along the links, m, at model angles (poses, n)."""
-    return link_points(robot, angles).transpose(1, 0, 2)
+    return sample_links(robot, angles).transpose(1, 0, 2)
 
 
 def _draw_errors(
@@ -185,7 +185,7 @@ def draw_plan(robot: Robot, cell: Cell, plan: Plan) -> Figure:
         axis.set_aspect("equal", adjustable="box")
         # A box may represent a floor without an end, so the arm sets the limits.
         fitted = robot.model_angles(plan.fitted.joint_angles)
-        reach = max(np.abs(link_points(robot, fitted)).max(), 0.1)
+        reach = max(np.abs(sample_links(robot, fitted)).max(), 0.1)
         shown = reach
         if cell.tracker_m is not None:
             shown = max(reach, float(np.abs(cell.tracker_m).max()))

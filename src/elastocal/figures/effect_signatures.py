@@ -186,14 +186,14 @@ def _compute_displacement(
 
 def list_candidates(name: str, robot: Robot) -> list[Candidate]:
     """List every way in which an effect can act on the arm, see `compute_signature`."""
-    return effects()[name].candidates(_find_sites(name, robot))
+    return list_effects()[name].candidates(_find_sites(name, robot))
 
 
 def _find_sites(name: str, robot: Robot) -> Sites:
     """Sites of the arm without masses, unless the effect exists only with them."""
     with_masses = replace(sites_of(robot), gear_ratio=(_GEAR_RATIO,) * robot.joints)
     without_masses = replace(with_masses, masses=())
-    if effects()[name].candidates(without_masses):
+    if list_effects()[name].candidates(without_masses):
         return without_masses
     return with_masses
 

@@ -361,7 +361,7 @@ def _label_model(step: str) -> str:
     """The effects of a model in words, in lines that fit next to the bars; the end of a
     long list is left out."""
     effects = in_words(step).split(", ")
-    return textwrap.fill(first_names(effects, _NAMED_EFFECTS), _MODEL_LABEL_WIDTH)
+    return textwrap.fill(list_first(effects, _NAMED_EFFECTS), _MODEL_LABEL_WIDTH)
 
 
 def _collect_errors(steps: Sequence[Mapping[str, Any]], poses: str) -> np.ndarray:
@@ -455,7 +455,7 @@ def _name_campaigns(table: pd.DataFrame) -> pd.Series:
     """
     names = table["campaign"].str.replace("_on_", ", judged on ").str.replace("_", " ")
     names = names.str.replace(r"^\w+|\b\w\b", lambda word: word[0].upper(), regex=True)
-    poses = table["poses"].map(lambda count: counted(count, "pose"))
+    poses = table["poses"].map(lambda count: format_count(count, "pose"))
     return names.where(~names.duplicated(keep=False), names + ", " + poses)
 
 

@@ -192,7 +192,7 @@ def _choose_optimal_designs(
     criteria = {"I": Criterion(form * np.outer(scale, scale))}
     for kind in CRITERIA:
         if kind != "I":
-            criteria[kind] = criterion(kind, regressors[:, :3])
+            criteria[kind] = build_criterion(kind, regressors[:, :3])
     designs = []
     for kind, rule in criteria.items():
         # The beginning of a greedy selection is the greedy selection of fewer.
@@ -207,7 +207,7 @@ def _draw_random_designs(
     study: StudyInMemory, candidates: int, sizes: Sequence[int], load: str
 ) -> list[_Designs]:
     """Draw random designs of each size."""
-    draws = stream(study.seed, study.key, f"random designs/{load}", 0)
+    draws = open_stream(study.seed, study.key, f"random designs/{load}", 0)
     designs = []
     for size in sizes:
         selections = [
@@ -248,7 +248,7 @@ def _simulate_estimates(
     regressors = pool.regressors[selections][..., pool.observable]
     matrix = regressors.reshape(count, -1, joints)
     ideal = pool.deflections[selections].reshape(count, -1, 1)
-    draws = stream(study.seed, study.key, f"noise of designs/{size}", 0)
+    draws = open_stream(study.seed, study.key, f"noise of designs/{size}", 0)
     noise = draws.standard_normal((*ideal.shape[:2], repeats))
     measured = ideal + study.size.noise * noise
     transposed = matrix.swapaxes(1, 2)

@@ -78,7 +78,7 @@ class Job(Protocol):
 
 def collect_provenance(job: Job) -> dict[str, Any]:
     """Provenance of a file whose robot, noise or strategy the rule's wildcards name."""
-    return provenance(job.params, **dict(job.wildcards))
+    return describe_provenance(job.params, **dict(job.wildcards))
 
 
 def load_robot(job: Job) -> Robot:

@@ -214,7 +214,7 @@ def draw_random_experiments(
     """
     chain = design.chain
     loading = design.loading
-    shares = draw(
+    shares = draw_data_sets(
         seed,
         design.key,
         f"{purpose}/joint angles",
@@ -495,7 +495,7 @@ def draw_weight_blocks(
     for sets in split_data_sets(data_sets):
         weights = draw_bootstrap_weights(seed, key, sets, replicates)
         yield _weight_columns(DATA_SETS, sets, weights[1:].T)
-    test_counts = draw(
+    test_counts = draw_data_sets(
         seed,
         key,
         "bootstrap of tests",
@@ -533,7 +533,7 @@ def draw_experiments(job: Job) -> None:
         for sets in split_data_sets(params.data_sets)
     )
     schema = make_experiments_schema(chain.coordinates)
-    write_table(job.output.experiments, schema, blocks, provenance(params))
+    write_table(job.output.experiments, schema, blocks, describe_provenance(params))
 
 
 def draw_weights(job: Job) -> None:
@@ -556,7 +556,7 @@ def simulate(job: Job) -> None:
     schema = make_experiments_schema(robot.joints)
     experiments = read_blocks(job.input.experiments, schema)
     blocks = simulate_blocks(experiments, robot, job.params.wrench_at)
-    write_table(job.output.ideal, DEFLECTIONS, blocks, provenance(job.params))
+    write_table(job.output.ideal, DEFLECTIONS, blocks, describe_provenance(job.params))
 
 
 def measure(job: Job) -> None:
@@ -566,7 +566,7 @@ def measure(job: Job) -> None:
     blocks = add_noise_to_blocks(
         ideal, job.wildcards.robot, job.params.seed, 1e-6 * float(noise_um)
     )
-    origin = provenance(job.params, noise_um=noise_um)
+    origin = describe_provenance(job.params, noise_um=noise_um)
     write_table(job.output.measured, DEFLECTIONS, blocks, origin)
 
 
@@ -575,7 +575,7 @@ def summarize_initial(job: Job) -> None:
     data set."""
     ideal = read_blocks(job.input.ideal, DEFLECTIONS, point=job.params.end_effector)
     blocks = map(_summarize_block, ideal)
-    write_table(job.output.initial, INITIAL, blocks, provenance(job.params))
+    write_table(job.output.initial, INITIAL, blocks, describe_provenance(job.params))
 
 
 def _summarize_block(block: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

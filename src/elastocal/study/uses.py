@@ -186,7 +186,7 @@ def _find_configurations(
     """Find configurations at positions (N, 3), the tool pointing downwards, under one
     force (3,)."""
     rotations = np.broadcast_to(_DOWN, (len(positions), 3, 3))
-    angles, residuals = along_path(robot, positions, rotations)
+    angles, residuals = solve_path(robot, positions, rotations)
     if (residuals > SOLVED_M).any() or find_beyond_limits(robot, angles).any():
         return None
     wrench = np.tile(np.pad(force, (0, 3)), (len(positions), 1))
