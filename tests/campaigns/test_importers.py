@@ -17,18 +17,19 @@ from made_fanuc_sources import POSES, REPEATS, assert_holds, cpa_source, static_
 from scipy.spatial.transform import Rotation
 from support import refused
 
+from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.importers import (
     FOLDER_VARIABLE,
     PublicFile,
-    campaign_sources,
     fetch,
+    find_importer,
     find_missing,
-    importer,
-    named_campaigns,
+    find_user_campaign,
+    list_campaigns,
+    read_campaign_sources,
     read_importers,
-    user_campaign,
 )
-from elastocal.campaigns.reading import campaign_files, read_campaign, read_robot
+from elastocal.campaigns.reading import read_campaign, read_robot
 from elastocal.io.documents import read_document
 
 CONFIG = Path(__file__).resolve().parents[2] / "config"
@@ -140,12 +141,12 @@ def test_importers_name_robots_and_campaigns_name_their_files():
         for document in public
     )
     with refused("mine.yaml", "importer", "'nobody'", ", ".join(ALL)):
-        importer("nobody", CONFIG, "mine.yaml")
+        find_importer("nobody", CONFIG, "mine.yaml")
 
 
 def made(tmp_path, name, *paths, **test):
     ALL[name].write_campaign(paths, tmp_path / "campaign", ROBOTS, name, **test)
-    return read_campaign(tmp_path / "campaign", ROBOTS)
+    return read_campaign(read_campaign_folder(tmp_path / "campaign", ROBOTS))
 
 
 def text(path, columns, separator=",", decimal="."):
@@ -332,8 +333,8 @@ def test_each_pose_of_the_motoman_counts_once_and_those_that_nobody_saw_not_at_a
 
 
 def test_campaigns_of_the_repository_pass(config, config_folder):
-    sources = campaign_sources(config, config_folder)
-    assert list(sources) == named_campaigns(config)
+    sources = read_campaign_sources(config, config_folder)
+    assert list(sources) == list_campaigns(config)
     for name, document in sources.items():
         assert document["source"] == (
             "simulated" if name in config["loop"]["campaigns"] else "public"
@@ -381,7 +382,7 @@ def test_fault_in_a_campaigns_file_is_one_line_that_names_it(
     path.parent.mkdir()
     path.write_text(yaml.safe_dump(document))
     with refused(path.as_posix(), key, *words):
-        campaign_sources(of_one_campaign(config), tmp_path, "study.yaml")
+        read_campaign_sources(of_one_campaign(config), tmp_path, "study.yaml")
 
 
 def users_folder(tmp_path, **changes):
@@ -401,6 +402,12 @@ def users_folder(tmp_path, **changes):
     return folder.as_posix()
 
 
+def users_own(config, robots, results):
+    """The user's own campaign: path of its folder by its name."""
+    campaigns = find_user_campaign(config, robots, results)
+    return {name: folder.path.as_posix() for name, folder in campaigns.items()}
+
+
 def test_a_users_own_campaign_has_one_spelling_however_its_folder_is_given(
     config, config_folder, tmp_path, monkeypatch
 ):
@@ -411,8 +418,7 @@ def test_a_users_own_campaign_has_one_spelling_however_its_folder_is_given(
     (tmp_path / "link").symlink_to(tmp_path / "2026")
     (tmp_path / "beside").mkdir()
     assert (
-        user_campaign(config | {"campaign": ""}, config_folder / "robots", tmp_path)
-        == {}
+        users_own(config | {"campaign": ""}, config_folder / "robots", tmp_path) == {}
     )
     everywhere = {
         "": ["2026", 2026, "./2026", "2026/../2026//", "link"],
@@ -421,7 +427,7 @@ def test_a_users_own_campaign_has_one_spelling_however_its_folder_is_given(
     for place, given in everywhere.items():
         monkeypatch.chdir(tmp_path / place)
         for each in [*given, f"{tmp_path}/2026/"]:
-            found = user_campaign(
+            found = users_own(
                 config | {"campaign": each},
                 config_folder / "robots",
                 tmp_path / "results",
@@ -455,11 +461,11 @@ def test_fault_in_a_users_own_campaign_is_one_line_that_names_its_file(
 ):
     folder = users_folder(tmp_path, **changes)
     with refused(f"{folder}/campaign.yaml", key, *words):
-        user_campaign(config | {"campaign": folder}, config_folder / "robots", tmp_path)
+        users_own(config | {"campaign": folder}, config_folder / "robots", tmp_path)
     (tmp_path / "a{x}b").mkdir()
     folder = users_folder(tmp_path / "a{x}b")
     with refused(f"{folder}/campaign.yaml", "", "braces", "without braces"):
-        user_campaign(config | {"campaign": folder}, config_folder / "robots", tmp_path)
+        users_own(config | {"campaign": folder}, config_folder / "robots", tmp_path)
 
 
 def test_two_campaigns_of_one_name_are_refused_while_both_are_there(
@@ -476,7 +482,7 @@ def test_two_campaigns_of_one_name_are_refused_while_both_are_there(
         (results / "cell7/campaign.json").write_text(
             json.dumps({"source": source}), encoding="utf-8"
         )
-        return user_campaign(
+        return users_own(
             config | {"campaign": folder}, config_folder / "robots", results
         )
 
@@ -510,13 +516,11 @@ def test_two_campaigns_that_test_each_other_come_with_the_files_of_both(
         .replace("cell7", "cell8")
     )
     robots = config_folder / "robots"
-    assert user_campaign(config | {"campaign": folder}, robots, tmp_path) == {
-        "cell7": folder
-    }
+    own = find_user_campaign(config | {"campaign": folder}, robots, tmp_path)["cell7"]
     expected = [
         f"{folder}/campaign.yaml",
         f"{robots}/kuka.yaml",
         f"{folder}/../other/campaign.yaml",
         f"{robots}/kuka.yaml",
     ]
-    assert campaign_files(folder, robots) == expected
+    assert own.files() == expected

@@ -32,12 +32,12 @@ def test_a_spreadsheets_marks_blanks_and_lines_of_its_own_are_passed_over_and_co
         line.replace(";", "; ") for line in lines
     )
     path.write_text(text, encoding="utf-8")
-    measurements = read_campaign(cell.folder, cell.robots).measurements
+    measurements = read_campaign(cell.open()).measurements
     assert measurements.row.tolist()[:5] == [1, 2, 4, 6, 7]
     assert_same(replace(measurements, row=whole.row), whole)
     path.write_text(text.replace("\n0; 0; 0; A", "\n0; 0; no; A"), encoding="utf-8")
     with refused(cell.measurements, "line 5, column repeat", "'no'"):
-        read_campaign(cell.folder, cell.robots)
+        read_campaign(cell.open())
 
 
 @pytest.mark.parametrize(
@@ -75,7 +75,7 @@ def test_faulty_cell_of_a_parquet_file_is_refused_alike(cell):
         "found nothing",
         "a number",
     ):
-        read_campaign(cell.folder, cell.robots)
+        read_campaign(cell.open())
 
 
 @pytest.mark.parametrize("missing", ["load", "q3", "rz", "mx", "approach1"])
@@ -107,13 +107,13 @@ def test_more_measurements_than_fit_into_memory_are_refused(cell, monkeypatch):
     rows = len(cell.table["pose"])
     path = cell.folder / "measurements.parquet"
     monkeypatch.setattr(module, "MOST_MEASUREMENTS", rows)
-    assert len(read_campaign(cell.folder, cell.robots).measurements) == rows
+    assert len(read_campaign(cell.open()).measurements) == rows
     monkeypatch.setattr(module, "MOST_MEASUREMENTS", rows - 1)
     with refused(path, "", "rows of data", f"at most {rows - 1}"):
-        read_campaign(cell.folder, cell.robots)
+        read_campaign(cell.open())
     monkeypatch.setattr(module, "_MOST_BYTES", 100)
     with refused(path, "", "bytes", "at most 100"):
-        read_campaign(cell.folder, cell.robots)
+        read_campaign(cell.open())
 
 
 @pytest.mark.parametrize(
@@ -129,7 +129,7 @@ def test_file_that_is_no_table_is_refused(cell, text, key, words):
     cell.write()
     (cell.folder / "measurements.csv").write_bytes(text)
     with refused(cell.measurements, key, *words):
-        read_campaign(cell.folder, cell.robots)
+        read_campaign(cell.open())
 
 
 def test_one_altered_byte_of_parquet_with_checksums_is_found(cell):
@@ -143,13 +143,13 @@ def test_one_altered_byte_of_parquet_with_checksums_is_found(cell):
         use_dictionary=False,
     )
     (cell.folder / "measurements.csv").unlink()
-    read_campaign(cell.folder, cell.robots)
+    read_campaign(cell.open())
     content = bytearray(path.read_bytes())
     place = content.index(struct.pack("<d", cell.table["x"][10]))
     content[place] ^= 1
     path.write_bytes(content)
     with refused(path.as_posix(), "", "no readable Parquet file"):
-        read_campaign(cell.folder, cell.robots)
+        read_campaign(cell.open())
 
 
 @pytest.mark.parametrize(
@@ -162,7 +162,7 @@ def test_a_column_of_parquet_holds_numbers_or_text(cell, column, entry, found):
     with refused(
         cell.folder / "measurements.parquet", f"column {column}", found, "numbers"
     ):
-        read_campaign(cell.folder, cell.robots)
+        read_campaign(cell.open())
 
 
 def test_one_file_of_measurements_must_be_there(cell):
@@ -171,22 +171,20 @@ def test_one_file_of_measurements_must_be_there(cell):
     with refused(
         cell.folder.as_posix(), "", "both measurements.csv and", "one of them"
     ):
-        read_campaign(cell.folder, cell.robots)
+        read_campaign(cell.open())
     for name in ("measurements.csv", "measurements.parquet"):
         (cell.folder / name).unlink()
     with refused(
         cell.folder.as_posix(), "", "neither measurements.csv nor", "one of them"
     ):
-        read_campaign(cell.folder, cell.robots)
+        read_campaign(cell.open())
 
 
 def test_a_sheet_may_be_ticked_and_have_degrees_that_agree(cell):
     cell.table["done"] = ["x"] * len(cell.table["pose"])
     cell.table["q2_deg"] = np.degrees(cell.table["q2"]).round(3)
     cell.write()
-    assert len(read_campaign(cell.folder, cell.robots).measurements) == len(
-        cell.table["pose"]
-    )
+    assert len(read_campaign(cell.open()).measurements) == len(cell.table["pose"])
     cell.table["q2_deg"][4] += 1.0
     cell.write()
     with refused(cell.measurements, "line 6, column q2_deg", "what is q2 in deg"):
@@ -203,14 +201,14 @@ def test_what_a_small_file_of_parquet_would_grow_to_is_refused_before_it_is_read
     empty = np.zeros(len(table), np.int32)
     pq.write_table(table.append_column("x", table["x"]), path)
     with refused(path.as_posix(), "header", "column 'x' twice", "each column once"):
-        read_campaign(cell.folder, cell.robots)
+        read_campaign(cell.open())
     lists = pa.ListArray.from_arrays(
         np.append(empty, np.int32(1000)), pa.array(np.zeros(1000, np.int8))
     )
     pq.write_table(table.set_column(table.column_names.index("x"), "x", lists), path)
     with refused(path.as_posix(), "column x", "list"):
-        read_campaign(cell.folder, cell.robots)
+        read_campaign(cell.open())
     monkeypatch.setattr(module, "_MOST_ROW_GROUPS", 7)
     pq.write_table(table, path, row_group_size=10)
     with refused(path.as_posix(), "", "8 row groups", "at most 7"):
-        read_campaign(cell.folder, cell.robots)
+        read_campaign(cell.open())

@@ -9,8 +9,8 @@ from made_cells import ARM, DOCUMENT, LOADS, POSES, REPEATS, WRENCH, assert_same
 from support import refused
 
 from elastocal.campaigns.campaign import Target
-from elastocal.campaigns.holdout import split
-from elastocal.campaigns.reading import campaign_files, held_out_campaign, read_campaign
+from elastocal.campaigns.holdout import split_poses
+from elastocal.campaigns.reading import read_campaign, read_held_out_campaign
 from elastocal.campaigns.writing import write_campaign
 
 
@@ -155,15 +155,16 @@ def test_other_campaign_of_the_same_chain_is_the_test_of_all_measurements(
 ):
     other_campaign(cell, tmp_path)
     campaign = cell.read()
-    training, held_out = split(campaign)
+    training, held_out = split_poses(campaign)
     assert len(held_out) == 0
     assert_same(training, campaign.measurements)
-    other = held_out_campaign(campaign, cell.folder, cell.robots)
+    other = read_held_out_campaign(cell.open())
     assert (other.name, [target.name for target in other.targets]) == ("other", ["T"])
     assert len(other.measurements) == len(campaign.measurements)
     cell.arm["chain"] = ARM["chain"].replace("0.7", "0.8")
+    cell.write()
     with refused(cell.source, "holdout.campaign", "another chain", "the same chain"):
-        held_out_campaign(cell.read(), cell.folder, cell.robots)
+        read_held_out_campaign(cell.open())
 
 
 @pytest.mark.parametrize(
@@ -296,9 +297,10 @@ def test_what_is_no_file_of_the_folder_is_called_what_it_is_without_a_look_at_it
         if kind == "link out"
         else f"found a {kind} that leads to no file"
     )
-    for read in (read_campaign, campaign_files):
-        with refused(path, "", found):
-            read(cell.folder, cell.robots)
+    with refused(path, "", found):
+        read_campaign(cell.open())
+    with refused(path, "", found):
+        cell.open().files()
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import pytest
 from analysed_robots import analysed
 from made_folders import made_folder, made_table
 
-from elastocal.campaigns.reading import read_descriptions
+from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.command import campaign
 
 ARM = "name: arm\nchain: Rz(q1) Tx(1.0) [tip]\n"
@@ -30,7 +30,9 @@ def test_a_new_folder_is_a_campaign_that_lacks_measurements_and_what_is_there_st
         "robot.yaml",
         "measurements.csv",
     }
-    document, robot = read_descriptions(tmp_path / "cell", tmp_path)
+    folder = read_campaign_folder(tmp_path / "cell", tmp_path)
+    document = folder.document
+    robot = folder.robot_file
     assert document["campaign"] == "cell" and robot.read_text() == ARM
     (tmp_path / "measurements.csv").write_text("pose,load,repeat,target\n")
     assert "already" in refusal("init", tmp_path, "--robot", tmp_path / "robot.yaml")
@@ -61,7 +63,7 @@ def test_targets_are_those_of_the_measurements_that_lie_there(
     assert elastocal("import", "csv", tmp_path / "t.csv", *words).exit_code == 0
     result = elastocal("init", tmp_path)
     assert result.exit_code == 0 and "fill in" not in result.output
-    document, _ = read_descriptions(tmp_path, tmp_path)
+    document = read_campaign_folder(tmp_path, tmp_path).document
     assert (document["measured"], document["targets"]) == (
         "pose",
         {"TCP": {"point": "tip", "offset_m": "unknown"}},

@@ -2,6 +2,7 @@
 goes the whole way with them."""
 
 import shlex
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -45,7 +46,8 @@ def test_what_is_printed_is_what_is_run_until_a_step_fails(
             f"elastocal_proof.blind.rehearsal.{name}", lambda *_, result=result: result
         )
     monkeypatch.setattr(
-        "elastocal.campaigns.reading.read_descriptions", lambda *_: ({}, "")
+        "elastocal.campaigns.campaign_folder.read_campaign_folder",
+        lambda *_: SimpleNamespace(document={}),
     )
     result = elastocal("demo", tmp_path / "cell")
     assert (

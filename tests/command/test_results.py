@@ -21,7 +21,9 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.application.accuracy import tabulate_errors
 from elastocal.application.calibrated import compute_nominal_poses, predict_poses
-from elastocal.campaigns.reading import campaign_files, read_robot
+from elastocal.campaigns import campaign_folder
+from elastocal.campaigns.campaign_folder import read_campaign_folder
+from elastocal.campaigns.reading import read_robot
 from elastocal.exchange.urdf import robot_from_urdf
 from elastocal.loop.calibrated_files import load_diagnosed
 from elastocal.mechanics.kinematics import poses
@@ -64,6 +66,21 @@ def output(tmp_path):
 @pytest.fixture
 def words(in_checkout, path, output):
     return "correct", in_checkout / "made", path, "--output", output
+
+
+def test_correct_reads_the_documents_of_a_campaign_once(
+    elastocal, words, checkout, monkeypatch
+):
+    read_files = []
+    read_document = campaign_folder.read_document
+
+    def read_and_note(path):
+        read_files.append(Path(path).name)
+        return read_document(path)
+
+    monkeypatch.setattr(campaign_folder, "read_document", read_and_note)
+    assert elastocal(*words).exit_code == 0
+    assert read_files == ["campaign.yaml"]
 
 
 def test_the_regression_corrects_what_physics_does_not_have(
@@ -299,7 +316,7 @@ def test_what_is_misplaced_is_said_and_data_at_fault_get_no_certificate(
     verdict = json.loads(VERDICT.read_text())
     sentence = "reflector or tool sits 5.0 mm from where it is declared"
     VERDICT.write_text(json.dumps(verdict | {"misplaced": [{"sentence": sentence}]}))
-    record_jobs("made", campaign_files("made", ROBOTS))
+    record_jobs("made", read_campaign_folder("made", ROBOTS).files())
     for words in (
         ("certificate", "made", "--tolerance", "0.5mm"),
         ("correct", "made", path, "--output", "t.csv"),
@@ -312,7 +329,7 @@ def test_what_is_misplaced_is_said_and_data_at_fault_get_no_certificate(
             | {"effects": [{"family": "data", "name": "wrong_sign"}], "accuracy": None}
         )
     )
-    record_jobs("made", campaign_files("made", ROBOTS))
+    record_jobs("made", read_campaign_folder("made", ROBOTS).files())
     assert "data at fault" in refusal("certificate", "made", "--tolerance", "0.5mm")
 
 

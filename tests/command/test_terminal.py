@@ -11,7 +11,7 @@ from certified import record_jobs
 from rich.console import Console
 from support import refused
 
-from elastocal.campaigns.reading import campaign_files
+from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.command import terminal as module
 from elastocal.command.terminal import (
     angle_rad,
@@ -130,7 +130,9 @@ def test_results_of_another_environment_come_with_a_warning(in_checkout, capsys)
         and not capsys.readouterr().err
     )
     record_jobs(
-        "made", campaign_files("made", ROBOTS), environment(".") | {"numpy": "1.0"}
+        "made",
+        read_campaign_folder("made", ROBOTS).files(),
+        environment(".") | {"numpy": "1.0"},
     )
     assert load_diagnosed_campaign(in_checkout / "made").name == "made"
     here = environment(".")["numpy"]

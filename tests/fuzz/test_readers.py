@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from made_cells import ARM, DOCUMENT, Cell
 from study_folder import REPOSITORY
 
-from elastocal.campaigns.importers import campaign_sources
-from elastocal.campaigns.reading import campaign_files, read_campaign, read_robot
+from elastocal.campaigns.campaign_folder import read_campaign_folder
+from elastocal.campaigns.importers import read_campaign_sources
+from elastocal.campaigns.reading import read_campaign, read_robot
 from elastocal.io.documents import check_document, read_document
 from elastocal.mechanics.chain import parse_chain
 from elastocal.study.configuration import check_study, override_entries
@@ -67,7 +68,7 @@ def read_strategy(path):
 def read_study(path):
     config = read_document(path)
     check_study(config, CONFIG, path)
-    campaign_sources(config, CONFIG, path)
+    read_campaign_sources(config, CONFIG, path)
 
 
 # What a file of the cell is altered from, its name, and its readers.
@@ -76,18 +77,23 @@ READERS = {
         FULL,
         "campaign.yaml",
         lambda path: read_campaign(
-            path.parent, path.parents[1] / "robots", ["joint_offset"]
+            read_campaign_folder(path.parent, path.parents[1] / "robots"),
+            ["joint_offset"],
         ),
     ),
     "files of a campaign": (
         FULL,
         "campaign.yaml",
-        lambda path: campaign_files(path.parent, path.parents[1] / "robots"),
+        lambda path: read_campaign_folder(
+            path.parent, path.parents[1] / "robots"
+        ).files(),
     ),
     "robot": (
         ARM,
         "arm.yaml",
-        lambda path: read_campaign(path.parent, path.parents[1] / "robots"),
+        lambda path: read_campaign(
+            read_campaign_folder(path.parent, path.parents[1] / "robots")
+        ),
     ),
     "robot with links": (KUKA, "arm.yaml", read_robot),
     "strategy": (STRATEGY, "strategy.yaml", read_strategy),
@@ -152,7 +158,7 @@ def test_measurements_as_text(place, data):
     path = place.folder / "measurements.csv"
     content = path.read_bytes()
     drawn = data.draw(BYTES | damaged(content) | tables(content))
-    over(path, drawn, lambda: read_campaign(place.folder, place.robots))
+    over(path, drawn, lambda: read_campaign(place.open()))
 
 
 @pytest.fixture(scope="module")
@@ -185,4 +191,4 @@ def test_measurements_as_parquet(parquet, data):
         except pa.ArrowException:
             return
         drawn = sink.getvalue().to_pybytes()
-    over(path, drawn, lambda: read_campaign(parquet.folder, parquet.robots))
+    over(path, drawn, lambda: read_campaign(parquet.open()))

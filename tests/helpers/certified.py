@@ -9,9 +9,9 @@ from analysed_robots import ROBOTS, analysed
 from loop_scripts import ANALYSIS, run_loop
 from made_folders import PLAN, made_folder, made_table
 
-from elastocal.campaigns.reading import campaign_files
+from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.io.origin import Origin, environment
-from elastocal.io.records import JobRecord, input_digests, write_records
+from elastocal.io.records import JobRecord, digest_inputs, write_records
 
 # A module by which all was made.
 ENGINE = "src/engine.py"
@@ -55,7 +55,7 @@ def certified_checkout(top, name="made", offset=3e-4, made=None):
         shutil.move(out / file, reports / file)
     (reports / REPORT).write_text("A report.\n", encoding="utf-8")
     with contextlib.chdir(top):
-        record_jobs(name, campaign_files(folder, ROBOTS))
+        record_jobs(name, read_campaign_folder(folder, ROBOTS).files())
     return folder
 
 
@@ -76,7 +76,7 @@ def record_jobs(name, files, installed=None):
         ),
     }
     for number, (rule, (inputs, outputs)) in enumerate(jobs.items()):
-        digests, own = input_digests([*inputs, ENGINE], None if number else [ENGINE])
+        digests, own = digest_inputs([*inputs, ENGINE], None if number else [ENGINE])
         times = f"2026-01-01T00:00:0{number}", f"2026-01-01T00:00:0{number + 1}"
         origin = Origin("c0ffee", "d16e57", 1)
         here = installed or environment(".")

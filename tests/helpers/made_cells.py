@@ -10,6 +10,7 @@ import pyarrow.parquet as pq
 import yaml
 
 from elastocal.campaigns.campaign import Measurements
+from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.reading import read_campaign
 
 ARM, DOCUMENT = yaml.safe_load(
@@ -112,7 +113,11 @@ class Cell:
 
     def read(self, **arguments):
         self.write()
-        return read_campaign(self.folder, self.robots, **arguments)
+        return read_campaign(self.open(), **arguments)
+
+    def open(self):
+        """The folder as it was written."""
+        return read_campaign_folder(self.folder, self.robots)
 
     @property
     def source(self):

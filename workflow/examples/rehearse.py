@@ -18,8 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
+from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.measurements import CSV
-from elastocal.campaigns.reading import read_descriptions, read_robot
 from elastocal.errors import InputError
 from elastocal_proof.blind.rehearsal import (
     fill_sheet,
@@ -33,19 +33,18 @@ from elastocal_proof.blind.rehearsal import (
 ROBOTS = Path("config/robots")
 
 
-def measure(given, robot, document):
+def measure(given, robot, campaign):
     path = given.folder / CSV
-    print(f"{fill_sheet(path, document, robot, given.seed)} measurements in {path}")
+    count = fill_sheet(path, campaign.document, robot, given.seed)
+    print(f"{count} measurements in {path}")
 
 
-def path(given, robot, document):
-    declared = read_robot(read_descriptions(given.folder, ROBOTS)[1])
-    print(
-        f"{write_milling_path(given.path, declared, robot, given.seed)} poses in {given.path}"
-    )
+def path(given, robot, campaign):
+    count = write_milling_path(given.path, campaign.robot, robot, given.seed)
+    print(f"{count} poses in {given.path}")
 
 
-def move(given, robot, document):
+def move(given, robot, campaign):
     missed = measured_errors(given.path, given.targets, robot, given.seed)
     rms = {name: 1e3 * np.sqrt((off**2).mean()) for name, off in missed.items()}
     for name, off in missed.items():
@@ -86,11 +85,11 @@ if __name__ == "__main__":
         command.set_defaults(run=run)
     given = parser.parse_args()
     try:
-        document, robot_file = read_descriptions(given.folder, ROBOTS)
-        robot, defects = hidden_robot(robot_file, given.seed, given.effect)
+        campaign = read_campaign_folder(given.folder, ROBOTS)
+        robot, defects = hidden_robot(campaign.robot_file, given.seed, given.effect)
         if given.misplaced_base:
             robot = with_misplaced_base(robot, given.seed)
-        given.run(given, robot, document)
+        given.run(given, robot, campaign)
     except InputError as error:
         sys.exit(str(error))
     if given.reveal:

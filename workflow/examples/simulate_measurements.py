@@ -10,9 +10,10 @@ import argparse
 import sys
 from pathlib import Path
 
-from elastocal.campaigns.campaign import DOCUMENT, targets_from
+from elastocal.campaigns.campaign import DOCUMENT, parse_targets
+from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.measurements import CSV, write_measurements
-from elastocal.campaigns.reading import read_descriptions, read_robot
+from elastocal.campaigns.reading import read_robot
 from elastocal.campaigns.simulation import Plan, draw_measurements
 from elastocal.errors import InputError
 
@@ -20,9 +21,9 @@ LADDER = (0.0, 1.0, 0.5, -0.5, -1.0)
 
 
 def measure(folder: Path, robot_file: Path, seed: int) -> None:
-    document, _ = read_descriptions(folder, Path("config/robots"))
+    document = read_campaign_folder(folder, "config/robots").document
     robot = read_robot(robot_file)
-    targets = targets_from(
+    targets = parse_targets(
         document["targets"], robot.chain, (folder / DOCUMENT).as_posix()
     )
     plan = Plan(

@@ -131,7 +131,7 @@ rule summarize_campaigns:
             kind="table",
         ),
     wildcard_constraints:
-        kind="campaigns|measured",
+        kind="campaigns|main|measured",
     params:
         step="elastocal.loop.summary.summarize_campaigns",
         campaigns=lambda wildcards: config["loop"][wildcards.kind],

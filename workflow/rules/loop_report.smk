@@ -4,6 +4,8 @@ Needs results/loop/{campaign}/ and the tables of reports/loop/{campaign}/. Write
 reports/loop/{campaign}/report.pdf and report.html, and, of the study too, the pictures of the README.
 """
 
+# The campaign whose pictures the README shows.
+LOOP_OF_PAGES = "reports/loop/kuka_extended_end_effector"
 LOOP_PAGES = ("loop.typ", "sheet.typ", "loop.html", "loop.js", "campaign.txt", "shared.txt")
 
 
@@ -78,22 +80,37 @@ rule draw_hero:
         "../scripts/draw_hero.py"
 
 
+# Copies in docs of what a finished run made, by the name of the copy: pictures of the
+# pages, and the tables that the figures of the pages are compared with.
+COPIES_IN_DOCS = (
+    {f"docs/{figure}.png": f"reports/figures/{figure}.png" for figure in FIGURES}
+    | {
+        f"docs/loop_{figure}.png": f"{LOOP_OF_PAGES}/figures/{figure}.png"
+        for figure in ("arrows", "candidates")
+    }
+    | {
+        f"docs/{campaign}.csv": f"reports/loop/{campaign}/before_after.csv"
+        for campaign in config["loop"]["main"]
+    }
+    | {
+        "docs/hero.png": f"{LOOP_OF_PAGES}/figures/hero.png",
+        "docs/main_campaigns.csv": "reports/loop/main.csv",
+        "docs/measured_in_the_box.png": "reports/loop/ur5_every_seventh/figures/before_after.png",
+    }
+)
+
+
+rule copy_into_docs:
+    input:
+        sources=list(COPIES_IN_DOCS.values()),
+    output:
+        copies=list(COPIES_IN_DOCS),
+    script:
+        "../scripts/copy_into_docs.py"
+
+
+# Everything in docs that a run of the study and of the two campaigns makes.
 rule pictures:
     input:
-        figures=expand("reports/figures/{figure}.png", figure=FIGURES),
-        loop=expand(
-            "reports/loop/kuka_extended_end_effector/figures/{figure}.png",
-            figure=["arrows", "candidates"],
-        ),
-        hero="reports/loop/kuka_extended_end_effector/figures/hero.png",
-        measured="reports/loop/ur5_every_seventh/figures/before_after.png",
-        steps=expand("reports/loop/{campaign}/before_after.csv", campaign=config["loop"]["main"]),
-        page=rules.write_study_page.output.page,
-    output:
-        figures=expand("docs/{figure}.png", figure=FIGURES),
-        loop=expand("docs/loop_{figure}.png", figure=["arrows", "candidates"]),
-        hero="docs/hero.png",
-        measured="docs/measured_in_the_box.png",
-        steps=expand("docs/{campaign}.csv", campaign=config["loop"]["main"]),
-    shell:
-        "(cp {input.figures} {input.hero} docs/; cp {input.measured} {output.measured}; for one in {input.loop}; do cp $one docs/loop_$(basename $one); done; for one in {input.steps}; do cp $one docs/$(basename $(dirname $one)).csv; done) 2> {log}"
+        rules.copy_into_docs.output.copies,
+        rules.write_study_page.output.page,

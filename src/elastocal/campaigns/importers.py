@@ -21,18 +21,19 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy
 
-from elastocal.campaigns.campaign import DOCUMENT
-from elastocal.campaigns.holdout import number_alike
-from elastocal.campaigns.reading import campaign_files, read_descriptions, read_robot
+from elastocal.campaigns.campaign_folder import CampaignFolder, read_campaign_folder
+from elastocal.campaigns.holdout import number_close_points
+from elastocal.campaigns.reading import read_robot
 from elastocal.campaigns.writing import write_campaign
 from elastocal.errors import InputError
 from elastocal.io.documents import (
     check_document,
     document_path,
-    named_document,
     read_document,
+    read_named_document,
 )
 from elastocal.io.json_files import read_json
+from elastocal.io.plugins import IMPORTERS, load_plugins
 
 # Names a folder that already has the files, for machines without a network.
 FOLDER_VARIABLE = "ELASTOCAL_DATA"
@@ -258,7 +259,7 @@ class Importer:
             angles, positions, others = part.read(path)
             joints = angles.shape[1]
             # Poses are numbered as they first come.
-            pose = number_alike(angles, part.same_pose_rad)
+            pose = number_close_points(angles, part.same_pose_rad)
             repeat = pd.Series(pose).groupby(pose).cumcount().to_numpy()
             if self.parts:
                 angles = read_robot(
@@ -313,7 +314,7 @@ class Importer:
 
 @cache
 def read_importers(path: Path) -> dict[str, Importer]:
-    """Importers of ``public_data.yaml`` by the names that ``importer`` of a campaign
+    """Importers of ``public_data.yaml`` by the names that ``find_importer`` of a campaign
     may have."""
     document = read_document(path)
     check_document(document, "public_data", path.as_posix())
@@ -338,16 +339,22 @@ def read_importers(path: Path) -> dict[str, Importer]:
     return found
 
 
-def importer(name: str, config: str | Path, source: str | Path) -> Importer:
-    """An importer of the folder ``config``; an InputError that names `source`, the file
-    that names it, refuses another name."""
-    known = read_importers(Path(config) / "public_data.yaml")
-    if name not in known:
-        raise InputError(source, "importer", repr(name), ", ".join(known))
-    return known[name]
+def find_importer(name: str, config: str | Path, source: str | Path) -> Importer:
+    """An importer of the folder ``config``, or one that an installed package offers.
+
+    Raises `InputError`, which names `source`, the file that asks for the importer:
+    there is no importer of this name.
+    """
+    importers = read_importers(Path(config) / "public_data.yaml")
+    if name not in importers:
+        # Look for plug-ins only now: each start of Snakemake asks for importers.
+        importers = importers | load_plugins(IMPORTERS, Importer, importers)
+    if name not in importers:
+        raise InputError(source, "importer", repr(name), ", ".join(importers))
+    return importers[name]
 
 
-def campaign_sources(
+def read_campaign_sources(
     config: Mapping[str, Any], folder: str | Path, source: str = "config.yaml"
 ) -> dict[str, dict[str, Any]]:
     """Documents of the campaigns that a configuration names, by the names of their
@@ -357,21 +364,25 @@ def campaign_sources(
     file of the configuration.
     """
     found = {}
-    for name in named_campaigns(config):
-        document = named_document(folder, "campaigns", "campaign_source", name, source)
+    for name in list_campaigns(config):
+        document = read_named_document(
+            folder, "campaigns", "campaign_source", name, source
+        )
         path = document_path(folder, "campaigns", name)
         if document["source"] == "public":
-            importer(document["importer"], folder, path)
+            find_importer(document["importer"], folder, path)
         else:
-            document["robot_document"] = named_document(
+            document["robot_document"] = read_named_document(
                 folder, "robots", "robot", document["robot"], path
             )
-            named_document(folder, "robots", "robot", document["declared_robot"], path)
+            read_named_document(
+                folder, "robots", "robot", document["declared_robot"], path
+            )
         found[name] = document
     return found
 
 
-def named_campaigns(config: Mapping[str, Any]) -> list[str]:
+def list_campaigns(config: Mapping[str, Any]) -> list[str]:
     """Campaigns that a configuration names, each once: simulated, measured, of the
     default run and of the league."""
     looped = (
@@ -379,10 +390,10 @@ def named_campaigns(config: Mapping[str, Any]) -> list[str]:
         for key in ("campaigns", "measured", "main")
         for name in config["loop"][key]
     )
-    return list(dict.fromkeys((*looped, *named_league(config))))
+    return list(dict.fromkeys((*looped, *list_league_data(config))))
 
 
-def named_league(config: Mapping[str, Any]) -> list[str]:
+def list_league_data(config: Mapping[str, Any]) -> list[str]:
     """Data sets of all leagues, each once."""
     return list(
         dict.fromkeys(
@@ -394,51 +405,55 @@ def named_league(config: Mapping[str, Any]) -> list[str]:
     )
 
 
-def user_campaign(
+def find_user_campaign(
     config: Mapping[str, Any], robots_folder: str | Path, results: str | Path
-) -> dict[str, str]:
-    """Folder of a user's own campaign by its name, spelled in one way however it was
-    given; empty where there is none.
+) -> dict[str, CampaignFolder]:
+    """Return the user's own campaign by its name; empty if the configuration has none.
 
-    `config`: ``campaign`` is its folder. `results`: of each campaign by its name. An
-    `InputError` refuses faults of its documents, and a name that a campaign of this
-    project has, or another one whose results are there.
+    The path of the folder is spelled in one way, however the user spelled it.
+
+    Parameters
+    ----------
+    config : configuration; ``campaign`` is the user's folder.
+    robots_folder : folder with the robot files that a campaign may name.
+    results : folder with the results of each campaign in a folder of its name.
+
+    Raises
+    ------
+    InputError
+        If a document of the campaign is faulty, or if its name belongs to a campaign of
+        this project or to another folder whose results are there.
     """
     if not config.get("campaign"):
         return {}
-    # Snakemake takes a folder that is called 2026 for a number, and another spelling of
-    # one folder for another one.
-    place = Path(str(config["campaign"])).resolve()
-    here = Path.cwd()
-    folder = (
-        place.relative_to(here) if place.is_relative_to(here) else place
-    ).as_posix()
-    for path in campaign_files(folder, robots_folder):
-        if set(path) & set("{}"):
-            raise InputError(
-                path,
-                "",
-                "braces",
-                "a path without braces, which Snakemake takes for wildcards",
-            )
-    document, _ = read_descriptions(folder, robots_folder)
-    name = document["campaign"]
-    source = f"{folder}/{DOCUMENT}"
-    if name in named_campaigns(config):
-        raise InputError(
-            source, "campaign", repr(name), "a name that no campaign of config.yaml has"
-        )
-    try:
-        earlier = Path(read_json(Path(results, name, "campaign.json"))["source"]).parent
-    except (OSError, ValueError, KeyError, TypeError):
-        # No results, or such as do not say of what they are.
-        earlier = None
-    if earlier is not None and earlier.is_dir() and not earlier.samefile(folder):
-        found = f"{name!r}, whose results are of {earlier.as_posix()}"
-        raise InputError(
-            source,
-            "campaign",
-            found,
-            f"another name, or first take away {Path(results, name).as_posix()}",
-        )
+    # YAML reads a folder named 2026 as a number.
+    path = Path(str(config["campaign"])).resolve()
+    # Snakemake would take another spelling of the same folder for another folder.
+    if path.is_relative_to(Path.cwd()):
+        path = path.relative_to(Path.cwd())
+    folder = read_campaign_folder(path, robots_folder)
+    for file in folder.files():
+        if set(file) & set("{}"):
+            allowed = "a path without braces, which Snakemake takes for wildcards"
+            raise InputError(file, "", "braces", allowed)
+    name = folder.name
+    if name in list_campaigns(config):
+        allowed = "a name that no campaign of config.yaml has"
+        raise InputError(folder.source, "campaign", repr(name), allowed)
+    earlier_path = _folder_of_results(Path(results, name))
+    if earlier_path is not None and not earlier_path.samefile(path):
+        found = f"{name!r}, whose results are of {earlier_path.as_posix()}"
+        allowed = f"another name, or first take away {Path(results, name).as_posix()}"
+        raise InputError(folder.source, "campaign", found, allowed)
     return {name: folder}
+
+
+def _folder_of_results(results: Path) -> Path | None:
+    """Return the campaign's folder whose results lie in a folder; None if there are no
+    results, if they do not name it, or if it no longer exists."""
+    try:
+        source = read_json(results / "campaign.json")["source"]
+        folder = Path(source).parent
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return folder if folder.is_dir() else None

@@ -13,152 +13,101 @@ from typing import Any
 import numpy as np
 
 from elastocal.campaigns.campaign import (
-    DEFAULT_HOLDOUT,
     DOCUMENT,
     Campaign,
     Measurements,
     Target,
     assemble_campaign,
-    groups_of,
-    targets_from,
+    group_equal_rows,
+    parse_targets,
 )
+from elastocal.campaigns.campaign_folder import CampaignFolder, read_robot_document
 from elastocal.campaigns.holdout import (
     FEWEST_HELD_OUT_POSES,
     SAME_POSE_RAD,
-    held_out_mask,
-    measured_poses,
-    other_folder,
+    list_poses,
+    select_held_out,
 )
 from elastocal.campaigns.measurements import (
-    CSV,
-    FARTHEST_RAD,
-    PARQUET,
+    LARGEST_ROTATION_RAD,
     ROTATION,
-    files_there,
-    is_file_in,
     read_measurements,
 )
 from elastocal.campaigns.tables import Cells
-from elastocal.counting import counted
-from elastocal.errors import InputError, closest_first
-from elastocal.io.documents import check_document, read_document
+from elastocal.counting import format_count
+from elastocal.errors import InputError, suggest_names
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.robot_file import robot_from_document
 
 
 def read_campaign(
-    folder: str | Path,
-    robots_folder: str | Path,
-    effects: Collection[str] | None = None,
+    folder: CampaignFolder, effects: Collection[str] | None = None
 ) -> Campaign:
-    """Read a campaign and check it as a whole.
+    """Read a campaign's measurements and check the campaign as a whole.
 
-    `folder`: holds ``campaign.yaml`` and the measurements. `robots_folder`: holds the
-    robots that a campaign may name. `effects`: names that ``declared`` may have; not
-    checked without. Raises `InputError`: the first fault found: file, row and column or
-    key, what stands there and what may.
+    Parameters
+    ----------
+    folder : campaign on disk.
+    effects : names that ``declared`` may have; not checked if None.
+
+    Raises
+    ------
+    InputError
+        The first fault: file, row and column or key, what was found and what is
+        allowed.
     """
-    folder, source = Path(folder), Path(folder, DOCUMENT).as_posix()
-    document, robot_path = read_descriptions(folder, robots_folder)
-    robot = read_robot(robot_path)
-    targets = targets_from(document["targets"], robot.chain, source)
-    holdout = document.get("holdout", DEFAULT_HOLDOUT)
-    if "campaign" in holdout:
-        other_folder(holdout["campaign"], folder, source)
+    document = folder.document
+    robot = folder.robot
+    source = folder.source
+    targets = parse_targets(document["targets"], robot.chain, source)
+    # Refuse a folder that cannot validate this campaign before reading measurements.
+    _ = folder.held_out_path
     for index, name in enumerate(document.get("declared", ())):
         if effects is not None and name not in set(effects):
             raise InputError(
                 source,
                 f"declared[{index}]",
                 repr(name),
-                closest_first(name, sorted(effects)),
+                suggest_names(name, sorted(effects)),
             )
-    table = read_measurements(folder, robot.joints, document["measured"])
+    table = read_measurements(folder.path, robot.joints, document["measured"])
     measurements = _measurements(table, robot, targets, document["measured"])
     _check_measurements(measurements, table, robot, targets, source)
-    _check_stated(document, measurements, robot, robot_path.name, source)
-    held_out_mask(holdout, measurements, robot.reported_offset, source)
+    _check_stated(document, measurements, robot, folder.robot_file.name, source)
+    select_held_out(folder.holdout, measurements, robot.reported_offset, source)
     place = {"table": Path(table.path).name, "header_line": table.header_line}
     return assemble_campaign(document | place, robot, measurements, source)
-
-
-def read_descriptions(
-    folder: str | Path, robots_folder: str | Path
-) -> tuple[dict[str, Any], Path]:
-    """What a campaign says of itself, as its schema has it, and where its robot is
-    described."""
-    source = Path(folder, DOCUMENT).as_posix()
-    files_there(folder, DOCUMENT)
-    document = read_document(source)
-    check_document(document, "campaign", source)
-    name = document["robot"]
-    known = sorted(file.stem for file in Path(robots_folder).glob("*.yaml"))
-    path = (
-        Path(robots_folder) / f"{name}.yaml" if name in known else Path(folder) / name
-    )
-    if not is_file_in(path, folder, robots_folder):
-        listed = f"{Path(robots_folder).as_posix()}: {closest_first(name, known)}"
-        allowed = f"a file in this folder, named relative to this folder, or a robot of {listed}"
-        raise InputError(source, "robot", repr(name), allowed)
-    return document, path
-
-
-def campaign_files(folder: str | Path, robots_folder: str | Path) -> list[str]:
-    """Files that a campaign is read from, those of the campaign that holds its test
-    included."""
-    document, robot_path = read_descriptions(folder, robots_folder)
-    files = [Path(folder) / DOCUMENT, *files_there(folder, CSV, PARQUET), robot_path]
-    if other := document.get("holdout", {}).get("campaign"):
-        there = other_folder(other, Path(folder), files[0].as_posix())
-        # What tests the other one is no part of this one: two campaigns may test each
-        # other.
-        files += [
-            there / DOCUMENT,
-            *files_there(there, CSV, PARQUET),
-            read_descriptions(there, robots_folder)[1],
-        ]
-    return [path.as_posix() for path in files]
 
 
 def read_robot(path: str | Path) -> Robot:
     """Read a robot file; an `InputError` is as in `robot_from_document`, or names what
     the schema refuses."""
-    source = Path(path).as_posix()
-    document = read_document(source)
-    check_document(document, "robot", source)
-    return robot_from_document(document, source)
+    return robot_from_document(read_robot_document(path), Path(path).as_posix())
 
 
-def held_out_campaign(
-    campaign: Campaign,
-    folder: str | Path,
-    robots_folder: str | Path,
-    effects: Collection[str] | None = None,
+def read_held_out_campaign(
+    folder: CampaignFolder, effects: Collection[str] | None = None
 ) -> Campaign | None:
-    """The other campaign that tests all of this one, of the same chain; None where this
-    campaign holds out its own poses."""
-    if "campaign" not in campaign.holdout:
+    """Read the campaign that validates this one; None if this campaign holds out poses
+    of its own.
+
+    An `InputError` refuses a campaign of another chain or with too few poses.
+    """
+    if folder.held_out_folder is None:
         return None
-    source = (Path(folder) / DOCUMENT).as_posix()
+    held_out = read_campaign(folder.held_out_folder, effects)
     key = "holdout.campaign"
-    other = read_campaign(
-        other_folder(campaign.holdout["campaign"], Path(folder), source),
-        robots_folder,
-        effects,
-    )
-    if other.robot.chain != campaign.robot.chain:
-        allowed = f"a campaign of the same chain, {campaign.robot.name}"
-        raise InputError(source, key, f"another chain, of {other.robot.name}", allowed)
-    poses = len(measured_poses(other.measurements)[0])
+    if held_out.robot.chain != folder.robot.chain:
+        allowed = f"a campaign of the same chain, {folder.robot.name}"
+        found = f"another chain, of {held_out.robot.name}"
+        raise InputError(folder.source, key, found, allowed)
+    poses = len(list_poses(held_out.measurements)[0])
     if poses < FEWEST_HELD_OUT_POSES:
-        raise InputError(
-            source,
-            key,
-            f"{counted(poses, 'pose')} there",
-            f"{FEWEST_HELD_OUT_POSES} or more",
-        )
-    return other
+        found = f"{format_count(poses, 'pose')} there"
+        allowed = f"{FEWEST_HELD_OUT_POSES} or more"
+        raise InputError(folder.source, key, found, allowed)
+    return held_out
 
 
 def _check_stated(
@@ -200,7 +149,7 @@ def _check_stated(
         raise InputError(
             source,
             "noise.joint_rad",
-            counted(len(each), "number"),
+            format_count(len(each), "number"),
             f"one for all joints, or {robot.joints}",
         )
 
@@ -224,7 +173,7 @@ def _measurements(
         raise table.fault(
             unknown,
             "target",
-            f"a target of {DOCUMENT}: {closest_first(labels[unknown], list(names))}",
+            f"a target of {DOCUMENT}: {suggest_names(labels[unknown], list(names))}",
         )
     approach = None
     if "approach1" in table.columns:
@@ -285,7 +234,9 @@ def find_degrees(reported: np.ndarray, robot: Robot) -> np.ndarray:
         angles = robot.model_angles(reported)
         return np.asarray(np.maximum(low - angles, angles - high))
 
-    found = np.abs(reported) > max(FARTHEST_RAD, np.abs(robot.joint_limits).max())
+    found = np.abs(reported) > max(
+        LARGEST_ROTATION_RAD, np.abs(robot.joint_limits).max()
+    )
     some = (off(reported) > _BEYOND_LIMITS_RAD).any(axis=1)
     # An angle that its opposite would bring inside the limits has rather a wrong sign,
     # which is for the diagnosis to trace.
@@ -305,7 +256,7 @@ def _check_measurements(
     format, by their places there."""
     names = ("session", "pose", "load", "repeat", "target")
     key = np.column_stack([getattr(measurements, name) for name in names])
-    first, group = groups_of(key)
+    first, group = group_equal_rows(key)
     again = first[group] != np.arange(len(measurements))
     if again.any():
         index = int(np.argmax(again))
@@ -330,7 +281,7 @@ def _check_measurements(
         WRENCH_NAMES,
         "0 where load is 0",
     )
-    pose_of = measured_poses(measurements)[1]
+    pose_of = list_poses(measurements)[1]
     angles = [f"q{j}" for j in range(1, robot.joints + 1)]
     reported = table.matrix(angles)
     first = np.unique(pose_of, return_index=True)[1]
@@ -368,9 +319,11 @@ def _check_measurements(
             table.refuse(away == np.nanmax(away), "xyz", allowed)
     if measurements.rotation_vector is not None:
         angle = np.linalg.norm(measurements.rotation_vector, axis=1)
-        allowed = f"a rotation vector in rad, not degrees, {FARTHEST_RAD:.3g} at most"
+        allowed = (
+            f"a rotation vector in rad, not degrees, {LARGEST_ROTATION_RAD:.3g} at most"
+        )
         table.refuse(
-            angle == max(angle.max(), FARTHEST_RAD),
+            angle == max(angle.max(), LARGEST_ROTATION_RAD),
             ["rx, ry, rz"],
             allowed,
             f"a turn of {angle.max():.4g}",

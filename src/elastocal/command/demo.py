@@ -15,7 +15,7 @@ from elastocal.command.terminal import (
     robots,
     workplace,
 )
-from elastocal.counting import counted
+from elastocal.counting import format_count
 
 # Fewer candidates than a real plan takes, for a demonstration of a minute.
 _PLAN = (
@@ -51,8 +51,9 @@ def demo(
     from rich.console import Console
 
     from elastocal.application.frames import root_mean_square
+    from elastocal.campaigns.campaign_folder import read_campaign_folder
     from elastocal.campaigns.measurements import CSV
-    from elastocal.campaigns.reading import read_descriptions, read_robot
+    from elastocal.campaigns.reading import read_robot
     from elastocal_proof.blind.rehearsal import (
         fill_sheet,
         hidden_robot,
@@ -79,12 +80,12 @@ def demo(
 
     run("plan", file, "--folder", folder, *_PLAN.split())
     count = fill_sheet(
-        folder / CSV, read_descriptions(folder, robots())[0], robot, seed
+        folder / CSV, read_campaign_folder(folder, robots()).document, robot, seed
     )
     print_lines(
         [
             "",
-            f"# The simulated robot is measured: {counted(count, 'measurement')} in {folder / CSV}",
+            f"# The simulated robot is measured: {format_count(count, 'measurement')} in {folder / CSV}",
         ],
         console,
     )

@@ -10,7 +10,7 @@ import typer
 from typer import Argument, Option
 
 from elastocal.command.terminal import MOST_ROWS, example, print_lines, robots
-from elastocal.counting import counted
+from elastocal.counting import format_count
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
@@ -198,8 +198,9 @@ def csv(
     from rich.console import Console
 
     from elastocal.campaigns.campaign import DOCUMENT
+    from elastocal.campaigns.campaign_folder import read_campaign_folder
     from elastocal.campaigns.measurements import CSV, PARQUET, write_measurements
-    from elastocal.campaigns.reading import read_descriptions, read_robot
+    from elastocal.campaigns.reading import read_robot
     from elastocal.exchange.measurement_table import (
         ImportOptions,
         read_measurement_table,
@@ -247,9 +248,9 @@ def csv(
     )
     known: set[str] = set()
     if (folder / DOCUMENT).is_file():
-        document, there = read_descriptions(folder, robots())
-        robot = robot or there
-        known = {*document["targets"]}
+        campaign = read_campaign_folder(folder, robots())
+        robot = robot or campaign.robot_file
+        known = {*campaign.document["targets"]}
     found = read_measurement_table(
         file, options, None if robot is None else read_robot(robot)
     )
@@ -318,13 +319,13 @@ def _summary(found: ImportedMeasurements) -> list[str]:
         )
     )
     targets = ", ".join(sorted(set(table["target"].tolist())))
-    joints = counted(found.joints, "joint")
+    joints = format_count(found.joints, "joint")
     read = [
         f"{name} from {header!r}{f' in {units[name]}' if name in units else ''}"
         for name, header in columns.items()
     ]
     lists = {
-        "left out": [f"{counted(found.skipped, 'row')} without a position"]
+        "left out": [f"{format_count(found.skipped, 'row')} without a position"]
         if found.skipped
         else [],
         "counted, as no column has it": [
@@ -336,7 +337,7 @@ def _summary(found: ImportedMeasurements) -> list[str]:
         "not used": found.ignored,
     }
     return [
-        f"{counted(len(table['pose']), 'measurement')} of {targets} at {counted(poses, 'pose')}, {joints}",
+        f"{format_count(len(table['pose']), 'measurement')} of {targets} at {format_count(poses, 'pose')}, {joints}",
         f"file: names of columns {f'in line {options.header}' if options.header else 'as stated'}, "
         f"separator {options.separator}, decimal {options.decimal}, encoding {options.encoding}",
         f"read: {'; '.join(read)}",

@@ -3,14 +3,13 @@ ones, once, at the end."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.counting import counted
-from elastocal.data_checks.faults import compliance_warnings, faults
-from elastocal.data_checks.protocol import Fault
+from elastocal.counting import format_count
+from elastocal.data_checks.faults import faults
 from elastocal.diagnosis import model_averaging, refit, verdict
 from elastocal.diagnosis.candidate_design import build_candidate_design, refine_shapes
 from elastocal.diagnosis.centre_prior import choose_centre_prior
@@ -24,18 +23,22 @@ from elastocal.diagnosis.gross_errors import (
     OutlierTest,
     describe_gross_errors,
     find_gross_errors,
-    format_gross_error_warnings,
 )
 from elastocal.diagnosis.search import run_alarm_test, screen_terms, search_models
+from elastocal.diagnosis.training_verdict import TrainingResult, state_training_verdict
 from elastocal.diagnosis.verdict import Evidence
-from elastocal.effects.catalogue import effects
-from elastocal.fitting.least_squares import ON_THE_WAY, SETTLED, fit
-from elastocal.fitting.model import Case, joint_compliances, parameter_values
-from elastocal.fitting.noise import effective_parameters, noise_facts
+from elastocal.effects.catalogue import list_effects
+from elastocal.fitting.least_squares import (
+    CONVERGENCE_TOLERANCE,
+    INTERMEDIATE_TOLERANCE,
+    fit_model,
+)
+from elastocal.fitting.model import Case, get_parameter_values
+from elastocal.fitting.noise import count_effective_parameters, serialize_noise
 from elastocal.fitting.observations import Observations
-from elastocal.random_streams import stream
+from elastocal.random_streams import open_stream
 from elastocal.remainder.repeatable import Repeatable, repeatable_part
-from elastocal.validation.held_out import left_out_squares
+from elastocal.validation.held_out import predict_left_out_squares
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -43,7 +46,6 @@ if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Measurements
     from elastocal.diagnosis.settings import Settings
     from elastocal.fitting.least_squares import Fit
-    from elastocal.fitting.noise import Noise
 
 # Mechanisms that are added one at a time, each by a fit; of more, only the first.
 _MOST_STEPS = 4
@@ -115,7 +117,7 @@ def diagnose(
         part = choose_centre_prior(part, settings)
         case = replace(case, model=part.case.model)
     tell(
-        f"declared model fitted to {counted(len(part.case.observations), 'measurement')}"
+        f"declared model fitted to {format_count(len(part.case.observations), 'measurement')}"
     )
     found: Evidence | None = None
     about = part.declared
@@ -138,7 +140,9 @@ def diagnose(
         # The model found looks at all rows once more, without these, before another
         # search is made.
         some = sample_for_search(case, case.select(remaining), settings)
-        about = fit(about.model, some, about.noise, about.estimate, True, ON_THE_WAY)
+        about = fit_model(
+            about.model, some, about.noise, about.estimate, True, INTERMEDIATE_TOLERANCE
+        )
         errors = find_gross_errors(about, part.noise, measurements, remaining, settings)
         good |= ~remaining & ~errors.gross
         last = part
@@ -146,22 +150,22 @@ def diagnose(
         if part is last:
             break
         tell(
-            f"{counted((~part.kept).sum(), 'gross error')} in {counted(len(good), 'row')}: once more without"
+            f"{format_count((~part.kept).sum(), 'gross error')} in {format_count(len(good), 'row')}: once more without"
         )
-        if noise_facts(part.noise) == noise_facts(last.noise):
+        if serialize_noise(part.noise) == serialize_noise(last.noise):
             again = about
             if (part.kept != remaining).any():
-                again = fit(
+                again = fit_model(
                     about.model,
                     part.search_sample,
                     about.noise,
                     about.estimate,
                     True,
-                    ON_THE_WAY,
+                    INTERMEDIATE_TOLERANCE,
                 )
             moved = np.subtract(
                 *(
-                    parameter_values(each.model, each.estimate)
+                    get_parameter_values(each.model, each.estimate)
                     for each in (again, found.fitted)
                 )
             )
@@ -184,8 +188,11 @@ def diagnose(
     case = part.case
     noise = part.noise
     declared = part.fit_to_all(part.declared)
-    bare = fit(
-        replace(case.model, effects=()), case.observations, noise, settled=ON_THE_WAY
+    bare = fit_model(
+        replace(case.model, effects=()),
+        case.observations,
+        noise,
+        tolerance=INTERMEDIATE_TOLERANCE,
     )
     steps = [
         Step("frames and targets", "frames", bare),
@@ -219,12 +226,12 @@ def diagnose(
                 declared.noise,
             )
             alone = (
-                fit(
+                fit_model(
                     declared.model,
                     case.observations,
                     left,
                     declared.estimate,
-                    reweighted=True,
+                    reweight_first_step=True,
                 )
                 if named
                 else final
@@ -240,7 +247,7 @@ def diagnose(
         if found.adopted:
             steps += _effect_steps(part, final, found)
         elif lost and lost[0]:
-            kept = fit(
+            kept = fit_model(
                 bare.model, case.observations, steps[-1].fitted.noise, bare.estimate
             )
             steps.append(Step("frames and targets, kept", "kept", kept))
@@ -266,14 +273,21 @@ def diagnose(
                 kept.noise, found.linearized.pose_std_error_rad
             )
         )
-    left_out = describe_gross_errors(errors, whole, held_out=False)
-    document = _document(case, noise, steps, final, found, known, settings, warnings)
-    document |= {
-        "contradictions": contradicting,
-        "gross_errors": left_out,
-        "repeatable": repeatable and asdict(repeatable),
-    }
-    document["warnings"] += format_gross_error_warnings(left_out)
+    document = state_training_verdict(
+        TrainingResult(
+            case=case,
+            noise=noise,
+            steps=tuple(steps),
+            full_model=final,
+            evidence=found,
+            faults=known,
+            warnings=tuple(warnings),
+            contradictions=tuple(contradicting),
+            repeatable=repeatable,
+            gross_errors=tuple(describe_gross_errors(errors, whole, held_out=False)),
+        ),
+        settings,
+    )
     return Diagnosis(
         case, tuple(steps), found, document, whole.measurements.select(errors.gross)
     )
@@ -292,11 +306,11 @@ def _losses(
     for fitted, name in zip(
         models, ("declared model", "model with the effects found"), strict=False
     ):
-        effective = effective_parameters(fitted)
+        effective = count_effective_parameters(fitted)
         words = ""
         if fitted.residual.size < settings.numbers_a_parameter * effective:
             mine, others = (
-                left_out_squares(each, observations) for each in (fitted, bare)
+                predict_left_out_squares(each, observations) for each in (fitted, bare)
             )
             off = mine - others
             if off.mean() > off.std(ddof=1) / np.sqrt(len(off)):
@@ -334,10 +348,19 @@ def _explained(
     about, before = start or (declared, None)
     tested: tuple[Fit, Repeatable | None] | None = None
     # The fit to all measurements starts where that to some ends.
-    enough = SETTLED if searched is part.case.observations else ON_THE_WAY
+    enough = (
+        CONVERGENCE_TOLERANCE
+        if searched is part.case.observations
+        else INTERMEDIATE_TOLERANCE
+    )
     if start:
-        about = fit(
-            about.model, searched, about.noise, about.estimate, True, ON_THE_WAY
+        about = fit_model(
+            about.model,
+            searched,
+            about.noise,
+            about.estimate,
+            True,
+            INTERMEDIATE_TOLERANCE,
         )
     for round_number in range(1 if start else 0, settings.linearizations):
         problem = build_candidate_design(
@@ -345,7 +368,9 @@ def _explained(
         )
         near = about if before else None
         nothing, alone = screen_terms(problem.problem)
-        draws = stream(seed, part.case.campaign.name, "null distribution", round_number)
+        draws = open_stream(
+            seed, part.case.campaign.name, "null distribution", round_number
+        )
         alarm = run_alarm_test(
             problem.problem, problem.products, nothing.pose_error_rad, draws
         )
@@ -366,7 +391,7 @@ def _explained(
         # No verdict yet, and no probability: a later search, or the poses left out, may
         # say otherwise.
         words = [
-            getattr(effects().get(name), "words", "an unknown mechanism")
+            getattr(list_effects().get(name), "words", "an unknown mechanism")
             for name in conclusion.best.mechanisms
         ]
         leading = " with ".join(words) or "nothing is missing"
@@ -382,7 +407,7 @@ def _explained(
             noise,
             refit.select_effects(problem, model),
             near,
-            settled=enough,
+            tolerance=enough,
         )
         off = noise.position_m > settings.relinearize_noise * taken.position_m
         small = not named or alarm.statistic < settings.relinearize_above
@@ -413,7 +438,9 @@ def _explained(
             most_pose_error_rad = settings.pose_repeatability_rad
             if large:
                 noise = refit.limit_pose_error(about, searched, most_pose_error_rad)
-                about = fit(about.model, searched, noise, about.estimate, True, enough)
+                about = fit_model(
+                    about.model, searched, noise, about.estimate, True, enough
+                )
         before = named
         if round_number + 1 < settings.linearizations:
             # The next problem takes the room of this one.
@@ -429,7 +456,7 @@ def _effect_steps(part: FittedSubset, final: Fit, found: Evidence) -> list[Step]
     """
     model = found.posterior.models[found.conclusion.best.model]
     chosen = [
-        (effect, final.values_of(effect.key)[1])
+        (effect, final.effect_values(effect.key)[1])
         for effect, _ in refit.select_effects(found.linearized, model)
     ]
     explained = model_averaging.compute_explained_squares(
@@ -454,148 +481,7 @@ def _effect_steps(part: FittedSubset, final: Fit, found: Evidence) -> list[Step]
             final.noise,
             some,
             steps[0].fitted,
-            settled=ON_THE_WAY,
+            tolerance=INTERMEDIATE_TOLERANCE,
         )
         steps.insert(0, Step(f"with {alone[number - 1]}", "effect", fitted))
     return steps
-
-
-def _document(
-    case: Case,
-    noise: Noise,
-    steps: Sequence[Step],
-    with_effects: Fit,
-    found: Evidence | None,
-    known: Sequence[Fault],
-    settings: Settings,
-    warnings: Sequence[str],
-) -> dict[str, Any]:
-    declared = steps[1].fitted
-    final = steps[-1].fitted
-    springs = model_averaging.ModelAverage({}, {})
-    tested = set[str]()
-    stated: dict[str, Any] = {
-        "verdict": verdict.NAMED if len(known) == 1 else verdict.SEVERAL,
-        "effects": [verdict.fault_entry(fault) for fault in known],
-    } | dict.fromkeys(("probabilities", "misfit", "other_models_m"))
-    untestable: dict[str, str] = {}
-    remarks = [*warnings]
-    if found:
-        problem = found.linearized.problem
-        conclusion = found.conclusion
-        models = found.posterior.models
-        nothing = found.posterior.empty_model
-        best = models[conclusion.best.model] if conclusion.best.mechanisms else nothing
-        chosen = best if conclusion.best.named else nothing
-        kept = chosen if found.adopted else nothing
-        owners = [(owner, parameter.name) for owner, parameter in declared.parameters]
-        averages = model_averaging.average_models(
-            found.linearized, found.posterior, chosen, owners
-        )
-        springs = (
-            averages
-            if kept is chosen
-            else model_averaging.average_models(
-                found.linearized, found.posterior, nothing, owners
-            )
-        )
-        entries = verdict.effect_entries(
-            found, with_effects, averages, case.observations
-        )
-        untestable = found.linearized.untestable
-        other = model_averaging.compute_between_model_squares(
-            problem, found.posterior, kept
-        )
-        tested = {unit.candidate.key for unit in problem.terms if unit.candidate}
-        stated = {
-            "verdict": conclusion.verdict,
-            "effects": entries,
-            "probabilities": verdict.probability_facts(found),
-            "misfit": {
-                "before": refit.predict_reduced_chi_square(problem, nothing),
-                "after": refit.predict_reduced_chi_square(problem, best),
-            },
-            # Root mean square by which positions may be elsewhere by other models than
-            # the one that is kept.
-            "other_models_m": float(
-                np.sqrt(3.0 * other / found.linearized.products.degrees_of_freedom)
-            )
-            * noise.position_m,
-        }
-        if entries and not found.adopted:
-            remarks.append(
-                "what was found is too uncertain to make predictions better: the model stays as declared"
-            )
-        remarks += verdict.implausible(with_effects, entries)
-        if not found.settled:
-            words = f"the problem was linearised {settings.linearizations} times, and each time another model was found"
-            remarks.append(f"{words}: more may be missing")
-    remarks += compliance_warnings(final) + verdict.scatter_warnings(
-        final.noise, noise, settings.relinearize_noise
-    )
-    for name, fitted in (("declared", declared), ("final", final)):
-        if not fitted.converged:
-            remarks.append(
-                f"the fit of the {name} model did not converge: its parameters are not to be relied on"
-            )
-    return stated | {
-        "campaign": case.campaign.name,
-        "noise": noise_facts(noise)
-        | {
-            "pose_rad": final.noise.pose_rad,
-            "factor": final.noise.position_m / noise.position_m,
-        },
-        "heldout": None,
-        "kept": steps[-1].kind.replace("kept", "frames"),
-        "compliance_urad_per_Nm": _compliances(
-            declared, final, springs, settings.prior_share
-        ),
-        "held": sorted(
-            {
-                f"{o} {p.name}"
-                for (o, p), held in zip(final.parameters, final.held, strict=True)
-                if held
-            }
-        ),
-        "candidates_tested": len(tested),
-        "untestable": untestable,
-        "converged": {"declared": declared.converged, "final": final.converged},
-        "warnings": list(dict.fromkeys(remarks)),
-        "settings": settings.document(),
-    }
-
-
-def _compliances(
-    declared: Fit, final: Fit, springs: model_averaging.ModelAverage, prior_share: float
-) -> dict[str, list[float]]:
-    joints = final.model.sites.joints
-    after = joint_compliances(final.model, final.estimate).copy()
-    deviations = np.zeros(joints)
-    identified = np.zeros(joints, bool)
-    if final.model.identifies_compliance:
-        mine = final.places_of("joint_compliance")
-        names = [
-            ("joint_compliance", final.parameters[index][1].name) for index in mine
-        ]
-        alone = np.sqrt(np.diag(final.covariance))[mine]
-        after += [springs.shift.get(name, 0.0) for name in names]
-        deviations = np.array(
-            [
-                springs.std_error.get(name, error)
-                for name, error in zip(names, alone, strict=True)
-            ]
-        )
-        # With a prior of the size that such a spring reaches, of which that share would
-        # be left.
-        plausible = np.array([final.parameters[index][1].plausible for index in mine])
-        identified = ~final.held[mine] & (
-            deviations**2 < prior_share * (deviations**2 + plausible**2)
-        )
-    found = {
-        "before": joint_compliances(declared.model, declared.estimate),
-        "after": after,
-        "std_error": deviations,
-    }
-    return {name: (1e6 * values).tolist() for name, values in found.items()} | {
-        "identifiable": identified.tolist()
-    }

@@ -25,21 +25,21 @@ from elastocal.application.accuracy import (
 )
 from elastocal.application.calibrated import compute_effect_contributions
 from elastocal.application.frames import root_mean_square
-from elastocal.campaigns.reading import campaign_files, read_descriptions
+from elastocal.campaigns.campaign_folder import CampaignFolder, read_campaign_folder
 from elastocal.diagnosis.misplaced import describe_reference_point
 from elastocal.errors import InputError
-from elastocal.fitting.noise import noise_from
+from elastocal.fitting.noise import parse_noise
 from elastocal.io.json_files import read_json
 from elastocal.io.origin import configuration_sha256
-from elastocal.io.records import check_sources, checksum, jobs_behind
+from elastocal.io.records import check_sources, trace_jobs
 from elastocal.loop.diagnosis_tables import load_case, rows_left_out, step_model
 from elastocal.remainder.corrected import predictor_of
 from elastocal.validation.conformity import (
     PASS,
     UNDECIDED,
-    joint_ranges,
-    predicted_conformity,
-    shortfalls,
+    decide_conformity,
+    find_joint_ranges,
+    list_shortfalls,
 )
 
 if TYPE_CHECKING:
@@ -53,17 +53,22 @@ if TYPE_CHECKING:
 class Diagnosed:
     """A campaign and what its diagnosis found.
 
-    `name`: of the campaign. `case`: of the training poses, without their gross errors.
+    `folder`: of the campaign. `case`: of the training poses, without their gross errors.
     `facts`, `verdict`: contents of diagnosis.json and verdict.json. `origin`:
     ``commit`` of the jobs that made them, ``code_sha256`` and ``data_sha256`` of all
     that they read of the program and of the campaign, ``environment``.
     """
 
-    name: str
+    folder: CampaignFolder
     case: Case
     facts: dict[str, Any]
     verdict: dict[str, Any]
     origin: dict[str, Any]
+
+    @property
+    def name(self) -> str:
+        """Name of the campaign."""
+        return self.folder.name
 
     @cached_property
     def calibrated(self) -> CalibratedRobot:
@@ -85,7 +90,7 @@ class Diagnosed:
             model,
             estimate,
             np.array(self.facts["covariance"]),
-            noise_from(step),
+            parse_noise(step),
             more,
         )
         contradicted = bool(accuracy and accuracy["contradicted"])
@@ -113,11 +118,12 @@ def load_diagnosed(
     """A campaign that was diagnosed, of which nothing has changed since, in the folder
     that holds results/ and reports/.
 
-    An InputError refuses what is not as `jobs_behind` asks of all jobs behind its
+    An InputError refuses what is not as `trace_jobs` asks of all jobs behind its
     report or `check_sources` of those behind its verdict, and other files of the
     campaign than were read.
     """
-    name = read_descriptions(folder, robots_folder)[0]["campaign"]
+    campaign_folder = read_campaign_folder(folder, robots_folder)
+    name = campaign_folder.name
     results = f"results/loop/{name}"
     reports = f"reports/loop/{name}"
     tables = Path(top, results)
@@ -126,8 +132,8 @@ def load_diagnosed(
     if not verdict.exists() and not (tables / "diagnosis.json").exists():
         raise InputError(folder, "", f"no diagnosis of it in {tables}", fresh)
     # The report has all other files behind it.
-    jobs_behind([f"{reports}/report.html"], top)
-    jobs = jobs_behind([f"{reports}/verdict.json"], top)
+    trace_jobs([f"{reports}/report.html"], top)
+    jobs = trace_jobs([f"{reports}/verdict.json"], top)
     check_sources(jobs, top, f"results of this version: {fresh}")
     reader = next(job for job in jobs if f"{results}/campaign.json" in job.outputs)
     # The user's files may have moved since.
@@ -136,8 +142,7 @@ def load_diagnosed(
         for file in reader.own or reader.made_inputs
     }
     now = {
-        (Path(file).name, checksum(file))
-        for file in campaign_files(folder, robots_folder)
+        (Path(file).name, digest) for file, digest in campaign_folder.digests.items()
     }
     if (
         not data
@@ -168,7 +173,7 @@ def load_diagnosed(
         },
     }
     return Diagnosed(
-        name,
+        campaign_folder,
         case.select(~rows_left_out(case, facts)),
         facts,
         read_json(verdict),
@@ -181,19 +186,14 @@ def _listed(values: Iterable[str]) -> str:
 
 
 def certificate(
-    folder: str | Path,
-    robots_folder: str | Path,
-    found: Diagnosed,
-    tolerance_m: float,
-    accepted_risk: float,
+    found: Diagnosed, tolerance_m: float, accepted_risk: float
 ) -> dict[str, Any]:
     """Contents of a certificate: all of the corrected robot is predicted, at the poses
     and loads of the campaign.
 
-    `folder`, `robots_folder`: as in `reading.read_campaign`. `found`: the campaign.
-    Returns JSON-serialisable.
+    `found`: the campaign. Returns JSON-serialisable.
     """
-    document = read_descriptions(folder, robots_folder)[0]
+    document = found.folder.document
     calibrated, verdict, heldout = (
         found.calibrated,
         found.verdict,
@@ -205,8 +205,8 @@ def certificate(
     prediction = predict_errors(calibrated, *poses)
     accuracy = prediction.accuracy(REGION)
     worst = int(np.argmax(prediction.error_m))
-    decision = predicted_conformity(prediction.rms_m, tolerance_m, accepted_risk)
-    missing = shortfalls(heldout["configurations"], states, robot)
+    decision = decide_conformity(prediction.rms_m, tolerance_m, accepted_risk)
+    missing = list_shortfalls(heldout["configurations"], states, robot)
     if not accuracy.fitted:
         missing = [
             "nothing fitted: no error of 0 is predicted of a robot of which nothing was fitted",
@@ -230,8 +230,7 @@ def certificate(
         "version": __version__,
         "origin": found.origin,
         "files": {
-            Path(file).name: checksum(file)
-            for file in campaign_files(folder, robots_folder)
+            Path(file).name: digest for file, digest in found.folder.digests.items()
         },
         "verdict": verdict["verdict"],
         "repeatable": verdict["repeatable"],
@@ -249,7 +248,7 @@ def certificate(
         "worst_pose": {"joints": joints, "error_m": float(prediction.error_m[worst])},
         "conformity": asdict(decision)
         | {"configurations": heldout["configurations"], "shortfalls": missing},
-        "joint_ranges": joint_ranges(states, robot),
+        "joint_ranges": find_joint_ranges(states, robot),
         "budget": [
             {"name": name, "rms_m": rms}
             for name, rms in error_budget(calibrated, *poses).items()

@@ -1,0 +1,85 @@
+"""A campaign's folder is read once, whatever is asked of it afterwards."""
+
+import hashlib
+import shutil
+from pathlib import Path
+
+import pytest
+import yaml
+
+from elastocal.campaigns import campaign_folder
+from elastocal.campaigns.reading import read_campaign, read_held_out_campaign
+
+
+@pytest.fixture
+def read_files(monkeypatch):
+    """Documents that were read, in their order."""
+    files = []
+    read_document = campaign_folder.read_document
+
+    def read_and_note(path):
+        files.append(Path(path).as_posix())
+        return read_document(path)
+
+    monkeypatch.setattr(campaign_folder, "read_document", read_and_note)
+    return files
+
+
+@pytest.fixture
+def validated_cell(cell, tmp_path):
+    """A cell that a copy of it validates."""
+    cell.write()
+    shutil.copytree(cell.folder, tmp_path / "other")
+    cell.document["holdout"] = {"campaign": "../other"}
+    cell.write()
+    return cell
+
+
+def test_every_document_is_read_once(validated_cell, read_files):
+    folder = validated_cell.open()
+    for _ in range(2):
+        read_campaign(folder)
+        read_held_out_campaign(folder)
+        assert folder.files() == [*folder.digests]
+    other = f"{validated_cell.folder}/../other"
+    assert sorted(read_files) == sorted(
+        f"{path}/{name}"
+        for path in (validated_cell.folder, other)
+        for name in ("campaign.yaml", "arm.yaml")
+    )
+
+
+def test_the_files_of_a_campaign_are_found_without_its_robot_being_read(
+    validated_cell, read_files
+):
+    folder = validated_cell.open()
+    names = [Path(file).name for file in folder.files()]
+    assert names == ["campaign.yaml", "measurements.csv", "arm.yaml"] * 2
+    assert {Path(file).name for file in read_files} == {"campaign.yaml"}
+
+
+def test_digests_are_those_of_the_files(cell):
+    cell.write()
+    folder = cell.open()
+    expected = {
+        file: hashlib.sha256(Path(file).read_bytes()).hexdigest()
+        for file in folder.files()
+    }
+    assert folder.digests == expected
+
+
+def test_a_campaign_that_holds_out_its_own_poses_has_no_other_folder(cell):
+    cell.write()
+    folder = cell.open()
+    assert folder.held_out_path is None
+    assert folder.held_out_folder is None
+    assert read_held_out_campaign(folder) is None
+
+
+def test_a_campaign_knows_its_documents(cell):
+    cell.write()
+    folder = cell.open()
+    assert folder.name == cell.document["campaign"]
+    assert folder.source == cell.source
+    robot_text = (cell.folder / "arm.yaml").read_text(encoding="utf-8")
+    assert folder.robot_document == yaml.safe_load(robot_text)
