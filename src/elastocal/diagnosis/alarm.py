@@ -183,9 +183,7 @@ class _AverageBayesFactor:
             + np.array(log_weights)
         )
         log_prior += self.log_priors[numbers, None]
-        likelihood = log_likelihood(
-            squares, self.problem.statistics.degrees_of_freedom
-        )
+        likelihood = log_likelihood(squares, self.problem.statistics.degrees_of_freedom)
         return likelihood + log_prior[..., None]
 
 

@@ -22,10 +22,10 @@ from elastocal.diagnosis.statistics import (
     compute_statistics,
 )
 from elastocal.errors import InputError
-from elastocal.fitting.linearization import Factored, linearize
-from elastocal.fitting.model import nonlinear_parameters, parameter_values
-from elastocal.fitting.normal_equations import whitening
-from elastocal.fitting.observations import Observations, spread_poses
+from elastocal.fitting.linearization import FactoredSensitivities, linearize
+from elastocal.fitting.model import find_nonlinear_parameters, get_parameter_values
+from elastocal.fitting.normal_equations import compute_whitening
+from elastocal.fitting.observations import Observations, select_spread_poses
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -94,8 +94,8 @@ class WhitenedFit:
         them (shapes)."""
         model = self.fitted.model
         estimate = self.fitted.estimate
-        is_nonlinear = nonlinear_parameters(model, estimate)
-        return np.where(is_nonlinear, 0.0, parameter_values(model, estimate))
+        is_nonlinear = find_nonlinear_parameters(model, estimate)
+        return np.where(is_nonlinear, 0.0, get_parameter_values(model, estimate))
 
     @property
     def rows(self) -> WhitenedRows:
@@ -119,8 +119,8 @@ class WhitenedFit:
             fitted.model, fitted.estimate, observations, self.conditions
         )
         root_weights = np.sqrt(fitted.weights)
-        whitener = whitening(
-            observations, linearization.joint_jacobian, fitted.noise.of_measurements
+        whitener = compute_whitening(
+            observations, linearization.joint_jacobian, fitted.noise.without_pose_error
         )
 
         def whiten(values: np.ndarray) -> np.ndarray:
@@ -129,17 +129,17 @@ class WhitenedFit:
 
         columns = linearization.columns
         contribution = (
-            columns.of_columns(self.is_candidate).dense()
+            columns.select_columns(self.is_candidate).dense()
             @ self.linear_values[self.is_candidate]
         )
-        no_candidates = Factored.of(
+        no_candidates = FactoredSensitivities.of(
             [],
             whiten(linearization.coordinate_jacobian),
             observations.state,
             len(observations.states),
         )
         rows = WhitenedRows(
-            whiten(columns.of_columns(~self.is_candidate).dense()),
+            whiten(columns.select_columns(~self.is_candidate).dense()),
             no_candidates,
             whiten(linearization.residual + contribution),
             whiten(linearization.joint_jacobian),
@@ -234,7 +234,7 @@ class CandidateDesign:
         for discrepancy in self.discrepancies:
             displacements += discrepancy.displacement(conditions)
         rows = self.whitened.rows
-        candidates = Factored.of(
+        candidates = FactoredSensitivities.of(
             displacements,
             rows.candidates.jacobian,
             rows.candidates.state,
@@ -298,7 +298,7 @@ class CandidateDesign:
         if products.rows.residual.size <= _MANY_ROWS:
             return sizes
         observations = self.whitened.observations
-        chosen = spread_poses(observations, _SAMPLE_ROWS // observations.rows)
+        chosen = select_spread_poses(observations, _SAMPLE_ROWS // observations.rows)
         sample = compute_cross_products(
             products.rows.at(chosen[observations.state]), *self.priors
         )
@@ -313,9 +313,7 @@ class CandidateDesign:
     @property
     def untestable(self) -> dict[str, str]:
         """Why a candidate is not tested, by key."""
-        tested = {
-            term.candidate.key for term in self.problem.terms if term.candidate
-        }
+        tested = {term.candidate.key for term in self.problem.terms if term.candidate}
         too_small = sorted(set(self.tried) - tested)
         reason = "too small to be seen at any size that such an effect has"
         return self.untestable_by_data | dict.fromkeys(too_small, reason)
@@ -338,8 +336,8 @@ def build_candidate_design(
     settings : settings of the diagnosis
     max_pose_error_rad : largest size of the pose error to be considered
     """
-    conditions = fitted.conditions_of(observations.states)
-    available = fitted.model.offered(observations.states)
+    conditions = fitted.get_conditions(observations.states)
+    available = fitted.model.available_inputs(observations.states)
     tried = {}
     untestable = {}
     for candidate in candidates:
@@ -401,7 +399,7 @@ def choose_shape_values(candidate: Candidate, fitted: Fit) -> ShapeValues:
     (shape,) = candidate.shapes
     values = shape.values(_SHAPES_TRIED)
     if candidate.key in {effect.key for effect in fitted.model.effects}:
-        (value,) = fitted.values_of(candidate.key)[1].tolist()
+        (value,) = fitted.effect_values(candidate.key)[1].tolist()
         reach = _CLOSER_STILL * np.diff(values[:2]).sum()
         values = np.array([value])
         if shape.tried > 1:
@@ -428,9 +426,7 @@ def refine_shapes(
     terms = design.problem.terms
     if not len(terms):
         return design
-    log_odds = (
-        log_bayes_factors + design.problem.initial_search.single_term_log_prior
-    )
+    log_odds = log_bayes_factors + design.problem.initial_search.single_term_log_prior
     matters = (log_odds > log_odds.max() - _NEAR_THE_BEST) & (
         log_bayes_factors > _WORTH_A_LOOK
     )
@@ -477,7 +473,7 @@ def explain_untestable(
     Parameters
     ----------
     candidate : the candidate
-    available : names of the data that a candidate may need, as of `Model.offered`
+    available : names of the data that a candidate may need, as of `Model.available_inputs`
     joint_angles : (S, n), at which was measured
     """
     missing = sorted(candidate.needs - available)

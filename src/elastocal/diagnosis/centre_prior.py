@@ -24,7 +24,7 @@ from elastocal.diagnosis.statistics import (
     compute_statistics,
 )
 from elastocal.effects.gravity import DECLARED_WEIGHT
-from elastocal.fitting.least_squares import fit
+from elastocal.fitting.least_squares import fit_model
 
 if TYPE_CHECKING:
     from elastocal.diagnosis.fitted_subset import FittedSubset
@@ -51,12 +51,12 @@ def choose_centre_prior(subset: FittedSubset, settings: Settings) -> FittedSubse
         return subset
     if _is_wide_more_probable(subset, stated_model, settings):
         return subset
-    fitted = fit(
+    fitted = fit_model(
         stated_model,
         subset.search_sample,
         subset.noise,
         subset.declared.estimate,
-        reweighted=True,
+        reweight_first_step=True,
     )
     case = replace(subset.case, model=apply_stated_centre_prior(subset.case.model))
     return replace(subset, case=case, declared=fitted)
@@ -65,9 +65,7 @@ def choose_centre_prior(subset: FittedSubset, settings: Settings) -> FittedSubse
 def _is_wide_more_probable(
     subset: FittedSubset, stated_model: Model, settings: Settings
 ) -> bool:
-    wide = build_candidate_design(
-        subset.declared, subset.search_sample, (), settings
-    )
+    wide = build_candidate_design(subset.declared, subset.search_sample, (), settings)
     stated = replace(
         wide, reference_fit=replace(wide.reference_fit, model=stated_model)
     )

@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.random_streams import stream
+from elastocal.random_streams import open_stream
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -135,7 +135,9 @@ def build_discrepancies(campaign: Conditions, features: int) -> list[Discrepancy
         if not any(of_coordinate.varies.any() for of_coordinate in inputs.values()):
             continue
         joint = kind.location[0] if kind.location else 0
-        draws = stream(_SEED, f"other {kind.name}", "random Fourier features", joint)
+        draws = open_stream(
+            _SEED, f"other {kind.name}", "random Fourier features", joint
+        )
         components = tuple(
             (
                 coordinate,
@@ -161,7 +163,12 @@ def _joint_kinds(campaign: Conditions, features: int) -> list[_Kind]:
                 suffix = UNDER_LOAD if loaded else ""
                 kinds.append(
                     _Kind(
-                        (index + 1,), cause, suffix, JOINT_RAD, [index], {loaded: features}
+                        (index + 1,),
+                        cause,
+                        suffix,
+                        JOINT_RAD,
+                        [index],
+                        {loaded: features},
                     )
                 )
     return kinds
@@ -181,7 +188,10 @@ def _base_kinds(campaign: Conditions) -> list[_Kind]:
     half = _BASE_FEATURES // 2
     unloaded = {False: _BASE_FEATURES}
     kinds = [
-        *(_Kind((), FORCE, *motion, {False: half, True: half}) for motion in (shift, turn)),
+        *(
+            _Kind((), FORCE, *motion, {False: half, True: half})
+            for motion in (shift, turn)
+        ),
         *(_Kind((), TIME, *motion, unloaded) for motion in (shift, turn)),
         *(_Kind((), PLACE, *motion, unloaded) for motion in (*shifts_along_axes, turn)),
     ]
@@ -206,9 +216,7 @@ class _Inputs:
     varies: np.ndarray
 
     @classmethod
-    def standardised(
-        cls, campaign: Conditions, cause: str, coordinate: int
-    ) -> _Inputs:
+    def standardised(cls, campaign: Conditions, cause: str, coordinate: int) -> _Inputs:
         """Inputs that are centred and scaled over the states of a campaign."""
         values = _raw_inputs(campaign, cause, coordinate)
         center = values.mean(axis=0)

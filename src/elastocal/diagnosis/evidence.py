@@ -582,10 +582,15 @@ class ModelDensity:
             signs = self.terms[number].signs
             if signs.any():
                 coefficients = _rotate_back(
-                    terms.eigenvectors[:, index], mean[:, :, index], variance[:, :, index]
+                    terms.eigenvectors[:, index],
+                    mean[:, :, index],
+                    variance[:, :, index],
                 )
                 log_density[1:, :, index] += _log_sign_factor(
-                    *coefficients, signs, squares[1:, :, index], self._degrees_of_freedom
+                    *coefficients,
+                    signs,
+                    squares[1:, :, index],
+                    self._degrees_of_freedom,
                 )
         log_density[1:] += self._log_weights_by_scale[numbers].T[:, None]
         log_density += self._log_weights.sum() - self._log_weights[numbers]

@@ -190,7 +190,9 @@ def _build_candidate_terms(
     `variants`: number of candidates that share the probability of the location.
     """
     parameters = candidate.parameters
-    sizes = np.array([p.plausible * p.order**-settings.harmonic_decay for p in parameters])
+    sizes = np.array(
+        [p.plausible * p.order**-settings.harmonic_decay for p in parameters]
+    )
     signs = np.array([p.sign for p in parameters])
     largest_scale = min((p.most for p in parameters), default=np.inf)
     shares = np.ones(1)

@@ -11,13 +11,14 @@ robot that was made badly everywhere, nothing is misplaced.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.fitting.model import get_parameter_values
-from elastocal.fitting.noise import SIZES
+from elastocal.fitting.noise import PRIOR_SCALES
+from elastocal.verdict import MisplacedFrame
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -52,30 +53,6 @@ _OFFSET = "joint_offset"
 
 
 @dataclass(frozen=True)
-class MisplacedFrame:
-    """A frame that is not where it was declared.
-
-    Attributes
-    ----------
-    place : "tool", "base" or "link 3"
-    alternatives : places whose shift explains the measurements as well
-    shift_m : (3,), in the axes of the base or of the far end of the link
-    sizes : length of the shift in usual sizes
-    sentence : what a report says of it
-    """
-
-    place: str
-    alternatives: list[str]
-    shift_m: list[float]
-    sizes: float
-    sentence: str
-
-    def document(self) -> dict[str, Any]:
-        """Entry of verdict.json."""
-        return asdict(self)
-
-
-@dataclass(frozen=True)
 class _FreeParameters:
     """The N free parameters of a fit.
 
@@ -99,12 +76,14 @@ class _FreeParameters:
     @classmethod
     def of_fit(cls, fitted: Fit, campaign: Campaign) -> _FreeParameters:
         """Sort the free parameters of a fit."""
-        free = np.flatnonzero(~fitted.held)
+        free = np.flatnonzero(~fitted.unidentifiable)
         owners = [fitted.parameters[index][0] for index in free]
         parameters = [fitted.parameters[index][1] for index in free]
         effects = {effect.key: effect.effect for effect in fitted.model.effects}
         kinds = [effects.get(owner) for owner in owners]
-        is_geometry = np.array([kind in (_BASE, _LINK, _OFFSET) for kind in kinds], bool)
+        is_geometry = np.array(
+            [kind in (_BASE, _LINK, _OFFSET) for kind in kinds], bool
+        )
         is_angle = np.array([p.unit == "rad" for p in parameters], bool)
         has_reflector = any(t.offset_m is not None for t in _end_targets(campaign))
         tool = f"{_LINK}@{campaign.robot.joints}" if has_reflector else ""
@@ -176,8 +155,8 @@ class _NormalEquations:
 
         The noise is scaled up if the model does not explain the measurements.
         """
-        free = np.flatnonzero(~fitted.held)
-        residual = fitted.whitened(fitted.residual)
+        free = np.flatnonzero(~fitted.unidentifiable)
+        residual = fitted.whiten(fitted.residual)
         degrees_of_freedom = max(residual.size - len(free), 1)
         misfit = max(1.0, float((residual**2).sum()) / degrees_of_freedom)
         precision = np.linalg.inv(fitted.covariance[np.ix_(free, free)])
@@ -195,7 +174,7 @@ class _NormalEquations:
         geometry of its most probable size."""
         is_geometry = self.parameters.is_geometry
         explanations = []
-        for size in SIZES:
+        for size in PRIOR_SCALES:
             prior_std = size * self.parameters.usual_sizes
             prior_std[list(wrong)] = self.wrong_m
             precision = self.precision + np.diag(
@@ -217,6 +196,10 @@ def find_misplaced_frames(fitted: Fit, campaign: Campaign) -> list[MisplacedFram
     ----------
     fitted : fit of the declared model, with geometry
     campaign : its campaign
+
+    Returns
+    -------
+    Frames; a shift is in the axes of the base, or of the far end of the link
     """
     parameters = _FreeParameters.of_fit(fitted, campaign)
     if not parameters.shifts or parameters.is_plausible or not parameters.is_linear:
@@ -255,7 +238,9 @@ def find_misplaced_frames(fitted: Fit, campaign: Campaign) -> list[MisplacedFram
         sizes = float(np.linalg.norm(shift_m) / usual_m)
         if sizes > _MOST_SIZES:
             frames.append(
-                _describe_frame(place, sorted(as_good - {place}), shift_m, sizes, campaign)
+                _describe_frame(
+                    place, sorted(as_good - {place}), shift_m, sizes, campaign
+                )
             )
     return frames
 
@@ -352,4 +337,6 @@ def _describe_frame(
     if alternatives:
         text += f" (or it is {' or '.join(alternatives)}: these measurements do not distinguish them)"
     sentence = f"{text}. It is {sizes:.0f} times what such a length is usually off"
-    return MisplacedFrame(place, alternatives, shift_m.tolist(), sizes, sentence)
+    return MisplacedFrame(
+        place, tuple(alternatives), tuple(shift_m.tolist()), sizes, sentence
+    )

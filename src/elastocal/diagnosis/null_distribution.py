@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from elastocal.fitting.observations import groups_by_size
+from elastocal.fitting.observations import batch_groups_by_size
 
 if TYPE_CHECKING:
     from elastocal.diagnosis.statistics import CrossProducts, PoseBlock
@@ -90,7 +90,7 @@ def _project_on_axes(block: PoseBlock, white: np.ndarray) -> np.ndarray:
     poses, axes = block.eigenvalues.shape
     count = white.shape[2]
     by_pose = np.empty((poses, axes, count))
-    for members in groups_by_size(block.rows.pose):
+    for members in batch_groups_by_size(block.rows.pose):
         jacobian = block.rows.jacobian[members].reshape(len(members), -1, axes)
         noise = white[members].reshape(len(members), -1, count)
         by_pose[block.rows.pose[members[:, 0]]] = jacobian.transpose(0, 2, 1) @ noise
@@ -125,8 +125,6 @@ def _eliminate_declared(
         factor = np.linalg.cholesky(rows[:, :declared])
         fitted = solve_triangular(factor, corrected[:declared], lower=True)
         cross = solve_triangular(factor, rows[:, declared:], lower=True)
-        np.subtract(
-            corrected[declared:], cross.T @ fitted, out=marginal_score[number]
-        )
+        np.subtract(corrected[declared:], cross.T @ fitted, out=marginal_score[number])
         marginal_squares[number] -= (fitted**2).sum(axis=0)
     return marginal_score, marginal_squares

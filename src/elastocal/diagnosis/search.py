@@ -380,7 +380,7 @@ class BeamSearch:
                     *scales[index:],
                 )
 
-    def _keep_pose_errors(self, kept: np.ndarray) -> None:
+    def _keep_pose_errors(self, kept: np.ndarray | np.bool_) -> None:
         """Continue with some of the sizes of the pose error only, (T,) bool.
 
         Their statistics are copied if they are not consecutive.
@@ -405,14 +405,10 @@ class BeamSearch:
     def evaluate(self, model: TermSet) -> ScoredModel:
         """Evaluate a model in full, and meet it without each of its terms."""
         default_scales = (self.problem.settings.scale_center,) * len(model)
-        evidence = self._evaluate_in_full(
-            model, self.scales.get(model, default_scales)
-        )
+        evidence = self._evaluate_in_full(model, self.scales.get(model, default_scales))
         terms = self.problem.terms
         log_prior = self.problem.prior.compute_log_odds(terms[n] for n in model)
-        log_odds = (
-            evidence.log_evidence - self.empty_evidence.log_evidence + log_prior
-        )
+        log_odds = evidence.log_evidence - self.empty_evidence.log_evidence + log_prior
         best_pose_error = np.argmax(evidence.log_pose_posterior)
         scored = ScoredModel(
             model,

@@ -25,12 +25,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from elastocal.fitting.observations import groups_by_size
+from elastocal.fitting.observations import batch_groups_by_size
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from elastocal.fitting.linearization import Factored
+    from elastocal.fitting.linearization import FactoredSensitivities
 
 # Upper bound on the products of poses with all columns that are in memory at once: 8 MB.
 _AT_ONCE = 1_000_000
@@ -58,7 +58,7 @@ class WhitenedRows:
     """
 
     declared: np.ndarray
-    candidates: Factored
+    candidates: FactoredSensitivities
     residual: np.ndarray
     jacobian: np.ndarray
     pose: np.ndarray
@@ -170,7 +170,7 @@ class CrossProducts:
         return replace(
             self,
             rows=replace(
-                self.rows, candidates=self.rows.candidates.of_columns(no_columns)
+                self.rows, candidates=self.rows.candidates.select_columns(no_columns)
             ),
             gram=self.gram[np.ix_(kept, kept)],
             projections=self.projections[:, -1:],
@@ -221,7 +221,7 @@ class CrossProducts:
         jacobian = np.empty((*rows.jacobian.shape[:2], axes))
         products = np.empty((poses, axes, self.gram.shape[0]))
         eigenvalues = np.empty((poses, axes))
-        for members in groups_by_size(rows.pose):
+        for members in batch_groups_by_size(rows.pose):
             pose = rows.pose[members[:, 0]]
             flat = (len(members), members.shape[1] * rows.jacobian.shape[1], -1)
             by_joint = rows.jacobian[members].reshape(flat)
@@ -234,7 +234,9 @@ class CrossProducts:
             )
             products[pose, :, :declared] = dense[..., :-1]
             products[pose, :, -1] = dense[..., -1]
-        products[..., declared:-1] = rows.candidates.times_by_pose(jacobian, rows.pose)
+        products[..., declared:-1] = rows.candidates.multiply_by_pose(
+            jacobian, rows.pose
+        )
         flat_products = products.reshape(-1, products.shape[2])
         flat_products[:, declared:] -= flat_products[:, :declared] @ self.projections
         products[..., declared:-1][..., self.spanned] = 0.0
