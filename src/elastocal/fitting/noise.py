@@ -102,6 +102,11 @@ class Noise:
         """The same without what the measurements of a pose have in common."""
         return replace(self, pose_rad=0.0)
 
+    @property
+    def has_joint_error(self) -> bool:
+        """Whether errors depend on the Jacobian of the joints."""
+        return bool(self.pose_rad or self.joint_rad.any())
+
     def scaled(self, factor: float) -> Noise:
         """The same with the noise of single measurements multiplied."""
         position = factor * self.position_m
