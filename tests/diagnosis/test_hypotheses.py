@@ -40,7 +40,9 @@ def test_the_number_of_locations_is_geometric_and_all_sets_of_so_many_are_equall
                 odds = prior.compute_log_odds(model)
                 by_places[places] = by_places.get(places, 0.0) + np.exp(odds)
                 smaller = prior.compute_log_odds(model[:-1])
-                assert prior.log_odds_change(model[-1], size - 1) == pytest.approx(odds - smaller)
+                assert prior.log_odds_change(model[-1], size - 1) == pytest.approx(
+                    odds - smaller
+                )
     there = SETTINGS.mechanism_probability / (1 - SETTINGS.mechanism_probability)
     expected = {
         places: there * {1: 4 / 7 / 3, 2: 2 / 7 / 3, 3: 1 / 7}[len(places)]

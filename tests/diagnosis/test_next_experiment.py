@@ -168,7 +168,9 @@ def planned(kuka):
     return campaign, states, observations
 
 
-def test_an_experiment_is_measured_at_every_target_without_its_load_and_under_it(planned):
+def test_an_experiment_is_measured_at_every_target_without_its_load_and_under_it(
+    planned,
+):
     _, states, observations = planned
     np.testing.assert_array_equal(observations.states.wrench, states.wrench)
     np.testing.assert_array_equal(observations.states.joint_angles, states.joint_angles)
