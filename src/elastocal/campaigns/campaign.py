@@ -140,9 +140,8 @@ class Campaign:
 
     def place_of(self, row: int) -> str:
         """Return where a row of the measurements is, by its line if the file is text."""
-        if self.header_line is None:
-            place = f"row {row}"
-        else:
+        place = f"row {row}"
+        if self.header_line is not None:
             place = f"line {row + self.header_line}"
         return f"{place} of {self.table}" if self.table else place
 
