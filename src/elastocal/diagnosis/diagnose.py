@@ -141,7 +141,12 @@ def diagnose(
         # search is made.
         some = sample_for_search(case, case.select(remaining), settings)
         about = fit_model(
-            about.model, some, about.noise, about.estimate, True, INTERMEDIATE_TOLERANCE
+            about.model,
+            some,
+            about.noise,
+            about.estimate,
+            reweight_first_step=True,
+            tolerance=INTERMEDIATE_TOLERANCE,
         )
         errors = find_gross_errors(about, part.noise, measurements, remaining, settings)
         good |= ~remaining & ~errors.gross
@@ -160,8 +165,8 @@ def diagnose(
                     part.search_sample,
                     about.noise,
                     about.estimate,
-                    True,
-                    INTERMEDIATE_TOLERANCE,
+                    reweight_first_step=True,
+                    tolerance=INTERMEDIATE_TOLERANCE,
                 )
             moved = np.subtract(
                 *(
@@ -359,8 +364,8 @@ def _explained(
             searched,
             about.noise,
             about.estimate,
-            True,
-            INTERMEDIATE_TOLERANCE,
+            reweight_first_step=True,
+            tolerance=INTERMEDIATE_TOLERANCE,
         )
     for round_number in range(1 if start else 0, settings.linearizations):
         problem = build_candidate_design(
@@ -439,7 +444,12 @@ def _explained(
             if large:
                 noise = refit.limit_pose_error(about, searched, most_pose_error_rad)
                 about = fit_model(
-                    about.model, searched, noise, about.estimate, True, enough
+                    about.model,
+                    searched,
+                    noise,
+                    about.estimate,
+                    reweight_first_step=True,
+                    tolerance=enough,
                 )
         before = named
         if round_number + 1 < settings.linearizations:
