@@ -11,6 +11,7 @@ import numpy as np
 from elastocal.counting import format_count
 from elastocal.data_checks.faults import faults
 from elastocal.diagnosis import model_averaging, refit, verdict
+from elastocal.diagnosis.alarm import run_alarm_test
 from elastocal.diagnosis.candidate_design import build_candidate_design, refine_shapes
 from elastocal.diagnosis.centre_prior import choose_centre_prior
 from elastocal.diagnosis.fitted_subset import (
@@ -24,7 +25,7 @@ from elastocal.diagnosis.gross_errors import (
     describe_gross_errors,
     find_gross_errors,
 )
-from elastocal.diagnosis.search import run_alarm_test, screen_terms, search_models
+from elastocal.diagnosis.search import screen_terms, search_models
 from elastocal.diagnosis.training_verdict import TrainingResult, state_training_verdict
 from elastocal.diagnosis.verdict import Evidence
 from elastocal.effects.catalogue import list_effects
