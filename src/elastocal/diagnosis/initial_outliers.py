@@ -236,6 +236,7 @@ def _build_pose_jacobian(products: CrossProducts) -> np.ndarray:
     rows = products.rows
     poses = int(rows.pose.max()) + 1
     jacobian = np.zeros((*rows.residual.shape, poses, products.axes))
-    for in_batch, batch, _, _ in products.iterate_poses():
-        jacobian[np.flatnonzero(in_batch), :, rows.pose[in_batch]] = batch.jacobian
+    for block in products.iterate_poses():
+        selected = np.flatnonzero(block.selected)
+        jacobian[selected, :, rows.pose[selected]] = block.rows.jacobian
     return jacobian.reshape(rows.residual.size, -1)
