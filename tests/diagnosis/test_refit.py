@@ -44,7 +44,7 @@ def found(kuka):
 def test_priors_arrive_in_the_fit(found):
     campaign, declared, line, models = found
     best = models.models[0]
-    assert [line.problem.units[number].candidate.key for number in best.units] == [
+    assert [line.problem.terms[number].candidate.key for number in best.term_indices] == [
         "offset@3"
     ]
     chosen = select_effects(line, best)
