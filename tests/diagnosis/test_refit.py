@@ -44,9 +44,9 @@ def found(kuka):
 def test_priors_arrive_in_the_fit(found):
     campaign, declared, line, models = found
     best = models.models[0]
-    assert [line.problem.terms[number].candidate.key for number in best.term_indices] == [
-        "offset@3"
-    ]
+    assert [
+        line.problem.terms[number].candidate.key for number in best.term_indices
+    ] == ["offset@3"]
     chosen = select_effects(line, best)
     (effect, shapes), *others = chosen
     assert not others and shapes.size == 0
