@@ -151,8 +151,10 @@ def diagnosis_from(case: Case, facts: Mapping[str, Any]) -> Diagnosis:
         Step(step["name"], step["kind"], step_fit(case, step))
         for step in facts["steps"]
     )
+    document = facts["document"]
+    settings = Settings.from_document(document["settings"])
     return Diagnosis(
-        case, steps, None, facts["document"], measurements.select(left_out)
+        case, steps, None, document, measurements.select(left_out), settings
     )
 
 
