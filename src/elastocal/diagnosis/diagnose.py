@@ -202,8 +202,8 @@ def diagnose(
         word = found.conclusion.verdict
         found = replace(
             found,
-            conclusion=verdict.with_related(
-                found.conclusion, verdict.oversized(final, named)
+            conclusion=verdict.allow_related_mechanisms(
+                found.conclusion, verdict.find_oversized_effects(final, named)
             ),
         )
         if not found.adopted:
@@ -245,10 +245,10 @@ def diagnose(
         kept, (asked, repeatable) = steps[-1].fitted, found.tested or (None, None)
         if asked is not kept:
             repeatable = repeatable_part(kept, case.observations, seed)
-        unnamed = verdict.remainder_sentences(repeatable)
+        unnamed = verdict.describe_repeatable_residual(repeatable)
         if word in (verdict.ADEQUATE, verdict.NOT_TESTABLE):
             contradicting = unnamed or (
-                verdict.contradictions(final, noise, settings)
+                verdict.find_contradictions(final, noise, settings)
                 if word == verdict.ADEQUATE
                 else []
             )
@@ -260,7 +260,7 @@ def diagnose(
         warnings += (
             []
             if unnamed
-            else verdict.pose_error_warnings(
+            else verdict.warn_of_pose_error(
                 kept.noise, found.linearized.pose_std_error_rad
             )
         )
@@ -361,7 +361,7 @@ def _explained(
         found = search_models(
             problem.problem, {effect.key for effect in about.model.effects}
         )
-        conclusion = verdict.concluded(problem.problem, found, alarm)
+        conclusion = verdict.conclude(problem.problem, found, alarm)
         # Rows of a long campaign make room for the fit, and for those of the next
         # linearisation.
         problem = problem.without_rows
