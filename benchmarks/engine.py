@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from common import ROOT, Row, beside_yardstick, interleaved
 
-from elastocal.campaigns.importers import FOLDER_VARIABLE, importer
+from elastocal.campaigns.importers import FOLDER_VARIABLE, find_importer
 from elastocal.campaigns.writing import write_campaign
 from elastocal.fitting.least_squares import fit, registered
 from elastocal.fitting.model import parameters
@@ -115,7 +115,7 @@ def rows(work: Path, setting: Setting) -> Iterator[Row]:
         how,
     )
     if os.environ.get(FOLDER_VARIABLE):
-        series = importer("ur10_ipa", "config", "the benchmark")
+        series = find_importer("ur10_ipa", "config", "the benchmark")
         source = Path(os.environ[FOLDER_VARIABLE], series.files["ur10_ipa_a"].local)
         header, *lines = source.read_text(encoding="utf-8").splitlines(keepends=True)
         kept = lines[: setting.series_a]

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from analysed_robots import ROBOTS
 
-from elastocal.campaigns.campaign import columns_of
+from elastocal.campaigns.campaign import tabulate_measurements
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import effect_columns, linearize
@@ -67,7 +67,7 @@ def seen(request, tmp_path_factory):
     descriptions, training, _ = load_campaign(
         read_campaign_folder(folder / "blind" / made.name, ROBOTS)
     )
-    case = case_from(descriptions, columns_of(training))
+    case = case_from(descriptions, tabulate_measurements(training))
     declared = fit(case.model, case.observations, estimated_noise(case)[0])
     candidates = [c for c in case.candidates.values() if not c.shapes]
     return directions(declared, case.observations, candidates)

@@ -17,7 +17,7 @@ from synthetic import (
     seen_exactly,
 )
 
-from elastocal.campaigns.campaign import Campaign, Target, columns_of
+from elastocal.campaigns.campaign import Campaign, Target, tabulate_measurements
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.model import (
     case_from,
@@ -63,7 +63,8 @@ def described(campaign, config_folder, **changes):
 
 def case_of(campaign, config_folder, **changes):
     return case_from(
-        described(campaign, config_folder, **changes), columns_of(campaign.measurements)
+        described(campaign, config_folder, **changes),
+        tabulate_measurements(campaign.measurements),
     )
 
 
@@ -75,14 +76,14 @@ def test_a_model_of_rigid_joints_knows_that_no_compliances_are_known(
     described_["robot"]["masses"] = [
         {"link": 2, "mass_kg": 10, "centre_m": [0.3, 0, 0], "relative_std": 0.2}
     ]
-    case = case_from(described_, columns_of(campaign.measurements))
+    case = case_from(described_, tabulate_measurements(campaign.measurements))
     assert (
         not case.model.compliance_known
         and not case.model.nominal_compliance.any()
         and not case.model.sites.masses
     )
     described_["campaign"]["compliance"] = "identify"
-    case = case_from(described_, columns_of(campaign.measurements))
+    case = case_from(described_, tabulate_measurements(campaign.measurements))
     assert (
         not case.model.compliance_known
         and (case.model.nominal_compliance > 0).all()

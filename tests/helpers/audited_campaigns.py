@@ -4,7 +4,7 @@ it finds in these."""
 from analysed_robots import ROBOTS
 from made_audits import CONFIGURATION
 
-from elastocal.campaigns.campaign import columns_of
+from elastocal.campaigns.campaign import tabulate_measurements
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import generate_residual_blocks
@@ -55,11 +55,13 @@ def diagnosed_campaign(top, robot, effects=(), **design):
         write_table(
             results / f"{name}.parquet",
             schemas.measurements(arm.joints),
-            [columns_of(part)],
+            [tabulate_measurements(part)],
             {},
         )
     write_json(results / "campaign.json", descriptions)
-    case, unseen = (case_from(descriptions, columns_of(part)) for part in parts)
+    case, unseen = (
+        case_from(descriptions, tabulate_measurements(part)) for part in parts
+    )
     found = diagnose(case, Settings(), 1)
     write_json(
         results / "diagnosis.json",

@@ -10,7 +10,7 @@ from made_folders import made_folder
 from support import chain_of, changed
 from synthetic import NOISE, made_estimate, made_model
 
-from elastocal.campaigns.campaign import Target, columns_of
+from elastocal.campaigns.campaign import Target, tabulate_measurements
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.diagnosis.diagnose import Step
 from elastocal.effects.catalogue import candidates_on
@@ -56,7 +56,7 @@ def test_a_case_is_the_folder_and_a_test_may_be_of_another_campaign(
         files[0],
         descriptions | {"held_out": changed(other, ("campaign", "campaign"), "other")},
     )
-    write_table(files[1], measurements(6), [columns_of(training)], {})
+    write_table(files[1], measurements(6), [tabulate_measurements(training)], {})
     case = tables.load_case(*files)
     for name in ("pose", "load", "joint_angles", "wrench", "position"):
         np.testing.assert_array_equal(

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.constants import g, pound_force
 
-from elastocal.campaigns.campaign import groups_of
+from elastocal.campaigns.campaign import group_equal_rows
 from elastocal.data_checks.hypotheses import other_interpretations
 from elastocal.data_checks.placement import (
     IMPLAUSIBLE_M,
@@ -221,7 +221,7 @@ def deflections(campaign: Campaign) -> tuple[np.ndarray, np.ndarray] | None:
     expected = [
         regressor(jacobian, each) @ campaign.robot.compliance for each in torques
     ]
-    group = groups_of(
+    group = group_equal_rows(
         np.column_stack([state_clusters(measurements), measurements.target])
     )[1]
     rows = np.stack([whole.measured[0] - whole.predicted, *expected], axis=-1)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import chdtri
 
-from elastocal.campaigns.campaign import groups_of
+from elastocal.campaigns.campaign import group_equal_rows
 from elastocal.fitting.least_squares import nominal_poses, registered_to
 from elastocal.fitting.model import declared_model, measured_in_base
 from elastocal.fitting.observations import select_states, single_observations
@@ -174,5 +174,7 @@ def _trimmed_rms(distance: np.ndarray) -> float:
 
 def of_each_target(measurements: Measurements) -> list[np.ndarray]:
     """Indices of the measurements of each target in each session."""
-    number = groups_of(np.column_stack([measurements.session, measurements.target]))[1]
+    number = group_equal_rows(
+        np.column_stack([measurements.session, measurements.target])
+    )[1]
     return [np.flatnonzero(number == group) for group in range(number.max() + 1)]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.counting import counted
+from elastocal.counting import format_count
 from elastocal.data_checks.faults import faults
 from elastocal.diagnosis import model_averaging, refit, verdict
 from elastocal.diagnosis.candidate_design import build_candidate_design, refine_shapes
@@ -25,18 +25,22 @@ from elastocal.diagnosis.gross_errors import (
     find_gross_errors,
 )
 from elastocal.diagnosis.search import run_alarm_test, screen_terms, search_models
+from elastocal.diagnosis.effect_estimates import find_oversized_effects
 from elastocal.diagnosis.training_verdict import TrainingResult, state_training_verdict
 from elastocal.diagnosis.verdict import Evidence
-from elastocal.effects.catalogue import effects
+from elastocal.effects.catalogue import list_effects
 from elastocal.fitting.least_squares import ON_THE_WAY, SETTLED, fit
 from elastocal.fitting.model import Case, parameter_values
 from elastocal.fitting.noise import effective_parameters, noise_facts
 from elastocal.fitting.observations import Observations
-from elastocal.random_streams import stream
-from elastocal.remainder.repeatable import Repeatable, repeatable_part
+from elastocal.random_streams import open_stream
+from elastocal.remainder.repeatable import repeatable_part
 from elastocal.validation.held_out import left_out_squares
+from functools import cached_property
+from elastocal.io.typed_json import to_document
 
 if TYPE_CHECKING:
+    from elastocal.verdict import RepeatableResidual, TrainingVerdict
     from collections.abc import Callable, Sequence
 
     from elastocal.campaigns.campaign import Measurements
@@ -68,15 +72,21 @@ class Step:
 class Diagnosis:
     """What training poses say of a campaign.
 
-    `steps`: the last is the final model. `document`: contents of verdict.json, but for
-    what held-out poses say. `left_out`: gross errors, which are no part of the case.
+    `steps`: the last is the final model. `verdict`: the part of the verdict that the
+    training poses decide. `left_out`: gross errors, which are no part of the case.
     """
 
     case: Case
     steps: tuple[Step, ...]
     evidence: Evidence | None
-    document: dict[str, Any] = field(repr=False)
+    verdict: TrainingVerdict = field(repr=False)
     left_out: Measurements
+
+    @cached_property
+    def document(self) -> dict[str, Any]:
+        """The verdict as a JSON document."""
+        document: dict[str, Any] = to_document(self.verdict)
+        return document
 
     @property
     def declared(self) -> Fit:
@@ -113,7 +123,7 @@ def diagnose(
         part = choose_centre_prior(part, settings)
         case = replace(case, model=part.case.model)
     tell(
-        f"declared model fitted to {counted(len(part.case.observations), 'measurement')}"
+        f"declared model fitted to {format_count(len(part.case.observations), 'measurement')}"
     )
     found: Evidence | None = None
     about = part.declared
@@ -144,7 +154,7 @@ def diagnose(
         if part is last:
             break
         tell(
-            f"{counted((~part.kept).sum(), 'gross error')} in {counted(len(good), 'row')}: once more without"
+            f"{format_count((~part.kept).sum(), 'gross error')} in {format_count(len(good), 'row')}: once more without"
         )
         if noise_facts(part.noise) == noise_facts(last.noise):
             again = about
@@ -203,7 +213,7 @@ def diagnose(
         found = replace(
             found,
             conclusion=verdict.allow_related_mechanisms(
-                found.conclusion, verdict.find_oversized_effects(final, named)
+                found.conclusion, find_oversized_effects(final, named)
             ),
         )
         if not found.adopted:
@@ -264,7 +274,7 @@ def diagnose(
                 kept.noise, found.linearized.pose_std_error_rad
             )
         )
-    document = state_training_verdict(
+    stated = state_training_verdict(
         TrainingResult(
             case=case,
             noise=noise,
@@ -280,7 +290,7 @@ def diagnose(
         settings,
     )
     return Diagnosis(
-        case, tuple(steps), found, document, whole.measurements.select(errors.gross)
+        case, tuple(steps), found, stated, whole.measurements.select(errors.gross)
     )
 
 
@@ -337,7 +347,7 @@ def _explained(
     searched = part.search_sample
     declared = part.declared
     about, before = start or (declared, None)
-    tested: tuple[Fit, Repeatable | None] | None = None
+    tested: tuple[Fit, RepeatableResidual | None] | None = None
     # The fit to all measurements starts where that to some ends.
     enough = SETTLED if searched is part.case.observations else ON_THE_WAY
     if start:
@@ -350,7 +360,9 @@ def _explained(
         )
         near = about if before else None
         nothing, alone = screen_terms(problem.problem)
-        draws = stream(seed, part.case.campaign.name, "null distribution", round_number)
+        draws = open_stream(
+            seed, part.case.campaign.name, "null distribution", round_number
+        )
         alarm = run_alarm_test(
             problem.problem, problem.products, nothing.pose_error_rad, draws
         )
@@ -371,7 +383,7 @@ def _explained(
         # No verdict yet, and no probability: a later search, or the poses left out, may
         # say otherwise.
         words = [
-            getattr(effects().get(name), "words", "an unknown mechanism")
+            getattr(list_effects().get(name), "words", "an unknown mechanism")
             for name in conclusion.best.mechanisms
         ]
         leading = " with ".join(words) or "nothing is missing"

@@ -182,7 +182,7 @@ def _state_parameter(
         prior_std=getattr(unknown, "prior_std", None),
         held=is_held,
         # A shape without a slope, such as the row of a step, was chosen by a search.
-        identifiable=is_shape or (not is_held and key not in average.of_prior),
+        identifiable=is_shape or (not is_held and key not in average.prior_dominated),
         shape=is_shape,
     )
 

@@ -15,12 +15,12 @@ explains after all are taken back.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import chdtri, fdtri, gammaincinv
 
-from elastocal.counting import counted
+from elastocal.counting import format_count
 from elastocal.effects.conditions import at_states
 from elastocal.fitting.linearization import by_coordinates, linearize
 from elastocal.fitting.model import conditions, parameters, residuals
@@ -33,6 +33,8 @@ from elastocal.fitting.observations import (
     single_observations,
     spread_poses,
 )
+
+from elastocal.verdict import GrossError
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
@@ -380,34 +382,34 @@ def find_held_out_gross_errors(
 
 def describe_gross_errors(
     found: OutlierTest, campaign: Campaign, held_out: bool
-) -> list[dict[str, Any]]:
+) -> list[GrossError]:
     """Gross errors as verdict.json has them, each with its row, its size and a
     sentence."""
     measurements = campaign.measurements
     return [
-        {
-            "rows": [int(measurements.row[place])],
-            "session": int(measurements.session[place]),
-            "pose": int(measurements.pose[place]),
-            "load": int(measurements.load[place]),
-            "target": campaign.targets[measurements.target[place]].name,
-            "held_out": held_out,
-            "distance_m": float(np.linalg.norm(found.residual[place, :3])),
-            "turn_rad": float(np.linalg.norm(found.residual[place, 3:]))
+        GrossError(
+            rows=(int(measurements.row[place]),),
+            session=int(measurements.session[place]),
+            pose=int(measurements.pose[place]),
+            load=int(measurements.load[place]),
+            target=campaign.targets[measurements.target[place]].name,
+            held_out=held_out,
+            distance_m=float(np.linalg.norm(found.residual[place, :3])),
+            turn_rad=float(np.linalg.norm(found.residual[place, 3:]))
             if found.residual.shape[1] > 3
             else None,
-            "standard_deviations": float(found.distance[place]),
-            "detail": _sentence(found, campaign, int(place)),
-        }
+            standard_deviations=float(found.distance[place]),
+            detail=_sentence(found, campaign, int(place)),
+        )
         for place in np.flatnonzero(found.gross)
     ]
 
 
-def format_gross_error_warnings(entries: list[dict[str, Any]]) -> list[str]:
+def format_gross_error_warnings(entries: Sequence[GrossError]) -> list[str]:
     """A sentence for each of the first gross errors, and how many more there are."""
     more = len(entries) - _MOST_NAMED
-    rest = [f"{counted(more, 'further row')} left out"] if more > 0 else []
-    return [entry["detail"] for entry in entries[:_MOST_NAMED]] + rest
+    rest = [f"{format_count(more, 'further row')} left out"] if more > 0 else []
+    return [entry.detail for entry in entries[:_MOST_NAMED]] + rest
 
 
 def _sentence(found: OutlierTest, campaign: Campaign, place: int) -> str:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.campaigns.campaign import NO_REMAINDER, Measurements, residual_columns
-from elastocal.counting import counted
+from elastocal.campaigns.campaign import NO_REMAINDER, Measurements, tabulate_residuals
+from elastocal.counting import format_count
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.gross_errors import (
     OutlierTest,
@@ -22,7 +22,7 @@ from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.model import Case, conditions, measured_in_base, residuals
 from elastocal.fitting.noise import noise_from
 from elastocal.fitting.observations import single_observations, state_clusters
-from elastocal.random_streams import stream
+from elastocal.random_streams import open_stream
 from elastocal.remainder.corrected import Corrected, corrected, remainder_facts
 from elastocal.validation import held_out as figures
 from elastocal.validation.conformity import count_configurations, joint_ranges
@@ -90,7 +90,7 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
         {"before": whole[_declared(steps)], "after": whole[-1]} if left_out else None
     )
     if left_out:
-        gross = counted(len(left_out), "gross error")
+        gross = format_count(len(left_out), "gross error")
         sizes = [1e3 * each["rms_m"] for each in (whole[-1], heldout["after"])]
         words = "with all rows the RMS is {:.3g} mm instead of {:.3g} mm".format(*sizes)
         warnings.append(f"held-out errors are without {gross}: {words}")
@@ -106,7 +106,7 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
     remainder = None
     delivered = apply_regression(diagnosis, part, seed)
     if delivered is not None:
-        draws = stream(seed, case.campaign.name, "remainder", 0)
+        draws = open_stream(seed, case.campaign.name, "remainder", 0)
         remainder = remainder_facts(
             delivered, diagnosis.declared, diagnosis.final, case, part, draws
         )
@@ -207,7 +207,7 @@ def compare_held_out_errors(
     there, errors = _errors(steps, case, held_out)
     before = _declared(steps)
     after = len(steps) - 1
-    draws = stream(seed, case.campaign.name, "held-out poses", 0)
+    draws = open_stream(seed, case.campaign.name, "held-out poses", 0)
     limits, reductions = figures.intervals(errors, _REPLICATES, draws, before)
     of_calibration = figures.intervals([errors[0], errors[after]], _REPLICATES, draws)[
         1
@@ -268,7 +268,7 @@ def compare_held_out_errors(
         "outside_range": by_range,
     }
     if count := by_range["poses"]:
-        lie = f"{count} of {counted(len(outside), 'validation pose')} {'lies' if count == 1 else 'lie'}"
+        lie = f"{count} of {format_count(len(outside), 'validation pose')} {'lies' if count == 1 else 'lie'}"
         warnings.append(
             f"{lie} outside the range of the fitted poses: errors there are extrapolated"
         )
@@ -329,6 +329,6 @@ def generate_residual_blocks(
                 for stage, each in zip(("before", "after"), there, strict=True)
             }
             position = measured_in_base(there[-1][1], observations)[0]
-            yield residual_columns(
+            yield tabulate_residuals(
                 some, unseen, some is left_out, beyond, position, off
             )

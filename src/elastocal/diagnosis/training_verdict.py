@@ -163,7 +163,9 @@ class _Statement:
     other_models_m: float | None = None
     candidates_tested: int = 0
     untestable: dict[str, str] = field(default_factory=dict)
-    compliance_average: ModelAverage = ModelAverage({}, {})
+    compliance_average: ModelAverage = field(
+        default_factory=lambda: ModelAverage({}, {})
+    )
     warnings: tuple[str, ...] = ()
 
 

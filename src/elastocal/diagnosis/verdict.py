@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.settings import Settings
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.noise import Noise
-    from elastocal.remainder.repeatable import Repeatable
+    from elastocal.verdict import RepeatableResidual
 
 Location = tuple[int | str, ...]
 ADEQUATE = "adequate"
@@ -136,7 +136,7 @@ class Evidence:
     adopted: bool
     settled: bool
     fitted: Fit
-    tested: tuple[Fit, Repeatable | None] | None
+    tested: tuple[Fit, RepeatableResidual | None] | None
 
 
 def conclude(problem: SearchProblem, posterior: Posterior, alarm: Alarm) -> Conclusion:
@@ -430,7 +430,7 @@ def find_contradictions(final: Fit, measured: Noise, settings: Settings) -> list
     return contradictions
 
 
-def describe_repeatable_residual(repeatable: Repeatable | None) -> list[str]:
+def describe_repeatable_residual(repeatable: RepeatableResidual | None) -> list[str]:
     """Return a sentence if a part of the residual is a function of the joints, which no
     verdict covers; otherwise nothing."""
     if repeatable is None or not repeatable.remains:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 from scipy.special import gammaincinv
 
-from elastocal.campaigns.campaign import NOT_TURNED
+from elastocal.campaigns.campaign import NO_ROTATION
 from elastocal.effects.conditions import at_states
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import (
@@ -505,7 +505,7 @@ def registered_to(
         if np.abs(offsets - before).max() < _SETTLED_M:
             break
     turns = Rotation.from_rotvec(
-        [target.rotation or NOT_TURNED for target in model.targets]
+        [target.rotation or NO_ROTATION for target in model.targets]
     ).as_matrix()
     if observations.rotation is not None:
         turned = (

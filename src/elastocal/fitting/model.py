@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.campaigns.campaign import Campaign, assemble_campaign, measurements_from
+from elastocal.campaigns.campaign import Campaign, assemble_campaign, build_measurements
 from elastocal.effects.catalogue import candidates_on, declared_candidates
 from elastocal.effects.conditions import (
     MASS_PARAMETERS,
@@ -518,7 +518,7 @@ def case_from(
     source = descriptions["source"]
     robot = robot_from_document(descriptions["robot"], source)
     campaign = assemble_campaign(
-        descriptions["campaign"], robot, measurements_from(columns), source
+        descriptions["campaign"], robot, build_measurements(columns), source
     )
     sites = sites_of(campaign.robot)
     model = declared_model(

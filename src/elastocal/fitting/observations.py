@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.campaigns.campaign import groups_of, means_of
+from elastocal.campaigns.campaign import average_by_group, group_equal_rows
 
 if TYPE_CHECKING:
     from typing import Any
@@ -87,7 +87,7 @@ class Observations:
 
 def state_clusters(states: States | Measurements) -> np.ndarray:
     """Number of the (session, pose) of each state, ndarray (S,): 0 .. P-1."""
-    return groups_of(np.column_stack([states.session, states.pose]))[1]
+    return group_equal_rows(np.column_stack([states.session, states.pose]))[1]
 
 
 def groups_by_size(group: np.ndarray) -> list[np.ndarray]:
@@ -115,7 +115,9 @@ def each_approach(measurements: Measurements) -> tuple[Observations, np.ndarray]
     repeats were averaged."""
     key = _approached_alike(measurements)
     single = np.column_stack([key, measurements.repeat])
-    return _observations(measurements, single), groups_of(key[groups_of(single)[0]])[1]
+    return _observations(measurements, single), group_equal_rows(
+        key[group_equal_rows(single)[0]]
+    )[1]
 
 
 def single_observations(measurements: Measurements) -> Observations:
@@ -143,7 +145,7 @@ def without_outlying_repeats(measurements: Measurements) -> Measurements:
     outlier would be taken for noise, and would move the mean of its repeats. Of two
     repeats nothing tells which is outlying.
     """
-    group = groups_of(_states_and_targets(measurements))[1]
+    group = group_equal_rows(_states_and_targets(measurements))[1]
     count = np.bincount(group)
     repeated = count[group] > 2
     if not repeated.any():
@@ -172,7 +174,7 @@ def measured_in(
     as those chosen of others, (N,)."""
     mine = _states_and_targets(some)
     theirs = _states_and_targets(others)
-    group = groups_of(np.concatenate([mine, theirs]))[1]
+    group = group_equal_rows(np.concatenate([mine, theirs]))[1]
     return np.isin(group[: len(mine)], group[len(mine) :][chosen])
 
 
@@ -197,9 +199,9 @@ def _approached_alike(measurements: Measurements | States) -> np.ndarray:
 def _observations(measurements: Measurements, key: np.ndarray) -> Observations:
     """Averages of the measurements of each target in each state, which measurements
     (N,) share whose `key` (N, k) is equal."""
-    first, state_of = groups_of(key)
+    first, state_of = group_equal_rows(key)
     pairs = np.column_stack([state_of, measurements.target])
-    first_pair, pair_of = groups_of(pairs)
+    first_pair, pair_of = group_equal_rows(pairs)
     state, target = pairs[first_pair].T
     repeats = np.full(len(first), len(measurements))
     row = measurements.row[first].copy()
@@ -217,7 +219,9 @@ def _observations(measurements: Measurements, key: np.ndarray) -> Observations:
     }
     mean_of = ("joint_angles", "wrench", "time_s", "temperature_c")
     shared |= {
-        name: means_of(there[name], state_of) for name in mean_of if name in there
+        name: average_by_group(there[name], state_of)
+        for name in mean_of
+        if name in there
     }
     states = States(**shared, repeats=repeats, row=row)
     rotation = None
@@ -229,13 +233,17 @@ def _observations(measurements: Measurements, key: np.ndarray) -> Observations:
             # towards the Riemannian mean (Moakher 2002).
             mean = (
                 Rotation.from_rotvec(
-                    means_of((each * mean[pair_of].inv()).as_rotvec(), pair_of)
+                    average_by_group((each * mean[pair_of].inv()).as_rotvec(), pair_of)
                 )
                 * mean
             )
         rotation = mean.as_matrix()
     return Observations(
-        states, state, target, means_of(measurements.position, pair_of), rotation
+        states,
+        state,
+        target,
+        average_by_group(measurements.position, pair_of),
+        rotation,
     )
 
 

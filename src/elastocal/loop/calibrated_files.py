@@ -31,7 +31,7 @@ from elastocal.errors import InputError
 from elastocal.fitting.noise import noise_from
 from elastocal.io.json_files import read_json
 from elastocal.io.origin import configuration_sha256
-from elastocal.io.records import check_sources, jobs_behind
+from elastocal.io.records import check_sources, trace_jobs
 from elastocal.loop.diagnosis_tables import load_case, rows_left_out, step_model
 from elastocal.remainder.corrected import predictor_of
 from elastocal.validation.conformity import (
@@ -118,7 +118,7 @@ def load_diagnosed(
     """A campaign that was diagnosed, of which nothing has changed since, in the folder
     that holds results/ and reports/.
 
-    An InputError refuses what is not as `jobs_behind` asks of all jobs behind its
+    An InputError refuses what is not as `trace_jobs` asks of all jobs behind its
     report or `check_sources` of those behind its verdict, and other files of the
     campaign than were read.
     """
@@ -132,8 +132,8 @@ def load_diagnosed(
     if not verdict.exists() and not (tables / "diagnosis.json").exists():
         raise InputError(folder, "", f"no diagnosis of it in {tables}", fresh)
     # The report has all other files behind it.
-    jobs_behind([f"{reports}/report.html"], top)
-    jobs = jobs_behind([f"{reports}/verdict.json"], top)
+    trace_jobs([f"{reports}/report.html"], top)
+    jobs = trace_jobs([f"{reports}/verdict.json"], top)
     check_sources(jobs, top, f"results of this version: {fresh}")
     reader = next(job for job in jobs if f"{results}/campaign.json" in job.outputs)
     # The user's files may have moved since.

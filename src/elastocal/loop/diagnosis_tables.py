@@ -17,11 +17,13 @@ from elastocal.fitting.least_squares import fit
 from elastocal.fitting.model import Estimate, case_from, parameters
 from elastocal.fitting.noise import noise_facts, noise_from
 from elastocal.io.json_files import read_json, write_json
-from elastocal.io.origin import provenance
+from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import read_table, write_table
 from elastocal.loop.schemas import STEPS, measurements
 from elastocal.mechanics.robot_file import robot_from_document
-from elastocal.random_streams import stream
+from elastocal.random_streams import open_stream
+from elastocal.io.typed_json import from_document
+from elastocal.verdict import NextExperiment, TrainingVerdict
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -53,10 +55,13 @@ def diagnose_campaign(job: Any) -> None:
         lambda line: print(f"{name}: {line}", file=sys.stderr, flush=True),
     )
     columns, facts = propose_experiment(
-        found, stream(seed, case.campaign.name, "next experiment", 0), job.params.states
+        found,
+        open_stream(seed, case.campaign.name, "next experiment", 0),
+        job.params.states,
     )
     write_csv(job.output.experiment, pd.DataFrame(columns))
-    found = replace(found, document=found.document | {"next_experiment": facts})
+    proposal = from_document(NextExperiment, facts, "next experiment")
+    found = replace(found, verdict=replace(found.verdict, next_experiment=proposal))
     write_csv(job.output.candidates, pd.DataFrame(candidate_rows(found)))
     write_json(
         job.output.diagnosis,
@@ -66,7 +71,7 @@ def diagnose_campaign(job: Any) -> None:
         job.output.steps,
         STEPS,
         step_blocks(found),
-        provenance(job.params, **job.wildcards),
+        describe_provenance(job.params, **job.wildcards),
     )
 
 
@@ -150,7 +155,11 @@ def diagnosis_from(case: Case, facts: Mapping[str, Any]) -> Diagnosis:
         for step in facts["steps"]
     )
     return Diagnosis(
-        case, steps, None, facts["document"], measurements.select(left_out)
+        case,
+        steps,
+        None,
+        from_document(TrainingVerdict, facts["document"], "diagnosis.json"),
+        measurements.select(left_out),
     )
 
 

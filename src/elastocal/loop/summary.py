@@ -11,7 +11,7 @@ import pandas as pd
 from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.io.json_files import read_json
 from elastocal.loop.schemas import residuals
-from elastocal.random_streams import stream
+from elastocal.random_streams import open_stream
 from elastocal.validation.held_out import Errors, intervals, summary
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def campaign_rows(
             rows.append(
                 head
                 | {"session": session}
-                | _errors(part, stream(seed, name, "summary", session))
+                | _errors(part, open_stream(seed, name, "summary", session))
             )
     return pd.DataFrame(rows)
 

@@ -16,7 +16,7 @@ from elastocal.application.accuracy import (
     set_form_error,
 )
 from elastocal.application.calibrated import compute_effect_contributions
-from elastocal.campaigns.campaign import columns_of
+from elastocal.campaigns.campaign import tabulate_measurements
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.diagnose import diagnose
@@ -25,7 +25,7 @@ from elastocal.diagnosis.misplaced import find_misplaced_frames
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.model import Case, case_from
 from elastocal.io.json_files import read_json, write_json
-from elastocal.io.origin import provenance
+from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import write_table
 from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop.loading import load_campaign
@@ -60,7 +60,7 @@ def judge_campaign(job: Any) -> None:
         job.output.residuals,
         schema,
         generate_residual_blocks(found, verdict),
-        provenance(job.params, **job.wildcards),
+        describe_provenance(job.params, **job.wildcards),
     )
 
 
@@ -73,8 +73,10 @@ def cases_in(folder: str | Path, robots_folder: str | Path) -> tuple[Case, Case]
         read_campaign_folder(folder, robots_folder)
     )
     return (
-        case_from(descriptions, columns_of(training)),
-        case_from(descriptions["held_out"] or descriptions, columns_of(held_out)),
+        case_from(descriptions, tabulate_measurements(training)),
+        case_from(
+            descriptions["held_out"] or descriptions, tabulate_measurements(held_out)
+        ),
     )
 
 

@@ -20,14 +20,14 @@ import numpy as np
 from scipy.special import stdtr
 
 from elastocal.campaigns.campaign import BEST_REMAINDER
-from elastocal.campaigns.holdout import blocks_of_poses, configurations
-from elastocal.effects.catalogue import effects, moves_robot
+from elastocal.campaigns.holdout import number_configurations, partition_poses
+from elastocal.effects.catalogue import list_effects, moves_robot
 from elastocal.fitting.least_squares import fit_frames
 from elastocal.fitting.linearization import effect_columns
 from elastocal.fitting.model import conditions, target_points
 from elastocal.fitting.observations import sample_of, state_clusters
 from elastocal.mechanics.kinematics import position_jacobians
-from elastocal.remainder.regressions import REGRESSIONS, Inputs, Predictor
+from elastocal.remainder.regressions import Inputs, Predictor, list_regressions
 from elastocal.validation.held_out import (
     Errors,
     intervals,
@@ -116,7 +116,9 @@ def corrected(
     were fitted.
     """
     there, (model, estimate) = held_out.observations, placed(fitted, case, held_out)
-    names = [name for name in REGRESSIONS if regression in (name, BEST_REMAINDER)]
+    names = [
+        name for name in list_regressions() if regression in (name, BEST_REMAINDER)
+    ]
     every = case.observations
     some = sample_of(case.observations, _MOST_TO_CHOOSE)
     inputs = inputs_of(fitted.model, fitted.estimate, some)
@@ -130,7 +132,7 @@ def corrected(
     if chosen["regression"]:
         predictor = predictor_of(chosen, fitted.model, fitted.estimate, every)
         asked = inputs_of(
-            model, estimate, there, REGRESSIONS[chosen["regression"]].by_jacobian
+            model, estimate, there, list_regressions()[chosen["regression"]].by_jacobian
         )
         mean = np.where(outside[:, None] & within_range, 0.0, predictor.mean(asked))
         std = predictor.std(asked)
@@ -187,13 +189,13 @@ def _chosen(
     model = fitted.model
     pose = state_clusters(states)
     each = observations.cluster
-    configuration = configurations(states.joint_angles, pose)
+    configuration = number_configurations(states.joint_angles, pose)
     count = min(_FOLDS, configuration.max() + 1)
     shuffled = (
         np.random.default_rng(seed).permutation(configuration.max() + 1)[configuration]
         % count
     )
-    fold = blocks_of_poses(states.joint_angles, pose, count) if blocks else shuffled
+    fold = partition_poses(states.joint_angles, pose, count) if blocks else shuffled
     without = np.stack(
         [
             position_residuals(model, other, observations)
@@ -212,7 +214,7 @@ def predictor_of(
 ) -> Predictor:
     """`fitted_again`, to what a model leaves of its training poses."""
     some = sample_of(observations, _MOST_TO_FIT)
-    by_jacobian = REGRESSIONS[chosen["regression"]].by_jacobian
+    by_jacobian = list_regressions()[chosen["regression"]].by_jacobian
     return fitted_again(
         chosen,
         inputs_of(model, estimate, some, by_jacobian),
@@ -225,7 +227,7 @@ def fitted_again(
 ) -> Predictor:
     """The regression of facts of `tuned`, fitted to residuals (M, 3), shrunk, with
     intervals as wide as poses left out say."""
-    fitted = REGRESSIONS[chosen["regression"]].fitted
+    fitted = list_regressions()[chosen["regression"]].fitted
     spread = chosen["spread"]
     found = next(fitted(inputs, residual, [chosen["setting"]], chosen["seed"]))
 
@@ -286,7 +288,7 @@ def inputs_of(
     found = [
         (effect, shapes)
         for effect, shapes in every
-        if effect.effect in effects() and is_commanded(effect)
+        if effect.effect in list_effects() and is_commanded(effect)
     ]
     if not found or not by_jacobian:
         return inputs
@@ -385,7 +387,9 @@ def tuned(
     if (count := int(group.max()) + 1) < FEWEST_CONFIGURATIONS:
         return facts
     pairs = [
-        (name, setting) for name in names for setting in REGRESSIONS[name].settings
+        (name, setting)
+        for name in names
+        for setting in list_regressions()[name].settings
     ]
     mine = [fold == number for number in range(len(without))]
     parts = [inputs.select(each) for each in mine]
@@ -398,7 +402,7 @@ def tuned(
         left = without[list(pair)].sum(axis=0) - whole
         rest = ~np.isin(fold, pair)
         some = inputs.select(rest)
-        each = [REGRESSIONS[name] for name in names]
+        each = [list_regressions()[name] for name in names]
         fits = (
             one
             for regression in each
@@ -419,7 +423,7 @@ def tuned(
         if best is not None:
             name, setting = pairs[best]
             predictor = next(
-                REGRESSIONS[name].fitted(
+                list_regressions()[name].fitted(
                     inputs.select(~within), without[number, ~within], [setting], seed
                 )
             )
@@ -438,7 +442,7 @@ def tuned(
     spread = spread_of(np.abs(off - gain["factor"] * predicted), std)
     return facts | {
         "regression": name,
-        "words": REGRESSIONS[name].words,
+        "words": list_regressions()[name].words,
         "setting": dict(setting),
         "spread": spread,
     }

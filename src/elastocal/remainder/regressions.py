@@ -9,7 +9,7 @@ turn.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +17,8 @@ import numpy as np
 from scipy.linalg import lapack
 
 from elastocal.fitting.normal_equations import inverse_by_factor
+from elastocal.io import plugins
+from elastocal.io.plugins import load_plugins
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -412,6 +414,16 @@ REGRESSIONS = {
         by_jacobian=True,
     ),
 }
+
+
+def list_regressions() -> dict[str, Regression]:
+    """Regressions of this package, and those that installed packages offer, by name."""
+    return REGRESSIONS | _plugin_regressions()
+
+
+@cache
+def _plugin_regressions() -> dict[str, Regression]:
+    return load_plugins(plugins.REGRESSIONS, Regression, REGRESSIONS)
 
 
 def by_harmonics(inputs: Inputs, orders: int) -> np.ndarray:

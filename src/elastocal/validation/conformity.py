@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.campaigns.holdout import configurations
-from elastocal.counting import counted
+from elastocal.campaigns.holdout import number_configurations
+from elastocal.counting import format_count
 from elastocal.fitting.observations import state_clusters
 
 if TYPE_CHECKING:
@@ -32,7 +32,10 @@ UNDECIDED = "undecided"
 
 def count_configurations(states: States | Measurements) -> int:
     """How many configurations states or measurements are of."""
-    return int(configurations(states.joint_angles, state_clusters(states)).max()) + 1
+    return (
+        int(number_configurations(states.joint_angles, state_clusters(states)).max())
+        + 1
+    )
 
 
 def joint_ranges(states: States, robot: Robot) -> list[dict[str, Any]]:
@@ -57,7 +60,7 @@ def shortfalls(judged: int, fitted: States, robot: Robot) -> list[str]:
     found = []
     if judged < FEWEST_CONFIGURATIONS:
         found.append(
-            f"too few: {counted(judged, 'configuration')}, where at least {FEWEST_CONFIGURATIONS} must judge"
+            f"too few: {format_count(judged, 'configuration')}, where at least {FEWEST_CONFIGURATIONS} must judge"
         )
     moved = np.ptp(fitted.joint_angles, axis=0)
     rails = np.array(robot.chain.prismatic)

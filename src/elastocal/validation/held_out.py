@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import stdtrit
 
-from elastocal.campaigns.holdout import configurations
+from elastocal.campaigns.holdout import number_configurations
 from elastocal.fitting.least_squares import ON_THE_WAY, fit, registered
 from elastocal.fitting.linearization import by_coordinates
 from elastocal.fitting.model import conditions, residuals
@@ -308,7 +308,7 @@ def left_out_squares(fitted: Fit, observations: Observations) -> np.ndarray:
     white = fitted.whitened(fitted.residual)
     states = observations.states
     found = []
-    configuration = configurations(states.joint_angles, state_clusters(states))[
+    configuration = number_configurations(states.joint_angles, state_clusters(states))[
         observations.cluster
     ]
     plain, whitened = (

@@ -10,8 +10,8 @@ import numpy as np
 from scipy.linalg import blas
 from scipy.spatial.transform import Rotation
 
-from elastocal.campaigns.holdout import beyond_range, find_repeated
-from elastocal.counting import counted
+from elastocal.campaigns.holdout import find_poses_beyond_range, find_repeated
+from elastocal.counting import format_count
 from elastocal.effects.protocol import LOADED_JOINTS
 from elastocal.fitting.least_squares import evaluated, fit_frames
 from elastocal.fitting.linearization import linearize
@@ -127,7 +127,7 @@ def outside_poses(fitted: Fit, case: Case, held_out: Case) -> np.ndarray:
     has to extrapolate.
 
     Either a joint stands beyond the fitted poses by more than chance explains, see
-    `holdout.beyond_range`; or the model predicts the position less surely than it would
+    `holdout.find_poses_beyond_range`; or the model predicts the position less surely than it would
     have predicted any pose it was fitted to, had that pose been left out. The second
     finds what ranges joint by joint miss: corners between the poses, loads, times and
     temperatures beyond those fitted. Poses drawn like the fitted ones pass that maximum
@@ -156,7 +156,7 @@ def repeat_warnings(
     again = find_repeated(_angles_of_poses(fitted_states), _angles_of_poses(states))
     if not again.any():
         return []
-    many = counted(len(again), "validation pose")
+    many = format_count(len(again), "validation pose")
     count = f"{again.sum()} of {many}" if not again.all() else f"all {many}"
     return [
         f"{count} repeat configurations that were fitted: these errors say nothing of other poses"
@@ -177,7 +177,7 @@ def beyond_campaign(
     nothing loads the robot. Returns (N,) of bool: by the joint angles as in
     `outside_poses`, or by its loads.
     """
-    outside = beyond_range(_angles_of_poses(fitted_states), joint_angles)
+    outside = find_poses_beyond_range(_angles_of_poses(fitted_states), joint_angles)
     return outside if wrench is None else outside | beyond_loads(fitted_states, wrench)
 
 

@@ -39,8 +39,8 @@ from elastocal.application.planning.designs import (
 )
 from elastocal.campaigns.campaign import Target
 from elastocal.campaigns.holdout import FEWEST_TRAINING_POSES
-from elastocal.campaigns.measurements import SHOWN, TICK
-from elastocal.counting import counted
+from elastocal.campaigns.measurements import DISPLAY_UNITS, TICK_COLUMN
+from elastocal.counting import format_count
 from elastocal.effects.catalogue import declared_candidates
 from elastocal.effects.elastic import joint_compliance
 from elastocal.effects.gravity import declared_weight
@@ -349,7 +349,7 @@ def find_allowed_candidates(
     good = np.flatnonzero(np.all(list(fine.values()), axis=0))[:count]
     if not len(good):
         least = min(fine, key=lambda name: fine[name].mean())
-        found = f"none of {counted(len(reported), 'configuration')} allowed: {_FORBIDDEN[least]}"
+        found = f"none of {format_count(len(reported), 'configuration')} allowed: {_FORBIDDEN[least]}"
         raise InputError("plan", least, found, "room for the arm and its targets")
     return Candidates(
         reported[good], survey.forces(len(good), np.random.default_rng(seed))
@@ -368,12 +368,12 @@ def choose_plan(
     count = len(some.joint_angles)
     draws = np.random.default_rng(seed)
     if count < poses + held_out:
-        found = f"{poses + held_out} of {counted(count, 'allowed configuration')}"
+        found = f"{poses + held_out} of {format_count(count, 'allowed configuration')}"
         raise InputError("plan", "poses", found, f"at most {count}, or more candidates")
     listed = parameters(*model_of(survey))
     fewest = max(-(-len(listed) // survey.numbers), FEWEST_TRAINING_POSES)
     if poses < fewest:
-        found = f"{poses}, which measure {counted(poses * survey.numbers, 'number')} for {counted(len(listed), 'parameter')}"
+        found = f"{poses}, which measure {format_count(poses * survey.numbers, 'number')} for {format_count(len(listed), 'parameter')}"
         raise InputError("plan", "poses", found, f"at least {fewest}")
     rows = information(survey, some.joint_angles, some.force)
     if (
@@ -475,11 +475,11 @@ def build_sheet(survey: Survey, plan: Plan) -> pd.DataFrame:
     for pose, (angles, force) in enumerate(configurations, 1):
         # What is typed at the controller is what is planned.
         shown = {
-            f"q{j}_{of}": round(q / SHOWN[of], 3) + 0.0
+            f"q{j}_{of}": round(q / DISPLAY_UNITS[of], 3) + 0.0
             for j, (q, of) in enumerate(zip(angles, endings, strict=True), 1)
         }
         exact = {
-            name.partition("_")[0]: value * SHOWN[name.partition("_")[2]]
+            name.partition("_")[0]: value * DISPLAY_UNITS[name.partition("_")[2]]
             for name, value in shown.items()
         }
         for repeat in range(REPEATS if pose <= min(REPEATED_POSES, fitted) else 1):
@@ -498,7 +498,7 @@ def build_sheet(survey: Survey, plan: Plan) -> pd.DataFrame:
                         "load": load,
                         "repeat": repeat,
                         "target": target.name,
-                        TICK: "",
+                        TICK_COLUMN: "",
                     }
                     rows.append(head | shown | exact | wrench)
     empty = ["x", "y", "z", *(["rx", "ry", "rz"] if survey.measured == "pose" else [])]
