@@ -14,7 +14,7 @@ held-out poses show more. Nothing of the tracker's noise is in it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -46,6 +46,7 @@ from elastocal.fitting.model import conditions, displaced_coordinates, parameter
 from elastocal.fitting.noise import hidden_repeatability
 from elastocal.mechanics.kinematics import jacobians, pose_differences, poses
 from elastocal.remainder.corrected import is_commanded
+from elastocal.verdict import Accuracy
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -72,40 +73,6 @@ _WORST_OF_FORM = 9.0
 _AT_ONCE = 200
 # States of a campaign over which its accuracy is stated: more change no digit.
 _MOST_STATES = 1000
-
-
-@dataclass(frozen=True)
-class Accuracy:
-    """How large a predicted error is, of what, how surely; lengths in m, without the
-    tracker's noise; `asdict` is its JSON.
-
-    `frame`: "robot" or "base". `rms_m`, `worst_m`: root mean square over the poses, and
-    at the worst of them; with one-sided confidence below `rms_bound_m`,
-    `worst_bound_m`, None where nothing says so. `region`: which poses these are.
-    `offset_removed`, `left_out`, `contradicted`: as in `frames.Scope`. Of `rms_m` are
-    `left_out_m` by what is left out, `form_m` by what the form of the model leaves
-    open, `repeated_m` by the repeatability of the joints and the error that each pose
-    has of its own, `regression_m` by what a regression on the remainder leaves beyond
-    parameters and repeatability. `fitted`: whether anything of the robot was; without,
-    no error of 0 is one.
-    """
-
-    frame: str
-    rms_m: float
-    worst_m: float
-    rms_bound_m: float | None
-    worst_bound_m: float | None
-    poses: int
-    region: str
-    offset_removed: bool = False
-    left_out: list[str] = field(default_factory=list)
-    left_out_m: float = 0.0
-    form_m: float = 0.0
-    contradicted: bool = False
-    repeated_m: float = 0.0
-    regression_m: float = 0.0
-    confidence: float = CONFIDENCE
-    fitted: bool = True
 
 
 @dataclass(frozen=True)
@@ -142,7 +109,7 @@ class Prediction:
             poses=len(self.error_m),
             region=region,
             offset_removed=scope.offset_removed,
-            left_out=list(scope.left_out),
+            left_out=scope.left_out,
             left_out_m=scope.left_out_m,
             form_m=root_mean_square(self.form_m),
             contradicted=scope.contradicted,

@@ -4,6 +4,7 @@ ones, once, at the end."""
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from elastocal.data_checks.faults import faults
 from elastocal.diagnosis import model_averaging, refit, verdict
 from elastocal.diagnosis.candidate_design import build_candidate_design, refine_shapes
 from elastocal.diagnosis.centre_prior import choose_centre_prior
+from elastocal.diagnosis.effect_estimates import find_oversized_effects
 from elastocal.diagnosis.fitted_subset import (
     FittedSubset,
     fit_subset,
@@ -25,7 +27,6 @@ from elastocal.diagnosis.gross_errors import (
     find_gross_errors,
 )
 from elastocal.diagnosis.search import run_alarm_test, screen_terms, search_models
-from elastocal.diagnosis.effect_estimates import find_oversized_effects
 from elastocal.diagnosis.training_verdict import TrainingResult, state_training_verdict
 from elastocal.diagnosis.verdict import Evidence
 from elastocal.effects.catalogue import list_effects
@@ -33,19 +34,18 @@ from elastocal.fitting.least_squares import ON_THE_WAY, SETTLED, fit
 from elastocal.fitting.model import Case, parameter_values
 from elastocal.fitting.noise import effective_parameters, noise_facts
 from elastocal.fitting.observations import Observations
+from elastocal.io.typed_json import to_document
 from elastocal.random_streams import open_stream
 from elastocal.remainder.repeatable import repeatable_part
 from elastocal.validation.held_out import left_out_squares
-from functools import cached_property
-from elastocal.io.typed_json import to_document
 
 if TYPE_CHECKING:
-    from elastocal.verdict import RepeatableResidual, TrainingVerdict
     from collections.abc import Callable, Sequence
 
     from elastocal.campaigns.campaign import Measurements
     from elastocal.diagnosis.settings import Settings
     from elastocal.fitting.least_squares import Fit
+    from elastocal.verdict import RepeatableResidual, TrainingVerdict
 
 # Mechanisms that are added one at a time, each by a fit; of more, only the first.
 _MOST_STEPS = 4

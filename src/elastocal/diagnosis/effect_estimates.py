@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.counting import plural
+from elastocal.counting import pluralize
 from elastocal.data_checks.protocol import OF_DATA, Fault
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.verdict import (
     MIN_REPORTED_PROBABILITY,
     compute_location_probabilities,
 )
-from elastocal.effects.catalogue import effects
+from elastocal.effects.catalogue import list_effects
 from elastocal.effects.protocol import Shape
 from elastocal.effects.sizes import lever_m
 from elastocal.fitting.linearization import effect_columns
@@ -65,7 +65,9 @@ def state_effects(
     stated = []
     for name in sorted(names, key=lambda name: -conclusion.mechanisms[name]):
         members = [
-            term.candidate for term in terms if term.candidate and term.mechanism == name
+            term.candidate
+            for term in terms
+            if term.candidate and term.mechanism == name
         ]
         parameters = state_largest_sag(name, members, fitted, observations)
         for member in members:
@@ -115,8 +117,8 @@ def format_location(mechanism: str, location: Sequence[int | str]) -> str:
     details = [entry for entry in location if isinstance(entry, str)]
     words = [detail for detail in details if detail]
     if numbers:
-        noun = getattr(effects().get(mechanism), "part", "joint")
-        words.insert(0, f"{plural(noun, len(numbers))} {' and '.join(numbers)}")
+        noun = getattr(list_effects().get(mechanism), "part", "joint")
+        words.insert(0, f"{pluralize(noun, len(numbers))} {' and '.join(numbers)}")
     if not words and mechanism == OTHER:
         return "base"
     return " ".join(words)
@@ -279,7 +281,8 @@ def state_fault(fault: Fault) -> DataFault:
         joints=tuple(fault.joints),
         detail=fault.detail,
         parameters=tuple(
-            FaultValue(value.name, value.value, value.unit) for value in fault.parameters
+            FaultValue(value.name, value.value, value.unit)
+            for value in fault.parameters
         ),
         alternatives=tuple(fault.alternatives),
         evidence=tuple(

@@ -33,10 +33,11 @@ from elastocal.fitting.observations import (
     single_observations,
     spread_poses,
 )
-
 from elastocal.verdict import GrossError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from elastocal.campaigns.campaign import Campaign, Measurements
     from elastocal.diagnosis.settings import Settings
     from elastocal.effects.conditions import Conditions

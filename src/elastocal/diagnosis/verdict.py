@@ -205,9 +205,7 @@ def _compute_inclusion_probabilities(
     for hypothesis in hypotheses:
         for name in hypothesis.mechanisms:
             # Rounding may carry the sum beyond one.
-            probabilities[name] = min(
-                probabilities[name] + hypothesis.probability, 1.0
-            )
+            probabilities[name] = min(probabilities[name] + hypothesis.probability, 1.0)
     return dict(sorted(probabilities.items(), key=lambda entry: -entry[1]))
 
 
@@ -272,7 +270,9 @@ def _minimize_expected_loss(
     probability = np.array([hypothesis.probability for hypothesis in ranked])
     further_lines = np.arange(len(ranked))
     missed = np.clip(probability.sum() - np.cumsum(probability), 0.0, None)
-    class_losses = settings.ambiguity_loss + settings.width_loss * further_lines + missed
+    class_losses = (
+        settings.ambiguity_loss + settings.width_loss * further_lines + missed
+    )
     silence_loss = settings.missed_loss * probability.sum()
     name_loss = 1.0 - probability[0]
     if silence_loss <= min(name_loss, class_losses.min()):

@@ -19,10 +19,10 @@ from elastocal.fitting.noise import noise_facts, noise_from
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import read_table, write_table
+from elastocal.io.typed_json import from_document
 from elastocal.loop.schemas import STEPS, measurements
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.random_streams import open_stream
-from elastocal.io.typed_json import from_document
 from elastocal.verdict import NextExperiment, TrainingVerdict
 
 if TYPE_CHECKING:

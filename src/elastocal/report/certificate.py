@@ -5,11 +5,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elastocal.application.accuracy import Accuracy, format_accuracy
+from elastocal.application.accuracy import format_accuracy
 from elastocal.counting import format_count
 from elastocal.report import words as say
 from elastocal.report.loop_facts import title_of
 from elastocal.report.typesetting import render_sentences
+from elastocal.verdict import Accuracy
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
