@@ -15,6 +15,7 @@ from elastocal.io.json_files import read_json
 from elastocal.loop.schemas import angles_of, read_residuals, worst_measurement
 from elastocal.mechanics.kinematics import corners
 from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.verdict import read_verdict
 
 
 def draw_campaign(job: Job) -> None:
@@ -26,7 +27,7 @@ def draw_campaign(job: Job) -> None:
     errors = pd.read_csv(job.input.before_after).to_dict("records")
     drawn = {
         "before_after": draw_before_after(
-            errors, read_json(job.input.verdict)["heldout"]["noise_floor_rms_m"]
+            errors, read_verdict(job.input.verdict).heldout.noise_floor_rms_m
         ),
         "arrows": draw_residual_arrows(table, arm),
         "candidates": draw_probabilities(

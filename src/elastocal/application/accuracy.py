@@ -15,7 +15,7 @@ held-out poses show more. Nothing of the tracker's noise is in it.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import gammaincinv
@@ -49,13 +49,12 @@ from elastocal.remainder.corrected import is_commanded
 from elastocal.verdict import Accuracy
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from elastocal.application.calibrated import CalibratedRobot
     from elastocal.fitting.model import Case, Estimate, Model
     from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import States
     from elastocal.remainder.regressions import Predictor
+    from elastocal.verdict import Verdict
 
 REGION = "the poses and loads that were fitted"
 # Of every bound, one-sided, as GUM and JCGM 106 have it; and how sure held-out poses
@@ -545,26 +544,25 @@ def format_accuracy(accuracy: Accuracy) -> str:
     return text
 
 
-def tabulate_errors(verdict: Mapping[str, Any]) -> list[list[str]]:
+def tabulate_errors(verdict: Verdict) -> list[list[str]]:
     """How far the robot is off before and after its correction: one table, the same in
     report and certificate.
 
     What is measured and what is predicted, over which poses and in which frame, are
     different errors; each row says which. Columns: which RMS error, of the uncorrected
-    robot, of the corrected one; no row where the data are at fault. `verdict`: contents
-    of verdict.json.
+    robot, of the corrected one; no row where the data are at fault.
     """
-    if not verdict.get("accuracy"):
+    stated = verdict.accuracy
+    if stated is None or verdict.uncorrected_m is None:
         return []
-    heldout = verdict["heldout"]
+    heldout = verdict.heldout
     measured = "measured at validation poses, noise included, after the best placement of the base"
-    stated = Accuracy(**verdict["accuracy"])
-    before = millimetres(verdict["uncorrected_m"])
+    before = millimetres(verdict.uncorrected_m)
     return [
         [
             measured,
-            millimetres(heldout["uncalibrated"]["rms_m"]),
-            millimetres(heldout["delivered"]["rms_m"]),
+            millimetres(heldout.uncalibrated.rms_m),
+            millimetres(heldout.delivered.rms_m),
         ],
         [
             f"predicted over {stated.region}, {FRAMES[stated.frame]}",

@@ -188,7 +188,8 @@ def correct(
             if added.any()
             else "nothing"
         )
-        words = campaign.verdict["remainder"]["words"]
+        remainder = campaign.verdict.remainder
+        words = remainder.words if remainder else ""
         lines.append(
             f"a {words} on what the model leaves corrects {format_integer((added > 0.0).sum())} of {count} by {size}"
         )
@@ -199,7 +200,7 @@ def correct(
         lines.append(
             f"{files[1].name} goes to all of them: {controller.words}, {called}"
         )
-    alarms = [each["sentence"] for each in campaign.verdict["misplaced"]]
+    alarms = [frame.sentence for frame in campaign.verdict.misplaced]
     if swings:
         alarms.append(list_first(swings, _NAMED))
     if not bounded.all():
@@ -323,7 +324,6 @@ def certificate(
     """
     from rich.console import Console
 
-    from elastocal.data_checks.protocol import data_at_fault
     from elastocal.figures.loop import draw_budget_bars
     from elastocal.figures.style import save_all
     from elastocal.io.atomic_writes import check_places, write_together
@@ -337,7 +337,7 @@ def certificate(
     found = load_diagnosed_campaign(folder)
     place = workplace() / "reports" / "loop" / found.name
     check_places(place / PAGES, place / DOCUMENT, top=workplace() / "reports")
-    if data_at_fault(found.verdict):
+    if found.verdict.faults:
         raise InputError(
             folder,
             "",
@@ -422,7 +422,8 @@ def export(
     under = states.wrench
     lines = []
     if whole.calibrated.remainder is not None:
-        words = whole.verdict["remainder"]["words"]
+        remainder = whole.verdict.remainder
+        words = remainder.words if remainder else ""
         lost = np.linalg.norm(regressed(whole.calibrated, at, under), axis=1)
         lines.append(
             f"! no file holds the {words} on the remainder, which elastocal correct adds: {_sizes(lost)}"

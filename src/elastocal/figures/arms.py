@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from elastocal.application.planning.cell import Cell
     from elastocal.application.planning.plan import Plan
     from elastocal.mechanics.robot import Robot
+    from elastocal.verdict import HeldOut
 
 _AZIMUTH = np.radians(-60.0)
 _ELEVATION = np.radians(20.0)
@@ -83,7 +84,7 @@ def draw_arm(axis: Axes, links: np.ndarray, width: float) -> None:
 
 @styled
 def draw_arm_with_errors(
-    robot: Robot, table: Mapping[str, np.ndarray], heldout: Mapping[str, Any]
+    robot: Robot, table: Mapping[str, np.ndarray], heldout: HeldOut
 ) -> Figure:
     """Two panels, before and after: the arm in one of the held-out poses, and an arrow
     for each of their errors.
@@ -119,7 +120,7 @@ def draw_arm_with_errors(
         }
         axis.quiver(*start.T, *(tip - start).T, color=color, gid=stage, **look)
         axis.update_datalim(tip)
-        error = f"{1e3 * heldout[stage]['rms_m']:.2f} mm"
+        error = f"{1e3 * getattr(heldout, stage).rms_m:.2f} mm"
         axis.set_title(
             error, fontsize=17, fontweight="bold", color=color, loc="left", pad=14
         )
@@ -130,8 +131,8 @@ def draw_arm_with_errors(
         axis.set_axis_off()
         axis.margins(0.03)
     figure.supxlabel(
-        f"RMS position error at {heldout['poses']} held-out poses; arrows: {_TIMES} times the error; "
-        f"the tracker's noise alone: {1e3 * heldout['noise_floor_rms_m']:.2f} mm",
+        f"RMS position error at {heldout.poses} held-out poses; arrows: {_TIMES} times the error; "
+        f"the tracker's noise alone: {1e3 * (heldout.noise_floor_rms_m or np.nan):.2f} mm",
         fontsize=7.5,
         color="#444444",
     )

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 from elastocal.application.accuracy import format_accuracy
 from elastocal.counting import format_count
 from elastocal.report import words as say
-from elastocal.report.loop_facts import title_of
+from elastocal.report.loop_facts import format_title
 from elastocal.report.typesetting import render_sentences
-from elastocal.verdict import Accuracy
+from elastocal.verdict import Accuracy, RepeatableResidual
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -40,7 +40,11 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
     """
     spoken = {
         "accuracy_sentence": format_accuracy(Accuracy(**document["accuracy"])),
-        "title": title_of(document),
+        "title": format_title(
+            document["verdict"],
+            document["effects"],
+            document["repeatable"] and RepeatableResidual(**document["repeatable"]),
+        ),
     }
     stated = render_sentences(
         "certificate.txt", say.FILTERS, document=document, **spoken
