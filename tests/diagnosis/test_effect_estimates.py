@@ -9,6 +9,7 @@ from planted import planted
 
 from elastocal.data_checks.protocol import Fault, Value
 from elastocal.diagnosis.effect_estimates import (
+    find_oversized_effects,
     format_location,
     state_fault,
     state_largest_sag,
@@ -23,7 +24,7 @@ from elastocal.fitting.model import predict
     ("mechanism", "location", "words"),
     [
         ("joint_offset", (2,), "joint 2"),
-        ("link_weight", (2, 3), "links 2 and 3"),
+        ("link_elasticity", (2, 3), "links 2 and 3"),
         ("transmission_harmonic", (4, "orders 1-2"), "joint 4 orders 1-2"),
         ("other", (), "base"),
         ("payload", (), ""),
@@ -132,7 +133,7 @@ def declared_springs(fitted, compliance):
             shapes=tuple(fitted.estimate.shapes[n] for n in kept),
         ),
         covariance=fitted.covariance[np.ix_(free, free)],
-        held=fitted.held[free],
+        unidentifiable=fitted.unidentifiable[free],
     )
 
 

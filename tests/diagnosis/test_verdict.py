@@ -28,7 +28,7 @@ from elastocal.diagnosis.verdict import (
     find_contradictions,
     rank_hypotheses,
 )
-from elastocal.fitting.model import joint_compliances
+from elastocal.fitting.model import get_joint_compliances
 
 SETTINGS = Settings()
 
@@ -291,7 +291,7 @@ def test_an_error_of_a_pose_beyond_that_of_drives_is_one(fitted, pose_rad, count
 )
 def test_a_compliance_that_is_negative_beyond_chance_is_one(fitted, errors, named):
     mine = np.array([owner == "joint_compliance" for owner, _ in fitted.parameters])
-    values = joint_compliances(fitted.model, fitted.estimate).copy()
+    values = get_joint_compliances(fitted.model, fitted.estimate).copy()
     values[2] = -errors * np.sqrt(np.diag(fitted.covariance))[mine][2]
     coefficients = tuple(
         values if effect.effect == "joint_compliance" else each

@@ -18,7 +18,7 @@ from elastocal.diagnosis.verdict import (
 )
 from elastocal.io.typed_json import from_document, to_document
 from elastocal.report.loop_facts import loop_facts
-from elastocal.verdict import DataFault, Effect, Verdict
+from elastocal.verdict import DataFault, Effect, Probabilities, Verdict
 
 # What of verdict.json is always the same.
 DATA = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8"))
@@ -114,7 +114,8 @@ def probabilities(sets=None, alarm_p_value=0.002):
             mechanisms[name] = mechanisms.get(name, 0.0) + value
     nothing = sum(value for where, value in sets if not where)
     facts = {"nothing": nothing, "stated": sets[0][1], "alarm_p_value": alarm_p_value}
-    return facts | {"mechanisms": mechanisms, "sets": listed}
+    document = facts | {"mechanisms": mechanisms, "sets": listed}
+    return from_document(Probabilities, document, "made up")
 
 
 def step_rows(effects=("lost_motion",), largest_m=3e-4):
@@ -214,7 +215,7 @@ def made_verdict(
         "remainder": remainder,
         "settings": to_document(Settings().document()),
         "kept": "effect" if is_adopted else "declared",
-        "probabilities": None if is_faulty else probabilities(sets),
+        "probabilities": None if is_faulty else to_document(probabilities(sets)),
     }
     if is_faulty:
         document |= {"misfit": None, "candidates_tested": 0}

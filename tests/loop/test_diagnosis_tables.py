@@ -15,7 +15,7 @@ from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.diagnosis.diagnose import Step
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.least_squares import Fit
-from elastocal.fitting.model import parameters
+from elastocal.fitting.model import list_parameters
 from elastocal.io.json_files import write_json
 from elastocal.io.storage import read_table, write_table
 from elastocal.loop import diagnosis_tables as tables
@@ -101,7 +101,7 @@ def test_models_and_estimates_come_back_from_json_and_parameters_from_their_tabl
     estimate = made_estimate(
         model, sessions=(0, 7) if settings["fitted_frames"] else (3,), seed=1
     )
-    listed = parameters(model, estimate)
+    listed = list_parameters(model, estimate)
     held = np.arange(len(listed)) % 3 == 1
     covariance = np.diag(1.0 - held)
     fitted = Fit(

@@ -36,5 +36,6 @@ def test_targets_that_are_fitted_and_turned_mounts_are_stated():
 def test_a_part_without_measurements_has_none():
     table = residual_table()
     table["held_out"][:] = False
-    rows = measured_rows(table, DATA["descriptions"])
-    assert rows[1][2] == "none"
+    rows = {name: cells for name, *cells in measured_rows(table, DATA["descriptions"])}
+    assert rows["measurements"] == ["120, each a position", "none"]
+    assert rows["poses"] == ["30 poses in 1 session", ""]

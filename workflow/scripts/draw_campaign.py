@@ -23,15 +23,14 @@ def draw_campaign(job: Job) -> None:
     table = read_residuals(job.input.residuals, robot.joints)
     arm = corners(robot.chain, angles_of(table, robot.joints)[worst_measurement(table)])
     candidates = pd.read_csv(job.input.candidates).fillna({"note": ""})
-    stated = read_json(job.input.diagnosis)["document"]["probabilities"]
+    verdict = read_verdict(job.input.verdict)
     errors = pd.read_csv(job.input.before_after).to_dict("records")
     drawn = {
-        "before_after": draw_before_after(
-            errors, read_verdict(job.input.verdict).heldout.noise_floor_rms_m
-        ),
+        "before_after": draw_before_after(errors, verdict.heldout.noise_floor_rms_m),
         "arrows": draw_residual_arrows(table, arm),
         "candidates": draw_probabilities(
-            stated, {name: column.to_numpy() for name, column in candidates.items()}
+            verdict.probabilities,
+            {name: column.to_numpy() for name, column in candidates.items()},
         ),
     }
     for name, pdf, png in zip(

@@ -18,7 +18,7 @@ from elastocal.diagnosis.verdict import (
 from elastocal.effects.catalogue import list_effects
 from elastocal.effects.protocol import Shape
 from elastocal.effects.sizes import lever_m
-from elastocal.fitting.linearization import effect_columns
+from elastocal.fitting.linearization import compute_effect_sensitivities
 from elastocal.verdict import DataFault, Effect, EffectParameter, FaultValue
 from elastocal.verdict import Location as StatedLocation
 
@@ -148,8 +148,8 @@ def state_parameters(
         _state_parameter(member.key, unknown, float(value), index, fitted, average)
         for unknown, value, index in zip(
             unknowns,
-            np.concatenate(fitted.values_of(member.key)),
-            fitted.places_of(member.key),
+            np.concatenate(fitted.effect_values(member.key)),
+            fitted.parameter_indices(member.key),
             strict=True,
         )
     ]
@@ -173,7 +173,7 @@ def _state_parameter(
 ) -> EffectParameter:
     """State the unknown at an index of a fit."""
     key = (owner, unknown.name)
-    is_held = bool(fitted.held[index])
+    is_held = bool(fitted.unidentifiable[index])
     is_shape = isinstance(unknown, Shape)
     std_error = float(np.sqrt(fitted.covariance[index, index]))
     return EffectParameter(
@@ -245,15 +245,17 @@ def state_largest_sag(
         or fitted.joint_jacobian is None
     ):
         return []
-    columns = effect_columns(
+    columns = compute_effect_sensitivities(
         [(member.displacement, ()) for member in members],
-        fitted.conditions_of(observations.states),
+        fitted.get_conditions(observations.states),
         fitted.joint_jacobian[:, :3],
         observations.state,
     )
-    indices = np.concatenate([fitted.places_of(member.key) for member in members])
+    indices = np.concatenate(
+        [fitted.parameter_indices(member.key) for member in members]
+    )
     coefficients = np.concatenate(
-        [fitted.values_of(member.key)[0] for member in members]
+        [fitted.effect_values(member.key)[0] for member in members]
     )
     sag = columns @ coefficients
     largest = int(np.argmax((sag**2).sum(axis=1)))
@@ -317,11 +319,11 @@ def _generate_estimates(
     fitted: Fit, effect: Candidate
 ) -> Iterator[tuple[float, float, Parameter]]:
     """Yield value, standard error and definition of each linear parameter."""
-    indices = fitted.places_of(effect.key)
+    indices = fitted.parameter_indices(effect.key)
     std_errors = np.sqrt(np.diag(fitted.covariance)[indices])
     # Shapes come last and are not among the parameters.
     yield from zip(
-        fitted.values_of(effect.key)[0], std_errors, effect.parameters, strict=False
+        fitted.effect_values(effect.key)[0], std_errors, effect.parameters, strict=False
     )
 
 

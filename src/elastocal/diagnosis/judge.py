@@ -19,15 +19,24 @@ from elastocal.diagnosis.gross_errors import (
     format_gross_error_warnings,
 )
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.model import Case, conditions, measured_in_base, residuals
-from elastocal.fitting.noise import noise_from
-from elastocal.fitting.observations import single_observations, state_clusters
+from elastocal.fitting.model import (
+    Case,
+    compute_residuals,
+    evaluate_conditions,
+    transform_to_base,
+)
+from elastocal.fitting.noise import parse_noise
+from elastocal.fitting.observations import index_poses, separate_measurements
 from elastocal.io.typed_json import from_document, to_document
 from elastocal.random_streams import open_stream
 from elastocal.remainder.corrected import Corrected, corrected, remainder_facts
 from elastocal.validation import held_out as figures
-from elastocal.validation.conformity import count_configurations, joint_ranges
-from elastocal.validation.placing import outside_poses, placed, repeat_warnings
+from elastocal.validation.conformity import count_configurations, find_joint_ranges
+from elastocal.validation.transfer import (
+    find_extrapolated_poses,
+    transfer_fit,
+    warn_of_repeated_poses,
+)
 from elastocal.verdict import (
     BeforeAfter,
     Effect,
@@ -95,7 +104,7 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
     rows, heldout, warnings = compare_held_out_errors(steps, case, part, outside, seed)
     whole = (
         [
-            ErrorSummary(**figures.summary(error.distance))
+            ErrorSummary(**figures.summarize_errors(error.distance))
             for error in _errors(steps, case, held_out)[1]
         ]
         if left_out
@@ -195,20 +204,20 @@ def remove_gross_errors(
     ones, (P,)."""
     final = diagnosis.final
     measurements = held_out.campaign.measurements
-    poses = outside_poses(final, diagnosis.case, held_out)
+    poses = find_extrapolated_poses(final, diagnosis.case, held_out)
     part = held_out
     errors = OutlierTest.none(len(measurements), held_out.model.rows)
     if diagnosis.verdict.faults:
         return errors, part, poses
     settings = Settings()
-    noise = noise_from(diagnosis.document).of_measurements
+    noise = parse_noise(diagnosis.document).without_pose_error
     yardstick = estimate_prediction_uncertainty(
         final, noise, diagnosis.case.campaign.measurements
     )
-    outside = poses[state_clusters(measurements)]
+    outside = poses[index_poses(measurements)]
     for _ in range(settings.gross_error_rounds):
         # Frames of another campaign are fitted to what is kept of it.
-        there = placed(final, diagnosis.case, part)
+        there = transfer_fit(final, diagnosis.case, part)
         last = errors.gross
         errors = find_held_out_gross_errors(
             final, there, yardstick, held_out, outside, settings
@@ -219,7 +228,7 @@ def remove_gross_errors(
     return (
         errors,
         part,
-        np.bincount(state_clusters(part.campaign.measurements), outside[~errors.gross])
+        np.bincount(index_poses(part.campaign.measurements), outside[~errors.gross])
         > 0,
     )
 
@@ -236,22 +245,26 @@ def compare_held_out_errors(
     before = _declared(steps)
     after = len(steps) - 1
     draws = open_stream(seed, case.campaign.name, "held-out poses", 0)
-    limits, reductions = figures.intervals(errors, _REPLICATES, draws, before)
-    of_calibration = figures.intervals([errors[0], errors[after]], _REPLICATES, draws)[
-        1
-    ][1]
-    floor = figures.noise_floor(
+    limits, reductions = figures.compute_error_intervals(
+        errors, _REPLICATES, draws, before
+    )
+    of_calibration = figures.compute_error_intervals(
+        [errors[0], errors[after]], _REPLICATES, draws
+    )[1][1]
+    floor = figures.compute_noise_floor(
         steps[after].fitted, held_out.observations, *there[after]
     )
     rows = []
     warnings = []
     for step, error, limit in zip(steps, errors, limits, strict=True):
-        training = figures.summary(np.linalg.norm(step.fitted.residual[:, :3], axis=1))
-        tested = figures.summary(error.distance)
+        training = figures.summarize_errors(
+            np.linalg.norm(step.fitted.residual[:, :3], axis=1)
+        )
+        tested = figures.summarize_errors(error.distance)
         row: dict[str, Any] = {
             "step": step.name,
             "kind": step.kind,
-            "parameters": int((~step.fitted.held).sum()),
+            "parameters": int((~step.fitted.unidentifiable).sum()),
         }
         row |= {f"train_{name}": training[name] for name in figures.METRICS}
         for name in figures.METRICS:
@@ -276,16 +289,16 @@ def compare_held_out_errors(
             warnings.append(
                 f"the {_ERRORS[name]} {ABOUT_ERRORS} grew from {low:.3f} to {high:.3f} mm"
             )
-    by_range = figures.errors_by_range(
+    by_range = figures.summarize_errors_by_range(
         {"before": errors[before], "after": errors[after]}, outside
     )
-    summary_after = ErrorSummary(**figures.summary(errors[after].distance))
+    summary_after = ErrorSummary(**figures.summarize_errors(errors[after].distance))
     heldout = HeldOut(
         uncalibrated=UncalibratedErrors(
-            **figures.summary(errors[0].distance),
+            **figures.summarize_errors(errors[0].distance),
             reduction_ci95=(of_calibration.low, of_calibration.high),
         ),
-        before=ErrorSummary(**figures.summary(errors[before].distance)),
+        before=ErrorSummary(**figures.summarize_errors(errors[before].distance)),
         after=summary_after,
         noise_floor_rms_m=None if np.isnan(floor) else floor,
         reduction_ci95=(reductions[after].low, reductions[after].high),
@@ -294,11 +307,11 @@ def compare_held_out_errors(
         configurations=count_configurations(held_out.observations.states),
         joint_ranges=tuple(
             JointRange(**entry)
-            for entry in joint_ranges(
+            for entry in find_joint_ranges(
                 held_out.observations.states, held_out.campaign.robot
             )
         ),
-        share_below_max=figures.share_below_largest(errors[0].poses),
+        share_below_max=figures.bound_share_below_maximum(errors[0].poses),
         outside_range=from_document(ErrorsByRange, by_range, "errors by range"),
         with_gross_errors=None,
         delivered=summary_after,
@@ -312,18 +325,20 @@ def compare_held_out_errors(
         rows,
         heldout,
         warnings
-        + repeat_warnings(case.observations.states, held_out.observations.states),
+        + warn_of_repeated_poses(
+            case.observations.states, held_out.observations.states
+        ),
     )
 
 
 def _errors(
     steps: Sequence[Step], case: Case, held_out: Case
-) -> tuple[list[tuple[Model, Estimate]], list[figures.Errors]]:
+) -> tuple[list[tuple[Model, Estimate]], list[figures.PositionErrors]]:
     """Models of all steps, placed where held-out measurements were made, and their
     errors there."""
-    there = [placed(step.fitted, case, held_out) for step in steps]
+    there = [transfer_fit(step.fitted, case, held_out) for step in steps]
     return there, [
-        figures.position_errors(model, estimate, held_out.observations)
+        figures.compute_position_errors(model, estimate, held_out.observations)
         for model, estimate in there
     ]
 
@@ -344,7 +359,7 @@ def generate_residual_blocks(
         (case, diagnosis.left_out, False),
         (verdict.held_out, verdict.left_out, True),
     ):
-        there = [placed(fitted, case, part) for fitted in (before, after)]
+        there = [transfer_fit(fitted, case, part) for fitted in (before, after)]
         outside = (
             verdict.outside
             if unseen
@@ -352,19 +367,19 @@ def generate_residual_blocks(
         )
         measurements = part.campaign.measurements
         for some, beyond in (
-            (measurements, outside[state_clusters(measurements)]),
+            (measurements, outside[index_poses(measurements)]),
             (left_out, np.zeros(len(left_out), bool)),
         ):
             if not len(some):
                 continue
-            observations = single_observations(some)
+            observations = separate_measurements(some)
             off = {
-                stage: residuals(
-                    *each, observations, conditions(*each, observations.states)
+                stage: compute_residuals(
+                    *each, observations, evaluate_conditions(*each, observations.states)
                 )
                 for stage, each in zip(("before", "after"), there, strict=True)
             }
-            position = measured_in_base(there[-1][1], observations)[0]
+            position = transform_to_base(there[-1][1], observations)[0]
             yield tabulate_residuals(
                 some, unseen, some is left_out, beyond, position, off
             )

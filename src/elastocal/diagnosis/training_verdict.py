@@ -28,7 +28,7 @@ from elastocal.diagnosis.verdict import (
     list_locations,
     warn_of_scatter,
 )
-from elastocal.fitting.model import joint_compliances
+from elastocal.fitting.model import get_joint_compliances
 from elastocal.verdict import (
     Compliances,
     Convergence,
@@ -114,7 +114,7 @@ def state_training_verdict(
     held = {
         f"{owner} {parameter.name}"
         for (owner, parameter), is_held in zip(
-            final.parameters, final.held, strict=True
+            final.parameters, final.unidentifiable, strict=True
         )
         if is_held
     }
@@ -322,11 +322,11 @@ def _state_compliances(
         Largest share of the prior variance that an identifiable compliance keeps.
     """
     joints = final.model.sites.joints
-    after = joint_compliances(final.model, final.estimate).copy()
+    after = get_joint_compliances(final.model, final.estimate).copy()
     std_error = np.zeros(joints)
     identifiable = np.zeros(joints, bool)
     if final.model.identifies_compliance:
-        indices = final.places_of("joint_compliance")
+        indices = final.parameter_indices("joint_compliance")
         parameters = [final.parameters[index][1] for index in indices]
         keys = [("joint_compliance", parameter.name) for parameter in parameters]
         after += [average.shift.get(key, 0.0) for key in keys]
@@ -339,10 +339,10 @@ def _state_compliances(
         )
         # The prior is taken to be as wide as the largest plausible compliance.
         plausible = np.array([parameter.plausible for parameter in parameters])
-        identifiable = ~final.held[indices] & (
+        identifiable = ~final.unidentifiable[indices] & (
             std_error**2 < prior_share * (std_error**2 + plausible**2)
         )
-    before = joint_compliances(declared.model, declared.estimate)
+    before = get_joint_compliances(declared.model, declared.estimate)
     return Compliances(
         before=tuple((1e6 * before).tolist()),
         after=tuple((1e6 * after).tolist()),

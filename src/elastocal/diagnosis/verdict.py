@@ -24,7 +24,7 @@ import numpy as np
 
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.model_averaging import compute_extra_squares
-from elastocal.fitting.model import joint_compliances
+from elastocal.fitting.model import get_joint_compliances
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -418,8 +418,8 @@ def find_contradictions(final: Fit, measured: Noise, settings: Settings) -> list
     contradictions += warn_of_pose_error(final.noise, settings.largest_pose_error_rad)
     if not final.model.identifies_compliance:
         return contradictions
-    compliance = joint_compliances(final.model, final.estimate)
-    indices = final.places_of("joint_compliance")
+    compliance = get_joint_compliances(final.model, final.estimate)
+    indices = final.parameter_indices("joint_compliance")
     std_error = np.sqrt(np.diag(final.covariance))[indices]
     negative = compliance < -settings.negative_compliance * std_error
     for joint in np.flatnonzero(negative):

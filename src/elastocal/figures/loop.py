@@ -32,6 +32,7 @@ from elastocal.report.words import (
     probability_words,
     unit_of,
 )
+from elastocal.verdict import Probabilities
 
 # Of more states than this only one is drawn in each cell of a grid of so many columns.
 _MOST_ARROWS = 320
@@ -380,7 +381,7 @@ def draw_errors_by_campaign(table: pd.DataFrame) -> Figure:
 
 @styled
 def draw_probabilities(
-    stated: Mapping[str, Any] | None, table: Mapping[str, np.ndarray]
+    stated: Probabilities | None, table: Mapping[str, np.ndarray]
 ) -> Figure:
     """Posterior probabilities of the leading hypotheses, and Bayes factors of the
     leading candidates alone.
@@ -400,10 +401,10 @@ def draw_probabilities(
             if faulty
             else nothing
         )
-    sets = stated["sets"][:_HYPOTHESES]
+    sets = stated.sets[:_HYPOTHESES]
     named = order[:_NAMED]
     labels = [textwrap.fill(capital(words), _LABEL) for words in hypotheses_words(sets)]
-    values = [entry["probability"] for entry in sets]
+    values = [hypothesis.probability for hypothesis in sets]
     if (rest := 1.0 - sum(values)) > 0.001:
         labels = [*labels, _ALL_ELSE]
         values = [*values, rest]

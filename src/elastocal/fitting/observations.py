@@ -82,15 +82,15 @@ class Observations:
     def cluster(self) -> np.ndarray:
         """ndarray (M,): number of the (session, pose) that each observation belongs to,
         0 .. P-1."""
-        return state_clusters(self.states)[self.state]
+        return index_poses(self.states)[self.state]
 
 
-def state_clusters(states: States | Measurements) -> np.ndarray:
+def index_poses(states: States | Measurements) -> np.ndarray:
     """Number of the (session, pose) of each state, ndarray (S,): 0 .. P-1."""
     return group_equal_rows(np.column_stack([states.session, states.pose]))[1]
 
 
-def groups_by_size(group: np.ndarray) -> list[np.ndarray]:
+def batch_groups_by_size(group: np.ndarray) -> list[np.ndarray]:
     """Places of each group, for each number k of places in one, ndarray (G, k) of int.
 
     `group` (M,) of int: such as the states or the poses of observations. Groups by
@@ -105,12 +105,12 @@ def groups_by_size(group: np.ndarray) -> list[np.ndarray]:
     ]
 
 
-def averaged(measurements: Measurements) -> Observations:
+def average_repeats(measurements: Measurements) -> Observations:
     """Observations with the repeats averaged that were approached alike."""
     return _observations(measurements, _approached_alike(measurements))
 
 
-def each_approach(measurements: Measurements) -> tuple[Observations, np.ndarray]:
+def separate_approaches(measurements: Measurements) -> tuple[Observations, np.ndarray]:
     """Observations of every single approach, and (S,) in which state it would be if
     repeats were averaged."""
     key = _approached_alike(measurements)
@@ -120,7 +120,7 @@ def each_approach(measurements: Measurements) -> tuple[Observations, np.ndarray]
     )[1]
 
 
-def single_observations(measurements: Measurements) -> Observations:
+def separate_measurements(measurements: Measurements) -> Observations:
     """Every measurement as an observation in a state of its own, in the order of the
     measurements."""
     every = np.arange(len(measurements))
@@ -136,7 +136,7 @@ def single_observations(measurements: Measurements) -> Observations:
     )
 
 
-def without_outlying_repeats(measurements: Measurements) -> Measurements:
+def remove_outlying_repeats(measurements: Measurements) -> Measurements:
     """Measurements without those that are far from the other repeats of their state and
     target.
 
@@ -165,7 +165,7 @@ def without_outlying_repeats(measurements: Measurements) -> Measurements:
     )
 
 
-def measured_in(
+def match_states_and_targets(
     some: Measurements | Observations,
     others: Measurements | Observations,
     chosen: np.ndarray,
@@ -253,7 +253,7 @@ def select_states(observations: Observations, kept: np.ndarray) -> Observations:
     return _some_of(observations, kept, kept[observations.state], np.cumsum(kept) - 1)
 
 
-def parts_of(
+def split_into_blocks(
     observations: Observations, columns: int
 ) -> list[tuple[slice, slice, Observations]]:
     """Some observations in parts of whole poses, in their order, one where their
@@ -273,7 +273,7 @@ def parts_of(
                 observations,
             )
         ]
-    first = np.flatnonzero(np.diff(state_clusters(observations.states), prepend=-1))
+    first = np.flatnonzero(np.diff(index_poses(observations.states), prepend=-1))
     place = np.searchsorted(observations.state, first)
     chosen = np.unique(
         np.searchsorted(place, np.arange(0, len(observations), most)).clip(
@@ -312,7 +312,7 @@ def _some_of(
     return Observations(States(**values), **own | {"state": number[own["state"]]})
 
 
-def spread_poses(observations: Observations, most: int) -> np.ndarray:
+def select_spread_poses(observations: Observations, most: int) -> np.ndarray:
     """Which states belong to poses evenly spread over a campaign, so many that about
     `most` observations are left.
 
@@ -320,7 +320,7 @@ def spread_poses(observations: Observations, most: int) -> np.ndarray:
     """
     if len(observations) <= most:
         return np.ones(len(observations.states), bool)
-    pose = state_clusters(observations.states)
+    pose = index_poses(observations.states)
     poses = pose.max() + 1
     chosen = np.zeros(poses, bool)
     chosen[
@@ -331,7 +331,7 @@ def spread_poses(observations: Observations, most: int) -> np.ndarray:
     return chosen[pose]
 
 
-def sample_of(
+def sample_observations(
     observations: Observations, most: int, like: Observations | None = None
 ) -> Observations:
     """About so many observations at poses spread over a campaign, or all where the
@@ -341,12 +341,12 @@ def sample_of(
     """
     if len(observations) <= most:
         return observations
-    chosen = spread_poses(observations, most)
+    chosen = select_spread_poses(observations, most)
     if like is not None:
         chosen = np.isin(
             np.arange(len(chosen)),
             observations.state[
-                measured_in(observations, like, np.ones(len(like), bool))
+                match_states_and_targets(observations, like, np.ones(len(like), bool))
             ],
         )
     some = select_states(observations, chosen)

@@ -15,20 +15,22 @@ import numpy as np
 from elastocal import __version__
 from elastocal.application.accuracy import (
     REGION,
-    build_residual_model,
-    calibrate_on_case,
     compute_uncorrected_rms_m,
     predict_errors,
     select_campaign_commands,
-    set_form_error,
-    tabulate_errors,
 )
 from elastocal.application.calibrated import compute_effect_contributions
 from elastocal.application.frames import root_mean_square
+from elastocal.application.scope import (
+    build_residual_model,
+    calibrate_on_case,
+    set_form_error,
+)
+from elastocal.application.statements import tabulate_errors
 from elastocal.campaigns.campaign_folder import CampaignFolder, read_campaign_folder
 from elastocal.diagnosis.misplaced import describe_reference_point
 from elastocal.errors import InputError
-from elastocal.fitting.noise import noise_from
+from elastocal.fitting.noise import parse_noise
 from elastocal.io.json_files import read_json
 from elastocal.io.origin import configuration_sha256
 from elastocal.io.records import check_sources, trace_jobs
@@ -38,9 +40,9 @@ from elastocal.remainder.corrected import predictor_of
 from elastocal.validation.conformity import (
     PASS,
     UNDECIDED,
-    joint_ranges,
-    predicted_conformity,
-    shortfalls,
+    decide_conformity,
+    find_joint_ranges,
+    list_shortfalls,
 )
 from elastocal.verdict import read_verdict
 
@@ -108,13 +110,15 @@ class Diagnosed:
             model,
             estimate,
             np.array(self.facts["covariance"]),
-            noise_from(step),
+            parse_noise(step),
             regression,
         )
         accuracy = self.verdict.accuracy
         if accuracy and accuracy.contradicted:
-            return set_form_error(robot, accuracy.form_m, True)
-        return set_form_error(robot, self.verdict.other_models_m or 0.0, False)
+            return set_form_error(robot, accuracy.form_m, contradicted=True)
+        return set_form_error(
+            robot, self.verdict.other_models_m or 0.0, contradicted=False
+        )
 
     def by_physics(self) -> Diagnosed:
         """Return the same campaign as if no regression had been asked for."""
@@ -243,9 +247,9 @@ def certificate(
     states = campaign.case.observations.states
     commands = select_campaign_commands(calibrated)
     prediction = predict_errors(calibrated, *commands)
-    accuracy = prediction.accuracy(REGION)
-    decision = predicted_conformity(prediction.rms_m, tolerance_m, accepted_risk)
-    missing = shortfalls(heldout.configurations, states, robot)
+    accuracy = prediction.summarize(REGION)
+    decision = decide_conformity(prediction.rms_m, tolerance_m, accepted_risk)
+    missing = list_shortfalls(heldout.configurations, states, robot)
     if not accuracy.fitted:
         missing.insert(
             0,
@@ -282,7 +286,7 @@ def certificate(
         "worst_pose": _describe_worst_pose(robot, commands[0], prediction.error_m),
         "conformity": asdict(decision)
         | {"configurations": heldout.configurations, "shortfalls": missing},
-        "joint_ranges": joint_ranges(states, robot),
+        "joint_ranges": find_joint_ranges(states, robot),
         "budget": [{"name": name, "rms_m": rms_m} for name, rms_m in budget.items()],
         "budget_states": accuracy.poses,
         "tracker_rms_m": float(np.sqrt(3.0) * calibrated.noise.position_m),

@@ -27,11 +27,11 @@ from elastocal.diagnosis.gross_errors import (
 )
 from elastocal.diagnosis.misplaced import find_misplaced_frames
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import case_from, joint_compliances
-from elastocal.fitting.noise import effective_parameters
+from elastocal.fitting.least_squares import fit_model
+from elastocal.fitting.model import build_case, get_joint_compliances
+from elastocal.fitting.noise import count_effective_parameters
 from elastocal.loop.loading import load_campaign
-from elastocal.validation.placing import repeat_warnings
+from elastocal.validation.transfer import warn_of_repeated_poses
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -82,7 +82,7 @@ def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
     descriptions, training, held_out = load_campaign(
         read_campaign_folder(folder, robots_folder)
     )
-    whole = case_from(descriptions, tabulate_measurements(training))
+    whole = build_case(descriptions, tabulate_measurements(training))
     settings = Settings()
     part = select_initial_subset(whole, settings)
     errors = find_gross_errors(
@@ -126,7 +126,7 @@ def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
     attention += [
         *format_gross_error_warnings(left_out),
         *_suspicious(case, declared, training, held_out),
-        *repeat_warnings(training, held_out),
+        *warn_of_repeated_poses(training, held_out),
     ]
     reasons = Counter(untestable.values()).most_common()
     rows += [
@@ -177,14 +177,16 @@ def _identified(declared: Fit) -> list[tuple[str, str]]:
     determine."""
     rms = 1e3 * np.sqrt((declared.residual[:, :3] ** 2).sum(axis=1).mean())
     named = [f"{owner} {parameter.name}" for owner, parameter in declared.parameters]
-    held = [name for name, held in zip(named, declared.held, strict=True) if held]
+    held = [
+        name for name, held in zip(named, declared.unidentifiable, strict=True) if held
+    ]
     left = f"; not identifiable: {list_first(held, _NAMED)}" if held else ""
-    count = format_count(int((~declared.held).sum()), "parameter")
+    count = format_count(int((~declared.unidentifiable).sum()), "parameter")
     return [
         ("declared model", f"residual of {rms:.3f} mm RMS on the fitted poses"),
         (
             "identified",
-            f"{count}, effectively {effective_parameters(declared):.0f}{left}",
+            f"{count}, effectively {count_effective_parameters(declared):.0f}{left}",
         ),
     ]
 
@@ -195,7 +197,7 @@ def _with_base(declared: Fit, case: Case) -> Fit:
     base = case.candidates.get("base_placement")
     if base is None or case.campaign.frame != "base":
         return declared
-    return fit(
+    return fit_model(
         replace(declared.model, effects=(*declared.model.effects, base)),
         case.observations,
         declared.noise,
@@ -211,11 +213,13 @@ def _negative_springs(declared: Fit) -> list[str]:
     lacks hides behind them."""
     if not declared.model.identifies_compliance:
         return []
-    mine = declared.places_of("joint_compliance")
+    mine = declared.parameter_indices("joint_compliance")
     errors = np.where(
-        declared.held[mine], np.inf, np.sqrt(np.diag(declared.covariance))[mine]
+        declared.unidentifiable[mine],
+        np.inf,
+        np.sqrt(np.diag(declared.covariance))[mine],
     )
-    below = joint_compliances(declared.model, declared.estimate) < -_CLEAR * errors
+    below = get_joint_compliances(declared.model, declared.estimate) < -_CLEAR * errors
     return [str(joint + 1) for joint in np.flatnonzero(below)]
 
 
@@ -226,8 +230,8 @@ def _suspicious(
     found = []
     states = case.observations.states
     numbers = declared.residual.size
-    effective = effective_parameters(declared)
-    parameters = int((~declared.held).sum())
+    effective = count_effective_parameters(declared)
+    parameters = int((~declared.unidentifiable).sum())
     poses = _poses(training)
     least = int(np.ceil(poses * Settings().numbers_a_parameter * effective / numbers))
     if least > poses:

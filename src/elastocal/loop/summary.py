@@ -11,7 +11,11 @@ import pandas as pd
 from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.loop.schemas import residuals
 from elastocal.random_streams import open_stream
-from elastocal.validation.held_out import Errors, intervals, summary
+from elastocal.validation.held_out import (
+    PositionErrors,
+    compute_error_intervals,
+    summarize_errors,
+)
 from elastocal.verdict import Verdict, read_verdict
 
 if TYPE_CHECKING:
@@ -104,13 +108,15 @@ def _errors(part: pd.DataFrame, draws: np.random.Generator) -> dict[str, float]:
     mean = part.groupby(state, sort=True)[columns].mean()
     cluster = np.unique(mean.index.get_level_values("pose"), return_inverse=True)[1]
     errors = [
-        Errors(np.linalg.norm(mean[columns[3 * k : 3 * k + 3]], axis=1), cluster)
+        PositionErrors(
+            np.linalg.norm(mean[columns[3 * k : 3 * k + 3]], axis=1), cluster
+        )
         for k in range(len(_STAGES))
     ]
-    limits, reductions = intervals(errors, _REPLICATES, draws)
+    limits, reductions = compute_error_intervals(errors, _REPLICATES, draws)
     row: dict[str, float] = {"poses": errors[0].poses}
     for stage, error, limit in zip(_STAGES, errors, limits, strict=True):
-        for name, value in summary(error.distance).items():
+        for name, value in summarize_errors(error.distance).items():
             row[f"{stage}_{name.removesuffix('_m')}_mm"] = 1e3 * value
         row[f"{stage}_rms_low_mm"], row[f"{stage}_rms_high_mm"] = 1e3 * limit["rms_m"]
     row["rms_reduction_low"] = reductions[1].low

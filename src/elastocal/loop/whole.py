@@ -7,22 +7,24 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from elastocal.application.accuracy import (
-    build_residual_model,
-    calibrate_on_case,
     compute_uncorrected_rms_m,
     inflate_to_held_out_errors,
     predict_campaign_accuracy,
     select_campaign_commands,
-    set_form_error,
 )
 from elastocal.application.calibrated import compute_effect_contributions
+from elastocal.application.scope import (
+    build_residual_model,
+    calibrate_on_case,
+    set_form_error,
+)
 from elastocal.campaigns.campaign import tabulate_measurements
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import generate_residual_blocks, judge
 from elastocal.diagnosis.misplaced import find_misplaced_frames
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.model import Case, case_from
+from elastocal.fitting.model import Case, build_case
 from elastocal.io.json_files import read_json
 from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import write_table
@@ -30,8 +32,8 @@ from elastocal.io.typed_json import from_document
 from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop.loading import load_campaign
 from elastocal.loop.schemas import residuals
-from elastocal.validation.held_out import position_residuals
-from elastocal.validation.placing import placed
+from elastocal.validation.held_out import compute_position_residuals
+from elastocal.validation.transfer import transfer_fit
 from elastocal.verdict import MisplacedFrame, PredictedErrors, write_verdict
 
 if TYPE_CHECKING:
@@ -74,8 +76,8 @@ def cases_in(folder: str | Path, robots_folder: str | Path) -> tuple[Case, Case]
         read_campaign_folder(folder, robots_folder)
     )
     return (
-        case_from(descriptions, tabulate_measurements(training)),
-        case_from(
+        build_case(descriptions, tabulate_measurements(training)),
+        build_case(
             descriptions["held_out"] or descriptions, tabulate_measurements(held_out)
         ),
     )
@@ -111,7 +113,9 @@ def calibrated_by(
     """
     case = diagnosis.case
     final = diagnosis.final
-    residual = position_residuals(*placed(final, case, held_out), held_out.observations)
+    residual = compute_position_residuals(
+        *transfer_fit(final, case, held_out), held_out.observations
+    )
     noise_m = final.noise.position_m
     more = None
     if delivered is not None and delivered.predictor is not None:
@@ -150,13 +154,13 @@ def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
         return judgement
     robot = calibrated_by(diagnosis, judgement.held_out, judgement.delivered)
     physics = None
-    if robot.remainder is not None:
+    if robot.residual_model is not None:
         physics_robot = calibrated_by(
             diagnosis, judgement.held_out, judgement.delivered, physics_only=True
         )
         physics = _predict_errors(physics_robot)
     contributions = compute_effect_contributions(
-        replace(robot, remainder=None), *select_campaign_commands(robot)
+        replace(robot, residual_model=None), *select_campaign_commands(robot)
     )
     predicted = _predict_errors(robot)
     misplaced = find_misplaced_frames(diagnosis.final, diagnosis.case.campaign)

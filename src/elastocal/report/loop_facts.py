@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal import __version__
-from elastocal.application.accuracy import tabulate_errors
+from elastocal.application.statements import tabulate_errors
 from elastocal.counting import format_integer, pluralize
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.effects.catalogue import list_effects

@@ -37,7 +37,10 @@ def measured_rows(
     validation_cells = _describe_measurements(
         _select_rows(table, held_out), validation["campaign"]
     )
-    return [[name, cell, validation_cells[name]] for name, cell in fitted_cells.items()]
+    return [
+        [name, cell, validation_cells.get(name, "")]
+        for name, cell in fitted_cells.items()
+    ]
 
 
 def _select_rows(

@@ -8,7 +8,7 @@ Sentences stand in templates, which have the functions of this module as filters
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from elastocal.effects.protocol import effect_of
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping, Sequence
 
-    from elastocal.verdict import MechanismSet
+    from elastocal.verdict import JointRange, MechanismSet
 
 MICRO = 1e6
 MILLI = 1e3
@@ -291,17 +291,16 @@ def true_minus(text: str) -> str:
     return re.sub(r"(?<= )-(?=\d)", "−", text)
 
 
-def span_words(joint_ranges: Sequence[Mapping[str, Any]]) -> str:
-    """Where the joints stood, as of `validation.span.joint_ranges`."""
-    each = []
+def span_words(joint_ranges: Sequence[JointRange]) -> str:
+    """Return the range of each joint in words."""
+    ranges = []
     for joint, ends in enumerate(joint_ranges, 1):
-        unit, digits = ("°", 0) if ends["unit"] == "deg" else (" m", 2)
-        each.append(
-            minus(
-                f"joint {joint} {ends['low']:.{digits}f} to {ends['high']:.{digits}f}{unit}"
-            )
-        )
-    return ", ".join(each)
+        if ends.unit == "deg":
+            text = f"joint {joint} {ends.low:.0f} to {ends.high:.0f}°"
+        else:
+            text = f"joint {joint} {ends.low:.2f} to {ends.high:.2f} m"
+        ranges.append(minus(text))
+    return ", ".join(ranges)
 
 
 def unit_of(metres: float) -> tuple[float, str]:

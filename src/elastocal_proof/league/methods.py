@@ -26,8 +26,8 @@ from elastocal.diagnosis.model_averaging import compute_explained_squares
 from elastocal.diagnosis.settings import Settings
 from elastocal.errors import InputError
 from elastocal.fitting.least_squares import Fit
-from elastocal.fitting.model import Case, case_from
-from elastocal.fitting.noise import estimated_noise, fit_declared
+from elastocal.fitting.model import Case, build_case
+from elastocal.fitting.noise import estimate_noise, fit_declared_model
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import read_table, write_table
@@ -38,8 +38,8 @@ from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.random_streams import open_stream
 from elastocal.remainder.corrected import corrected
 from elastocal.remainder.regressions import REGRESSIONS
-from elastocal.validation.held_out import position_residuals
-from elastocal.validation.placing import placed
+from elastocal.validation.held_out import compute_position_residuals
+from elastocal.validation.transfer import transfer_fit
 from elastocal_proof.league.schemas import ENTRIES, FOLDS, MECHANISMS
 
 Columns = Mapping[str, np.ndarray]
@@ -62,7 +62,7 @@ class DataSet:
 
     def case(self, chosen: np.ndarray | slice = slice(None)) -> Case:
         """A case of some of the measurements, or of all."""
-        return case_from(
+        return build_case(
             self.descriptions,
             {name: values[chosen] for name, values in self.columns.items()},
         )
@@ -154,7 +154,7 @@ def method_from(described: Mapping[str, Any], name: str, source: str) -> Method:
 def fitted_physics(physics: str, case: Case) -> Fit:
     """Fit frames, or what the campaign declares, to training poses."""
     model = replace(case.model, effects=()) if physics == FRAMES else case.model
-    return fit_declared(model, case.observations, estimated_noise(case)[0])
+    return fit_declared_model(model, case.observations, estimate_noise(case)[0])
 
 
 def entered(
@@ -170,7 +170,9 @@ def entered(
     seen = held_out.observations
     std = None
     if method.regression is None:
-        residual = position_residuals(*placed(fitted, case, held_out), seen)
+        residual = compute_position_residuals(
+            *transfer_fit(fitted, case, held_out), seen
+        )
     else:
         blocks = split != RANDOM
         within_range = method.within_range

@@ -13,7 +13,11 @@ from elastocal.campaigns.campaign import group_equal_rows
 from elastocal.counting import format_count
 from elastocal.random_streams import open_stream
 from elastocal.remainder.corrected import NORMAL_WIDTH
-from elastocal.validation.held_out import Errors, intervals, summary
+from elastocal.validation.held_out import (
+    PositionErrors,
+    compute_error_intervals,
+    summarize_errors,
+)
 from elastocal_proof.league.methods import BLOCKS, DIAGNOSIS, RANDOM, SESSION, Method
 
 # A row of the league's table; and rows of the entries table by data set, split and
@@ -60,15 +64,15 @@ def league_table(
             for part in mine.values()
         ]
         poses = [group_equal_rows(part[_POSE].to_numpy())[1] for part in mine.values()]
-        errors = [Errors(*each) for each in zip(distances, poses, strict=True)]
-        figures = [summary(error.distance) for error in errors]
+        errors = [PositionErrors(*each) for each in zip(distances, poses, strict=True)]
+        figures = [summarize_errors(error.distance) for error in errors]
         rms = [each["rms_m"] for each in figures]
         places = {
             "ratio": list(mine).index(reference),
             "ratio_to_best": int(np.argmin(rms)),
         }
         drawn = [
-            intervals(
+            compute_error_intervals(
                 errors,
                 _REPLICATES,
                 open_stream(seed, data, f"league {split}", number),
