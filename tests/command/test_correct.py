@@ -7,6 +7,7 @@ Nothing is written where a pose cannot be reached.
 import json
 import re
 import shutil
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 
@@ -15,6 +16,7 @@ import pandas as pd
 import pytest
 from analysed_robots import ROBOTS, analysed
 from certified import record_jobs
+from made_loop_tables import CAMPAIGNS
 from made_urdf import joint, link
 from made_urdf import robot as made
 from scipy.spatial.transform import Rotation
@@ -25,8 +27,10 @@ from elastocal.campaigns import campaign_folder
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.reading import read_robot
 from elastocal.exchange.urdf import robot_from_urdf
+from elastocal.io.typed_json import to_document
 from elastocal.loop.calibrated_files import load_diagnosed
 from elastocal.mechanics.kinematics import poses
+from elastocal.verdict import MisplacedFrame, read_verdict, write_verdict
 
 BENT = np.array([0.0, 0.2, 0.1, 0.3, 0.7, 0.0])
 
@@ -255,7 +259,7 @@ def test_a_certificate_states_the_campaign_and_correct_its_targets(
         and document["point"] in lines[2]
         and lines[3].endswith(".pdf")
     )
-    rows = tabulate_errors(json.loads(VERDICT.read_text()))
+    rows = tabulate_errors(read_verdict(VERDICT))
     assert document["errors"] == rows and len(rows) == 2
     assert (
         document["budget"][0]["name"] == "uncorrected"
@@ -313,22 +317,19 @@ def test_what_is_misplaced_is_said_and_data_at_fault_get_no_certificate(
 ):
     shutil.copytree(checkout, tmp_path / "top", symlinks=True)
     monkeypatch.chdir(tmp_path / "top")
-    verdict = json.loads(VERDICT.read_text())
+    verdict = read_verdict(VERDICT)
     sentence = "reflector or tool sits 5.0 mm from where it is declared"
-    VERDICT.write_text(json.dumps(verdict | {"misplaced": [{"sentence": sentence}]}))
+    frame = MisplacedFrame("reflector or tool", (), (0.0, 0.0, 5e-3), 10.0, sentence)
+    write_verdict(VERDICT, replace(verdict, misplaced=(frame,)))
     record_jobs("made", read_campaign_folder("made", ROBOTS).files())
     for words in (
         ("certificate", "made", "--tolerance", "0.5mm"),
         ("correct", "made", path, "--output", "t.csv"),
     ):
         assert f"! {sentence}" in elastocal(*words).stderr, words
-    assert json.loads(CERTIFICATE.read_text())["misplaced"] == [{"sentence": sentence}]
-    VERDICT.write_text(
-        json.dumps(
-            verdict
-            | {"effects": [{"family": "data", "name": "wrong_sign"}], "accuracy": None}
-        )
-    )
+    assert json.loads(CERTIFICATE.read_text())["misplaced"] == [to_document(frame)]
+    faults = CAMPAIGNS["fault of the data"].effects
+    write_verdict(VERDICT, replace(verdict, effects=faults, accuracy=None))
     record_jobs("made", read_campaign_folder("made", ROBOTS).files())
     assert "data at fault" in refusal("certificate", "made", "--tolerance", "0.5mm")
 

@@ -59,7 +59,10 @@ def found(campaign):
     count = len(campaign.declared.parameters) + sum(
         len(effect.parameters) for effect in effects
     )
-    stated = {"covariance": 1e-24 * np.eye(count), "held": np.zeros(count, bool)}
+    stated = {
+        "covariance": 1e-24 * np.eye(count),
+        "unidentifiable": np.zeros(count, bool),
+    }
     fitted = replace(campaign.declared, model=model, estimate=start, **stated)
     return fitted, [effect.key for effect in effects]
 
