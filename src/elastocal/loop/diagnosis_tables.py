@@ -23,7 +23,7 @@ from elastocal.io.typed_json import from_document
 from elastocal.loop.schemas import STEPS, measurements
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.random_streams import open_stream
-from elastocal.verdict import NextExperiment, TrainingVerdict
+from elastocal.verdict import TrainingVerdict
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -54,13 +54,12 @@ def diagnose_campaign(job: Any) -> None:
         seed,
         lambda line: print(f"{name}: {line}", file=sys.stderr, flush=True),
     )
-    columns, facts = propose_experiment(
+    columns, proposal = propose_experiment(
         found,
         open_stream(seed, case.campaign.name, "next experiment", 0),
         job.params.states,
     )
     write_csv(job.output.experiment, pd.DataFrame(columns))
-    proposal = from_document(NextExperiment, facts, "next experiment")
     found = replace(found, verdict=replace(found.verdict, next_experiment=proposal))
     write_csv(job.output.candidates, pd.DataFrame(candidate_rows(found)))
     write_json(

@@ -28,13 +28,12 @@ from elastocal.fitting.model import Case, build_case
 from elastocal.io.json_files import read_json
 from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import write_table
-from elastocal.io.typed_json import from_document
 from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop.loading import load_campaign
 from elastocal.loop.schemas import residuals
 from elastocal.validation.held_out import compute_position_residuals
 from elastocal.validation.transfer import transfer_fit
-from elastocal.verdict import MisplacedFrame, PredictedErrors, write_verdict
+from elastocal.verdict import PredictedErrors, write_verdict
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -175,10 +174,7 @@ def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
             accuracy=predicted.accuracy,
             uncorrected_m=predicted.uncorrected_m,
             physics=physics,
-            misplaced=tuple(
-                from_document(MisplacedFrame, frame, "misplaced frames")
-                for frame in misplaced
-            ),
+            misplaced=tuple(misplaced),
         ),
     )
 

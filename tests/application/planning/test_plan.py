@@ -121,9 +121,9 @@ def test_information_is_the_inverse_of_the_covariance_of_a_fit_with_priors(measu
         seen, position=position, rotation=None if seen.rotation is None else rotation
     )
     noise = Noise("declared", survey.position_m, survey.orientation_rad, np.zeros(6))
-    found = fit(model, exact, noise, estimate)
+    found = fit_model(model, exact, noise, estimate)
     rows = compute_information_rows(survey, some.joint_angles, some.force)
-    scale = np.array([p.plausible for _, p in parameters(model, estimate)])
+    scale = np.array([p.plausible for _, p in list_parameters(model, estimate)])
     free = np.array(
         [
             owner.startswith(("frame", "target", "joint_compliance"))
@@ -147,7 +147,7 @@ def test_what_a_placement_of_the_base_takes_up_is_no_error_unless_the_base_is_kn
         rows = compute_accuracy_rows(survey, some.joint_angles, some.force)
         names = [
             (owner, parameter.name)
-            for owner, parameter in parameters(*declare_model(survey))
+            for owner, parameter in list_parameters(*declare_model(survey))
         ]
         assert rows.shape == (40, 3, len(names))
         size = np.sqrt((rows**2).sum(axis=1).mean(axis=0))
@@ -177,7 +177,7 @@ def test_an_unknown_offset_of_the_reflector_takes_up_the_last_link(survey):
         )
         last = [
             owner == "link_geometry@6" and p.unit == "m"
-            for owner, p in parameters(*declare_model(one))
+            for owner, p in list_parameters(*declare_model(one))
         ]
         sizes.append(
             np.abs(
