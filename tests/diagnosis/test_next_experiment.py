@@ -29,7 +29,7 @@ from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.verdict import conclude
 
 SETTINGS = Settings(pose_steps=(0.0, 2.0), other_features=6)
-RAISED = Alarm(0.002, 10.0, True)
+RAISED = Alarm(0.002, 10.0, raised=True)
 ELASTIC = ("link_elasticity", "base_compliance", "joint_tilt")
 
 

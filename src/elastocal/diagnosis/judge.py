@@ -14,11 +14,11 @@ from elastocal.counting import format_count
 from elastocal.diagnosis.gross_errors import (
     OutlierTest,
     describe_gross_errors,
-    estimate_prediction_uncertainty,
     find_held_out_gross_errors,
     format_gross_error_warnings,
 )
 from elastocal.diagnosis.settings import Settings
+from elastocal.diagnosis.studentized_residuals import estimate_prediction_uncertainty
 from elastocal.fitting.model import (
     Case,
     compute_residuals,
@@ -211,16 +211,19 @@ def remove_gross_errors(
         return errors, part, poses
     settings = Settings()
     noise = parse_noise(diagnosis.document).without_pose_error
-    yardstick = estimate_prediction_uncertainty(
+    fitted_uncertainty = estimate_prediction_uncertainty(
         final, noise, diagnosis.case.campaign.measurements
     )
     outside = poses[index_poses(measurements)]
     for _ in range(settings.gross_error_rounds):
         # Frames of another campaign are fitted to what is kept of it.
-        there = transfer_fit(final, diagnosis.case, part)
+        model, estimate = transfer_fit(final, diagnosis.case, part)
+        uncertainty = fitted_uncertainty
+        if model is not final.model or estimate is not final.estimate:
+            uncertainty = replace(fitted_uncertainty, parameter_covariance=None)
         last = errors.gross
         errors = find_held_out_gross_errors(
-            final, there, yardstick, held_out, outside, settings
+            model, estimate, uncertainty, held_out, outside, settings
         )
         part = held_out.select(~errors.gross) if errors.gross.any() else held_out
         if (errors.gross == last).all():

@@ -137,7 +137,7 @@ def state_training_verdict(
         converged=Convergence(declared.converged, final.converged),
         warnings=(
             *dict.fromkeys(warnings),
-            *format_gross_error_warnings(result.gross_errors),
+            *format_gross_error_warnings(list(result.gross_errors)),
         ),
         settings={
             name: Setting(**entry) for name, entry in settings.document().items()
