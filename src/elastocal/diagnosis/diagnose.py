@@ -6,6 +6,7 @@ The held-out poses are opened by `judge`, once, at the end.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from elastocal.diagnosis import model_averaging, refit, verdict
 from elastocal.diagnosis.alarm import run_alarm_test
 from elastocal.diagnosis.candidate_design import build_candidate_design, refine_shapes
 from elastocal.diagnosis.centre_prior import choose_centre_prior
+from elastocal.diagnosis.effect_estimates import find_oversized_effects
 from elastocal.diagnosis.fitted_subset import (
     FittedSubset,
     fit_subset,
@@ -40,8 +42,9 @@ from elastocal.fitting.least_squares import (
 from elastocal.fitting.model import Case, get_parameter_values
 from elastocal.fitting.noise import count_effective_parameters, serialize_noise
 from elastocal.fitting.observations import Observations
+from elastocal.io.typed_json import to_document
 from elastocal.random_streams import open_stream
-from elastocal.remainder.repeatable import Repeatable, repeatable_part
+from elastocal.remainder.repeatable import repeatable_part
 from elastocal.validation.held_out import predict_left_out_squares
 
 if TYPE_CHECKING:
@@ -107,9 +110,15 @@ class Diagnosis:
     case: Case
     steps: tuple[Step, ...]
     evidence: Evidence | None
-    document: dict[str, Any] = field(repr=False)
+    verdict: TrainingVerdict = field(repr=False)
     left_out: Measurements
     settings: Settings = field(default_factory=Settings, repr=False)
+
+    @cached_property
+    def document(self) -> dict[str, Any]:
+        """The verdict as a JSON document."""
+        document: dict[str, Any] = to_document(self.verdict)
+        return document
 
     @property
     def declared(self) -> Fit:
