@@ -57,6 +57,7 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.search import Posterior, ScoredModel
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.noise import Noise
+    from elastocal.verdict import RepeatableResidual, TrainingVerdict
 
 # Number of mechanisms that are added one at a time, each by a fit of its own. With more
 # mechanisms, only the first has a step of its own.
@@ -99,8 +100,8 @@ class Diagnosis:
         Models from the frames to the final one.
     evidence
         Result of the search; None if the data are at fault.
-    document
-        Contents of verdict.json, without what held-out poses add.
+    verdict
+        The verdict, without what held-out poses add.
     left_out
         Gross errors.
     settings
@@ -165,7 +166,7 @@ class _SearchRound:
     reference: Fit
     named: tuple[str, ...] | None
     max_pose_error_rad: float = np.inf
-    tested: tuple[Fit, Repeatable | None] | None = None
+    tested: tuple[Fit, RepeatableResidual | None] | None = None
 
 
 @dataclass(frozen=True)
@@ -225,7 +226,7 @@ class _Outcome:
     evidence: Evidence | None
     warnings: list[str]
     contradictions: list[str]
-    repeatable: Repeatable | None
+    repeatable: RepeatableResidual | None
 
 
 def diagnose(
@@ -261,7 +262,7 @@ def diagnose(
     outcome = _choose_model(rows, settings, seed)
     subset = rows.subset
     outliers = replace(rows.outliers, gross=~subset.kept)
-    document = state_training_verdict(
+    training_verdict = state_training_verdict(
         TrainingResult(
             case=subset.case,
             noise=subset.noise,
@@ -283,7 +284,7 @@ def diagnose(
         subset.case,
         tuple(outcome.steps),
         outcome.evidence,
-        document,
+        training_verdict,
         left_out,
         settings,
     )
@@ -454,7 +455,7 @@ def _run_search_round(
     settings = context.settings
     sample = subset.search_sample
     design, posterior, alarm = _search(context, subset, start)
-    conclusion = verdict.concluded(design.problem, posterior, alarm)
+    conclusion = verdict.conclude(design.problem, posterior, alarm)
     named = conclusion.best.named
     model = posterior.empty_model
     if named:
@@ -609,8 +610,8 @@ def _choose_model(rows: _SettledRows, settings: Settings, seed: int) -> _Outcome
     if full_model is not evidence.fitted or subset.search_sample is not observations:
         full_model = subset.fit_to_all(full_model)
     named = evidence.conclusion.best.named
-    oversized = verdict.oversized(full_model, named)
-    conclusion = verdict.with_related(evidence.conclusion, oversized)
+    oversized = find_oversized_effects(full_model, named)
+    conclusion = verdict.allow_related_mechanisms(evidence.conclusion, oversized)
     if not evidence.adopted:
         alone = full_model
         if named:
@@ -662,7 +663,7 @@ def _refit_declared(
 
 def _test_repeatable(
     evidence: Evidence, kept: Fit, observations: Observations, seed: int
-) -> Repeatable | None:
+) -> RepeatableResidual | None:
     """Test whether the kept model leaves a function of the joints, unless the search
     tested that fit."""
     if evidence.tested is not None and evidence.tested[0] is kept:
@@ -675,18 +676,20 @@ def _contradict(
 ) -> _Outcome:
     """Withdraw a verdict of adequacy if something contradicts it, and warn."""
     kept = outcome.steps[-1].fitted
-    repeatable_warnings = verdict.remainder_sentences(outcome.repeatable)
+    repeatable_warnings = verdict.describe_repeatable_residual(outcome.repeatable)
     conclusion = evidence.conclusion
     contradictions: list[str] = []
     if conclusion.verdict in (verdict.ADEQUATE, verdict.NOT_TESTABLE):
         contradictions = repeatable_warnings
     if conclusion.verdict == verdict.ADEQUATE and not contradictions:
-        contradictions = verdict.contradictions(outcome.full_model, noise, settings)
+        contradictions = verdict.find_contradictions(
+            outcome.full_model, noise, settings
+        )
     if contradictions:
         conclusion = replace(conclusion, verdict=verdict.UNEXPLAINED)
     warnings = [*contradictions, *outcome.warnings]
     if not repeatable_warnings:
-        warnings += verdict.pose_error_warnings(
+        warnings += verdict.warn_of_pose_error(
             kept.noise, evidence.linearized.pose_std_error_rad
         )
     return replace(

@@ -154,14 +154,13 @@ def diagnosis_from(case: Case, facts: Mapping[str, Any]) -> Diagnosis:
         Step(step["name"], step["kind"], step_fit(case, step))
         for step in facts["steps"]
     )
-    document = facts["document"]
-    settings = Settings.from_document(document["settings"])
     return Diagnosis(
         case,
         steps,
         None,
         from_document(TrainingVerdict, facts["document"], "diagnosis.json"),
         measurements.select(left_out),
+        Settings.from_document(facts["document"]["settings"]),
     )
 
 
