@@ -32,7 +32,7 @@ from elastocal.effects.catalogue import (
 )
 from elastocal.effects.conditions import with_total
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.model import conditions
+from elastocal.fitting.model import evaluate_conditions
 from elastocal.mechanics.kinematics import poses
 
 CHAINS = ["fanuc", "fixed rotations", *ODD_CHAINS]
@@ -185,7 +185,7 @@ def test_sensitivities_of_every_candidate_are_central_differences(chain):
         if candidate.effect in ("joint_offset", "payload", "lost_motion"):
             model = made_model(chain, targets, 6, effects=(candidate,))
         estimate = made_estimate(model, seed=3)
-        around = conditions(model, estimate, states)
+        around = evaluate_conditions(model, estimate, states)
         seen = seen_exactly(model, estimate, states)
         steps = np.diag(small_steps(model, estimate))
         # Of a long law, steps of all parameters at once.

@@ -88,7 +88,7 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.campaigns.campaign_folder import read_campaign_folder
-from elastocal.campaigns.importers import importer
+from elastocal.campaigns.importers import find_importer
 from elastocal.campaigns.reading import read_campaign, read_robot
 from elastocal.effects.catalogue import candidates_on, list_bundled_effects, list_effects
 from elastocal.exchange.controllers import axes_of, find_controller, targets_of
@@ -100,7 +100,7 @@ from elastocal.remainder.regressions import Inputs, list_regressions
 config, folder = map(Path, sys.argv[1:])
 robots = config / "robots"
 candidates = candidates_on(sites_of(read_robot(robots / "ur10.yaml")))
-source = importer("workshop", config, "a test")
+source = find_importer("workshop", config, "a test")
 rows = np.hstack([np.arange(72.0).reshape(12, 6), np.arange(36.0).reshape(12, 3)])
 np.savetxt(folder / "values.txt", rows)
 source.write_campaign([folder / "values.txt"], folder / "campaign", robots, "workshop")

@@ -30,7 +30,7 @@ rule audit_files:
         rows=config["audit"]["rows"],
         # Where another target has run since, the audit is anew; it makes none of them run.
         others=lambda wildcards: {
-            target: checksum(file) if Path(file).is_file() else ""
+            target: compute_sha256(file) if Path(file).is_file() else ""
             for target, file in AUDITED_TOO.items()
         },
     script:

@@ -13,10 +13,15 @@ import elastocal
 from snakemake.io import _IOFile
 from snakemake.iocontainers import Wildcards
 
-from elastocal.campaigns.importers import campaign_sources, importer, named_league, user_campaign
+from elastocal.campaigns.importers import (
+    find_importer,
+    find_user_campaign,
+    list_league_data,
+    read_campaign_sources,
+)
 from elastocal.errors import InputError
 from elastocal.io.origin import SOURCES_DIGEST, Origin, configuration_sha256, environment
-from elastocal.io.records import checksum
+from elastocal.io.records import compute_sha256
 from elastocal.report.outcome import outcome
 from elastocal.study.configuration import check_study, count_components, override_entries
 
@@ -85,9 +90,9 @@ try:
         CONFIG,
         " with --config ".join(["config.yaml", *(entry.partition("=")[0] for entry in CHANGES)]),
     )
-    SOURCES = campaign_sources(config, CONFIG)
+    SOURCES = read_campaign_sources(config, CONFIG)
     # The user's own campaign by its name, if there is one.
-    OWN = user_campaign(config, f"{CONFIG}/robots", "results/loop")
+    OWN = find_user_campaign(config, f"{CONFIG}/robots", "results/loop")
     # Not of the jobs of this run, and not where nothing is written.
     if workflow.is_main_process and not workflow.dryrun:
         RUN = begin(Path(".snakemake"), ["data", "results", "reports"])
@@ -198,7 +203,7 @@ def digest_of(files):
     return hashlib.sha256(" ".join(map(checksum_once, files)).encode()).hexdigest()[:16]
 
 
-checksum_once = cache(checksum)
+checksum_once = cache(compute_sha256)
 
 
 def remember_checksums():
@@ -339,7 +344,7 @@ def files_of_campaign(campaign):
 
 def robots_of_import(wildcards):
     """Files of the robots that an importer reads or names."""
-    source = importer(
+    source = find_importer(
         SOURCES[wildcards.campaign]["importer"], CONFIG, f"campaign {wildcards.campaign}"
     )
     return expand(f"{CONFIG}/robots/{{robot}}.yaml", robot=source.robots)

@@ -10,14 +10,14 @@ def missing_data(names):
     sources = {name: SOURCES[name] for name in names if SOURCES[name]["source"] == "public"}
     files = {
         name: find_missing(
-            source["files"], importer(source["importer"], CONFIG, name).files, "data/public", BOX
+            source["files"], find_importer(source["importer"], CONFIG, name).files, "data/public", BOX
         )
         for name, source in sources.items()
     }
     return {name: file for name, file in files.items() if file}
 
 
-MISSING_DATA = missing_data(named_league(config))
+MISSING_DATA = missing_data(list_league_data(config))
 # Robots of each league with the data sets that are at hand.
 LEAGUES = {
     league: {

@@ -11,7 +11,7 @@ import elastocal.effects
 from elastocal.effects.protocol import Effect, require_unique
 from elastocal.errors import InputError
 from elastocal.io import plugins
-from elastocal.io.modules import module_names
+from elastocal.io.modules import list_modules
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -36,7 +36,7 @@ def list_bundled_effects() -> dict[str, Effect]:
     """Effects of the modules of this package, by name, sorted."""
     modules = [
         import_module(f"elastocal.effects.{name}")
-        for name in module_names(elastocal.effects)
+        for name in list_modules(elastocal.effects)
     ]
     # A module that imports an effect of another one does not define it again.
     effects = {

@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from elastocal.counting import counted
-from elastocal.errors import InputError, printable
+from elastocal.counting import format_count
+from elastocal.errors import InputError, format_printable
 from elastocal.io import plugins
 
 
@@ -82,7 +82,7 @@ def remarks(
     plain = [
         "".join(
             c if c.isascii() and (c.isalnum() or c in " .,:_+-/()") else "?"
-            for c in printable(note)
+            for c in format_printable(note)
         )
         for note in notes
     ]
@@ -265,17 +265,19 @@ def axes_of(
             or len(set(names)) < len(names)
             or not set(names) <= set(known)
         ):
-            allowed = f"{counted(len(prismatic), 'different name')}, of q1 to q{len(prismatic)}, of {', '.join(known)}"
+            allowed = f"{format_count(len(prismatic), 'different name')}, of q1 to q{len(prismatic)}, of {', '.join(known)}"
             raise InputError("--axes", "", repr(stated), allowed)
         return names
     shifts = sum(prismatic)
     if len(prismatic) - shifts != len(controller.axes) or shifts > len(
         controller.external
     ):
-        found = f"{counted(len(prismatic) - shifts, 'joint that turns', 'joints that turn')} and {shifts} that shift"
+        found = f"{format_count(len(prismatic) - shifts, 'joint that turns', 'joints that turn')} and {shifts} that shift"
         allowed = f"--axes with what {controller.words} calls each of q1 to q{len(prismatic)}: {', '.join(known)}"
         if not controller.external:
-            axes = counted(len(controller.axes), "joint that turns", "joints that turn")
+            axes = format_count(
+                len(controller.axes), "joint that turns", "joints that turn"
+            )
             allowed = f"{axes}, which is all that {controller.words} has"
         raise InputError("--format", controller.name, found, allowed)
     turning = iter(controller.axes)

@@ -16,7 +16,7 @@ from elastocal.effects.catalogue import list_effects
 from elastocal.effects.conditions import conditions_of
 from elastocal.effects.protocol import Candidate
 from elastocal.figures.style import PALETTE, create_panels, styled
-from elastocal.fitting.model import displaced_by
+from elastocal.fitting.model import sum_displacements
 from elastocal.fitting.observations import States
 from elastocal.mechanics.kinematics import poses
 from elastocal.mechanics.robot import Robot
@@ -121,7 +121,7 @@ def compute_signature(name: str, robot: Robot) -> Signature:
         commanded = sites.chain.at(angles)
         displaced = commanded.copy()
         shapes = [shape.start for shape in candidate.shapes]
-        for coordinate, by in displaced_by(
+        for coordinate, by in sum_displacements(
             [(candidate, sizes, shapes)], around
         ).items():
             displaced[:, coordinate] += by

@@ -39,7 +39,7 @@ class Origin:
         return f"commit {self.commit}, configuration SHA-256 {self.configuration_sha256}, seed {self.seed}"
 
 
-def canonical_json(value: Any) -> str:
+def format_canonical_json(value: Any) -> str:
     """The one JSON text of a value: keys sorted, no spaces, so that equal values have
     equal digests."""
     return json.dumps(
@@ -54,7 +54,7 @@ def canonical_json(value: Any) -> str:
 def configuration_sha256(configuration: Any) -> str:
     """SHA-256 of the canonical JSON of a configuration with everything that it refers
     to, such as the documents of robots."""
-    return hashlib.sha256(canonical_json(configuration).encode()).hexdigest()
+    return hashlib.sha256(format_canonical_json(configuration).encode()).hexdigest()
 
 
 def environment(folder: str | Path) -> dict[str, str]:
@@ -67,7 +67,7 @@ def environment(folder: str | Path) -> dict[str, str]:
     return {name: version(name) for name in _LIBRARIES} | plugin_versions() | pinned
 
 
-def provenance(settings: Any, **more: Any) -> dict[str, Any]:
+def describe_provenance(settings: Any, **more: Any) -> dict[str, Any]:
     """What a table was made from, as JSON has it: `settings`, a mapping or parameters
     of a rule, and further facts."""
     kept = {

@@ -6,13 +6,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from elastocal.campaigns import reading
-from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, columns_of
+from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, tabulate_measurements
 from elastocal.campaigns.campaign_folder import read_campaign_folder
-from elastocal.campaigns.holdout import split
+from elastocal.campaigns.holdout import split_poses
 from elastocal.effects.catalogue import list_effects
 from elastocal.errors import InputError
 from elastocal.io.json_files import write_json
-from elastocal.io.origin import provenance
+from elastocal.io.origin import describe_provenance
 from elastocal.io.plugins import REGRESSIONS, plugin_names
 from elastocal.io.storage import write_table
 from elastocal.loop.schemas import measurements
@@ -45,7 +45,10 @@ def read_campaign(job: Any) -> None:
     ):
         schema = measurements(part.joint_angles.shape[1])
         write_table(
-            path, schema, [columns_of(part)], provenance(descriptions, **job.wildcards)
+            path,
+            schema,
+            [tabulate_measurements(part)],
+            describe_provenance(descriptions, **job.wildcards),
         )
     write_json(job.output.descriptions, descriptions)
 
@@ -67,7 +70,7 @@ def load_campaign(
         As `reading.read_campaign` and `reading.read_held_out_campaign`.
     """
     descriptions, campaign = described_campaign(folder)
-    training, held_out = split(campaign)
+    training, held_out = split_poses(campaign)
     held_out_descriptions = None
     held_out_campaign = reading.read_held_out_campaign(folder, list_effects())
     if folder.held_out_folder is not None and held_out_campaign is not None:

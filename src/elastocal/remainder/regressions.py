@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.linalg import lapack
 
-from elastocal.fitting.normal_equations import inverse_by_factor
+from elastocal.fitting.normal_equations import invert_cholesky_factor
 from elastocal.io import plugins
 from elastocal.io.plugins import load_plugins
 
@@ -493,7 +493,7 @@ def _surprise(
     value = 0.5 * (standard * along).sum() + axes * (
         np.log(np.diag(lower)).sum() + 0.5 * count * np.log(2.0 * np.pi)
     )
-    inverse = -axes * inverse_by_factor(lower)
+    inverse = -axes * invert_cholesky_factor(lower)
     inverse += along @ along.T
     of_noise = noise * np.trace(inverse)
     of_variance = variance * np.vdot(inverse.T, correlation)

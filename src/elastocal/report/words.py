@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal import counting
-from elastocal.counting import plural
+from elastocal.counting import pluralize
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.effects.catalogue import list_effects
 from elastocal.effects.protocol import effect_of
@@ -125,7 +125,9 @@ def at_joints(effect: str, joints: Collection[int]) -> str:
     """Where an effect acts: " of joint 3", or nothing where it is no joint's."""
     part = getattr(list_effects().get(effect), "part", "joint")
     return (
-        f" of {plural(part, len(joints))} {listed(map(str, joints))}" if joints else ""
+        f" of {pluralize(part, len(joints))} {listed(map(str, joints))}"
+        if joints
+        else ""
     )
 
 
