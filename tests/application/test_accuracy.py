@@ -13,17 +13,21 @@ from scipy.stats import chi, norm
 from synthetic import made_states
 
 from elastocal.application.accuracy import (
-    before_m,
-    calibrate_on_case,
-    format_accuracy,
+    compute_length_quantiles,
+    compute_uncorrected_errors_m,
     inflate_to_held_out_errors,
     predict_campaign_accuracy,
     predict_errors,
-    quantile_of_length,
-    scope_of,
 )
 from elastocal.application.calibrated import predict_poses
 from elastocal.application.frames import BASE, ROBOT, Scope, subtract_placement
+from elastocal.application.scope import (
+    calibrate_on_case,
+    determine_scope,
+)
+from elastocal.application.statements import (
+    format_accuracy,
+)
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.model import apply_step
@@ -40,7 +44,7 @@ STATES = replace(LOADED, wrench=np.zeros((60, 6)))
 
 def set_scope(calibrated, unknown_base):
     model = replace(calibrated.model, fitted_frames=unknown_base)
-    scope = scope_of(
+    scope = determine_scope(
         calibrated, model, calibrated.estimate, calibrated.covariance, STATES
     )
     return replace(calibrated, scope=scope, fitted=STATES)
@@ -53,7 +57,7 @@ def test_bounds_hold_95_percent_of_robots_drawn_from_the_covariance(
     """Of 150 robots; 90 to 100 % are within nearly three standard errors."""
     calibrated = set_scope(made_calibrated(fanuc, *USUAL), unknown_base)
     angles = calibrated.robot.reported_angles(STATES.joint_angles)
-    stated = predict_errors(calibrated, angles, STATES.wrench).accuracy("")
+    stated = predict_errors(calibrated, angles, STATES.wrench).summarize("")
     assert stated.frame == (ROBOT if unknown_base else BASE)
     position, _ = predict_poses(calibrated, angles)
     draws = np.random.default_rng(3)
@@ -95,7 +99,7 @@ def test_a_misplaced_base_is_no_error_of_the_uncorrected_robot_where_nobody_know
         [position @ nominal.T - position, np.tile([0.0, 0.0, -1e-3], (60, 1))], axis=1
     )
     known, unknown = (
-        before_m(set_scope(value, each), position, rotation, off)
+        compute_uncorrected_errors_m(set_scope(value, each), position, rotation, off)
         for each in (False, True)
     )
     np.testing.assert_allclose(
@@ -108,7 +112,7 @@ def test_a_misplaced_base_is_no_error_of_the_uncorrected_robot_where_nobody_know
 def test_quantiles_are_those_of_one_and_of_three_directions():
     alike = np.eye(3)
     single = np.diag([1.0, 0.0, 0.0])
-    found = quantile_of_length(np.stack([alike, single, np.zeros((3, 3))]))
+    found = compute_length_quantiles(np.stack([alike, single, np.zeros((3, 3))]))
     np.testing.assert_allclose(
         found, [chi.ppf(0.95, 3), norm.ppf(0.975), 0.0], rtol=1e-12
     )
@@ -134,7 +138,7 @@ def scope_with(robot, candidate, values, shapes, std=0.0):
         )
         ** 2
     )
-    return scope_of(
+    return determine_scope(
         calibrated, model, estimate, block_diag(calibrated.covariance, added), LOADED
     )
 
@@ -174,7 +178,7 @@ def test_an_unknown_offset_of_the_target_at_the_end_effector_is_no_error(fanuc):
     sizes = []
     for stated in ((0.0, 0.0, 0.0), None):
         model = replace(calibrated.model, targets=(replace(target, offset_m=stated),))
-        scope = scope_of(
+        scope = determine_scope(
             calibrated, model, calibrated.estimate, calibrated.covariance, LOADED
         )
         variances = [0.0] * (len(calibrated.covariance) - 6) + [1e-3] * 3 + [0.0] * 3
@@ -241,7 +245,7 @@ def test_repeats_tell_how_well_joints_repeat_though_the_sensor_hides_each(campai
 
 def test_of_a_robot_of_which_nothing_was_fitted_no_error_of_zero_is_predicted(fanuc):
     calibrated = made_calibrated(fanuc, relative_std=0.0)
-    found = predict_errors(calibrated, *np.zeros((2, 3, 6))).accuracy("some poses")
+    found = predict_errors(calibrated, *np.zeros((2, 3, 6))).summarize("some poses")
     assert found.rms_m == 0.0 and not found.fitted
     assert "nothing of the robot was fitted" in format_accuracy(
         found
@@ -251,7 +255,7 @@ def test_of_a_robot_of_which_nothing_was_fitted_no_error_of_zero_is_predicted(fa
         calibrated, scope=replace(calibrated.scope, form_m=1e-3, contradicted=True)
     )
     open_form = predict_errors(contradicted, *np.zeros((2, 3, 6)))
-    stated = open_form.accuracy("some poses")
+    stated = open_form.summarize("some poses")
     assert (
         stated.rms_m == pytest.approx(1e-3, rel=0.01)
         and min(stated.rms_bound_m, stated.worst_m) > 1e-3

@@ -9,7 +9,7 @@ from analysed_robots import analysed
 from made_calibrated import USUAL, made_calibrated
 
 from elastocal.application.accuracy import predict_errors
-from elastocal.application.calibrated import come_to_rest, compute_nominal_poses
+from elastocal.application.calibrated import compute_nominal_poses, find_equilibrium
 from elastocal.application.compensation import (
     OK,
     OTHER_POSTURE,
@@ -17,7 +17,7 @@ from elastocal.application.compensation import (
     SINGULAR,
     UNREACHABLE,
     find_joint_targets,
-    large_steps,
+    find_large_steps,
 )
 from elastocal.mechanics.kinematics import jacobians, pose_differences
 
@@ -50,9 +50,9 @@ def draw_states(calibrated, count, force=100.0):
 
 def settle(robot, angles, wrench):
     """As `forward`, with the loads found again until the arm has come to rest."""
-    found = come_to_rest(robot, angles, wrench)
+    found = find_equilibrium(robot, angles, wrench)
     for _ in range(6):
-        found = come_to_rest(robot, angles, wrench, found[0])
+        found = find_equilibrium(robot, angles, wrench, found[0])
     return found[1:]
 
 
@@ -177,7 +177,7 @@ def test_random_paths_never_swing(name):
         )
         good = found.status == OK
         whole += good.all()
-        assert not large_steps(
+        assert not find_large_steps(
             robot.robot, position[good], rotation[good], found.joint_angles[good]
         )
     assert whole >= 4

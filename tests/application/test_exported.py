@@ -8,9 +8,12 @@ from made_calibrated import made_calibrated, plain_estimate, plain_model
 from elastocal.application.calibrated import (
     calibrate_by_model,
     predict_poses,
-    without,
+    remove_effects,
 )
-from elastocal.application.exported import find_left_out_m, fold_effects
+from elastocal.application.exported import (
+    compute_left_out_displacements_m,
+    fold_effects,
+)
 from elastocal.effects.catalogue import candidates_on
 from elastocal.mechanics.robot_file import document_of, robot_from_document
 from elastocal.mechanics.sites import sites_of
@@ -86,12 +89,12 @@ def test_what_a_robot_file_cannot_say_is_left_out_and_changes_nothing_else():
     found = fold_effects(calibrated)
     assert [calibrated.model.effects[number].key for number in found.left_out] == keys
     angles, wrench = draw_states(calibrated.robot)
-    bare = without(calibrated, set(found.left_out))
+    bare = remove_effects(calibrated, set(found.left_out))
     ends = [
         predict_poses(each, angles, wrench)[0]
         for each in (read_file_model(found.robot), bare, calibrated)
     ]
     np.testing.assert_allclose(ends[0], ends[1], atol=1e-9)
-    off = find_left_out_m(calibrated, angles, wrench)
+    off = compute_left_out_displacements_m(calibrated, angles, wrench)
     np.testing.assert_allclose(off, np.linalg.norm(ends[2] - ends[1], axis=1))
     assert off.max() > 1e-6

@@ -314,7 +314,7 @@ class Importer:
 
 @cache
 def read_importers(path: Path) -> dict[str, Importer]:
-    """Importers of ``public_data.yaml`` by the names that ``find_importer`` of a campaign
+    """Importers of ``public_data.yaml`` by the names that ``importer`` of a campaign
     may have."""
     document = read_document(path)
     check_document(document, "public_data", path.as_posix())

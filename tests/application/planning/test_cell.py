@@ -5,11 +5,11 @@ import pytest
 from analysed_robots import analysed
 from made_surveys import made_survey
 
-from elastocal.application.inverse_kinematics import reach_m
+from elastocal.application.inverse_kinematics import compute_reach_m
 from elastocal.application.planning.cell import (
     COLUMN_SHARE,
     Cell,
-    find_allowed,
+    check_configurations,
     sample_links,
 )
 from elastocal.campaigns.campaign import Target
@@ -32,10 +32,10 @@ def angles(survey):
 def test_nothing_is_allowed_in_a_box_around_everything_and_all_far_from_it(
     survey, angles
 ):
-    assert not find_allowed(
+    assert not check_configurations(
         Cell((EVERYWHERE,), None, 0.05), survey.robot, survey.targets, angles
     )["boxes"].any()
-    assert find_allowed(
+    assert check_configurations(
         Cell((EVERYWHERE + 20.0,), None, 0.05), survey.robot, survey.targets, angles
     )["boxes"].all()
 
@@ -52,11 +52,13 @@ def test_a_target_behind_the_arm_is_hidden_and_one_before_it_is_seen(survey, ang
     out = (target - elbow) / np.linalg.norm(target - elbow, axis=1, keepdims=True)
     for number in np.flatnonzero(np.linalg.norm(target - elbow, axis=1) > 0.4)[::60]:
         behind = Cell((), elbow[number] - 3.0 * out[number], 0.08)
-        assert not find_allowed(
+        assert not check_configurations(
             behind, survey.robot, survey.targets, angles[number : number + 1]
         )["sight"][0]
     lone = Cell((), np.array([0.0, 0.0, 500.0]), 1e-6)
-    assert find_allowed(lone, survey.robot, survey.targets, angles)["sight"].all()
+    assert check_configurations(lone, survey.robot, survey.targets, angles)[
+        "sight"
+    ].all()
 
 
 @pytest.mark.parametrize("name", ["abb", "iiwa14"])
@@ -68,7 +70,7 @@ def test_neither_forearm_nor_target_is_below_the_floor_or_in_the_column(name):
         low + (high - low) * draws.random((2000, robot.joints))
     )
     end = robot.chain.end_effector.name
-    column = COLUMN_SHARE * reach_m(robot)
+    column = COLUMN_SHARE * compute_reach_m(robot)
     targets = (Target("A", end, (0.0, 0.0, 0.2)),)
     free = Cell((), None, 0.02)
     angles = robot.model_angles(reported)
@@ -76,7 +78,9 @@ def test_neither_forearm_nor_target_is_below_the_floor_or_in_the_column(name):
     tip = at + turned @ [0.0, 0.0, 0.2]
     forearm = sample_links(robot, angles, 2)
     low_ones = (tip[:, 2] < 0.0) | (forearm[..., 2] < 0.0).any(axis=0)
-    found = find_allowed(Cell((), None, 0.02, 0.0, column), robot, targets, reported)
+    found = check_configurations(
+        Cell((), None, 0.02, 0.0, column), robot, targets, reported
+    )
     assert (
         low_ones.sum() > 50
         and not (found["floor"] & low_ones).any()
@@ -84,13 +88,14 @@ def test_neither_forearm_nor_target_is_below_the_floor_or_in_the_column(name):
     )
     # Half a metre below, more is allowed.
     assert (
-        find_allowed(Cell((), None, 0.02, -0.5), robot, targets, reported)[
+        check_configurations(Cell((), None, 0.02, -0.5), robot, targets, reported)[
             "floor"
         ].sum()
         > found["floor"].sum()
     )
     assert all(
-        each.all() for each in find_allowed(free, robot, targets, reported).values()
+        each.all()
+        for each in check_configurations(free, robot, targets, reported).values()
     )
     shoulder = sample_links(robot, angles, 1)[0, :, 2]
     inside = (

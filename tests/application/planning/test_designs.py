@@ -10,8 +10,8 @@ from elastocal.application.planning.designs import (
     CRITERIA,
     build_criterion,
     choose_greedily,
+    compute_information_matrix,
     exchange_candidates,
-    matrix_of,
 )
 
 ROWS = made_rows()
@@ -42,9 +42,12 @@ def test_the_exchange_is_near_the_best_of_all_subsets(kind, seed):
     rows = made_rows(12, 3, 5, seed)
     rule = build_criterion(kind, PLACES)
     found = rule.value(
-        matrix_of(rows, exchange_candidates(rows, choose_greedily(rows, 4, rule), rule))
+        compute_information_matrix(
+            rows, exchange_candidates(rows, choose_greedily(rows, 4, rule), rule)
+        )
     )
     values = [
-        rule.value(matrix_of(rows, list(some))) for some in combinations(range(12), 4)
+        rule.value(compute_information_matrix(rows, list(some)))
+        for some in combinations(range(12), 4)
     ]
     assert found >= max(values) - 0.02 * (max(values) - np.median(values))

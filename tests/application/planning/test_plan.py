@@ -8,16 +8,20 @@ import pytest
 from made_surveys import OPEN, made_candidates, made_survey
 
 from elastocal.application.planning.plan import (
-    REPEATED_POSES,
-    REPEATS,
     Candidates,
-    accuracy_rows,
-    build_sheet,
     choose_plan,
     find_allowed_candidates,
-    information,
-    model_of,
-    observe,
+)
+from elastocal.application.planning.sheet import (
+    REPEATED_POSES,
+    REPEATS,
+    build_sheet,
+)
+from elastocal.application.planning.survey import (
+    build_observations,
+    compute_accuracy_rows,
+    compute_information_rows,
+    declare_model,
 )
 from elastocal.campaigns.campaign import Target
 from elastocal.errors import InputError
@@ -53,7 +57,7 @@ def test_a_plan_is_better_than_random_designs_and_its_first_poses_are_repeated(
 
 
 def test_no_pose_judges_that_is_fitted_and_too_few_are_refused(survey, some):
-    plan = choose_plan(survey, some.at(np.arange(21)), 16, 5, 1)
+    plan = choose_plan(survey, some.select(np.arange(21)), 16, 5, 1)
     both = np.concatenate([plan.fitted.joint_angles, plan.held_out.joint_angles])
     assert len(np.unique(both, axis=0)) == 21
     for poses, words in ((2, "at least"), (298, "more candidates")):
@@ -101,7 +105,7 @@ def test_targets_that_no_joint_moves_are_refused(survey):
 def test_information_is_the_inverse_of_the_covariance_of_a_fit_with_priors(measured):
     survey = made_survey(measured=measured)
     some = made_candidates(survey, 40)
-    model, estimate = model_of(survey)
+    model, estimate = declare_model(survey)
     # The fit takes the priors that the plan takes: a plausible size each.
     effects = tuple(
         replace(
@@ -110,7 +114,7 @@ def test_information_is_the_inverse_of_the_covariance_of_a_fit_with_priors(measu
         for e in model.effects[1:]
     )
     model = replace(model, effects=(model.effects[0], *effects))
-    seen = observe(survey, some.joint_angles, some.force)
+    seen = build_observations(survey, some.joint_angles, some.force)
     position, rotation = predict(
         model, estimate, seen, evaluate_conditions(model, estimate, seen.states)
     )
@@ -118,9 +122,9 @@ def test_information_is_the_inverse_of_the_covariance_of_a_fit_with_priors(measu
         seen, position=position, rotation=None if seen.rotation is None else rotation
     )
     noise = Noise("declared", survey.position_m, survey.orientation_rad, np.zeros(6))
-    found = fit_model(model, exact, noise, estimate)
-    rows = information(survey, some.joint_angles, some.force)
-    scale = np.array([p.plausible for _, p in list_parameters(model, estimate)])
+    found = fit(model, exact, noise, estimate)
+    rows = compute_information_rows(survey, some.joint_angles, some.force)
+    scale = np.array([p.plausible for _, p in parameters(model, estimate)])
     free = np.array(
         [
             owner.startswith(("frame", "target", "joint_compliance"))
@@ -141,10 +145,10 @@ def test_what_a_placement_of_the_base_takes_up_is_no_error_unless_the_base_is_kn
     for unknown in (True, False):
         survey = replace(made_survey(), unknown_base=unknown)
         some = made_candidates(survey, 40)
-        rows = accuracy_rows(survey, some.joint_angles, some.force)
+        rows = compute_accuracy_rows(survey, some.joint_angles, some.force)
         names = [
             (owner, parameter.name)
-            for owner, parameter in list_parameters(*model_of(survey))
+            for owner, parameter in parameters(*declare_model(survey))
         ]
         assert rows.shape == (40, 3, len(names))
         size = np.sqrt((rows**2).sum(axis=1).mean(axis=0))
@@ -174,9 +178,11 @@ def test_an_unknown_offset_of_the_reflector_takes_up_the_last_link(survey):
         )
         last = [
             owner == "link_geometry@6" and p.unit == "m"
-            for owner, p in list_parameters(*model_of(one))
+            for owner, p in parameters(*declare_model(one))
         ]
         sizes.append(
-            np.abs(accuracy_rows(one, some.joint_angles, some.force)[..., last]).max()
+            np.abs(
+                compute_accuracy_rows(one, some.joint_angles, some.force)[..., last]
+            ).max()
         )
     assert sizes[0] < 1e-2 * sizes[1]

@@ -19,8 +19,8 @@ from made_urdf import joint, link
 from made_urdf import robot as made
 from scipy.spatial.transform import Rotation
 
-from elastocal.application.accuracy import tabulate_errors
 from elastocal.application.calibrated import compute_nominal_poses, predict_poses
+from elastocal.application.statements import tabulate_errors
 from elastocal.campaigns import campaign_folder
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.reading import read_robot
