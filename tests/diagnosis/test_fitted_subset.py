@@ -51,7 +51,7 @@ def test_the_last_step_to_all_of_a_long_campaign_leaves_a_tenth_of_a_standard_er
     usual = part.fit_to_all(part.declared)
     for module in ("fitting.least_squares", "diagnosis.fitted_subset"):
         monkeypatch.setattr(f"elastocal.{module}.LARGE_FIT_SIZE", 30)
-    monkeypatch.setattr("elastocal.fitting.least_squares._STEPPING_STONE", 36)
+    monkeypatch.setattr("elastocal.fitting.least_squares._INTERMEDIATE_SAMPLE_SIZE", 36)
     long = part.fit_to_all(part.declared)
     off, exact = (
         get_parameter_values(each.model, each.estimate)

@@ -54,7 +54,7 @@ def _format_frame(accuracy: Accuracy) -> str:
         return frame
     if accuracy.frame == ROBOT:
         return f"{frame.removesuffix(')')} and {_OFFSET})"
-    return f"{frame} (after {_OFFSET})"
+    return f"{frame} (after the best choice {_OFFSET})"
 
 
 def _format_bounded(accuracy: Accuracy, error_m: float, bound_m: float | None) -> str:

@@ -64,8 +64,7 @@ def draw_measurements(
     Columns of a file of measurements.
     """
     draws = open_stream(seed, name, "campaign", 0)
-    low, high = robot.joint_limits.T
-    angles_of_pose = low + (high - low) * draws.random((plan.poses, robot.joints))
+    angles_of_pose = _draw_angles(robot, plan.poses, draws)
     direction = draws.standard_normal((plan.poses, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     pose, load, repeat = _list_approaches(plan).T
@@ -84,6 +83,12 @@ def draw_measurements(
     }
     table |= dict(zip(("x", "y", "z", "rx", "ry", "rz"), measured.T, strict=True))
     return table | {"target": np.repeat(plan.points, len(pose))}
+
+
+def _draw_angles(robot: Robot, poses: int, draws: np.random.Generator) -> np.ndarray:
+    """Draw joint angles (poses, n), rad, uniformly within the limits."""
+    low, high = robot.joint_limits.T
+    return np.asarray(low + (high - low) * draws.random((poses, robot.joints)))
 
 
 def _list_approaches(plan: Plan) -> np.ndarray:

@@ -136,8 +136,9 @@ def _with_pose_error(
     """
     rows = products.rows
     jacobian = np.zeros((*rows.residual.shape, int(rows.pose.max()) + 1, products.axes))
-    for seen, part, _, _ in products.iterate_poses():
-        jacobian[np.flatnonzero(seen), :, rows.pose[seen]] = part.jacobian
+    for block in products.iterate_poses():
+        observations = np.flatnonzero(block.selected)
+        jacobian[observations, :, rows.pose[observations]] = block.rows.jacobian
     jacobian = jacobian.reshape(len(whole.residual), -1)
     of_whole = jacobian - sum(
         factor @ (factor.T @ jacobian) for factor in whole.factors

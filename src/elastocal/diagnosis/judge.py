@@ -348,5 +348,10 @@ def generate_residual_blocks(
             }
             position = transform_to_base(there[-1][1], observations)[0]
             yield tabulate_residuals(
-                some, unseen, some is left_out, beyond, position, off
+                some,
+                beyond,
+                position,
+                off,
+                held_out=unseen,
+                gross_errors=some is left_out,
             )

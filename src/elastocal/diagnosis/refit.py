@@ -97,7 +97,7 @@ def fit_selected_effects(
         observations,
         noise,
         start,
-        near is not None,
+        reweight_first_step=near is not None,
         **options,
     )
 

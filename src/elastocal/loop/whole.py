@@ -158,7 +158,12 @@ def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
     if not data_at_fault(verdict.document):
         found = calibrated_by(diagnosis, verdict.held_out, verdict.delivered)
         stated |= _accuracy(found) | {
-            "misplaced": find_misplaced_frames(diagnosis.final, diagnosis.case.campaign)
+            "misplaced": [
+                asdict(frame)
+                for frame in find_misplaced_frames(
+                    diagnosis.final, diagnosis.case.campaign
+                )
+            ]
         }
         if found.residual_model is not None:
             stated["physics"] = _accuracy(
