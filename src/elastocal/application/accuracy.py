@@ -18,7 +18,7 @@ unless held-out poses show more. The tracker's noise is in none of the parts.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,6 +39,7 @@ from elastocal.application.frames import (
 )
 from elastocal.application.scope import set_form_error
 from elastocal.mechanics.kinematics import jacobians, pose_differences
+from elastocal.verdict import Accuracy
 
 if TYPE_CHECKING:
     from elastocal.application.calibrated import CalibratedRobot
@@ -60,48 +61,6 @@ _CHUNK = 200
 # Upper bound on the states over which the accuracy of a campaign is stated; more states
 # do not change a printed digit.
 _MOST_STATES = 1000
-
-
-@dataclass(frozen=True)
-class Accuracy:
-    """Predicted errors over some poses, without the tracker's noise; `asdict` is its
-    JSON.
-
-    Attributes
-    ----------
-    frame : "robot" or "base", the frame in which errors are stated.
-    rms_m, worst_m : root mean square over the poses, and RMS at the worst pose.
-    rms_bound_m, worst_bound_m : one-sided confidence bounds on them; None if unknown.
-    poses : number of poses.
-    region : which poses these are, in words.
-    offset_removed, left_out, contradicted : as in `frames.Scope`.
-    left_out_m, form_m : contributions to `rms_m` of effects that no command contains
-        and of the uncertain form of the model.
-    repeated_m : contribution of the joints' repeatability and the random error of each
-        pose.
-    regression_m : error of a regression on the residuals beyond parameters and
-        repeatability.
-    confidence : of the bounds.
-    fitted : whether any parameter of the robot was fitted. If none was, an error of 0
-        is no prediction.
-    """
-
-    frame: str
-    rms_m: float
-    worst_m: float
-    rms_bound_m: float | None
-    worst_bound_m: float | None
-    poses: int
-    region: str
-    offset_removed: bool = False
-    left_out: list[str] = field(default_factory=list)
-    left_out_m: float = 0.0
-    form_m: float = 0.0
-    contradicted: bool = False
-    repeated_m: float = 0.0
-    regression_m: float = 0.0
-    confidence: float = CONFIDENCE
-    fitted: bool = True
 
 
 @dataclass(frozen=True)
@@ -143,7 +102,7 @@ class ErrorPrediction:
             poses=len(self.error_m),
             region=region,
             offset_removed=scope.offset_removed,
-            left_out=list(scope.left_out),
+            left_out=scope.left_out,
             left_out_m=scope.left_out_m,
             form_m=root_mean_square(self.form_m),
             contradicted=scope.contradicted,

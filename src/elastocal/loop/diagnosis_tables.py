@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,9 +19,11 @@ from elastocal.fitting.noise import parse_noise, serialize_noise
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import read_table, write_table
+from elastocal.io.typed_json import from_document
 from elastocal.loop.schemas import STEPS, measurements
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.random_streams import open_stream
+from elastocal.verdict import TrainingVerdict
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -52,13 +54,13 @@ def diagnose_campaign(job: Any) -> None:
         seed,
         lambda line: print(f"{name}: {line}", file=sys.stderr, flush=True),
     )
-    columns, facts = propose_experiment(
+    columns, proposal = propose_experiment(
         found,
         open_stream(seed, case.campaign.name, "next experiment", 0),
         job.params.states,
     )
     write_csv(job.output.experiment, pd.DataFrame(columns))
-    found = replace(found, document=found.document | {"next_experiment": asdict(facts)})
+    found = replace(found, verdict=replace(found.verdict, next_experiment=proposal))
     write_csv(job.output.candidates, pd.DataFrame(candidate_rows(found)))
     write_json(
         job.output.diagnosis,
@@ -152,7 +154,11 @@ def diagnosis_from(case: Case, facts: Mapping[str, Any]) -> Diagnosis:
         for step in facts["steps"]
     )
     return Diagnosis(
-        case, steps, None, facts["document"], measurements.select(left_out)
+        case,
+        steps,
+        None,
+        from_document(TrainingVerdict, facts["document"], "diagnosis.json"),
+        measurements.select(left_out),
     )
 
 

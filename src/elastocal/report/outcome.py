@@ -3,12 +3,11 @@ the verdict."""
 
 from __future__ import annotations
 
-import json
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from elastocal.data_checks.protocol import data_at_fault
+from elastocal.verdict import read_verdict
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -36,12 +35,8 @@ def outcome(made: Iterable[str], workplace: str | Path = "") -> list[str]:
         if path in _REPORTS:
             lines.append(f"{_REPORTS[path]}: {path}")
         if match := _CAMPAIGN.fullmatch(path):
-            verdict = json.loads(
-                Path(workplace, path)
-                .with_name("verdict.json")
-                .read_text(encoding="utf-8")
-            )
-            of_use = verdict["verdict"] in _OF_USE and not data_at_fault(verdict)
+            verdict = read_verdict(Path(workplace, path).with_name("verdict.json"))
+            of_use = verdict.verdict in _OF_USE and not verdict.faults
             stated = campaign_sentences(verdict)
             errors = [f"  {line}" for line in stated["headline_line"]]
             lines += [

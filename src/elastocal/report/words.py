@@ -8,7 +8,7 @@ Sentences stand in templates, which have the functions of this module as filters
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,6 +20,8 @@ from elastocal.effects.protocol import effect_of
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping, Sequence
+
+    from elastocal.verdict import JointRange, MechanismSet
 
 MICRO = 1e6
 MILLI = 1e3
@@ -166,29 +168,30 @@ def _where(effect: str, found: Iterable[re.Match[str] | None]) -> str:
     return f" {listed(parts)}" if any(parts) else ""
 
 
-def hypotheses_words(sets: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Hypotheses, each a set of mechanisms; those that hold all of the first and more
-    by what they add to it.
+def hypotheses_words(sets: Sequence[MechanismSet]) -> list[str]:
+    """Return hypotheses in words, the most probable one first.
 
-    `sets`: as in verdict.json, the most probable first. `OTHER` alone is something that
-    the catalogue does not have; beside a mechanism, that a related one may act.
+    A hypothesis that contains all mechanisms of the first one is described by what it
+    adds. `OTHER` alone is something that the catalogue does not have; together with a
+    mechanism it means that a related mechanism may act.
     """
-    first = set(sets[0]["mechanisms"]) if sets else set()
-    found = []
-    for entry in sets:
-        names = set(entry["mechanisms"])
+    first = set(sets[0].mechanisms) if sets else set()
+    hypotheses = []
+    for hypothesis in sets:
+        names = set(hypothesis.mechanisms)
+        added = names - first
         if not names:
-            found.append(NOTHING)
+            hypotheses.append(NOTHING)
         elif not first or not first < names:
-            found.append(mechanisms_words(entry["mechanisms"], entry["locations"]))
-        elif names - first == {OTHER}:
-            found.append(f"the same or {RELATED}")
-        else:
-            found.append(
-                "the same with "
-                + mechanisms_words(sorted(names - first), entry["locations"])
+            hypotheses.append(
+                mechanisms_words(hypothesis.mechanisms, hypothesis.locations)
             )
-    return found
+        elif added == {OTHER}:
+            hypotheses.append(f"the same or {RELATED}")
+        else:
+            words = mechanisms_words(sorted(added), hypothesis.locations)
+            hypotheses.append(f"the same with {words}")
+    return hypotheses
 
 
 def mechanisms_words(
@@ -288,17 +291,16 @@ def true_minus(text: str) -> str:
     return re.sub(r"(?<= )-(?=\d)", "−", text)
 
 
-def span_words(joint_ranges: Sequence[Mapping[str, Any]]) -> str:
-    """Where the joints stood, as of `validation.span.joint_ranges`."""
-    each = []
+def span_words(joint_ranges: Sequence[JointRange]) -> str:
+    """Return the range of each joint in words."""
+    ranges = []
     for joint, ends in enumerate(joint_ranges, 1):
-        unit, digits = ("°", 0) if ends["unit"] == "deg" else (" m", 2)
-        each.append(
-            minus(
-                f"joint {joint} {ends['low']:.{digits}f} to {ends['high']:.{digits}f}{unit}"
-            )
-        )
-    return ", ".join(each)
+        if ends.unit == "deg":
+            text = f"joint {joint} {ends.low:.0f} to {ends.high:.0f}°"
+        else:
+            text = f"joint {joint} {ends.low:.2f} to {ends.high:.2f} m"
+        ranges.append(minus(text))
+    return ", ".join(ranges)
 
 
 def unit_of(metres: float) -> tuple[float, str]:
