@@ -307,10 +307,9 @@ class Importer:
             ]
         else:
             tables = [_tabulate(measured[0], self.same_pose_rad)]
-        table = {
-            column: np.concatenate([table[column] for table in tables])
-            for column in tables[0]
-        }
+        table = {}
+        for column in tables[0]:
+            table[column] = np.concatenate([session[column] for session in tables])
         targets = [
             target for measurements in measured for target in measurements.positions
         ]

@@ -293,7 +293,7 @@ class _Header:
         return f"line {self.line}" if self.line else "--columns"
 
 
-def read_text_table(
+def read_text_table(  # noqa: PLR0913 - independent options
     path: str | Path,
     is_header: Callable[[Sequence[str]], bool],
     stated: Dialect = _UNSTATED,

@@ -200,7 +200,10 @@ def read_table(
             for column in wanted
         }
     names = [column.name for column in wanted]
-    return {name: np.concatenate([block[name] for block in blocks]) for name in names}
+    table = {}
+    for name in names:
+        table[name] = np.concatenate([block[name] for block in blocks])
+    return table
 
 
 def read_provenance(path: str | Path) -> dict[str, Any]:
