@@ -19,11 +19,11 @@ from typing import Any
 import numpy as np
 from common import ROOT, Row, beside_yardstick, interleaved
 
-from elastocal.campaigns.importers import FOLDER_VARIABLE, importer
+from elastocal.campaigns.importers import FOLDER_VARIABLE, find_importer
 from elastocal.campaigns.writing import write_campaign
-from elastocal.fitting.least_squares import fit, registered
-from elastocal.fitting.model import parameters
-from elastocal.fitting.noise import estimated_noise
+from elastocal.fitting.least_squares import fit_model, register_placement
+from elastocal.fitting.model import list_parameters
+from elastocal.fitting.noise import estimate_noise
 from elastocal.io.documents import read_document
 from elastocal.loop.whole import cases_in
 from elastocal_proof.blind.cases import cases_of, make_case
@@ -115,7 +115,7 @@ def rows(work: Path, setting: Setting) -> Iterator[Row]:
         how,
     )
     if os.environ.get(FOLDER_VARIABLE):
-        series = importer("ur10_ipa", "config", "the benchmark")
+        series = find_importer("ur10_ipa", "config", "the benchmark")
         source = Path(os.environ[FOLDER_VARIABLE], series.files["ur10_ipa_a"].local)
         header, *lines = source.read_text(encoding="utf-8").splitlines(keepends=True)
         kept = lines[: setting.series_a]
@@ -143,15 +143,15 @@ def _fit(work: Path, measurements: int, repetitions: int) -> Row:
         if each.effect in FITTED and not each.shapes
     )
     model = replace(case.model, effects=(*case.model.effects, *effects))
-    noise = estimated_noise(case)[0]
-    start = registered(model, case.observations)
+    noise = estimate_noise(case)[0]
+    start = register_placement(model, case.observations)
     size = (
         case.observations.rows * len(case.observations),
-        len(parameters(model, start)),
+        len(list_parameters(model, start)),
     )
     matrix = np.random.default_rng(1).standard_normal(size)
     functions: dict[str, Callable[[], Any]] = {
-        "fit": lambda: fit(model, case.observations, noise, start),
+        "fit": lambda: fit_model(model, case.observations, noise, start),
         "numpy.linalg.lstsq": lambda: np.linalg.lstsq(matrix, matrix[:, 0]),
     }
     ours, theirs = map(min, interleaved(functions, repetitions))

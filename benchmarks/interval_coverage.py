@@ -15,7 +15,7 @@ from made_errors import KINDS, campaigns_of, true_figures
 from scipy.stats import bootstrap
 
 from elastocal.figures.style import PALETTE, create_panels, styled
-from elastocal.validation.held_out import Errors, intervals
+from elastocal.validation.held_out import PositionErrors, compute_error_intervals
 
 POSES = (9, 18, 36)
 REPLICATES = 999
@@ -97,8 +97,8 @@ def covered(
             method: by_scipy(before, after, false, method, rng)
             for method in METHODS[:2]
         }
-        limits, reductions = intervals([before, after], REPLICATES, rng)
-        of_none = intervals([after, false], REPLICATES, rng)[1][1]
+        limits, reductions = compute_error_intervals([before, after], REPLICATES, rng)
+        of_none = compute_error_intervals([after, false], REPLICATES, rng)[1][1]
         ours = {name: limits[1][name] for name in FIGURES[:2]}
         ours |= {
             "reduction": (reductions[1].low, reductions[1].high),
@@ -113,7 +113,11 @@ def covered(
 
 
 def by_scipy(
-    before: Errors, after: Errors, false: Errors, method: str, rng: np.random.Generator
+    before: PositionErrors,
+    after: PositionErrors,
+    false: PositionErrors,
+    method: str,
+    rng: np.random.Generator,
 ) -> dict[str, np.ndarray]:
     """The same intervals by `scipy.stats.bootstrap` over poses."""
     cluster = after.cluster

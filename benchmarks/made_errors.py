@@ -3,7 +3,7 @@ pose, skewed, with poses far off."""
 
 import numpy as np
 
-from elastocal.validation.held_out import Errors
+from elastocal.validation.held_out import PositionErrors
 
 INTERPRETATIONS = 6
 _MANY = 400_000
@@ -63,6 +63,6 @@ def campaigns_of(kind, campaigns, poses, seed):
     """(before, after, false) as `Errors`, campaign by campaign."""
     cluster, *stages = made_errors(kind, campaigns, poses, np.random.default_rng(seed))
     return [
-        tuple(Errors(distance, cluster) for distance in of_one)
+        tuple(PositionErrors(distance, cluster) for distance in of_one)
         for of_one in zip(*stages, strict=True)
     ]

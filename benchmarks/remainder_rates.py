@@ -22,12 +22,12 @@ from elastocal.campaigns.simulation import Plan as Survey
 from elastocal.campaigns.simulation import draw_measurements
 from elastocal.campaigns.writing import write_campaign
 from elastocal.fitting.model import Case
-from elastocal.fitting.noise import Noise, fit_declared
+from elastocal.fitting.noise import Noise, fit_declared_model
 from elastocal.loop.whole import cases_in
 from elastocal.remainder.corrected import corrected, inputs_of
 from elastocal.remainder.repeatable import repeatable_part
-from elastocal.validation.held_out import position_residuals
-from elastocal.validation.placing import placed
+from elastocal.validation.held_out import compute_position_residuals
+from elastocal.validation.transfer import transfer_fit
 
 NOISE_M = 5e-5
 JOINT_RAD = 2e-5
@@ -73,7 +73,7 @@ def exact_cases(poses: int) -> tuple[Case, Case]:
 def drawn(case: Case, seed: int, part: int, size: float) -> tuple[Case, np.ndarray]:
     """A case with errors, and what no model could predict of it, (M, 3), m. `part`: of
     one robot, that of the seed."""
-    fitted = fit_declared(case.model, case.observations, NOISE)
+    fitted = fit_declared_model(case.model, case.observations, NOISE)
     robot = np.random.default_rng(seed)
     inputs = inputs_of(fitted.model, fitted.estimate, case.observations)
     offsets = robot.normal(0.0, OFFSET_RAD, 6)
@@ -118,12 +118,12 @@ if __name__ == "__main__":
             (case, _), (held_out, chance) = (
                 drawn(each, seed, part, size) for part, each in enumerate(exact)
             )
-            fitted = fit_declared(case.model, case.observations, NOISE)
+            fitted = fit_declared_model(case.model, case.observations, NOISE)
             p_values.append(repeatable_part(fitted, case.observations, seed).p_value)
             if asked.check:
                 continue
-            alone = position_residuals(
-                *placed(fitted, case, held_out), held_out.observations
+            alone = compute_position_residuals(
+                *transfer_fit(fitted, case, held_out), held_out.observations
             )
             found = corrected(
                 fitted,

@@ -8,10 +8,10 @@ import pytest
 from elastocal.errors import (
     LONGEST_MESSAGE,
     InputError,
-    closest_first,
-    escaped,
-    fault_of_machine,
-    steering,
+    describe_system_fault,
+    escape_control_characters,
+    find_control_character,
+    suggest_names,
 )
 
 
@@ -40,8 +40,8 @@ def test_the_message_is_one_line_of_place_what_was_found_and_what_is_allowed_and
 
 
 def test_the_closest_of_the_names_that_are_allowed_comes_first_whatever_its_case():
-    assert closest_first("KUKE", ["abb", "kuka"]) == "'kuka'? (abb, kuka)"
-    assert closest_first("joint", ["abb", "kuka"]) == "abb, kuka"
+    assert suggest_names("KUKE", ["abb", "kuka"]) == "'kuka'? (abb, kuka)"
+    assert suggest_names("joint", ["abb", "kuka"]) == "abb, kuka"
 
 
 @pytest.mark.parametrize("part", range(4))
@@ -68,8 +68,8 @@ def test_what_would_steer_a_terminal_is_escaped():
     [("a\x1bb", "\x1b"), ("a\u202eb", "\u202e"), ("a\nb", "\n"), ("KR\u00a0270 é", "")],
 )
 def test_the_first_character_that_would_steer_is_found(text, character):
-    assert steering(text) == character
-    assert escaped(text) == (
+    assert find_control_character(text) == character
+    assert escape_control_characters(text) == (
         text.replace(character, ascii(character)[1:-1]) if character else text
     )
 
@@ -99,4 +99,4 @@ def test_the_first_character_that_would_steer_is_found(text, character):
     ],
 )
 def test_a_fault_of_the_machine_is_one_line_with_what_would_help(error, words):
-    assert words in str(fault_of_machine(error, "here"))
+    assert words in str(describe_system_fault(error, "here"))

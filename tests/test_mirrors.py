@@ -12,7 +12,7 @@ SOURCES = [TESTS.parent / "src" / name for name in ("elastocal", "elastocal_proo
 # Tests of the catalogue and of closed forms go through all of them.
 EFFECTS = {
     f"effects/{effect.listed.__module__.rpartition('.')[2]}.py"
-    for effect in catalogue.effects().values()
+    for effect in catalogue.list_bundled_effects().values()
 }
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import yaml
 
 from elastocal.campaigns.reading import read_robot
-from elastocal.effects.catalogue import effects
+from elastocal.effects.catalogue import list_effects
 from elastocal.figures.effect_signatures import compute_signature, list_candidates
 
 from extensions import with_plain_references
@@ -71,7 +71,7 @@ NEEDS = {
 
 def page() -> str:
     """The page, in reStructuredText as the docstrings are."""
-    listed = effects()
+    listed = list_effects()
     unknown = {effect.family for effect in listed.values()} - set(FAMILIES)
     if unknown or set(FORMULAS) != set(listed):
         differ = sorted(unknown | (set(FORMULAS) ^ set(listed)))

@@ -8,23 +8,23 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 
-def counted(number: int, one: str, many: str | None = None) -> str:
+def format_count(number: int, one: str, many: str | None = None) -> str:
     """A number with its noun, with thin spaces in large numbers: 1 row, 2 rows."""
-    return f"{grouped(number)} {plural(one, number, many)}"
+    return f"{format_integer(number)} {pluralize(one, number, many)}"
 
 
-def first_names(names: Sequence[str], most: int) -> str:
+def list_first(names: Sequence[str], most: int) -> str:
     """The first of some names, and how many more there are: a, b and 3 more."""
     return ", ".join(names[:most]) + (
         f" and {len(names) - most} more" if len(names) > most else ""
     )
 
 
-def plural(one: str, number: int, many: str | None = None) -> str:
+def pluralize(one: str, number: int, many: str | None = None) -> str:
     """A noun in the form of its number: row, rows."""
     return one if number == 1 else many or one + "s"
 
 
-def grouped(number: int) -> str:
+def format_integer(number: int) -> str:
     """A whole number with a thin space between thousands."""
     return f"{number:,}".replace(",", "\u2009")

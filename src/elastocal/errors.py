@@ -37,26 +37,25 @@ class InputError(ValueError):
         self.key = key
         self.found = found
         self.allowed = allowed
-        name = printable(self.source)
+        name = format_printable(self.source)
         where = (
             name if len(name) <= _LONGEST_SOURCE else f"…{name[1 - _LONGEST_SOURCE :]}"
         )
-        where += f": {_shortened(printable(key), _LONGEST_KEY)}" if key else ""
-        message = (
-            f"{where}: found {_shortened(printable(found), _LONGEST_FOUND)}; allowed: "
-        )
+        where += f": {_shortened(format_printable(key), _LONGEST_KEY)}" if key else ""
+        message = f"{where}: found {_shortened(format_printable(found), _LONGEST_FOUND)}; allowed: "
         super().__init__(
-            message + _shortened(printable(allowed), LONGEST_MESSAGE - len(message))
+            message
+            + _shortened(format_printable(allowed), LONGEST_MESSAGE - len(message))
         )
 
 
-def closest_first(name: str, known: Collection[str]) -> str:
+def suggest_names(name: str, known: Collection[str]) -> str:
     """What is allowed instead of a name: the closest first."""
     listed = ", ".join(known)
-    return f"{hint} ({listed})" if (hint := closest(name, known)) else listed
+    return f"{hint} ({listed})" if (hint := suggest_name(name, known)) else listed
 
 
-def closest(name: str, known: Collection[str]) -> str:
+def suggest_name(name: str, known: Collection[str]) -> str:
     """The closest of some names as a question, whatever the case of its letters; empty
     where none is close."""
     lower = {other.lower(): other for other in known}
@@ -64,22 +63,22 @@ def closest(name: str, known: Collection[str]) -> str:
     return f"{lower[close[0]]!r}?" if close else ""
 
 
-def printable(text: str) -> str:
+def format_printable(text: str) -> str:
     """A text on one line, `escaped`."""
-    return escaped(" ".join(text.split()))
+    return escape_control_characters(" ".join(text.split()))
 
 
-def escaped(text: str) -> str:
+def escape_control_characters(text: str) -> str:
     """A text with what `steering` finds as escapes: what a file holds must not steer a
     terminal."""
     return (
         text
         if text.isprintable()
-        else "".join(ascii(c)[1:-1] if steering(c) else c for c in text)
+        else "".join(ascii(c)[1:-1] if find_control_character(c) else c for c in text)
     )
 
 
-def steering(text: str) -> str:
+def find_control_character(text: str) -> str:
     """The first control character of a text, or mark that turns the order of letters or
     is not seen; empty where none is."""
     return (
@@ -96,10 +95,10 @@ def steering(text: str) -> str:
     )
 
 
-def text_fault(text: str) -> tuple[str, str] | None:
+def find_text_fault(text: str) -> tuple[str, str] | None:
     """What is wrong with a name or text that reports, tables and terminals show, and
     what is allowed; None where nothing is."""
-    if character := steering(text):
+    if character := find_control_character(text):
         return (
             f"the character {character!a} in {text!r}",
             "printable characters on one line",
@@ -118,7 +117,7 @@ _NO_MEMORY = ("failed to map segment", "annot allocate memory")
 _USABLE = "a file or folder that is there, on a disk with space, where this user may read and write"
 
 
-def fault_of_machine(
+def describe_system_fault(
     error: OSError | MemoryError | ImportError, place: str = "disk"
 ) -> InputError:
     """A full disk, a folder that cannot be written to, memory that is used up and the
@@ -141,11 +140,14 @@ def fault_of_machine(
         )
     # What was asked for, not the name beside it under which it is written.
     return InputError(
-        _PARTIAL.sub("", str(error.filename or place)), "", reason_of(error), _USABLE
+        _PARTIAL.sub("", str(error.filename or place)),
+        "",
+        describe_os_error(error),
+        _USABLE,
     )
 
 
-def reason_of(error: OSError) -> str:
+def describe_os_error(error: OSError) -> str:
     """What was found where something could not be read or written, in words that fit a
     sentence."""
     return (

@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
 
-def stream(seed: int, robot: str, purpose: str, data_set: int) -> np.random.Generator:
+def open_stream(
+    seed: int, robot: str, purpose: str, data_set: int
+) -> np.random.Generator:
     """Generator for one purpose in one data set.
 
     `robot`: name of the robot's file. `purpose`: such as ``configurations``.
@@ -26,7 +28,7 @@ def stream(seed: int, robot: str, purpose: str, data_set: int) -> np.random.Gene
     return np.random.Generator(np.random.Philox(key=key, counter=[0, 0, data_set, use]))
 
 
-def draw(
+def draw_data_sets(
     seed: int,
     robot: str,
     purpose: str,
@@ -38,7 +40,7 @@ def draw(
     `seed`, `robot`, `purpose`: as in `stream`. `sampler`: takes a Generator, returns an
     array of fixed shape. Returns (sets, ...).
     """
-    generator = stream(seed, robot, purpose, 0)
+    generator = open_stream(seed, robot, purpose, 0)
     start = generator.bit_generator.state
     drawn = []
     for data_set in data_sets:

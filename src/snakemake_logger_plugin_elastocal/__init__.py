@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from snakemake_interface_logger_plugins.base import LogHandlerBase
 from snakemake_interface_logger_plugins.common import LogEvent
 
-from elastocal.counting import counted
+from elastocal.counting import format_count
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -80,7 +80,7 @@ class LogHandler(LogHandlerBase):
             return [] if unasked else [self.format(record)]
         if event == LogEvent.RUN_INFO:
             self._total = record.stats.get("total", 0)
-            return [counted(self._total, "job")]
+            return [format_count(self._total, "job")]
         if event == LogEvent.JOB_INFO:
             self._started += 1
             return [

@@ -25,14 +25,14 @@ from elastocal.application.accuracy import (
 from elastocal.application.calibrated import predict_poses
 from elastocal.application.frames import BASE, ROBOT, Scope, subtract_placement
 from elastocal.effects.catalogue import candidates_on
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import stepped
+from elastocal.fitting.least_squares import fit_model
+from elastocal.fitting.model import apply_step
 from elastocal.fitting.noise import Noise
 from elastocal.loop.whole import cases_in
 from elastocal.mechanics.sites import sites_of
 from elastocal.remainder.corrected import is_commanded
-from elastocal.validation.held_out import position_residuals
-from elastocal.validation.placing import placed
+from elastocal.validation.held_out import compute_position_residuals
+from elastocal.validation.transfer import transfer_fit
 
 LOADED = made_states(6, 60)
 STATES = replace(LOADED, wrench=np.zeros((60, 6)))
@@ -63,7 +63,7 @@ def test_bounds_hold_95_percent_of_robots_drawn_from_the_covariance(
     for _ in range(150):
         step = root @ draws.standard_normal(len(root))
         other = replace(
-            calibrated, estimate=stepped(calibrated.model, calibrated.estimate, step)
+            calibrated, estimate=apply_step(calibrated.model, calibrated.estimate, step)
         )
         off = (predict_poses(other, angles)[0] - position)[..., None]
         if unknown_base:
@@ -193,7 +193,7 @@ def campaign(kuka, tmp_path_factory, config_folder):
     )
     case, held_out = cases_in(folder, config_folder / "robots")
     noise = Noise("declared", 6e-5, 6e-5, np.zeros(6))
-    final = fit(case.model, case.observations, noise)
+    final = fit_model(case.model, case.observations, noise)
     return (
         case,
         held_out,
@@ -203,7 +203,9 @@ def campaign(kuka, tmp_path_factory, config_folder):
 
 
 def judged(calibrated, final, case, held_out):
-    residual = position_residuals(*placed(final, case, held_out), held_out.observations)
+    residual = compute_position_residuals(
+        *transfer_fit(final, case, held_out), held_out.observations
+    )
     return inflate_to_held_out_errors(
         calibrated, held_out, residual, final.noise.position_m
     )

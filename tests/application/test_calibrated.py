@@ -14,7 +14,7 @@ from elastocal.application.calibrated import (
     compute_pose_sensitivities,
     predict_poses,
 )
-from elastocal.fitting.model import stepped
+from elastocal.fitting.model import apply_step
 from elastocal.mechanics.kinematics import pose_differences
 from elastocal.mechanics.robot import Mass
 
@@ -93,7 +93,7 @@ def test_sensitivities_are_the_derivatives_of_the_poses_by_every_parameter(fanuc
     for place, size in enumerate(np.sqrt(np.diag(found.covariance))):
         step = np.zeros(len(found.covariance))
         step[place] = 1e-2 * size
-        moved = replace(found, estimate=stepped(found.model, found.estimate, step))
+        moved = replace(found, estimate=apply_step(found.model, found.estimate, step))
         off = pose_differences(
             *predict_poses(moved, states.joint_angles, states.wrench), *middle
         )

@@ -3,8 +3,8 @@
 import pytest
 from made_audits import CONFIGURATION, ROBOT, failed, forge
 
-from elastocal.io.origin import provenance as written_by
-from elastocal.io.records import recorded
+from elastocal.io.origin import describe_provenance as written_by
+from elastocal.io.records import list_recorded_files
 from elastocal.io.storage import write_table
 from elastocal.study.simulation import INITIAL
 from elastocal_proof.audit.audited import Audited, Finding
@@ -67,7 +67,7 @@ def test_an_altered_a_missing_and_an_unreadable_file_are_found_and_an_empty_fold
 ):
     assert [finding.holds for finding in audit(folder)] == [False]
     write(folder)
-    digest = recorded(folder.folder)[FILE]
+    digest = list_recorded_files(folder.folder)[FILE]
     with open(folder.folder / FILE, "ab") as file:
         file.write(b"x")
     assert not intact(folder, FILE, digest).holds

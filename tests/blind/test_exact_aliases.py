@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 from analysed_robots import ROBOTS
 
-from elastocal.campaigns.campaign import columns_of
+from elastocal.campaigns.campaign import tabulate_measurements
 from elastocal.campaigns.campaign_folder import read_campaign_folder
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.linearization import effect_columns, linearize
-from elastocal.fitting.model import case_from
-from elastocal.fitting.noise import estimated_noise
+from elastocal.fitting.least_squares import fit_model
+from elastocal.fitting.linearization import compute_effect_sensitivities, linearize
+from elastocal.fitting.model import build_case
+from elastocal.fitting.noise import estimate_noise
 from elastocal.loop.loading import load_campaign
 from elastocal_proof.blind.cases import Case, make_case
 from elastocal_proof.blind.scores import EXACT_ALIASES
@@ -27,17 +27,17 @@ def directions(declared, observations, candidates):
     line = linearize(
         declared.model, declared.estimate, observations, declared.conditions
     )
-    left = declared.whitened(line.sensitivities).reshape(line.residual.size, -1)
+    left = declared.whiten(line.sensitivities).reshape(line.residual.size, -1)
     basis = np.linalg.qr(left / np.linalg.norm(left, axis=0))[0]
     found = []
     for candidate in candidates:
-        made = effect_columns(
+        made = compute_effect_sensitivities(
             [(candidate.displacement, ())],
             line.conditions,
             line.coordinate_jacobian,
             observations.state,
         )
-        columns = declared.whitened(made).reshape(line.residual.size, -1)
+        columns = declared.whiten(made).reshape(line.residual.size, -1)
         columns = columns / np.linalg.norm(columns, axis=0)
         for _ in range(2):
             columns = columns - basis @ (basis.T @ columns)
@@ -67,8 +67,8 @@ def seen(request, tmp_path_factory):
     descriptions, training, _ = load_campaign(
         read_campaign_folder(folder / "blind" / made.name, ROBOTS)
     )
-    case = case_from(descriptions, columns_of(training))
-    declared = fit(case.model, case.observations, estimated_noise(case)[0])
+    case = build_case(descriptions, tabulate_measurements(training))
+    declared = fit_model(case.model, case.observations, estimate_noise(case)[0])
     candidates = [c for c in case.candidates.values() if not c.shapes]
     return directions(declared, case.observations, candidates)
 

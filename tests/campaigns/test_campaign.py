@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from made_cells import assert_same
 
 from elastocal.campaigns.campaign import (
-    columns_of,
-    groups_of,
-    measurements_from,
-    residual_columns,
+    build_measurements,
+    group_equal_rows,
+    tabulate_measurements,
+    tabulate_residuals,
 )
 
 PARTS = {
@@ -61,24 +61,24 @@ def test_selected_measurements_come_in_the_order_of_the_index(measurements):
 
 
 def test_every_number_stands_in_the_column_of_its_name(cell, measurements):
-    columns = columns_of(measurements)
+    columns = tabulate_measurements(measurements)
     assert [*columns] == [*PLAIN, *(name for names in PARTS.values() for name in names)]
     for name in [*columns.keys() & cell.table.keys() - {"target"}]:
         np.testing.assert_array_equal(columns[name], cell.table[name], err_msg=name)
-    assert_same(measurements_from(columns), measurements)
+    assert_same(build_measurements(columns), measurements)
 
 
 @pytest.mark.parametrize("part", PARTS)
 def test_what_was_not_measured_is_an_empty_column_and_is_absent_again(
     measurements, part
 ):
-    columns = columns_of(replace(measurements, **{part: None}))
+    columns = tabulate_measurements(replace(measurements, **{part: None}))
     assert {name for name, values in columns.items() if np.isnan(values).any()} == set(
         PARTS[part]
     )
     assert [
         name
-        for name, values in vars(measurements_from(columns)).items()
+        for name, values in vars(build_measurements(columns)).items()
         if values is None
     ] == [part]
 
@@ -90,7 +90,7 @@ def test_residuals_of_poses_stand_beside_the_measurements_in_the_positions_that_
     before, after = (np.arange(12.0).reshape(2, 6) + start for start in (100.0, 200.0))
     position = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
     beyond = np.array([False, True])
-    columns = residual_columns(
+    columns = tabulate_residuals(
         some, False, False, beyond, position, {"before": before, "after": after[:, :3]}
     )
     for number, component in enumerate(("dx", "dy", "dz", "rx", "ry", "rz")):
@@ -100,7 +100,7 @@ def test_residuals_of_poses_stand_beside_the_measurements_in_the_positions_that_
             after[:, number] if number < 3 else [np.nan] * 2,
         )
     np.testing.assert_array_equal([columns[axis] for axis in "xyz"], position.T)
-    whole = columns_of(some)
+    whole = tabulate_measurements(some)
     assert all(
         (columns[name] == whole[name]).all() for name in ("row", "q2", "mz", "time_s")
     )
@@ -127,6 +127,6 @@ def test_groups_are_those_of_numpy_unique(rows):
     _, expected_first, expected = np.unique(
         keys, axis=0, return_index=True, return_inverse=True
     )
-    first, group = groups_of(keys)
+    first, group = group_equal_rows(keys)
     np.testing.assert_array_equal(first, expected_first)
     np.testing.assert_array_equal(group, expected.ravel())

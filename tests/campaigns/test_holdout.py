@@ -13,12 +13,12 @@ from support import refused
 
 from elastocal.campaigns.holdout import (
     SAME_POSE_RAD,
-    beyond_range,
-    blocks_of_poses,
-    configurations,
+    find_poses_beyond_range,
     find_repeated,
-    number_alike,
-    split,
+    number_close_points,
+    number_configurations,
+    partition_poses,
+    split_poses,
 )
 
 
@@ -31,7 +31,7 @@ def poses_of(measurements):
 def parts(cell, **holdout):
     """Poses that are fitted, and poses that are held out."""
     cell.document |= {"holdout": holdout} if holdout else {}
-    fitted, held_out = map(poses_of, split(cell.read()))
+    fitted, held_out = map(poses_of, split_poses(cell.read()))
     assert fitted.isdisjoint(held_out)
     return fitted, held_out
 
@@ -136,7 +136,10 @@ def test_poses_of_one_configuration_alone_are_refused_soon(cell):
         cell.read()
     angles = np.tile(np.random.default_rng(4).uniform(-2, 2, (2, 6)), (50_000, 1))
     begun = time.process_time()
-    assert configurations(angles, np.arange(len(angles))).tolist() == [0, 1] * 50_000
+    assert (
+        number_configurations(angles, np.arange(len(angles))).tolist()
+        == [0, 1] * 50_000
+    )
     assert time.process_time() - begun < 10.0
 
 
@@ -146,14 +149,14 @@ def test_blocks_are_clusters_whatever_the_order_of_the_poses_and_whole_turns():
     of = rng.permutation(np.repeat(np.arange(4), 6))
     angles = centres[of] + 0.15 * rng.standard_normal((24, 3))
     order = rng.permutation(24)
-    found = blocks_of_poses(angles, np.arange(24), 4)
+    found = partition_poses(angles, np.arange(24), 4)
     assert len({(block, centre) for block, centre in zip(found, of, strict=True)}) == 4
     turned = angles[order] + 2 * np.pi * rng.integers(-1, 2, (24, 3))
     np.testing.assert_array_equal(
-        blocks_of_poses(turned, np.arange(24), 4), found[order]
+        partition_poses(turned, np.arange(24), 4), found[order]
     )
     np.testing.assert_array_equal(
-        blocks_of_poses(np.tile(angles, (2, 1)), np.arange(48), 4), np.tile(found, 2)
+        partition_poses(np.tile(angles, (2, 1)), np.arange(48), 4), np.tile(found, 2)
     )
 
 
@@ -179,7 +182,9 @@ def test_a_pose_is_beyond_the_range_from_the_margin_on_that_chance_leaves_once_i
                 pose[joint] = edge[joint] + factor * sign * share * (
                     high[joint] - low[joint]
                 )
-                assert beyond_range(angles, pose[None]).tolist() == [beyond], (
+                assert find_poses_beyond_range(angles, pose[None]).tolist() == [
+                    beyond
+                ], (
                     joint,
                     sign,
                 )
@@ -210,10 +215,10 @@ def test_a_row_is_alike_to_the_first_that_began_a_number_near_it_and_poses_are_s
         ]
         leaders += [] if alike else [row]
         expected.append(alike[0] if alike else len(leaders) - 1)
-    np.testing.assert_array_equal(number_alike(points, 0.1), expected)
+    np.testing.assert_array_equal(number_close_points(points, 0.1), expected)
     spread = (SAME_POSE_RAD / 0.1) * np.repeat(points, 2, axis=0) + np.tile(
         [[1.0], [-1.0]], (300, 1)
     )
     np.testing.assert_array_equal(
-        configurations(spread, np.repeat(np.arange(300), 2)), expected
+        number_configurations(spread, np.repeat(np.arange(300), 2)), expected
     )

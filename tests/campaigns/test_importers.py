@@ -21,13 +21,13 @@ from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.importers import (
     FOLDER_VARIABLE,
     PublicFile,
-    campaign_sources,
     fetch,
+    find_importer,
     find_missing,
-    importer,
-    named_campaigns,
+    find_user_campaign,
+    list_campaigns,
+    read_campaign_sources,
     read_importers,
-    user_campaign,
 )
 from elastocal.campaigns.reading import read_campaign, read_robot
 from elastocal.io.documents import read_document
@@ -141,7 +141,7 @@ def test_importers_name_robots_and_campaigns_name_their_files():
         for document in public
     )
     with refused("mine.yaml", "importer", "'nobody'", ", ".join(ALL)):
-        importer("nobody", CONFIG, "mine.yaml")
+        find_importer("nobody", CONFIG, "mine.yaml")
 
 
 def made(tmp_path, name, *paths, **test):
@@ -333,8 +333,8 @@ def test_each_pose_of_the_motoman_counts_once_and_those_that_nobody_saw_not_at_a
 
 
 def test_campaigns_of_the_repository_pass(config, config_folder):
-    sources = campaign_sources(config, config_folder)
-    assert list(sources) == named_campaigns(config)
+    sources = read_campaign_sources(config, config_folder)
+    assert list(sources) == list_campaigns(config)
     for name, document in sources.items():
         assert document["source"] == (
             "simulated" if name in config["loop"]["campaigns"] else "public"
@@ -382,7 +382,7 @@ def test_fault_in_a_campaigns_file_is_one_line_that_names_it(
     path.parent.mkdir()
     path.write_text(yaml.safe_dump(document))
     with refused(path.as_posix(), key, *words):
-        campaign_sources(of_one_campaign(config), tmp_path, "study.yaml")
+        read_campaign_sources(of_one_campaign(config), tmp_path, "study.yaml")
 
 
 def users_folder(tmp_path, **changes):
@@ -404,7 +404,7 @@ def users_folder(tmp_path, **changes):
 
 def users_own(config, robots, results):
     """The user's own campaign: path of its folder by its name."""
-    campaigns = user_campaign(config, robots, results)
+    campaigns = find_user_campaign(config, robots, results)
     return {name: folder.path.as_posix() for name, folder in campaigns.items()}
 
 
@@ -516,7 +516,7 @@ def test_two_campaigns_that_test_each_other_come_with_the_files_of_both(
         .replace("cell7", "cell8")
     )
     robots = config_folder / "robots"
-    own = user_campaign(config | {"campaign": folder}, robots, tmp_path)["cell7"]
+    own = find_user_campaign(config | {"campaign": folder}, robots, tmp_path)["cell7"]
     expected = [
         f"{folder}/campaign.yaml",
         f"{robots}/kuka.yaml",

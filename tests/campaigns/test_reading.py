@@ -9,7 +9,7 @@ from made_cells import ARM, DOCUMENT, LOADS, POSES, REPEATS, WRENCH, assert_same
 from support import refused
 
 from elastocal.campaigns.campaign import Target
-from elastocal.campaigns.holdout import split
+from elastocal.campaigns.holdout import split_poses
 from elastocal.campaigns.reading import read_campaign, read_held_out_campaign
 from elastocal.campaigns.writing import write_campaign
 
@@ -155,7 +155,7 @@ def test_other_campaign_of_the_same_chain_is_the_test_of_all_measurements(
 ):
     other_campaign(cell, tmp_path)
     campaign = cell.read()
-    training, held_out = split(campaign)
+    training, held_out = split_poses(campaign)
     assert len(held_out) == 0
     assert_same(training, campaign.measurements)
     other = read_held_out_campaign(cell.open())

@@ -108,7 +108,7 @@ def test_more_than_a_campaign_can_have_is_refused_at_once(
 ):
     monkeypatch.setattr(tables, limit, largest)
     # Before any line is looked at.
-    monkeypatch.setattr(tables, "steering", None)
+    monkeypatch.setattr(tables, "find_control_character", None)
     with refused(tmp_path / "table.txt", "", words):
         read(tmp_path, "x;y\n" + "1;2\n" * 200)
 

@@ -10,8 +10,8 @@ from support import refused
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.reading import read_campaign
 from elastocal.campaigns.writing import (
-    campaign_template,
-    sheet_template,
+    format_campaign_template,
+    format_sheet_header,
     write_campaign,
 )
 from elastocal.io.documents import check_document, read_schema
@@ -40,7 +40,7 @@ def test_written_campaign_is_the_one_read_and_one_that_cannot_be_written_leaves_
 
 
 def test_every_key_is_explained_and_those_left_out_are_valid_once_uncommented(kuka):
-    text = campaign_template("cell", kuka)
+    text = format_campaign_template("cell", kuka)
     known = read_schema("campaign")["properties"]
     lines = text.splitlines()
     shown = yaml.safe_load(text)
@@ -51,5 +51,6 @@ def test_every_key_is_explained_and_those_left_out_are_valid_once_uncommented(ku
             assert lines[number - 1].startswith("# "), "explained above"
             check_document(shown | yaml.safe_load(line[2:]), "campaign", line)
     assert (
-        sheet_template(2) == "pose,load,repeat,target,q1,q2,fx,fy,fz,mx,my,mz,x,y,z\n"
+        format_sheet_header(2)
+        == "pose,load,repeat,target,q1,q2,fx,fy,fz,mx,my,mz,x,y,z\n"
     )

@@ -26,9 +26,9 @@ from elastocal.data_checks.faults import (
     implausible_measurements,
     wrong_loads,
 )
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import declared_model
-from elastocal.fitting.observations import averaged
+from elastocal.fitting.least_squares import fit_model
+from elastocal.fitting.model import build_declared_model
+from elastocal.fitting.observations import average_repeats
 
 PLANS = {
     "base": Plan(poses=10, loads=2),
@@ -165,7 +165,11 @@ def warned(robot, factors=1.0, turned=1.0, known=True):
     )
     campaign = with_measured(campaign, wrench=turned * campaign.measurements.wrench)
     return compliance_warnings(
-        fit(declared_model(campaign), averaged(campaign.measurements), NOISE)
+        fit_model(
+            build_declared_model(campaign),
+            average_repeats(campaign.measurements),
+            NOISE,
+        )
     )
 
 
@@ -205,7 +209,9 @@ def test_loads_turned_round_are_seen_by_compliances_below_zero_and_joints_withou
         made(replace(fanuc, compliance_known=False), 1), compliance="nominal"
     )
     (warning,) = compliance_warnings(
-        fit(declared_model(rigid), averaged(rigid.measurements), NOISE)
+        fit_model(
+            build_declared_model(rigid), average_repeats(rigid.measurements), NOISE
+        )
     )
     assert "taken as rigid" in warning
 

@@ -14,8 +14,8 @@ from elastocal.diagnosis.candidate_design import (
     refine_shapes,
 )
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import residuals
+from elastocal.fitting.least_squares import fit_model
+from elastocal.fitting.model import compute_residuals
 
 SETTINGS = Settings()
 KEYS = (
@@ -68,7 +68,7 @@ def test_a_column_is_the_change_of_the_exact_prediction_at_the_plausible_size(
     step = np.zeros(len(unit.columns))
     step[0] = 1e-3
     model, moved = with_effect(campaign, key, step * unit.sizes)
-    off = residuals(model, moved, campaign.observations, fitted.conditions)
+    off = compute_residuals(model, moved, campaign.observations, fitted.conditions)
     # Robust weights of the fit stay as they are.
     pushed = replace(fitted, estimate=fitted.estimate)
     observations = replace(
@@ -90,8 +90,8 @@ def test_a_problem_about_a_model_with_an_effect_is_the_one_about_the_model_witho
     is given back to the measurements."""
     model, start = with_effect(campaign, "joint_offset@3", [0.0])
     noise = campaign.declared.noise
-    fitted = fit(model, campaign.observations, noise, start)
-    assert abs(fitted.values_of("joint_offset@3")[0][0]) > 4e-4
+    fitted = fit_model(model, campaign.observations, noise, start)
+    assert abs(fitted.effect_values("joint_offset@3")[0][0]) > 4e-4
     keys = ("joint_offset@2", "joint_offset@3", "joint_offset@4")
     one = problem_of(
         campaign, replace(campaign.declared, weights=fitted.weights), keys

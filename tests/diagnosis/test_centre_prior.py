@@ -12,7 +12,7 @@ from elastocal.diagnosis.centre_prior import choose_centre_prior
 from elastocal.diagnosis.fitted_subset import FittedSubset
 from elastocal.diagnosis.settings import Settings
 from elastocal.effects.catalogue import candidates_on
-from elastocal.fitting.least_squares import fit
+from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.model import Case
 from elastocal.mechanics.robot import Mass
 
@@ -51,7 +51,7 @@ def kept(robot, off=0.0, payload_kg=0.0):
     seen = seen_exactly(model.with_effects([candidates["payload[mass]"]]), true, states)
     seen = with_noise(seen, np.random.default_rng(6))
     noise = replace(NOISE, joint_rad=np.zeros(6))
-    declared = fit(model, seen, noise)
+    declared = fit_model(model, seen, noise)
     return FittedSubset(
         Case(None, seen, model, candidates),
         np.ones(len(seen), bool),

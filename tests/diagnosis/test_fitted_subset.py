@@ -8,8 +8,8 @@ from bad_rows import damaged
 
 from elastocal.diagnosis.fitted_subset import fit_subset, select_initial_subset
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import parameter_values
+from elastocal.fitting.least_squares import fit_model
+from elastocal.fitting.model import get_parameter_values
 
 SETTINGS = Settings()
 NOISE_M = 6e-5
@@ -50,14 +50,14 @@ def test_the_last_step_to_all_of_a_long_campaign_leaves_a_tenth_of_a_standard_er
     )
     usual = part.fit_to_all(part.declared)
     for module in ("fitting.least_squares", "diagnosis.fitted_subset"):
-        monkeypatch.setattr(f"elastocal.{module}.LONG", 30)
+        monkeypatch.setattr(f"elastocal.{module}.LARGE_FIT_SIZE", 30)
     monkeypatch.setattr("elastocal.fitting.least_squares._STEPPING_STONE", 36)
     long = part.fit_to_all(part.declared)
     off, exact = (
-        parameter_values(each.model, each.estimate)
-        for each in (long, fit(usual.model, part.case.observations, usual.noise))
+        get_parameter_values(each.model, each.estimate)
+        for each in (long, fit_model(usual.model, part.case.observations, usual.noise))
     )
-    assert (off != parameter_values(usual.model, usual.estimate)).any()
+    assert (off != get_parameter_values(usual.model, usual.estimate)).any()
     assert (np.abs(off - exact) <= 0.1 * np.sqrt(np.diag(usual.covariance))).all()
 
 

@@ -8,9 +8,9 @@ import pytest
 
 from elastocal.diagnosis.diagnose import Diagnosis, Step
 from elastocal.diagnosis.judge import generate_residual_blocks, judge
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import joint_compliances
-from elastocal.fitting.noise import Noise, noise_facts
+from elastocal.fitting.least_squares import fit_model
+from elastocal.fitting.model import get_joint_compliances
+from elastocal.fitting.noise import Noise, serialize_noise
 from elastocal.mechanics.elastostatics import generalized_forces
 from elastocal.mechanics.kinematics import poses, poses_and_jacobians
 from elastocal.validation.held_out import METRICS
@@ -32,7 +32,7 @@ def diagnosis_of(case, steps):
         "warnings": ["as it was"],
         "gross_errors": [],
     }
-    document["noise"] = noise_facts(NOISE)
+    document["noise"] = serialize_noise(NOISE)
     return Diagnosis(
         case,
         tuple(steps),
@@ -48,10 +48,10 @@ def made(cases):
     case = cases[0]
     members = [cases[0].candidates["joint_offset@3"]]
     bare, declared = (
-        fit(model, case.observations, NOISE)
+        fit_model(model, case.observations, NOISE)
         for model in (replace(case.model, effects=()), case.model)
     )
-    final = fit(
+    final = fit_model(
         case.model.with_effects(members),
         case.observations,
         NOISE,
@@ -112,9 +112,9 @@ def test_residuals_are_measured_less_predicted_for_every_measurement_in_its_orde
                 end = poses_and_jacobians(robot.chain, moved, robot.chain.end_effector)[
                     2
                 ]
-                moved = angles + generalized_forces(end, wrench) * joint_compliances(
-                    fitted.model, fitted.estimate
-                )
+                moved = angles + generalized_forces(
+                    end, wrench
+                ) * get_joint_compliances(fitted.model, fitted.estimate)
                 if kind == "effect":
                     moved[:, 2] += fitted.estimate.coefficients[-1][0]
             for number, target in enumerate(case.campaign.targets):

@@ -11,7 +11,7 @@ from elastocal.diagnosis.misplaced import (
     describe_reference_point,
     find_misplaced_frames,
 )
-from elastocal.fitting.noise import estimated_noise, fit_declared
+from elastocal.fitting.noise import estimate_noise, fit_declared_model
 from elastocal.loop.overview import overview
 from elastocal.loop.whole import cases_in
 from elastocal.mechanics.kinematics import poses
@@ -75,7 +75,7 @@ def misdeclared_folder(folder, robot, name, place, shift_m, poses_measured=40, s
 def findings(folder):
     case, _ = cases_in(folder, ROBOTS)
     return find_misplaced_frames(
-        fit_declared(case.model, case.observations, estimated_noise(case)[0]),
+        fit_declared_model(case.model, case.observations, estimate_noise(case)[0]),
         case.campaign,
     )
 

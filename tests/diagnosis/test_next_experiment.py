@@ -26,7 +26,7 @@ from elastocal.diagnosis.next_experiment import (
 )
 from elastocal.diagnosis.search import Alarm, ScoredModel, search_models
 from elastocal.diagnosis.settings import Settings
-from elastocal.diagnosis.verdict import concluded
+from elastocal.diagnosis.verdict import conclude
 
 SETTINGS = Settings(pose_steps=(0.0, 2.0), other_features=6)
 RAISED = Alarm(0.002, 10.0, True)
@@ -43,7 +43,7 @@ def diagnosed(campaign, robot, keys):
         SETTINGS,
     )
     found = search_models(line.problem)
-    conclusion = concluded(line.problem, found, RAISED)
+    conclusion = conclude(line.problem, found, RAISED)
     evidence = SimpleNamespace(
         linearized=line, posterior=found, alarm=RAISED, conclusion=conclusion
     )

@@ -11,7 +11,7 @@ from elastocal.diagnosis.candidate_design import build_candidate_design
 from elastocal.diagnosis.refit import fit_selected_effects, select_effects
 from elastocal.diagnosis.search import search_models
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.least_squares import fit
+from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.linearization import linearize
 
 SETTINGS = Settings()
@@ -27,7 +27,7 @@ def found(kuka):
     known = campaign.candidates["joint_offset@2"]
     model = campaign.declared.model.with_effects([known])
     start = campaign.declared.estimate.with_effects([known])
-    declared = fit(model, campaign.observations, campaign.declared.noise, start)
+    declared = fit_model(model, campaign.observations, campaign.declared.noise, start)
     candidates = [
         candidate
         for candidate in campaign.all_candidates
@@ -67,7 +67,7 @@ def test_priors_arrive_in_the_fit(found):
     about = linearize(
         final.model, final.estimate, campaign.observations, final.conditions
     )
-    left = final.whitened(about.sensitivities).reshape(-1, len(final.parameters))
+    left = final.whiten(about.sensitivities).reshape(-1, len(final.parameters))
     precision = np.array(
         [0.0 if p.prior_std is None else p.prior_std**-2 for _, p in final.parameters]
     )

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from elastocal.fitting.model import joint_compliances
+from elastocal.fitting.model import get_joint_compliances
 
 
 def test_compliances_before_are_those_of_the_declared_model(diagnosis):
     declared = diagnosis.declared
     compliances = diagnosis.document["compliance_urad_per_Nm"]
-    before = 1e6 * joint_compliances(declared.model, declared.estimate)
+    before = 1e6 * get_joint_compliances(declared.model, declared.estimate)
     np.testing.assert_allclose(compliances["before"], before)
     assert len(compliances["after"]) == len(compliances["std_error"]) == len(before)
     # A compliance that the measurements tell has a standard error.

@@ -22,17 +22,17 @@ from elastocal.diagnosis.verdict import (
     UNEXPLAINED,
     Conclusion,
     Hypothesis,
-    concluded,
-    contradictions,
-    hypotheses_of,
-    implausible,
-    location_probabilities,
-    oversized,
+    allow_related_mechanisms,
+    compute_location_probabilities,
+    conclude,
+    find_contradictions,
+    find_oversized_effects,
     parameter_entries,
+    rank_hypotheses,
     sag_entries,
-    with_related,
+    warn_of_implausible_values,
 )
-from elastocal.fitting.model import joint_compliances, predict
+from elastocal.fitting.model import get_joint_compliances, predict
 
 SETTINGS = Settings()
 
@@ -74,7 +74,7 @@ def made_posterior(*pairs):
 
 
 def conclusion(*pairs, alarm=RAISED):
-    return concluded(PROBLEM, made_posterior(*pairs), alarm)
+    return conclude(PROBLEM, made_posterior(*pairs), alarm)
 
 
 # Verdict, best hypothesis, what is meant instead, probability of what is left open;
@@ -186,13 +186,13 @@ def test_of_a_law_and_a_smooth_error_that_which_adds_little_is_a_part_of_the_oth
         OTHER not in mechanisms,
         "offset" not in mechanisms,
     )
-    assert hypotheses_of(PROBLEM, posterior)[0].mechanisms == mechanisms
+    assert rank_hypotheses(PROBLEM, posterior)[0].mechanisms == mechanisms
 
 
 def test_nothing_is_testable_where_only_the_competitor_is_left():
     units = UNITS[OTHER_1:]
     problem = replace(PROBLEM, terms=units)
-    found = concluded(problem, made_posterior(((0,), 0.9)), RAISED)
+    found = conclude(problem, made_posterior(((0,), 0.9)), RAISED)
     assert found.verdict == NOT_TESTABLE and found.best.mechanisms == ()
 
 
@@ -207,9 +207,9 @@ def test_a_set_up_that_holds_still_is_no_test_of_the_robot():
         ),
     )
     assert (
-        concluded(problem, made_posterior(((0,), 0.1)), SILENT).verdict == NOT_TESTABLE
+        conclude(problem, made_posterior(((0,), 0.1)), SILENT).verdict == NOT_TESTABLE
     )
-    found = concluded(problem, made_posterior(((0,), 0.9)), RAISED)
+    found = conclude(problem, made_posterior(((0,), 0.9)), RAISED)
     assert found.verdict == NAMED and found.best.mechanisms == ("setup_step",)
 
 
@@ -220,7 +220,7 @@ def test_hypotheses_gather_locations_laws_and_sum_to_one():
         ((OFFSET_2, OFFSET_3), 0.1),
         ((OTHER_1, OTHER_2), 0.1),
     )
-    found = hypotheses_of(PROBLEM, posterior)
+    found = rank_hypotheses(PROBLEM, posterior)
     assert [(h.mechanisms, pytest.approx(h.probability)) for h in found] == [
         (("offset",), 0.7),
         ((), 0.2),
@@ -228,7 +228,7 @@ def test_hypotheses_gather_locations_laws_and_sum_to_one():
     ]
     # The most probable of its models stands for each.
     assert [h.model for h in found] == [0, 2, 4]
-    where = location_probabilities(PROBLEM, posterior, "offset")
+    where = compute_location_probabilities(PROBLEM, posterior, "offset")
     assert where == pytest.approx({(2,): 4 / 7, (3,): 4 / 7})
 
 
@@ -242,19 +242,19 @@ def test_a_mechanism_whose_size_is_wrong_is_stated_with_something_related():
     sure = Conclusion(
         "named", (best,), best, {"joint_offset": ()}, {"joint_offset": 0.99}, 0.99
     )
-    doubted = with_related(sure, {"joint_offset"})
+    doubted = allow_related_mechanisms(sure, {"joint_offset"})
     assert (doubted.verdict, doubted.alternatives) == (
         "class",
         {"joint_offset": (OTHER,)},
     )
     assert (
-        with_related(doubted, {"joint_offset"}) == doubted
-        and with_related(sure, set()) == sure
+        allow_related_mechanisms(doubted, {"joint_offset"}) == doubted
+        and allow_related_mechanisms(sure, set()) == sure
     )
     both = replace(
         sure, verdict="several", alternatives={"joint_offset": (), "payload": ()}
     )
-    found = with_related(both, {"payload"})
+    found = allow_related_mechanisms(both, {"payload"})
     assert (found.verdict, found.alternatives) == (
         "several",
         {"joint_offset": (), "payload": (OTHER,)},
@@ -269,15 +269,17 @@ def with_noise(fitted, **changes):
 def test_scatter_far_beyond_the_noise_measured_is_one(fitted, factor, count):
     left = with_noise(fitted, position_m=factor * fitted.noise.position_m)
     repeats = replace(fitted.noise, source="repeats")
-    found = contradictions(left, repeats, SETTINGS)
+    found = find_contradictions(left, repeats, SETTINGS)
     assert len(found) == count
     assert all("scatter about the model" in sentence for sentence in found)
-    assert contradictions(left, replace(repeats, source="declared"), SETTINGS) == []
+    assert (
+        find_contradictions(left, replace(repeats, source="declared"), SETTINGS) == []
+    )
 
 
 @pytest.mark.parametrize(("pose_rad", "count"), [(4e-4, 0), (1e-3, 1)])
 def test_an_error_of_a_pose_beyond_that_of_drives_is_one(fitted, pose_rad, count):
-    found = contradictions(
+    found = find_contradictions(
         with_noise(fitted, pose_rad=pose_rad), fitted.noise, SETTINGS
     )
     assert len(found) == count
@@ -293,7 +295,7 @@ def test_an_error_of_a_pose_beyond_that_of_drives_is_one(fitted, pose_rad, count
 )
 def test_a_compliance_that_is_negative_beyond_chance_is_one(fitted, errors, named):
     mine = np.array([owner == "joint_compliance" for owner, _ in fitted.parameters])
-    values = joint_compliances(fitted.model, fitted.estimate).copy()
+    values = get_joint_compliances(fitted.model, fitted.estimate).copy()
     values[2] = -errors * np.sqrt(np.diag(fitted.covariance))[mine][2]
     coefficients = tuple(
         values if effect.effect == "joint_compliance" else each
@@ -302,7 +304,7 @@ def test_a_compliance_that_is_negative_beyond_chance_is_one(fitted, errors, name
         )
     )
     off = replace(fitted, estimate=replace(fitted.estimate, coefficients=coefficients))
-    assert contradictions(off, fitted.noise, SETTINGS) == named
+    assert find_contradictions(off, fitted.noise, SETTINGS) == named
 
 
 @pytest.fixture(scope="module")
@@ -395,7 +397,7 @@ def declared_springs(fitted, compliance):
             shapes=tuple(fitted.estimate.shapes[n] for n in kept),
         ),
         covariance=fitted.covariance[np.ix_(free, free)],
-        held=fitted.held[free],
+        unidentifiable=fitted.unidentifiable[free],
     )
 
 
@@ -447,7 +449,9 @@ def test_sag_is_how_far_the_weight_moves_a_target_at_most(found, campaign, kuka)
 
 def test_the_wrong_sign_is_named(found):
     fitted, entries = found
-    (warning,) = implausible(with_value(fitted, "joint_tilt@2", -1e-7, 1e-8), entries)
+    (warning,) = warn_of_implausible_values(
+        with_value(fitted, "joint_tilt@2", -1e-7, 1e-8), entries
+    )
     assert (
         warning.startswith("joint_tilt@2: tilt_about_")
         and "by its physics positive" in warning
@@ -458,7 +462,7 @@ def test_a_size_beyond_what_such_an_effect_reaches_is_named(found):
     fitted, entries = found
     plausible = effect_of(fitted, "joint_offset@3").parameters[0].plausible
     for sign in (1, -1):
-        (warning,) = implausible(
+        (warning,) = warn_of_implausible_values(
             with_value(
                 fitted, "joint_offset@3", 3.5 * sign * plausible, 0.1 * plausible
             ),
@@ -471,11 +475,11 @@ def test_a_size_beyond_what_such_an_effect_reaches_is_named(found):
         large = with_value(
             fitted, "joint_offset@3", 3.5 * sign * plausible, 0.1 * plausible
         )
-        assert oversized(large, {"joint_offset", "payload"}) == {
+        assert find_oversized_effects(large, {"joint_offset", "payload"}) == {
             "joint_offset"
-        } and not oversized(large, {"payload"})
+        } and not find_oversized_effects(large, {"payload"})
     assert (
-        implausible(
+        warn_of_implausible_values(
             with_value(fitted, "joint_offset@3", 3.1 * plausible, 0.1 * plausible),
             entries,
         )

@@ -27,7 +27,7 @@ from elastocal.effects import catalogue
 from elastocal.effects.catalogue import candidates_on, declared_candidates
 from elastocal.effects.conditions import with_total
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.model import conditions
+from elastocal.fitting.model import evaluate_conditions
 from elastocal.mechanics.kinematics import poses
 
 # The table of the design, without the data family: that is no physics.
@@ -103,7 +103,7 @@ def test_laws_that_are_fixed_are_the_same_under_other_loads_and_springs_and_at_o
 
 def test_names_and_families_are_those_of_the_design():
     assert {
-        name: effect.family for name, effect in catalogue.effects().items()
+        name: effect.family for name, effect in catalogue.list_bundled_effects().items()
     } == FAMILIES
 
 
@@ -126,7 +126,7 @@ def test_every_effect_says_whether_it_moves_the_robot_or_only_what_was_measured_
     """A correction must not move the robot by an error of the tracker, its targets, the
     force sensor or the set-up."""
     sites = equipped(fanuc.chain)
-    for name, effect in catalogue.effects().items():
+    for name, effect in catalogue.list_bundled_effects().items():
         instruments = effect.family == "load" or any(
             candidate.of_setup for candidate in effect.candidates(sites)
         )
@@ -203,7 +203,7 @@ def test_sensitivities_of_every_candidate_are_central_differences(chain):
         if candidate.effect in ("joint_offset", "payload", "lost_motion"):
             model = made_model(chain, targets, 6, effects=(candidate,))
         estimate = made_estimate(model, seed=3)
-        around = conditions(model, estimate, states)
+        around = evaluate_conditions(model, estimate, states)
         seen = seen_exactly(model, estimate, states)
         steps = np.diag(small_steps(model, estimate))
         # Of a long law, steps of all parameters at once.
@@ -280,21 +280,26 @@ def sinking_foot(own, sites):
 '''
 
 
+def clear_catalogue():
+    catalogue.list_effects.cache_clear()
+    catalogue.list_bundled_effects.cache_clear()
+
+
 @pytest.fixture
 def one_more_module(tmp_path, monkeypatch):
     (tmp_path / "anything.py").write_text(NEW)
     monkeypatch.setattr(
         elastocal.effects, "__path__", [*elastocal.effects.__path__, str(tmp_path)]
     )
-    catalogue.effects.cache_clear()
+    clear_catalogue()
     yield
-    catalogue.effects.cache_clear()
+    clear_catalogue()
     sys.modules.pop("elastocal.effects.anything", None)
     vars(elastocal.effects).pop("anything", None)
 
 
 def test_adding_an_effect_is_adding_one_module(fanuc, one_more_module):
-    assert set(catalogue.effects()) == {*FAMILIES, "sinking_foot"}
+    assert set(catalogue.list_bundled_effects()) == {*FAMILIES, "sinking_foot"}
     model = made_model(
         fanuc.chain, (Target("A", "6DoF", (0, 0, 0)),), fitted_frames=False
     )

@@ -541,13 +541,13 @@ def close(found, expected):
 
 
 @pytest.mark.parametrize("chain", CHAINS)
-@pytest.mark.parametrize("effect", sorted(catalogue.effects()))
+@pytest.mark.parametrize("effect", sorted(catalogue.list_bundled_effects()))
 def test_effect_is_its_closed_form(effect, chain, arms):
     assert effect in CLOSED_FORMS, (
         "it has no closed form: add one, by name of its parameters"
     )
     closed = CLOSED_FORMS[effect]
-    laws = catalogue.effects()[effect].candidates
+    laws = catalogue.list_bundled_effects()[effect].candidates
     for key, found, expected in compared(arms, chain, laws, closed):
         assert close(found, expected), (
             key,

@@ -23,7 +23,11 @@ from elastocal.effects.catalogue import candidates_on
 from elastocal.effects.conditions import conditions_of, offered
 from elastocal.effects.gravity import declared_weight, lever_of_pull
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.model import conditions, displaced_coordinates, parameters
+from elastocal.fitting.model import (
+    compute_displaced_coordinates,
+    evaluate_conditions,
+    list_parameters,
+)
 from elastocal.mechanics.kinematics import motion
 from elastocal.mechanics.robot import Mass
 from elastocal.mechanics.sites import sites_of
@@ -75,8 +79,8 @@ def test_gravity_on_every_coordinate_where_the_robot_has_yielded_is_that_of_pino
     model = made_model(robot, effects=(base,))
     estimate = made_estimate(model, seed=2, size=1.0)
     states = made_states(robot.joints, 3, seed=3, force=300.0)
-    around = conditions(model, estimate, states)
-    at = displaced_coordinates(model, estimate, around)
+    around = evaluate_conditions(model, estimate, states)
+    at = compute_displaced_coordinates(model, estimate, around)
     corrections = around.mass_corrections.reshape(-1, 4)
     assert corrections.any()
     expected = 0.0
@@ -127,8 +131,8 @@ def test_masses_and_compliances_have_exact_sensitivities_with_all_that_they_load
             estimate, coefficients=(fanuc.compliance, *estimate.coefficients[1:])
         )
     seen = seen_exactly(model, estimate, states)
-    around = conditions(model, estimate, states)
-    listed = parameters(model, estimate)
+    around = evaluate_conditions(model, estimate, states)
+    listed = list_parameters(model, estimate)
     sizes = [
         1e-3 * (fanuc.compliance.max() if owner == "joint_compliance" else p.plausible)
         for owner, p in listed

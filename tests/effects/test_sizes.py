@@ -10,7 +10,7 @@ import pytest
 from support import chain_of
 from synthetic import equipped
 
-from elastocal.effects.catalogue import candidates_on, effects
+from elastocal.effects.catalogue import candidates_on, list_bundled_effects
 from elastocal.effects.sizes import full_torque_Nm, lever_m
 from elastocal.mechanics.robot import Mass
 from elastocal.mechanics.sites import sites_of
@@ -38,7 +38,7 @@ def plausible(robot):
 def test_documentation_prints_the_table():
     lines = [
         f"| {name}, {s.quantity} | {s.share:g} | {s.of} | {'+-'[s.sign < 0] if s.sign else ''} | {s.most:g} | {s.reason} |"
-        for name, effect in effects().items()
+        for name, effect in list_bundled_effects().items()
         for s in effect.sizes.values()
     ]
     (table,) = re.findall(
@@ -67,12 +67,12 @@ def test_what_yields_is_sized_by_the_compliance_of_the_arm_and_nothing_else_is(f
 def test_rigid_joints_are_sized_as_those_of_an_arm_of_this_load_and_reach(fanuc):
     rigid = replace(fanuc, compliance=0.0 * fanuc.compliance, payload_kg=165.0)
     for joint in range(6):
-        ours = effects()["joint_tilt"].size("tilt", sites_of(rigid), joint)
+        ours = list_bundled_effects()["joint_tilt"].size("tilt", sites_of(rigid), joint)
         assert 0.1 < ours / fanuc.compliance[joint] < 3.0
 
 
 def test_parameters_have_the_sign_of_the_size(fanuc):
-    own = effects()
+    own = list_bundled_effects()
     (tilt,) = own["joint_tilt"].parameters(
         "tilt", ["t"], "rad/(N m)", sites_of(fanuc), 0, over=4.0
     )

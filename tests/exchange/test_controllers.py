@@ -13,7 +13,7 @@ from elastocal.exchange.controllers import (
     CONTROLLERS,
     axes_of,
     check_name,
-    controller_of,
+    find_controller,
 )
 
 ALL = CONTROLLERS
@@ -40,16 +40,12 @@ def targets(name, **options):
     return re.findall(TARGET[name], text), text
 
 
-def test_a_language_is_found_by_its_name_and_by_the_suffix_of_its_files():
+def test_a_language_is_found_by_its_name():
     suffixes = {"krl": ".src", "rapid": ".mod", "tp": ".ls", "urscript": ".script"}
     assert {name: each.suffix for name, each in ALL.items()} == suffixes
-    assert all(
-        controller_of("", each.suffix.upper()) is controller_of(name, "") is each
-        for name, each in ALL.items()
-    )
-    assert controller_of("", ".csv") is None
+    assert all(find_controller(name) is controller for name, controller in ALL.items())
     with refused("--format", "'karel'", "krl"):
-        controller_of("karel", "")
+        find_controller("karel")
 
 
 @pytest.mark.parametrize("name", ALL)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from analysed_robots import analysed
 
-from elastocal.effects.catalogue import effects
+from elastocal.effects.catalogue import list_bundled_effects
 from elastocal.figures.effect_signatures import compute_signature, list_candidates
 
 
@@ -14,7 +14,7 @@ def arm():
     return analysed("gp180")
 
 
-@pytest.mark.parametrize("name", effects())
+@pytest.mark.parametrize("name", list_bundled_effects())
 def test_every_effect_of_the_catalogue_displaces_the_reflector_somewhere(name, arm):
     shown = compute_signature(name, arm)
     moved = shown.moved.values()

@@ -35,14 +35,14 @@ from synthetic import (
 from elastocal.campaigns.campaign import Target
 from elastocal.fitting import least_squares
 from elastocal.fitting.least_squares import (
-    SETTLED,
-    fit,
-    fit_frames,
-    registered,
-    sizes_of,
+    CONVERGENCE_TOLERANCE,
+    fit_model,
+    fit_placement,
+    get_plausible_sizes,
+    register_placement,
 )
 from elastocal.fitting.noise import Noise
-from elastocal.fitting.normal_equations import Parts
+from elastocal.fitting.normal_equations import LeastSquaresProblem
 
 
 @pytest.mark.parametrize("rows", [3, 6])
@@ -65,7 +65,7 @@ def test_noiseless_measurements_give_back_every_parameter(fanuc, keys, rows):
     # Loads as large as such an arm carries, with which the measurements show where the
     # laws of a gear bend.
     states.wrench[:] *= 1.5
-    found = fit(model, seen_exactly(model, true, states), NOISE)
+    found = fit_model(model, seen_exactly(model, true, states), NOISE)
     assert names_held(found) == []
     np.testing.assert_allclose(found.residual, 0.0, atol=1e-9)
     for owner in (
@@ -152,8 +152,12 @@ def test_a_linear_problem_has_the_generalized_least_squares_solution_with_its_pr
     begin["far away"] = replace(
         nothing, coefficients=(np.array([1e-2, -1e-2, 5e-3, 0.0, -5e-3]),)
     )
-    found = fit(model, seen, noise, begin[start])
-    assert found.converged and not found.held.any() and (found.weights == 1.0).all()
+    found = fit_model(model, seen, noise, begin[start])
+    assert (
+        found.converged
+        and not found.unidentifiable.any()
+        and (found.weights == 1.0).all()
+    )
     np.testing.assert_allclose(
         found.estimate.coefficients[0] / deviation,
         expected / deviation,
@@ -182,7 +186,7 @@ def test_what_has_a_prior_or_starts_larger_is_as_large_as_these_say_however_smal
         made_estimate(model, size=0.0), coefficients=(np.array([0.0, 0.0, -2e-7]),)
     )
     expected = [plausible, max(plausible, 3e-6), max(plausible, 2e-7)]
-    np.testing.assert_array_equal(sizes_of(model, start), expected)
+    np.testing.assert_array_equal(get_plausible_sizes(model, start), expected)
 
 
 @pytest.mark.parametrize("long", [30, 60])
@@ -191,16 +195,20 @@ def test_a_fit_to_more_than_it_starts_from_is_that_to_all_of_them(long, monkeypa
     noise = GANTRY_NOISES["joints"]
     model, seen, left, right, sigma = linear_problem(noise, 60)
     expected, covariance = generalized_least_squares(left, right, sigma, PRIORS)
-    for name, count in (("STARTED_FROM", 20), ("LONG", long), ("_STEPPING_STONE", 40)):
+    for name, count in (
+        ("START_SAMPLE_SIZE", 20),
+        ("LARGE_FIT_SIZE", long),
+        ("_STEPPING_STONE", 40),
+    ):
         monkeypatch.setattr(f"elastocal.fitting.least_squares.{name}", count)
     fitted_to = []
-    usual = least_squares.robustly
+    usual = least_squares.fit_robustly
     monkeypatch.setattr(
         least_squares,
-        "robustly",
+        "fit_robustly",
         lambda *given, **how: fitted_to.append(len(given[1])) or usual(*given, **how),
     )
-    found = fit(model, seen, noise)
+    found = fit_model(model, seen, noise)
     # Whole poses.
     assert fitted_to == [18, *([37] if long < 60 else []), 60]
     deviation = np.sqrt(np.diag(covariance))
@@ -221,13 +229,15 @@ def test_frames_are_fitted_to_targets_that_stay_as_they_were_found(fanuc, rows):
         fanuc, "joint_offset@3", "lost_motion@2", targets=TARGETS, rows=rows
     )
     true = made_estimate(model, seed=36)
-    fitted = fit(model, seen_exactly(model, true, made_states(6, 40, seed=37)), NOISE)
+    fitted = fit_model(
+        model, seen_exactly(model, true, made_states(6, 40, seed=37)), NOISE
+    )
     elsewhere = replace(
         made_estimate(model, seed=38),
         coefficients=true.coefficients,
         shapes=true.shapes,
     )
-    found = fit_frames(
+    found = fit_placement(
         fitted, model, seen_exactly(model, elsewhere, made_states(6, 10, seed=39))
     )
     for name in ("frame_position", "frame_rotation", "target_offset"):
@@ -258,10 +268,10 @@ def test_steps_that_do_not_help_are_halved_until_the_fit_converges(
     fanuc, seed, lag, monkeypatch
 ):
     model, seen = bent(fanuc, seed, lag)
-    found = fit(model, seen, NOISE)
+    found = fit_model(model, seen, NOISE)
     assert found.converged
     monkeypatch.setattr("elastocal.fitting.least_squares._HALVINGS", 0)
-    whole = fit(model, seen, NOISE)
+    whole = fit_model(model, seen, NOISE)
     assert not whole.converged
     assert robust_objective(found) < robust_objective(whole) - 0.01
 
@@ -271,7 +281,7 @@ def test_steps_that_do_not_help_are_halved_until_the_fit_converges(
 )
 def test_fit_converges_at_the_end_of_the_range_of_a_shape(fanuc, seed, lag, end):
     model, seen = bent(fanuc, seed, lag)
-    found = fit(model, seen, NOISE)
+    found = fit_model(model, seen, NOISE)
     assert found.converged and found.estimate.shapes[0][0] == end
     # The others are where they are best given that end: held there they do not move.
     frozen = replace(
@@ -281,7 +291,7 @@ def test_fit_converges_at_the_end_of_the_range_of_a_shape(fanuc, seed, lag, end)
     )
     without = replace(model, effects=(frozen,))
     start = replace(found.estimate, shapes=(np.zeros(0),))
-    again = fit(without, seen, NOISE, start)
+    again = fit_model(without, seen, NOISE, start)
     deviation = np.sqrt(again.covariance[-1, -1])
     assert (
         abs(again.estimate.coefficients[0][0] - found.estimate.coefficients[0][0])
@@ -328,7 +338,7 @@ def test_weights_fall_with_the_distance_by_the_scale_of_the_errors_that_are_ther
     """One up to the 99 % quantile, then its share; the scale is that of the median
     distance, but never below the noise."""
     model, seen, left, off, turned = with_outliers(rows)
-    found = fit(model, seen, SENSOR.scaled(taken))
+    found = fit_model(model, seen, SENSOR.scaled(taken))
     far = distances(off, turned, left, found.estimate.coefficients[0], taken)
     scale = max(1.0, np.median(far) / np.sqrt(chi2.ppf(0.5, rows) / rows))
     assert (scale > 1.3) == (taken < 0.75)
@@ -350,7 +360,7 @@ def test_weights_fall_with_the_distance_by_the_scale_of_the_errors_that_are_ther
         atol=5e-3 * scale,
     )
     np.testing.assert_allclose(
-        np.sqrt(np.diag(found.covariance)), deviation, rtol=SETTLED
+        np.sqrt(np.diag(found.covariance)), deviation, rtol=CONVERGENCE_TOLERANCE
     )
 
 
@@ -359,23 +369,23 @@ def test_a_small_step_leaves_its_gram_matrix_to_the_next_one_and_the_fit_ends_wh
 ):
     model, seen, *_ = with_outliers(6)
     taken_anew = []
-    usual = Parts.normal_equations
+    usual = LeastSquaresProblem.normal_equations
     found = []
 
     def counted(self, weights, known=None):
         taken_anew[-1] += known is None
         return usual(self, weights, known)
 
-    monkeypatch.setattr(Parts, "normal_equations", counted)
+    monkeypatch.setattr(LeastSquaresProblem, "normal_equations", counted)
     for near in (0.3, 0.0):
         monkeypatch.setattr("elastocal.fitting.least_squares._NEAR", near)
         taken_anew.append(0)
-        found.append(fit(model, seen, SENSOR))
+        found.append(fit_model(model, seen, SENSOR))
     assert taken_anew[0] < taken_anew[1]
     (values,), (others,) = (each.estimate.coefficients for each in found)
     assert (
         np.abs(values - others).max()
-        < 2 * SETTLED * np.sqrt(np.diag(found[1].covariance)).max()
+        < 2 * CONVERGENCE_TOLERANCE * np.sqrt(np.diag(found[1].covariance)).max()
     )
 
 
@@ -404,7 +414,9 @@ def test_a_fit_has_converged_where_its_step_is_below_a_share_of_the_standard_err
         coefficients=(np.array([best + share * settled * scale * deviation]),),
     )
     monkeypatch.setattr("elastocal.fitting.least_squares._STEPS", 1)
-    found = fit(model, seen, SENSOR, start, reweighted=True, settled=settled)
+    found = fit_model(
+        model, seen, SENSOR, start, reweight_first_step=True, tolerance=settled
+    )
     assert found.converged == converged
     # The last step is taken all the same: a linear problem is solved by it.
     assert found.estimate.coefficients[0][0] == pytest.approx(
@@ -412,7 +424,7 @@ def test_a_fit_has_converged_where_its_step_is_below_a_share_of_the_standard_err
     )
     # One that starts anew gives all observations one weight first, and does not trust
     # that step.
-    assert not fit(model, seen, SENSOR, start, settled=settled).converged
+    assert not fit_model(model, seen, SENSOR, start, tolerance=settled).converged
 
 
 def unloaded(states):
@@ -456,7 +468,7 @@ def test_frames_and_targets_are_found_from_nothing(fanuc, rows, sessions, seen_o
     if seen_of == 1:
         true = replace(true, target_offset=true.target_offset * [[1], [0]])
         true.target_rotation[1] = np.eye(3)
-    found = registered(model, seen)
+    found = register_placement(model, seen)
     assert found.sessions == sessions
     assert_known(found, true, rows)
 
@@ -470,7 +482,7 @@ def test_a_known_mount_keeps_its_turn_and_an_unknown_one_is_found(fanuc, fitted_
     model = made_model(fanuc.chain, targets, rows=6, fitted_frames=fitted_frames)
     states = unloaded(made_states(6, 15, seed=7))
     true = made_estimate(model, seed=8)
-    found = registered(model, seen_exactly(model, true, states))
+    found = register_placement(model, seen_exactly(model, true, states))
     assert_known(found, true, 6)
     np.testing.assert_array_equal(found.target_offset[1], (0.1, 0.0, 0.2))
 
@@ -483,7 +495,7 @@ def test_frame_is_no_reflection_where_all_points_lie_in_a_plane():
     for seed in range(8):
         states = unloaded(made_states(2, 20, seed=seed))
         true = made_estimate(model, seed=seed + 10)
-        assert_known(registered(model, seen_exactly(model, true, states)), true)
+        assert_known(register_placement(model, seen_exactly(model, true, states)), true)
 
 
 @pytest.mark.parametrize("joint_rad", [0.0, 2e-5])
@@ -497,10 +509,10 @@ def test_a_fit_of_more_states_than_are_kept_is_the_same_and_keeps_no_jacobian(
     seen = with_noise(seen, np.random.default_rng(66))
     seen.position[[5, 20]] += 3e-3
     noise = replace(NOISE, joint_rad=np.full(6, joint_rad))
-    kept = fit(model, seen, noise)
+    kept = fit_model(model, seen, noise)
     monkeypatch.setattr("elastocal.fitting.normal_equations._MOST_STATES", 10)
     monkeypatch.setattr("elastocal.fitting.observations._MOST_HELD", 16 * 180)
-    found = fit(model, seen, noise)
+    found = fit_model(model, seen, noise)
     assert (
         kept.joint_jacobian is not None
         and found.joint_jacobian is None
@@ -511,7 +523,8 @@ def test_a_fit_of_more_states_than_are_kept_is_the_same_and_keeps_no_jacobian(
     assert (np.abs(values[0] - values[1]) < 5e-3 * deviation[-len(values[0]) :]).all()
     np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), deviation, rtol=1e-4)
     parts = [
-        list(zip(*each.sensitivities(seen), strict=True)) for each in (kept, found)
+        list(zip(*each.iterate_sensitivities(seen), strict=True))
+        for each in (kept, found)
     ]
     assert len(parts[1][0]) > 1
     poses = [set(seen.cluster[part]) for part in parts[1][0]]
@@ -521,7 +534,7 @@ def test_a_fit_of_more_states_than_are_kept_is_the_same_and_keeps_no_jacobian(
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-5 * np.abs(one).max())
     monkeypatch.undo()
     for each in (kept, found):
-        ((_, plain, white),) = each.sensitivities(seen)
+        ((_, plain, white),) = each.iterate_sensitivities(seen)
         np.testing.assert_allclose(
-            white, each.whitened(plain), rtol=0, atol=1e-5 * np.abs(white).max()
+            white, each.whiten(plain), rtol=0, atol=1e-5 * np.abs(white).max()
         )

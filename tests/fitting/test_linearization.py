@@ -21,9 +21,9 @@ from synthetic import (
 
 from elastocal.campaigns.campaign import Target
 from elastocal.fitting import linearization
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.linearization import Factored, linearize
-from elastocal.fitting.model import conditions, parameters
+from elastocal.fitting.least_squares import fit_model
+from elastocal.fitting.linearization import FactoredSensitivities, linearize
+from elastocal.fitting.model import evaluate_conditions, list_parameters
 
 
 def made(seed, states=5, observations=17, rows=3, coordinates=4, columns=6):
@@ -42,7 +42,7 @@ def made(seed, states=5, observations=17, rows=3, coordinates=4, columns=6):
     laws = [{int(c): rng.standard_normal(states) for c in some} for some in chosen]
     sizes = rng.uniform(0.5, 2.0, columns)
     jacobian = rng.standard_normal((observations, rows, coordinates))
-    return Factored.of(laws, jacobian, state, states, sizes), laws, sizes
+    return FactoredSensitivities.of(laws, jacobian, state, states, sizes), laws, sizes
 
 
 MADE = st.builds(
@@ -72,7 +72,7 @@ def test_products_are_those_of_the_columns_written_out_however_many_states_are_t
             )
     np.testing.assert_allclose(columns.dense(), dense, atol=1e-12)
     np.testing.assert_allclose(
-        columns.of_columns(sizes > 1.2).dense(), dense[..., sizes > 1.2], atol=1e-12
+        columns.select_columns(sizes > 1.2).dense(), dense[..., sizes > 1.2], atol=1e-12
     )
     np.testing.assert_allclose(
         columns.at(columns.state > 0).dense(), dense[columns.state > 0], atol=1e-12
@@ -83,7 +83,7 @@ def test_products_are_those_of_the_columns_written_out_however_many_states_are_t
     with mock.patch.object(linearization, "_AT_ONCE", at_once):
         gram = columns.gram()
         products = columns.times(right)
-        of_poses = columns.times_by_pose(right, pose)
+        of_poses = columns.multiply_by_pose(right, pose)
     np.testing.assert_allclose(
         gram, np.tensordot(dense, dense, ((0, 1), (0, 1))), atol=1e-10
     )
@@ -106,7 +106,9 @@ def test_what_two_columns_have_in_common_is_known_to_the_rounding_of_their_squar
     law = size * rng.standard_normal(30)
     off = 1e-3 * size * rng.standard_normal(30)
     jacobian = rng.standard_normal((30, 3, 2))
-    gram = Factored.of([{0: law}, {0: law, 1: off}], jacobian, np.arange(30), 30).gram()
+    gram = FactoredSensitivities.of(
+        [{0: law}, {0: law, 1: off}], jacobian, np.arange(30), 30
+    ).gram()
     rest = gram[1, 1] - 2 * gram[0, 1] + gram[0, 0]
     assert rest == pytest.approx(
         (off**2 * (jacobian[..., 1] ** 2).sum(axis=1)).sum(), rel=1e-8
@@ -116,13 +118,13 @@ def test_what_two_columns_have_in_common_is_known_to_the_rounding_of_their_squar
 def assert_slopes(model, estimate, seen, shape):
     """Sensitivities are central differences of the residuals; every parameter is
     seen."""
-    around = conditions(model, estimate, seen.states)
+    around = evaluate_conditions(model, estimate, seen.states)
     steps = np.diag(small_steps(model, estimate))
     expected = slopes(model, estimate, seen, around, steps)
     found = linearize(model, estimate, seen, around).sensitivities @ steps
     largest = np.abs(expected).max(axis=(0, 1))
     assert (
-        found.shape == expected.shape == (*shape, len(parameters(model, estimate)))
+        found.shape == expected.shape == (*shape, len(list_parameters(model, estimate)))
         and (largest > 0).all()
     )
     np.testing.assert_allclose(found / largest, expected / largest, rtol=0, atol=1e-5)
@@ -151,11 +153,13 @@ def test_the_place_of_a_jump_has_no_slope_where_a_row_is_within_a_step_of_it(fan
     seen = seen_exactly(model, made_estimate(model, seed=4), states)
     # A row at a half lies on the other side of the jump a step further on.
     estimate = replace(made_estimate(model, seed=5), shapes=(np.array([0.5 - 1e-6]),))
-    line = linearize(model, estimate, seen, conditions(model, estimate, states))
+    line = linearize(
+        model, estimate, seen, evaluate_conditions(model, estimate, states)
+    )
     assert not line.sensitivities[..., -1].any() and line.sensitivities[..., -2].any()
-    found = fit(model, seen, NOISE, estimate)
+    found = fit_model(model, seen, NOISE, estimate)
     assert (
-        found.held[-1]
+        found.unidentifiable[-1]
         and found.estimate.shapes[0] == estimate.shapes[0]
         and found.converged
     )

@@ -17,18 +17,18 @@ from synthetic import (
     seen_exactly,
 )
 
-from elastocal.campaigns.campaign import Campaign, Target, columns_of
+from elastocal.campaigns.campaign import Campaign, Target, tabulate_measurements
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.model import (
-    case_from,
-    conditions,
-    declared_model,
-    limits,
-    nonlinear_parameters,
-    parameters,
+    apply_step,
+    build_case,
+    build_declared_model,
+    compute_residuals,
+    evaluate_conditions,
+    find_nonlinear_parameters,
+    get_parameter_bounds,
+    list_parameters,
     predict,
-    residuals,
-    stepped,
 )
 from elastocal.io.documents import read_document
 from elastocal.mechanics.elastostatics import exact_deflections, joint_torques
@@ -62,8 +62,9 @@ def described(campaign, config_folder, **changes):
 
 
 def case_of(campaign, config_folder, **changes):
-    return case_from(
-        described(campaign, config_folder, **changes), columns_of(campaign.measurements)
+    return build_case(
+        described(campaign, config_folder, **changes),
+        tabulate_measurements(campaign.measurements),
     )
 
 
@@ -75,14 +76,14 @@ def test_a_model_of_rigid_joints_knows_that_no_compliances_are_known(
     described_["robot"]["masses"] = [
         {"link": 2, "mass_kg": 10, "centre_m": [0.3, 0, 0], "relative_std": 0.2}
     ]
-    case = case_from(described_, columns_of(campaign.measurements))
+    case = build_case(described_, tabulate_measurements(campaign.measurements))
     assert (
         not case.model.compliance_known
         and not case.model.nominal_compliance.any()
         and not case.model.sites.masses
     )
     described_["campaign"]["compliance"] = "identify"
-    case = case_from(described_, columns_of(campaign.measurements))
+    case = build_case(described_, tabulate_measurements(campaign.measurements))
     assert (
         not case.model.compliance_known
         and (case.model.nominal_compliance > 0).all()
@@ -133,7 +134,7 @@ def test_declared_model_is_that_of_the_campaign(
         "c", fanuc, measured, frame, TWO, compliance, (), None, {}, measurements
     )
     offset = candidates_on(made_model(fanuc.chain).sites)["joint_offset@2"]
-    model = declared_model(campaign, (offset,))
+    model = build_declared_model(campaign, (offset,))
     assert (model.rows, model.fitted_frames, model.targets) == (rows, fitted, TWO)
     assert model.identifies_compliance == (compliance == "identify")
     assert [effect.key for effect in model.effects][-1] == "joint_offset@2"
@@ -143,7 +144,7 @@ def test_declared_model_is_that_of_the_campaign(
 
 def test_parameters_are_named_in_the_order_of_the_sensitivities(full_case):
     model, estimate, _ = full_case
-    owners = [owner for owner, _ in parameters(model, estimate)]
+    owners = [owner for owner, _ in list_parameters(model, estimate)]
     of_target = model.rows
     expected = (
         ["frame 0"] * 6
@@ -157,7 +158,7 @@ def test_parameters_are_named_in_the_order_of_the_sensitivities(full_case):
         *["lost_motion@2"] * 2,
         *["link_geometry@3"] * 6,
     ]
-    names = [parameter.name for _, parameter in parameters(model, estimate)]
+    names = [parameter.name for _, parameter in list_parameters(model, estimate)]
     assert names[:6] == ["dx", "dy", "dz", "rx", "ry", "rz"]
     assert names[-8:-6] == ["half_play", "torque"]
 
@@ -178,12 +179,12 @@ def test_of_a_target_only_what_is_unknown_is_a_parameter(fanuc):
         model = made_model(fanuc.chain, targets, rows=rows, fitted_frames=False)
         estimate = made_estimate(model, seed=3)
         expected = [*names[rows], *(f"both {name}" for name in both[rows])]
-        owned = parameters(model, estimate)
+        owned = list_parameters(model, estimate)
         assert [
             f"{owner.removeprefix('target ')} {parameter.name}"
             for owner, parameter in owned
         ] == expected
-        there = stepped(model, estimate, np.full(len(expected), 1e-3))
+        there = apply_step(model, estimate, np.full(len(expected), 1e-3))
         moved = np.abs(there.target_offset - estimate.target_offset).max(axis=1) > 0
         turned = (
             np.abs(there.target_rotation - estimate.target_rotation).max(axis=(1, 2))
@@ -208,21 +209,21 @@ def owned(model, estimate, key, name):
     """Places of one parameter of one owner."""
     return [
         n
-        for n, (owner, p) in enumerate(parameters(model, estimate))
+        for n, (owner, p) in enumerate(list_parameters(model, estimate))
         if (owner, p.name) == (key, name)
     ]
 
 
 def test_only_shapes_have_limits_each_those_of_its_own_law(two_laws):
     model, estimate = two_laws
-    found = limits(model, estimate)
-    expected = np.tile([-np.inf, np.inf], (len(parameters(model, estimate)), 1))
+    found = get_parameter_bounds(model, estimate)
+    expected = np.tile([-np.inf, np.inf], (len(list_parameters(model, estimate)), 1))
     for effect in (model.effects[0], model.effects[2]):
         (place,) = owned(model, estimate, effect.key, "torque")
         expected[place] = effect.shapes[0].lowest, effect.shapes[0].highest
     np.testing.assert_array_equal(found, expected)
     np.testing.assert_array_equal(
-        nonlinear_parameters(model, estimate), np.isfinite(expected[:, 0])
+        find_nonlinear_parameters(model, estimate), np.isfinite(expected[:, 0])
     )
     assert np.isfinite(expected).sum() == 4
 
@@ -258,7 +259,7 @@ def test_nominal_springs_deflect_as_equation_9_with_exact_kinematics(fanuc):
     states = made_states(6, 6, seed=4)
     seen = seen_exactly(model, estimate, states)
     position, rotation = predict(
-        model, estimate, seen, conditions(model, estimate, states)
+        model, estimate, seen, evaluate_conditions(model, estimate, states)
     )
     turned = equilibrium(fanuc.chain, fanuc.compliance, states)
     for index, point in enumerate(fanuc.chain.points):
@@ -287,5 +288,7 @@ def test_effects_at_zero_leave_the_declared_model(name):
     same = estimate.with_effects(effects)
     seen = seen_exactly(model, estimate, states)
     np.testing.assert_allclose(
-        residuals(more, same, seen, conditions(more, same, states)), 0.0, atol=1e-14
+        compute_residuals(more, same, seen, evaluate_conditions(more, same, states)),
+        0.0,
+        atol=1e-14,
     )

@@ -19,24 +19,24 @@ from synthetic import made_estimate, made_measurements, made_model
 
 from elastocal.campaigns.campaign import Campaign, Target
 from elastocal.fitting import noise as noise_module
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import Case, declared_model
+from elastocal.fitting.least_squares import fit_model
+from elastocal.fitting.model import Case, build_declared_model
 from elastocal.fitting.noise import (
-    SIZES,
+    PRIOR_SCALES,
     Noise,
-    chosen_noise,
-    declared_geometry,
-    effective_parameters,
-    estimated_noise,
-    fit_declared,
-    hidden_repeatability,
-    most_probable,
-    noise_facts,
-    noise_from,
-    noise_from_repeats,
-    with_size,
+    choose_noise,
+    count_effective_parameters,
+    estimate_joint_repeatability,
+    estimate_noise,
+    estimate_noise_from_repeats,
+    find_declared_geometry,
+    fit_declared_model,
+    maximize_evidence,
+    parse_noise,
+    serialize_noise,
+    set_prior_scale,
 )
-from elastocal.fitting.observations import averaged
+from elastocal.fitting.observations import average_repeats
 
 TARGETS = tuple(
     Target(name, point, (0.1, 0.05, 0.0))
@@ -77,7 +77,7 @@ def test_uncertainties_of_measurements_are_the_declared_noise(fanuc):
     stated = campaign(fanuc)
     u95 = 1.959964 * np.array([3e-5, 4e-5, 5e-5])
     stated = replace(stated, measurements=replace(stated.measurements, u95_m=u95))
-    found = chosen_noise(stated, *drawn(fanuc, 0, poses=1, repeats=1)[:2])[0]
+    found = choose_noise(stated, *drawn(fanuc, 0, poses=1, repeats=1)[:2])[0]
     assert found.position_m == pytest.approx(1e-5 * np.sqrt(50 / 3))
 
 
@@ -141,7 +141,9 @@ def test_few_repeats_have_the_pooled_standard_deviation_of_states_with_different
         & (measurements.repeat == 3)
         & (measurements.target == 0)
     )
-    found = noise_from_repeats(model, estimate, measurements.select(there | alone))
+    found = estimate_noise_from_repeats(
+        model, estimate, measurements.select(there | alone)
+    )
     parts = [
         values[pose, : repeats[pose], : targets[pose]]
         for values in (off, turned)
@@ -168,7 +170,7 @@ def test_a_joint_that_shifts_all_targets_has_the_maximum_of_its_likelihood_in_cl
     parts = SENSOR_M * rng.standard_normal((40, 2, 3))
     parts[..., 0] += 80e-6 * rng.standard_normal((40, 1))
     turns = SENSOR_RAD * rng.standard_normal((40, 2, 3))
-    found = noise_from_repeats(
+    found = estimate_noise_from_repeats(
         model,
         estimate,
         off_by(model, mirrored(parts), mirrored(turns) if rows == 6 else None),
@@ -202,7 +204,9 @@ def test_joints_are_taken_where_they_raise_the_log_likelihood_by_more_than_one_e
     for off, taken in ((-0.05, False), (0.05, True)):
         ratio = brentq(lambda ratio, off=off: gain(ratio) - joints - off, 1.0, 10.0)
         parts = SENSOR_M * np.array([ratio, 1.0, 1.0]) * np.ones((poses, 1, 3))
-        found = noise_from_repeats(model, estimate, off_by(model, mirrored(parts)))
+        found = estimate_noise_from_repeats(
+            model, estimate, off_by(model, mirrored(parts))
+        )
         assert found.joint_rad.any() == taken, ratio
 
 
@@ -215,8 +219,8 @@ def test_of_more_contrasts_than_are_needed_those_of_states_spread_over_the_campa
     parts = SENSOR_M * np.repeat([1.0, 3.0], 20)[:, None, None] * np.ones((40, 1, 3))
     measurements = off_by(model, mirrored(parts))
     for most, freedom in ((120, 120), (60, 60)):
-        monkeypatch.setattr(noise_module, "MOST", most)
-        found = noise_from_repeats(model, estimate, measurements)
+        monkeypatch.setattr(noise_module, "MAX_CONTRASTS", most)
+        found = estimate_noise_from_repeats(model, estimate, measurements)
         assert found.degrees_of_freedom == freedom
         assert found.position_m == pytest.approx(np.sqrt(5) * SENSOR_M, rel=1e-6)
 
@@ -238,7 +242,7 @@ def test_only_approaches_to_one_state_from_one_side_are_repeats_of_each_other(pa
     measurements = off_by(model, off)
     later = measurements.repeat // 2
     values = {"approach": 2.0 * later[:, None] - 1.0, "load": later, "session": later}
-    found = noise_from_repeats(
+    found = estimate_noise_from_repeats(
         model, estimate, replace(measurements, **{part: values[part]})
     )
     assert found.degrees_of_freedom == 30
@@ -261,7 +265,7 @@ def test_declared_noise_is_doubted_beyond_the_range_of_chance_in_a_hundred_campa
             campaign(fanuc, position_m=SENSOR_M / (share * limit)),
             measurements=measurements,
         )
-        assert len(chosen_noise(declared, model, estimate)[1]) == warned
+        assert len(choose_noise(declared, model, estimate)[1]) == warned
 
 
 @pytest.mark.parametrize("joint_rad", [5e-6, 2e-5])
@@ -272,7 +276,7 @@ def test_joints_that_the_sensor_hides_are_found_where_all_repeat_alike(
     a third."""
     found = np.array(
         [
-            hidden_repeatability(*drawn(fanuc, seed, joint_rad=joint_rad))
+            estimate_joint_repeatability(*drawn(fanuc, seed, joint_rad=joint_rad))
             for seed in range(6)
         ]
     )
@@ -281,12 +285,15 @@ def test_joints_that_the_sensor_hides_are_found_where_all_repeat_alike(
 
 
 def test_without_repeats_nothing_is_said_of_joints(fanuc):
-    assert hidden_repeatability(*drawn(fanuc, 1, poses=2, repeats=1)) == (0.0, 0.0)
+    assert estimate_joint_repeatability(*drawn(fanuc, 1, poses=2, repeats=1)) == (
+        0.0,
+        0.0,
+    )
 
 
 def test_noise_comes_back_from_its_document():
     noise = Noise("repeats", 1e-5, 2e-5, np.array([1e-6, 0, 3e-6]), 77, 2e-6)
-    back = noise_from({"noise": noise_facts(noise), "warnings": []})
+    back = parse_noise({"noise": serialize_noise(noise), "warnings": []})
     np.testing.assert_array_equal(back.joint_rad, noise.joint_rad)
     assert replace(back, joint_rad=None) == replace(noise, joint_rad=None)
 
@@ -310,8 +317,8 @@ def campaign_of(robot, offset, **options):
 
 
 def wide_fit(campaign, model, share=1.0):
-    return fit(
-        with_size(model, SIZES[-1]),
+    return fit_model(
+        set_prior_scale(model, PRIOR_SCALES[-1]),
         campaign.observations,
         campaign.declared.noise.scaled(share),
     )
@@ -323,9 +330,11 @@ def test_declared_geometry_has_the_size_that_the_measurements_make_most_probable
 ):
     campaign, model = campaign_of(kuka, offset)
     # Springs of the joints have no size: they have no prior.
-    assert declared_geometry(model) == {"joint_offset"}
-    assert most_probable(wide_fit(campaign, model))[0] == pytest.approx(size, rel=0.01)
-    fitted = fit_declared(model, campaign.observations, campaign.declared.noise)
+    assert find_declared_geometry(model) == {"joint_offset"}
+    assert maximize_evidence(wide_fit(campaign, model))[0] == pytest.approx(
+        size, rel=0.01
+    )
+    fitted = fit_declared_model(model, campaign.observations, campaign.declared.noise)
     priors = {owner: parameter.prior_std for owner, parameter in fitted.parameters}
     assert [priors[f"joint_offset@{joint}"] for joint in JOINTS] == pytest.approx(
         [size * 1e-3] * 4, rel=0.01
@@ -340,28 +349,28 @@ def test_the_size_is_the_same_whatever_noise_was_taken_and_the_noise_comes_back(
     """Noise that is declared far too small must not make sizes small: they would be so
     many standard errors, not so many mm."""
     campaign, model = campaign_of(kuka, 1e-3)
-    size, factor = most_probable(wide_fit(campaign, model, share))
+    size, factor = maximize_evidence(wide_fit(campaign, model, share))
     assert size == pytest.approx(1.0, rel=0.01)
     assert factor == pytest.approx(1.0 / share, rel=0.15)
 
 
 def test_effective_parameters_are_the_trace_of_the_hat_matrix(kuka):
     campaign, model = campaign_of(kuka, 1e-4, poses=6)
-    fitted = fit(
-        with_size(model, 0.1),
+    fitted = fit_model(
+        set_prior_scale(model, 0.1),
         campaign.observations,
         campaign.declared.noise.scaled(30.0),
     )
     rows = np.concatenate(
         [
-            white.reshape(-1, len(fitted.held))
-            for _, _, white in fitted.sensitivities(campaign.observations)
+            white.reshape(-1, len(fitted.unidentifiable))
+            for _, _, white in fitted.iterate_sensitivities(campaign.observations)
         ]
     )
-    assert effective_parameters(fitted) == pytest.approx(
+    assert count_effective_parameters(fitted) == pytest.approx(
         np.trace(rows @ fitted.covariance @ rows.T), rel=1e-3
     )
-    assert effective_parameters(fitted) < (~fitted.held).sum() - 0.5
+    assert count_effective_parameters(fitted) < (~fitted.unidentifiable).sum() - 0.5
 
 
 def case_of(robot, off=0.0, turned=0.0, noise=None, oriented=True, repeats=1):
@@ -378,7 +387,7 @@ def case_of(robot, off=0.0, turned=0.0, noise=None, oriented=True, repeats=1):
         vectors = turns * Rotation.from_rotvec(seen.rotation_vector)
         seen = replace(seen, rotation_vector=vectors.as_rotvec())
     campaign = replace(campaign, measurements=seen)
-    return Case(campaign, averaged(seen), declared_model(campaign), {})
+    return Case(campaign, average_repeats(seen), build_declared_model(campaign), {})
 
 
 def errors(seed, size, repeats=1):
@@ -391,7 +400,7 @@ def test_noise_is_the_root_mean_square_of_the_residual_where_nothing_else_says_i
 ):
     off = errors(1, 70e-6)
     turned = errors(2, 20e-6)
-    noise, warnings = estimated_noise(case_of(fanuc, off, turned, oriented=oriented))
+    noise, warnings = estimate_noise(case_of(fanuc, off, turned, oriented=oriented))
     assert (
         noise.source == "residual"
         and noise.degrees_of_freedom == 0

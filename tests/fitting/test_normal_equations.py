@@ -27,15 +27,20 @@ from synthetic import (
 )
 
 from elastocal.campaigns.campaign import Target
-from elastocal.fitting.least_squares import fit
+from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.model import conditions, parameters, residuals, stepped
+from elastocal.fitting.model import (
+    apply_step,
+    compute_residuals,
+    evaluate_conditions,
+    list_parameters,
+)
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.normal_equations import (
-    Parts,
-    identifiable,
-    solve_normal,
-    whitening,
+    LeastSquaresProblem,
+    compute_whitening,
+    find_identifiable_parameters,
+    solve_normal_equations,
 )
 from elastocal.fitting.observations import Observations
 
@@ -43,7 +48,9 @@ from elastocal.fitting.observations import Observations
 def solved(left, right, plausible, *given):
     """By the normal equations of whitened sensitivities and residual."""
     scaled = left * plausible
-    return solve_normal(scaled.T @ scaled, scaled.T @ right, plausible, *given)
+    return solve_normal_equations(
+        scaled.T @ scaled, scaled.T @ right, plausible, *given
+    )
 
 
 def test_solution_with_a_prior_is_that_of_numpy_with_a_row_for_each_prior():
@@ -83,7 +90,10 @@ def test_a_shape_is_given_up_for_another_from_a_correlation_of_a_half_on(
     gram = informed([1.05**2, shared], [shared, 0.5**2])
     assert 1 / np.sqrt(gram[0, 0]) < 1.0
     np.testing.assert_array_equal(
-        identifiable(gram, np.zeros(2, bool), np.array([False, True]))[0], kept
+        find_identifiable_parameters(gram, np.zeros(2, bool), np.array([False, True]))[
+            0
+        ],
+        kept,
     )
 
 
@@ -95,7 +105,8 @@ def test_a_standard_error_of_the_plausible_size_is_the_largest_that_is_estimated
     """Alone as beside another parameter that is known better."""
     gram = informed([0.01, 0.1 * error * beside], [0.1 * error * beside, error**2])
     np.testing.assert_array_equal(
-        identifiable(gram, np.zeros(2, bool), np.zeros(2, bool))[0], [True, kept]
+        find_identifiable_parameters(gram, np.zeros(2, bool), np.zeros(2, bool))[0],
+        [True, kept],
     )
 
 
@@ -121,20 +132,20 @@ def test_what_the_frame_or_the_target_makes_as_well_is_held_and_named(fanuc, key
         seen_exactly(model, true, made_states(6, 40, seed=14)),
         np.random.default_rng(15),
     )
-    found = fit(model, seen, NOISE)
+    found = fit_model(model, seen, NOISE)
     assert names_held(found) == held
     assert not found.estimate.coefficients[0].any()
     assert (
-        not found.covariance[found.held].any()
-        and not found.covariance[:, found.held].any()
+        not found.covariance[found.unidentifiable].any()
+        and not found.covariance[:, found.unidentifiable].any()
     )
     # It is not shrunk towards zero by a penalty: without it the fit is the very same.
-    without = fit(model_of(fanuc, "joint_offset@3"), seen, NOISE)
+    without = fit_model(model_of(fanuc, "joint_offset@3"), seen, NOISE)
     np.testing.assert_allclose(
         found.estimate.coefficients[1], without.estimate.coefficients[0], rtol=1e-9
     )
     np.testing.assert_allclose(
-        found.covariance[~found.held][:, ~found.held],
+        found.covariance[~found.unidentifiable][:, ~found.unidentifiable],
         without.covariance,
         rtol=1e-6,
         atol=1e-22,
@@ -146,7 +157,7 @@ def test_a_prior_of_the_plausible_size_alone_identifies_nothing_however_it_round
     gram = np.diag([50.0, 1.0 + off * np.finfo(float).eps, 3.0])
     none = np.zeros(3, bool)
     np.testing.assert_array_equal(
-        identifiable(gram, none, none)[0], [True, False, True]
+        find_identifiable_parameters(gram, none, none)[0], [True, False, True]
     )
 
 
@@ -168,7 +179,9 @@ def test_kept_are_those_of_one_pivot_after_the_other_where_ranks_are_deficient()
             if rest > max(1.0, 1e-11 * gram[number, number]):
                 kept.append(number)
         none = np.zeros(size, bool)
-        found = np.flatnonzero(identifiable(gram, none, none)[0]).tolist()
+        found = np.flatnonzero(
+            find_identifiable_parameters(gram, none, none)[0]
+        ).tolist()
         # Those that come later may take what told their predecessors.
         assert set(found) <= set(kept)
         if (np.diag(np.linalg.inv(gram[np.ix_(kept, kept)])) <= 1.0).all():
@@ -200,7 +213,7 @@ def case(request, fanuc):
     )
     estimate = made_estimate(model)
     jacobian = linearize(
-        model, estimate, seen, conditions(model, estimate, states)
+        model, estimate, seen, evaluate_conditions(model, estimate, states)
     ).coordinate_jacobian[..., :6]
     return seen, jacobian
 
@@ -233,7 +246,7 @@ def test_whitened_rows_are_those_of_a_dense_cholesky_factor(case, pose_rad):
     noise = replace(OF_JOINTS, pose_rad=pose_rad)
     covariance = dense_covariance(seen, jacobian, noise)
     values = np.random.default_rng(2).standard_normal((len(seen), seen.rows, 5))
-    found = whitening(seen, jacobian, noise).apply(values).reshape(-1, 5)
+    found = compute_whitening(seen, jacobian, noise).apply(values).reshape(-1, 5)
     # A factor of a covariance is unique but for the order of its rows: what is whitened
     # has the same products.
     expected = values.reshape(-1, 5).T @ np.linalg.solve(
@@ -243,7 +256,11 @@ def test_whitened_rows_are_those_of_a_dense_cholesky_factor(case, pose_rad):
         found.T @ found, expected, rtol=1e-7, atol=1e-7 * np.abs(expected).max()
     )
     identity = np.eye(len(covariance)).reshape(len(seen), seen.rows, -1)
-    factor = whitening(seen, jacobian, noise).apply(identity).reshape(covariance.shape)
+    factor = (
+        compute_whitening(seen, jacobian, noise)
+        .apply(identity)
+        .reshape(covariance.shape)
+    )
     np.testing.assert_allclose(
         factor @ covariance @ factor.T, np.eye(len(covariance)), atol=1e-7
     )
@@ -273,7 +290,7 @@ def test_products_by_factors_are_those_of_the_columns_written_out(
     joints = 1e-6 * np.array([40.0, 15, 15, 30, 45, 220])
     noise = Noise("declared", 5e-6, 1e-5, joints, pose_rad=pose_rad)
     plausible = np.array(
-        [parameter.plausible for _, parameter in parameters(model, estimate)]
+        [parameter.plausible for _, parameter in list_parameters(model, estimate)]
     )
     weights = np.random.default_rng(90).uniform(0.3, 1.0, len(seen))
     found = []
@@ -281,7 +298,7 @@ def test_products_by_factors_are_those_of_the_columns_written_out(
         monkeypatch.setattr(
             "elastocal.fitting.normal_equations._COLUMNS_A_COORDINATE", fewest
         )
-        measurements = Parts(model, seen, noise, estimate, plausible)
+        measurements = LeastSquaresProblem(model, seen, noise, estimate, plausible)
         measurements.linearize(estimate)
         measurements.whiten()
         found.append(measurements.normal_equations(weights))
@@ -294,7 +311,7 @@ def test_products_by_factors_are_those_of_the_columns_written_out(
     steps = 1e-4 * np.diag(plausible / np.sqrt(np.diag(gram)))
     ends = [
         [
-            measurements.squares(weights, stepped(model, estimate, way * step))
+            measurements.squares(weights, apply_step(model, estimate, way * step))
             for way in (-1, 1)
         ]
         for step in steps
@@ -326,7 +343,7 @@ def test_normal_equations_of_a_linear_problem_are_those_written_out(
     estimate = replace(
         made_estimate(model), coefficients=(np.array([1e-4, -2e-4, 3e-5]),)
     )
-    parts = Parts(model, seen, noise, estimate, plausible)
+    parts = LeastSquaresProblem(model, seen, noise, estimate, plausible)
     assert len(parts.parts) == 1 if at_once is None else len(parts.parts) > 2
     parts.linearize(estimate)
     parts.whiten()
@@ -367,14 +384,16 @@ def test_squares_of_another_estimate_are_whitened_in_the_axes_in_which_the_step_
         seen_exactly(model, estimate, made_states(6, 9, seed=4)),
         np.random.default_rng(5),
     )
-    parts = Parts(model, seen, OF_JOINTS, estimate, np.ones(12))
+    parts = LeastSquaresProblem(model, seen, OF_JOINTS, estimate, np.ones(12))
     parts.linearize(estimate)
     parts.whiten()
-    there = stepped(model, estimate, np.array([0, 0, 0, 0.3, -0.2, 0.1, *[0.0] * 6]))
-    residual = residuals(model, there, seen, conditions(model, there, seen.states))
+    there = apply_step(model, estimate, np.array([0, 0, 0, 0.3, -0.2, 0.1, *[0.0] * 6]))
+    residual = compute_residuals(
+        model, there, seen, evaluate_conditions(model, there, seen.states)
+    )
     turned = residual @ there.frame_rotation[0].T @ estimate.frame_rotation[0]
     expected = (
-        whitening(seen, parts.parts[0].jacobian, OF_JOINTS).apply(turned) ** 2
+        compute_whitening(seen, parts.parts[0].jacobian, OF_JOINTS).apply(turned) ** 2
     ).sum()
     assert parts.squares(np.ones(len(seen)), there) == pytest.approx(expected, rel=1e-6)
     assert parts.squares(np.ones(len(seen)), there) != pytest.approx(

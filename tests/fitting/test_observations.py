@@ -11,10 +11,10 @@ from scipy.spatial.transform import Rotation
 from synthetic import measurements_of
 
 from elastocal.fitting.observations import (
-    averaged,
-    measured_in,
-    state_clusters,
-    without_outlying_repeats,
+    average_repeats,
+    index_poses,
+    match_states_and_targets,
+    remove_outlying_repeats,
 )
 
 
@@ -74,7 +74,7 @@ def test_averages_are_those_of_each_session_pose_load_side_and_target_by_hand(se
         else taken.approach,
     )
     taken = taken.select(rng.permutation(len(taken))[: len(taken) - 3])
-    found = averaged(taken)
+    found = average_repeats(taken)
     groups = {}
     rows_found = 0
     keys = zip(
@@ -97,7 +97,7 @@ def test_averages_are_those_of_each_session_pose_load_side_and_target_by_hand(se
             *states.approach[number],
         ) == state
         assert states.repeats[number] == min(map(len, groups[state].values()))
-        assert state_clusters(states)[number] == poses.index(state[:2])
+        assert index_poses(states)[number] == poses.index(state[:2])
         for target, rows in groups[state].items():
             (place,) = np.flatnonzero(
                 (found.state == number) & (found.target == target)
@@ -114,7 +114,7 @@ def test_averages_are_those_of_each_session_pose_load_side_and_target_by_hand(se
             )
             rows_found += 1
     assert len(found.states) == len(groups) and len(found) == rows_found
-    again = averaged(taken.select(np.argsort(taken.row)))
+    again = average_repeats(taken.select(np.argsort(taken.row)))
     for name, value in vars(found.states).items():
         np.testing.assert_allclose(
             value, getattr(again.states, name), rtol=0, atol=1e-14
@@ -123,7 +123,7 @@ def test_averages_are_those_of_each_session_pose_load_side_and_target_by_hand(se
 
 def test_measurements_of_the_same_state_and_target_are_found():
     single = full_measurements(2)
-    averages = averaged(single)
+    averages = average_repeats(single)
     chosen = np.arange(len(averages)) % 3 == 0
     of_state = list(
         zip(
@@ -139,10 +139,12 @@ def test_measurements_of_the_same_state_and_target_are_found():
     ]
     wanted = {key for key, mine in zip(keys, chosen, strict=True) if mine}
     rows = zip(single.session, single.pose, single.load, single.target, strict=True)
-    assert measured_in(single, averages, chosen).tolist() == [
+    assert match_states_and_targets(single, averages, chosen).tolist() == [
         key in wanted for key in rows
     ]
-    assert measured_in(averages, averages, chosen).tolist() == chosen.tolist()
+    assert (
+        match_states_and_targets(averages, averages, chosen).tolist() == chosen.tolist()
+    )
 
 
 def repeated(repeats, poses=30, seed=0, targets=2, single=0):
@@ -161,7 +163,7 @@ def repeated(repeats, poses=30, seed=0, targets=2, single=0):
 
 
 def rows_lost(taken):
-    return sorted(set(taken.row) - set(without_outlying_repeats(taken).row))
+    return sorted(set(taken.row) - set(remove_outlying_repeats(taken).row))
 
 
 @pytest.mark.parametrize("repeats", [3, 4, 5])

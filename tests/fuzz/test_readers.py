@@ -14,7 +14,7 @@ from made_cells import ARM, DOCUMENT, Cell
 from study_folder import REPOSITORY
 
 from elastocal.campaigns.campaign_folder import read_campaign_folder
-from elastocal.campaigns.importers import campaign_sources
+from elastocal.campaigns.importers import read_campaign_sources
 from elastocal.campaigns.reading import read_campaign, read_robot
 from elastocal.io.documents import check_document, read_document
 from elastocal.mechanics.chain import parse_chain
@@ -68,7 +68,7 @@ def read_strategy(path):
 def read_study(path):
     config = read_document(path)
     check_study(config, CONFIG, path)
-    campaign_sources(config, CONFIG, path)
+    read_campaign_sources(config, CONFIG, path)
 
 
 # What a file of the cell is altered from, its name, and its readers.

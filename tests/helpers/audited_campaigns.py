@@ -4,12 +4,12 @@ it finds in these."""
 from analysed_robots import ROBOTS
 from made_audits import CONFIGURATION
 
-from elastocal.campaigns.campaign import columns_of
+from elastocal.campaigns.campaign import tabulate_measurements
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import generate_residual_blocks
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.model import case_from
+from elastocal.fitting.model import build_case
 from elastocal.io.json_files import write_json
 from elastocal.io.storage import write_table
 from elastocal.loop import diagnosis_tables as tables
@@ -55,11 +55,13 @@ def diagnosed_campaign(top, robot, effects=(), **design):
         write_table(
             results / f"{name}.parquet",
             schemas.measurements(arm.joints),
-            [columns_of(part)],
+            [tabulate_measurements(part)],
             {},
         )
     write_json(results / "campaign.json", descriptions)
-    case, unseen = (case_from(descriptions, columns_of(part)) for part in parts)
+    case, unseen = (
+        build_case(descriptions, tabulate_measurements(part)) for part in parts
+    )
     found = diagnose(case, Settings(), 1)
     write_json(
         results / "diagnosis.json",

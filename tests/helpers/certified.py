@@ -11,7 +11,7 @@ from made_folders import PLAN, made_folder, made_table
 
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.io.origin import Origin, environment
-from elastocal.io.records import JobRecord, input_digests, write_records
+from elastocal.io.records import JobRecord, digest_inputs, write_records
 
 # A module by which all was made.
 ENGINE = "src/engine.py"
@@ -76,7 +76,7 @@ def record_jobs(name, files, installed=None):
         ),
     }
     for number, (rule, (inputs, outputs)) in enumerate(jobs.items()):
-        digests, own = input_digests([*inputs, ENGINE], None if number else [ENGINE])
+        digests, own = digest_inputs([*inputs, ENGINE], None if number else [ENGINE])
         times = f"2026-01-01T00:00:0{number}", f"2026-01-01T00:00:0{number + 1}"
         origin = Origin("c0ffee", "d16e57", 1)
         here = installed or environment(".")

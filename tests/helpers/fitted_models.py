@@ -37,7 +37,7 @@ def names_held(found):
     """Owners and names of the parameters that a fit held."""
     return [
         f"{owner} {p.name}"
-        for (owner, p), held in zip(found.parameters, found.held, strict=True)
+        for (owner, p), held in zip(found.parameters, found.unidentifiable, strict=True)
         if held
     ]
 

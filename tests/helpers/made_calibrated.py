@@ -10,7 +10,7 @@ from elastocal.application.calibrated import calibrate_by_model
 from elastocal.effects.catalogue import candidates_on
 from elastocal.effects.elastic import joint_compliance
 from elastocal.effects.gravity import declared_weight
-from elastocal.fitting.model import Estimate, Model, parameters
+from elastocal.fitting.model import Estimate, Model, list_parameters
 from elastocal.mechanics.sites import sites_of
 
 # What a good arm has, of each family that an afternoon finds.
@@ -74,7 +74,7 @@ def made_calibrated(
         )
     estimate = plain_estimate(model, coefficients)
     sizes = np.array(
-        [parameter.plausible for _, parameter in parameters(model, estimate)]
+        [parameter.plausible for _, parameter in list_parameters(model, estimate)]
     )
     mixed = (
         np.eye(len(sizes))

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 from made_remainders import smoothly_wrong_folder
 
-from elastocal.campaigns.campaign import columns_of
+from elastocal.campaigns.campaign import tabulate_measurements
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.loop.loading import described_campaign
 from elastocal_proof.league.methods import DataSet, dealt
@@ -23,7 +23,9 @@ def made_data_set(folder, robot, robots_folder, poses=24, **changes):
     )
     seen = campaign.measurements
     return DataSet(
-        descriptions, columns_of(seen), dealt(seen, 4, np.random.default_rng(1))
+        descriptions,
+        tabulate_measurements(seen),
+        dealt(seen, 4, np.random.default_rng(1)),
     )
 
 

@@ -13,7 +13,7 @@ from elastocal.diagnosis.statistics import (
     compute_cross_products,
     compute_statistics,
 )
-from elastocal.fitting.linearization import Factored
+from elastocal.fitting.linearization import FactoredSensitivities
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Rows:
         declared, jacobian, candidates = (
             part[:, None] for part in (self.declared, self.jacobian, self.candidates)
         )
-        made = Factored.of(
+        made = FactoredSensitivities.of(
             [{column: np.ones(rows)} for column in range(columns)],
             candidates,
             np.arange(rows),

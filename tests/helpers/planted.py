@@ -15,7 +15,7 @@ from synthetic import (
 
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
-from elastocal.fitting.least_squares import Fit, fit
+from elastocal.fitting.least_squares import Fit, fit_model
 from elastocal.fitting.observations import Observations
 
 # At known places, so that nothing but the effects is to be identified.
@@ -84,4 +84,4 @@ def planted(
     seen = seen_exactly(declared.with_effects(added), true, states)
     seen = with_noise(seen, np.random.default_rng((6, seed)))
     noise = replace(NOISE, joint_rad=np.zeros(declared.sites.joints))
-    return Planted(fit(declared, seen, noise, start), seen, candidates)
+    return Planted(fit_model(declared, seen, noise, start), seen, candidates)

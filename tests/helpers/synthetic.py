@@ -15,11 +15,11 @@ from elastocal.effects.gravity import declared_weight
 from elastocal.fitting.model import (
     Estimate,
     Model,
-    conditions,
-    parameters,
+    apply_step,
+    compute_residuals,
+    evaluate_conditions,
+    list_parameters,
     predict,
-    residuals,
-    stepped,
 )
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import Observations, States
@@ -153,7 +153,7 @@ def seen_exactly(model, estimate, states):
     target = np.tile(np.arange(len(model.targets)), len(states))
     blank = Observations(states, state, target, np.zeros((len(state), 3)), None)
     position, rotation = predict(
-        model, estimate, blank, conditions(model, estimate, states)
+        model, estimate, blank, evaluate_conditions(model, estimate, states)
     )
     session = np.searchsorted(estimate.sessions, states.session[state])
     turn = estimate.frame_rotation[session]
@@ -266,7 +266,7 @@ def small_steps(model, estimate):
     shapes = {
         (effect.key, shape.name) for effect in model.effects for shape in effect.shapes
     }
-    listed = parameters(model, estimate)
+    listed = list_parameters(model, estimate)
     return np.array(
         [
             (1e-4 if (owner, p.name) in shapes else 1e-3) * p.plausible
@@ -281,8 +281,11 @@ def slopes(model, estimate, observations, conditions, steps):
     columns = []
     for step in steps:
         ahead, behind = (
-            residuals(
-                model, stepped(model, estimate, sign * step), observations, conditions
+            compute_residuals(
+                model,
+                apply_step(model, estimate, sign * step),
+                observations,
+                conditions,
             )
             for sign in (1, -1)
         )

@@ -13,8 +13,8 @@ from elastocal.io.documents import (
     LARGEST_BYTES,
     MOST_VALUES,
     check_document,
-    named_document,
     read_document,
+    read_named_document,
     read_schema,
 )
 
@@ -215,9 +215,11 @@ def test_a_document_is_named_and_not_reached_by_a_path(tmp_path, name):
     (tmp_path / "robots" / "one.yaml").write_text(
         yaml.safe_dump(ROBOT), encoding="utf-8"
     )
-    assert named_document(tmp_path, "robots", "robot", "one", "config.yaml") == ROBOT
+    assert (
+        read_named_document(tmp_path, "robots", "robot", "one", "config.yaml") == ROBOT
+    )
     with refused("config.yaml", "robots", "one"):
-        named_document(tmp_path, "robots", "robot", name, "config.yaml")
+        read_named_document(tmp_path, "robots", "robot", name, "config.yaml")
 
 
 @pytest.mark.parametrize(

@@ -6,28 +6,32 @@ import json
 import pytest
 
 import elastocal
-from elastocal.io.origin import canonical_json, configuration_sha256, provenance
+from elastocal.io.origin import (
+    configuration_sha256,
+    describe_provenance,
+    format_canonical_json,
+)
 
 
 def test_equal_configurations_have_one_digest_however_they_are_ordered():
     one = {"a": 1, "b": {"c": [1.5, "µ"], "d": None}}
     other = {"b": {"d": None, "c": [1.5, "µ"]}, "a": 1}
     assert (
-        canonical_json(one)
-        == canonical_json(other)
+        format_canonical_json(one)
+        == format_canonical_json(other)
         == '{"a":1,"b":{"c":[1.5,"µ"],"d":null}}'
     )
     assert (
         configuration_sha256(one)
-        == hashlib.sha256(canonical_json(other).encode("utf-8")).hexdigest()
+        == hashlib.sha256(format_canonical_json(other).encode("utf-8")).hexdigest()
     )
     with pytest.raises(ValueError, match="JSON"):
-        canonical_json({"a": float("nan")})
+        format_canonical_json({"a": float("nan")})
 
 
 def test_provenance_holds_version_settings_and_whatever_else_is_given_and_does_not_depend_on_their_order():
     settings = {"seed": 1, "loading": {"force_N": 1000, "offset_m": [0, 0.5, 0]}}
-    found = provenance(settings, noise_um="200")
+    found = describe_provenance(settings, noise_um="200")
     assert found["elastocal_version"] == elastocal.__version__
     assert (
         found["configuration"] == settings
@@ -40,5 +44,7 @@ def test_provenance_holds_version_settings_and_whatever_else_is_given_and_does_n
         "sources_sha256": "x",
     }
     assert (
-        provenance(turned) == provenance(settings) != provenance(settings | {"seed": 2})
+        describe_provenance(turned)
+        == describe_provenance(settings)
+        != describe_provenance(settings | {"seed": 2})
     )

@@ -13,11 +13,11 @@ from elastocal.errors import InputError
 from elastocal.io.origin import Origin
 from elastocal.io.records import (
     JobRecord,
-    input_digests,
-    jobs_behind,
+    digest_inputs,
+    list_recorded_files,
+    locate_record,
     read_record,
-    record_of,
-    recorded,
+    trace_jobs,
     write_records,
 )
 
@@ -39,7 +39,7 @@ ALTERED = {
 
 def write(rule, number, inputs, outputs, checked=None):
     """As a job does that ended well."""
-    digests, own = input_digests(inputs, checked)
+    digests, own = digest_inputs(inputs, checked)
     job = JobRecord(
         rule,
         {"robot": "kuka"},
@@ -82,8 +82,8 @@ def jobs(tmp_path, monkeypatch):
 
 
 def test_a_file_leads_back_to_every_job_behind_it_and_to_no_other(jobs):
-    assert jobs_behind([DRAWN]) == jobs
-    assert jobs_behind([TABLE]) == jobs[:2]
+    assert trace_jobs([DRAWN]) == jobs
+    assert trace_jobs([TABLE]) == jobs[:2]
     assert [job.name for job in jobs] == ["measure kuka", "fit kuka", "draw kuka"]
 
 
@@ -96,29 +96,31 @@ def test_any_altered_byte_is_found_by_the_next_job_and_by_all_who_follow(output,
     altered.write_bytes(content)
     delete = f"(delete {'it' if output == ALTERED[output] else output}"
     with refused(altered.as_posix(), "", "other contents than were written", delete):
-        input_digests([CODE, output])
+        digest_inputs([CODE, output])
     with refused(altered.as_posix(), "", "other contents than were written"):
-        jobs_behind([DRAWN])
+        trace_jobs([DRAWN])
 
 
 @pytest.mark.parametrize("output", ALTERED)
 def test_a_missing_record_is_an_error(output):
-    record_of(output).unlink()
-    with refused(output, "", f"no record of the job that made it, {record_of(output)}"):
-        jobs_behind([DRAWN])
+    locate_record(output).unlink()
+    with refused(
+        output, "", f"no record of the job that made it, {locate_record(output)}"
+    ):
+        trace_jobs([DRAWN])
     with refused(output, "", "no record of the job that made it"):
-        input_digests([output])
+        digest_inputs([output])
 
 
 def test_a_file_that_was_made_again_since_another_read_it_is_found(jobs):
     Path(FITTED).write_text("another fit", encoding="utf-8")
     write_records(jobs[1])
     with refused(FITTED, "", "not what draw kuka read"):
-        jobs_behind([DRAWN])
+        trace_jobs([DRAWN])
 
 
 def test_any_altered_character_of_a_record_is_found():
-    path = record_of(FITTED)
+    path = locate_record(FITTED)
     written = path.read_text(encoding="utf-8")
     altered = [
         written[:n] + chr(ord(c) ^ 1) + written[n + 1 :]
@@ -144,7 +146,7 @@ def test_any_altered_character_of_a_record_is_found():
 def test_sha256sum_reads_what_is_recorded():
     called = [sys.executable, "-m", "elastocal.io.records"]
     lines = subprocess.run(called, capture_output=True, text=True, check=True).stdout
-    assert len(lines.splitlines()) == len(recorded()) == 6
+    assert len(lines.splitlines()) == len(list_recorded_files()) == 6
     done = subprocess.run(
         ["sha256sum", "--check"], input=lines, capture_output=True, text=True
     )

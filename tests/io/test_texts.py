@@ -5,7 +5,7 @@ import os
 import pytest
 from support import refused
 
-from elastocal.io.texts import LARGEST_NUMBER, plain_number, read_bytes, read_text
+from elastocal.io.texts import LARGEST_NUMBER, parse_number, read_bytes, read_text
 
 
 def test_contents_are_read_up_to_a_bound_and_what_might_never_end_is_not_opened(
@@ -55,4 +55,4 @@ def test_text_loses_its_mark_and_other_encodings_are_refused_with_their_line(tmp
     ],
 )
 def test_numbers_as_people_write_them(text, value):
-    assert plain_number(text) == value
+    assert parse_number(text) == value

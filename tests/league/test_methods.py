@@ -6,7 +6,7 @@ import pytest
 from made_folders import made_folder, made_table
 from made_leagues import made_data_set
 
-from elastocal.campaigns.campaign import measurements_from
+from elastocal.campaigns.campaign import build_measurements
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.settings import Settings
 from elastocal.errors import InputError
@@ -40,12 +40,12 @@ def data(kuka, config_folder, tmp_path_factory):
 def test_every_pose_is_held_out_once_in_folds_of_one_size_and_blocks_are_neighbours(
     data,
 ):
-    found = dealt(measurements_from(data.columns), 5, np.random.default_rng(2))
+    found = dealt(build_measurements(data.columns), 5, np.random.default_rng(2))
     assert len(found["pose"]) == 24
     for split in ("random", "blocks"):
         counts = np.bincount(found[split])
         assert counts[0] == 0 and len(counts) == 6 and np.ptp(counts[1:]) <= 1
-    seen = measurements_from(data.columns)
+    seen = build_measurements(data.columns)
     angles = seen.joint_angles[np.unique(seen.pose, return_index=True)[1]]
     block = data.dealt["blocks"]
     apart = np.linalg.norm(np.exp(1j * angles[:, None]) - np.exp(1j * angles), axis=2)

@@ -28,7 +28,7 @@ from elastocal.application.calibrated import (
 )
 from elastocal.io.json_files import read_json
 from elastocal.io.origin import environment
-from elastocal.io.records import checksum
+from elastocal.io.records import compute_sha256
 from elastocal.loop.calibrated_files import certificate, error_budget, load_diagnosed
 from elastocal.loop.diagnosis_tables import diagnosis_from
 
@@ -116,7 +116,7 @@ def test_it_says_what_code_data_and_environment_made_it(checkout):
     files["kuka.yaml"] = hashlib.sha256((ROBOTS / "kuka.yaml").read_bytes()).hexdigest()
     assert origin == {
         "commit": "c0ffee",
-        "code_sha256": digest({ENGINE: checksum(checkout / ENGINE)}),
+        "code_sha256": digest({ENGINE: compute_sha256(checkout / ENGINE)}),
         "data_sha256": digest(sorted(files.items())),
         "environment": environment(checkout),
     }

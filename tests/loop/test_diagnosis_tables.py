@@ -10,12 +10,12 @@ from made_folders import made_folder
 from support import chain_of, changed
 from synthetic import NOISE, made_estimate, made_model
 
-from elastocal.campaigns.campaign import Target, columns_of
+from elastocal.campaigns.campaign import Target, tabulate_measurements
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.diagnosis.diagnose import Step
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.least_squares import Fit
-from elastocal.fitting.model import parameters
+from elastocal.fitting.model import list_parameters
 from elastocal.io.json_files import write_json
 from elastocal.io.storage import read_table, write_table
 from elastocal.loop import diagnosis_tables as tables
@@ -56,7 +56,7 @@ def test_a_case_is_the_folder_and_a_test_may_be_of_another_campaign(
         files[0],
         descriptions | {"held_out": changed(other, ("campaign", "campaign"), "other")},
     )
-    write_table(files[1], measurements(6), [columns_of(training)], {})
+    write_table(files[1], measurements(6), [tabulate_measurements(training)], {})
     case = tables.load_case(*files)
     for name in ("pose", "load", "joint_angles", "wrench", "position"):
         np.testing.assert_array_equal(
@@ -101,7 +101,7 @@ def test_models_and_estimates_come_back_from_json_and_parameters_from_their_tabl
     estimate = made_estimate(
         model, sessions=(0, 7) if settings["fitted_frames"] else (3,), seed=1
     )
-    listed = parameters(model, estimate)
+    listed = list_parameters(model, estimate)
     held = np.arange(len(listed)) % 3 == 1
     covariance = np.diag(1.0 - held)
     fitted = Fit(

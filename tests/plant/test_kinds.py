@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from elastocal.effects.catalogue import effects
+from elastocal.effects.catalogue import list_bundled_effects
 from elastocal_proof.plant.kinds import KINDS, OUTSIDE, drawn_defect, with_defects
 
 NAMED = sorted(kind for kind in KINDS if not kind.startswith(OUTSIDE))
@@ -14,10 +14,10 @@ NAMED = sorted(kind for kind in KINDS if not kind.startswith(OUTSIDE))
 def test_every_effect_of_the_catalogue_can_be_a_defect():
     # A base that stands elsewhere than declared is none of the robot: the tracker of a
     # setting sees it there.
-    assert {*NAMED, "base_placement"} == set(effects())
+    assert {*NAMED, "base_placement"} == set(list_bundled_effects())
     # Else what the catalogue finds rightly would count as a wrong name.
     assert not {kind.removeprefix(OUTSIDE) for kind in set(KINDS) - set(NAMED)} & set(
-        effects()
+        list_bundled_effects()
     )
 
 

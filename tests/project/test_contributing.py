@@ -12,7 +12,7 @@ from support import refused
 from synthetic import displacements, made_states
 
 from elastocal.campaigns.campaign_folder import read_campaign_folder
-from elastocal.campaigns.importers import importer
+from elastocal.campaigns.importers import find_importer
 from elastocal.campaigns.reading import read_campaign, read_robot
 from elastocal.effects import catalogue
 from elastocal.effects.conditions import conditions_of
@@ -81,7 +81,7 @@ def test_the_effect_is_whole_and_displaces_what_its_formula_says(module, kuka):
     effect = module("An effect").hoses
     assert (
         isinstance(effect, Effect)
-        and effect.name not in catalogue.effects()
+        and effect.name not in catalogue.list_effects()
         and "k q^3" in effect.doc
     )
     sites = sites_of(kuka)
@@ -100,7 +100,7 @@ def test_the_importer_makes_a_campaign_and_refuses_a_file_of_another_kind(
     config_folder, tmp_path
 ):
     (tmp_path / "public_data.yaml").write_text(example("An importer"), encoding="utf-8")
-    mine = importer("mine", tmp_path, "a test")
+    mine = find_importer("mine", tmp_path, "a test")
     robots = config_folder / "robots"
     angles = np.linspace(-90, 90, 12)[:, None] + np.arange(6)
     positions = np.arange(36.0).reshape(12, 3)

@@ -141,7 +141,7 @@ def named_effects(cell):
     effects = set()
     for entry in cell.split(" + "):
         name, _, joints = entry.partition(" ")
-        effects.add((catalogue.effects()[name].words, *re.findall(r"\d", joints)))
+        effects.add((catalogue.list_effects()[name].words, *re.findall(r"\d", joints)))
     return effects
 
 

@@ -17,7 +17,7 @@ from made_blind_documents import PLAN, effect, frame, oracle, truth, verdict
 from made_leagues import made_entries
 
 from elastocal.io.data_frames import write_csv
-from elastocal.random_streams import stream
+from elastocal.random_streams import open_stream
 from elastocal_proof.blind.closed_loop import MODELS, PARTS, case_errors, goals, summary
 from elastocal_proof.blind.scores import intervals_of
 from elastocal_proof.blind.summary import rates, reliability, summarize
@@ -157,7 +157,9 @@ def _league():
     measured = SimpleNamespace(
         session=np.zeros(len(pose), np.int32), pose=pose, joint_angles=angles
     )
-    folds = dealt(measured, 4, stream(SEED, "one", "league folds", 0))["random"][pose]
+    folds = dealt(measured, 4, open_stream(SEED, "one", "league folds", 0))["random"][
+        pose
+    ]
     results = {}
     for method, size, std in (
         ("geometry", 2e-4, None),

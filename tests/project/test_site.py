@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from elastocal.command.campaign import diagnose
-from elastocal.effects.catalogue import effects
+from elastocal.effects.catalogue import list_bundled_effects
 
 ROOT = Path(__file__).resolve().parents[2]
 SITE = ROOT / "site" / "html"
@@ -89,12 +89,14 @@ def test_nothing_is_fetched_from_elsewhere(pages):
 
 def test_every_effect_has_a_formula_and_a_picture(pages):
     page = pages[SITE / "reference" / "effects.html"]
-    assert {Path(picture).stem for picture in page.pictures} >= set(effects())
-    assert page.formulas == len(effects())
+    assert {Path(picture).stem for picture in page.pictures} >= set(
+        list_bundled_effects()
+    )
+    assert page.formulas == len(list_bundled_effects())
     formulas = yaml.safe_load(
         (ROOT / "docs" / "site" / "effect_formulas.yaml").read_text(encoding="utf-8")
     )
-    assert set(formulas) == set(effects())
+    assert set(formulas) == set(list_bundled_effects())
 
 
 # Headings without a level, code that no keyboard reaches (critical to axe), landmarks

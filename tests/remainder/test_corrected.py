@@ -10,8 +10,8 @@ from made_remainders import SMOOTH_M, made_inputs, smoothly_wrong_cases
 from synthetic import made_estimate, made_model, made_states, seen_exactly
 
 from elastocal.effects.catalogue import candidates_on
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import conditions, predict, target_points
+from elastocal.fitting.least_squares import fit_model
+from elastocal.fitting.model import evaluate_conditions, locate_targets, predict
 from elastocal.fitting.noise import Noise
 from elastocal.mechanics.kinematics import poses
 from elastocal.remainder.corrected import (
@@ -24,8 +24,8 @@ from elastocal.remainder.corrected import (
     tuned,
 )
 from elastocal.remainder.regressions import REGRESSIONS, Predictor, Regression
-from elastocal.validation.held_out import position_errors
-from elastocal.validation.placing import placed
+from elastocal.validation.held_out import compute_position_errors
+from elastocal.validation.transfer import transfer_fit
 
 NOISE = Noise("declared", 2e-5, 2e-5, np.zeros(6))
 PLAN = {
@@ -41,7 +41,7 @@ def made(kuka, config_folder, tmp_path_factory):
     case, held_out = smoothly_wrong_cases(
         tmp_path_factory.mktemp("corrected"), kuka, config_folder / "robots", poses=90
     )
-    return case, held_out, fit(case.model, case.observations, NOISE)
+    return case, held_out, fit_model(case.model, case.observations, NOISE)
 
 
 @pytest.fixture
@@ -64,8 +64,8 @@ def rms(values):
 
 def alone(case, held_out, fitted):
     """Held-out errors without a regression."""
-    return position_errors(
-        *placed(fitted, case, held_out), held_out.observations
+    return compute_position_errors(
+        *transfer_fit(fitted, case, held_out), held_out.observations
     ).distance
 
 
@@ -151,7 +151,7 @@ def test_the_jacobian_is_that_of_each_target_and_its_place_is_shown_but_neither_
 ):
     model, estimate, observations = seen
     inputs = inputs_of(model, estimate, observations)
-    for number, point in enumerate(target_points(model, estimate)):
+    for number, point in enumerate(locate_targets(model, estimate)):
         mask = observations.target == number
         coordinates = np.zeros((2, mask.sum(), model.sites.chain.coordinates))
         coordinates[..., :6] = observations.states.joint_angles[
@@ -202,7 +202,7 @@ def test_what_effects_of_the_model_do_may_be_taken_back_but_for_what_tasks_know_
                     model,
                     each,
                     observations,
-                    conditions(model, each, observations.states),
+                    evaluate_conditions(model, each, observations.states),
                 )[0]
                 for each in two
             ]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from made_remainders import NOISE_M, smoothly_wrong_cases
 
-from elastocal.fitting.least_squares import fit
+from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.noise import Noise
 from elastocal.remainder.repeatable import repeatable_part
 
@@ -18,7 +18,7 @@ def smooth(kuka, config_folder, tmp_path_factory):
     case, _ = smoothly_wrong_cases(
         tmp_path_factory.mktemp("repeatable"), kuka, config_folder / "robots", **changes
     )
-    return case, fit(
+    return case, fit_model(
         case.model, case.observations, Noise("declared", NOISE_M, NOISE_M, np.zeros(6))
     )
 
@@ -41,13 +41,13 @@ def test_chance_is_called_repeatable_no_more_often_than_stated(smooth):
     passed = []
     sensitivities, white = (
         np.concatenate(parts)
-        for parts in list(zip(*fitted.sensitivities(case.observations), strict=True))[
-            1:
-        ]
+        for parts in list(
+            zip(*fitted.iterate_sensitivities(case.observations), strict=True)
+        )[1:]
     )
     for seed in range(30):
         noise = draws.normal(0.0, NOISE_M, fitted.residual.shape)
-        step = fitted.covariance @ np.einsum("mrp,mr->p", white, fitted.whitened(noise))
+        step = fitted.covariance @ np.einsum("mrp,mr->p", white, fitted.whiten(noise))
         found = repeatable_part(
             replace(fitted, residual=noise - sensitivities @ step),
             case.observations,
@@ -59,7 +59,7 @@ def test_chance_is_called_repeatable_no_more_often_than_stated(smooth):
 
 def test_too_few_configurations_say_nothing(kuka, config_folder, tmp_path):
     case, _ = smoothly_wrong_cases(tmp_path, kuka, config_folder / "robots", poses=12)
-    fitted = fit(
+    fitted = fit_model(
         case.model, case.observations, Noise("declared", NOISE_M, NOISE_M, np.zeros(6))
     )
     assert repeatable_part(fitted, case.observations, 1) is None

@@ -3,7 +3,7 @@ them."""
 
 import pytest
 
-from elastocal.effects.catalogue import effects
+from elastocal.effects.catalogue import list_bundled_effects
 from elastocal.report.words import (
     UNKNOWN,
     alternative_words,
@@ -21,14 +21,14 @@ from elastocal.report.words import (
 
 
 def test_every_effect_of_the_catalogue_brings_its_own_physical_name_and_a_kind():
-    named = {name: effect.words for name, effect in effects().items()}
+    named = {name: effect.words for name, effect in list_bundled_effects().items()}
     assert all(named.values()) and len(set(named.values())) == len(named)
     assert not [
         words
         for words in named.values()
         if "_" in words or words != words.strip() or words[0].isupper()
     ]
-    assert all(in_common(name, []) for name in effects())
+    assert all(in_common(name, []) for name in list_bundled_effects())
 
 
 @pytest.mark.parametrize(

@@ -10,15 +10,15 @@ from support import chain_of
 
 from elastocal.validation.conformity import (
     FAIL,
-    FEWEST_CONFIGURATIONS,
-    LEAST_TRAVEL,
-    LEAST_TURN_RAD,
+    MIN_CONFIGURATIONS,
+    MIN_ROTATION_RAD,
+    MIN_TRAVEL_SHARE,
     PASS,
     UNDECIDED,
     count_configurations,
-    joint_ranges,
-    predicted_conformity,
-    shortfalls,
+    decide_conformity,
+    find_joint_ranges,
+    list_shortfalls,
 )
 
 
@@ -29,7 +29,7 @@ def test_a_prediction_is_decided_by_the_robots_that_it_leaves_possible(
     tolerance, decision
 ):
     rms = 1e-4 * (1.0 + 0.1 * np.random.default_rng(1).standard_normal(4000))
-    found = predicted_conformity(rms, tolerance, 0.05)
+    found = decide_conformity(rms, tolerance, 0.05)
     assert found.decision == decision
     assert found.limit_m == pytest.approx(1e-4 * (1.0 + 0.1 * 1.645), rel=0.01)
     assert found.risk_above == pytest.approx((rms > tolerance).mean(), abs=1e-3)
@@ -53,14 +53,14 @@ def test_loads_and_repeats_of_a_pose_are_one_configuration(states):
 
 
 def test_fewer_configurations_than_a_judgement_needs_are_too_few(kuka, states):
-    (sentence,) = shortfalls(FEWEST_CONFIGURATIONS - 1, states, kuka)
+    (sentence,) = list_shortfalls(MIN_CONFIGURATIONS - 1, states, kuka)
     assert sentence == "too few: 7 configurations, where at least 8 must judge"
 
 
 @pytest.mark.parametrize(("share", "count"), [(0.9, 1), (1.1, 0)])
 def test_a_joint_that_hardly_turned_is_too_close(kuka, states, share, count):
-    found = shortfalls(
-        FEWEST_CONFIGURATIONS, turned(states, 3, share * LEAST_TURN_RAD), kuka
+    found = list_shortfalls(
+        MIN_CONFIGURATIONS, turned(states, 3, share * MIN_ROTATION_RAD), kuka
     )
     assert len(found) == count and all(
         "joint 4 moved by 26°, and 29° are needed" in sentence for sentence in found
@@ -74,10 +74,10 @@ def test_a_rail_needs_a_share_of_its_travel(kuka, states, share, count):
     moved = replace(
         states,
         joint_angles=np.linspace(
-            0.0, [[share * LEAST_TRAVEL * 4.0, 2.0, 2.0]], len(states)
+            0.0, [[share * MIN_TRAVEL_SHARE * 4.0, 2.0, 2.0]], len(states)
         )[:, 0],
     )
-    found = shortfalls(FEWEST_CONFIGURATIONS, moved, gantry)
+    found = list_shortfalls(MIN_CONFIGURATIONS, moved, gantry)
     assert len(found) == count and all(
         "too close: joint 1 moved by 0.36 m, and 0.4 m are needed" in each
         for each in found
@@ -88,13 +88,13 @@ def test_the_least_turn_is_that_over_which_a_sine_changes_by_half_its_amplitude(
     """At most by that: about the extremes of the sine less."""
     turn = np.linspace(-np.pi, np.pi, 100_001)
     change = np.abs(
-        np.sin(turn + 0.5 * LEAST_TURN_RAD) - np.sin(turn - 0.5 * LEAST_TURN_RAD)
+        np.sin(turn + 0.5 * MIN_ROTATION_RAD) - np.sin(turn - 0.5 * MIN_ROTATION_RAD)
     ).max()
     assert change == pytest.approx(0.5, abs=1e-6)
 
 
 def test_joint_ranges_are_smallest_and_largest_angles_in_degrees(kuka, states):
-    found = joint_ranges(states, kuka)
+    found = find_joint_ranges(states, kuka)
     assert {entry["unit"] for entry in found} == {"deg"}
     spans = [entry["high"] - entry["low"] for entry in found]
     np.testing.assert_allclose(

@@ -17,27 +17,31 @@ from synthetic import (
 )
 
 from elastocal.campaigns.campaign import Target
-from elastocal.fitting.least_squares import SETTLED, evaluated, fit
-from elastocal.fitting.model import stepped
-from elastocal.fitting.noise import Noise, with_size
-from elastocal.fitting.observations import select_states, state_clusters
+from elastocal.fitting.least_squares import (
+    CONVERGENCE_TOLERANCE,
+    evaluate_as_fit,
+    fit_model,
+)
+from elastocal.fitting.model import apply_step
+from elastocal.fitting.noise import Noise, set_prior_scale
+from elastocal.fitting.observations import index_poses, select_states
 from elastocal.validation.held_out import (
     METRICS,
-    Errors,
-    errors_by_range,
-    intervals,
-    left_out_squares,
-    noise_floor,
-    position_errors,
-    position_residuals,
-    refits,
-    share_below_largest,
-    summary,
+    PositionErrors,
+    bound_share_below_maximum,
+    compute_error_intervals,
+    compute_noise_floor,
+    compute_position_errors,
+    compute_position_residuals,
+    predict_left_out_squares,
+    refit_without_folds,
+    summarize_errors,
+    summarize_errors_by_range,
 )
 
 
 def test_summary_by_hand():
-    found = summary(np.array([3.0, 4.0, 0.0, 5.0]))
+    found = summarize_errors(np.array([3.0, 4.0, 0.0, 5.0]))
     assert set(found) == set(METRICS)
     assert found["mean_m"] == 3.0
     assert found["rms_m"] == pytest.approx(np.sqrt(50 / 4))
@@ -53,8 +57,8 @@ def errors():
     cluster = rng.permutation(np.repeat(np.arange(7), [1, 2, 3, 4, 5, 6, 7]))
     first = rng.random(len(cluster)) * (1 + cluster)
     return [
-        Errors(first, cluster),
-        Errors(0.4 * first + 0.1 * rng.random(len(cluster)), cluster),
+        PositionErrors(first, cluster),
+        PositionErrors(0.4 * first + 0.1 * rng.random(len(cluster)), cluster),
     ]
 
 
@@ -75,7 +79,7 @@ def jackknifed(top, bottom):
 
 def test_intervals_are_those_of_a_bootstrap_t_over_whole_poses(errors):
     """Pose by pose and replicate by replicate, as the books have it."""
-    found, reductions = intervals(errors, 300, np.random.default_rng(5))
+    found, reductions = compute_error_intervals(errors, 300, np.random.default_rng(5))
     totals = [np.bincount(one.cluster, one.distance**2) for one in errors]
     counts = np.bincount(errors[0].cluster)
     draws = np.random.default_rng(5)
@@ -122,15 +126,17 @@ def test_intervals_are_those_of_a_bootstrap_t_over_whole_poses(errors):
 
 def test_a_pose_that_makes_most_of_the_error_does_not_make_the_interval_endless():
     distance = np.array([1.0, 1.1, 0.9, 1.05, 1.0, 0.95, 0.9, 1.0, 60.0])
-    errors = Errors(distance, np.arange(9))
-    low, high = intervals([errors], 400, np.random.default_rng(9))[0][0]["rms_m"]
+    errors = PositionErrors(distance, np.arange(9))
+    low, high = compute_error_intervals([errors], 400, np.random.default_rng(9))[0][0][
+        "rms_m"
+    ]
     value, error = jackknifed(distance**2, np.ones(9))
     assert np.log(high**2) == pytest.approx(value + student.ppf(0.975, 2) * error)
     assert low < 20.0
 
 
 def test_a_maximum_has_no_interval_but_a_share_that_stays_below_it(errors):
-    found = intervals(errors, 50, np.random.default_rng(6))[0][0]
+    found = compute_error_intervals(errors, 50, np.random.default_rng(6))[0][0]
     assert (
         np.isnan([found["p95_m"], found["max_m"]]).all()
         and np.isfinite([found["mean_m"], found["rms_m"]]).all()
@@ -139,12 +145,14 @@ def test_a_maximum_has_no_interval_but_a_share_that_stays_below_it(errors):
     # poses stays below. 4,000 samples: 1.1 % are 3.2 standard errors, and a share of 93
     # % is seen with a power of 0.98.
     largest = np.random.default_rng(7).random((4000, 12)).max(axis=1)
-    assert (largest > share_below_largest(12)).mean() == pytest.approx(0.95, abs=0.011)
+    assert (largest > bound_share_below_maximum(12)).mean() == pytest.approx(
+        0.95, abs=0.011
+    )
 
 
 def test_one_pose_has_no_interval():
-    found, reductions = intervals(
-        [Errors(np.array([1.0, 2.0]), np.zeros(2, int))] * 2,
+    found, reductions = compute_error_intervals(
+        [PositionErrors(np.array([1.0, 2.0]), np.zeros(2, int))] * 2,
         50,
         np.random.default_rng(7),
     )
@@ -156,7 +164,9 @@ def test_one_pose_has_no_interval():
 def test_few_poses_have_intervals_of_student_and_six_are_drawn(poses):
     cluster = np.repeat(np.arange(poses), 3)
     distance = 1.0 + np.random.default_rng(poses).random(3 * poses)
-    found = intervals([Errors(distance, cluster)], 50, np.random.default_rng(8))[0][0]
+    found = compute_error_intervals(
+        [PositionErrors(distance, cluster)], 50, np.random.default_rng(8)
+    )[0][0]
     value, error = jackknifed(np.bincount(cluster, distance), np.bincount(cluster))
     of_student = value + error * student.ppf([0.025, 0.975], poses - 1)
     assert np.allclose(np.log(found["mean_m"]), of_student) == (poses < 6)
@@ -179,7 +189,7 @@ def test_noise_floor_is_what_the_noise_alone_leaves(rows, repeats, fanuc):
     states = made_states(6, 20, seed=8, repeats=repeats)
     estimate = made_estimate(model, seed=9)
     seen = seen_exactly(model, estimate, states)
-    fitted = fit(model, seen, noise, estimate)
+    fitted = fit_model(model, seen, noise, estimate)
     rng = np.random.default_rng(10)
     off = []
     for _ in range(60):
@@ -201,31 +211,33 @@ def test_noise_floor_is_what_the_noise_alone_leaves(rows, repeats, fanuc):
     # Joints of 1,200 states share their errors over two targets: the simulation is sure
     # to 1.5 %, 5 % are 3.3 of that, and a floor that is off by a tenth is seen with a
     # power of 0.99.
-    assert noise_floor(fitted, seen, model, estimate) == pytest.approx(
+    assert compute_noise_floor(fitted, seen, model, estimate) == pytest.approx(
         simulated, rel=0.05
     )
 
 
 def test_no_noise_floor_where_the_noise_is_unknown(fanuc):
     campaign = planted(fanuc, {}, poses=8)
-    fitted = fit(
+    fitted = fit_model(
         campaign.declared.model,
         campaign.observations,
         Noise("residual", 1e-4, 1e-4, np.zeros(6)),
         campaign.declared.estimate,
     )
     assert np.isnan(
-        noise_floor(fitted, campaign.observations, fitted.model, fitted.estimate)
+        compute_noise_floor(
+            fitted, campaign.observations, fitted.model, fitted.estimate
+        )
     )
 
 
 def test_errors_are_told_inside_and_outside_the_range():
     cluster = np.array([0, 0, 1, 2])
     errors = {
-        "before": Errors(np.array([1.0, 1.0, 4.0, 2.0]), cluster),
-        "after": Errors(np.array([0.5, 0.5, 3.0, 1.0]), cluster),
+        "before": PositionErrors(np.array([1.0, 1.0, 4.0, 2.0]), cluster),
+        "after": PositionErrors(np.array([0.5, 0.5, 3.0, 1.0]), cluster),
     }
-    found = errors_by_range(errors, np.array([False, True, False]))
+    found = summarize_errors_by_range(errors, np.array([False, True, False]))
     assert found["poses"] == 1
     assert (
         found["outside"]["before"]["max_m"] == 4.0
@@ -235,7 +247,7 @@ def test_errors_are_told_inside_and_outside_the_range():
         found["inside"]["before"]["mean_m"] == pytest.approx(4 / 3)
         and found["inside"]["after"]["max_m"] == 1.0
     )
-    assert errors_by_range(errors, np.zeros(3, bool))["outside"] is None
+    assert summarize_errors_by_range(errors, np.zeros(3, bool))["outside"] is None
 
 
 def test_left_out_squares_are_those_of_refits(kuka):
@@ -243,15 +255,15 @@ def test_left_out_squares_are_those_of_refits(kuka):
     campaign = planted(
         kuka, {key: [5e-4] for key in keys}, seed=3, poses=8, fitted_frames=True
     )
-    model = with_size(
+    model = set_prior_scale(
         campaign.declared.model.with_effects(
             [campaign.candidates[key] for key in keys]
         ),
         0.3,
     )
-    fitted = fit(model, campaign.observations, campaign.declared.noise)
-    found = left_out_squares(fitted, campaign.observations)
-    pose = state_clusters(campaign.observations.states)
+    fitted = fit_model(model, campaign.observations, campaign.declared.noise)
+    found = predict_left_out_squares(fitted, campaign.observations)
+    pose = index_poses(campaign.observations.states)
     refitted = []
     for number in range(pose.max() + 1):
         rest, alone = (
@@ -260,9 +272,11 @@ def test_left_out_squares_are_those_of_refits(kuka):
             )
             for mine in (0, 1)
         )
-        again = fit(model, rest, fitted.noise, fitted.estimate)
+        again = fit_model(model, rest, fitted.noise, fitted.estimate)
         refitted.append(
-            (position_residuals(model, again.estimate, alone) ** 2).sum(axis=1).mean()
+            (compute_position_residuals(model, again.estimate, alone) ** 2)
+            .sum(axis=1)
+            .mean()
         )
     np.testing.assert_allclose(np.sqrt(found), np.sqrt(refitted), rtol=0.1)
     inside = np.bincount(
@@ -275,16 +289,16 @@ def test_left_out_squares_are_those_of_refits(kuka):
 
 def test_without_anything_to_fit_errors_are_the_residuals(kuka):
     campaign = planted(kuka, {}, seed=5, poses=6)
-    bare = fit(
+    bare = fit_model(
         replace(campaign.declared.model, effects=()),
         campaign.observations,
         campaign.declared.noise,
     )
-    assert bare.held.size == 0
+    assert bare.unidentifiable.size == 0
     squares = (bare.residual[:, :3] ** 2).sum(axis=1)
     cluster = campaign.observations.cluster
     np.testing.assert_allclose(
-        left_out_squares(bare, campaign.observations),
+        predict_left_out_squares(bare, campaign.observations),
         np.bincount(cluster, squares) / np.bincount(cluster),
     )
 
@@ -302,24 +316,24 @@ def loaded_in(robot, loaded, poses=24):
         made_estimate(model, (0,), seed=2), coefficients=(2.0 * robot.compliance,)
     )
     seen = with_noise(seen_exactly(model, estimate, states), np.random.default_rng(3))
-    return fit(model, seen, NOISE), seen
+    return fit_model(model, seen, NOISE), seen
 
 
 def test_what_only_the_part_left_out_identifies_goes_back_to_where_fits_start(fanuc):
     part = np.arange(24) // 6
     fitted, seen = loaded_in(fanuc, part == 1)
     (found,) = fitted.estimate.coefficients
-    assert not fitted.held[-6:].any() and found[0] > 1.9 * fanuc.compliance[0]
-    for number, refit in enumerate(refits(fitted, seen, part)):
+    assert not fitted.unidentifiable[-6:].any() and found[0] > 1.9 * fanuc.compliance[0]
+    for number, refit in enumerate(refit_without_folds(fitted, seen, part)):
         (without,) = refit.coefficients
         if number == 1:
             np.testing.assert_allclose(without, fanuc.compliance, rtol=1e-12)
-            from_nothing = fit(
+            from_nothing = fit_model(
                 fitted.model, select_states(seen, part != 1), NOISE
             ).estimate
             left_out = select_states(seen, part == 1)
             errors = [
-                position_residuals(fitted.model, each, left_out)
+                compute_position_residuals(fitted.model, each, left_out)
                 for each in (refit, from_nothing)
             ]
             np.testing.assert_allclose(*errors, atol=1e-2 * NOISE.position_m)
@@ -333,14 +347,18 @@ def test_a_step_that_equations_after_it_do_not_prove_is_followed_by_others(fanuc
     rest."""
     part = np.arange(24) // 6
     fitted, seen = loaded_in(fanuc, np.ones(24, bool))
-    off = stepped(
+    off = apply_step(
         fitted.model,
         fitted.estimate,
-        np.where(np.arange(len(fitted.held)) < 6, 0.3, 0.0),
+        np.where(np.arange(len(fitted.unidentifiable)) < 6, 0.3, 0.0),
     )
-    far = evaluated(fitted.model, seen, NOISE, off)
-    for pair in zip(refits(far, seen, part), refits(fitted, seen, part), strict=True):
-        errors = [position_residuals(fitted.model, each, seen) for each in pair]
+    far = evaluate_as_fit(fitted.model, seen, NOISE, off)
+    for pair in zip(
+        refit_without_folds(far, seen, part),
+        refit_without_folds(fitted, seen, part),
+        strict=True,
+    ):
+        errors = [compute_position_residuals(fitted.model, each, seen) for each in pair]
         np.testing.assert_allclose(*errors, atol=1e-3 * NOISE.position_m)
 
 
@@ -348,11 +366,11 @@ def test_a_refit_that_does_not_converge_is_made_from_nothing(fanuc, monkeypatch)
     fitted, seen = loaded_in(fanuc, np.ones(24, bool))
 
     def stuck(*given, **options):
-        return replace(fitted, converged=False) if options else fit(*given)
+        return replace(fitted, converged=False) if options else fit_model(*given)
 
-    monkeypatch.setattr("elastocal.validation.held_out.fit", stuck)
-    (found,) = next(refits(fitted, seen, np.arange(24) // 6)).coefficients
-    (from_nothing,) = fit(
+    monkeypatch.setattr("elastocal.validation.held_out.fit_model", stuck)
+    (found,) = next(refit_without_folds(fitted, seen, np.arange(24) // 6)).coefficients
+    (from_nothing,) = fit_model(
         fitted.model, select_states(seen, np.arange(24) >= 6), NOISE
     ).estimate.coefficients
     np.testing.assert_array_equal(found, from_nothing)
@@ -371,9 +389,11 @@ def test_a_target_that_only_the_part_left_out_shows_is_placed_as_from_nothing(fa
     some = replace(
         some, rotation=None if seen.rotation is None else seen.rotation[kept]
     )
-    fitted = fit(fitted.model, some, NOISE, fitted.estimate)
-    refit = list(refits(fitted, some, part))[2]
-    from_nothing = fit(fitted.model, select_states(some, part != 2), NOISE).estimate
+    fitted = fit_model(fitted.model, some, NOISE, fitted.estimate)
+    refit = list(refit_without_folds(fitted, some, part))[2]
+    from_nothing = fit_model(
+        fitted.model, select_states(some, part != 2), NOISE
+    ).estimate
     np.testing.assert_array_equal(refit.target_offset[1], from_nothing.target_offset[1])
     assert (
         np.abs(refit.target_offset[1] - fitted.estimate.target_offset[1]).max() > 1e-3
@@ -387,14 +407,14 @@ def of_sessions(robot, poses=24, sessions=3):
     estimate = made_estimate(model, tuple(range(sessions)), seed=2)
     estimate = replace(estimate, coefficients=(robot.compliance,))
     seen = with_noise(seen_exactly(model, estimate, states), np.random.default_rng(3))
-    return fit(model, seen, NOISE), seen
+    return fit_model(model, seen, NOISE), seen
 
 
 def left_out_errors(fitted, seen, part):
     """Distance of each observation from its prediction by a refit without its part."""
     distances = [
-        position_errors(fitted.model, each, seen).distance
-        for each in refits(fitted, seen, part)
+        compute_position_errors(fitted.model, each, seen).distance
+        for each in refit_without_folds(fitted, seen, part)
     ]
     return np.choose(np.unique(part, return_inverse=True)[1][seen.state], distances)
 
@@ -409,13 +429,13 @@ def test_errors_are_those_of_a_fit_to_the_rest(fanuc):
         rest, left = (
             select_states(seen, mask) for mask in (part != number, part == number)
         )
-        refit = fit(fitted.model, rest, fitted.noise)
-        expected = position_errors(fitted.model, refit.estimate, left).distance
+        refit = fit_model(fitted.model, rest, fitted.noise)
+        expected = compute_position_errors(fitted.model, refit.estimate, left).distance
         mask = part[seen.state] == number
         # As near as fits end, of what the rest leaves unsure of the prediction, and
         # that is less than the noise.
         np.testing.assert_allclose(
-            found[mask], expected, atol=SETTLED * fitted.noise.position_m
+            found[mask], expected, atol=CONVERGENCE_TOLERANCE * fitted.noise.position_m
         )
 
 
@@ -426,13 +446,13 @@ def test_refits_to_some_observations_are_those_of_a_fit_to_them(fanuc):
     some = select_states(seen, seen.states.pose < 12)
     part = np.arange(12).repeat(2) // 4
     found = left_out_errors(fitted, some, part)
-    expected = left_out_errors(fit(fitted.model, some, fitted.noise), some, part)
+    expected = left_out_errors(fit_model(fitted.model, some, fitted.noise), some, part)
     np.testing.assert_allclose(found, expected, atol=1e-3 * fitted.noise.position_m)
 
 
 def test_a_session_left_out_is_placed_by_itself(fanuc):
     fitted, seen = of_sessions(fanuc)
     found = left_out_errors(fitted, seen, seen.states.session)
-    assert summary(found)["rms_m"] == pytest.approx(
+    assert summarize_errors(found)["rms_m"] == pytest.approx(
         np.sqrt(3) * NOISE.position_m, rel=0.25
     )

@@ -215,7 +215,7 @@ body = ast.parse((root / "workflow" / "scripts" / script).read_text()).body
 exec(compile(ast.Module([node for node in body if isinstance(node, (ast.Import, ast.ImportFrom))], []), script, "exec"), {})
 exec(f"import {step}" if step else "")
 # What is a catalogue looks up the modules beside it when it is asked.
-for name in [name for name, module in sys.modules.items() if "module_names" in vars(module)]:
+for name in [name for name, module in sys.modules.items() if "list_modules" in vars(module)]:
     if name != "elastocal.io.modules":
         package = sys.modules[name.rpartition(".")[0]]
         for each in sys.modules["elastocal.io.modules"].module_names(package):

@@ -10,7 +10,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from elastocal.campaigns.campaign import DOCUMENT, targets_from
+from elastocal.campaigns.campaign import DOCUMENT, parse_targets
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.measurements import CSV, write_measurements
 from elastocal.campaigns.reading import read_robot
@@ -23,7 +23,7 @@ LADDER = (0.0, 1.0, 0.5, -0.5, -1.0)
 def measure(folder: Path, robot_file: Path, seed: int) -> None:
     document = read_campaign_folder(folder, "config/robots").document
     robot = read_robot(robot_file)
-    targets = targets_from(
+    targets = parse_targets(
         document["targets"], robot.chain, (folder / DOCUMENT).as_posix()
     )
     plan = Plan(

@@ -30,7 +30,7 @@ rule audit_files:
         rows=config["audit"]["rows"],
         # The audit runs again after another target has finished; it does not start one.
         others=lambda wildcards: {
-            target: checksum(file) if Path(file).is_file() else ""
+            target: compute_sha256(file) if Path(file).is_file() else ""
             for target, file in AUDITED_TOO.items()
         },
     script:

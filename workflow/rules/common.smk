@@ -12,7 +12,7 @@ import elastocal
 from elastocal.campaigns.importers import campaign_sources, importer, named_league, user_campaign
 from elastocal.errors import InputError
 from elastocal.io.origin import SOURCES_DIGEST, Origin, configuration_sha256, environment
-from elastocal.io.records import checksum
+from elastocal.io.records import compute_sha256
 from elastocal.report.outcome import outcome
 from elastocal.study.configuration import check_study, count_components, override_entries
 

@@ -7,7 +7,7 @@ reports/league/{league}/.
 
 
 wildcard_constraints:
-    data="|".join(named_league(config)) or "none",
+    data="|".join(list_league_data(config)) or "none",
     split="random|blocks|session",
     method="|".join(LEAGUE["methods"]),
     league="|".join(LEAGUE["data"]),

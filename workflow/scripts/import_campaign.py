@@ -4,13 +4,13 @@ from pathlib import Path
 
 from job import Job, run
 
-from elastocal.campaigns.importers import fetch, importer
+from elastocal.campaigns.importers import fetch, find_importer
 
 
 def import_campaign(job: Job) -> None:
     settings = job.params.source
     name = job.wildcards.campaign
-    source = importer(
+    source = find_importer(
         settings["importer"], Path(job.input.sources).parent, f"campaign {name}"
     )
     paths = [

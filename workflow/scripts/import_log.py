@@ -7,7 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
-from elastocal.errors import InputError, fault_of_machine
+from elastocal.errors import InputError, describe_system_fault
 from elastocal.io.atomic_writes import write_text
 
 
@@ -26,7 +26,7 @@ def _log_and_say(
     if job is not None:
         text = "".join(traceback.format_exception(kind, error, trace))
         fault = (
-            fault_of_machine(error)
+            describe_system_fault(error)
             if isinstance(error, MemoryError | ImportError)
             else None
         )

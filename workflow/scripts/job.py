@@ -12,9 +12,9 @@ from typing import Any, Protocol
 
 from import_log import write_log
 
-from elastocal.errors import InputError, fault_of_machine
+from elastocal.errors import InputError, describe_system_fault
 from elastocal.io.origin import Origin, environment
-from elastocal.io.records import JobRecord, input_digests, write_records
+from elastocal.io.records import JobRecord, digest_inputs, write_records
 
 # With the Snakefile; the name of this file goes by the folder of the rules.
 TOP = Path(__file__).resolve().parents[2]
@@ -50,7 +50,7 @@ def run(
     try:
         with _under_way():
             started = _now()
-            digests, own = input_digests(
+            digests, own = digest_inputs(
                 snakemake.input, None if checked is None else set(map(str, checked))
             )
             step(snakemake)
@@ -60,7 +60,7 @@ def run(
         sys.exit(str(error))
     except (OSError, MemoryError) as error:
         # What pyarrow writes comes without a name.
-        line = f"{fault_of_machine(error, next(iter(snakemake.output), 'disk'))}; the same command goes on then"
+        line = f"{describe_system_fault(error, next(iter(snakemake.output), 'disk'))}; the same command goes on then"
         write_log(log, f"{traceback.format_exc()}{line}\n")
         sys.exit(line)
     except BaseException:

@@ -42,8 +42,12 @@ from elastocal.application.frames import (
     root_mean_square,
 )
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.model import conditions, displaced_coordinates, parameters
-from elastocal.fitting.noise import hidden_repeatability
+from elastocal.fitting.model import (
+    compute_displaced_coordinates,
+    evaluate_conditions,
+    list_parameters,
+)
+from elastocal.fitting.noise import estimate_joint_repeatability
 from elastocal.mechanics.kinematics import jacobians, pose_differences, poses
 from elastocal.remainder.corrected import is_commanded
 
@@ -323,7 +327,7 @@ def calibrate_on_case(
     states = case.observations.states
     freedom = 0.0
     if noise.source == "repeats" and not noise.joint_rad.any():
-        alike, freedom = hidden_repeatability(
+        alike, freedom = estimate_joint_repeatability(
             model, estimate, case.campaign.measurements
         )
         noise = replace(noise, joint_rad=np.full(robot.joints, alike))
@@ -507,8 +511,8 @@ def _find_left_out(
     chain = model.sites.chain
     ends = []
     for each in (values, replace(values, coefficients=commanded)):
-        coordinates = displaced_coordinates(
-            moved, each, conditions(moved, each, states)
+        coordinates = compute_displaced_coordinates(
+            moved, each, evaluate_conditions(moved, each, states)
         )
         ends.append(poses(chain, coordinates, chain.end_effector))
     keys = {
@@ -517,11 +521,14 @@ def _find_left_out(
         if not moves
     }
     ours, theirs = (
-        np.array([owner in keys for owner, _ in parameters(*each)])
+        np.array([owner in keys for owner, _ in list_parameters(*each)])
         for each in ((moved, values), (model, estimate))
     )
     line = linearize(
-        moved, values, observations_of(states), conditions(moved, values, states)
+        moved,
+        values,
+        observations_of(states),
+        evaluate_conditions(moved, values, states),
     )
     spread = line.sensitivities[..., ours] @ square_root(
         covariance[np.ix_(theirs, theirs)]

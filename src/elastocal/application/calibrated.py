@@ -28,11 +28,15 @@ from elastocal.application.frames import (
 )
 from elastocal.campaigns.campaign import Target
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.model import conditions, displaced_coordinates, parameters
+from elastocal.fitting.model import (
+    compute_displaced_coordinates,
+    evaluate_conditions,
+    list_parameters,
+)
 from elastocal.fitting.observations import Observations, States, select_states
 from elastocal.mechanics.kinematics import pose_differences, poses
 from elastocal.remainder.corrected import beyond_regressed, inputs_of, is_commanded
-from elastocal.validation.placing import beyond_campaign, beyond_loads
+from elastocal.validation.transfer import find_beyond_campaign, find_larger_loads
 
 if TYPE_CHECKING:
     from elastocal.fitting.least_squares import Fit
@@ -111,7 +115,9 @@ def calibrate_by_model(
         number for number, effect in enumerate(model.effects) if is_commanded(effect)
     ]
     keys = {model.effects[number].key for number in kept}
-    rows = np.flatnonzero([owner in keys for owner, _ in parameters(model, estimate)])
+    rows = np.flatnonzero(
+        [owner in keys for owner, _ in list_parameters(model, estimate)]
+    )
     bare, values = move_to_end_effector(model, estimate)
     bare = replace(bare, effects=tuple(model.effects[number] for number in kept))
     values = replace(
@@ -250,11 +256,13 @@ def come_to_rest(
 
     `near` (N, C): coordinates at which the loads are taken, of states that differ
     little. Without, loads act where the robot has yielded to them, by the fixed-point
-    iteration of `model.conditions`.
+    iteration of `model.evaluate_conditions`.
     """
     fitted = (calibrated.model, calibrated.estimate)
     states = states_of(calibrated, reported_angles, wrench)
-    coordinates = displaced_coordinates(*fitted, conditions(*fitted, states, near))
+    coordinates = compute_displaced_coordinates(
+        *fitted, evaluate_conditions(*fitted, states, near)
+    )
     chain = calibrated.model.sites.chain
     return coordinates, *poses(chain, coordinates, chain.end_effector)
 
@@ -282,7 +290,7 @@ def compute_pose_sensitivities(
             states_of(calibrated, reported_angles[part], wrench[part])
         )
         found[part] = linearize(
-            model, estimate, seen, conditions(model, estimate, seen.states)
+            model, estimate, seen, evaluate_conditions(model, estimate, seen.states)
         ).sensitivities
     return found
 
@@ -295,10 +303,10 @@ def beyond_fitted(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Which commands (N, n) stand beyond the joint angles that were fitted, and which
     are loaded so many times more: (N,)."""
-    joints = beyond_campaign(
+    joints = find_beyond_campaign(
         calibrated.states, calibrated.robot.model_angles(reported_angles), None
     )
-    return joints, beyond_loads(calibrated.states, wrench, times)
+    return joints, find_larger_loads(calibrated.states, wrench, times)
 
 
 def states_of(

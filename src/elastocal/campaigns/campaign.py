@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from elastocal.errors import InputError, closest_first
+from elastocal.errors import InputError, suggest_names
 from elastocal.mechanics.chain import Chain
 from elastocal.mechanics.components import COMPONENT_NAMES, WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
@@ -20,7 +20,7 @@ DEFAULT_HOLDOUT = {"fraction": 0.3, "seed": 1}
 NO_REMAINDER = "none"
 BEST_REMAINDER = "auto"
 UNKNOWN = "unknown"
-NOT_TURNED = (0.0, 0.0, 0.0)
+NO_ROTATION = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Target:
     def __post_init__(self) -> None:
         if self.rotation == ():
             object.__setattr__(
-                self, "rotation", None if self.offset_m is None else NOT_TURNED
+                self, "rotation", None if self.offset_m is None else NO_ROTATION
             )
 
 
@@ -142,7 +142,7 @@ def assemble_campaign(
         else robot,
         measured=document["measured"],
         frame=document["frame"],
-        targets=targets_from(document["targets"], robot.chain, source),
+        targets=parse_targets(document["targets"], robot.chain, source),
         compliance=compliance,
         declared=tuple(document.get("declared", ())),
         noise=document.get("noise"),
@@ -154,7 +154,7 @@ def assemble_campaign(
     )
 
 
-def targets_from(
+def parse_targets(
     described: Mapping[str, Any], chain: Chain, source: str
 ) -> tuple[Target, ...]:
     """``targets`` of ``campaign.yaml``, which `source`, named in errors, describes; an
@@ -171,7 +171,7 @@ def targets_from(
                 allowed,
             )
         if target["point"] not in points:
-            allowed = f"a measuring point of the chain: {closest_first(target['point'], points)}"
+            allowed = f"a measuring point of the chain: {suggest_names(target['point'], points)}"
             raise InputError(
                 source, f"targets.{name}.point", repr(target["point"]), allowed
             )
@@ -207,7 +207,7 @@ def _columns_by_part(joints: int) -> dict[str, Sequence[str]]:
     return parts | {name: (name,) for name in ("time_s", "temperature_c", "u95_m")}
 
 
-def columns_of(
+def tabulate_measurements(
     measurements: Measurements, parts: Collection[str] = ()
 ) -> dict[str, np.ndarray]:
     """Columns of the measurements table, dict of str to ndarray (N,); of some parts
@@ -226,7 +226,7 @@ def columns_of(
     return columns
 
 
-def measurements_from(columns: Mapping[str, np.ndarray]) -> Measurements:
+def build_measurements(columns: Mapping[str, np.ndarray]) -> Measurements:
     """Measurements from the columns of their table, dict of str to ndarray (N,)."""
     found: dict[str, Any] = {}
     for part, names in _columns_by_part(
@@ -243,7 +243,7 @@ def measurements_from(columns: Mapping[str, np.ndarray]) -> Measurements:
     return Measurements(**found)
 
 
-def residual_columns(
+def tabulate_residuals(
     measurements: Measurements,
     held_out: bool,
     gross_errors: bool,
@@ -258,13 +258,13 @@ def residual_columns(
     declared model, and "after", of the found one, m and rad. Returns (N,).
     """
     count = len(measurements)
-    columns = columns_of(measurements, _IDENTITY)
+    columns = tabulate_measurements(measurements, _IDENTITY)
     columns |= {
         "held_out": np.full(count, held_out),
         "gross_error": np.full(count, gross_errors),
         "outside_range": outside,
     }
-    columns |= columns_of(measurements, ("time_s",)) | columns_of(
+    columns |= tabulate_measurements(measurements, ("time_s",)) | tabulate_measurements(
         measurements, ("joint_angles", "wrench")
     )
     columns |= dict(zip("xyz", position.T, strict=True))
@@ -277,7 +277,7 @@ def residual_columns(
     return columns
 
 
-def groups_of(keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def group_equal_rows(keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Group equal rows: `numpy.unique` along the first axis, many times as fast.
 
     `keys` (N, k). Returns `first` (G,) of int: first row of each group; groups in
@@ -294,7 +294,7 @@ def groups_of(keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return order[new], group
 
 
-def means_of(values: np.ndarray, group: np.ndarray) -> np.ndarray:
+def average_by_group(values: np.ndarray, group: np.ndarray) -> np.ndarray:
     """Mean of the values (N, ...) of each group (N,), 0 .. G-1, ndarray (G, ...)."""
     columns = values.reshape(len(values), math.prod(values.shape[1:])).T
     total = np.column_stack([np.bincount(group, column) for column in columns])

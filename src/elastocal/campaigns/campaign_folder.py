@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, DOCUMENT
-from elastocal.campaigns.measurements import CSV, PARQUET, files_there, is_file_in
-from elastocal.errors import InputError, closest_first
+from elastocal.campaigns.measurements import CSV, PARQUET, find_files, is_file_in
+from elastocal.errors import InputError, suggest_names
 from elastocal.io.documents import check_document, read_document
-from elastocal.io.records import checksum
+from elastocal.io.records import compute_sha256
 from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.robot_file import robot_from_document
 
@@ -107,13 +107,13 @@ class CampaignFolder:
         return [file.as_posix() for file in files]
 
     def _own_files(self) -> list[Path]:
-        measurements = files_there(self.path, CSV, PARQUET)
+        measurements = find_files(self.path, CSV, PARQUET)
         return [self.path / DOCUMENT, *measurements, self.robot_file]
 
     @cached_property
     def digests(self) -> dict[str, str]:
         """SHA-256 of each of the `files`, by its path."""
-        return {file: checksum(file) for file in self.files()}
+        return {file: compute_sha256(file) for file in self.files()}
 
 
 def read_campaign_folder(path: str | Path, robots_folder: str | Path) -> CampaignFolder:
@@ -133,7 +133,7 @@ def read_campaign_folder(path: str | Path, robots_folder: str | Path) -> Campaig
     path = Path(path)
     robots_folder = Path(robots_folder)
     source = (path / DOCUMENT).as_posix()
-    files_there(path, DOCUMENT)
+    find_files(path, DOCUMENT)
     document = read_document(source)
     check_document(document, "campaign", source)
     robot = document["robot"]
@@ -143,7 +143,7 @@ def read_campaign_folder(path: str | Path, robots_folder: str | Path) -> Campaig
     else:
         robot_file = path / robot
     if not is_file_in(robot_file, path, robots_folder):
-        listed = f"{robots_folder.as_posix()}: {closest_first(robot, named_robots)}"
+        listed = f"{robots_folder.as_posix()}: {suggest_names(robot, named_robots)}"
         allowed = (
             "a file in this folder, named relative to this folder, "
             f"or a robot of {listed}"

@@ -11,10 +11,10 @@ import numpy as np
 from elastocal.campaigns.campaign import (
     Campaign,
     Measurements,
-    groups_of,
-    means_of,
+    average_by_group,
+    group_equal_rows,
 )
-from elastocal.counting import counted
+from elastocal.counting import format_count
 from elastocal.errors import InputError
 
 # Below these a fit or a test says nothing.
@@ -23,14 +23,14 @@ FEWEST_HELD_OUT_POSES = 2
 _NOWHERE_RAD = 1e9
 
 
-def split(campaign: Campaign) -> tuple[Measurements, Measurements]:
+def split_poses(campaign: Campaign) -> tuple[Measurements, Measurements]:
     """Measurements to fit and measurements to test, parted by whole poses.
 
     Returns `training`, `held_out`: in the order of the file, on which the choice of
     poses does not depend. Where another campaign is the test, see
     `reading.read_held_out_campaign`, all measurements are training.
     """
-    held_out = held_out_mask(
+    held_out = select_held_out(
         campaign.holdout,
         campaign.measurements,
         campaign.robot.reported_offset,
@@ -41,7 +41,7 @@ def split(campaign: Campaign) -> tuple[Measurements, Measurements]:
     )
 
 
-def held_out_mask(
+def select_held_out(
     holdout: Mapping[str, Any],
     measurements: Measurements,
     reported_zero: np.ndarray,
@@ -55,7 +55,7 @@ def held_out_mask(
     `InputError`, which names ``source``: too few configurations, or poses that are not
     there.
     """
-    pairs, index = measured_poses(measurements)
+    pairs, index = list_poses(measurements)
     measured = (measurements.joint_angles != reported_zero).any(
         axis=1
     ) | measurements.position.any(axis=1)
@@ -65,7 +65,7 @@ def held_out_mask(
         # counted it would part all poses anew.
         mask = np.ones(len(measurements), bool)
         known = ~nothing[index]
-        mask[known] = held_out_mask(
+        mask[known] = select_held_out(
             holdout, measurements.select(known), reported_zero, source
         )
         return mask
@@ -73,7 +73,7 @@ def held_out_mask(
     angles = np.where(
         nothing[index, None], _NOWHERE_RAD + index[:, None], measurements.joint_angles
     )
-    configuration = configurations(angles, index)
+    configuration = number_configurations(angles, index)
     chosen = np.zeros(len(pairs), bool)
     count = configuration.max() + 1
     for entry in holdout.get("poses", ()):
@@ -100,7 +100,7 @@ def held_out_mask(
     )
     fewest = 0 if "campaign" in holdout else FEWEST_HELD_OUT_POSES
     if fitted < FEWEST_TRAINING_POSES or tested < fewest:
-        found = f"{counted(fitted, 'configuration')} to fit and {tested} held out"
+        found = f"{format_count(fitted, 'configuration')} to fit and {tested} held out"
         least = f"at least {FEWEST_TRAINING_POSES} to fit" + (
             f" and {fewest} held out" if fewest else ""
         )
@@ -113,11 +113,11 @@ def held_out_mask(
     return chosen[index]
 
 
-def measured_poses(measurements: Measurements) -> tuple[np.ndarray, np.ndarray]:
+def list_poses(measurements: Measurements) -> tuple[np.ndarray, np.ndarray]:
     """Session and pose of those that were measured, each once and sorted (P, 2); of
     each measurement its index there (N,)."""
     pairs = np.column_stack([measurements.session, measurements.pose])
-    first, index = groups_of(pairs)
+    first, index = group_equal_rows(pairs)
     return pairs[first], index
 
 
@@ -129,7 +129,7 @@ _ROUNDS = 100
 _LEVEL = 0.05
 
 
-def configurations(joint_angles: np.ndarray, pose: np.ndarray) -> np.ndarray:
+def number_configurations(joint_angles: np.ndarray, pose: np.ndarray) -> np.ndarray:
     """The configuration of each pose, ndarray of int (P,), from angles (N, n) and pose,
     0 .. P-1, of measurements or states.
 
@@ -138,10 +138,10 @@ def configurations(joint_angles: np.ndarray, pose: np.ndarray) -> np.ndarray:
     (Hartigan, Clustering Algorithms, 1975). Poses along a path, each near the next, are
     several configurations.
     """
-    return number_alike(means_of(joint_angles, pose), SAME_POSE_RAD)
+    return number_close_points(average_by_group(joint_angles, pose), SAME_POSE_RAD)
 
 
-def number_alike(points: np.ndarray, within: float) -> np.ndarray:
+def number_close_points(points: np.ndarray, within: float) -> np.ndarray:
     """Number of each row (N, n), 0 for the first: one for rows that agree to `within`
     with the row that began it."""
     # Its import takes a tenth of each start of Snakemake, whose rules read
@@ -150,7 +150,7 @@ def number_alike(points: np.ndarray, within: float) -> np.ndarray:
 
     # Equal rows lead or follow together: a tree of a hundred thousand equal points
     # takes minutes.
-    first, same = groups_of(points)
+    first, same = group_equal_rows(points)
     order = np.argsort(first)
     different = points[first[order]]
     tree = cKDTree(different)
@@ -169,7 +169,7 @@ def number_alike(points: np.ndarray, within: float) -> np.ndarray:
     ]
 
 
-def blocks_of_poses(
+def partition_poses(
     joint_angles: np.ndarray, pose: np.ndarray, count: int
 ) -> np.ndarray:
     """Poses parted into blocks of neighbours, which have numbers of configurations that
@@ -180,15 +180,15 @@ def blocks_of_poses(
     No draw decides, and no block is too small to be held out. Joints count alike, by
     the cosine and sine of their angles over their spread.
 
-    `joint_angles`, `pose`: as of `configurations`. `count`: of blocks, at most one for
+    `joint_angles`, `pose`: as of `number_configurations`. `count`: of blocks, at most one for
     each configuration. Returns (P,) of int: 0 .. count-1.
 
     [1] Steinbach, M., Karypis, G. and Kumar, V., A comparison of document clustering techniques, KDD Workshop on Text Mining,
         2000.
     [2] Boley, D., Principal direction divisive partitioning, Data Mining and Knowledge Discovery 2, 1998.
     """
-    configuration = configurations(joint_angles, pose)
-    angles = means_of(means_of(joint_angles, pose), configuration)
+    configuration = number_configurations(joint_angles, pose)
+    angles = average_by_group(average_by_group(joint_angles, pose), configuration)
     circle = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     circle = circle - circle.mean(axis=0)
     spread = np.sqrt((circle**2).mean(axis=0).sum(axis=-1))
@@ -224,7 +224,9 @@ def blocks_of_poses(
     return found[configuration]
 
 
-def beyond_range(fitted_angles: np.ndarray, joint_angles: np.ndarray) -> np.ndarray:
+def find_poses_beyond_range(
+    fitted_angles: np.ndarray, joint_angles: np.ndarray
+) -> np.ndarray:
     """Poses at which a joint stands farther beyond those of other poses than chance
     explains.
 

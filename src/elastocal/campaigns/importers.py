@@ -22,17 +22,18 @@ import numpy as np
 import scipy
 
 from elastocal.campaigns.campaign_folder import CampaignFolder, read_campaign_folder
-from elastocal.campaigns.holdout import number_alike
+from elastocal.campaigns.holdout import number_close_points
 from elastocal.campaigns.reading import read_robot
 from elastocal.campaigns.writing import write_campaign
 from elastocal.errors import InputError
 from elastocal.io.documents import (
     check_document,
     document_path,
-    named_document,
     read_document,
+    read_named_document,
 )
 from elastocal.io.json_files import read_json
+from elastocal.io.plugins import IMPORTERS, load_plugins
 
 # Names a folder that already has the files, for machines without a network.
 FOLDER_VARIABLE = "ELASTOCAL_DATA"
@@ -258,7 +259,7 @@ class Importer:
             angles, positions, others = part.read(path)
             joints = angles.shape[1]
             # Poses are numbered as they first come.
-            pose = number_alike(angles, part.same_pose_rad)
+            pose = number_close_points(angles, part.same_pose_rad)
             repeat = pd.Series(pose).groupby(pose).cumcount().to_numpy()
             if self.parts:
                 angles = read_robot(
@@ -313,7 +314,7 @@ class Importer:
 
 @cache
 def read_importers(path: Path) -> dict[str, Importer]:
-    """Importers of ``public_data.yaml`` by the names that ``importer`` of a campaign
+    """Importers of ``public_data.yaml`` by the names that ``find_importer`` of a campaign
     may have."""
     document = read_document(path)
     check_document(document, "public_data", path.as_posix())
@@ -338,16 +339,22 @@ def read_importers(path: Path) -> dict[str, Importer]:
     return found
 
 
-def importer(name: str, config: str | Path, source: str | Path) -> Importer:
-    """An importer of the folder ``config``; an InputError that names `source`, the file
-    that names it, refuses another name."""
-    known = read_importers(Path(config) / "public_data.yaml")
-    if name not in known:
-        raise InputError(source, "importer", repr(name), ", ".join(known))
-    return known[name]
+def find_importer(name: str, config: str | Path, source: str | Path) -> Importer:
+    """An importer of the folder ``config``, or one that an installed package offers.
+
+    Raises `InputError`, which names `source`, the file that asks for the importer:
+    there is no importer of this name.
+    """
+    importers = read_importers(Path(config) / "public_data.yaml")
+    if name not in importers:
+        # Look for plug-ins only now: each start of Snakemake asks for importers.
+        importers = importers | load_plugins(IMPORTERS, Importer, importers)
+    if name not in importers:
+        raise InputError(source, "importer", repr(name), ", ".join(importers))
+    return importers[name]
 
 
-def campaign_sources(
+def read_campaign_sources(
     config: Mapping[str, Any], folder: str | Path, source: str = "config.yaml"
 ) -> dict[str, dict[str, Any]]:
     """Documents of the campaigns that a configuration names, by the names of their
@@ -357,21 +364,25 @@ def campaign_sources(
     file of the configuration.
     """
     found = {}
-    for name in named_campaigns(config):
-        document = named_document(folder, "campaigns", "campaign_source", name, source)
+    for name in list_campaigns(config):
+        document = read_named_document(
+            folder, "campaigns", "campaign_source", name, source
+        )
         path = document_path(folder, "campaigns", name)
         if document["source"] == "public":
-            importer(document["importer"], folder, path)
+            find_importer(document["importer"], folder, path)
         else:
-            document["robot_document"] = named_document(
+            document["robot_document"] = read_named_document(
                 folder, "robots", "robot", document["robot"], path
             )
-            named_document(folder, "robots", "robot", document["declared_robot"], path)
+            read_named_document(
+                folder, "robots", "robot", document["declared_robot"], path
+            )
         found[name] = document
     return found
 
 
-def named_campaigns(config: Mapping[str, Any]) -> list[str]:
+def list_campaigns(config: Mapping[str, Any]) -> list[str]:
     """Campaigns that a configuration names, each once: simulated, measured, of the
     default run and of the league."""
     looped = (
@@ -379,10 +390,10 @@ def named_campaigns(config: Mapping[str, Any]) -> list[str]:
         for key in ("campaigns", "measured", "main")
         for name in config["loop"][key]
     )
-    return list(dict.fromkeys((*looped, *named_league(config))))
+    return list(dict.fromkeys((*looped, *list_league_data(config))))
 
 
-def named_league(config: Mapping[str, Any]) -> list[str]:
+def list_league_data(config: Mapping[str, Any]) -> list[str]:
     """Data sets of all leagues, each once."""
     return list(
         dict.fromkeys(
@@ -394,7 +405,7 @@ def named_league(config: Mapping[str, Any]) -> list[str]:
     )
 
 
-def user_campaign(
+def find_user_campaign(
     config: Mapping[str, Any], robots_folder: str | Path, results: str | Path
 ) -> dict[str, CampaignFolder]:
     """Return the user's own campaign by its name; empty if the configuration has none.
@@ -426,7 +437,7 @@ def user_campaign(
             allowed = "a path without braces, which Snakemake takes for wildcards"
             raise InputError(file, "", "braces", allowed)
     name = folder.name
-    if name in named_campaigns(config):
+    if name in list_campaigns(config):
         allowed = "a name that no campaign of config.yaml has"
         raise InputError(folder.source, "campaign", repr(name), allowed)
     earlier_path = _folder_of_results(Path(results, name))

@@ -14,12 +14,12 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from elastocal.campaigns.tables import A_HEADER_ALONE, Cells, read_text_table
-from elastocal.counting import counted
-from elastocal.errors import InputError, closest_first
+from elastocal.campaigns.tables import HEADER_WITHOUT_ROWS, Cells, read_text_table
+from elastocal.counting import format_count
+from elastocal.errors import InputError, suggest_names
 from elastocal.io.atomic_writes import atomic_write
 from elastocal.io.storage import Column
-from elastocal.io.texts import kind_of
+from elastocal.io.texts import describe_file_kind
 from elastocal.mechanics.components import WRENCH, WRENCH_NAMES
 
 # A diagnosis of a million measurements takes 2 GB (benchmarks); a tracker's stream is
@@ -36,16 +36,16 @@ ROTATION = ("rx", "ry", "rz")
 # Columns of a sheet for people: a place to tick, which is not read, and joint angles as
 # controllers show them, q1_deg or q1_mm, with the SI value of one unit. They must agree
 # with q1 .. qn to what is shown.
-TICK = "done"
-SHOWN = {"deg": math.radians(1.0), "mm": 1e-3}
-SHOWN_TO = 2e-3
+TICK_COLUMN = "done"
+DISPLAY_UNITS = {"deg": math.radians(1.0), "mm": 1e-3}
+DISPLAY_TOLERANCE = 2e-3
 
 # A turn and a half, of a rotation vector; nor does a joint of a serial arm report more,
 # unless its limits say so.
-FARTHEST_RAD = 3.0 * np.pi
+LARGEST_ROTATION_RAD = 3.0 * np.pi
 
 
-def file_columns(joints: int) -> dict[str, Column]:
+def describe_columns(joints: int) -> dict[str, Column]:
     """Every column that a file of measurements may have."""
     numbers = range(1, joints + 1)
     columns = [
@@ -128,7 +128,7 @@ def is_file_in(path: str | Path, *folders: str | Path) -> bool:
     )
 
 
-def files_there(folder: str | Path, *names: str) -> list[Path]:
+def find_files(folder: str | Path, *names: str) -> list[Path]:
     """Files of these names in a folder; a link out of it, a pipe and the like are
     refused."""
     there = [path for name in names if os.path.lexists(path := Path(folder) / name)]
@@ -137,7 +137,7 @@ def files_there(folder: str | Path, *names: str) -> list[Path]:
             raise InputError(
                 path,
                 "",
-                f"{kind_of(os.lstat(path).st_mode)} that leads to no file",
+                f"{describe_file_kind(os.lstat(path).st_mode)} that leads to no file",
                 "the file itself",
             )
         if not is_file_in(path, folder):
@@ -155,12 +155,12 @@ def read_measurements(folder: Path, joints: int, measured: str) -> Cells:
     missing, unknown or there twice, a row of another length, more than
     `MOST_MEASUREMENTS` rows, or angles that are others than those shown beside.
     """
-    there = files_there(folder, CSV, PARQUET)
+    there = find_files(folder, CSV, PARQUET)
     if len(there) != 1:
         found = f"both {CSV} and {PARQUET}" if there else f"neither {CSV} nor {PARQUET}"
         raise InputError(folder.as_posix(), "", found, "one of them")
     table = _read(there[0], joints)
-    known = file_columns(joints)
+    known = describe_columns(joints)
     if len(table.rows) == 0:
         raise InputError(
             there[0], "", "no row of data", "one row for each measurement of one target"
@@ -193,11 +193,13 @@ def read_measurements(folder: Path, joints: int, measured: str) -> Cells:
             f"no column {missing!r}",
             f"{missing}: {known[missing].meaning}{unit}",
         )
-    for name, unit in itertools.product(angles, SHOWN):
+    for name, unit in itertools.product(angles, DISPLAY_UNITS):
         if (beside := f"{name}_{unit}") in table.columns:
             wrong = (
-                np.abs(table.numbers(name) / SHOWN[unit] - table.numbers(beside))
-                > SHOWN_TO
+                np.abs(
+                    table.numbers(name) / DISPLAY_UNITS[unit] - table.numbers(beside)
+                )
+                > DISPLAY_TOLERANCE
             )
             table.refuse(
                 wrong,
@@ -207,7 +209,7 @@ def read_measurements(folder: Path, joints: int, measured: str) -> Cells:
     return table
 
 
-def described_by(folder: Path) -> tuple[list[str], str]:
+def read_measured_targets(folder: Path) -> tuple[list[str], str]:
     """Targets that the measurements of a folder are of, in their order, and whether
     each is a "position" or a "pose".
 
@@ -216,11 +218,11 @@ def described_by(folder: Path) -> tuple[list[str], str]:
     """
     try:
         table = next(
-            (_read(path, MOST_JOINTS) for path in files_there(folder, CSV, PARQUET)),
+            (_read(path, MOST_JOINTS) for path in find_files(folder, CSV, PARQUET)),
             None,
         )
     except InputError as error:
-        if error.found != A_HEADER_ALONE:
+        if error.found != HEADER_WITHOUT_ROWS:
             raise
         table = None
     if table is None:
@@ -236,11 +238,11 @@ def described_by(folder: Path) -> tuple[list[str], str]:
 def check_column_names(names: Collection[str], joints: int, path: str) -> None:
     """Refuse the first column that is there twice, or that neither the format nor a
     sheet has; `path` is named in errors."""
-    known = file_columns(joints)
+    known = describe_columns(joints)
     allowed = {
         *known,
-        TICK,
-        *(f"q{j}_{unit}" for j in range(1, joints + 1) for unit in SHOWN),
+        TICK_COLUMN,
+        *(f"q{j}_{unit}" for j in range(1, joints + 1) for unit in DISPLAY_UNITS),
     }
     if twice := next(
         (name for place, name in enumerate(names) if name in [*names][:place]), None
@@ -259,7 +261,7 @@ def check_column_names(names: Collection[str], joints: int, path: str) -> None:
             path,
             "header",
             f"the unknown column {name!r}",
-            closest_first(name, missing) + of,
+            suggest_names(name, missing) + of,
         )
 
 
@@ -269,9 +271,11 @@ def write_measurements(
     """Write the measurements of a campaign.
 
     `path`: holds CSV where its name is `CSV`, else Parquet. `table`: columns of one
-    length, named as in `file_columns`.
+    length, named as in `describe_columns`.
     """
-    columns = [column for name, column in file_columns(joints).items() if name in table]
+    columns = [
+        column for name, column in describe_columns(joints).items() if name in table
+    ]
     cells = [np.asarray(table[column.name]).tolist() for column in columns]
     with atomic_write(path) as partial:
         if Path(path).name == CSV:
@@ -320,10 +324,10 @@ def _read_csv(path: str, joints: int) -> Cells:
 
 def _read_parquet(path: str, joints: int) -> Cells:
     texts = {
-        TICK,
+        TICK_COLUMN,
         *(
             name
-            for name, column in file_columns(joints).items()
+            for name, column in describe_columns(joints).items()
             if column.type == "string"
         ),
     }
@@ -331,7 +335,7 @@ def _read_parquet(path: str, joints: int) -> Cells:
         raise InputError(
             path,
             "",
-            counted(size, "byte"),
+            format_count(size, "byte"),
             f"at most {_MOST_BYTES}, which hold {MOST_MEASUREMENTS} measurements",
         )
     try:

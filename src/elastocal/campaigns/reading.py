@@ -18,24 +18,24 @@ from elastocal.campaigns.campaign import (
     Measurements,
     Target,
     assemble_campaign,
-    groups_of,
-    targets_from,
+    group_equal_rows,
+    parse_targets,
 )
 from elastocal.campaigns.campaign_folder import CampaignFolder, read_robot_document
 from elastocal.campaigns.holdout import (
     FEWEST_HELD_OUT_POSES,
     SAME_POSE_RAD,
-    held_out_mask,
-    measured_poses,
+    list_poses,
+    select_held_out,
 )
 from elastocal.campaigns.measurements import (
-    FARTHEST_RAD,
+    LARGEST_ROTATION_RAD,
     ROTATION,
     read_measurements,
 )
 from elastocal.campaigns.tables import Cells
-from elastocal.counting import counted
-from elastocal.errors import InputError, closest_first
+from elastocal.counting import format_count
+from elastocal.errors import InputError, suggest_names
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.robot_file import robot_from_document
@@ -60,7 +60,7 @@ def read_campaign(
     document = folder.document
     robot = folder.robot
     source = folder.source
-    targets = targets_from(document["targets"], robot.chain, source)
+    targets = parse_targets(document["targets"], robot.chain, source)
     # Refuse a folder that cannot validate this campaign before reading measurements.
     _ = folder.held_out_path
     for index, name in enumerate(document.get("declared", ())):
@@ -69,13 +69,13 @@ def read_campaign(
                 source,
                 f"declared[{index}]",
                 repr(name),
-                closest_first(name, sorted(effects)),
+                suggest_names(name, sorted(effects)),
             )
     table = read_measurements(folder.path, robot.joints, document["measured"])
     measurements = _measurements(table, robot, targets, document["measured"])
     _check_measurements(measurements, table, robot, targets, source)
     _check_stated(document, measurements, robot, folder.robot_file.name, source)
-    held_out_mask(folder.holdout, measurements, robot.reported_offset, source)
+    select_held_out(folder.holdout, measurements, robot.reported_offset, source)
     place = {"table": Path(table.path).name, "header_line": table.header_line}
     return assemble_campaign(document | place, robot, measurements, source)
 
@@ -102,9 +102,9 @@ def read_held_out_campaign(
         allowed = f"a campaign of the same chain, {folder.robot.name}"
         found = f"another chain, of {held_out.robot.name}"
         raise InputError(folder.source, key, found, allowed)
-    poses = len(measured_poses(held_out.measurements)[0])
+    poses = len(list_poses(held_out.measurements)[0])
     if poses < FEWEST_HELD_OUT_POSES:
-        found = f"{counted(poses, 'pose')} there"
+        found = f"{format_count(poses, 'pose')} there"
         allowed = f"{FEWEST_HELD_OUT_POSES} or more"
         raise InputError(folder.source, key, found, allowed)
     return held_out
@@ -149,7 +149,7 @@ def _check_stated(
         raise InputError(
             source,
             "noise.joint_rad",
-            counted(len(each), "number"),
+            format_count(len(each), "number"),
             f"one for all joints, or {robot.joints}",
         )
 
@@ -173,7 +173,7 @@ def _measurements(
         raise table.fault(
             unknown,
             "target",
-            f"a target of {DOCUMENT}: {closest_first(labels[unknown], list(names))}",
+            f"a target of {DOCUMENT}: {suggest_names(labels[unknown], list(names))}",
         )
     approach = None
     if "approach1" in table.columns:
@@ -234,7 +234,9 @@ def find_degrees(reported: np.ndarray, robot: Robot) -> np.ndarray:
         angles = robot.model_angles(reported)
         return np.asarray(np.maximum(low - angles, angles - high))
 
-    found = np.abs(reported) > max(FARTHEST_RAD, np.abs(robot.joint_limits).max())
+    found = np.abs(reported) > max(
+        LARGEST_ROTATION_RAD, np.abs(robot.joint_limits).max()
+    )
     some = (off(reported) > _BEYOND_LIMITS_RAD).any(axis=1)
     # An angle that its opposite would bring inside the limits has rather a wrong sign,
     # which is for the diagnosis to trace.
@@ -254,7 +256,7 @@ def _check_measurements(
     format, by their places there."""
     names = ("session", "pose", "load", "repeat", "target")
     key = np.column_stack([getattr(measurements, name) for name in names])
-    first, group = groups_of(key)
+    first, group = group_equal_rows(key)
     again = first[group] != np.arange(len(measurements))
     if again.any():
         index = int(np.argmax(again))
@@ -279,7 +281,7 @@ def _check_measurements(
         WRENCH_NAMES,
         "0 where load is 0",
     )
-    pose_of = measured_poses(measurements)[1]
+    pose_of = list_poses(measurements)[1]
     angles = [f"q{j}" for j in range(1, robot.joints + 1)]
     reported = table.matrix(angles)
     first = np.unique(pose_of, return_index=True)[1]
@@ -317,9 +319,11 @@ def _check_measurements(
             table.refuse(away == np.nanmax(away), "xyz", allowed)
     if measurements.rotation_vector is not None:
         angle = np.linalg.norm(measurements.rotation_vector, axis=1)
-        allowed = f"a rotation vector in rad, not degrees, {FARTHEST_RAD:.3g} at most"
+        allowed = (
+            f"a rotation vector in rad, not degrees, {LARGEST_ROTATION_RAD:.3g} at most"
+        )
         table.refuse(
-            angle == max(angle.max(), FARTHEST_RAD),
+            angle == max(angle.max(), LARGEST_ROTATION_RAD),
             ["rx, ry, rz"],
             allowed,
             f"a turn of {angle.max():.4g}",

@@ -15,7 +15,7 @@ from elastocal.mechanics.elastostatics import (
 )
 from elastocal.mechanics.kinematics import poses_and_jacobians, poses_of_points
 from elastocal.mechanics.robot import Robot
-from elastocal.random_streams import stream
+from elastocal.random_streams import open_stream
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def draw_measurements(
     `name`: of the campaign; part of the name of the random stream. Returns columns of a
     file of measurements.
     """
-    draws = stream(seed, name, "campaign", 0)
+    draws = open_stream(seed, name, "campaign", 0)
     low, high = robot.joint_limits.T
     angles = low + (high - low) * draws.random((plan.poses, robot.joints))
     direction = draws.standard_normal((plan.poses, 3))

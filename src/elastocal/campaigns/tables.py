@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from elastocal.counting import counted
-from elastocal.errors import InputError, closest_first, steering
+from elastocal.counting import format_count
+from elastocal.errors import InputError, find_control_character, suggest_names
 from elastocal.io.texts import (
-    A_NUMBER,
     LARGEST_NUMBER,
-    decoded,
-    plain_number,
+    NUMBER_ALLOWED,
+    decode_text,
+    parse_number,
     read_bytes,
 )
 
@@ -44,7 +44,7 @@ _DECIMAL = {
 _SURE = re.compile(
     rf"(?![+-]?[1-9]\d{{0,2}},\d{{3}}$){_DECIMAL['comma'].pattern}", re.ASCII
 )
-A_HEADER_ALONE = "a header alone"
+HEADER_WITHOUT_ROWS = "a header alone"
 # The whole of it is in memory, as text and as cells: some 2 GB at most.
 LARGEST_BYTES = 100_000_000
 MOST_LINES = 500_000
@@ -158,12 +158,12 @@ class Cells:
             values = self.columns[name].cast(pa.float64()).to_numpy()
         except pa.ArrowInvalid:
             # A cell is none, or written as a spreadsheet does.
-            found = [plain_number(str(cell)) for cell in self.columns[name].to_pylist()]
+            found = [parse_number(str(cell)) for cell in self.columns[name].to_pylist()]
             values = np.array(
                 [np.nan if number is None else number for number in found]
             )
         # Not a number is no more than anything either.
-        self.refuse(~(np.abs(values) <= LARGEST_NUMBER), [name], A_NUMBER)
+        self.refuse(~(np.abs(values) <= LARGEST_NUMBER), [name], NUMBER_ALLOWED)
         return self.bounded(name, values * self.scales.get(name, 1.0))
 
     def bounded(self, name: str, values: np.ndarray) -> np.ndarray:
@@ -305,18 +305,20 @@ def read_text_table(
         if len(cells) != len(names):
             allowed = f"{len(names)}, one for each column of {where}"
             raise InputError(
-                source, f"line {number}", counted(len(cells), "cell"), allowed
+                source, f"line {number}", format_count(len(cells), "cell"), allowed
             )
     units = dict(zip(names, (rows and units_in(rows[0][1])) or (), strict=False))
     rows = rows[1:] if units else rows
     if not rows:
-        raise InputError(source, "", A_HEADER_ALONE, "one row for each measurement")
+        raise InputError(
+            source, "", HEADER_WITHOUT_ROWS, "one row for each measurement"
+        )
     if unknown := next((name for name in ignored if name not in names), None):
         raise InputError(
             source,
             where,
             f"no column {unknown!r} to ignore",
-            closest_first(unknown, list(dict.fromkeys(names))),
+            suggest_names(unknown, list(dict.fromkeys(names))),
         )
     numbers = [number for number, _ in rows]
     cells_of = zip(*(cells for _, cells in rows), strict=True)
@@ -363,7 +365,7 @@ def _read_lines(path: str | Path, encoding: str | None) -> tuple[list[str], str]
         (name for mark, name in _MARKS if content.startswith(mark)), "utf-8"
     )
     try:
-        text = decoded(content, path, found).removeprefix("\ufeff")
+        text = decode_text(content, path, found).removeprefix("\ufeff")
     except InputError as error:
         allowed = "UTF-8 (iconv -f cp1252 -t utf-8), or in import csv --encoding cp1252, shift_jis, gb18030 or such"
         raise InputError(
@@ -380,10 +382,10 @@ def _read_lines(path: str | Path, encoding: str | None) -> tuple[list[str], str]
     )
     if count > MOST_LINES:
         allowed = f"at most {MOST_LINES} (the mean of a tracker's stream at each pose is one measurement)"
-        raise InputError(path, "", counted(count, "line"), allowed)
+        raise InputError(path, "", format_count(count, "line"), allowed)
     lines = re.split(r"\r\n|\n|\r", text)
     for number, line in enumerate(lines, 1):
-        if character := steering(line.replace("\t", " ")):
+        if character := find_control_character(line.replace("\t", " ")):
             allowed = (
                 "printable characters, in UTF-8, or in UTF-16 with a byte order mark"
             )

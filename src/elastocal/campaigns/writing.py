@@ -14,11 +14,11 @@ from elastocal.campaigns.measurements import (
     CSV,
     PARQUET,
     check_column_names,
-    file_columns,
+    describe_columns,
     write_measurements,
 )
 from elastocal.io.atomic_writes import write_text, write_together
-from elastocal.io.documents import check_document, one_line, read_schema
+from elastocal.io.documents import check_document, format_one_line, read_schema
 from elastocal.mechanics.robot import Robot
 
 
@@ -55,7 +55,7 @@ def write_campaign(
         write_text(partial / DOCUMENT, text)
 
 
-def campaign_template(
+def format_campaign_template(
     name: str, robot: Robot, targets: Sequence[str] = (), measured: str = "position"
 ) -> str:
     """Text of a campaign.yaml to fill in, each key explained; those that it leaves out
@@ -86,15 +86,15 @@ def campaign_template(
             subsequent_indent="# ",
         )
         entry = (
-            f"{key}: {one_line(document[key])}"
+            f"{key}: {format_one_line(document[key])}"
             if key in document
-            else f"# {key}: {one_line(rule['examples'][0])}"
+            else f"# {key}: {format_one_line(rule['examples'][0])}"
         )
         text += f"\n{meaning}\n{entry}\n"
     return text
 
 
-def sheet_template(joints: int) -> str:
+def format_sheet_header(joints: int) -> str:
     """Header of a measurements.csv to fill in, without optional covariates."""
     optional = (
         "session",
@@ -107,6 +107,8 @@ def sheet_template(joints: int) -> str:
         "rz",
     )
     return (
-        ",".join(name for name in file_columns(joints) if not name.startswith(optional))
+        ",".join(
+            name for name in describe_columns(joints) if not name.startswith(optional)
+        )
         + "\n"
     )

@@ -19,8 +19,8 @@ from elastocal.command.terminal import (
     robots,
     workplace,
 )
-from elastocal.counting import counted
-from elastocal.errors import InputError, steering
+from elastocal.counting import format_count
+from elastocal.errors import InputError, find_control_character
 
 _ROBOT = "robot.yaml"
 # Snakemake prints the second before its logger begins.
@@ -47,9 +47,12 @@ def init(
     from rich.console import Console
 
     from elastocal.campaigns.campaign import DOCUMENT
-    from elastocal.campaigns.measurements import CSV, PARQUET, described_by
+    from elastocal.campaigns.measurements import CSV, PARQUET, read_measured_targets
     from elastocal.campaigns.reading import read_robot
-    from elastocal.campaigns.writing import campaign_template, sheet_template
+    from elastocal.campaigns.writing import (
+        format_campaign_template,
+        format_sheet_header,
+    )
     from elastocal.io.atomic_writes import check_places, write_text, write_together
     from elastocal.io.documents import LARGEST_BYTES
     from elastocal.io.texts import read_text
@@ -69,12 +72,14 @@ def init(
         )
     arm, (targets, measured) = (
         read_robot(robot or folder / _ROBOT),
-        described_by(folder),
+        read_measured_targets(folder),
     )
     files = {} if robot is None else {_ROBOT: read_text(robot, LARGEST_BYTES)}
     if not (folder / CSV).exists() and not (folder / PARQUET).exists():
-        files[CSV] = sheet_template(arm.joints)
-    files[DOCUMENT] = campaign_template(folder.resolve().name, arm, targets, measured)
+        files[CSV] = format_sheet_header(arm.joints)
+    files[DOCUMENT] = format_campaign_template(
+        folder.resolve().name, arm, targets, measured
+    )
     with write_together(folder, files) as partial:
         for name, text in files.items():
             write_text(partial / name, text)
@@ -103,11 +108,11 @@ def check(folder: Annotated[Path, Argument(help="Folder of the campaign.")]) -> 
     answer = f"{found.campaign} cannot be diagnosed: the data are at fault"
     if found.diagnosable:
         more = (
-            f"; {counted(len(found.attention), 'remark')} below"
+            f"; {format_count(len(found.attention), 'remark')} below"
             if found.attention
             else ""
         )
-        answer = f"{found.campaign} can be diagnosed: {counted(found.testable, 'candidate effect')} can be tested{more}"
+        answer = f"{found.campaign} can be diagnosed: {format_count(found.testable, 'candidate effect')} can be tested{more}"
     details = [
         *(f"{name:<16}{words}" for name, words in found.rows),
         *(f"! {sentence}" for sentence in found.attention),
@@ -140,7 +145,7 @@ def diagnose(
     # Braces are wildcards to Snakemake, the others mapping and comment of YAML.
     if mark := next(
         (mark for mark in ("{", "}", ": ", " #") if mark in campaign),
-        steering(campaign),
+        find_control_character(campaign),
     ):
         raise InputError(
             folder,

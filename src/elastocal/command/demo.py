@@ -15,7 +15,7 @@ from elastocal.command.terminal import (
     robots,
     workplace,
 )
-from elastocal.counting import counted
+from elastocal.counting import format_count
 
 # Fewer candidates than a real plan takes, for a demonstration of a minute.
 _PLAN = (
@@ -85,7 +85,7 @@ def demo(
     print_lines(
         [
             "",
-            f"# The simulated robot is measured: {counted(count, 'measurement')} in {folder / CSV}",
+            f"# The simulated robot is measured: {format_count(count, 'measurement')} in {folder / CSV}",
         ],
         console,
     )

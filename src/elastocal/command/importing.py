@@ -10,7 +10,7 @@ import typer
 from typer import Argument, Option
 
 from elastocal.command.terminal import MOST_ROWS, example, print_lines, robots
-from elastocal.counting import counted
+from elastocal.counting import format_count
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
@@ -319,13 +319,13 @@ def _summary(found: ImportedMeasurements) -> list[str]:
         )
     )
     targets = ", ".join(sorted(set(table["target"].tolist())))
-    joints = counted(found.joints, "joint")
+    joints = format_count(found.joints, "joint")
     read = [
         f"{name} from {header!r}{f' in {units[name]}' if name in units else ''}"
         for name, header in columns.items()
     ]
     lists = {
-        "left out": [f"{counted(found.skipped, 'row')} without a position"]
+        "left out": [f"{format_count(found.skipped, 'row')} without a position"]
         if found.skipped
         else [],
         "counted, as no column has it": [
@@ -337,7 +337,7 @@ def _summary(found: ImportedMeasurements) -> list[str]:
         "not used": found.ignored,
     }
     return [
-        f"{counted(len(table['pose']), 'measurement')} of {targets} at {counted(poses, 'pose')}, {joints}",
+        f"{format_count(len(table['pose']), 'measurement')} of {targets} at {format_count(poses, 'pose')}, {joints}",
         f"file: names of columns {f'in line {options.header}' if options.header else 'as stated'}, "
         f"separator {options.separator}, decimal {options.decimal}, encoding {options.encoding}",
         f"read: {'; '.join(read)}",

@@ -16,7 +16,7 @@ from elastocal.command.importing import importing
 from elastocal.command.plan import plan
 from elastocal.command.results import certificate, correct, export
 from elastocal.command.terminal import example
-from elastocal.errors import InputError, fault_of_machine
+from elastocal.errors import InputError, describe_system_fault
 
 # Each subcommand with an example, in the order in which a calibration needs them;
 # `import` is a group of its own.
@@ -84,4 +84,4 @@ def main() -> None:
     except InputError as error:
         sys.exit(str(error))
     except (OSError, MemoryError, ImportError) as error:
-        sys.exit(str(fault_of_machine(error)))
+        sys.exit(str(describe_system_fault(error)))

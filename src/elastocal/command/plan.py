@@ -20,8 +20,8 @@ from elastocal.command.terminal import (
     numbers,
     print_answer,
 )
-from elastocal.counting import counted
-from elastocal.errors import InputError, text_fault
+from elastocal.counting import format_count
+from elastocal.errors import InputError, find_text_fault
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -134,7 +134,7 @@ def plan(
     )
     from elastocal.campaigns.measurements import CSV
     from elastocal.campaigns.reading import read_robot
-    from elastocal.io.texts import kind_of
+    from elastocal.io.texts import describe_file_kind
 
     arm, console, (_, position_m, orientation_rad) = (
         read_robot(robot),
@@ -161,7 +161,7 @@ def plan(
         raise InputError(
             folder,
             "",
-            f"{kind_of(os.lstat(folder).st_mode)} that is there",
+            f"{describe_file_kind(os.lstat(folder).st_mode)} that is there",
             "a new one",
         )
     with console.status("planning"):
@@ -172,8 +172,8 @@ def plan(
     )
     rows = _write(folder, robot, survey, cell, found, worth)
     answer = (
-        f"{counted(poses, 'pose')} to fit and {held_out} held out, of {len(some.joint_angles):,} that the cell allows: "
-        f"{counted(rows, 'measurement')}"
+        f"{format_count(poses, 'pose')} to fit and {held_out} held out, of {len(some.joint_angles):,} that the cell allows: "
+        f"{format_count(rows, 'measurement')}"
     )
     following = f"measure, fill in {folder / CSV}, then elastocal check {folder}"
     print_answer(
@@ -226,7 +226,7 @@ def _read_targets(described: list[str], chain: Chain) -> tuple[Target, ...]:
                 f"a name of {len(name)} characters",
                 f"1 to {_LONGEST_NAME}, such as A:{point}",
             )
-        if fault := text_fault(name):
+        if fault := find_text_fault(name):
             raise InputError("--target", "", *fault)
         if name in found:
             raise InputError(

@@ -18,7 +18,7 @@ from elastocal.command.terminal import (
     print_answer,
     workplace,
 )
-from elastocal.counting import counted, first_names, grouped
+from elastocal.counting import format_count, format_integer, list_first
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ def correct(
     from elastocal.exchange.controllers import (
         axes_of,
         check_name,
-        controller_of,
+        find_controller,
         targets_of,
     )
     from elastocal.exchange.target_path import NO_BOUND, OK, read_target_path_of
@@ -108,7 +108,7 @@ def correct(
     from elastocal.io.data_frames import write_csv
 
     console = Console(stderr=True)
-    controller = controller_of(language, "") if language else None
+    controller = find_controller(language) if language else None
     if output.suffix != ".csv":
         raise InputError(
             "--output",
@@ -136,7 +136,7 @@ def correct(
             calibrated, wanted.position, wanted.rotation, wrench, wanted.start
         )
     if (failed := np.flatnonzero(found.status != OK)).size:
-        rows = first_names(
+        rows = list_first(
             [f"line {wanted.lines[row]} is {found.status[row]}" for row in failed],
             _NAMED,
         )
@@ -147,7 +147,7 @@ def correct(
         raise InputError(
             path,
             "",
-            first_names(swings, 1),
+            list_first(swings, 1),
             "targets between, another posture, or --allow-large-steps",
         )
     outside, loaded = beyond_fitted(calibrated, found.joint_angles, wrench)
@@ -178,7 +178,7 @@ def correct(
         )
         uncorrected = f"uncorrected they would be missed by {millimetres(root_mean_square(before[bounded]))} RMS"
         lines += [format_accuracy(accuracy), uncorrected]
-    count = counted(len(wanted), "target")
+    count = format_count(len(wanted), "target")
     if calibrated.remainder is not None:
         added = np.linalg.norm(
             regressed(calibrated, found.joint_angles, wrench), axis=1
@@ -190,7 +190,7 @@ def correct(
         )
         words = campaign.verdict["remainder"]["words"]
         lines.append(
-            f"a {words} on what the model leaves corrects {grouped((added > 0.0).sum())} of {count} by {size}"
+            f"a {words} on what the model leaves corrects {format_integer((added > 0.0).sum())} of {count} by {size}"
         )
     if controller:
         called = ", ".join(
@@ -201,14 +201,14 @@ def correct(
         )
     alarms = [each["sentence"] for each in campaign.verdict["misplaced"]]
     if swings:
-        alarms.append(first_names(swings, _NAMED))
+        alarms.append(list_first(swings, _NAMED))
     if not bounded.all():
         what = f"{_LOADS_BOUNDED:g} times the measured loads or outside the fitted range of joints"
         alarms.append(
-            f"no bound is stated for {grouped((~bounded).sum())} of {count}: beyond {what}"
+            f"no bound is stated for {format_integer((~bounded).sum())} of {count}: beyond {what}"
         )
     if beyond.any():
-        some = f"{grouped(beyond.sum())} of {count} lie beyond the poses or loads of the campaign"
+        some = f"{format_integer(beyond.sum())} of {count} lie beyond the poses or loads of the campaign"
         alarms.append(f"{some}: their predicted errors are extrapolated")
     lines += [*(f"! {alarm}" for alarm in alarms), *map(str, files)]
     print_answer(
@@ -490,7 +490,7 @@ def _drop_in(
     theirs, _ = poses(chain, nominal.model_angles(reported), chain.end_effector)
     mine, _ = poses(robot.chain, robot.model_angles(reported), robot.chain.end_effector)
     off = 1e3 * float(np.linalg.norm(theirs - mine, axis=1).max())
-    changed = counted(drop_in.changed, "joint origin")
+    changed = format_count(drop_in.changed, "joint origin")
     lines = [
         f"{URDF}: {changed} changed, nothing else; put it where the old one is, beside its meshes"
     ]

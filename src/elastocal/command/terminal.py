@@ -10,7 +10,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from elastocal.errors import InputError, escaped
+from elastocal.errors import InputError, escape_control_characters
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -30,7 +30,7 @@ _RADIANS = {
     "µrad": 1e-6,
 }
 _QUANTITY = re.compile(r"(\d+(?:\.\d*)?|\.\d+)\s*([a-zµ°]+)")
-# m and rad: no instrument repeats better (`fitting.noise.FINEST`).
+# m and rad: no instrument repeats better (`fitting.noise.FINEST_RESOLUTION`).
 _LEAST = 1e-8
 # Trackers stand at up to a hundred metres, targets within an arm's reach of where they
 # are fixed, as in a campaign.
@@ -134,7 +134,12 @@ def print_lines(lines: Iterable[str], console: Console) -> None:
     """Print lines as they are, with what would steer a terminal as escapes: they hold
     names and paths of other people."""
     for line in lines:
-        console.print(escaped(line), markup=False, highlight=False, soft_wrap=True)
+        console.print(
+            escape_control_characters(line),
+            markup=False,
+            highlight=False,
+            soft_wrap=True,
+        )
 
 
 def pipeline() -> Path:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.constants import g, pound_force
 
-from elastocal.campaigns.campaign import groups_of
+from elastocal.campaigns.campaign import group_equal_rows
 from elastocal.data_checks.hypotheses import other_interpretations
 from elastocal.data_checks.placement import (
     IMPLAUSIBLE_M,
@@ -25,8 +25,8 @@ from elastocal.data_checks.placement import (
     spread,
 )
 from elastocal.data_checks.protocol import Fault, Value
-from elastocal.fitting.model import joint_compliances
-from elastocal.fitting.observations import state_clusters
+from elastocal.fitting.model import get_joint_compliances
+from elastocal.fitting.observations import index_poses
 from elastocal.mechanics.elastostatics import generalized_forces, regressor
 from elastocal.mechanics.kinematics import jacobians, position_jacobians
 
@@ -192,7 +192,7 @@ def deflections(campaign: Campaign) -> tuple[np.ndarray, np.ndarray] | None:
     means of each target in each pose (within transformation). None where loads do not
     differ within poses, compliances are not known or poses are too few.
     """
-    pose = state_clusters(campaign.measurements)
+    pose = index_poses(campaign.measurements)
     loaded = campaign.robot.compliance_known and campaign.measurements.wrench.any()
     if not loaded or pose.max() + 1 < _FEWEST_LOADED:
         return None
@@ -221,8 +221,8 @@ def deflections(campaign: Campaign) -> tuple[np.ndarray, np.ndarray] | None:
     expected = [
         regressor(jacobian, each) @ campaign.robot.compliance for each in torques
     ]
-    group = groups_of(
-        np.column_stack([state_clusters(measurements), measurements.target])
+    group = group_equal_rows(
+        np.column_stack([index_poses(measurements), measurements.target])
     )[1]
     rows = np.stack([whole.measured[0] - whole.predicted, *expected], axis=-1)
     mean = np.zeros((group.max() + 1, *rows.shape[1:]))
@@ -346,9 +346,9 @@ def compliance_warnings(fitted: Fit) -> list[str]:
     if rms(np.linalg.norm(fitted.residual[:, :3], axis=1)) > IMPLAUSIBLE_M:
         return []
     std_error = np.sqrt(np.diag(fitted.covariance))[
-        fitted.places_of("joint_compliance")
+        fitted.parameter_indices("joint_compliance")
     ]
-    found = joint_compliances(model, fitted.estimate)
+    found = get_joint_compliances(model, fitted.estimate)
     nominal = model.nominal_compliance
     most, word = (
         (_MOST_OFF_NOMINAL, "nominal")

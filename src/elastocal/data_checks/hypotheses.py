@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.campaigns.campaign import groups_of
+from elastocal.campaigns.campaign import group_equal_rows
 from elastocal.data_checks.placement import (
     FAR_BETTER,
     IMPLAUSIBLE_M,
@@ -265,7 +265,7 @@ def shifts(campaign: Campaign) -> list[Hypothesis]:
         "pose": [*of_target, measurements.load, measurements.repeat],
     }
     for kind, keys in alike.items():
-        group = groups_of(np.column_stack(keys))[1]
+        group = group_equal_rows(np.column_stack(keys))[1]
         order = np.lexsort((measurements.row, group))
         rows = np.array([order[:-1], order[1:]])[
             :, group[order[1:]] == group[order[:-1]]

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import chdtri
 
-from elastocal.campaigns.campaign import groups_of
-from elastocal.fitting.least_squares import nominal_poses, registered_to
-from elastocal.fitting.model import declared_model, measured_in_base
-from elastocal.fitting.observations import select_states, single_observations
+from elastocal.campaigns.campaign import group_equal_rows
+from elastocal.fitting.least_squares import compute_nominal_poses, register_to_poses
+from elastocal.fitting.model import build_declared_model, transform_to_base
+from elastocal.fitting.observations import select_states, separate_measurements
 from elastocal.mechanics.kinematics import rotation_vectors
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ class Placement:
     def measured(self) -> tuple[np.ndarray, np.ndarray | None]:
         """Positions (N, 3), m, and orientations (N, 3, 3); these None where positions
         alone are measured."""
-        return measured_in_base(self.estimate, self.observations)
+        return transform_to_base(self.estimate, self.observations)
 
     @cached_property
     def distance(self) -> np.ndarray:
@@ -107,14 +107,14 @@ class Placement:
 def placed(campaign: Campaign, estimate: Estimate | None = None) -> Placement:
     """Measurements in given frames and targets, or in those fitted to all measurements
     alike."""
-    model = replace(declared_model(campaign), effects=())
-    observations = single_observations(campaign.measurements)
-    nominal = nominal_poses(model, observations)
+    model = replace(build_declared_model(campaign), effects=())
+    observations = separate_measurements(campaign.measurements)
+    nominal = compute_nominal_poses(model, observations)
     return Placement(
         model,
         observations,
         nominal,
-        estimate or registered_to(model, observations, *nominal),
+        estimate or register_to_poses(model, observations, *nominal),
     )
 
 
@@ -128,7 +128,7 @@ def robustly_placed(campaign: Campaign) -> Placement:
         12, 2006.
     """
     found = placed(campaign)
-    if campaign.frame == "base" and not found.model.fitted_parts:
+    if campaign.frame == "base" and not found.model.fitted_target_components:
         return found
     for step in range(_CORE_STEPS + 1):
         distance = found.distance
@@ -143,7 +143,7 @@ def robustly_placed(campaign: Campaign) -> Placement:
             kept[members] = distance[members] <= limit
         some = select_states(found.observations, kept)
         nominal = (part[kept] for part in found.nominal)
-        found = replace(found, estimate=registered_to(found.model, some, *nominal))
+        found = replace(found, estimate=register_to_poses(found.model, some, *nominal))
     return found
 
 
@@ -174,5 +174,7 @@ def _trimmed_rms(distance: np.ndarray) -> float:
 
 def of_each_target(measurements: Measurements) -> list[np.ndarray]:
     """Indices of the measurements of each target in each session."""
-    number = groups_of(np.column_stack([measurements.session, measurements.target]))[1]
+    number = group_equal_rows(
+        np.column_stack([measurements.session, measurements.target])
+    )[1]
     return [np.flatnonzero(number == group) for group in range(number.max() + 1)]

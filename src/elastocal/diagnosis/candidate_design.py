@@ -26,10 +26,10 @@ from elastocal.diagnosis.statistics import (
     compute_statistics,
 )
 from elastocal.errors import InputError
-from elastocal.fitting.linearization import Factored, linearize
-from elastocal.fitting.model import nonlinear_parameters, parameter_values
-from elastocal.fitting.normal_equations import whitening
-from elastocal.fitting.observations import Observations, spread_poses
+from elastocal.fitting.linearization import FactoredSensitivities, linearize
+from elastocal.fitting.model import find_nonlinear_parameters, get_parameter_values
+from elastocal.fitting.normal_equations import compute_whitening
+from elastocal.fitting.observations import Observations, select_spread_poses
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -134,9 +134,9 @@ class CandidateDesign:
         model = self.reference_fit.model
         estimate = self.reference_fit.estimate
         return np.where(
-            nonlinear_parameters(model, estimate),
+            find_nonlinear_parameters(model, estimate),
             0.0,
-            parameter_values(model, estimate),
+            get_parameter_values(model, estimate),
         )
 
     @cached_property
@@ -152,7 +152,7 @@ class CandidateDesign:
         line = linearize(fitted.model, fitted.estimate, some, self.around)
         jacobian = line.joint_jacobian
         root = np.sqrt(fitted.weights)
-        whitener = whitening(some, jacobian, fitted.noise.of_measurements)
+        whitener = compute_whitening(some, jacobian, fitted.noise.without_pose_error)
 
         def white(values: np.ndarray) -> np.ndarray:
             return whitener.apply(values * root.reshape(-1, *[1] * (values.ndim - 1)))
@@ -161,13 +161,14 @@ class CandidateDesign:
             [owner for owner, _ in fitted.parameters], list(self.candidates)
         )
         residual = (
-            line.residual + line.columns.of_columns(found).dense() @ self._values[found]
+            line.residual
+            + line.columns.select_columns(found).dense() @ self._values[found]
         )
-        nothing = Factored.of(
+        nothing = FactoredSensitivities.of(
             [], white(line.coordinate_jacobian), some.state, len(some.states)
         )
         rows = WhitenedRows(
-            white(line.columns.of_columns(~found).dense()),
+            white(line.columns.select_columns(~found).dense()),
             nothing,
             white(residual),
             white(jacobian),
@@ -197,7 +198,7 @@ class CandidateDesign:
         state = rows.candidates.state
         return replace(
             rows,
-            candidates=Factored.of(
+            candidates=FactoredSensitivities.of(
                 laws, jacobian, state, len(self.observations.states), sizes
             ),
         )
@@ -248,7 +249,7 @@ class CandidateDesign:
             )
         ]
         if products.rows.residual.size > _MANY_ROWS:
-            some = spread_poses(
+            some = select_spread_poses(
                 self.observations, _SAMPLE_ROWS // self.observations.rows
             )[self.observations.state]
             sample = compute_cross_products(products.rows.at(some), *self.priors)
@@ -288,8 +289,8 @@ def build_candidate_design(
     max_pose_error_rad: float = np.inf,
 ) -> CandidateDesign:
     """Gather what the measurements say of a fit to them and of all candidates."""
-    around = fitted.conditions_of(observations.states)
-    there = fitted.model.offered(observations.states)
+    around = fitted.get_conditions(observations.states)
+    there = fitted.model.available_inputs(observations.states)
     why = {
         candidate.key: explain_untestable(
             candidate, there, observations.states.joint_angles
@@ -347,7 +348,7 @@ def choose_shape_values(candidate: Candidate, fitted: Fit) -> list[Shapes]:
     (shape,) = candidate.shapes
     values = shape.values(_SHAPES_TRIED)
     if candidate.key in {effect.key for effect in fitted.model.effects}:
-        (value,) = fitted.values_of(candidate.key)[1].tolist()
+        (value,) = fitted.effect_values(candidate.key)[1].tolist()
         reach = _CLOSER_STILL * np.diff(values[:2]).sum()
         values = np.array([value])
         if shape.tried > 1:

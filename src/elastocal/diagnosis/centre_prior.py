@@ -16,7 +16,7 @@ from elastocal.diagnosis.statistics import (
     compute_statistics,
 )
 from elastocal.effects.gravity import DECLARED_WEIGHT
-from elastocal.fitting.least_squares import fit
+from elastocal.fitting.least_squares import fit_model
 
 if TYPE_CHECKING:
     from elastocal.diagnosis.fitted_subset import FittedSubset
@@ -60,8 +60,12 @@ def choose_centre_prior(part: FittedSubset, settings: Settings) -> FittedSubset:
         )
         if wide > narrow:
             return part
-    fitted = fit(
-        stated, part.search_sample, part.noise, part.declared.estimate, reweighted=True
+    fitted = fit_model(
+        stated,
+        part.search_sample,
+        part.noise,
+        part.declared.estimate,
+        reweight_first_step=True,
     )
     return replace(
         part,

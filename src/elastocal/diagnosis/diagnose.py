@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.counting import counted
+from elastocal.counting import format_count
 from elastocal.data_checks.faults import faults
 from elastocal.diagnosis import model_averaging, refit, verdict
 from elastocal.diagnosis.candidate_design import build_candidate_design, refine_shapes
@@ -27,14 +27,18 @@ from elastocal.diagnosis.gross_errors import (
 from elastocal.diagnosis.search import run_alarm_test, screen_terms, search_models
 from elastocal.diagnosis.training_verdict import TrainingResult, state_training_verdict
 from elastocal.diagnosis.verdict import Evidence
-from elastocal.effects.catalogue import effects
-from elastocal.fitting.least_squares import ON_THE_WAY, SETTLED, fit
-from elastocal.fitting.model import Case, parameter_values
-from elastocal.fitting.noise import effective_parameters, noise_facts
+from elastocal.effects.catalogue import list_effects
+from elastocal.fitting.least_squares import (
+    CONVERGENCE_TOLERANCE,
+    INTERMEDIATE_TOLERANCE,
+    fit_model,
+)
+from elastocal.fitting.model import Case, get_parameter_values
+from elastocal.fitting.noise import count_effective_parameters, serialize_noise
 from elastocal.fitting.observations import Observations
-from elastocal.random_streams import stream
+from elastocal.random_streams import open_stream
 from elastocal.remainder.repeatable import Repeatable, repeatable_part
-from elastocal.validation.held_out import left_out_squares
+from elastocal.validation.held_out import predict_left_out_squares
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -113,7 +117,7 @@ def diagnose(
         part = choose_centre_prior(part, settings)
         case = replace(case, model=part.case.model)
     tell(
-        f"declared model fitted to {counted(len(part.case.observations), 'measurement')}"
+        f"declared model fitted to {format_count(len(part.case.observations), 'measurement')}"
     )
     found: Evidence | None = None
     about = part.declared
@@ -136,7 +140,9 @@ def diagnose(
         # The model found looks at all rows once more, without these, before another
         # search is made.
         some = sample_for_search(case, case.select(remaining), settings)
-        about = fit(about.model, some, about.noise, about.estimate, True, ON_THE_WAY)
+        about = fit_model(
+            about.model, some, about.noise, about.estimate, True, INTERMEDIATE_TOLERANCE
+        )
         errors = find_gross_errors(about, part.noise, measurements, remaining, settings)
         good |= ~remaining & ~errors.gross
         last = part
@@ -144,22 +150,22 @@ def diagnose(
         if part is last:
             break
         tell(
-            f"{counted((~part.kept).sum(), 'gross error')} in {counted(len(good), 'row')}: once more without"
+            f"{format_count((~part.kept).sum(), 'gross error')} in {format_count(len(good), 'row')}: once more without"
         )
-        if noise_facts(part.noise) == noise_facts(last.noise):
+        if serialize_noise(part.noise) == serialize_noise(last.noise):
             again = about
             if (part.kept != remaining).any():
-                again = fit(
+                again = fit_model(
                     about.model,
                     part.search_sample,
                     about.noise,
                     about.estimate,
                     True,
-                    ON_THE_WAY,
+                    INTERMEDIATE_TOLERANCE,
                 )
             moved = np.subtract(
                 *(
-                    parameter_values(each.model, each.estimate)
+                    get_parameter_values(each.model, each.estimate)
                     for each in (again, found.fitted)
                 )
             )
@@ -182,8 +188,11 @@ def diagnose(
     case = part.case
     noise = part.noise
     declared = part.fit_to_all(part.declared)
-    bare = fit(
-        replace(case.model, effects=()), case.observations, noise, settled=ON_THE_WAY
+    bare = fit_model(
+        replace(case.model, effects=()),
+        case.observations,
+        noise,
+        tolerance=INTERMEDIATE_TOLERANCE,
     )
     steps = [
         Step("frames and targets", "frames", bare),
@@ -217,12 +226,12 @@ def diagnose(
                 declared.noise,
             )
             alone = (
-                fit(
+                fit_model(
                     declared.model,
                     case.observations,
                     left,
                     declared.estimate,
-                    reweighted=True,
+                    reweight_first_step=True,
                 )
                 if named
                 else final
@@ -238,7 +247,7 @@ def diagnose(
         if found.adopted:
             steps += _effect_steps(part, final, found)
         elif lost and lost[0]:
-            kept = fit(
+            kept = fit_model(
                 bare.model, case.observations, steps[-1].fitted.noise, bare.estimate
             )
             steps.append(Step("frames and targets, kept", "kept", kept))
@@ -297,11 +306,11 @@ def _losses(
     for fitted, name in zip(
         models, ("declared model", "model with the effects found"), strict=False
     ):
-        effective = effective_parameters(fitted)
+        effective = count_effective_parameters(fitted)
         words = ""
         if fitted.residual.size < settings.numbers_a_parameter * effective:
             mine, others = (
-                left_out_squares(each, observations) for each in (fitted, bare)
+                predict_left_out_squares(each, observations) for each in (fitted, bare)
             )
             off = mine - others
             if off.mean() > off.std(ddof=1) / np.sqrt(len(off)):
@@ -339,10 +348,19 @@ def _explained(
     about, before = start or (declared, None)
     tested: tuple[Fit, Repeatable | None] | None = None
     # The fit to all measurements starts where that to some ends.
-    enough = SETTLED if searched is part.case.observations else ON_THE_WAY
+    enough = (
+        CONVERGENCE_TOLERANCE
+        if searched is part.case.observations
+        else INTERMEDIATE_TOLERANCE
+    )
     if start:
-        about = fit(
-            about.model, searched, about.noise, about.estimate, True, ON_THE_WAY
+        about = fit_model(
+            about.model,
+            searched,
+            about.noise,
+            about.estimate,
+            True,
+            INTERMEDIATE_TOLERANCE,
         )
     for round_number in range(1 if start else 0, settings.linearizations):
         problem = build_candidate_design(
@@ -350,7 +368,9 @@ def _explained(
         )
         near = about if before else None
         nothing, alone = screen_terms(problem.problem)
-        draws = stream(seed, part.case.campaign.name, "null distribution", round_number)
+        draws = open_stream(
+            seed, part.case.campaign.name, "null distribution", round_number
+        )
         alarm = run_alarm_test(
             problem.problem, problem.products, nothing.pose_error_rad, draws
         )
@@ -371,7 +391,7 @@ def _explained(
         # No verdict yet, and no probability: a later search, or the poses left out, may
         # say otherwise.
         words = [
-            getattr(effects().get(name), "words", "an unknown mechanism")
+            getattr(list_effects().get(name), "words", "an unknown mechanism")
             for name in conclusion.best.mechanisms
         ]
         leading = " with ".join(words) or "nothing is missing"
@@ -387,7 +407,7 @@ def _explained(
             noise,
             refit.select_effects(problem, model),
             near,
-            settled=enough,
+            tolerance=enough,
         )
         off = noise.position_m > settings.relinearize_noise * taken.position_m
         small = not named or alarm.statistic < settings.relinearize_above
@@ -418,7 +438,9 @@ def _explained(
             most_pose_error_rad = settings.pose_repeatability_rad
             if large:
                 noise = refit.limit_pose_error(about, searched, most_pose_error_rad)
-                about = fit(about.model, searched, noise, about.estimate, True, enough)
+                about = fit_model(
+                    about.model, searched, noise, about.estimate, True, enough
+                )
         before = named
         if round_number + 1 < settings.linearizations:
             # The next problem takes the room of this one.
@@ -434,7 +456,7 @@ def _effect_steps(part: FittedSubset, final: Fit, found: Evidence) -> list[Step]
     """
     model = found.posterior.models[found.conclusion.best.model]
     chosen = [
-        (effect, final.values_of(effect.key)[1])
+        (effect, final.effect_values(effect.key)[1])
         for effect, _ in refit.select_effects(found.linearized, model)
     ]
     explained = model_averaging.compute_explained_squares(
@@ -459,7 +481,7 @@ def _effect_steps(part: FittedSubset, final: Fit, found: Evidence) -> list[Step]
             final.noise,
             some,
             steps[0].fitted,
-            settled=ON_THE_WAY,
+            tolerance=INTERMEDIATE_TOLERANCE,
         )
         steps.insert(0, Step(f"with {alone[number - 1]}", "effect", fitted))
     return steps

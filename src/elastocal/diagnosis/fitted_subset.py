@@ -10,15 +10,20 @@ import numpy as np
 from elastocal.diagnosis.candidate_design import build_candidate_design
 from elastocal.diagnosis.gross_errors import find_gross_errors
 from elastocal.diagnosis.initial_outliers import find_unexplained_observations
-from elastocal.fitting.least_squares import LONG, ON_THE_WAY, evaluated, fit
-from elastocal.fitting.noise import Noise, estimated_noise, fit_declared
+from elastocal.fitting.least_squares import (
+    INTERMEDIATE_TOLERANCE,
+    LARGE_FIT_SIZE,
+    evaluate_as_fit,
+    fit_model,
+)
+from elastocal.fitting.noise import Noise, estimate_noise, fit_declared_model
 from elastocal.fitting.observations import (
     Observations,
-    measured_in,
-    sample_of,
+    match_states_and_targets,
+    remove_outlying_repeats,
+    sample_observations,
+    select_spread_poses,
     select_states,
-    spread_poses,
-    without_outlying_repeats,
 )
 
 if TYPE_CHECKING:
@@ -54,19 +59,27 @@ class FittedSubset:
         """
         every = self.case.observations
         if self.search_sample is not every:
-            settled = ON_THE_WAY if len(every) <= LONG else _LAST_STEP
-            return fit(
+            settled = (
+                INTERMEDIATE_TOLERANCE if len(every) <= LARGE_FIT_SIZE else _LAST_STEP
+            )
+            return fit_model(
                 found.model,
                 every,
                 found.noise,
                 found.estimate,
-                reweighted=True,
-                settled=settled,
+                reweight_first_step=True,
+                tolerance=settled,
             )
         return (
             found
             if found is self.declared
-            else fit(found.model, every, found.noise, found.estimate, reweighted=True)
+            else fit_model(
+                found.model,
+                every,
+                found.noise,
+                found.estimate,
+                reweight_first_step=True,
+            )
         )
 
 
@@ -77,10 +90,15 @@ def fit_subset(
     if last is not None and (kept == last.kept).all():
         return last
     part = case if kept.all() else case.select(kept)
-    noise, warnings = estimated_noise(part)
+    noise, warnings = estimate_noise(part)
     searched = sample_for_search(case, part, settings)
     return FittedSubset(
-        part, kept, noise, warnings, fit_declared(part.model, searched, noise), searched
+        part,
+        kept,
+        noise,
+        warnings,
+        fit_declared_model(part.model, searched, noise),
+        searched,
     )
 
 
@@ -88,7 +106,9 @@ def sample_for_search(case: Case, part: Case, settings: Settings) -> Observation
     """What a search looks at of a part of a case: at the same poses whatever is kept,
     so that only gross errors move a fit."""
     most = settings.searched_observations
-    return sample_of(part.observations, most, sample_of(case.observations, most))
+    return sample_observations(
+        part.observations, most, sample_observations(case.observations, most)
+    )
 
 
 def select_initial_subset(case: Case, settings: Settings) -> FittedSubset:
@@ -113,27 +133,37 @@ def select_initial_subset(case: Case, settings: Settings) -> FittedSubset:
             break
     observations = case.observations
     most = settings.gross_start_numbers // case.model.rows
-    few = spread_poses(observations, most)
+    few = select_spread_poses(observations, most)
     if part is whole and not few.all():
         # Nothing stands apart, and there are too many to look more closely.
         return whole
     apart = np.unique(
-        observations.state[measured_in(observations, measurements, ~part.kept)]
+        observations.state[
+            match_states_and_targets(observations, measurements, ~part.kept)
+        ]
     )
     few[apart[np.linspace(0, len(apart) - 1, min(len(apart), most)).astype(int)]] = True
-    few[observations.state[measured_in(observations, measurements, pulling)]] = False
+    few[
+        observations.state[
+            match_states_and_targets(observations, measurements, pulling)
+        ]
+    ] = False
     some = select_states(observations, few)
-    about = evaluated(part.declared.model, some, part.noise, part.declared.estimate)
+    about = evaluate_as_fit(
+        part.declared.model, some, part.noise, part.declared.estimate
+    )
     taken = find_unexplained_observations(
         build_candidate_design(about, some, candidates, settings)
     )
     # A repeat far from its others is in no average, and stays what the declared model
     # says of it.
-    looked_at = measured_in(measurements, some, np.ones(len(some), bool))
-    looked_at &= np.isin(measurements.row, without_outlying_repeats(measurements).row)
+    looked_at = match_states_and_targets(measurements, some, np.ones(len(some), bool))
+    looked_at &= np.isin(measurements.row, remove_outlying_repeats(measurements).row)
     return fit_subset(
         case,
-        ~np.where(looked_at, measured_in(measurements, some, taken), ~part.kept),
+        ~np.where(
+            looked_at, match_states_and_targets(measurements, some, taken), ~part.kept
+        ),
         settings,
         whole,
     )

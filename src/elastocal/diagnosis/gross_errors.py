@@ -20,18 +20,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.special import chdtri, fdtri, gammaincinv
 
-from elastocal.counting import counted
+from elastocal.counting import format_count
 from elastocal.effects.conditions import at_states
-from elastocal.fitting.linearization import by_coordinates, linearize
-from elastocal.fitting.model import conditions, parameters, residuals
+from elastocal.fitting.linearization import linearize, linearize_coordinates
+from elastocal.fitting.model import (
+    compute_residuals,
+    evaluate_conditions,
+    list_parameters,
+)
 from elastocal.fitting.noise import Noise
-from elastocal.fitting.normal_equations import measurement_covariances
+from elastocal.fitting.normal_equations import compute_measurement_covariances
 from elastocal.fitting.observations import (
     Observations,
-    parts_of,
+    select_spread_poses,
     select_states,
-    single_observations,
-    spread_poses,
+    separate_measurements,
+    split_into_blocks,
 )
 
 if TYPE_CHECKING:
@@ -117,21 +121,25 @@ class _Beside:
     ) -> _Beside:
         """Of rows that are ``kept``, (N,) of bool; ``unsure``: whether parameters are
         so."""
-        single = single_observations(measurements)
+        single = separate_measurements(measurements)
         sample = kept.copy()
-        sample[kept] = spread_poses(select_states(single, kept), _MOST)
-        near = spread_poses(single, _MOST)
+        sample[kept] = select_spread_poses(select_states(single, kept), _MOST)
+        near = select_spread_poses(single, _MOST)
         residual = np.empty((len(single), model.rows))
-        whole = conditions(model, estimate, single.states) if near.all() else None
+        whole = (
+            evaluate_conditions(model, estimate, single.states) if near.all() else None
+        )
 
         def around(part: Observations, states: slice) -> Conditions:
             """Conditions, found once where all rows are looked at closely."""
             if whole is None:
-                return conditions(model, estimate, part.states)
+                return evaluate_conditions(model, estimate, part.states)
             return whole if len(part) == len(single) else at_states(whole, states)
 
-        for states, seen, part in parts_of(single, 0):
-            residual[seen] = residuals(model, estimate, part, around(part, states))
+        for states, seen, part in split_into_blocks(single, 0):
+            residual[seen] = compute_residuals(
+                model, estimate, part, around(part, states)
+            )
         far = np.linalg.norm(
             residual
             / np.repeat([noise.position_m, noise.orientation_rad], 3)[: model.rows],
@@ -140,12 +148,14 @@ class _Beside:
         closely = near | sample | (far > np.quantile(far[near], _SCALE_QUANTILES[-1]))
         some = select_states(single, closely)
         parts = []
-        for states, seen, part in parts_of(some, len(parameters(model, estimate))):
-            line = (linearize if unsure else by_coordinates)(
+        for states, seen, part in split_into_blocks(
+            some, len(list_parameters(model, estimate))
+        ):
+            line = (linearize if unsure else linearize_coordinates)(
                 model, estimate, part, around(part, states)
             )
             jacobian = line.joint_jacobian
-            own = measurement_covariances(noise, jacobian[:, None], model.rows)
+            own = compute_measurement_covariances(noise, jacobian[:, None], model.rows)
             parts.append(
                 (
                     seen,
@@ -158,7 +168,7 @@ class _Beside:
 
     def yardstick(self, fitted: Fit) -> PredictionUncertainty:
         """As `yardstick_of`, by the sample."""
-        free = ~fitted.held
+        free = ~fitted.unidentifiable
         mine = self.sample[self.closely]
         rows = fitted.model.rows
         negligible = any(by is None for _, by, _, _ in self.parts) or not free.any()
@@ -257,7 +267,7 @@ def estimate_prediction_uncertainty(
     Statistics 1987): the rest may be that of the very errors that are looked for, or of
     a law that is not linear.
     """
-    near = spread_poses(single_observations(measurements), _MOST)
+    near = select_spread_poses(separate_measurements(measurements), _MOST)
     some = measurements.select(near)
     few = len(measurements) <= _MOST
     return _Beside.of(
@@ -406,7 +416,7 @@ def describe_gross_errors(
 def format_gross_error_warnings(entries: list[dict[str, Any]]) -> list[str]:
     """A sentence for each of the first gross errors, and how many more there are."""
     more = len(entries) - _MOST_NAMED
-    rest = [f"{counted(more, 'further row')} left out"] if more > 0 else []
+    rest = [f"{format_count(more, 'further row')} left out"] if more > 0 else []
     return [entry["detail"] for entry in entries[:_MOST_NAMED]] + rest
 
 

@@ -32,7 +32,7 @@ import numpy as np
 from scipy.special import gammaln, logit, logsumexp
 
 from elastocal.effects.protocol import Candidate
-from elastocal.random_streams import stream
+from elastocal.random_streams import open_stream
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -306,7 +306,7 @@ def build_discrepancies(campaign: Conditions, features: int) -> list[Discrepancy
         }
         if any(each(campaign).size for each in inputs.values()):
             name = f"{cause}{words}"
-            draws = stream(
+            draws = open_stream(
                 _SEED,
                 f"other {name}",
                 "random Fourier features",

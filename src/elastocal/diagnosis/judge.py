@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.campaigns.campaign import NO_REMAINDER, Measurements, residual_columns
-from elastocal.counting import counted
+from elastocal.campaigns.campaign import NO_REMAINDER, Measurements, tabulate_residuals
+from elastocal.counting import format_count
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.gross_errors import (
     OutlierTest,
@@ -19,14 +19,23 @@ from elastocal.diagnosis.gross_errors import (
     format_gross_error_warnings,
 )
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.model import Case, conditions, measured_in_base, residuals
-from elastocal.fitting.noise import noise_from
-from elastocal.fitting.observations import single_observations, state_clusters
-from elastocal.random_streams import stream
+from elastocal.fitting.model import (
+    Case,
+    compute_residuals,
+    evaluate_conditions,
+    transform_to_base,
+)
+from elastocal.fitting.noise import parse_noise
+from elastocal.fitting.observations import index_poses, separate_measurements
+from elastocal.random_streams import open_stream
 from elastocal.remainder.corrected import Corrected, corrected, remainder_facts
 from elastocal.validation import held_out as figures
-from elastocal.validation.conformity import count_configurations, joint_ranges
-from elastocal.validation.placing import outside_poses, placed, repeat_warnings
+from elastocal.validation.conformity import count_configurations, find_joint_ranges
+from elastocal.validation.transfer import (
+    find_extrapolated_poses,
+    transfer_fit,
+    warn_of_repeated_poses,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -75,7 +84,10 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
     left_out = describe_gross_errors(errors, held_out.campaign, held_out=True)
     rows, heldout, warnings = compare_held_out_errors(steps, case, part, outside, seed)
     whole = (
-        [figures.summary(error.distance) for error in _errors(steps, case, held_out)[1]]
+        [
+            figures.summarize_errors(error.distance)
+            for error in _errors(steps, case, held_out)[1]
+        ]
         if left_out
         else []
     )
@@ -90,7 +102,7 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
         {"before": whole[_declared(steps)], "after": whole[-1]} if left_out else None
     )
     if left_out:
-        gross = counted(len(left_out), "gross error")
+        gross = format_count(len(left_out), "gross error")
         sizes = [1e3 * each["rms_m"] for each in (whole[-1], heldout["after"])]
         words = "with all rows the RMS is {:.3g} mm instead of {:.3g} mm".format(*sizes)
         warnings.append(f"held-out errors are without {gross}: {words}")
@@ -106,7 +118,7 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
     remainder = None
     delivered = apply_regression(diagnosis, part, seed)
     if delivered is not None:
-        draws = stream(seed, case.campaign.name, "remainder", 0)
+        draws = open_stream(seed, case.campaign.name, "remainder", 0)
         remainder = remainder_facts(
             delivered, diagnosis.declared, diagnosis.final, case, part, draws
         )
@@ -167,20 +179,20 @@ def remove_gross_errors(
     ones, (P,)."""
     final = diagnosis.final
     measurements = held_out.campaign.measurements
-    poses = outside_poses(final, diagnosis.case, held_out)
+    poses = find_extrapolated_poses(final, diagnosis.case, held_out)
     part = held_out
     errors = OutlierTest.none(len(measurements), held_out.model.rows)
     if data_at_fault(diagnosis.document):
         return errors, part, poses
     settings = Settings()
-    noise = noise_from(diagnosis.document).of_measurements
+    noise = parse_noise(diagnosis.document).without_pose_error
     yardstick = estimate_prediction_uncertainty(
         final, noise, diagnosis.case.campaign.measurements
     )
-    outside = poses[state_clusters(measurements)]
+    outside = poses[index_poses(measurements)]
     for _ in range(settings.gross_error_rounds):
         # Frames of another campaign are fitted to what is kept of it.
-        there = placed(final, diagnosis.case, part)
+        there = transfer_fit(final, diagnosis.case, part)
         last = errors.gross
         errors = find_held_out_gross_errors(
             final, there, yardstick, held_out, outside, settings
@@ -191,7 +203,7 @@ def remove_gross_errors(
     return (
         errors,
         part,
-        np.bincount(state_clusters(part.campaign.measurements), outside[~errors.gross])
+        np.bincount(index_poses(part.campaign.measurements), outside[~errors.gross])
         > 0,
     )
 
@@ -207,23 +219,27 @@ def compare_held_out_errors(
     there, errors = _errors(steps, case, held_out)
     before = _declared(steps)
     after = len(steps) - 1
-    draws = stream(seed, case.campaign.name, "held-out poses", 0)
-    limits, reductions = figures.intervals(errors, _REPLICATES, draws, before)
-    of_calibration = figures.intervals([errors[0], errors[after]], _REPLICATES, draws)[
-        1
-    ][1]
-    floor = figures.noise_floor(
+    draws = open_stream(seed, case.campaign.name, "held-out poses", 0)
+    limits, reductions = figures.compute_error_intervals(
+        errors, _REPLICATES, draws, before
+    )
+    of_calibration = figures.compute_error_intervals(
+        [errors[0], errors[after]], _REPLICATES, draws
+    )[1][1]
+    floor = figures.compute_noise_floor(
         steps[after].fitted, held_out.observations, *there[after]
     )
     rows = []
     warnings = []
     for step, error, limit in zip(steps, errors, limits, strict=True):
-        training = figures.summary(np.linalg.norm(step.fitted.residual[:, :3], axis=1))
-        tested = figures.summary(error.distance)
+        training = figures.summarize_errors(
+            np.linalg.norm(step.fitted.residual[:, :3], axis=1)
+        )
+        tested = figures.summarize_errors(error.distance)
         row: dict[str, Any] = {
             "step": step.name,
             "kind": step.kind,
-            "parameters": int((~step.fitted.held).sum()),
+            "parameters": int((~step.fitted.unidentifiable).sum()),
         }
         row |= {f"train_{name}": training[name] for name in figures.METRICS}
         for name in figures.METRICS:
@@ -248,27 +264,27 @@ def compare_held_out_errors(
             warnings.append(
                 f"the {_ERRORS[name]} {ABOUT_ERRORS} grew from {low:.3f} to {high:.3f} mm"
             )
-    by_range = figures.errors_by_range(
+    by_range = figures.summarize_errors_by_range(
         {"before": errors[before], "after": errors[after]}, outside
     )
     heldout = {
-        "uncalibrated": figures.summary(errors[0].distance)
+        "uncalibrated": figures.summarize_errors(errors[0].distance)
         | {"reduction_ci95": [of_calibration.low, of_calibration.high]},
-        "before": figures.summary(errors[before].distance),
-        "after": figures.summary(errors[after].distance),
+        "before": figures.summarize_errors(errors[before].distance),
+        "after": figures.summarize_errors(errors[after].distance),
         "noise_floor_rms_m": None if np.isnan(floor) else floor,
         "reduction_ci95": [reductions[after].low, reductions[after].high],
         "reduction_std_error": reductions[after].std_error,
         "poses": errors[0].poses,
         "configurations": count_configurations(held_out.observations.states),
-        "joint_ranges": joint_ranges(
+        "joint_ranges": find_joint_ranges(
             held_out.observations.states, held_out.campaign.robot
         ),
-        "share_below_max": figures.share_below_largest(errors[0].poses),
+        "share_below_max": figures.bound_share_below_maximum(errors[0].poses),
         "outside_range": by_range,
     }
     if count := by_range["poses"]:
-        lie = f"{count} of {counted(len(outside), 'validation pose')} {'lies' if count == 1 else 'lie'}"
+        lie = f"{count} of {format_count(len(outside), 'validation pose')} {'lies' if count == 1 else 'lie'}"
         warnings.append(
             f"{lie} outside the range of the fitted poses: errors there are extrapolated"
         )
@@ -276,18 +292,20 @@ def compare_held_out_errors(
         rows,
         heldout,
         warnings
-        + repeat_warnings(case.observations.states, held_out.observations.states),
+        + warn_of_repeated_poses(
+            case.observations.states, held_out.observations.states
+        ),
     )
 
 
 def _errors(
     steps: Sequence[Step], case: Case, held_out: Case
-) -> tuple[list[tuple[Model, Estimate]], list[figures.Errors]]:
+) -> tuple[list[tuple[Model, Estimate]], list[figures.PositionErrors]]:
     """Models of all steps, placed where held-out measurements were made, and their
     errors there."""
-    there = [placed(step.fitted, case, held_out) for step in steps]
+    there = [transfer_fit(step.fitted, case, held_out) for step in steps]
     return there, [
-        figures.position_errors(model, estimate, held_out.observations)
+        figures.compute_position_errors(model, estimate, held_out.observations)
         for model, estimate in there
     ]
 
@@ -308,7 +326,7 @@ def generate_residual_blocks(
         (case, diagnosis.left_out, False),
         (verdict.held_out, verdict.left_out, True),
     ):
-        there = [placed(fitted, case, part) for fitted in (before, after)]
+        there = [transfer_fit(fitted, case, part) for fitted in (before, after)]
         outside = (
             verdict.outside
             if unseen
@@ -316,19 +334,19 @@ def generate_residual_blocks(
         )
         measurements = part.campaign.measurements
         for some, beyond in (
-            (measurements, outside[state_clusters(measurements)]),
+            (measurements, outside[index_poses(measurements)]),
             (left_out, np.zeros(len(left_out), bool)),
         ):
             if not len(some):
                 continue
-            observations = single_observations(some)
+            observations = separate_measurements(some)
             off = {
-                stage: residuals(
-                    *each, observations, conditions(*each, observations.states)
+                stage: compute_residuals(
+                    *each, observations, evaluate_conditions(*each, observations.states)
                 )
                 for stage, each in zip(("before", "after"), there, strict=True)
             }
-            position = measured_in_base(there[-1][1], observations)[0]
-            yield residual_columns(
+            position = transform_to_base(there[-1][1], observations)[0]
+            yield tabulate_residuals(
                 some, unseen, some is left_out, beyond, position, off
             )

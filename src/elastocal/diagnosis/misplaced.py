@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.fitting.model import parameter_values
-from elastocal.fitting.noise import SIZES
+from elastocal.fitting.model import get_parameter_values
+from elastocal.fitting.noise import PRIOR_SCALES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -54,7 +54,7 @@ def find_misplaced_frames(fitted: Fit, campaign: Campaign) -> list[dict[str, Any
     it as well; ``shift_m`` (3,) in the axes of the base or of the far end of the link;
     ``sizes``, its length over the usual one; ``sentence``.
     """
-    free = np.flatnonzero(~fitted.held)
+    free = np.flatnonzero(~fitted.unidentifiable)
     effects = {effect.key: effect.effect for effect in fitted.model.effects}
     owners, listed = (
         zip(*(fitted.parameters[at] for at in free), strict=True)
@@ -64,7 +64,7 @@ def find_misplaced_frames(fitted: Fit, campaign: Campaign) -> list[dict[str, Any
     kinds = [effects.get(owner) for owner in owners]
     geometry = np.array([kind in (_BASE, _LINK, _OFFSET) for kind in kinds], bool)
     usual = np.array([parameter.plausible for parameter in listed])
-    values = parameter_values(fitted.model, fitted.estimate)[free]
+    values = get_parameter_values(fitted.model, fitted.estimate)[free]
     shifts = [
         n
         for n, kind in enumerate(kinds)
@@ -80,7 +80,7 @@ def find_misplaced_frames(fitted: Fit, campaign: Campaign) -> list[dict[str, Any
     wrong_m = max(_WRONG_M, float(np.abs(values[shifts]).max()))
     # What the measurements say, without the prior of the fit, and no more surely than
     # the model explains them.
-    off = fitted.whitened(fitted.residual)
+    off = fitted.whiten(fitted.residual)
     misfit = max(1.0, float((off**2).sum()) / max(off.size - len(free), 1))
     precision = np.linalg.inv(fitted.covariance[np.ix_(free, free)])
     weighted = precision @ values
@@ -94,7 +94,7 @@ def find_misplaced_frames(fitted: Fit, campaign: Campaign) -> list[dict[str, Any
         """Log evidence with the most probable size of all else, but for a constant, and
         the parameters then."""
         found = []
-        for size in SIZES:
+        for size in PRIOR_SCALES:
             prior = size * usual
             prior[wrong] = wrong_m
             whole = precision + np.diag(np.where(geometry, prior**-2.0, 0.0))

@@ -33,7 +33,7 @@ from elastocal.diagnosis.verdict import (
     Evidence,
     Hypothesis,
 )
-from elastocal.fitting.model import conditions
+from elastocal.fitting.model import evaluate_conditions
 from elastocal.fitting.observations import Observations, States
 from elastocal.mechanics.components import WRENCH_NAMES
 
@@ -128,7 +128,7 @@ def compute_whitened_rows(
     about = linearized.reference_fit
     products = linearized.products
     # Nothing comes after the last row of the campaign but these.
-    around = conditions(about.model, about.estimate, observations.states)
+    around = evaluate_conditions(about.model, about.estimate, observations.states)
     around = replace(around, progress=np.ones(len(observations.states)))
     about = replace(about, weights=np.ones(len(observations)))
     seen = replace(

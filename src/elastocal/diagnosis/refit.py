@@ -25,10 +25,10 @@ from elastocal.diagnosis.search import (
     ScoredModel,
     SearchProblem,
 )
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import parameter_values
-from elastocal.fitting.noise import with_prior
-from elastocal.fitting.normal_equations import whitening
+from elastocal.fitting.least_squares import fit_model
+from elastocal.fitting.model import get_parameter_values
+from elastocal.fitting.noise import set_prior_std
+from elastocal.fitting.normal_equations import compute_whitening
 
 if TYPE_CHECKING:
     from elastocal.diagnosis.candidate_design import CandidateDesign
@@ -57,7 +57,7 @@ def select_effects(linearized: CandidateDesign, model: ScoredModel) -> SelectedE
             size = min(scale, problem.grid.root_mean_square(unit))
             effects.append(
                 (
-                    with_prior(unit.candidate, size * unit.sizes),
+                    set_prior_std(unit.candidate, size * unit.sizes),
                     np.array(unit.shapes, float),
                 )
             )
@@ -88,11 +88,11 @@ def fit_selected_effects(
         met = {effect.key for effect in near.model.effects}
         values = zip((*model.effects, *effects), start.coefficients, strict=True)
         coefficients = tuple(
-            near.values_of(effect.key)[0] if effect.key in met else value
+            near.effect_values(effect.key)[0] if effect.key in met else value
             for effect, value in values
         )
         start = replace(near.estimate, coefficients=coefficients, shapes=start.shapes)
-    return fit(
+    return fit_model(
         model.with_effects(effects),
         observations,
         noise,
@@ -119,12 +119,13 @@ def predict_reduced_chi_square(problem: SearchProblem, model: ScoredModel) -> fl
 def compute_reduced_chi_square(fitted: Fit) -> float:
     """The same of an exact fit, over all that is left free, its priors included: 1
     where it left the noise that it has."""
-    white = fitted.whitened(fitted.residual)
+    white = fitted.whiten(fitted.residual)
     squares = (white**2).sum() + (
-        (parameter_values(fitted.model, fitted.estimate) / fitted.prior_std) ** 2
+        (get_parameter_values(fitted.model, fitted.estimate) / fitted.prior_std) ** 2
     ).sum()
     return float(
-        squares / (white.size - (np.isinf(fitted.prior_std) & ~fitted.held).sum())
+        squares
+        / (white.size - (np.isinf(fitted.prior_std) & ~fitted.unidentifiable).sum())
     )
 
 
@@ -132,11 +133,14 @@ def limit_pose_error(fitted: Fit, observations: Observations, pose_rad: float) -
     """Noise of measurements that a fit leaves if those of a pose have no more in
     common: by it the mean square stays."""
     noise = replace(fitted.noise, pose_rad=min(fitted.noise.pose_rad, pose_rad))
-    usual = (fitted.whitened(fitted.residual) ** 2).mean()
+    usual = (fitted.whiten(fitted.residual) ** 2).mean()
     residual = fitted.residual * np.sqrt(fitted.weights)[:, None]
     for _ in range(_NOISE_STEPS if fitted.joint_jacobian is not None else 0):
         over = (
-            whitening(observations, fitted.joint_jacobian, noise).apply(residual) ** 2
+            compute_whitening(observations, fitted.joint_jacobian, noise).apply(
+                residual
+            )
+            ** 2
         ).mean() / usual
         noise = noise.scaled(float(np.sqrt(over)))
         if over < 1.0 + _NOISE_SETTLED:

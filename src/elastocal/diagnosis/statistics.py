@@ -24,12 +24,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from elastocal.fitting.observations import groups_by_size
+from elastocal.fitting.observations import batch_groups_by_size
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from elastocal.fitting.linearization import Factored
+    from elastocal.fitting.linearization import FactoredSensitivities
 
 # Products of one pose with all columns that are in memory at once.
 _AT_ONCE = 1_000_000
@@ -51,7 +51,7 @@ class WhitenedRows:
     """
 
     declared: np.ndarray
-    candidates: Factored
+    candidates: FactoredSensitivities
     residual: np.ndarray
     jacobian: np.ndarray
     pose: np.ndarray
@@ -102,7 +102,7 @@ class CrossProducts:
         kept = np.append(np.arange(self.declared_count), -1)
         rows = replace(
             self.rows,
-            candidates=self.rows.candidates.of_columns(
+            candidates=self.rows.candidates.select_columns(
                 np.zeros(len(self.inside), bool)
             ),
         )
@@ -155,7 +155,7 @@ class CrossProducts:
                 if poses <= step
                 else self.basis_and_residual[seen]
             )
-            groups = groups_by_size(part.pose)
+            groups = batch_groups_by_size(part.pose)
             jacobian = np.empty((*part.jacobian.shape[:2], axes))
             found = np.empty((min(step, poses - start), axes, width))
             values = np.empty((min(step, poses - start), axes))
@@ -170,7 +170,7 @@ class CrossProducts:
                 together = turned.transpose(0, 2, 1) @ beside[members].reshape(flat)
                 found[mine, :, :count] = together[..., :-1]
                 found[mine, :, -1] = together[..., -1]
-            found[..., count:-1] = part.candidates.times_by_pose(jacobian, part.pose)
+            found[..., count:-1] = part.candidates.multiply_by_pose(jacobian, part.pose)
             every = found.reshape(-1, width)
             every[:, count:] -= every[:, :count] @ self.projections
             found[..., count:-1][..., self.inside] = 0.0
@@ -396,7 +396,7 @@ def simulate_null_statistics(
         drawn = white[chosen]
         by_pose = np.empty((*each.shape[:2], count))
         axes = each.shape[1]
-        for members in groups_by_size(part.pose):
+        for members in batch_groups_by_size(part.pose):
             turned = (
                 part.jacobian[members]
                 .reshape(len(members), -1, axes)

@@ -10,8 +10,8 @@ import numpy as np
 from elastocal.data_checks.faults import compliance_warnings
 from elastocal.diagnosis import model_averaging, refit, verdict
 from elastocal.diagnosis.gross_errors import format_gross_error_warnings
-from elastocal.fitting.model import joint_compliances
-from elastocal.fitting.noise import noise_facts
+from elastocal.fitting.model import get_joint_compliances
+from elastocal.fitting.noise import serialize_noise
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -169,7 +169,7 @@ def _document(
             )
     return stated | {
         "campaign": case.campaign.name,
-        "noise": noise_facts(noise)
+        "noise": serialize_noise(noise)
         | {
             "pose_rad": final.noise.pose_rad,
             "factor": final.noise.position_m / noise.position_m,
@@ -182,7 +182,9 @@ def _document(
         "held": sorted(
             {
                 f"{o} {p.name}"
-                for (o, p), held in zip(final.parameters, final.held, strict=True)
+                for (o, p), held in zip(
+                    final.parameters, final.unidentifiable, strict=True
+                )
                 if held
             }
         ),
@@ -198,11 +200,11 @@ def _compliances(
     declared: Fit, final: Fit, springs: model_averaging.ModelAverage, prior_share: float
 ) -> dict[str, list[float]]:
     joints = final.model.sites.joints
-    after = joint_compliances(final.model, final.estimate).copy()
+    after = get_joint_compliances(final.model, final.estimate).copy()
     deviations = np.zeros(joints)
     identified = np.zeros(joints, bool)
     if final.model.identifies_compliance:
-        mine = final.places_of("joint_compliance")
+        mine = final.parameter_indices("joint_compliance")
         names = [
             ("joint_compliance", final.parameters[index][1].name) for index in mine
         ]
@@ -217,11 +219,11 @@ def _compliances(
         # With a prior of the size that such a spring reaches, of which that share would
         # be left.
         plausible = np.array([final.parameters[index][1].plausible for index in mine])
-        identified = ~final.held[mine] & (
+        identified = ~final.unidentifiable[mine] & (
             deviations**2 < prior_share * (deviations**2 + plausible**2)
         )
     found = {
-        "before": joint_compliances(declared.model, declared.estimate),
+        "before": get_joint_compliances(declared.model, declared.estimate),
         "after": after,
         "std_error": deviations,
     }

@@ -18,15 +18,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.counting import plural
+from elastocal.counting import pluralize
 from elastocal.data_checks.protocol import OF_DATA, Fault
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.model_averaging import ModelAverage, compute_extra_squares
-from elastocal.effects.catalogue import effects
+from elastocal.effects.catalogue import list_effects
 from elastocal.effects.protocol import Candidate, Parameter, Shape
 from elastocal.effects.sizes import lever_m
-from elastocal.fitting.linearization import effect_columns
-from elastocal.fitting.model import joint_compliances
+from elastocal.fitting.linearization import compute_effect_sensitivities
+from elastocal.fitting.model import get_joint_compliances
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -342,9 +342,9 @@ def contradictions(final: Fit, measured: Noise, settings: Settings) -> list[str]
     )
     found += pose_error_warnings(final.noise, settings.largest_pose_error_rad)
     if final.model.identifies_compliance:
-        compliance = joint_compliances(final.model, final.estimate)
+        compliance = get_joint_compliances(final.model, final.estimate)
         deviation = np.sqrt(np.diag(final.covariance))[
-            final.places_of("joint_compliance")
+            final.parameter_indices("joint_compliance")
         ]
         found += [
             f"the compliance of joint {joint + 1} is negative by {-compliance[joint] / deviation[joint]:.1f} standard errors"
@@ -396,8 +396,8 @@ def location_words(mechanism: str, location: Sequence[int | str]) -> str:
         for named in (False, True)
     )
     # Numbers count joints, or links, which begin at the joint of the same number.
-    part = getattr(effects().get(mechanism), "part", "joint")
-    where = f"{plural(part, len(joints))} {' and '.join(joints)}" if joints else ""
+    part = getattr(list_effects().get(mechanism), "part", "joint")
+    where = f"{pluralize(part, len(joints))} {' and '.join(joints)}" if joints else ""
     return " ".join(filter(None, [where, *names])) or (
         "base" if mechanism == OTHER else ""
     )
@@ -509,8 +509,8 @@ def parameter_entries(
     with that of the joint that it turns most, which measurements tell.
     """
     effect = next(effect for effect in final.model.effects if effect.key == member.key)
-    mine = final.places_of(member.key)
-    values = np.concatenate(final.values_of(member.key))
+    mine = final.parameter_indices(member.key)
+    values = np.concatenate(final.effect_values(member.key))
     unknowns: list[Parameter | Shape] = [*effect.parameters, *effect.shapes]
     entries = [
         {
@@ -523,8 +523,8 @@ def parameter_entries(
             ),
             "unit": parameter.unit,
             "prior_std": getattr(parameter, "prior_std", None),
-            "held": bool(final.held[index]),
-            "identifiable": not final.held[index]
+            "held": bool(final.unidentifiable[index]),
+            "identifiable": not final.unidentifiable[index]
             and (member.key, parameter.name) not in averages.prior_dominated,
         }
         # Where a shape has no slope, such as the row of a step, a search has chosen it.
@@ -588,11 +588,11 @@ def sag_entries(
         return []
     jacobian = final.joint_jacobian[:, :3]
     laws = [(member.displacement, ()) for member in members]
-    around = final.conditions_of(observations.states)
-    columns = effect_columns(laws, around, jacobian, observations.state)
-    mine = np.concatenate([final.places_of(member.key) for member in members])
+    around = final.get_conditions(observations.states)
+    columns = compute_effect_sensitivities(laws, around, jacobian, observations.state)
+    mine = np.concatenate([final.parameter_indices(member.key) for member in members])
     sag = columns @ np.concatenate(
-        [final.values_of(member.key)[0] for member in members]
+        [final.effect_values(member.key)[0] for member in members]
     )
     most = int(np.argmax((sag**2).sum(axis=1)))
     size = float(np.linalg.norm(sag[most]))
@@ -641,9 +641,9 @@ def _estimates(
 ) -> Iterator[tuple[float, float, Parameter, bool]]:
     """Value, standard error and kind of each parameter of an effect, its shapes aside,
     and whether it is too large."""
-    errors = np.sqrt(np.diag(final.covariance)[final.places_of(effect.key)])
+    errors = np.sqrt(np.diag(final.covariance)[final.parameter_indices(effect.key)])
     for value, error, parameter in zip(
-        final.values_of(effect.key)[0], errors, effect.parameters, strict=False
+        final.effect_values(effect.key)[0], errors, effect.parameters, strict=False
     ):
         yield (
             value,

@@ -1,5 +1,5 @@
-"""All effects that are there: whatever a module of this package makes one by
-`effect`."""
+"""All effects that a model may lack: those of the modules of this package, and those
+that other installed packages offer by an entry point (see `io.plugins`)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import elastocal.effects
 from elastocal.effects.protocol import Effect, require_unique
 from elastocal.errors import InputError
-from elastocal.io.modules import module_names
+from elastocal.io import plugins
+from elastocal.io.modules import list_modules
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -20,47 +21,68 @@ if TYPE_CHECKING:
 
 
 @cache
-def effects() -> dict[str, Effect]:
-    """Effects of the catalogue by their names, sorted."""
+def list_effects() -> dict[str, Effect]:
+    """Effects of this package and of plug-ins, by name, sorted.
+
+    Raises `InputError`, which names the package: a plug-in cannot be loaded.
+    """
+    bundled = list_bundled_effects()
+    offered = plugins.load_plugins(plugins.EFFECTS, Effect, bundled)
+    return dict(sorted((bundled | offered).items()))
+
+
+@cache
+def list_bundled_effects() -> dict[str, Effect]:
+    """Effects of the modules of this package, by name, sorted."""
     modules = [
         import_module(f"elastocal.effects.{name}")
-        for name in module_names(elastocal.effects)
+        for name in list_modules(elastocal.effects)
     ]
-    found = {
-        id(each): each
+    # A module that imports an effect of another one does not define it again.
+    effects = {
+        id(value): value
         for module in modules
-        for each in vars(module).values()
-        if isinstance(each, Effect)
+        for value in vars(module).values()
+        if isinstance(value, Effect)
     }
-    require_unique([each.name for each in found.values()])
-    return dict(sorted((each.name, each) for each in found.values()))
+    require_unique([effect.name for effect in effects.values()])
+    return dict(sorted((effect.name, effect) for effect in effects.values()))
 
 
 def candidates_on(sites: Sites) -> dict[str, Candidate]:
-    """Every way in which an effect of the catalogue can act on a robot, by their
-    keys."""
-    found = [
-        candidate for each in effects().values() for candidate in each.candidates(sites)
+    """List every way in which an effect of the catalogue can act on a robot, by key."""
+    candidates = [
+        candidate
+        for effect in list_effects().values()
+        for candidate in effect.candidates(sites)
     ]
-    require_unique([candidate.key for candidate in found])
-    return {candidate.key: candidate for candidate in found}
+    require_unique([candidate.key for candidate in candidates])
+    return {candidate.key: candidate for candidate in candidates}
 
 
 def moves_robot(candidate: Candidate) -> bool:
-    """Whether a candidate moves the robot, as its effect says; springs and declared
-    weights, which are no effects, do."""
-    known = effects().get(candidate.effect)
-    return not candidate.of_setup and (known is None or known.moves_robot)
+    """Decide whether a candidate moves the robot, so that its tasks feel it.
+
+    Joint compliances and errors of declared masses, which are not effects of the
+    catalogue, move the robot too.
+    """
+    if candidate.of_setup:
+        return False
+    effect = list_effects().get(candidate.effect)
+    return effect is None or effect.moves_robot
 
 
 def declared_candidates(
     names: Iterable[str], sites: Sites, source: str = "declared"
 ) -> list[Candidate]:
-    """All candidates of the effects that a campaign declares; `InputError` with the
-    `source`: one that there is not."""
+    """List all candidates of the effects that a campaign declares.
+
+    Raises `InputError`, which names `source`: there is no effect of this name.
+    """
+    effects = list_effects()
+    candidates = []
     for name in names:
-        if name not in effects():
-            raise InputError(source, "declared", repr(name), ", ".join(effects()))
-    return [
-        candidate for name in names for candidate in effects()[name].candidates(sites)
-    ]
+        if name not in effects:
+            raise InputError(source, "declared", repr(name), ", ".join(effects))
+        candidates += effects[name].candidates(sites)
+    return candidates

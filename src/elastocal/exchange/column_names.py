@@ -17,7 +17,7 @@ from scipy import constants
 from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.tables import TextTable
-from elastocal.errors import InputError, closest_first
+from elastocal.errors import InputError, suggest_names
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 
@@ -275,7 +275,7 @@ def find_columns(
                 text.path,
                 "header",
                 f"no column {header!r}",
-                closest_first(header, list(text.columns)),
+                suggest_names(header, list(text.columns)),
             )
     of_joints = {
         _simplify(called): f"q{joint}"

@@ -16,8 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
-from elastocal.counting import counted
-from elastocal.errors import InputError, printable
+from elastocal.counting import format_count
+from elastocal.errors import InputError, format_printable
+from elastocal.io import plugins
 
 
 @dataclass(frozen=True)
@@ -81,7 +82,7 @@ def remarks(
     plain = [
         "".join(
             c if c.isascii() and (c.isalnum() or c in " .,:_+-/()") else "?"
-            for c in printable(note)
+            for c in format_printable(note)
         )
         for note in notes
     ]
@@ -194,7 +195,7 @@ _TP_AXES = tuple(f"J{axis}" for axis in range(1, 7))
 _TP_EXTERNAL = tuple(f"E{axis}" for axis in range(1, 4))
 _UR_AXES = ("base", "shoulder", "elbow", "wrist1", "wrist2", "wrist3")
 _NAMED = "letters, digits and underscores that begin with"
-_ALL = (
+_CONTROLLERS = (
     Controller(
         "krl", "KUKA KRL", ".src", tuple(f"A{axis}" for axis in range(1, 7)), tuple(f"E{axis}" for axis in range(1, 7)),
         r"[A-Za-z_]\w{0,23}", f"up to 24 {_NAMED} no digit", _krl,
@@ -212,19 +213,24 @@ _ALL = (
         r"[A-Za-z_]\w*", f"{_NAMED} no digit", _urscript,
     ),
 )  # fmt: skip
-CONTROLLERS = {each.name: each for each in _ALL}
+CONTROLLERS = {controller.name: controller for controller in _CONTROLLERS}
 
 
-def controller_of(name: str, suffix: str) -> Controller | None:
-    """The language of a name; without one that of a file's suffix, None where it is
-    none's. An unknown name is refused."""
-    if name and name not in CONTROLLERS:
-        raise InputError("--format", "", repr(name), " | ".join(CONTROLLERS))
-    return (
-        CONTROLLERS[name]
-        if name
-        else next((each for each in _ALL if suffix.lower() == each.suffix), None)
+def list_controllers() -> dict[str, Controller]:
+    """Languages of this package, and those that installed packages offer, by name."""
+    return CONTROLLERS | plugins.load_plugins(
+        plugins.CONTROLLERS, Controller, CONTROLLERS
     )
+
+
+def find_controller(name: str) -> Controller:
+    """Find a language by its name; `InputError`: there is no such language."""
+    if name in CONTROLLERS:
+        return CONTROLLERS[name]
+    controllers = list_controllers()
+    if name not in controllers:
+        raise InputError("--format", "", repr(name), " | ".join(controllers))
+    return controllers[name]
 
 
 def check_name(controller: Controller, path: Path) -> str:
@@ -259,17 +265,19 @@ def axes_of(
             or len(set(names)) < len(names)
             or not set(names) <= set(known)
         ):
-            allowed = f"{counted(len(prismatic), 'different name')}, of q1 to q{len(prismatic)}, of {', '.join(known)}"
+            allowed = f"{format_count(len(prismatic), 'different name')}, of q1 to q{len(prismatic)}, of {', '.join(known)}"
             raise InputError("--axes", "", repr(stated), allowed)
         return names
     shifts = sum(prismatic)
     if len(prismatic) - shifts != len(controller.axes) or shifts > len(
         controller.external
     ):
-        found = f"{counted(len(prismatic) - shifts, 'joint that turns', 'joints that turn')} and {shifts} that shift"
+        found = f"{format_count(len(prismatic) - shifts, 'joint that turns', 'joints that turn')} and {shifts} that shift"
         allowed = f"--axes with what {controller.words} calls each of q1 to q{len(prismatic)}: {', '.join(known)}"
         if not controller.external:
-            axes = counted(len(controller.axes), "joint that turns", "joints that turn")
+            axes = format_count(
+                len(controller.axes), "joint that turns", "joints that turn"
+            )
             allowed = f"{axes}, which is all that {controller.words} has"
         raise InputError("--format", controller.name, found, allowed)
     turning = iter(controller.axes)

@@ -36,8 +36,8 @@ from typing import Any
 import numpy as np
 
 from elastocal.campaigns.tables import Dialect, read_text_table
-from elastocal.counting import counted
-from elastocal.errors import InputError, closest_first
+from elastocal.counting import format_count
+from elastocal.errors import InputError, suggest_names
 from elastocal.exchange.column_names import ANGLE, LENGTH, UNITS, read_units, split_unit
 from elastocal.exchange.robot_text import (
     MOST_TURNS,
@@ -50,7 +50,7 @@ from elastocal.exchange.robot_text import (
     word,
 )
 from elastocal.io.documents import read_document
-from elastocal.io.texts import A_NUMBER, plain_number
+from elastocal.io.texts import NUMBER_ALLOWED, parse_number
 
 _KINDS = {"theta_offset": ANGLE, "d": LENGTH, "a": LENGTH, "alpha": ANGLE}
 _NEEDED = ("d", "a", "alpha")
@@ -175,7 +175,7 @@ def _read_table(
     for header in text.columns:
         name, stated = (header, None) if header in _WORDS else split_unit(header)
         if name not in (*_KINDS, *_WORDS):
-            allowed = f"{closest_first(header, _USUAL)}; import dh --ignore {header!r} leaves it out"
+            allowed = f"{suggest_names(header, _USUAL)}; import dh --ignore {header!r} leaves it out"
             raise InputError(source, "header", repr(header), allowed)
         if name in headers:
             raise InputError(source, "header", f"{name} twice", "each column once")
@@ -195,7 +195,7 @@ def _read_table(
         raise InputError(
             source,
             "",
-            counted(len(text.lines), "row"),
+            format_count(len(text.lines), "row"),
             f"at most {_MOST_ROWS}, one for each joint",
         )
     read = text.cells(
@@ -349,8 +349,10 @@ def _robot_from_kinematics(path: str | Path, name: str | None) -> Imported:
             raise InputError(source, where, found or "nothing", ", ".join(_KEYS))
         values: list[float] = []
         for key in _KEYS:
-            if (value := plain_number(str(origin[key]))) is None:
-                raise InputError(source, f"{where}.{key}", repr(origin[key]), A_NUMBER)
+            if (value := parse_number(str(origin[key]))) is None:
+                raise InputError(
+                    source, f"{where}.{key}", repr(origin[key]), NUMBER_ALLOWED
+                )
             values.append(value)
         words += [
             *displacement_words(origin_transform(values[:3], values[3:])),

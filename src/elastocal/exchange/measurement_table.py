@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from elastocal.campaigns.holdout import number_alike
-from elastocal.campaigns.measurements import file_columns
+from elastocal.campaigns.holdout import number_close_points
+from elastocal.campaigns.measurements import describe_columns
 from elastocal.campaigns.tables import Cells, Dialect, TextTable, read_text_table
-from elastocal.counting import counted
-from elastocal.errors import InputError, closest_first, text_fault
+from elastocal.counting import format_count
+from elastocal.errors import InputError, find_text_fault, suggest_names
 from elastocal.exchange.column_names import (
     HOMOGENEOUS_MATRICES,
     POSITION,
@@ -39,7 +39,7 @@ from elastocal.exchange.column_names import (
     rotation_vectors,
     scales_of,
 )
-from elastocal.io.texts import plain_number
+from elastocal.io.texts import parse_number
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 
@@ -152,7 +152,7 @@ def _times(read: Cells) -> np.ndarray:
     """Times (N,), s: of numbers, or of dates of ISO 8601: since 1970, at Greenwich
     without a zone."""
     cells = read.texts("time_s")
-    numbers = [plain_number(cell, _LARGEST_TIME) for cell in cells]
+    numbers = [parse_number(cell, _LARGEST_TIME) for cell in cells]
     if None not in numbers:
         return read.bounded("time_s", np.array(numbers, float) * read.scales["time_s"])
     with suppress(ValueError, OverflowError):
@@ -198,7 +198,7 @@ def read_measurement_table(
                 "--column",
                 "",
                 repr(name),
-                closest_first(name, [*file_columns(6), "qw", "e1", "r11", "t11"]),
+                suggest_names(name, [*describe_columns(6), "qw", "e1", "r11", "t11"]),
             )
 
     def is_header(cells: Sequence[str]) -> bool:
@@ -214,7 +214,7 @@ def read_measurement_table(
             any(name and find_joints([name]) for name in names) and len(cells) > 1
         )
         return has_position(names) or (
-            only_joints and not any(plain_number(cell) is not None for cell in cells)
+            only_joints and not any(parse_number(cell) is not None for cell in cells)
         )
 
     text = read_text_table(
@@ -360,7 +360,7 @@ def _check_complete(
         allowed = f"columns q1, q2 …{named}, --column q1=NAME, or --robot FILE with joint_names; not yet used: {unused}"
         raise InputError(text.path, "header", "no joint angles", allowed)
     if robot and len(angles) > robot.joints:
-        found = f"{counted(len(angles), 'joint')}: {', '.join(columns[name] for name in angles)}"
+        found = f"{format_count(len(angles), 'joint')}: {', '.join(columns[name] for name in angles)}"
         raise InputError(
             text.path,
             "header",
@@ -386,7 +386,8 @@ def _targets(read: Cells, name: str | None) -> np.ndarray:
         else [name or ""] * len(read.rows)
     )
     if fault := next(
-        (fault for each in dict.fromkeys(names) if (fault := text_fault(each))), None
+        (fault for each in dict.fromkeys(names) if (fault := find_text_fault(each))),
+        None,
     ):
         where = (
             (read.path, f"column {read.headers['target']}")
@@ -412,7 +413,7 @@ def _number_poses(read: Cells, angles: Sequence[str]) -> dict[str, np.ndarray]:
             else pd.factorize(pd.Series(labels))[0] + 1
         )
     else:
-        table["pose"] = number_alike(read.matrix(angles), SAME_POSE) + 1
+        table["pose"] = number_close_points(read.matrix(angles), SAME_POSE) + 1
     return table
 
 

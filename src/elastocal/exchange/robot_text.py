@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.counting import counted
-from elastocal.errors import InputError, reason_of
+from elastocal.counting import format_count
+from elastocal.errors import InputError, describe_os_error
 from elastocal.io.atomic_writes import check_places, write_text
-from elastocal.io.documents import check_document, one_line
+from elastocal.io.documents import check_document, format_one_line
 from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.robot_file import robot_from_document
 
@@ -96,11 +96,11 @@ def robot_text(result: Imported) -> str:
     body: list[str] = []
     for key, value in result.document.items():
         if key == "masses":
-            body += ["masses:", *(f"  - {one_line(entry)}" for entry in value)]
+            body += ["masses:", *(f"  - {format_one_line(entry)}" for entry in value)]
         else:
             # A name may have blanks that a break of the line would join.
             width = _WIDTH if key in ("chain", "joint_limits_deg") else 10**6
-            line = f"{key}: {one_line(value)}"
+            line = f"{key}: {format_one_line(value)}"
             body += textwrap.wrap(
                 line,
                 width,
@@ -117,14 +117,16 @@ def write_robot(result: Imported, path: str | Path) -> None:
     try:
         write_text(path, robot_text(result))
     except OSError as error:
-        raise InputError(path, "", reason_of(error), "a place for a file") from None
+        raise InputError(
+            path, "", describe_os_error(error), "a place for a file"
+        ) from None
 
 
 def summary(result: Imported) -> list[str]:
     """What was read, and what is to be known of it, in a few lines."""
     robot = result.robot
     shifts = sum(robot.chain.prismatic)
-    kinds = counted(robot.joints, "joint") + (
+    kinds = format_count(robot.joints, "joint") + (
         f", {shifts} of them prismatic" if shifts else ""
     )
     reach = math.fsum(abs(t.constant) for t in robot.chain.transforms if t.kind == "T")

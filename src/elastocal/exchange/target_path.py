@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.campaigns.measurements import FARTHEST_RAD
+from elastocal.campaigns.measurements import LARGEST_ROTATION_RAD
 from elastocal.campaigns.reading import find_degrees
 from elastocal.campaigns.tables import Dialect, read_text_table
-from elastocal.errors import InputError, closest_first
+from elastocal.errors import InputError, suggest_names
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 
@@ -65,7 +65,7 @@ def read_target_path(path: str | Path, joints: int) -> TargetPath:
     for name in cells:
         if name not in known:
             raise InputError(
-                path, header, f"the unknown column {name!r}", closest_first(name, known)
+                path, header, f"the unknown column {name!r}", suggest_names(name, known)
             )
 
     def group(names: tuple[str, ...]) -> np.ndarray | None:
@@ -87,7 +87,7 @@ def read_target_path(path: str | Path, joints: int) -> TargetPath:
         (
             np.linalg.norm(pose[:, 3:], axis=1),
             "turn",
-            FARTHEST_RAD,
+            LARGEST_ROTATION_RAD,
             "a rotation vector in rad, not degrees",
         ),
     ):

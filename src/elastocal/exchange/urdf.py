@@ -23,8 +23,8 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from elastocal.counting import first_names
-from elastocal.errors import InputError, closest_first
+from elastocal.counting import list_first
+from elastocal.errors import InputError, suggest_names
 from elastocal.exchange.robot_text import (
     Imported,
     check_imported,
@@ -34,7 +34,7 @@ from elastocal.exchange.robot_text import (
     origin_transform,
     point_name,
 )
-from elastocal.io.texts import LARGEST_NUMBER, plain_number, read_bytes
+from elastocal.io.texts import LARGEST_NUMBER, parse_number, read_bytes
 from elastocal.mechanics.robot import STANDARD_GRAVITY, UNLIMITED_DEG
 
 # The longest public descriptions, of humanoids with hands, have less than a megabyte.
@@ -274,7 +274,7 @@ def _numbers(
     largest = 1e100 if tag == "limit" else LARGEST_NUMBER
     words = text.split(None, count)
     numbers = [
-        number for each in words if (number := plain_number(each, largest)) is not None
+        number for each in words if (number := parse_number(each, largest)) is not None
     ]
     if not len(words) == len(numbers) == count:
         allowed = f"{'a number' if count == 1 else f'{count} numbers'}, up to {largest:g} in size"
@@ -408,7 +408,7 @@ def chain_between(
     for name in points:
         if name not in on_chain:
             allowed = (
-                f"a link between {base!r} and {tip!r}: {closest_first(name, on_chain)}"
+                f"a link between {base!r} and {tip!r}: {suggest_names(name, on_chain)}"
             )
             raise InputError(source, "point", repr(name), allowed)
     marked = {name: point_name(name) for name in (*points, tip)}
@@ -447,7 +447,7 @@ def _path(urdf: Urdf, base: str, tip: str, source: str) -> list[Joint]:
     for key, name in (("base", base), ("tip", tip)):
         if name not in names:
             raise InputError(
-                source, key, repr(name), f"a link: {closest_first(name, names)}"
+                source, key, repr(name), f"a link: {suggest_names(name, names)}"
             )
     path = urdf.path_to(tip, base)
     if base != (path[0].parent if path else tip):
@@ -508,7 +508,7 @@ def _weights(urdf: Urdf, chain: UrdfChain) -> tuple[list[dict[str, Any]], list[s
         ]
     notes = [] if moments else ["no masses: the weight of the links is not known"]
     if at_zero:
-        held = first_names(sorted(at_zero), _NAMED)
+        held = list_first(sorted(at_zero), _NAMED)
         notes.insert(
             0, f"joints beside the chain are held at zero for what they carry: {held}"
         )

@@ -15,7 +15,7 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from elastocal.counting import counted
+from elastocal.counting import format_count
 from elastocal.errors import InputError
 from elastocal.exchange.robot_text import (
     elementary,
@@ -102,7 +102,7 @@ def _ends_of(urdf: Urdf, robot: Robot, source: str) -> tuple[str, str]:
                 tuple(each.name for each in found.joints),
             ) and _is_same(chain, robot.chain):
                 return joint.parent, tip
-    wanted_joints = ", ".join(names or ()) or counted(robot.joints, "joint")
+    wanted_joints = ", ".join(names or ()) or format_count(robot.joints, "joint")
     raise InputError(
         source,
         "",

@@ -12,11 +12,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from elastocal.effects.catalogue import effects
+from elastocal.effects.catalogue import list_effects
 from elastocal.effects.conditions import conditions_of
 from elastocal.effects.protocol import Candidate
 from elastocal.figures.style import PALETTE, create_panels, styled
-from elastocal.fitting.model import displaced_by
+from elastocal.fitting.model import sum_displacements
 from elastocal.fitting.observations import States
 from elastocal.mechanics.kinematics import poses
 from elastocal.mechanics.robot import Robot
@@ -121,7 +121,7 @@ def compute_signature(name: str, robot: Robot) -> Signature:
         commanded = sites.chain.at(angles)
         displaced = commanded.copy()
         shapes = [shape.start for shape in candidate.shapes]
-        for coordinate, by in displaced_by(
+        for coordinate, by in sum_displacements(
             [(candidate, sizes, shapes)], around
         ).items():
             displaced[:, coordinate] += by
@@ -145,7 +145,7 @@ def compute_signature(name: str, robot: Robot) -> Signature:
 def list_candidates(name: str, robot: Robot) -> list[Candidate]:
     """Every way in which an effect can act on the arm of the figures, see
     `signature`."""
-    return effects()[name].candidates(_sites(name, robot))
+    return list_effects()[name].candidates(_sites(name, robot))
 
 
 def _sites(name: str, robot: Robot) -> Sites:
@@ -153,7 +153,7 @@ def _sites(name: str, robot: Robot) -> Sites:
     masses are declared."""
     weighed = replace(sites_of(robot), gear_ratio=(_GEAR_RATIO,) * robot.joints)
     bare = replace(weighed, masses=())
-    return bare if effects()[name].candidates(bare) else weighed
+    return bare if list_effects()[name].candidates(bare) else weighed
 
 
 @styled

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from elastocal.counting import counted, first_names
+from elastocal.counting import format_count, list_first
 from elastocal.figures.style import (
     MILLI,
     PALETTE,
@@ -243,7 +243,7 @@ def draw_before_after(
     """
     # Words, with the ends of long lists left out, in lines that fit beside the bars.
     labels = [
-        textwrap.fill(first_names(in_words(step["step"]).split(", "), _NAMES), _LINE)
+        textwrap.fill(list_first(in_words(step["step"]).split(", "), _NAMES), _LINE)
         for step in steps
     ]
     lines = [label.count("\n") + 1 for label in labels]
@@ -365,7 +365,7 @@ def draw_errors_by_campaign(table: pd.DataFrame) -> Figure:
     # A campaign with two sessions has two lines.
     names = names.where(
         ~names.duplicated(keep=False),
-        names + ", " + table["poses"].map(lambda count: counted(count, "pose")),
+        names + ", " + table["poses"].map(lambda count: format_count(count, "pose")),
     )
     axis.set_yticks(rows, names)
     axis.set(

@@ -10,21 +10,25 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 from scipy.special import gammaincinv
 
-from elastocal.campaigns.campaign import NOT_TURNED
+from elastocal.campaigns.campaign import NO_ROTATION
 from elastocal.effects.conditions import at_states
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import (
     Estimate,
-    conditions,
-    limits,
-    nonlinear_parameters,
-    of_placement,
-    parameter_values,
-    parameters,
-    stepped,
+    apply_step,
+    evaluate_conditions,
+    find_nonlinear_parameters,
+    find_placement_parameters,
+    get_parameter_bounds,
+    get_parameter_values,
+    list_parameters,
 )
-from elastocal.fitting.normal_equations import Parts, solve_normal, whitening
-from elastocal.fitting.observations import parts_of, sample_of
+from elastocal.fitting.normal_equations import (
+    LeastSquaresProblem,
+    compute_whitening,
+    solve_normal_equations,
+)
+from elastocal.fitting.observations import sample_observations, split_into_blocks
 from elastocal.mechanics.kinematics import poses_of_points
 
 if TYPE_CHECKING:
@@ -49,18 +53,18 @@ _STEPS = 30
 _HALVINGS = 6
 # Largest step that remains, in standard errors: in a fit, and in one from which others
 # start.
-SETTLED = 1e-3
-ON_THE_WAY = 0.1
+CONVERGENCE_TOLERANCE = 1e-3
+INTERMEDIATE_TOLERANCE = 0.1
 # A fit to more observations that does not come of a fit starts from the fit to so many
 # of them: they show the size of some fifty parameters as well as any number.
-STARTED_FROM = 2_000
+START_SAMPLE_SIZE = 2_000
 # Standard errors: a step that moves no parameter farther, and no shape, leaves its Gram
 # matrix to the next one: standard errors by it are as sure as an estimate is within
 # `SETTLED`.
 _NEAR = 0.3
 # A step by all of so many observations takes seconds: the last of some that a fit to
 # all takes follow a fit to so many.
-LONG = 100_000
+LARGE_FIT_SIZE = 100_000
 _STEPPING_STONE = 20_000
 # Loads are those of the step before: of a step so much is still to come, at most, by
 # deflection over reach.
@@ -79,7 +83,7 @@ _HUBER_QUANTILE = 0.99
 class Fit:
     """A model fitted to observations.
 
-    `held` (P,) of bool: parameters that are not identifiable from the data.
+    `unidentifiable` (P,) of bool: parameters that are not identifiable from the data.
     `covariance` (P, P): of the parameters: inverse of the normal matrix of the last
     step, which approximates the Hessian (Gauss-Newton); with priors as in Laplace's
     approximation (Tierney and Kadane, J. Am. Stat. Assoc. 81, 1986). Zero where held.
@@ -93,7 +97,7 @@ class Fit:
     model: Model
     estimate: Estimate
     noise: Noise
-    held: np.ndarray
+    unidentifiable: np.ndarray
     covariance: np.ndarray
     weights: np.ndarray
     whitener: Whitening
@@ -104,8 +108,8 @@ class Fit:
 
     @property
     def parameters(self) -> list[tuple[str, Parameter]]:
-        """As `model.parameters`."""
-        return parameters(self.model, self.estimate)
+        """As `model.list_parameters`."""
+        return list_parameters(self.model, self.estimate)
 
     @property
     def prior_std(self) -> np.ndarray:
@@ -118,23 +122,23 @@ class Fit:
             ]
         )
 
-    def places_of(self, owner: str) -> np.ndarray:
+    def parameter_indices(self, owner: str) -> np.ndarray:
         """Places among the parameters of those that belong to one owner, such as the
         key of an effect; ndarray of int."""
         return np.flatnonzero([each == owner for each, _ in self.parameters])
 
-    def values_of(self, key: str) -> tuple[np.ndarray, np.ndarray]:
+    def effect_values(self, key: str) -> tuple[np.ndarray, np.ndarray]:
         """Linear parameters (D,) and shapes (F,) of one effect."""
         number = [effect.key for effect in self.model.effects].index(key)
         return self.estimate.coefficients[number], self.estimate.shapes[number]
 
-    def whitened(self, values: np.ndarray) -> np.ndarray:
+    def whiten(self, values: np.ndarray) -> np.ndarray:
         """Rows (M, rows, ...) weighted and whitened as in the fit."""
         return self.whitener.apply(
             values * np.sqrt(self.weights).reshape(-1, *[1] * (values.ndim - 1))
         )
 
-    def sensitivities(
+    def iterate_sensitivities(
         self, observations: Observations
     ) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
         """Sensitivities of the observations that were fitted, as they are and whitened,
@@ -142,8 +146,10 @@ class Fit:
 
         Yields `seen`: observations of the part; `plain`, `whitened` (M', rows, P).
         """
-        for states, seen, part in parts_of(observations, len(self.held)):
-            around = self.conditions_of(
+        for states, seen, part in split_into_blocks(
+            observations, len(self.unidentifiable)
+        ):
+            around = self.get_conditions(
                 part.states, states if len(part) < len(observations) else None
             )
             line = linearize(self.model, self.estimate, part, around)
@@ -152,7 +158,7 @@ class Fit:
                 if self.joint_jacobian is None
                 else self.joint_jacobian[seen]
             )
-            white = whitening(part, jacobian, self.noise)
+            white = compute_whitening(part, jacobian, self.noise)
             yield (
                 seen,
                 line.sensitivities,
@@ -161,55 +167,62 @@ class Fit:
                 ),
             )
 
-    def conditions_of(self, states: States, chosen: slice | None = None) -> Conditions:
+    def get_conditions(self, states: States, chosen: slice | None = None) -> Conditions:
         """Conditions of the states, or of those chosen: as they were kept, or found
         again where they were too many."""
         if self.conditions is None:
-            return conditions(self.model, self.estimate, states)
+            return evaluate_conditions(self.model, self.estimate, states)
         return self.conditions if chosen is None else at_states(self.conditions, chosen)
 
 
-def fit(
+def fit_model(
     model: Model,
     observations: Observations,
     noise: Noise,
     start: Estimate | None = None,
-    reweighted: bool = False,
-    settled: float = SETTLED,
+    reweight_first_step: bool = False,
+    tolerance: float = CONVERGENCE_TOLERANCE,
 ) -> Fit:
     """Fit a model by robust generalized least squares and Gauss-Newton steps (Björck
     1996), see `robustly`.
 
-    `start`: of this model; by `registered` without. `reweighted`: whether the start
-    comes of a fit: outliers lose weight from the first step on. `settled`: largest step
+    `start`: of this model; by `registered` without. `reweight_first_step`: whether the start
+    comes of a fit: outliers lose weight from the first step on. `tolerance`: largest step
     that remains, in standard errors.
     """
-    for most in ([] if reweighted else [STARTED_FROM]) + (
-        [_STEPPING_STONE] if len(observations) > LONG else []
+    for most in ([] if reweight_first_step else [START_SAMPLE_SIZE]) + (
+        [_STEPPING_STONE] if len(observations) > LARGE_FIT_SIZE else []
     ):
-        few = sample_of(observations, most)
+        few = sample_observations(observations, most)
         if len(few) < len(observations):
             # Where all the measurements lead is close to where some of them do.
-            start = fit(model, few, noise, start, reweighted, ON_THE_WAY).estimate
-            reweighted = True
-    start = registered(model, observations) if start is None else start
-    return robustly(
-        model, observations, noise, start, reweighted=reweighted, settled=settled
+            start = fit_model(
+                model, few, noise, start, reweight_first_step, INTERMEDIATE_TOLERANCE
+            ).estimate
+            reweight_first_step = True
+    start = register_placement(model, observations) if start is None else start
+    return fit_robustly(
+        model,
+        observations,
+        noise,
+        start,
+        reweight_first_step=reweight_first_step,
+        tolerance=tolerance,
     )
 
 
-def evaluated(
+def evaluate_as_fit(
     model: Model, observations: Observations, noise: Noise, estimate: Estimate
 ) -> Fit:
     """An estimate as a fit to observations that it need not come of; they have weight
     one, whatever their distance."""
     return replace(
-        robustly(model, observations, noise, estimate, frozen=True),
+        fit_robustly(model, observations, noise, estimate, frozen=True),
         weights=np.ones(len(observations)),
     )
 
 
-def fit_frames(fitted: Fit, model: Model, observations: Observations) -> Estimate:
+def fit_placement(fitted: Fit, model: Model, observations: Observations) -> Estimate:
     """Fit frames and targets of other observations; everything else stays as it was
     found.
 
@@ -217,22 +230,24 @@ def fit_frames(fitted: Fit, model: Model, observations: Observations) -> Estimat
     """
     found = fitted.estimate
     start = replace(
-        registered(model, observations),
+        register_placement(model, observations),
         coefficients=found.coefficients,
         shapes=found.shapes,
     )
-    frozen = ~of_placement(owner for owner, _ in parameters(model, start))
-    return robustly(model, observations, fitted.noise, start, frozen).estimate
+    frozen = ~find_placement_parameters(
+        owner for owner, _ in list_parameters(model, start)
+    )
+    return fit_robustly(model, observations, fitted.noise, start, frozen).estimate
 
 
-def robustly(
+def fit_robustly(
     model: Model,
     observations: Observations,
     noise: Noise,
     estimate: Estimate,
     frozen: bool | np.ndarray = False,
-    reweighted: bool = False,
-    settled: float = SETTLED,
+    reweight_first_step: bool = False,
+    tolerance: float = CONVERGENCE_TOLERANCE,
 ) -> Fit:
     """Iteratively reweighted least squares with Huber's weights [1] by Gauss-Newton
     steps, each halved until it helps enough.
@@ -254,18 +269,18 @@ def robustly(
     comes of reweighted steps already.
 
     `estimate`: from which the first step is taken. `frozen` (P,) of bool: parameters
-    not to move. `reweighted`, `settled`: as in `fit`.
+    not to move. `reweight_first_step`, `tolerance`: as in `fit`.
 
     [1] Holland, P. W. and Welsch, R. E., Robust regression using iteratively reweighted least-squares, Communications in
         Statistics A6, 1977.
     """
     rows = observations.rows
-    listed = [parameter for _, parameter in parameters(model, estimate)]
+    listed = [parameter for _, parameter in list_parameters(model, estimate)]
     # Of chi-squared with as many degrees of freedom as a measurement has rows.
     corner, typical = np.sqrt(2 * gammaincinv(rows / 2, [_HUBER_QUANTILE, 0.5]) / rows)
-    nonlinear = nonlinear_parameters(model, estimate)
-    bounds = limits(model, estimate)
-    plausible = sizes_of(model, estimate)
+    nonlinear = find_nonlinear_parameters(model, estimate)
+    bounds = get_parameter_bounds(model, estimate)
+    plausible = get_plausible_sizes(model, estimate)
     penalty = np.array(
         [0.0 if p.prior_std is None else p.prior_std**-2 for p in listed]
     )
@@ -277,12 +292,12 @@ def robustly(
         if effect.effect == "joint_compliance" or "load" in effect.needs
     }
     yielding = np.array(
-        [owner in through for owner, _ in parameters(model, estimate)], bool
+        [owner in through for owner, _ in list_parameters(model, estimate)], bool
     )
 
     def objective(estimate: Estimate, squares: float) -> float:
         """Half the weighted squares of the residual and of what has a prior."""
-        return 0.5 * (squares + penalty @ parameter_values(model, estimate) ** 2)
+        return 0.5 * (squares + penalty @ get_parameter_values(model, estimate) ** 2)
 
     def solved(
         gram: np.ndarray,
@@ -292,7 +307,7 @@ def robustly(
     ) -> Solved:
         """Gauss-Newton step, covariance and what is held, as of `solve_normal`, within
         the ranges of the shapes."""
-        step, covariance, held = solve_normal(
+        step, covariance, held = solve_normal_equations(
             gram, along, plausible, frozen, penalty, present, nonlinear
         )
         # A shape that would leave its range goes to the end of it, and the others as
@@ -301,13 +316,13 @@ def robustly(
         if leaving.any():
             ends = np.clip(present + step, *bounds.T)[leaving] - present[leaving]
             rest = along - gram[:, leaving] @ (ends / plausible[leaving])
-            step = solve_normal(
+            step = solve_normal_equations(
                 gram, rest, plausible, frozen | leaving, penalty, present, nonlinear
             )[0]
             step[leaving] = ends
         return step, covariance, held
 
-    measurements = Parts(model, observations, noise, estimate, plausible)
+    measurements = LeastSquaresProblem(model, observations, noise, estimate, plausible)
     weights = np.ones(len(observations))
     measurements.linearize(estimate)
     scale = 1.0
@@ -318,12 +333,12 @@ def robustly(
         # Loads where the robot yielded to in the last step: a fixed point that the
         # steps bring about.
         measurements.whiten()
-        if number or reweighted:
+        if number or reweight_first_step:
             distance = measurements.distance()
             scale = max(np.median(distance) / typical, 1.0)
             weights = corner / np.maximum(distance / scale, corner)
         gram, along = measurements.normal_equations(weights, known)
-        present = parameter_values(model, estimate)
+        present = get_parameter_values(model, estimate)
         if known is None:
             step, covariance, held = solved(gram, along, present, frozen)
             deviation = np.sqrt(np.diag(covariance))
@@ -331,15 +346,17 @@ def robustly(
             step = covariance @ (along / plausible - penalty * present)
         # Standard errors of the errors that are there, which the noise may be less
         # than.
-        small = settled * (scale * deviation) + (deviation == 0)
+        small = tolerance * (scale * deviation) + (deviation == 0)
         # A small step under the loads of before a large one says nothing of what these
         # loads still bring about.
         coming = np.maximum(
             np.abs(step), _LAGGING * np.abs(last) * plausible * yielding
         )
-        converged = bool(number or reweighted) and bool((coming <= small).all())
+        converged = bool(number or reweight_first_step) and bool(
+            (coming <= small).all()
+        )
         if converged:
-            estimate = stepped(model, estimate, step)
+            estimate = apply_step(model, estimate, step)
             break
         # Weights and whitening follow the estimate. Where they throw it to and fro,
         # half the way lies between (relaxation of a fixed-point iteration): a step that
@@ -354,7 +371,7 @@ def robustly(
         acceleration = np.zeros(len(step))
         for halving in range(first, _HALVINGS + 1):
             share = 0.5**halving
-            estimate = stepped(model, origin, share * step + share**2 * acceleration)
+            estimate = apply_step(model, origin, share * step + share**2 * acceleration)
             measurements.linearize(estimate)
             after = objective(estimate, measurements.squares(weights))
             least = _LEAST_FALL * share * slope - _ROUNDING * max(before, 1.0)
@@ -369,11 +386,11 @@ def robustly(
                     there = measurements.normal_equations(weights)
                     rest = solved(
                         *there,
-                        parameter_values(model, estimate),
+                        get_parameter_values(model, estimate),
                         frozen | nonlinear | yielding,
                     )[0]
                     acceleration = rest / share**2
-                    estimate = stepped(
+                    estimate = apply_step(
                         model, origin, share * step + share**2 * acceleration
                     )
                     measurements.linearize(estimate)
@@ -384,7 +401,7 @@ def robustly(
                 )
                 known = (
                     gram
-                    if (number or reweighted) and not halving and near.all()
+                    if (number or reweight_first_step) and not halving and near.all()
                     else None
                 )
                 stuck = False
@@ -410,7 +427,7 @@ def robustly(
     )
 
 
-def sizes_of(model: Model, estimate: Estimate) -> np.ndarray:
+def get_plausible_sizes(model: Model, estimate: Estimate) -> np.ndarray:
     """Sizes of the parameters, ndarray (P,), beyond which a standard error means that
     the data do not identify them.
 
@@ -419,13 +436,16 @@ def sizes_of(model: Model, estimate: Estimate) -> np.ndarray:
     held there, without a standard error, once the noise turns out to be larger.
     """
     plausible = np.array(
-        [max(p.plausible, p.prior_std or 0.0) for _, p in parameters(model, estimate)]
+        [
+            max(p.plausible, p.prior_std or 0.0)
+            for _, p in list_parameters(model, estimate)
+        ]
     )
-    linear = ~nonlinear_parameters(model, estimate)
-    return np.maximum(plausible, linear * np.abs(parameter_values(model, estimate)))
+    linear = ~find_nonlinear_parameters(model, estimate)
+    return np.maximum(plausible, linear * np.abs(get_parameter_values(model, estimate)))
 
 
-def registered(model: Model, observations: Observations) -> Estimate:
+def register_placement(model: Model, observations: Observations) -> Estimate:
     """Frames and targets of a model that its nominal kinematics explain best, by
     alternating closed-form steps.
 
@@ -437,11 +457,13 @@ def registered(model: Model, observations: Observations) -> Estimate:
     Returns with all effects at zero, except that joint compliances start at their
     nominal values.
     """
-    observations = sample_of(observations, STARTED_FROM)
-    return registered_to(model, observations, *nominal_poses(model, observations))
+    observations = sample_observations(observations, START_SAMPLE_SIZE)
+    return register_to_poses(
+        model, observations, *compute_nominal_poses(model, observations)
+    )
 
 
-def nominal_poses(
+def compute_nominal_poses(
     model: Model, observations: Observations
 ) -> tuple[np.ndarray, np.ndarray]:
     """Positions (M, 3) and rotations (M, 3, 3) of measuring points on the nominal robot
@@ -455,7 +477,7 @@ def nominal_poses(
     return position[seen], rotation[seen]
 
 
-def registered_to(
+def register_to_poses(
     model: Model,
     observations: Observations,
     nominal_position: np.ndarray,
@@ -505,7 +527,7 @@ def registered_to(
         if np.abs(offsets - before).max() < _SETTLED_M:
             break
     turns = Rotation.from_rotvec(
-        [target.rotation or NOT_TURNED for target in model.targets]
+        [target.rotation or NO_ROTATION for target in model.targets]
     ).as_matrix()
     if observations.rotation is not None:
         turned = (

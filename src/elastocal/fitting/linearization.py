@@ -27,17 +27,17 @@ from elastocal.effects.conditions import (
     with_total,
 )
 from elastocal.fitting.model import (
-    SPRINGS,
-    displaced_by,
-    displaced_coordinates,
-    joint_compliances,
-    laws_of,
-    mass_corrections,
-    off_measured,
-    sprung,
-    target_points,
+    LOAD_EFFECTS,
+    compute_displaced_coordinates,
+    evaluate_basis_functions,
+    get_joint_compliances,
+    get_mass_corrections,
+    locate_targets,
+    subtract_prediction,
+    sum_displacements,
+    update_springs_and_masses,
 )
-from elastocal.fitting.observations import groups_by_size
+from elastocal.fitting.observations import batch_groups_by_size
 from elastocal.mechanics.kinematics import motion
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ _SPRING_STEP = 1e-4
 
 
 @dataclass(frozen=True)
-class Factored:
+class FactoredSensitivities:
     """Rows of K columns that displace coordinates, in two factors.
 
     Entries tell what a column does to a coordinate; those of one coordinate lie side by
@@ -84,7 +84,7 @@ class Factored:
         state: np.ndarray,
         states: int,
         sizes: np.ndarray | None = None,
-    ) -> Factored:
+    ) -> FactoredSensitivities:
         """Gather laws, one for each column, each a displacement of some coordinates in
         S `states`, times `sizes` (K,)."""
         count = Counter(coordinate for law in laws for coordinate in law)
@@ -100,15 +100,17 @@ class Factored:
         _, coordinates, columns = np.array(entries, int).reshape(-1, 3).T
         return cls(len(laws), values, coordinates, columns, jacobian, state)
 
-    def of_columns(self, kept: np.ndarray) -> Factored:
+    def select_columns(self, kept: np.ndarray) -> FactoredSensitivities:
         """The same of some of the columns, ndarray of bool (K,), which are numbered
         anew."""
         mine = kept[self.column]
         number = np.cumsum(kept) - 1
         entries = self.values[mine], self.coordinate[mine], number[self.column[mine]]
-        return Factored(int(kept.sum()), *entries, self.jacobian, self.state)
+        return FactoredSensitivities(
+            int(kept.sum()), *entries, self.jacobian, self.state
+        )
 
-    def at(self, seen: np.ndarray) -> Factored:
+    def at(self, seen: np.ndarray) -> FactoredSensitivities:
         """The same of some of the observations, ndarray of bool (M,), whose states are
         numbered anew."""
         states, state = np.unique(self.state[seen], return_inverse=True)
@@ -150,7 +152,7 @@ class Factored:
         right = left if right is None else right
         shape, states = (left.shape[2], right.shape[2]), self.values.shape[1]
         step = max(_AT_ONCE // max(shape[0] * shape[1], 1), 1)
-        groups = groups_by_size(self.state)
+        groups = batch_groups_by_size(self.state)
         for start in range(0, states, step):
             found = np.zeros((min(step, states - start), *shape))
             for each in groups:
@@ -193,7 +195,7 @@ class Factored:
                 found[span] += self.values[span, states] @ products[:, number]
         return self._fold @ found
 
-    def times_by_pose(self, right: np.ndarray, pose: np.ndarray) -> np.ndarray:
+    def multiply_by_pose(self, right: np.ndarray, pose: np.ndarray) -> np.ndarray:
         """Products of the columns with other rows (M, rows, n), of the measurements of
         each pose, ndarray (G, n, K).
 
@@ -204,7 +206,7 @@ class Factored:
         of_state[self.state] = pose
         found = np.zeros((len(self.values), *shape))
         for states, products in self._products(right):
-            for members in groups_by_size(of_state[states]):
+            for members in batch_groups_by_size(of_state[states]):
                 at = of_state[states][members[:, 0]]
                 for number, (_, span) in enumerate(self.spans):
                     some = self.values[span, states][:, members].transpose(1, 0, 2)
@@ -235,7 +237,7 @@ class Factored:
 
 
 @dataclass(frozen=True)
-class Linearization:
+class LinearModel:
     """A model about an estimate, for M observations.
 
     `residual` (M, rows): measured less predicted, base axes, m and rad. `columns`:
@@ -245,7 +247,7 @@ class Linearization:
     """
 
     residual: np.ndarray
-    columns: Factored
+    columns: FactoredSensitivities
     coordinates: np.ndarray
     conditions: Conditions
 
@@ -268,15 +270,15 @@ class Linearization:
 
 def linearize(
     model: Model, estimate: Estimate, observations: Observations, conditions: Conditions
-) -> Linearization:
+) -> LinearModel:
     """Residuals of a model and their sensitivities; arguments as of `predict`.
 
     Sensitivities are analytic, but for shapes (central differences) and for what
     springs do by way of other effects (forward differences).
     """
-    around = sprung(model, estimate, conditions)
+    around = update_springs_and_masses(model, estimate, conditions)
     states = observations.states
-    found = by_coordinates(model, estimate, observations, around)
+    found = linearize_coordinates(model, estimate, observations, around)
     laws = []
     for session in estimate.sessions if model.fitted_frames else ():
         in_session = (states.session == session).astype(float)
@@ -288,31 +290,31 @@ def linearize(
     ):
         laws += (
             _spring_laws(effect, model, estimate, around)
-            if effect.effect in SPRINGS
-            else laws_of(effect, shapes, around)
+            if effect.effect in LOAD_EFFECTS
+            else evaluate_basis_functions(effect, shapes, around)
         )
         laws += _shape_laws(effect, values, shapes, around)
     return replace(
         found,
-        columns=Factored.of(
+        columns=FactoredSensitivities.of(
             laws, found.columns.jacobian, observations.state, len(states)
         ),
     )
 
 
-def by_coordinates(
+def linearize_coordinates(
     model: Model, estimate: Estimate, observations: Observations, conditions: Conditions
-) -> Linearization:
+) -> LinearModel:
     """The same without sensitivities to parameters: no columns beside the Jacobian."""
-    around = sprung(model, estimate, conditions)
-    coordinates = displaced_coordinates(model, estimate, around)
+    around = update_springs_and_masses(model, estimate, conditions)
+    coordinates = compute_displaced_coordinates(model, estimate, around)
     count = len(observations)
     rows = model.rows
     chain = model.sites.chain
-    points = target_points(model, estimate)
+    points = locate_targets(model, estimate)
     placed = [
         (index, part)
-        for index, parts in model.fitted_parts
+        for index, parts in model.fitted_target_components
         for part in range(parts.start, parts.stop, 3)
     ]
     moved = motion(chain, coordinates, (*model.sites.followed, *points))
@@ -334,7 +336,7 @@ def by_coordinates(
         jacobian[:, : chain.coordinates, seen] = moved.jacobian(
             point.after, at, rows, state
         )
-    residual = off_measured(
+    residual = subtract_prediction(
         estimate,
         observations,
         position,
@@ -349,13 +351,13 @@ def by_coordinates(
         jacobian[part : part + 3, first : first + 3, seen] = rotation[seen].transpose(
             1, 2, 0
         )
-    columns = Factored.of(
+    columns = FactoredSensitivities.of(
         [], np.moveaxis(jacobian, -1, 0), observations.state, len(observations.states)
     )
-    return Linearization(residual, columns, coordinates, replace(around, motion=moved))
+    return LinearModel(residual, columns, coordinates, replace(around, motion=moved))
 
 
-def effect_columns(
+def compute_effect_sensitivities(
     effects: Iterable[tuple[Law, Iterable[float]]],
     around: Conditions,
     jacobian: np.ndarray,
@@ -367,7 +369,9 @@ def effect_columns(
     laws = [
         law for displacement, shapes in effects for law in displacement(around, *shapes)
     ]
-    return Factored.of(laws, jacobian, state, len(around.joint_angles), sizes).dense()
+    return FactoredSensitivities.of(
+        laws, jacobian, state, len(around.joint_angles), sizes
+    ).dense()
 
 
 def _shape_laws(
@@ -382,7 +386,7 @@ def _shape_laws(
         step = _SHAPE_STEP * max(abs(shapes[number]), shape.lowest, 0.1 * shape.highest)
         off = step * (np.arange(len(shapes)) == number)
         above, below = (
-            displaced_by([(effect, values, at)], conditions)
+            sum_displacements([(effect, values, at)], conditions)
             for at in (shapes + off, shapes - off)
         )
         yield {
@@ -410,12 +414,12 @@ def _spring_laws(
         if (
             found[0].family in ("gravity", "load")
             if springs
-            else "load" in found[0].needs and found[0].effect not in SPRINGS
+            else "load" in found[0].needs and found[0].effect not in LOAD_EFFECTS
         )
     ]
     if not others:
         return laws
-    present = [displaced_by([other], around) for other in others]
+    present = [sum_displacements([other], around) for other in others]
     place = around.motion.place
     coordinates = sorted(
         {coordinate for each in present for coordinate in each},
@@ -426,8 +430,8 @@ def _spring_laws(
     )
     if springs:
         every = {*coordinates}
-        values = joint_compliances(model, estimate)
-        corrections = mass_corrections(model, estimate)
+        values = get_joint_compliances(model, estimate)
+        corrections = get_mass_corrections(model, estimate)
         sprung: Iterable[Any] = (
             (every, with_springs(around, values + row, corrections))
             for row in np.diag(steps)
@@ -436,7 +440,9 @@ def _spring_laws(
         sprung = _with_each_correction(around, coordinates, steps)
     for law, step, (loaded, changed) in zip(laws, steps, sprung, strict=True):
         for other, before in zip(others, present, strict=True):
-            moved = {} if loaded.isdisjoint(before) else displaced_by([other], changed)
+            moved = (
+                {} if loaded.isdisjoint(before) else sum_displacements([other], changed)
+            )
             for coordinate, by in moved.items():
                 by -= before[coordinate]
                 if by.any():

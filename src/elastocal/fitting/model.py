@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.campaigns.campaign import Campaign, assemble_campaign, measurements_from
+from elastocal.campaigns.campaign import Campaign, assemble_campaign, build_measurements
 from elastocal.effects.catalogue import candidates_on, declared_candidates
 from elastocal.effects.conditions import (
     MASS_PARAMETERS,
@@ -22,8 +22,8 @@ from elastocal.effects.gravity import DECLARED_WEIGHT, declared_weight
 from elastocal.effects.protocol import Candidate, Parameter, moved_and_turned
 from elastocal.fitting.observations import (
     Observations,
-    averaged,
-    without_outlying_repeats,
+    average_repeats,
+    remove_outlying_repeats,
 )
 from elastocal.mechanics.kinematics import motion, pose_differences, poses_of_points
 from elastocal.mechanics.robot_file import robot_from_document
@@ -47,7 +47,7 @@ _ANYWHERE_RAD = 1.0
 _PASSES = 2
 # Effects on which the laws of others depend: they turn a wrench into angles, or are
 # part of the load.
-SPRINGS = ("joint_compliance", DECLARED_WEIGHT)
+LOAD_EFFECTS = ("joint_compliance", DECLARED_WEIGHT)
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class Model:
         )
 
     @property
-    def fitted_parts(self) -> list[tuple[int, slice]]:
+    def fitted_target_components(self) -> list[tuple[int, slice]]:
         """Targets that are fitted, and which of shift and turn (x, y, z, rx, ry, rz)
         are."""
         ends = [
@@ -109,7 +109,7 @@ class Model:
             if first < last
         ]
 
-    def offered(self, states: States) -> frozenset[str]:
+    def available_inputs(self, states: States) -> frozenset[str]:
         """What effects may need that some states and the campaign have: see
         `Candidate.needs`."""
         return offered(self.sites, states) | (
@@ -157,7 +157,9 @@ class Estimate:
         )
 
 
-def declared_model(campaign: Campaign, effects: Iterable[Candidate] = ()) -> Model:
+def build_declared_model(
+    campaign: Campaign, effects: Iterable[Candidate] = ()
+) -> Model:
     """The model that a campaign declares, with its declared effects."""
     sites = sites_of(campaign.robot)
     measurements = campaign.measurements
@@ -182,7 +184,7 @@ def declared_model(campaign: Campaign, effects: Iterable[Candidate] = ()) -> Mod
     )
 
 
-def parameters(model: Model, estimate: Estimate) -> list[tuple[str, Parameter]]:
+def list_parameters(model: Model, estimate: Estimate) -> list[tuple[str, Parameter]]:
     """Everything that is fitted, in the order of the sensitivities.
 
     Returns (str, Parameter): what it belongs to ("frame 0", "target A", the key of an
@@ -196,7 +198,7 @@ def parameters(model: Model, estimate: Estimate) -> list[tuple[str, Parameter]]:
             for session in estimate.sessions
             for parameter in placed
         ]
-    for number, parts in model.fitted_parts:
+    for number, parts in model.fitted_target_components:
         found += [
             (f"target {model.targets[number].name}", parameter)
             for parameter in placed[parts]
@@ -210,12 +212,12 @@ def parameters(model: Model, estimate: Estimate) -> list[tuple[str, Parameter]]:
     return found
 
 
-def of_placement(owners: Iterable[str]) -> np.ndarray:
+def find_placement_parameters(owners: Iterable[str]) -> np.ndarray:
     """Which of some owners of parameters are frames and targets, ndarray of bool."""
     return np.array([owner.startswith(("frame ", "target ")) for owner in owners], bool)
 
 
-def limits(model: Model, estimate: Estimate) -> np.ndarray:
+def get_parameter_bounds(model: Model, estimate: Estimate) -> np.ndarray:
     """Lowest and highest value of each of the `parameters`, ndarray (P, 2): the ranges
     of shapes, infinite for all others."""
     ranges = {
@@ -226,12 +228,12 @@ def limits(model: Model, estimate: Estimate) -> np.ndarray:
     return np.array(
         [
             ranges.get((o, p.name), (-np.inf, np.inf))
-            for o, p in parameters(model, estimate)
+            for o, p in list_parameters(model, estimate)
         ]
     ).reshape(-1, 2)
 
 
-def nonlinear_parameters(model: Model, estimate: Estimate) -> np.ndarray:
+def find_nonlinear_parameters(model: Model, estimate: Estimate) -> np.ndarray:
     """Which of the `parameters` are shapes, which alone have limits, ndarray of bool
     (P,)."""
     shapes = [
@@ -240,11 +242,11 @@ def nonlinear_parameters(model: Model, estimate: Estimate) -> np.ndarray:
         for shape in (False,) * len(effect.parameters) + (True,) * len(effect.shapes)
     ]
     return np.array(
-        [False] * (len(parameters(model, estimate)) - len(shapes)) + shapes, bool
+        [False] * (len(list_parameters(model, estimate)) - len(shapes)) + shapes, bool
     )
 
 
-def parameter_values(model: Model, estimate: Estimate) -> np.ndarray:
+def get_parameter_values(model: Model, estimate: Estimate) -> np.ndarray:
     """Present values of the `parameters`, ndarray (P,); frames and targets are fitted
     by steps and count as zero."""
     effects = [
@@ -253,11 +255,14 @@ def parameter_values(model: Model, estimate: Estimate) -> np.ndarray:
         for part in pair
     ]
     return np.concatenate(
-        [np.zeros(len(parameters(model, estimate)) - sum(map(len, effects))), *effects]
+        [
+            np.zeros(len(list_parameters(model, estimate)) - sum(map(len, effects))),
+            *effects,
+        ]
     )
 
 
-def stepped(model: Model, estimate: Estimate, step: np.ndarray) -> Estimate:
+def apply_step(model: Model, estimate: Estimate, step: np.ndarray) -> Estimate:
     """An estimate after a step (P,) of all `parameters`; shapes stay in their
     ranges."""
 
@@ -279,7 +284,7 @@ def stepped(model: Model, estimate: Estimate, step: np.ndarray) -> Estimate:
             )
     target_offset = estimate.target_offset.copy()
     target_rotation = estimate.target_rotation.copy()
-    for number, parts in model.fitted_parts:
+    for number, parts in model.fitted_target_components:
         moved = np.zeros(6)
         moved[parts] = take(parts.stop - parts.start)
         target_offset[number] += moved[:3]
@@ -300,7 +305,7 @@ def stepped(model: Model, estimate: Estimate, step: np.ndarray) -> Estimate:
     return Estimate(estimate.sessions, *placed, tuple(coefficients), tuple(shapes))
 
 
-def conditions(
+def evaluate_conditions(
     model: Model,
     estimate: Estimate,
     states: States,
@@ -311,7 +316,10 @@ def conditions(
 
     `coordinates` (S, C): where the robot has yielded to; found without.
     """
-    springs = joint_compliances(model, estimate), mass_corrections(model, estimate)
+    springs = (
+        get_joint_compliances(model, estimate),
+        get_mass_corrections(model, estimate),
+    )
     around = conditions_of(
         model.sites,
         springs[0],
@@ -322,20 +330,20 @@ def conditions(
         coordinates,
     )
     for _ in range(_PASSES if coordinates is None else 0):
-        displaced = displaced_coordinates(model, estimate, around)
+        displaced = compute_displaced_coordinates(model, estimate, around)
         around = replace(
             around, motion=motion(model.sites.chain, displaced, model.sites.followed)
         )
     return around
 
 
-def joint_compliances(model: Model, estimate: Estimate) -> np.ndarray:
+def get_joint_compliances(model: Model, estimate: Estimate) -> np.ndarray:
     """Joint compliances of an estimate, ndarray (n,), rad/(N m): the identified ones
     where they are parameters."""
     return _values_of("joint_compliance", model, estimate, model.nominal_compliance)
 
 
-def mass_corrections(model: Model, estimate: Estimate) -> np.ndarray:
+def get_mass_corrections(model: Model, estimate: Estimate) -> np.ndarray:
     """By how much the declared masses of an estimate are off the robot file, ndarray (4
     m,): see `Conditions`."""
     return _values_of(
@@ -346,10 +354,14 @@ def mass_corrections(model: Model, estimate: Estimate) -> np.ndarray:
     )
 
 
-def sprung(model: Model, estimate: Estimate, around: Conditions) -> Conditions:
+def update_springs_and_masses(
+    model: Model, estimate: Estimate, around: Conditions
+) -> Conditions:
     """Conditions with the springs and the masses of an estimate."""
     return with_springs(
-        around, joint_compliances(model, estimate), mass_corrections(model, estimate)
+        around,
+        get_joint_compliances(model, estimate),
+        get_mass_corrections(model, estimate),
     )
 
 
@@ -362,7 +374,7 @@ def _values_of(
     return otherwise
 
 
-def displaced_coordinates(
+def compute_displaced_coordinates(
     model: Model, estimate: Estimate, conditions: Conditions
 ) -> np.ndarray:
     """Coordinates of the sites in each state, ndarray (S, C): joint angles, springs
@@ -371,28 +383,30 @@ def displaced_coordinates(
     Springs yield to the total load, the external one and the weight that the robot file
     declares.
     """
-    around = sprung(model, estimate, conditions)
+    around = update_springs_and_masses(model, estimate, conditions)
     # Component first, as kinematics look at them.
     displaced = np.zeros((model.sites.chain.coordinates, len(around.joint_angles))).T
     displaced[:, : model.sites.joints] = (
         around.joint_angles + around.total[:, : model.sites.joints] * around.compliance
     )
     effects = zip(model.effects, estimate.coefficients, estimate.shapes, strict=True)
-    for coordinate, by in displaced_by(
-        (each for each in effects if each[0].effect not in SPRINGS), around
+    for coordinate, by in sum_displacements(
+        (each for each in effects if each[0].effect not in LOAD_EFFECTS), around
     ).items():
         displaced[:, coordinate] += by
     return displaced
 
 
-def displaced_by(
+def sum_displacements(
     effects: Iterable[tuple[Candidate, np.ndarray, Iterable[float]]], around: Conditions
 ) -> dict[int, np.ndarray]:
     """What effects, with their linear parameters (D,) and their shapes (F,), do
     together to each coordinate, (S,)."""
     displaced: dict[int, np.ndarray] = {}
     for effect, values, shapes in effects:
-        for value, law in zip(values, laws_of(effect, shapes, around), strict=True):
+        for value, law in zip(
+            values, evaluate_basis_functions(effect, shapes, around), strict=True
+        ):
             for coordinate, per_unit in law.items():
                 by = value * per_unit
                 displaced[coordinate] = (
@@ -403,7 +417,7 @@ def displaced_by(
     return displaced
 
 
-def laws_of(
+def evaluate_basis_functions(
     effect: Candidate, shapes: Iterable[float], around: Conditions
 ) -> list[dict[int, np.ndarray]]:
     """Displacements per unit of each linear parameter of an effect, those that no step
@@ -420,9 +434,9 @@ def predict(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Exact poses of the targets, in base axes: positions (M, 3) and rotations (M, 3,
     3); `around`: of their states."""
-    coordinates = displaced_coordinates(model, estimate, around)
+    coordinates = compute_displaced_coordinates(model, estimate, around)
     position, rotation = poses_of_points(
-        model.sites.chain, coordinates, target_points(model, estimate)
+        model.sites.chain, coordinates, locate_targets(model, estimate)
     )
     seen = observations.target, observations.state
     return position[seen], rotation[seen] @ estimate.target_rotation[
@@ -430,7 +444,7 @@ def predict(
     ]
 
 
-def target_points(model: Model, estimate: Estimate) -> list[MeasuringPoint]:
+def locate_targets(model: Model, estimate: Estimate) -> list[MeasuringPoint]:
     """The targets as points of the kinematic chain, where an estimate has them."""
     points = [model.sites.chain.point(target.point) for target in model.targets]
     return [
@@ -439,17 +453,17 @@ def target_points(model: Model, estimate: Estimate) -> list[MeasuringPoint]:
     ]
 
 
-def residuals(
+def compute_residuals(
     model: Model, estimate: Estimate, observations: Observations, conditions: Conditions
 ) -> np.ndarray:
     """Measured less predicted, ndarray (M, rows): base axes, m and, where poses are
     measured, rad; arguments of `predict`."""
-    return off_measured(
+    return subtract_prediction(
         estimate, observations, *predict(model, estimate, observations, conditions)
     )
 
 
-def off_measured(
+def subtract_prediction(
     estimate: Estimate,
     observations: Observations,
     position: np.ndarray,
@@ -457,7 +471,7 @@ def off_measured(
 ) -> np.ndarray:
     """Measured less predicted, as `residuals`, of poses (M, 3), (M, 3, 3) as by
     `predict`."""
-    measured, turned = measured_in_base(estimate, observations)
+    measured, turned = transform_to_base(estimate, observations)
     return (
         measured - position
         if turned is None
@@ -465,7 +479,7 @@ def off_measured(
     )
 
 
-def measured_in_base(
+def transform_to_base(
     estimate: Estimate, observations: Observations
 ) -> tuple[np.ndarray, np.ndarray | None]:
     """Measured positions (M, 3) and rotations (M, 3, 3), taken from the frames of the
@@ -506,11 +520,11 @@ class Case:
         return replace(
             self,
             campaign=some,
-            observations=averaged(without_outlying_repeats(some.measurements)),
+            observations=average_repeats(remove_outlying_repeats(some.measurements)),
         )
 
 
-def case_from(
+def build_case(
     descriptions: Mapping[str, Any], columns: Mapping[str, np.ndarray]
 ) -> Case:
     """Put a campaign together from its description, as step 1 writes it, and the
@@ -518,10 +532,10 @@ def case_from(
     source = descriptions["source"]
     robot = robot_from_document(descriptions["robot"], source)
     campaign = assemble_campaign(
-        descriptions["campaign"], robot, measurements_from(columns), source
+        descriptions["campaign"], robot, build_measurements(columns), source
     )
     sites = sites_of(campaign.robot)
-    model = declared_model(
+    model = build_declared_model(
         campaign, declared_candidates(campaign.declared, sites, source)
     )
     candidates = {
@@ -531,7 +545,7 @@ def case_from(
     }
     return Case(
         campaign,
-        averaged(without_outlying_repeats(campaign.measurements)),
+        average_repeats(remove_outlying_repeats(campaign.measurements)),
         model,
         candidates,
     )

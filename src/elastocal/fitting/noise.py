@@ -23,15 +23,20 @@ import scipy  # Its optimizers load where a campaign has repeats enough for them
 from scipy.linalg import helmert
 from scipy.special import gammaincinv
 
-from elastocal.fitting.least_squares import ON_THE_WAY, STARTED_FROM, fit, registered
+from elastocal.fitting.least_squares import (
+    INTERMEDIATE_TOLERANCE,
+    START_SAMPLE_SIZE,
+    fit_model,
+    register_placement,
+)
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.model import conditions, parameter_values
+from elastocal.fitting.model import evaluate_conditions, get_parameter_values
 from elastocal.fitting.observations import (
-    each_approach,
-    groups_by_size,
-    sample_of,
+    batch_groups_by_size,
+    remove_outlying_repeats,
+    sample_observations,
     select_states,
-    without_outlying_repeats,
+    separate_approaches,
 )
 
 if TYPE_CHECKING:
@@ -47,12 +52,12 @@ if TYPE_CHECKING:
 # Fewer contrasts of repeats than this do not separate the joints' part from the
 # sensor's; fewer than the second say nothing of their own; as many as the third tell
 # every deviation to a percent, and more only take time.
-FEWEST_FOR_JOINTS = 60
-FEWEST = 9
-MOST = 20_000
+MIN_CONTRASTS_FOR_JOINTS = 60
+MIN_CONTRASTS = 9
+MAX_CONTRASTS = 20_000
 # No sensor repeats to less than this, m or rad: a sixtieth of the wavelength of a
 # laser.
-FINEST = 1e-8
+FINEST_RESOLUTION = 1e-8
 # Half width of the interval that holds 95 % of a normal distribution, in standard
 # deviations (JCGM 100:2008, section 6).
 _COVERAGE = 1.959964
@@ -65,7 +70,7 @@ _LARGEST_RAD = 1e-2
 _DEVIATIONS = 40
 # Sizes of declared geometry, in plausible sizes: measured robots exceed data-sheet
 # tolerances tenfold, and none is ten times better than these.
-SIZES = np.geomspace(0.1, 10.0, 9)
+PRIOR_SCALES = np.geomspace(0.1, 10.0, 9)
 # Noise that is there over the noise taken, in steps that change no verdict.
 _FACTORS = np.geomspace(1.0, 1e4, 185)
 # Shares of a prior's variance that measurements leave below this are rounding.
@@ -93,7 +98,7 @@ class Noise:
     pose_rad: float = 0.0
 
     @property
-    def of_measurements(self) -> Noise:
+    def without_pose_error(self) -> Noise:
         """The same without what the measurements of a pose have in common."""
         return replace(self, pose_rad=0.0)
 
@@ -111,18 +116,18 @@ class Noise:
         return np.repeat([self.position_m, self.orientation_rad], 3)[:rows]
 
 
-def noise_facts(noise: Noise) -> dict[str, Any]:
+def serialize_noise(noise: Noise) -> dict[str, Any]:
     """Noise as a JSON document."""
     return asdict(noise) | {"joint_rad": noise.joint_rad.tolist()}
 
 
-def noise_from(facts: Mapping[str, Any]) -> Noise:
+def parse_noise(facts: Mapping[str, Any]) -> Noise:
     """Noise from its JSON document, or from a verdict, which tells more of it."""
     known = {entry.name: facts["noise"][entry.name] for entry in fields(Noise)}
     return Noise(**known | {"joint_rad": np.array(known["joint_rad"])})
 
 
-def chosen_noise(
+def choose_noise(
     campaign: Campaign, model: Model, estimate: Estimate
 ) -> tuple[Noise | None, list[str]]:
     """Noise from repeats where there are enough, else as a campaign declares it, or by
@@ -132,7 +137,7 @@ def chosen_noise(
     square counts. A ratio of the two outside the chi-squared interval of 99 % of a
     variance is a warning. Returns `noise`: None where there are neither.
     """
-    repeats = noise_from_repeats(model, estimate, campaign.measurements)
+    repeats = estimate_noise_from_repeats(model, estimate, campaign.measurements)
     stated = campaign.noise or {}
     u95 = campaign.measurements.u95_m
     declared = None
@@ -164,34 +169,40 @@ def chosen_noise(
     ]
 
 
-def estimated_noise(case: Case) -> tuple[Noise, list[str]]:
+def estimate_noise(case: Case) -> tuple[Noise, list[str]]:
     """Noise from repeats or as declared, from the residual of the declared model where
     there is neither; and warnings."""
-    start = registered(case.model, case.observations)
-    noise, warnings = chosen_noise(case.campaign, case.model, start)
+    start = register_placement(case.model, case.observations)
+    noise, warnings = choose_noise(case.campaign, case.model, start)
     if noise is None:
         assumed = Noise(
             "residual", _ASSUMED, _ASSUMED, np.zeros(case.campaign.robot.joints)
         )
         # The widest prior leaves nearly what none would leave, without parameters that
         # nothing determines.
-        model = with_size(case.model, SIZES[-1])
-        left = fit(model, case.observations, assumed, start).residual
+        model = set_prior_scale(case.model, PRIOR_SCALES[-1])
+        left = fit_model(model, case.observations, assumed, start).residual
         typical = [
-            max(float(np.sqrt((part**2).mean())), FINEST)
+            max(float(np.sqrt((part**2).mean())), FINEST_RESOLUTION)
             for part in (left[:, :3], left[:, -3:])
         ]
         noise = replace(assumed, position_m=typical[0], orientation_rad=typical[1])
         # What parameters have taken of it is given back.
         noise = noise.scaled(
-            most_probable(
-                fit(model, case.observations, noise, start, settled=ON_THE_WAY)
+            maximize_evidence(
+                fit_model(
+                    model,
+                    case.observations,
+                    noise,
+                    start,
+                    tolerance=INTERMEDIATE_TOLERANCE,
+                )
             )[1]
         )
     return noise, warnings
 
 
-def noise_from_repeats(
+def estimate_noise_from_repeats(
     model: Model, estimate: Estimate, measurements: Measurements
 ) -> Noise | None:
     """Noise by restricted maximum likelihood from the differences between repeats.
@@ -212,14 +223,14 @@ def noise_from_repeats(
         return None
     total = contrasts.count * sensors
     start = np.sqrt(contrasts.squares / contrasts.count)
-    if start.min() < FINEST:
+    if start.min() < FINEST_RESOLUTION:
         # The same number again and again is a sensor that stands still or digits that
         # were cut off, not one without noise.
         return None
     sensor = Noise(
         "repeats", float(start[0]), float(start[-1]), np.zeros(joints), total
     )
-    if total < FEWEST_FOR_JOINTS:
+    if total < MIN_CONTRASTS_FOR_JOINTS:
         return sensor
     both = np.log(start)
     free = np.concatenate([both, np.full(joints, np.log(0.3 * start[0]))])
@@ -252,7 +263,7 @@ def noise_from_repeats(
     )
 
 
-def hidden_repeatability(
+def estimate_joint_repeatability(
     model: Model, estimate: Estimate, measurements: Measurements
 ) -> tuple[float, float]:
     """How well joints repeat, rad, all alike, where the sensor hides each of them;
@@ -267,7 +278,9 @@ def hidden_repeatability(
     joints = model.sites.joints
     if contrasts is None:
         return 0.0, 0.0
-    start = 0.5 * np.log(np.maximum(contrasts.squares / contrasts.count, FINEST**2))
+    start = 0.5 * np.log(
+        np.maximum(contrasts.squares / contrasts.count, FINEST_RESOLUTION**2)
+    )
     deviations = np.geomspace(_SMALLEST_RAD, _LARGEST_RAD, _DEVIATIONS)
 
     def value(free: np.ndarray, joint: float) -> tuple[float, np.ndarray]:
@@ -316,7 +329,7 @@ def _contrasts(
     """Contrasts between repeats; None where there are too few to say anything."""
     if not len(measurements) or not np.ptp(measurements.repeat):
         return None
-    observations, repeated = each_approach(without_outlying_repeats(measurements))
+    observations, repeated = separate_approaches(remove_outlying_repeats(measurements))
     first = np.flatnonzero(np.diff(repeated, prepend=-1))
     # The targets that an approach saw, beside those of the first approach to its state.
     seen = np.bincount(observations.state)
@@ -329,7 +342,7 @@ def _contrasts(
     number = np.bincount(repeated, alike).astype(int)
     # As many as tell, of states spread over the campaign.
     wanted = np.flatnonzero(number > 1)
-    share = ((number - 1) * seen[first]).sum() * model.rows / MOST
+    share = ((number - 1) * seen[first]).sum() * model.rows / MAX_CONTRASTS
     wanted = (
         wanted[np.linspace(0, len(wanted) - 1, int(len(wanted) / share)).astype(int)]
         if share > 1
@@ -338,15 +351,15 @@ def _contrasts(
     chosen = alike & np.isin(repeated, wanted)
     some = select_states(observations, chosen)
     bare = replace(model, effects=())
-    if len(some) * model.rows < FEWEST:
+    if len(some) * model.rows < MIN_CONTRASTS:
         return None
     at = replace(estimate, coefficients=(), shapes=())
-    line = linearize(bare, at, some, conditions(bare, at, some.states))
+    line = linearize(bare, at, some, evaluate_conditions(bare, at, some.states))
     sensors = model.rows // 3
     squares = np.zeros(model.rows // 3)
     found = []
     targets_of = np.bincount(some.state)[some.state]
-    for members in groups_by_size(
+    for members in batch_groups_by_size(
         np.unique(repeated[chosen], return_inverse=True)[1][some.state]
     ):
         for count in np.unique(targets_of[members[:, 0]]):
@@ -375,7 +388,7 @@ def _contrasts(
     contrasts = _Contrasts(
         sum(counts), squares, np.concatenate(alongs), np.concatenate(grams)
     )
-    return contrasts if contrasts.count * sensors >= FEWEST else None
+    return contrasts if contrasts.count * sensors >= MIN_CONTRASTS else None
 
 
 def _negative_log_likelihood(
@@ -415,27 +428,27 @@ def _negative_log_likelihood(
     )
 
 
-def fit_declared(model: Model, observations: Observations, noise: Noise) -> Fit:
+def fit_declared_model(model: Model, observations: Observations, noise: Noise) -> Fit:
     """Fit a declared model, its geometry under priors of the most probable size;
-    without geometry as `least_squares.fit`."""
-    if not declared_geometry(model):
-        return fit(model, observations, noise)
-    wide = fit(
-        with_size(model, SIZES[-1]),
-        sample_of(observations, STARTED_FROM),
+    without geometry as `least_squares.fit_model`."""
+    if not find_declared_geometry(model):
+        return fit_model(model, observations, noise)
+    wide = fit_model(
+        set_prior_scale(model, PRIOR_SCALES[-1]),
+        sample_observations(observations, START_SAMPLE_SIZE),
         noise,
-        settled=ON_THE_WAY,
+        tolerance=INTERMEDIATE_TOLERANCE,
     )
-    return fit(
-        with_size(model, most_probable(wide)[0]),
+    return fit_model(
+        set_prior_scale(model, maximize_evidence(wide)[0]),
         observations,
         noise,
         wide.estimate,
-        reweighted=True,
+        reweight_first_step=True,
     )
 
 
-def declared_geometry(model: Model) -> set[str]:
+def find_declared_geometry(model: Model) -> set[str]:
     """Names of declared effects whose size is estimated: those whose parameters have no
     prior of their own, but for springs."""
     return {
@@ -446,11 +459,11 @@ def declared_geometry(model: Model) -> set[str]:
     }
 
 
-def with_size(model: Model, size: float) -> Model:
+def set_prior_scale(model: Model, size: float) -> Model:
     """A declared model with priors of a size, in plausible sizes, on its geometry."""
-    sized = declared_geometry(model)
+    sized = find_declared_geometry(model)
     effects = [
-        with_prior(effect, [size * p.plausible for p in effect.parameters])
+        set_prior_std(effect, [size * p.plausible for p in effect.parameters])
         if effect.effect in sized
         else effect
         for effect in model.effects
@@ -458,7 +471,7 @@ def with_size(model: Model, size: float) -> Model:
     return replace(model, effects=tuple(effects))
 
 
-def with_prior(
+def set_prior_std(
     candidate: Candidate, deviations: Sequence[float] | np.ndarray
 ) -> Candidate:
     """A candidate with normal priors about zero whose standard deviations were
@@ -472,7 +485,7 @@ def with_prior(
     )
 
 
-def most_probable(wide: Fit) -> tuple[float, float]:
+def maximize_evidence(wide: Fit) -> tuple[float, float]:
     """Size of declared geometry, in plausible sizes, and noise over the noise taken
     that make the measurements most probable.
 
@@ -482,25 +495,25 @@ def most_probable(wide: Fit) -> tuple[float, float]:
     """
     mine = np.flatnonzero(
         np.array([parameter.sized for _, parameter in wide.parameters], bool)
-        & ~wide.held
+        & ~wide.unidentifiable
     )
     prior = wide.prior_std[mine]
     left, axes = np.linalg.eigh(
         wide.covariance[np.ix_(mine, mine)] / np.outer(prior, prior)
     )
     left = np.clip(left, _ROUNDING, 1.0)
-    shift = axes.T @ (parameter_values(wide.model, wide.estimate)[mine] / prior)
+    shift = axes.T @ (get_parameter_values(wide.model, wide.estimate)[mine] / prior)
     seen = 1.0 / left - 1.0
     # Squares of the whitened residual were all of it zero, beside frames and targets.
-    squares = (wide.whitened(wide.residual) ** 2).sum() + (
-        (seen + 2.0) * shift**2
-    ).sum()
+    squares = (wide.whiten(wide.residual) ** 2).sum() + ((seen + 2.0) * shift**2).sum()
     freedom = max(
-        wide.weights.sum() * wide.residual.shape[1] - (~wide.held).sum() + len(mine),
+        wide.weights.sum() * wide.residual.shape[1]
+        - (~wide.unidentifiable).sum()
+        + len(mine),
         1.0,
     )
     variance = _FACTORS[:, None, None] ** 2
-    wider = ((SIZES / SIZES[-1]) ** 2)[:, None]
+    wider = ((PRIOR_SCALES / PRIOR_SCALES[-1]) ** 2)[:, None]
     explained = ((shift / left) ** 2 * wider / (variance + seen * wider)).sum(axis=2)
     volume = np.log1p(wider * seen / variance).sum(axis=2)
     variance = variance[..., 0]
@@ -508,13 +521,13 @@ def most_probable(wide: Fit) -> tuple[float, float]:
         freedom * np.log(variance) + (squares - explained) / variance + volume
     )
     factor, size = np.unravel_index(np.argmax(evidence), evidence.shape)
-    return float(SIZES[size]), float(_FACTORS[factor])
+    return float(PRIOR_SCALES[size]), float(_FACTORS[factor])
 
 
-def effective_parameters(fitted: Fit) -> float:
+def count_effective_parameters(fitted: Fit) -> float:
     """Free parameters, with a prior the share that it leaves open: trace of a ridge's
     hat matrix (Hastie et al., 3.4.1)."""
-    free = ~fitted.held
+    free = ~fitted.unidentifiable
     return float(
         free.sum()
         - (np.diag(fitted.covariance)[free] / fitted.prior_std[free] ** 2).sum()

@@ -15,12 +15,17 @@ import numpy as np
 from scipy.linalg.lapack import dpotrf, dpotri
 
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.model import conditions, displaced_coordinates, residuals, sprung
-from elastocal.fitting.observations import groups_by_size, parts_of
+from elastocal.fitting.model import (
+    compute_displaced_coordinates,
+    compute_residuals,
+    evaluate_conditions,
+    update_springs_and_masses,
+)
+from elastocal.fitting.observations import batch_groups_by_size, split_into_blocks
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
-    from elastocal.fitting.linearization import Linearization
+    from elastocal.fitting.linearization import LinearModel
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import Observations
@@ -36,7 +41,7 @@ _MOST_STATES_OF_A_FIT = 2_000
 _COLUMNS_A_COORDINATE = 4
 
 
-def solve_normal(
+def solve_normal_equations(
     gram: np.ndarray,
     along: np.ndarray,
     plausible: np.ndarray,
@@ -62,7 +67,7 @@ def solve_normal(
     """
     gram = gram + np.diag(np.broadcast_to(penalty, len(plausible)) * plausible**2)
     along = along - plausible * np.broadcast_to(penalty * present, len(plausible))
-    known, inverse = identifiable(
+    known, inverse = find_identifiable_parameters(
         gram, *(np.broadcast_to(flags, len(plausible)) for flags in (frozen, nonlinear))
     )
     return (
@@ -72,7 +77,7 @@ def solve_normal(
     )
 
 
-def identifiable(
+def find_identifiable_parameters(
     gram: np.ndarray, frozen: np.ndarray, nonlinear: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Which parameters the data distinguish from zero at their plausible size: first
@@ -93,7 +98,9 @@ def identifiable(
         kept = np.delete(kept, first)
     # Parameters that came later may have taken from what identified their predecessors.
     while len(kept):
-        covariance = inverse_by_factor(dpotrf(gram[np.ix_(kept, kept)], lower=1)[0])
+        covariance = invert_cholesky_factor(
+            dpotrf(gram[np.ix_(kept, kept)], lower=1)[0]
+        )
         deviation = np.sqrt(np.diag(covariance))
         worst = int(np.argmax(deviation))
         if deviation[worst] <= 1.0:
@@ -109,7 +116,7 @@ def identifiable(
     return np.isin(np.arange(len(gram)), kept), found
 
 
-def inverse_by_factor(lower: np.ndarray) -> np.ndarray:
+def invert_cholesky_factor(lower: np.ndarray) -> np.ndarray:
     """Inverse of a symmetric positive matrix, of which this is Cholesky's factor."""
     inverse = dpotri(lower, lower=1)[0]
     # LAPACK leaves the other triangle as it was.
@@ -186,7 +193,7 @@ class Whitening:
         return Whitening(tuple(blocks))
 
 
-def measurement_covariances(
+def compute_measurement_covariances(
     noise: Noise, jacobians: np.ndarray, rows: int
 ) -> np.ndarray:
     """Covariance of all measurements of one approach, ndarray (G, k * rows, k * rows).
@@ -203,7 +210,7 @@ def measurement_covariances(
     return covariance
 
 
-def whitening(
+def compute_whitening(
     observations: Observations, jacobian: np.ndarray | None, noise: Noise
 ) -> Whitening:
     """Whitening of averaged observations.
@@ -223,7 +230,7 @@ def whitening(
         return Whitening(((np.arange(len(each))[:, None], each),))
     assert jacobian is not None
     blocks = []
-    for members in groups_by_size(
+    for members in batch_groups_by_size(
         observations.cluster if noise.pose_rad else observations.state
     ):
         stacked = jacobian[members].reshape(len(members), members.shape[1] * rows, -1)
@@ -233,7 +240,8 @@ def whitening(
         )[:, None, :]
         common = noise.pose_rad**2 * (stacked @ stacked.transpose(0, 2, 1))
         covariance = (
-            alike * measurement_covariances(noise, jacobian[members], rows) + common
+            alike * compute_measurement_covariances(noise, jacobian[members], rows)
+            + common
         )
         blocks.append((members, np.linalg.inv(np.linalg.cholesky(covariance))))
     return Whitening(tuple(blocks))
@@ -253,13 +261,13 @@ class _Part:
     seen: slice
     observations: Observations
     around: Conditions | None = None
-    line: Linearization | None = None
+    line: LinearModel | None = None
     jacobian: np.ndarray | None = None
     coordinates: np.ndarray | None = None
     whitener: Whitening = Whitening(())
 
 
-class Parts:
+class LeastSquaresProblem:
     """Measurements beside a model, in parts of whole poses: what a step needs of them
     adds up over the parts.
 
@@ -280,10 +288,12 @@ class Parts:
         self.observations = observations
         self.noise = noise
         self.plausible = plausible
-        self.parts = [_Part(*edges) for edges in parts_of(observations, len(plausible))]
+        self.parts = [
+            _Part(*edges) for edges in split_into_blocks(observations, len(plausible))
+        ]
         self.kept = len(observations.states) <= _MOST_STATES
         for part in self.parts if self.kept else ():
-            part.around = conditions(model, estimate, part.observations.states)
+            part.around = evaluate_conditions(model, estimate, part.observations.states)
         # What is whitened over several states has no factors any more, one of which
         # belongs to the state.
         self.factors = not noise.pose_rad or observations.cluster.max() + 1 == len(
@@ -311,13 +321,15 @@ class Parts:
             if part.line is not None:
                 part.around = part.line.conditions
                 part.jacobian = part.line.joint_jacobian
-                part.whitener = whitening(part.observations, part.jacobian, self.noise)
+                part.whitener = compute_whitening(
+                    part.observations, part.jacobian, self.noise
+                )
             elif not part.whitener.blocks and (
                 self.noise.pose_rad or self.noise.joint_rad.any()
             ):
                 self._linearized(part)
             elif not part.whitener.blocks:
-                part.whitener = whitening(part.observations, None, self.noise)
+                part.whitener = compute_whitening(part.observations, None, self.noise)
 
     def normal_equations(
         self, weights: np.ndarray, known: np.ndarray | None = None
@@ -390,7 +402,9 @@ class Parts:
         """
         for part in self.parts:
             if part.line is not None:
-                part.around = sprung(self.model, estimate, part.line.conditions)
+                part.around = update_springs_and_masses(
+                    self.model, estimate, part.line.conditions
+                )
         blocks = [
             (members + part.seen.start, factor)
             for part in self.parts
@@ -416,7 +430,7 @@ class Parts:
         )
 
     def _residual_of(self, part: _Part, estimate: Estimate) -> np.ndarray:
-        return residuals(
+        return compute_residuals(
             self.model, estimate, part.observations, self._around(part, estimate)
         )
 
@@ -430,14 +444,16 @@ class Parts:
         found at first."""
         if part.around is not None:
             return part.around
-        around = conditions(
+        around = evaluate_conditions(
             self.model, estimate, part.observations.states, part.coordinates
         )
         if part.coordinates is None:
-            part.coordinates = displaced_coordinates(self.model, estimate, around)
+            part.coordinates = compute_displaced_coordinates(
+                self.model, estimate, around
+            )
         return around
 
-    def _linearized(self, part: _Part) -> Linearization:
+    def _linearized(self, part: _Part) -> LinearModel:
         """At the present estimate, by which whitening and loads are then taken, where
         lines are not kept."""
         line = linearize(
@@ -447,7 +463,9 @@ class Parts:
             self._around(part, self.estimate),
         )
         part.coordinates = line.coordinates
-        part.whitener = whitening(part.observations, line.joint_jacobian, self.noise)
+        part.whitener = compute_whitening(
+            part.observations, line.joint_jacobian, self.noise
+        )
         return line
 
 

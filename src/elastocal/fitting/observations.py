@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.campaigns.campaign import groups_of, means_of
+from elastocal.campaigns.campaign import average_by_group, group_equal_rows
 
 if TYPE_CHECKING:
     from typing import Any
@@ -82,15 +82,15 @@ class Observations:
     def cluster(self) -> np.ndarray:
         """ndarray (M,): number of the (session, pose) that each observation belongs to,
         0 .. P-1."""
-        return state_clusters(self.states)[self.state]
+        return index_poses(self.states)[self.state]
 
 
-def state_clusters(states: States | Measurements) -> np.ndarray:
+def index_poses(states: States | Measurements) -> np.ndarray:
     """Number of the (session, pose) of each state, ndarray (S,): 0 .. P-1."""
-    return groups_of(np.column_stack([states.session, states.pose]))[1]
+    return group_equal_rows(np.column_stack([states.session, states.pose]))[1]
 
 
-def groups_by_size(group: np.ndarray) -> list[np.ndarray]:
+def batch_groups_by_size(group: np.ndarray) -> list[np.ndarray]:
     """Places of each group, for each number k of places in one, ndarray (G, k) of int.
 
     `group` (M,) of int: such as the states or the poses of observations. Groups by
@@ -105,20 +105,22 @@ def groups_by_size(group: np.ndarray) -> list[np.ndarray]:
     ]
 
 
-def averaged(measurements: Measurements) -> Observations:
+def average_repeats(measurements: Measurements) -> Observations:
     """Observations with the repeats averaged that were approached alike."""
     return _observations(measurements, _approached_alike(measurements))
 
 
-def each_approach(measurements: Measurements) -> tuple[Observations, np.ndarray]:
+def separate_approaches(measurements: Measurements) -> tuple[Observations, np.ndarray]:
     """Observations of every single approach, and (S,) in which state it would be if
     repeats were averaged."""
     key = _approached_alike(measurements)
     single = np.column_stack([key, measurements.repeat])
-    return _observations(measurements, single), groups_of(key[groups_of(single)[0]])[1]
+    return _observations(measurements, single), group_equal_rows(
+        key[group_equal_rows(single)[0]]
+    )[1]
 
 
-def single_observations(measurements: Measurements) -> Observations:
+def separate_measurements(measurements: Measurements) -> Observations:
     """Every measurement as an observation in a state of its own, in the order of the
     measurements."""
     every = np.arange(len(measurements))
@@ -134,7 +136,7 @@ def single_observations(measurements: Measurements) -> Observations:
     )
 
 
-def without_outlying_repeats(measurements: Measurements) -> Measurements:
+def remove_outlying_repeats(measurements: Measurements) -> Measurements:
     """Measurements without those that are far from the other repeats of their state and
     target.
 
@@ -143,7 +145,7 @@ def without_outlying_repeats(measurements: Measurements) -> Measurements:
     outlier would be taken for noise, and would move the mean of its repeats. Of two
     repeats nothing tells which is outlying.
     """
-    group = groups_of(_states_and_targets(measurements))[1]
+    group = group_equal_rows(_states_and_targets(measurements))[1]
     count = np.bincount(group)
     repeated = count[group] > 2
     if not repeated.any():
@@ -163,7 +165,7 @@ def without_outlying_repeats(measurements: Measurements) -> Measurements:
     )
 
 
-def measured_in(
+def match_states_and_targets(
     some: Measurements | Observations,
     others: Measurements | Observations,
     chosen: np.ndarray,
@@ -172,7 +174,7 @@ def measured_in(
     as those chosen of others, (N,)."""
     mine = _states_and_targets(some)
     theirs = _states_and_targets(others)
-    group = groups_of(np.concatenate([mine, theirs]))[1]
+    group = group_equal_rows(np.concatenate([mine, theirs]))[1]
     return np.isin(group[: len(mine)], group[len(mine) :][chosen])
 
 
@@ -197,9 +199,9 @@ def _approached_alike(measurements: Measurements | States) -> np.ndarray:
 def _observations(measurements: Measurements, key: np.ndarray) -> Observations:
     """Averages of the measurements of each target in each state, which measurements
     (N,) share whose `key` (N, k) is equal."""
-    first, state_of = groups_of(key)
+    first, state_of = group_equal_rows(key)
     pairs = np.column_stack([state_of, measurements.target])
-    first_pair, pair_of = groups_of(pairs)
+    first_pair, pair_of = group_equal_rows(pairs)
     state, target = pairs[first_pair].T
     repeats = np.full(len(first), len(measurements))
     row = measurements.row[first].copy()
@@ -217,7 +219,9 @@ def _observations(measurements: Measurements, key: np.ndarray) -> Observations:
     }
     mean_of = ("joint_angles", "wrench", "time_s", "temperature_c")
     shared |= {
-        name: means_of(there[name], state_of) for name in mean_of if name in there
+        name: average_by_group(there[name], state_of)
+        for name in mean_of
+        if name in there
     }
     states = States(**shared, repeats=repeats, row=row)
     rotation = None
@@ -229,13 +233,17 @@ def _observations(measurements: Measurements, key: np.ndarray) -> Observations:
             # towards the Riemannian mean (Moakher 2002).
             mean = (
                 Rotation.from_rotvec(
-                    means_of((each * mean[pair_of].inv()).as_rotvec(), pair_of)
+                    average_by_group((each * mean[pair_of].inv()).as_rotvec(), pair_of)
                 )
                 * mean
             )
         rotation = mean.as_matrix()
     return Observations(
-        states, state, target, means_of(measurements.position, pair_of), rotation
+        states,
+        state,
+        target,
+        average_by_group(measurements.position, pair_of),
+        rotation,
     )
 
 
@@ -245,7 +253,7 @@ def select_states(observations: Observations, kept: np.ndarray) -> Observations:
     return _some_of(observations, kept, kept[observations.state], np.cumsum(kept) - 1)
 
 
-def parts_of(
+def split_into_blocks(
     observations: Observations, columns: int
 ) -> list[tuple[slice, slice, Observations]]:
     """Some observations in parts of whole poses, in their order, one where their
@@ -265,7 +273,7 @@ def parts_of(
                 observations,
             )
         ]
-    first = np.flatnonzero(np.diff(state_clusters(observations.states), prepend=-1))
+    first = np.flatnonzero(np.diff(index_poses(observations.states), prepend=-1))
     place = np.searchsorted(observations.state, first)
     chosen = np.unique(
         np.searchsorted(place, np.arange(0, len(observations), most)).clip(
@@ -304,7 +312,7 @@ def _some_of(
     return Observations(States(**values), **own | {"state": number[own["state"]]})
 
 
-def spread_poses(observations: Observations, most: int) -> np.ndarray:
+def select_spread_poses(observations: Observations, most: int) -> np.ndarray:
     """Which states belong to poses evenly spread over a campaign, so many that about
     `most` observations are left.
 
@@ -312,7 +320,7 @@ def spread_poses(observations: Observations, most: int) -> np.ndarray:
     """
     if len(observations) <= most:
         return np.ones(len(observations.states), bool)
-    pose = state_clusters(observations.states)
+    pose = index_poses(observations.states)
     poses = pose.max() + 1
     chosen = np.zeros(poses, bool)
     chosen[
@@ -323,7 +331,7 @@ def spread_poses(observations: Observations, most: int) -> np.ndarray:
     return chosen[pose]
 
 
-def sample_of(
+def sample_observations(
     observations: Observations, most: int, like: Observations | None = None
 ) -> Observations:
     """About so many observations at poses spread over a campaign, or all where the
@@ -333,12 +341,12 @@ def sample_of(
     """
     if len(observations) <= most:
         return observations
-    chosen = spread_poses(observations, most)
+    chosen = select_spread_poses(observations, most)
     if like is not None:
         chosen = np.isin(
             np.arange(len(chosen)),
             observations.state[
-                measured_in(observations, like, np.ones(len(like), bool))
+                match_states_and_targets(observations, like, np.ones(len(like), bool))
             ],
         )
     some = select_states(observations, chosen)

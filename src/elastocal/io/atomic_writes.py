@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from elastocal.errors import InputError
-from elastocal.io.texts import kind_of
+from elastocal.io.texts import describe_file_kind
 
 _PARTIAL = re.compile(r"\.[0-9a-f]{16}\.partial$")
 
@@ -41,7 +41,7 @@ def check_places(*paths: str | Path, top: Path | None = None) -> None:
             raise InputError(
                 path,
                 "",
-                kind_of(mode),
+                describe_file_kind(mode),
                 "a place for a file: a new name, or that of a file",
             )
 
@@ -102,7 +102,10 @@ def write_together(folder: str | Path, names: Iterable[str]) -> Iterator[Path]:
     check_places(*(folder / name for name in names))
     if os.path.lexists(folder) and not folder.is_dir():
         raise InputError(
-            folder, "", kind_of(os.lstat(folder).st_mode), "a folder, or a new name"
+            folder,
+            "",
+            describe_file_kind(os.lstat(folder).st_mode),
+            "a folder, or a new name",
         )
     new = not folder.exists()
     folder.parent.mkdir(parents=True, exist_ok=True)

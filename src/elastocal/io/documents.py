@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 
 import yaml
 
-from elastocal.errors import InputError, closest, closest_first, text_fault
+from elastocal.errors import InputError, find_text_fault, suggest_name, suggest_names
 from elastocal.io.texts import read_text
 
 # Far above what people write by hand (no schema goes deeper than 7), and read in
@@ -133,12 +133,12 @@ def _validator(schema: str) -> Any:
 
 
 def read_document(path: str | Path) -> Any:
-    """Contents of a YAML file; one that is missing or `parsed` refuses is an
+    """Contents of a YAML file; one that is missing or `parse_yaml` refuses is an
     InputError."""
-    return parsed(read_text(path, LARGEST_BYTES), path)
+    return parse_yaml(read_text(path, LARGEST_BYTES), path)
 
 
-def parsed(text: str, source: str | Path) -> Any:
+def parse_yaml(text: str, source: str | Path) -> Any:
     """Contents of a YAML text; an InputError names the line of what is no YAML, unclear
     or out of bounds, such as a URDF."""
     if text.lstrip("\ufeff \r\n\t").startswith("<"):
@@ -208,7 +208,7 @@ def _check_events(text: str) -> None:
             )
 
 
-def one_line(value: Any) -> str:
+def format_one_line(value: Any) -> str:
     """A value as YAML on one line."""
     text: str = yaml.safe_dump(
         value,
@@ -243,7 +243,9 @@ def check_document(document: Any, schema: str, source: str) -> None:
         raise _refusal(source, *_explained(error))
     for place, text in _texts(document):
         # White space between the transforms of a chain is free.
-        if fault := text_fault(" ".join(text.split()) if place == ("chain",) else text):
+        if fault := find_text_fault(
+            " ".join(text.split()) if place == ("chain",) else text
+        ):
             raise _refusal(source, place, *fault)
 
 
@@ -314,7 +316,7 @@ def _explained(error: Any) -> tuple[list[str | int], str, str]:
         return (
             [*path, unknown],
             "an unknown key",
-            f"{closest(unknown, known)} ({', '.join(known)})".strip(),
+            f"{suggest_name(unknown, known)} ({', '.join(known)})".strip(),
         )
     if error.validator == "required":
         missing = next(
@@ -387,7 +389,7 @@ def document_path(folder: str | Path, kind: str, name: str) -> str:
     return (Path(folder) / kind / f"{name}.yaml").as_posix()
 
 
-def named_document(
+def read_named_document(
     folder: str | Path, kind: str, schema: str, name: str, source: str
 ) -> dict[str, Any]:
     """Read and check a document that a configuration, `source`, names: that of `name`
@@ -398,7 +400,7 @@ def named_document(
     # By its name alone: a path would lead out of the folder.
     if name not in known:
         allowed = (
-            f"a file of {Path(folder, kind).as_posix()}: {closest_first(name, known)}"
+            f"a file of {Path(folder, kind).as_posix()}: {suggest_names(name, known)}"
         )
         raise InputError(source, kind, repr(name), allowed)
     path = document_path(folder, kind, name)

@@ -5,6 +5,6 @@ import pkgutil
 from types import ModuleType
 
 
-def module_names(package: ModuleType) -> list[str]:
+def list_modules(package: ModuleType) -> list[str]:
     """Names of the modules of a package, sorted."""
     return sorted(module.name for module in pkgutil.iter_modules(package.__path__))

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from elastocal import __version__
+from elastocal.io.plugins import plugin_versions
 
 # Parameters of rules that tell Snakemake of edited sources, and a job what to call:
 # nothing of what was configured.
@@ -38,7 +39,7 @@ class Origin:
         return f"commit {self.commit}, configuration SHA-256 {self.configuration_sha256}, seed {self.seed}"
 
 
-def canonical_json(value: Any) -> str:
+def format_canonical_json(value: Any) -> str:
     """The one JSON text of a value: keys sorted, no spaces, so that equal values have
     equal digests."""
     return json.dumps(
@@ -53,20 +54,20 @@ def canonical_json(value: Any) -> str:
 def configuration_sha256(configuration: Any) -> str:
     """SHA-256 of the canonical JSON of a configuration with everything that it refers
     to, such as the documents of robots."""
-    return hashlib.sha256(canonical_json(configuration).encode()).hexdigest()
+    return hashlib.sha256(format_canonical_json(configuration).encode()).hexdigest()
 
 
 def environment(folder: str | Path) -> dict[str, str]:
-    """Versions of the installed libraries, and the SHA-256 of the pins in the folder of
-    the Snakefile, where it has some."""
+    """Versions of the installed libraries and of packages with plug-ins, and the
+    SHA-256 of the pins in the folder of the Snakefile if it has some."""
     lock = Path(folder, _LOCK)
     pinned = (
         {_LOCK: hashlib.sha256(lock.read_bytes()).hexdigest()} if lock.is_file() else {}
     )
-    return {name: version(name) for name in _LIBRARIES} | pinned
+    return {name: version(name) for name in _LIBRARIES} | plugin_versions() | pinned
 
 
-def provenance(settings: Any, **more: Any) -> dict[str, Any]:
+def describe_provenance(settings: Any, **more: Any) -> dict[str, Any]:
     """What a table was made from, as JSON has it: `settings`, a mapping or parameters
     of a rule, and further facts."""
     kept = {

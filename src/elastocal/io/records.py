@@ -75,7 +75,7 @@ def write_records(job: JobRecord) -> None:
     """Keep the record of each output that lies where the pipeline makes files; a
     folder's has all of these."""
     for output in filter(_made, job.outputs):
-        place = record_of(output)
+        place = locate_record(output)
         place.parent.mkdir(parents=True, exist_ok=True)
         written = asdict(job) | {_FILES: _digests(output)}
         write_json(place, written | {_DIGEST: configuration_sha256(written)})
@@ -89,7 +89,7 @@ def read_record(path: str, within: str | Path = "") -> tuple[JobRecord, dict[str
     working directory without. An InputError refuses a missing record and one that is
     not as it was written.
     """
-    place = record_of(path, within)
+    place = locate_record(path, within)
     if not place.is_file():
         found = f"no record of the job that made it, {place}"
         raise InputError(Path(within, path), "", found, _AS_WRITTEN.format("it"))
@@ -109,7 +109,7 @@ def read_record(path: str, within: str | Path = "") -> tuple[JobRecord, dict[str
         ) from None
 
 
-def recorded(within: str | Path = "") -> dict[str, str]:
+def list_recorded_files(within: str | Path = "") -> dict[str, str]:
     """SHA-256 of every file that has a record, as `read_record`."""
     top = Path(within, RECORDS)
     names = sorted(
@@ -123,12 +123,12 @@ def recorded(within: str | Path = "") -> dict[str, str]:
     }
 
 
-def record_of(path: str, within: str | Path = "") -> Path:
+def locate_record(path: str, within: str | Path = "") -> Path:
     """Where the record of a file or folder is."""
     return Path(within, RECORDS, f"{path}.json")
 
 
-def input_digests(
+def digest_inputs(
     paths: Iterable[str], checked: Collection[str] | None = None
 ) -> tuple[dict[str, str], tuple[str, ...]]:
     """SHA-256 of what a job reads, and which of it is the user's own: what need not be
@@ -144,12 +144,12 @@ def input_digests(
         digests[path] = (
             _intact(path)[1] if judged and _made(path) else _joint(_digests(path))
         )
-        if not judged and not record_of(path).is_file():
+        if not judged and not locate_record(path).is_file():
             own.append(path)
     return digests, tuple(own)
 
 
-def jobs_behind(targets: Iterable[str], within: str | Path = "") -> list[JobRecord]:
+def trace_jobs(targets: Iterable[str], within: str | Path = "") -> list[JobRecord]:
     """The jobs that made some files, and those that made what these read, to the first;
     in the order in which they began.
 
@@ -184,13 +184,13 @@ def check_sources(jobs: Iterable[JobRecord], within: str | Path, allowed: str) -
         for path, digest in (
             (Path(within, file), digest) for file, digest in job.sources.items()
         ):
-            if not path.is_file() or checksum(path) != digest:
+            if not path.is_file() or compute_sha256(path) != digest:
                 raise InputError(
                     path, "", f"not what {job.name} was made with", allowed
                 )
 
 
-def checksum(path: str | Path) -> str:
+def compute_sha256(path: str | Path) -> str:
     """SHA-256 of a file."""
     check_file(path)
     with open(path, "rb") as file:
@@ -211,7 +211,7 @@ def _digests(path: str, within: str | Path = "") -> dict[str, str]:
         if folder.is_dir()
         else [path]
     )
-    return {name: checksum(Path(within, name)) for name in names}
+    return {name: compute_sha256(Path(within, name)) for name in names}
 
 
 def _intact(path: str, within: str | Path = "") -> tuple[JobRecord, str]:
@@ -254,6 +254,6 @@ def _made(path: str) -> bool:
 
 if __name__ == "__main__":
     try:
-        sys.stdout.writelines(_lines(recorded()))
+        sys.stdout.writelines(_lines(list_recorded_files()))
     except InputError as error:
         sys.exit(str(error))

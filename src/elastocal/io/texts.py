@@ -7,18 +7,18 @@ import re
 import stat
 from pathlib import Path
 
-from elastocal.errors import InputError, reason_of
+from elastocal.errors import InputError, describe_os_error
 
 # Python also takes 1_0 for 10, other scripts' digits, and words for what is no number.
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 # No length, angle, force, mass or time of a robot is larger in any unit; squares and
 # products of such numbers are finite.
 LARGEST_NUMBER = 1e12
-A_NUMBER = f"a number such as -0.25 or 2.5e-3, up to {LARGEST_NUMBER:g} in size"
+NUMBER_ALLOWED = f"a number such as -0.25 or 2.5e-3, up to {LARGEST_NUMBER:g} in size"
 _LONGEST_NUMBER = 100
 
 
-def kind_of(mode: int) -> str:
+def describe_file_kind(mode: int) -> str:
     """What has a name, by the mode of its status."""
     kinds = {
         stat.S_IFREG: "file",
@@ -35,7 +35,7 @@ def check_file(path: str | Path, kind: str = "the path of a readable file") -> i
     might never end."""
     status = os.stat(path)
     if not stat.S_ISREG(status.st_mode):
-        raise InputError(path, "", kind_of(status.st_mode), kind)
+        raise InputError(path, "", describe_file_kind(status.st_mode), kind)
     return status.st_size
 
 
@@ -58,7 +58,7 @@ def read_bytes(
             path, "", f"more than {largest} bytes", f"{kind} of at most {largest} bytes"
         )
     except OSError as error:
-        raise InputError(path, "", reason_of(error), kind) from None
+        raise InputError(path, "", describe_os_error(error), kind) from None
     except ValueError as error:
         # A null character in the path; but an InputError is one too.
         if isinstance(error, InputError):
@@ -71,10 +71,10 @@ def read_text(
 ) -> str:
     """Contents of a file in UTF-8, see `read_bytes`, without the byte order mark that
     spreadsheets write."""
-    return decoded(read_bytes(path, largest, kind), path)
+    return decode_text(read_bytes(path, largest, kind), path)
 
 
-def decoded(content: bytes, path: str | Path, encoding: str = "utf-8-sig") -> str:
+def decode_text(content: bytes, path: str | Path, encoding: str = "utf-8-sig") -> str:
     """Text of the contents of a file; an InputError names the line of what is in
     another encoding."""
     try:
@@ -91,7 +91,7 @@ def decoded(content: bytes, path: str | Path, encoding: str = "utf-8-sig") -> st
         ) from None
 
 
-def plain_number(text: str, largest: float = LARGEST_NUMBER) -> float | None:
+def parse_number(text: str, largest: float = LARGEST_NUMBER) -> float | None:
     """A decimal number as people write it; None for words, not-a-number, digits with
     underscores, and what is larger."""
     value = (

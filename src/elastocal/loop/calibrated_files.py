@@ -28,18 +28,18 @@ from elastocal.application.frames import root_mean_square
 from elastocal.campaigns.campaign_folder import CampaignFolder, read_campaign_folder
 from elastocal.diagnosis.misplaced import describe_reference_point
 from elastocal.errors import InputError
-from elastocal.fitting.noise import noise_from
+from elastocal.fitting.noise import parse_noise
 from elastocal.io.json_files import read_json
 from elastocal.io.origin import configuration_sha256
-from elastocal.io.records import check_sources, jobs_behind
+from elastocal.io.records import check_sources, trace_jobs
 from elastocal.loop.diagnosis_tables import load_case, rows_left_out, step_model
 from elastocal.remainder.corrected import predictor_of
 from elastocal.validation.conformity import (
     PASS,
     UNDECIDED,
-    joint_ranges,
-    predicted_conformity,
-    shortfalls,
+    decide_conformity,
+    find_joint_ranges,
+    list_shortfalls,
 )
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ class Diagnosed:
             model,
             estimate,
             np.array(self.facts["covariance"]),
-            noise_from(step),
+            parse_noise(step),
             more,
         )
         contradicted = bool(accuracy and accuracy["contradicted"])
@@ -118,7 +118,7 @@ def load_diagnosed(
     """A campaign that was diagnosed, of which nothing has changed since, in the folder
     that holds results/ and reports/.
 
-    An InputError refuses what is not as `jobs_behind` asks of all jobs behind its
+    An InputError refuses what is not as `trace_jobs` asks of all jobs behind its
     report or `check_sources` of those behind its verdict, and other files of the
     campaign than were read.
     """
@@ -132,8 +132,8 @@ def load_diagnosed(
     if not verdict.exists() and not (tables / "diagnosis.json").exists():
         raise InputError(folder, "", f"no diagnosis of it in {tables}", fresh)
     # The report has all other files behind it.
-    jobs_behind([f"{reports}/report.html"], top)
-    jobs = jobs_behind([f"{reports}/verdict.json"], top)
+    trace_jobs([f"{reports}/report.html"], top)
+    jobs = trace_jobs([f"{reports}/verdict.json"], top)
     check_sources(jobs, top, f"results of this version: {fresh}")
     reader = next(job for job in jobs if f"{results}/campaign.json" in job.outputs)
     # The user's files may have moved since.
@@ -205,8 +205,8 @@ def certificate(
     prediction = predict_errors(calibrated, *poses)
     accuracy = prediction.accuracy(REGION)
     worst = int(np.argmax(prediction.error_m))
-    decision = predicted_conformity(prediction.rms_m, tolerance_m, accepted_risk)
-    missing = shortfalls(heldout["configurations"], states, robot)
+    decision = decide_conformity(prediction.rms_m, tolerance_m, accepted_risk)
+    missing = list_shortfalls(heldout["configurations"], states, robot)
     if not accuracy.fitted:
         missing = [
             "nothing fitted: no error of 0 is predicted of a robot of which nothing was fitted",
@@ -248,7 +248,7 @@ def certificate(
         "worst_pose": {"joints": joints, "error_m": float(prediction.error_m[worst])},
         "conformity": asdict(decision)
         | {"configurations": heldout["configurations"], "shortfalls": missing},
-        "joint_ranges": joint_ranges(states, robot),
+        "joint_ranges": find_joint_ranges(states, robot),
         "budget": [
             {"name": name, "rms_m": rms}
             for name, rms in error_budget(calibrated, *poses).items()

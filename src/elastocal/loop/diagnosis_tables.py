@@ -13,15 +13,15 @@ from elastocal.diagnosis.diagnose import Diagnosis, Step, diagnose
 from elastocal.diagnosis.next_experiment import propose_experiment
 from elastocal.diagnosis.search import screen_terms
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import Estimate, case_from, parameters
-from elastocal.fitting.noise import noise_facts, noise_from
+from elastocal.fitting.least_squares import fit_model
+from elastocal.fitting.model import Estimate, build_case, list_parameters
+from elastocal.fitting.noise import parse_noise, serialize_noise
 from elastocal.io.json_files import read_json, write_json
-from elastocal.io.origin import provenance
+from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import read_table, write_table
 from elastocal.loop.schemas import STEPS, measurements
 from elastocal.mechanics.robot_file import robot_from_document
-from elastocal.random_streams import stream
+from elastocal.random_streams import open_stream
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -53,7 +53,9 @@ def diagnose_campaign(job: Any) -> None:
         lambda line: print(f"{name}: {line}", file=sys.stderr, flush=True),
     )
     columns, facts = propose_experiment(
-        found, stream(seed, case.campaign.name, "next experiment", 0), job.params.states
+        found,
+        open_stream(seed, case.campaign.name, "next experiment", 0),
+        job.params.states,
     )
     write_csv(job.output.experiment, pd.DataFrame(columns))
     found = replace(found, document=found.document | {"next_experiment": facts})
@@ -66,7 +68,7 @@ def diagnose_campaign(job: Any) -> None:
         job.output.steps,
         STEPS,
         step_blocks(found),
-        provenance(job.params, **job.wildcards),
+        describe_provenance(job.params, **job.wildcards),
     )
 
 
@@ -80,14 +82,14 @@ def load_case(
     descriptions = read_json(descriptions_path)
     described = (part and descriptions[part]) or descriptions
     joints = robot_from_document(described["robot"], described["source"]).joints
-    return case_from(described, read_table(measurements_path, measurements(joints)))
+    return build_case(described, read_table(measurements_path, measurements(joints)))
 
 
 def step_blocks(diagnosis: Diagnosis) -> Iterator[dict[str, np.ndarray | list[str]]]:
     """Blocks of the steps table."""
     for number, step in enumerate(diagnosis.steps):
         yield {
-            "step": np.full(len(step.fitted.held), number),
+            "step": np.full(len(step.fitted.unidentifiable), number),
             **parameter_columns(step.fitted),
         }
 
@@ -114,7 +116,7 @@ def _step_facts(step: Step) -> dict[str, Any]:
     return {
         "name": step.name,
         "kind": step.kind,
-        "noise": noise_facts(step.fitted.noise),
+        "noise": serialize_noise(step.fitted.noise),
         "effects": [effect.key for effect in effects],
         "priors": [
             [parameter.prior_std for parameter in effect.parameters]
@@ -166,7 +168,7 @@ def rows_left_out(case: Case, facts: Mapping[str, Any]) -> np.ndarray:
 def step_fit(case: Case, step: Mapping[str, Any]) -> Fit:
     """The fit of one step of diagnosis.json; it starts where it once ended."""
     model, estimate = step_model(case, step)
-    return fit(model, case.observations, noise_from(step), estimate)
+    return fit_model(model, case.observations, parse_noise(step), estimate)
 
 
 def step_model(case: Case, step: Mapping[str, Any]) -> tuple[Model, Estimate]:
@@ -258,14 +260,14 @@ def candidate_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 def parameter_columns(fitted: Fit) -> dict[str, np.ndarray | list[str]]:
     """Columns of the parameters table of a fit."""
-    named = parameters(fitted.model, fitted.estimate)
+    named = list_parameters(fitted.model, fitted.estimate)
     return {
         "owner": [owner for owner, _ in named],
         "parameter": [parameter.name for _, parameter in named],
         "unit": [parameter.unit for _, parameter in named],
         "value": _absolute_values(fitted.model, fitted.estimate),
         "std_error": np.sqrt(np.diag(fitted.covariance)),
-        "held": fitted.held,
+        "held": fitted.unidentifiable,
         "prior_std": np.array(
             [np.nan if p.prior_std is None else p.prior_std for _, p in named]
         ),
@@ -279,7 +281,7 @@ def _absolute_values(model: Model, estimate: Estimate) -> np.ndarray:
             estimate.frame_position, estimate.frame_rotation, strict=True
         ):
             parts += [shift, Rotation.from_matrix(turn).as_rotvec()]
-    for number, fitted in model.fitted_parts:
+    for number, fitted in model.fitted_target_components:
         turn = Rotation.from_matrix(estimate.target_rotation[number]).as_rotvec()
         parts.append(np.concatenate([estimate.target_offset[number], turn])[fitted])
     effects = [

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.campaigns.campaign import columns_of
+from elastocal.campaigns.campaign import tabulate_measurements
 from elastocal.campaigns.campaign_folder import read_campaign_folder
-from elastocal.campaigns.holdout import measured_poses
-from elastocal.counting import counted, first_names
+from elastocal.campaigns.holdout import list_poses
+from elastocal.counting import format_count, list_first
 from elastocal.data_checks.faults import controller_warnings, faults
 from elastocal.diagnosis.candidate_design import build_candidate_design
 from elastocal.diagnosis.fitted_subset import select_initial_subset
@@ -27,11 +27,11 @@ from elastocal.diagnosis.gross_errors import (
 )
 from elastocal.diagnosis.misplaced import find_misplaced_frames
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import case_from, joint_compliances
-from elastocal.fitting.noise import effective_parameters
+from elastocal.fitting.least_squares import fit_model
+from elastocal.fitting.model import build_case, get_joint_compliances
+from elastocal.fitting.noise import count_effective_parameters
 from elastocal.loop.loading import load_campaign
-from elastocal.validation.placing import repeat_warnings
+from elastocal.validation.transfer import warn_of_repeated_poses
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -82,7 +82,7 @@ def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
     descriptions, training, held_out = load_campaign(
         read_campaign_folder(folder, robots_folder)
     )
-    whole = case_from(descriptions, columns_of(training))
+    whole = build_case(descriptions, tabulate_measurements(training))
     settings = Settings()
     part = select_initial_subset(whole, settings)
     errors = find_gross_errors(
@@ -126,11 +126,11 @@ def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
     attention += [
         *format_gross_error_warnings(left_out),
         *_suspicious(case, declared, training, held_out),
-        *repeat_warnings(training, held_out),
+        *warn_of_repeated_poses(training, held_out),
     ]
     reasons = Counter(untestable.values()).most_common()
     rows += [
-        ("testable", counted(testable, "candidate effect")),
+        ("testable", format_count(testable, "candidate effect")),
         *(("", f"{n} not testable: {why}") for why, n in reasons),
     ]
     return Overview(campaign.name, diagnosable, testable, rows, attention)
@@ -142,18 +142,20 @@ def _read(
     """What was read."""
     campaign = case.campaign
     states = case.observations.states
-    sessions = counted(len(np.unique(states.session)), "session")
+    sessions = format_count(len(np.unique(states.session)), "session")
     most = int(states.repeats.max())
     force = np.linalg.norm(states.wrench[:, :3], axis=1).max()
     # Numbers of loads are labels; 0 is none.
     loaded = np.unique(states.load[states.load != 0]).size
     loads = (
-        f"{counted(loaded, 'load')} of up to {force:,.0f} N" if loaded else "no load"
+        f"{format_count(loaded, 'load')} of up to {force:,.0f} N"
+        if loaded
+        else "no load"
     )
     return [
         (
             "read",
-            f"{campaign.name}: {campaign.robot.name}, {counted(campaign.robot.joints, 'joint')}",
+            f"{campaign.name}: {campaign.robot.name}, {format_count(campaign.robot.joints, 'joint')}",
         ),
         (
             "",
@@ -161,11 +163,11 @@ def _read(
         ),
         (
             "",
-            f"{counted(_poses(training), 'pose')} to fit and {counted(_poses(held_out), 'validation pose')} in {sessions}",
+            f"{format_count(_poses(training), 'pose')} to fit and {format_count(_poses(held_out), 'validation pose')} in {sessions}",
         ),
         (
             "",
-            f"{counted(len(training), 'measurement')}, up to {most} of a state, {loads}",
+            f"{format_count(len(training), 'measurement')}, up to {most} of a state, {loads}",
         ),
     ]
 
@@ -175,14 +177,16 @@ def _identified(declared: Fit) -> list[tuple[str, str]]:
     determine."""
     rms = 1e3 * np.sqrt((declared.residual[:, :3] ** 2).sum(axis=1).mean())
     named = [f"{owner} {parameter.name}" for owner, parameter in declared.parameters]
-    held = [name for name, held in zip(named, declared.held, strict=True) if held]
-    left = f"; not identifiable: {first_names(held, _NAMED)}" if held else ""
-    count = counted(int((~declared.held).sum()), "parameter")
+    held = [
+        name for name, held in zip(named, declared.unidentifiable, strict=True) if held
+    ]
+    left = f"; not identifiable: {list_first(held, _NAMED)}" if held else ""
+    count = format_count(int((~declared.unidentifiable).sum()), "parameter")
     return [
         ("declared model", f"residual of {rms:.3f} mm RMS on the fitted poses"),
         (
             "identified",
-            f"{count}, effectively {effective_parameters(declared):.0f}{left}",
+            f"{count}, effectively {count_effective_parameters(declared):.0f}{left}",
         ),
     ]
 
@@ -193,7 +197,7 @@ def _with_base(declared: Fit, case: Case) -> Fit:
     base = case.candidates.get("base_placement")
     if base is None or case.campaign.frame != "base":
         return declared
-    return fit(
+    return fit_model(
         replace(declared.model, effects=(*declared.model.effects, base)),
         case.observations,
         declared.noise,
@@ -201,7 +205,7 @@ def _with_base(declared: Fit, case: Case) -> Fit:
 
 
 def _poses(part: Measurements) -> int:
-    return len(measured_poses(part)[0])
+    return len(list_poses(part)[0])
 
 
 def _negative_springs(declared: Fit) -> list[str]:
@@ -209,11 +213,13 @@ def _negative_springs(declared: Fit) -> list[str]:
     lacks hides behind them."""
     if not declared.model.identifies_compliance:
         return []
-    mine = declared.places_of("joint_compliance")
+    mine = declared.parameter_indices("joint_compliance")
     errors = np.where(
-        declared.held[mine], np.inf, np.sqrt(np.diag(declared.covariance))[mine]
+        declared.unidentifiable[mine],
+        np.inf,
+        np.sqrt(np.diag(declared.covariance))[mine],
     )
-    below = joint_compliances(declared.model, declared.estimate) < -_CLEAR * errors
+    below = get_joint_compliances(declared.model, declared.estimate) < -_CLEAR * errors
     return [str(joint + 1) for joint in np.flatnonzero(below)]
 
 
@@ -224,8 +230,8 @@ def _suspicious(
     found = []
     states = case.observations.states
     numbers = declared.residual.size
-    effective = effective_parameters(declared)
-    parameters = int((~declared.held).sum())
+    effective = count_effective_parameters(declared)
+    parameters = int((~declared.unidentifiable).sum())
     poses = _poses(training)
     least = int(np.ceil(poses * Settings().numbers_a_parameter * effective / numbers))
     if least > poses:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.campaigns.measurements import file_columns
+from elastocal.campaigns.measurements import describe_columns
 from elastocal.io.storage import Column, TableSchema, read_table
 from elastocal.mechanics.components import COMPONENTS, WRENCH_NAMES
 
@@ -26,7 +26,7 @@ def _columns(joints: int) -> dict[str, Column]:
     angles as the chain counts them."""
     found = {
         name: replace(c, missing=name.startswith(_OPTIONAL))
-        for name, c in file_columns(joints).items()
+        for name, c in describe_columns(joints).items()
     }
     found |= {
         name: replace(found[name], meaning=f"angle of joint {name[1:]} of the chain")

@@ -11,8 +11,12 @@ import pandas as pd
 from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.io.json_files import read_json
 from elastocal.loop.schemas import residuals
-from elastocal.random_streams import stream
-from elastocal.validation.held_out import Errors, intervals, summary
+from elastocal.random_streams import open_stream
+from elastocal.validation.held_out import (
+    PositionErrors,
+    compute_error_intervals,
+    summarize_errors,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -74,7 +78,7 @@ def campaign_rows(
             rows.append(
                 head
                 | {"session": session}
-                | _errors(part, stream(seed, name, "summary", session))
+                | _errors(part, open_stream(seed, name, "summary", session))
             )
     return pd.DataFrame(rows)
 
@@ -105,13 +109,15 @@ def _errors(part: pd.DataFrame, draws: np.random.Generator) -> dict[str, float]:
     mean = part.groupby(state, sort=True)[columns].mean()
     cluster = np.unique(mean.index.get_level_values("pose"), return_inverse=True)[1]
     errors = [
-        Errors(np.linalg.norm(mean[columns[3 * k : 3 * k + 3]], axis=1), cluster)
+        PositionErrors(
+            np.linalg.norm(mean[columns[3 * k : 3 * k + 3]], axis=1), cluster
+        )
         for k in range(len(_STAGES))
     ]
-    limits, reductions = intervals(errors, _REPLICATES, draws)
+    limits, reductions = compute_error_intervals(errors, _REPLICATES, draws)
     row: dict[str, float] = {"poses": errors[0].poses}
     for stage, error, limit in zip(_STAGES, errors, limits, strict=True):
-        for name, value in summary(error.distance).items():
+        for name, value in summarize_errors(error.distance).items():
             row[f"{stage}_{name.removesuffix('_m')}_mm"] = 1e3 * value
         row[f"{stage}_rms_low_mm"], row[f"{stage}_rms_high_mm"] = 1e3 * limit["rms_m"]
     row["rms_reduction_low"] = reductions[1].low

@@ -16,22 +16,22 @@ from elastocal.application.accuracy import (
     set_form_error,
 )
 from elastocal.application.calibrated import compute_effect_contributions
-from elastocal.campaigns.campaign import columns_of
+from elastocal.campaigns.campaign import tabulate_measurements
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import generate_residual_blocks, judge
 from elastocal.diagnosis.misplaced import find_misplaced_frames
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.model import Case, case_from
+from elastocal.fitting.model import Case, build_case
 from elastocal.io.json_files import read_json, write_json
-from elastocal.io.origin import provenance
+from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import write_table
 from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop.loading import load_campaign
 from elastocal.loop.schemas import residuals
-from elastocal.validation.held_out import position_residuals
-from elastocal.validation.placing import placed
+from elastocal.validation.held_out import compute_position_residuals
+from elastocal.validation.transfer import transfer_fit
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -60,7 +60,7 @@ def judge_campaign(job: Any) -> None:
         job.output.residuals,
         schema,
         generate_residual_blocks(found, verdict),
-        provenance(job.params, **job.wildcards),
+        describe_provenance(job.params, **job.wildcards),
     )
 
 
@@ -73,8 +73,10 @@ def cases_in(folder: str | Path, robots_folder: str | Path) -> tuple[Case, Case]
         read_campaign_folder(folder, robots_folder)
     )
     return (
-        case_from(descriptions, columns_of(training)),
-        case_from(descriptions["held_out"] or descriptions, columns_of(held_out)),
+        build_case(descriptions, tabulate_measurements(training)),
+        build_case(
+            descriptions["held_out"] or descriptions, tabulate_measurements(held_out)
+        ),
     )
 
 
@@ -108,7 +110,9 @@ def calibrated_by(
     """
     case = diagnosis.case
     final = diagnosis.final
-    residual = position_residuals(*placed(final, case, held_out), held_out.observations)
+    residual = compute_position_residuals(
+        *transfer_fit(final, case, held_out), held_out.observations
+    )
     noise_m = final.noise.position_m
     more = None
     if delivered is not None and delivered.predictor is not None:

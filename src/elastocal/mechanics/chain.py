@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.errors import InputError, text_fault
+from elastocal.errors import InputError, find_text_fault
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -175,7 +175,7 @@ def parse_chain(text: str, lengths_m: Mapping[str, float], source: str) -> Chain
                     f"[{token['point']}] twice",
                     "each measuring point once",
                 )
-            if fault := text_fault(token["point"]):
+            if fault := find_text_fault(token["point"]):
                 raise InputError(source, "chain", *fault)
             points.append(MeasuringPoint(token["point"], len(transforms)))
             continue

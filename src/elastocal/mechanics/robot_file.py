@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.counting import counted
+from elastocal.counting import format_count
 from elastocal.errors import InputError
 from elastocal.mechanics.chain import notation, parse_chain
 from elastocal.mechanics.robot import (
@@ -86,7 +86,7 @@ def robot_from_document(document: Mapping[str, Any], source: str = "robot") -> R
     matrix = reported.get("matrix", np.eye(n).tolist())
     offset = reported.get("offset_deg", [0.0] * n)
     if [len(row) for row in matrix] != [n] * n or len(offset) != n:
-        found = f"rows of {[len(row) for row in matrix]} and {counted(len(offset), 'offset')}"
+        found = f"rows of {[len(row) for row in matrix]} and {format_count(len(offset), 'offset')}"
         raise InputError(
             source, "reported_joints", found, f"{n} rows of {n} numbers and {n} offsets"
         )
@@ -234,7 +234,7 @@ def _of_each_joint(
         raise InputError(
             source,
             key,
-            counted(len(entries), "entry", "entries"),
+            format_count(len(entries), "entry", "entries"),
             f"{one} for each of the {joints} joints",
         )
     return None if entries is None else tuple(entries)
@@ -270,7 +270,9 @@ def _links(
     tubes = described["tubes"]
     if len(tubes) not in (1, len(rigid)):
         allowed = f"one for all links or one for each of the {len(rigid)}"
-        raise InputError(source, "links.tubes", counted(len(tubes), "tube"), allowed)
+        raise InputError(
+            source, "links.tubes", format_count(len(tubes), "tube"), allowed
+        )
     moduli = [1e9 * described[f"{name}_modulus_GPa"] for name in ("youngs", "shear")]
     for size in tubes:
         if 2 * size["wall_m"] > size["outer_diameter_m"]:

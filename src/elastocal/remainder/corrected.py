@@ -20,23 +20,27 @@ import numpy as np
 from scipy.special import stdtr
 
 from elastocal.campaigns.campaign import BEST_REMAINDER
-from elastocal.campaigns.holdout import blocks_of_poses, configurations
-from elastocal.effects.catalogue import effects, moves_robot
-from elastocal.fitting.least_squares import fit_frames
-from elastocal.fitting.linearization import effect_columns
-from elastocal.fitting.model import conditions, target_points
-from elastocal.fitting.observations import sample_of, state_clusters
+from elastocal.campaigns.holdout import number_configurations, partition_poses
+from elastocal.effects.catalogue import list_effects, moves_robot
+from elastocal.fitting.least_squares import fit_placement
+from elastocal.fitting.linearization import compute_effect_sensitivities
+from elastocal.fitting.model import evaluate_conditions, locate_targets
+from elastocal.fitting.observations import index_poses, sample_observations
 from elastocal.mechanics.kinematics import position_jacobians
-from elastocal.remainder.regressions import REGRESSIONS, Inputs, Predictor
+from elastocal.remainder.regressions import Inputs, Predictor, list_regressions
 from elastocal.validation.held_out import (
-    Errors,
-    intervals,
-    position_errors,
-    position_residuals,
-    refits,
-    summary,
+    PositionErrors,
+    compute_error_intervals,
+    compute_position_errors,
+    compute_position_residuals,
+    refit_without_folds,
+    summarize_errors,
 )
-from elastocal.validation.placing import beyond_campaign, placed, same_campaign
+from elastocal.validation.transfer import (
+    find_beyond_campaign,
+    is_same_campaign,
+    transfer_fit,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -115,10 +119,15 @@ def corrected(
     `within_range`: whether nothing is corrected beyond the joint angles and loads that
     were fitted.
     """
-    there, (model, estimate) = held_out.observations, placed(fitted, case, held_out)
-    names = [name for name in REGRESSIONS if regression in (name, BEST_REMAINDER)]
+    there, (model, estimate) = (
+        held_out.observations,
+        transfer_fit(fitted, case, held_out),
+    )
+    names = [
+        name for name in list_regressions() if regression in (name, BEST_REMAINDER)
+    ]
     every = case.observations
-    some = sample_of(case.observations, _MOST_TO_CHOOSE)
+    some = sample_observations(case.observations, _MOST_TO_CHOOSE)
     inputs = inputs_of(fitted.model, fitted.estimate, some)
     chosen = _chosen(fitted, some, inputs, names, blocks, seed)
     outside = beyond_regressed(
@@ -130,20 +139,20 @@ def corrected(
     if chosen["regression"]:
         predictor = predictor_of(chosen, fitted.model, fitted.estimate, every)
         asked = inputs_of(
-            model, estimate, there, REGRESSIONS[chosen["regression"]].by_jacobian
+            model, estimate, there, list_regressions()[chosen["regression"]].by_jacobian
         )
         mean = np.where(outside[:, None] & within_range, 0.0, predictor.mean(asked))
         std = predictor.std(asked)
-    if not same_campaign(case, held_out):
+    if not is_same_campaign(case, held_out):
         session = np.searchsorted(estimate.sessions, there.states.session[there.state])
         moved = (
             there.position
             - (estimate.frame_rotation[session] @ mean[..., None])[..., 0]
         )
         known = replace(fitted, model=model, estimate=estimate)
-        estimate = fit_frames(known, model, replace(there, position=moved))
+        estimate = fit_placement(known, model, replace(there, position=moved))
     return Corrected(
-        position_residuals(model, estimate, there) - mean,
+        compute_position_residuals(model, estimate, there) - mean,
         std,
         outside,
         chosen,
@@ -168,7 +177,7 @@ def beyond_regressed(
     low = fitted.joint_angles.min(axis=0)
     high = fitted.joint_angles.max(axis=0)
     middle = 0.5 * (low + high)
-    return beyond_campaign(
+    return find_beyond_campaign(
         fitted, middle + (joint_angles - middle) / (1.0 + 2.0 * _BESIDE), wrench
     )
 
@@ -185,22 +194,22 @@ def _chosen(
     each."""
     states = observations.states
     model = fitted.model
-    pose = state_clusters(states)
+    pose = index_poses(states)
     each = observations.cluster
-    configuration = configurations(states.joint_angles, pose)
+    configuration = number_configurations(states.joint_angles, pose)
     count = min(_FOLDS, configuration.max() + 1)
     shuffled = (
         np.random.default_rng(seed).permutation(configuration.max() + 1)[configuration]
         % count
     )
-    fold = blocks_of_poses(states.joint_angles, pose, count) if blocks else shuffled
+    fold = partition_poses(states.joint_angles, pose, count) if blocks else shuffled
     without = np.stack(
         [
-            position_residuals(model, other, observations)
-            for other in refits(fitted, observations, fold[pose])
+            compute_position_residuals(model, other, observations)
+            for other in refit_without_folds(fitted, observations, fold[pose])
         ]
     )
-    whole = position_residuals(model, fitted.estimate, observations)
+    whole = compute_position_residuals(model, fitted.estimate, observations)
     return tuned(names, inputs, configuration[each], fold[each], whole, without, seed)
 
 
@@ -211,12 +220,12 @@ def predictor_of(
     observations: Observations,
 ) -> Predictor:
     """`fitted_again`, to what a model leaves of its training poses."""
-    some = sample_of(observations, _MOST_TO_FIT)
-    by_jacobian = REGRESSIONS[chosen["regression"]].by_jacobian
+    some = sample_observations(observations, _MOST_TO_FIT)
+    by_jacobian = list_regressions()[chosen["regression"]].by_jacobian
     return fitted_again(
         chosen,
         inputs_of(model, estimate, some, by_jacobian),
-        position_residuals(model, estimate, some),
+        compute_position_residuals(model, estimate, some),
     )
 
 
@@ -225,7 +234,7 @@ def fitted_again(
 ) -> Predictor:
     """The regression of facts of `tuned`, fitted to residuals (M, 3), shrunk, with
     intervals as wide as poses left out say."""
-    fitted = REGRESSIONS[chosen["regression"]].fitted
+    fitted = list_regressions()[chosen["regression"]].fitted
     spread = chosen["spread"]
     found = next(fitted(inputs, residual, [chosen["setting"]], chosen["seed"]))
 
@@ -263,7 +272,7 @@ def geometric_inputs_of(
     if by_jacobian:
         coordinates = chain.at(states.joint_angles)[seen]
         jacobian = position_jacobians(
-            chain, coordinates, target_points(model, estimate), observations.target
+            chain, coordinates, locate_targets(model, estimate), observations.target
         )
     return Inputs(states.joint_angles[seen], others, jacobian)
 
@@ -286,16 +295,16 @@ def inputs_of(
     found = [
         (effect, shapes)
         for effect, shapes in every
-        if effect.effect in effects() and is_commanded(effect)
+        if effect.effect in list_effects() and is_commanded(effect)
     ]
     if not found or not by_jacobian:
         return inputs
     sizes = np.array(
         [parameter.plausible for effect, _ in found for parameter in effect.parameters]
     )
-    around = conditions(model, estimate, observations.states)
+    around = evaluate_conditions(model, estimate, observations.states)
     laws = [(effect.displacement, shapes) for effect, shapes in found]
-    columns = effect_columns(
+    columns = compute_effect_sensitivities(
         laws, around, inputs.jacobian, observations.state, sizes / _RAD_OF_A_SIZE
     )
     return replace(inputs, jacobian=np.concatenate([inputs.jacobian, columns], axis=2))
@@ -314,7 +323,7 @@ def remainder_facts(
 
     `declared`, `final`: to the training poses. `case`: of the training poses. `draws`:
     of the bootstrap over poses. Returns the facts of `tuned`, and ``errors``, the
-    summary of `held_out.summary` with it; ``rms_ci95_m``; of the squared error that the
+    summary of `held_out.summarize_errors` with it; ``rms_ci95_m``; of the squared error that the
     declared model leaves the shares that effects (``physics``) and the regression
     (``regression_share``) explain and that is ``left``; ``reduction_ci95`` of the RMS
     by the regression alone; ``covered``, the share of coordinates inside the stated 95
@@ -323,11 +332,13 @@ def remainder_facts(
     which nothing is corrected.
     """
     before, after = (
-        position_errors(*placed(fitted, case, held_out), held_out.observations)
+        compute_position_errors(
+            *transfer_fit(fitted, case, held_out), held_out.observations
+        )
         for fitted in (declared, final)
     )
-    with_it = Errors(np.linalg.norm(found.residual, axis=1), before.cluster)
-    limits, reductions = intervals([after, with_it], _REPLICATES, draws)
+    with_it = PositionErrors(np.linalg.norm(found.residual, axis=1), before.cluster)
+    limits, reductions = compute_error_intervals([after, with_it], _REPLICATES, draws)
     squares = [
         float((errors.distance**2).mean()) for errors in (before, after, with_it)
     ]
@@ -342,7 +353,7 @@ def remainder_facts(
         }
     return {
         **found.chosen,
-        "errors": summary(with_it.distance),
+        "errors": summarize_errors(with_it.distance),
         "rms_ci95_m": [float(end) for end in limits[1]["rms_m"]],
         "reduction_ci95": [reductions[1].low, reductions[1].high],
         "physics": 1.0 - squares[1] / squares[0],
@@ -385,7 +396,9 @@ def tuned(
     if (count := int(group.max()) + 1) < FEWEST_CONFIGURATIONS:
         return facts
     pairs = [
-        (name, setting) for name in names for setting in REGRESSIONS[name].settings
+        (name, setting)
+        for name in names
+        for setting in list_regressions()[name].settings
     ]
     mine = [fold == number for number in range(len(without))]
     parts = [inputs.select(each) for each in mine]
@@ -398,7 +411,7 @@ def tuned(
         left = without[list(pair)].sum(axis=0) - whole
         rest = ~np.isin(fold, pair)
         some = inputs.select(rest)
-        each = [REGRESSIONS[name] for name in names]
+        each = [list_regressions()[name] for name in names]
         fits = (
             one
             for regression in each
@@ -419,7 +432,7 @@ def tuned(
         if best is not None:
             name, setting = pairs[best]
             predictor = next(
-                REGRESSIONS[name].fitted(
+                list_regressions()[name].fitted(
                     inputs.select(~within), without[number, ~within], [setting], seed
                 )
             )
@@ -438,7 +451,7 @@ def tuned(
     spread = spread_of(np.abs(off - gain["factor"] * predicted), std)
     return facts | {
         "regression": name,
-        "words": REGRESSIONS[name].words,
+        "words": list_regressions()[name].words,
         "setting": dict(setting),
         "spread": spread,
     }

@@ -9,14 +9,16 @@ turn.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.linalg import lapack
 
-from elastocal.fitting.normal_equations import inverse_by_factor
+from elastocal.fitting.normal_equations import invert_cholesky_factor
+from elastocal.io import plugins
+from elastocal.io.plugins import load_plugins
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -414,6 +416,16 @@ REGRESSIONS = {
 }
 
 
+def list_regressions() -> dict[str, Regression]:
+    """Regressions of this package, and those that installed packages offer, by name."""
+    return REGRESSIONS | _plugin_regressions()
+
+
+@cache
+def _plugin_regressions() -> dict[str, Regression]:
+    return load_plugins(plugins.REGRESSIONS, Regression, REGRESSIONS)
+
+
 def by_harmonics(inputs: Inputs, orders: int) -> np.ndarray:
     """Displacement of the target by one radian of each harmonic, (M, 3, 2 n orders),
     lower orders first."""
@@ -481,7 +493,7 @@ def _surprise(
     value = 0.5 * (standard * along).sum() + axes * (
         np.log(np.diag(lower)).sum() + 0.5 * count * np.log(2.0 * np.pi)
     )
-    inverse = -axes * inverse_by_factor(lower)
+    inverse = -axes * invert_cholesky_factor(lower)
     inverse += along @ along.T
     of_noise = noise * np.trace(inverse)
     of_variance = variance * np.vdot(inverse.T, correlation)

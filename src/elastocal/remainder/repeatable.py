@@ -25,9 +25,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.campaigns.holdout import SAME_POSE_RAD, configurations
-from elastocal.fitting.least_squares import ON_THE_WAY, fit
-from elastocal.fitting.observations import sample_of, state_clusters
+from elastocal.campaigns.holdout import SAME_POSE_RAD, number_configurations
+from elastocal.fitting.least_squares import INTERMEDIATE_TOLERANCE, fit_model
+from elastocal.fitting.observations import index_poses, sample_observations
 from elastocal.remainder.corrected import (
     FEWEST_CONFIGURATIONS,
     gain_of,
@@ -82,17 +82,17 @@ def repeatable_part(
     `observations`: which it was fitted to. `seed`: of signs, folds and functions. None
     with too few configurations.
     """
-    some = sample_of(observations, _MOST_OBSERVATIONS)
+    some = sample_observations(observations, _MOST_OBSERVATIONS)
     if len(some) < len(observations):
-        fitted = fit(
+        fitted = fit_model(
             fitted.model,
             some,
             fitted.noise,
             fitted.estimate,
-            reweighted=True,
-            settled=ON_THE_WAY,
+            reweight_first_step=True,
+            tolerance=INTERMEDIATE_TOLERANCE,
         )
-    group = configurations(some.states.joint_angles, state_clusters(some.states))[
+    group = number_configurations(some.states.joint_angles, index_poses(some.states))[
         some.cluster
     ]
     count = int(group.max()) + 1
@@ -103,7 +103,7 @@ def repeatable_part(
     inputs = geometric_inputs_of(fitted.model, fitted.estimate, some)
     kinds = _kinds(inputs, int(np.clip(count, _FEWEST, _MOST)), draws)
     sizes = [kind(inputs.select(slice(1))).shape[2] for kind in kinds]
-    parameters = len(fitted.held)
+    parameters = len(fitted.unidentifiable)
     # Of each kind of functions the products with residuals by configurations, with
     # themselves and with sensitivities by folds.
     sums = [
@@ -112,9 +112,9 @@ def repeatable_part(
     ]
     followed = np.zeros((count, parameters))
     leverage = np.zeros(count)
-    white_residual = fitted.whitened(fitted.residual)
+    white_residual = fitted.whiten(fitted.residual)
     weight = np.sqrt(fitted.weights)[:, None, None]
-    for seen, plain, white in fitted.sensitivities(some):
+    for seen, plain, white in fitted.iterate_sensitivities(some):
         mine = group[seen]
         w = weight[seen]
         there = inputs.select(seen)

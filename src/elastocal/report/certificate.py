@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from elastocal.application.accuracy import Accuracy, format_accuracy
-from elastocal.counting import counted
+from elastocal.counting import format_count
 from elastocal.report import words as say
 from elastocal.report.loop_facts import title_of
 from elastocal.report.typesetting import render_sentences
@@ -68,7 +68,7 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
         "errors": document["errors"],
         "floor": say.length(document["noise_floor_rms_m"]),
         "budget": budget,
-        "budget_states": counted(document["budget_states"], "state"),
+        "budget_states": format_count(document["budget_states"], "state"),
     }
 
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from elastocal import __version__
 from elastocal.application.accuracy import tabulate_errors
-from elastocal.counting import counted, grouped, plural
+from elastocal.counting import format_count, format_integer, pluralize
 from elastocal.data_checks.protocol import OF_DATA, data_at_fault
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.effects.catalogue import effects
+from elastocal.effects.catalogue import list_effects
 from elastocal.effects.protocol import effect_of
 from elastocal.report import words as say
 from elastocal.report.typesetting import render_sentences
@@ -170,7 +170,7 @@ def cost_words(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> str:
     were left out of the correction."""
     cost = effect["cost_m"]
     if cost is None:
-        known = effects().get(effect["name"])
+        known = list_effects().get(effect["name"])
         moves = known is None or known.moves_robot
         return (
             "in no command"
@@ -279,7 +279,7 @@ def effect_facts(
     return {
         "name": say.capital(say.words(name) if of_data else say.physical_name(name))
         + (
-            f" of {plural('joint', len(joints))} {say.listed(map(str, joints))}"
+            f" of {pluralize('joint', len(joints))} {say.listed(map(str, joints))}"
             if joints
             else ""
         ),
@@ -294,7 +294,7 @@ def effect_facts(
         else [f"{place} ({probability})" for place, probability in where],
         "parameters": rows,
         "with_prior": any(entry.get("prior_std") for entry in shown),
-        "left_out": grouped(len(known)) if len(known) > len(shown) else "",
+        "left_out": format_integer(len(known)) if len(known) > len(shown) else "",
         "with_angle": any("q)" in row[0] for row in rows),
         "held": len(effect["parameters"]) - len(known),
         "probability": ""
@@ -332,7 +332,7 @@ def _with_interval(step: Mapping[str, Any]) -> str:
 def description(effect: str) -> str:
     """What an effect of the catalogue is, in the first line of its docstring, without
     the formula."""
-    known = effects().get(effect)
+    known = list_effects().get(effect)
     summary = known.doc.split("\n")[0] if known and known.doc else say.words(effect)
     return re.sub(r", \w+\([^,]*=.*$", "", summary.split(":")[0]).rstrip(".")
 
@@ -355,7 +355,7 @@ def _parameter_row(entry: Mapping[str, Any], members: Sequence[str]) -> list[str
     where = f"{say.place_words([member])}: " if member and len(members) > 1 else ""
     row = [where + name, *say.scaled(entry["value"], entry["std_error"], entry["unit"])]
     if entry["unit"] == "–" and float(entry["value"]).is_integer():
-        row[1] = grouped(int(entry["value"]))
+        row[1] = format_integer(int(entry["value"]))
     return [
         *row,
         "measurements"
@@ -495,7 +495,7 @@ def _part(
         ends = " to ".join(
             map(say.plain, [loaded.min()] if same else [loaded.min(), loaded.max()])
         )
-        numbers = counted(len(np.unique(part["load"][force > 0])), "load")
+        numbers = format_count(len(np.unique(part["load"][force > 0])), "load")
         loads = f"{numbers} of {ends} N on {say.percent(len(loaded) / len(force))} of the measurements"
     used = [
         ("" if name == target["point"] else f"{name} ")
@@ -504,9 +504,11 @@ def _part(
     ]
     return {
         "campaign": campaign["campaign"],
-        "measurements": f"{grouped(len(force))}, each a {'position and orientation' if oriented else 'position'}",
-        "poses": f"{counted(len(distinct('session', 'pose')), 'pose')} in {counted(len(distinct('session')), 'session')}",
-        "states (pose and load)": grouped(len(distinct("session", "pose", "load"))),
+        "measurements": f"{format_integer(len(force))}, each a {'position and orientation' if oriented else 'position'}",
+        "poses": f"{format_count(len(distinct('session', 'pose')), 'pose')} in {format_count(len(distinct('session')), 'session')}",
+        "states (pose and load)": format_integer(
+            len(distinct("session", "pose", "load"))
+        ),
         "loads": loads,
         "targets": say.listed(used, 12),
         "repeats of a state": str(each.min())

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elastocal.campaigns.measurements import SHOWN
-from elastocal.counting import counted
+from elastocal.campaigns.measurements import DISPLAY_UNITS
+from elastocal.counting import format_count
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,7 +29,7 @@ def plan_facts(
     angles = [
         name
         for name in map(str, rows)
-        if name.startswith("q") and name.rpartition("_")[2] in SHOWN
+        if name.startswith("q") and name.rpartition("_")[2] in DISPLAY_UNITS
     ]
     heads = [
         "pose",
@@ -67,9 +67,9 @@ def plan_facts(
         "targets": [_where(target) for target in survey.targets],
         "loaded": survey.loaded,
         "counts": [
-            counted(fitted, "pose"),
+            format_count(fitted, "pose"),
             f"{len(poses) - fitted}",
-            counted(len(rows), "measurement"),
+            format_count(len(rows), "measurement"),
         ],
         "heads": [*heads, *(f"F{name[1]} (N)" for name in forces), "measured"],
         "rows": poses,

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal import counting
-from elastocal.counting import plural
+from elastocal.counting import pluralize
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.effects.catalogue import effects
+from elastocal.effects.catalogue import list_effects
 from elastocal.effects.protocol import effect_of
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ _MOST_DETAILED = 2
 def physical_name(effect: str) -> str:
     """Physical name of an effect; its own name as words where the catalogue does not
     have it."""
-    return getattr(effects().get(effect), "words", words(effect))
+    return getattr(list_effects().get(effect), "words", words(effect))
 
 
 def parameter_words(effect: str, name: str) -> str:
@@ -77,7 +77,9 @@ def parameter_words(effect: str, name: str) -> str:
     `effect`: by its name in the catalogue; what is not there, such as a frame, has no
     words of its own.
     """
-    text = getattr(effects().get(effect), "parameter_words", {}).get(name, words(name))
+    text = getattr(list_effects().get(effect), "parameter_words", {}).get(
+        name, words(name)
+    )
     for pattern, instead in _PARAMETER_WORDS:
         text = re.sub(pattern, instead, text)
     return text
@@ -121,9 +123,11 @@ def place_words(keys: Sequence[str]) -> str:
 
 def at_joints(effect: str, joints: Collection[int]) -> str:
     """Where an effect acts: " of joint 3", or nothing where it is no joint's."""
-    part = getattr(effects().get(effect), "part", "joint")
+    part = getattr(list_effects().get(effect), "part", "joint")
     return (
-        f" of {plural(part, len(joints))} {listed(map(str, joints))}" if joints else ""
+        f" of {pluralize(part, len(joints))} {listed(map(str, joints))}"
+        if joints
+        else ""
     )
 
 
@@ -145,7 +149,9 @@ def _where(effect: str, found: Iterable[re.Match[str] | None]) -> str:
     for numbers, which in details.items():
         detail = ", ".join(filter(None, which))
         # A variant in words, where it has some.
-        detail = getattr(effects().get(effect), "detail_words", {}).get(detail, detail)
+        detail = getattr(list_effects().get(effect), "detail_words", {}).get(
+            detail, detail
+        )
         # What is no joint's needs a place of its own only in a list with those that
         # are.
         where = at_joints(effect, numbers) or (
@@ -209,7 +215,8 @@ def in_common(effect: str, alternatives: Iterable[str]) -> str:
     What the catalogue does not have may be of any.
     """
     families = {
-        getattr(effects().get(name), "family", "") for name in (effect, *alternatives)
+        getattr(list_effects().get(name), "family", "")
+        for name in (effect, *alternatives)
     }
     kinds = {_IN_COMMON.get(family, "") for family in families}
     return kinds.pop() if len(kinds) == 1 else ""
@@ -218,7 +225,7 @@ def in_common(effect: str, alternatives: Iterable[str]) -> str:
 def in_words(text: str) -> str:
     """A text with every name of the catalogue, every key of a candidate and the
     parameter stated after it in words."""
-    names = "|".join(sorted(effects(), key=len, reverse=True))
+    names = "|".join(sorted(list_effects(), key=len, reverse=True))
 
     def worded(found: re.Match[str]) -> str:
         # Names that are common words, such as payload, are meant only as keys or where

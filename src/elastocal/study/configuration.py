@@ -8,7 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from elastocal.errors import InputError
-from elastocal.io.documents import check_document, document_path, named_document, parsed
+from elastocal.io.documents import (
+    check_document,
+    document_path,
+    parse_yaml,
+    read_named_document,
+)
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.equation_11 import find_first_solvable_length
 from elastocal.study.strategies import check_strategy, strategy_from_document
@@ -45,7 +50,7 @@ def check_study(
     """
     check_document(config, "config", source)
     robots = {
-        name: named_document(folder, "robots", "robot", name, source)
+        name: read_named_document(folder, "robots", "robot", name, source)
         for name in config["robots"]
     }
     for name, document in robots.items():
@@ -57,7 +62,7 @@ def check_study(
                 "values to simulate with, in a robot of the study",
             )
     strategies = {
-        name: named_document(folder, "strategies", "strategy", name, source)
+        name: read_named_document(folder, "strategies", "strategy", name, source)
         for name in config["strategies"]
     }
     named: dict[str, str] = {}
@@ -136,7 +141,7 @@ def override_entries(
     """
     changed = dict(config)
     for key, _, text in (entry.partition("=") for entry in entries):
-        changed[key] = _merge(changed.get(key), parsed(text, f"--config {key}"))
+        changed[key] = _merge(changed.get(key), parse_yaml(text, f"--config {key}"))
     return changed
 
 

@@ -19,7 +19,7 @@ from elastocal.application.planning.designs import (
     exchange_candidates,
 )
 from elastocal.io.storage import Column
-from elastocal.random_streams import stream
+from elastocal.random_streams import open_stream
 from elastocal.study.in_memory import define_study_step
 from elastocal.study.jobs import (
     MICRO,
@@ -122,7 +122,7 @@ def evaluate_designs(
                 (kind, size, exchange_candidates(rows, longest[:size], rule))
                 for size in sizes
             ]
-        draws = stream(study.seed, study.key, f"random designs/{load}", 0)
+        draws = open_stream(study.seed, study.key, f"random designs/{load}", 0)
         found += [
             (
                 RANDOM,
@@ -167,7 +167,9 @@ def _simulate(
 ) -> tuple[float, float]:
     """RMS error with its standard error of noisy data sets by designs (D, size)."""
     repeats = -(-study.size.data_sets // len(designs))
-    draws = stream(study.seed, study.key, f"noise of designs/{designs.shape[1]}", 0)
+    draws = open_stream(
+        study.seed, study.key, f"noise of designs/{designs.shape[1]}", 0
+    )
     of = candidates.observable
     rows = candidates.rows[designs][..., of].reshape(len(designs), -1, of.sum())
     ideal = candidates.deflections[designs].reshape(len(designs), -1, 1)

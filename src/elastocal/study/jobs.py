@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Protocol
 
-from elastocal.io.origin import SOURCES_DIGEST, STEP, provenance
+from elastocal.io.origin import SOURCES_DIGEST, STEP, describe_provenance
 from elastocal.io.storage import Column, TableSchema
 from elastocal.mechanics.robot import with_target_offset
 from elastocal.mechanics.robot_file import robot_from_document
@@ -78,7 +78,7 @@ class Job(Protocol):
 
 def collect_provenance(job: Job) -> dict[str, Any]:
     """Provenance of a file of one robot, noise or strategy, which its wildcards are."""
-    return provenance(job.params, **dict(job.wildcards))
+    return describe_provenance(job.params, **dict(job.wildcards))
 
 
 def load_robot(job: Job) -> Robot:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.io.origin import provenance
+from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import TableSchema, read_blocks, write_table
 from elastocal.mechanics.chain import parse_chain
 from elastocal.mechanics.components import (
@@ -31,7 +31,7 @@ from elastocal.mechanics.elastostatics import (
 )
 from elastocal.mechanics.kinematics import jacobians, poses
 from elastocal.mechanics.robot_file import joint_limits
-from elastocal.random_streams import draw
+from elastocal.random_streams import draw_data_sets
 from elastocal.study.jobs import (
     CONFIGURATION,
     DATA_SET,
@@ -167,7 +167,7 @@ def draw_random_experiments(
         1959.
     """
     n = chain.coordinates
-    turns = draw(
+    turns = draw_data_sets(
         seed,
         key,
         f"{purpose}/joint angles",
@@ -181,7 +181,7 @@ def draw_random_experiments(
     )
     joint_angles = low + (high - low) * turns
     if loading.direction is None:
-        normal = draw(
+        normal = draw_data_sets(
             seed,
             key,
             f"{purpose}/force",
@@ -240,7 +240,7 @@ def draw_measurement_noise(
     [1] Glasserman, P. and Yao, D. D., Some guidelines and guarantees for common random
     numbers, Management Science 38, 1992.
     """
-    return draw(
+    return draw_data_sets(
         seed,
         key,
         f"noise/{point_name}",
@@ -390,12 +390,12 @@ def draw_bootstrap_weights(
     how many data sets there are. They are the same for every noise level and strategy,
     so that replicates of two of them may be compared one by one.
 
-    `seed`, `key`: as in `random_streams.stream`. Returns (1 + replicates, sets).
+    `seed`, `key`: as in `random_streams.open_stream`. Returns (1 + replicates, sets).
 
     [1] Hanley, J. A. and MacGibbon, B., Creating non-parametric bootstrap samples using Poisson frequencies, Computer Methods
         and Programs in Biomedicine 83, 2006.
     """
-    counts = draw(
+    counts = draw_data_sets(
         seed,
         key,
         "bootstrap",
@@ -418,7 +418,7 @@ def draw_weight_blocks(
         yield _weight_columns(
             DATA_SETS, sets, draw_bootstrap_weights(seed, key, sets, replicates)[1:].T
         )
-    of_tests = draw(
+    of_tests = draw_data_sets(
         seed,
         key,
         "bootstrap of tests",
@@ -466,7 +466,7 @@ def draw_experiments(job: Job) -> None:
         job.output.experiments,
         make_experiments_schema(chain.coordinates),
         blocks,
-        provenance(asked),
+        describe_provenance(asked),
     )
 
 
@@ -488,7 +488,7 @@ def simulate(job: Job) -> None:
         robot,
         job.params.wrench_at,
     )
-    write_table(job.output.ideal, DEFLECTIONS, blocks, provenance(job.params))
+    write_table(job.output.ideal, DEFLECTIONS, blocks, describe_provenance(job.params))
 
 
 def measure(job: Job) -> None:
@@ -501,7 +501,7 @@ def measure(job: Job) -> None:
         job.output.measured,
         DEFLECTIONS,
         blocks,
-        provenance(job.params, noise_um=job.wildcards.noise),
+        describe_provenance(job.params, noise_um=job.wildcards.noise),
     )
 
 
@@ -518,4 +518,4 @@ def summarize_initial(job: Job) -> None:
         }
         for block in ideal
     )
-    write_table(job.output.initial, INITIAL, blocks, provenance(job.params))
+    write_table(job.output.initial, INITIAL, blocks, describe_provenance(job.params))

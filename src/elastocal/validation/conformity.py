@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.campaigns.holdout import configurations
-from elastocal.counting import counted
-from elastocal.fitting.observations import state_clusters
+from elastocal.campaigns.holdout import number_configurations
+from elastocal.counting import format_count
+from elastocal.fitting.observations import index_poses
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Measurements
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 
 # With so many configurations the largest error bounds 69 % of all others at 95 %
 # confidence; fewer show little more than half.
-FEWEST_CONFIGURATIONS = 8
+MIN_CONFIGURATIONS = 8
 # Over this turn an error that goes with the sine of a joint's angle changes by half of
 # its amplitude: over less it is hardly distinguishable from a constant.
-LEAST_TURN_RAD = 2.0 * np.arcsin(0.25)
+MIN_ROTATION_RAD = 2.0 * np.arcsin(0.25)
 # The same of a rail, as a share of its travel.
-LEAST_TRAVEL = 0.1
+MIN_TRAVEL_SHARE = 0.1
 PASS = "pass"
 FAIL = "fail"
 UNDECIDED = "undecided"
@@ -32,10 +32,12 @@ UNDECIDED = "undecided"
 
 def count_configurations(states: States | Measurements) -> int:
     """How many configurations states or measurements are of."""
-    return int(configurations(states.joint_angles, state_clusters(states)).max()) + 1
+    return (
+        int(number_configurations(states.joint_angles, index_poses(states)).max()) + 1
+    )
 
 
-def joint_ranges(states: States, robot: Robot) -> list[dict[str, Any]]:
+def find_joint_ranges(states: States, robot: Robot) -> list[dict[str, Any]]:
     """Smallest and largest angle of each joint with its unit, degrees or of a rail m,
     JSON-serialisable."""
     ends = np.array(
@@ -51,18 +53,18 @@ def joint_ranges(states: States, robot: Robot) -> list[dict[str, Any]]:
     ]
 
 
-def shortfalls(judged: int, fitted: States, robot: Robot) -> list[str]:
+def list_shortfalls(judged: int, fitted: States, robot: Robot) -> list[str]:
     """Why errors at some configurations say too little of a robot: they are too few, or
     a joint hardly moved."""
     found = []
-    if judged < FEWEST_CONFIGURATIONS:
+    if judged < MIN_CONFIGURATIONS:
         found.append(
-            f"too few: {counted(judged, 'configuration')}, where at least {FEWEST_CONFIGURATIONS} must judge"
+            f"too few: {format_count(judged, 'configuration')}, where at least {MIN_CONFIGURATIONS} must judge"
         )
     moved = np.ptp(fitted.joint_angles, axis=0)
     rails = np.array(robot.chain.prismatic)
     least = np.where(
-        rails, LEAST_TRAVEL * np.ptp(robot.joint_limits, axis=1), LEAST_TURN_RAD
+        rails, MIN_TRAVEL_SHARE * np.ptp(robot.joint_limits, axis=1), MIN_ROTATION_RAD
     )
     for joint in np.flatnonzero(moved < least):
         sizes = [
@@ -90,7 +92,7 @@ class Conformity:
     accepted_risk: float
 
 
-def predicted_conformity(
+def decide_conformity(
     rms_m: np.ndarray, tolerance_m: float, accepted_risk: float
 ) -> Conformity:
     """Decide by the RMS over some poses of robots (draws,) that a fit leaves possible.

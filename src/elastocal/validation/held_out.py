@@ -17,12 +17,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import stdtrit
 
-from elastocal.campaigns.holdout import configurations
-from elastocal.fitting.least_squares import ON_THE_WAY, fit, registered
-from elastocal.fitting.linearization import by_coordinates
-from elastocal.fitting.model import conditions, residuals
-from elastocal.fitting.observations import parts_of, select_states, state_clusters
-from elastocal.validation.placing import placed_estimate
+from elastocal.campaigns.holdout import number_configurations
+from elastocal.fitting.least_squares import (
+    INTERMEDIATE_TOLERANCE,
+    fit_model,
+    register_placement,
+)
+from elastocal.fitting.linearization import linearize_coordinates
+from elastocal.fitting.model import compute_residuals, evaluate_conditions
+from elastocal.fitting.observations import index_poses, select_states, split_into_blocks
+from elastocal.validation.transfer import place_unseen_sessions
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -52,7 +56,7 @@ _SHARE = 1e-9
 
 
 @dataclass(frozen=True)
-class Errors:
+class PositionErrors:
     """Position errors of observations.
 
     `distance` (M,): m. `cluster` (M,): pose of each, 0 .. P-1.
@@ -67,31 +71,35 @@ class Errors:
         return int(self.cluster.max()) + 1
 
 
-def position_errors(
+def compute_position_errors(
     model: Model, estimate: Estimate, observations: Observations
-) -> Errors:
+) -> PositionErrors:
     """Distances between measured and predicted positions."""
-    return Errors(
-        np.linalg.norm(position_residuals(model, estimate, observations), axis=1),
+    return PositionErrors(
+        np.linalg.norm(
+            compute_position_residuals(model, estimate, observations), axis=1
+        ),
         observations.cluster,
     )
 
 
-def position_residuals(
+def compute_position_residuals(
     model: Model, estimate: Estimate, observations: Observations
 ) -> np.ndarray:
     """Measured less predicted positions, ndarray (M, 3): m, base axes; in parts that
     fit into memory."""
-    parts = [part for _, _, part in parts_of(observations, 0)]
+    parts = [part for _, _, part in split_into_blocks(observations, 0)]
     return np.concatenate(
         [
-            residuals(model, estimate, p, conditions(model, estimate, p.states))[:, :3]
+            compute_residuals(
+                model, estimate, p, evaluate_conditions(model, estimate, p.states)
+            )[:, :3]
             for p in parts
         ]
     )
 
 
-def summary(distance: np.ndarray) -> dict[str, float]:
+def summarize_errors(distance: np.ndarray) -> dict[str, float]:
     """Mean, RMS, 95th percentile and maximum of distances (M,)."""
     found = (
         distance.mean(),
@@ -114,8 +122,8 @@ class Reduction:
     std_error: float
 
 
-def intervals(
-    errors: Sequence[Errors],
+def compute_error_intervals(
+    errors: Sequence[PositionErrors],
     replicates: int,
     stream: np.random.Generator,
     reference: int = 0,
@@ -213,7 +221,7 @@ def _log_ratios(
     return np.log(tops / bottoms), np.sqrt(variance)
 
 
-def share_below_largest(poses: int) -> float:
+def bound_share_below_maximum(poses: int) -> float:
     """Share of all poses whose errors stay below the largest of so many, at 95 %
     confidence, whatever their distribution.
 
@@ -223,7 +231,7 @@ def share_below_largest(poses: int) -> float:
     return float((1.0 - _CONFIDENCE) ** (1.0 / poses))
 
 
-def noise_floor(
+def compute_noise_floor(
     fitted: Fit, observations: Observations, model: Model, estimate: Estimate
 ) -> float:
     """RMS position error that the noise of a fit alone leaves in observations, m; not a
@@ -232,11 +240,11 @@ def noise_floor(
     total = 0.0
     if noise.source == "residual":
         return float("nan")
-    for _, _, part in parts_of(observations, len(fitted.held)):
+    for _, _, part in split_into_blocks(observations, len(fitted.unidentifiable)):
         variance = np.full((len(part), 3), noise.position_m**2)
         if noise.joint_rad.any():
-            line = by_coordinates(
-                model, estimate, part, conditions(model, estimate, part.states)
+            line = linearize_coordinates(
+                model, estimate, part, evaluate_conditions(model, estimate, part.states)
             )
             variance += ((line.joint_jacobian[:, :3] * noise.joint_rad) ** 2).sum(
                 axis=2
@@ -245,8 +253,8 @@ def noise_floor(
     return float(np.sqrt(total / len(observations)))
 
 
-def errors_by_range(
-    errors: Mapping[str, Errors], outside: np.ndarray
+def summarize_errors_by_range(
+    errors: Mapping[str, PositionErrors], outside: np.ndarray
 ) -> dict[str, Any]:
     """Errors before and after, inside and outside the range of the fitted poses.
 
@@ -258,13 +266,13 @@ def errors_by_range(
     for name, poses in (("inside", ~outside), ("outside", outside)):
         there = errors if poses.any() else {}
         found[name] = {
-            stage: summary(one.distance[poses[one.cluster]])
+            stage: summarize_errors(one.distance[poses[one.cluster]])
             for stage, one in there.items()
         } or None
     return found
 
 
-def refits(
+def refit_without_folds(
     fitted: Fit, observations: Observations, part: np.ndarray
 ) -> Iterator[Estimate]:
     """Fit a model without each part of the observations in turn, as a fit from the
@@ -277,47 +285,51 @@ def refits(
     model = fitted.model
     noise = fitted.noise
     if len(observations) < len(fitted.weights):
-        fitted = fit(
+        fitted = fit_model(
             model,
             observations,
             noise,
             fitted.estimate,
-            reweighted=True,
-            settled=ON_THE_WAY,
+            reweight_first_step=True,
+            tolerance=INTERMEDIATE_TOLERANCE,
         )
     for number in np.unique(part):
         rest = select_states(observations, part != number)
-        refit = fit(model, rest, noise, fitted.estimate, reweighted=True)
+        refit = fit_model(model, rest, noise, fitted.estimate, reweight_first_step=True)
         # What only that part identifies is where the nominal robot has it.
-        if (refit.held & ~fitted.held).any() or not refit.converged:
-            refit = fit(
+        if (refit.unidentifiable & ~fitted.unidentifiable).any() or not refit.converged:
+            refit = fit_model(
                 model,
                 rest,
                 noise,
-                replace(registered(model, rest), shapes=fitted.estimate.shapes),
+                replace(register_placement(model, rest), shapes=fitted.estimate.shapes),
             )
-        yield placed_estimate(refit, observations)
+        yield place_unseen_sessions(refit, observations)
 
 
-def left_out_squares(fitted: Fit, observations: Observations) -> np.ndarray:
+def predict_left_out_squares(fitted: Fit, observations: Observations) -> np.ndarray:
     """Mean square position error of each configuration as all others predict it, m²,
     ndarray (configurations,).
 
     By the step alone, in closed form, with what is held as in the fit.
     """
-    white = fitted.whitened(fitted.residual)
+    white = fitted.whiten(fitted.residual)
     states = observations.states
     found = []
-    configuration = configurations(states.joint_angles, state_clusters(states))[
+    configuration = number_configurations(states.joint_angles, index_poses(states))[
         observations.cluster
     ]
     plain, whitened = (
         np.concatenate(parts)
-        for parts in list(zip(*fitted.sensitivities(observations), strict=True))[1:]
+        for parts in list(
+            zip(*fitted.iterate_sensitivities(observations), strict=True)
+        )[1:]
     )
     for number in range(configuration.max() + 1):
         mine = configuration == number
-        rows = whitened[mine].reshape(mine.sum() * whitened.shape[1], len(fitted.held))
+        rows = whitened[mine].reshape(
+            mine.sum() * whitened.shape[1], len(fitted.unidentifiable)
+        )
         gain = fitted.covariance @ rows.T
         inverse = np.linalg.pinv(
             np.eye(len(rows)) - rows @ gain, rcond=_SHARE, hermitian=True

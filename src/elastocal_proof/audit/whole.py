@@ -17,7 +17,7 @@ import pyarrow.parquet as pq
 from jinja2 import Environment
 
 from elastocal import __version__
-from elastocal.io.records import RECORDS, recorded
+from elastocal.io.records import RECORDS, list_recorded_files
 from elastocal_proof.audit import campaigns, fits, study
 from elastocal_proof.audit.audited import Audited, Finding, require
 
@@ -48,7 +48,7 @@ def audit(run: Audited, only: Collection[str] | None = None) -> list[Finding]:
     column, does not hold.
     """
     found = []
-    for file, digest in recorded(run.folder).items():
+    for file, digest in list_recorded_files(run.folder).items():
         # What an audit itself wrote is not audited.
         if file in only if only is not None else not file.startswith("reports/audit."):
             found.append(replace(intact(run, file, digest), file=file))

@@ -33,18 +33,18 @@ from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import apply_regression, remove_gross_errors
 from elastocal.diagnosis.settings import Settings
 from elastocal.effects.catalogue import declared_candidates
-from elastocal.effects.catalogue import effects as catalogue
+from elastocal.effects.catalogue import list_effects as catalogue
 from elastocal.exchange.target_path import OK
-from elastocal.fitting.model import declared_model
-from elastocal.fitting.noise import fit_declared
+from elastocal.fitting.model import build_declared_model
+from elastocal.fitting.noise import fit_declared_model
 from elastocal.fitting.observations import select_states
 from elastocal.io.data_frames import read_frame, write_csv
-from elastocal.io.origin import provenance
+from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import write_table
 from elastocal.loop.whole import calibrated_by, cases_in
 from elastocal.mechanics.kinematics import jacobians, pose_differences
-from elastocal.random_streams import stream as analysis_stream
-from elastocal.validation.conformity import predicted_conformity
+from elastocal.random_streams import open_stream as analysis_stream
+from elastocal.validation.conformity import decide_conformity
 from elastocal_proof.blind import schemas
 from elastocal_proof.blind.folders import write_blind_campaign
 from elastocal_proof.blind.rehearsal import (
@@ -316,12 +316,12 @@ def _geometry(case: Case, found: Diagnosis) -> Fit:
     rigid = replace(
         campaign.robot, masses=(), compliance=np.zeros(campaign.robot.joints)
     )
-    bare = declared_model(replace(campaign, robot=rigid, compliance="nominal"))
+    bare = build_declared_model(replace(campaign, robot=rigid, compliance="nominal"))
     model = bare.with_effects(
         declared_candidates(campaign.declared, bare.sites, "closed loop")
     )
     unloaded = np.asarray(~case.observations.states.wrench.any(axis=1))
-    return fit_declared(
+    return fit_declared_model(
         model, select_states(case.observations, unloaded), found.declared.noise
     )
 
@@ -416,7 +416,7 @@ def stated_accuracy(
         )
         stated = prediction.accuracy(part)
         distance = np.linalg.norm(off[mine], axis=1)
-        decided = predicted_conformity(prediction.rms_m, tolerance, _RISK)
+        decided = decide_conformity(prediction.rms_m, tolerance, _RISK)
         rows.append(
             {
                 "robot": robot_file.stem,
@@ -448,7 +448,7 @@ def close_loop(job: Any) -> None:
         job.output.moved,
         schemas.closed_loop(read_robot(robot).joints),
         blocks,
-        provenance(asked, **job.wildcards),
+        describe_provenance(asked, **job.wildcards),
     )
 
 

@@ -34,10 +34,10 @@ from elastocal.diagnosis.refit import fit_selected_effects
 from elastocal.diagnosis.search import screen_terms
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.model import Case
-from elastocal.fitting.noise import fit_declared, noise_from
+from elastocal.fitting.noise import fit_declared_model, parse_noise
 from elastocal.io.json_files import read_json, write_json
 from elastocal.loop.whole import cases_in
-from elastocal.validation.placing import outside_poses
+from elastocal.validation.transfer import find_extrapolated_poses
 from elastocal_proof.blind.cases import NAMED, absent_on, defects_of, yardstick_of
 from elastocal_proof.blind.cases import Case as BlindCase
 from elastocal_proof.blind.folders import load_ground_truth
@@ -99,12 +99,12 @@ def oracle(
         # already.
         return _outcome((), 1.0, verdict["heldout"]["before"])
     case, unseen = cases_in(folder, robots_folder)
-    declared = fit_declared(
-        case.model, case.observations, noise_from(verdict).of_measurements
+    declared = fit_declared_model(
+        case.model, case.observations, parse_noise(verdict).without_pose_error
     )
     fitted, members, variants = _with_effects(declared, case, effects)
     p_value = min(variants * _wald(fitted, members), 1.0)
-    outside = outside_poses(fitted, case, unseen)
+    outside = find_extrapolated_poses(fitted, case, unseen)
     _, heldout, _ = compare_held_out_errors(
         [Step("oracle", "declared", fitted)], case, unseen, outside, seed
     )
@@ -177,21 +177,21 @@ def _with_effects(
 def _wald(fitted: Fit, members: Sequence[Candidate]) -> float:
     """Of all coefficients at once, given the shapes."""
     places = [
-        np.split(fitted.places_of(member.key), [len(member.parameters)])
+        np.split(fitted.parameter_indices(member.key), [len(member.parameters)])
         for member in members
     ]
     linear, shapes = (
         np.concatenate([place[part] for place in places] or [np.empty(0)])
         for part in (0, 1)
     )
-    free = np.flatnonzero(~fitted.held)
+    free = np.flatnonzero(~fitted.unidentifiable)
     tested = np.isin(free, linear)
     kept = ~np.isin(free, shapes)
     if not tested.any():
         return 1.0
-    values = np.concatenate([fitted.values_of(member.key)[0] for member in members])[
-        np.isin(linear, free)
-    ]
+    values = np.concatenate(
+        [fitted.effect_values(member.key)[0] for member in members]
+    )[np.isin(linear, free)]
     information = np.linalg.inv(fitted.covariance[np.ix_(free, free)])
     covariance = np.linalg.inv(information[np.ix_(kept, kept)])[
         np.ix_(tested[kept], tested[kept])

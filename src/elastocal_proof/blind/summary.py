@@ -12,7 +12,7 @@ from scipy.stats import bootstrap
 
 from elastocal.io.data_frames import write_csv
 from elastocal.io.json_files import read_json
-from elastocal.random_streams import stream
+from elastocal.random_streams import open_stream
 from elastocal_proof.blind.cases import PROOF, TUNED, Plan
 from elastocal_proof.blind.folders import load_ground_truth
 from elastocal_proof.blind.scores import intervals_of, rate, score
@@ -137,7 +137,9 @@ def _measured(
             sampled[figure["best"]].to_numpy(float),
         )
         found = _bootstrapped(
-            hits, _ratio_of_sums, stream(seed, "blind", f"{words} over the limit", 0)
+            hits,
+            _ratio_of_sums,
+            open_stream(seed, "blind", f"{words} over the limit", 0),
         )
         yield _row(f"{words}{OVER_THE_BEST}", found, target)
     elif measure == "calibration_error":
@@ -150,7 +152,7 @@ def _measured(
         yield _row(
             words,
             _bootstrapped(
-                (ratio,), statistic, stream(seed, "blind", f"{name} ratio", 0)
+                (ratio,), statistic, open_stream(seed, "blind", f"{name} ratio", 0)
             ),
             target,
         )
@@ -255,7 +257,7 @@ def calibration(rows: pd.DataFrame, seed: int) -> dict[str, Any]:
     low = np.nan
     high = np.nan
     if len(rows) > 1:
-        picked = stream(seed, "blind", "calibration error", 0).integers(
+        picked = open_stream(seed, "blind", "calibration error", 0).integers(
             len(rows), size=(_RESAMPLES, len(rows))
         )
         again = calibration_error(probability[picked], correct[picked])

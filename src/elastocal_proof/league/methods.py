@@ -10,28 +10,36 @@ from typing import Any
 
 import numpy as np
 
-from elastocal.campaigns.campaign import Measurements, columns_of, measurements_from
+from elastocal.campaigns.campaign import (
+    Measurements,
+    build_measurements,
+    tabulate_measurements,
+)
 from elastocal.campaigns.campaign_folder import read_campaign_folder
-from elastocal.campaigns.holdout import blocks_of_poses, configurations, measured_poses
+from elastocal.campaigns.holdout import (
+    list_poses,
+    number_configurations,
+    partition_poses,
+)
 from elastocal.diagnosis.diagnose import Diagnosis, diagnose
 from elastocal.diagnosis.model_averaging import compute_explained_squares
 from elastocal.diagnosis.settings import Settings
 from elastocal.errors import InputError
 from elastocal.fitting.least_squares import Fit
-from elastocal.fitting.model import Case, case_from
-from elastocal.fitting.noise import estimated_noise, fit_declared
+from elastocal.fitting.model import Case, build_case
+from elastocal.fitting.noise import estimate_noise, fit_declared_model
 from elastocal.io.json_files import read_json, write_json
-from elastocal.io.origin import provenance
+from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import read_table, write_table
 from elastocal.loop.diagnosis_tables import diagnosis_facts, step_fit
 from elastocal.loop.loading import described_campaign
 from elastocal.loop.schemas import measurements
 from elastocal.mechanics.robot_file import robot_from_document
-from elastocal.random_streams import stream
+from elastocal.random_streams import open_stream
 from elastocal.remainder.corrected import corrected
 from elastocal.remainder.regressions import REGRESSIONS
-from elastocal.validation.held_out import position_residuals
-from elastocal.validation.placing import placed
+from elastocal.validation.held_out import compute_position_residuals
+from elastocal.validation.transfer import transfer_fit
 from elastocal_proof.league.schemas import ENTRIES, FOLDS, MECHANISMS
 
 Columns = Mapping[str, np.ndarray]
@@ -54,7 +62,7 @@ class DataSet:
 
     def case(self, chosen: np.ndarray | slice = slice(None)) -> Case:
         """A case of some of the measurements, or of all."""
-        return case_from(
+        return build_case(
             self.descriptions,
             {name: values[chosen] for name, values in self.columns.items()},
         )
@@ -102,10 +110,10 @@ def dealt(
     [1] Roberts, D. R. et al., Cross-validation strategies for data with temporal, spatial, hierarchical, or phylogenetic
         structure, Ecography 40, 2017.
     """
-    pairs, index = measured_poses(seen)
-    configuration = configurations(seen.joint_angles, index)
+    pairs, index = list_poses(seen)
+    configuration = number_configurations(seen.joint_angles, index)
     shuffled = draws.permutation(configuration.max() + 1)[configuration] % count + 1
-    blocks = blocks_of_poses(seen.joint_angles, index, count) + 1
+    blocks = partition_poses(seen.joint_angles, index, count) + 1
     return {
         "session": pairs[:, 0],
         "pose": pairs[:, 1],
@@ -123,7 +131,7 @@ def rounds(
         yield 1, data.case(), [other.case() for other in others]
         return
     fold = np.asarray(data.dealt[split])[
-        measured_poses(measurements_from(data.columns))[1]
+        list_poses(build_measurements(data.columns))[1]
     ]
     for number in np.unique(fold):
         yield int(number), data.case(fold != number), [data.case(fold == number)]
@@ -146,7 +154,7 @@ def method_from(described: Mapping[str, Any], name: str, source: str) -> Method:
 def fitted_physics(physics: str, case: Case) -> Fit:
     """Fit frames, or what the campaign declares, to training poses."""
     model = replace(case.model, effects=()) if physics == FRAMES else case.model
-    return fit_declared(model, case.observations, estimated_noise(case)[0])
+    return fit_declared_model(model, case.observations, estimate_noise(case)[0])
 
 
 def entered(
@@ -162,7 +170,9 @@ def entered(
     seen = held_out.observations
     std = None
     if method.regression is None:
-        residual = position_residuals(*placed(fitted, case, held_out), seen)
+        residual = compute_position_residuals(
+            *transfer_fit(fitted, case, held_out), seen
+        )
     else:
         blocks = split != RANDOM
         within_range = method.within_range
@@ -233,12 +243,12 @@ def deal_league_folds(job: Any) -> None:
         read_campaign_folder(job.params.folder, job.params.robots)
     )
     seen = campaign.measurements
-    origin = provenance(job.params, **job.wildcards)
-    draws = stream(job.params.seed, job.wildcards.data, "league folds", 0)
+    origin = describe_provenance(job.params, **job.wildcards)
+    draws = open_stream(job.params.seed, job.wildcards.data, "league folds", 0)
     write_table(
         job.output.measurements,
         measurements(seen.joint_angles.shape[1]),
-        [columns_of(seen)],
+        [tabulate_measurements(seen)],
         origin,
     )
     write_table(job.output.folds, FOLDS, [dealt(seen, job.params.folds, draws)], origin)
@@ -262,7 +272,7 @@ def diagnose_league_folds(job: Any) -> None:
         job.output.mechanisms,
         MECHANISMS,
         mechanisms,
-        provenance(job.params, **job.wildcards),
+        describe_provenance(job.params, **job.wildcards),
     )
 
 
@@ -290,5 +300,8 @@ def enter_league(job: Any) -> None:
                 {"fold": np.full(count, fold), "set": np.full(count, number)} | columns
             )
     write_table(
-        job.output.entries, ENTRIES, blocks, provenance(job.params, **job.wildcards)
+        job.output.entries,
+        ENTRIES,
+        blocks,
+        describe_provenance(job.params, **job.wildcards),
     )

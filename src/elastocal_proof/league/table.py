@@ -9,11 +9,15 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from elastocal.campaigns.campaign import groups_of
-from elastocal.counting import counted
-from elastocal.random_streams import stream
+from elastocal.campaigns.campaign import group_equal_rows
+from elastocal.counting import format_count
+from elastocal.random_streams import open_stream
 from elastocal.remainder.corrected import NORMAL_WIDTH
-from elastocal.validation.held_out import Errors, intervals, summary
+from elastocal.validation.held_out import (
+    PositionErrors,
+    compute_error_intervals,
+    summarize_errors,
+)
 from elastocal_proof.league.methods import BLOCKS, DIAGNOSIS, RANDOM, SESSION, Method
 
 # A row of the league's table; and rows of the entries table by data set, split and
@@ -59,19 +63,19 @@ def league_table(
             np.linalg.norm(part[["dx", "dy", "dz"]].to_numpy(), axis=1)
             for part in mine.values()
         ]
-        poses = [groups_of(part[_POSE].to_numpy())[1] for part in mine.values()]
-        errors = [Errors(*each) for each in zip(distances, poses, strict=True)]
-        figures = [summary(error.distance) for error in errors]
+        poses = [group_equal_rows(part[_POSE].to_numpy())[1] for part in mine.values()]
+        errors = [PositionErrors(*each) for each in zip(distances, poses, strict=True)]
+        figures = [summarize_errors(error.distance) for error in errors]
         rms = [each["rms_m"] for each in figures]
         places = {
             "ratio": list(mine).index(reference),
             "ratio_to_best": int(np.argmin(rms)),
         }
         drawn = [
-            intervals(
+            compute_error_intervals(
                 errors,
                 _REPLICATES,
-                stream(seed, data, f"league {split}", number),
+                open_stream(seed, data, f"league {split}", number),
                 place,
             )
             for number, place in enumerate(places.values())
@@ -180,7 +184,7 @@ def league_page(
                 .value_counts()
             )
             each = ", ".join(f"{name} {count}" for name, count in counts.items())
-            winners = f"Smallest RMS error of {counted(int(counts.sum()), 'data set')}: {each}."
+            winners = f"Smallest RMS error of {format_count(int(counts.sum()), 'data set')}: {each}."
             parts += [
                 f"## {title}",
                 winners,

@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from elastocal.counting import counted, grouped
+from elastocal.counting import format_count, format_integer
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.documents import read_document
 from elastocal.report.words import plain
@@ -56,9 +56,7 @@ def reached_words(summary: pd.DataFrame) -> str:
         if proven
         else "robots on which the method was developed, which proves nothing"
     )
-    return (
-        f"{held} of {counted(len(judged), 'figure')} with a target reach it on {where}."
-    )
+    return f"{held} of {format_count(len(judged), 'figure')} with a target reach it on {where}."
 
 
 def target_rows(
@@ -118,9 +116,9 @@ def _is_ratio(row: Any) -> bool:
 
 def _hits(row: Any) -> str:
     return (
-        grouped(int(row.cases))
+        format_integer(int(row.cases))
         if pd.isna(row.hits)
-        else f"{grouped(int(row.hits))} of {grouped(int(row.cases))}"
+        else f"{format_integer(int(row.hits))} of {format_integer(int(row.cases))}"
     )
 
 

@@ -21,8 +21,8 @@ from elastocal.application.planning.plan import (
 )
 from elastocal.campaigns.campaign import Target
 from elastocal.errors import InputError
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import conditions, parameters, predict
+from elastocal.fitting.least_squares import fit_model
+from elastocal.fitting.model import evaluate_conditions, list_parameters, predict
 from elastocal.fitting.noise import Noise
 from elastocal.mechanics.robot_file import robot_from_document
 
@@ -112,23 +112,23 @@ def test_information_is_the_inverse_of_the_covariance_of_a_fit_with_priors(measu
     model = replace(model, effects=(model.effects[0], *effects))
     seen = observe(survey, some.joint_angles, some.force)
     position, rotation = predict(
-        model, estimate, seen, conditions(model, estimate, seen.states)
+        model, estimate, seen, evaluate_conditions(model, estimate, seen.states)
     )
     exact = replace(
         seen, position=position, rotation=None if seen.rotation is None else rotation
     )
     noise = Noise("declared", survey.position_m, survey.orientation_rad, np.zeros(6))
-    found = fit(model, exact, noise, estimate)
+    found = fit_model(model, exact, noise, estimate)
     rows = information(survey, some.joint_angles, some.force)
-    scale = np.array([p.plausible for _, p in parameters(model, estimate)])
+    scale = np.array([p.plausible for _, p in list_parameters(model, estimate)])
     free = np.array(
         [
             owner.startswith(("frame", "target", "joint_compliance"))
-            for owner, _ in parameters(model, estimate)
+            for owner, _ in list_parameters(model, estimate)
         ]
     )
     prior = np.diag(np.where(free, 0.0, 1.0))
-    here = np.flatnonzero(~found.held)
+    here = np.flatnonzero(~found.unidentifiable)
     assert len(here) > 30
     matrix = (prior + np.einsum("nki,nkj->ij", rows, rows))[np.ix_(here, here)]
     expected = np.linalg.inv(matrix) * np.outer(scale[here], scale[here])
@@ -144,7 +144,7 @@ def test_what_a_placement_of_the_base_takes_up_is_no_error_unless_the_base_is_kn
         rows = accuracy_rows(survey, some.joint_angles, some.force)
         names = [
             (owner, parameter.name)
-            for owner, parameter in parameters(*model_of(survey))
+            for owner, parameter in list_parameters(*model_of(survey))
         ]
         assert rows.shape == (40, 3, len(names))
         size = np.sqrt((rows**2).sum(axis=1).mean(axis=0))
@@ -174,7 +174,7 @@ def test_an_unknown_offset_of_the_reflector_takes_up_the_last_link(survey):
         )
         last = [
             owner == "link_geometry@6" and p.unit == "m"
-            for owner, p in parameters(*model_of(one))
+            for owner, p in list_parameters(*model_of(one))
         ]
         sizes.append(
             np.abs(accuracy_rows(one, some.joint_angles, some.force)[..., last]).max()

@@ -39,14 +39,19 @@ from elastocal.application.planning.designs import (
 )
 from elastocal.campaigns.campaign import Target
 from elastocal.campaigns.holdout import FEWEST_TRAINING_POSES
-from elastocal.campaigns.measurements import SHOWN, TICK
-from elastocal.counting import counted
+from elastocal.campaigns.measurements import DISPLAY_UNITS, TICK_COLUMN
+from elastocal.counting import format_count
 from elastocal.effects.catalogue import declared_candidates
 from elastocal.effects.elastic import joint_compliance
 from elastocal.effects.gravity import declared_weight
 from elastocal.errors import InputError
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.model import Estimate, Model, conditions, parameters
+from elastocal.fitting.model import (
+    Estimate,
+    Model,
+    evaluate_conditions,
+    list_parameters,
+)
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import Observations, States
 from elastocal.mechanics.components import WRENCH_NAMES
@@ -197,7 +202,7 @@ def information(
     the k numbers measured in each; information is ``rows.T @ rows``.
     """
     model, estimate = model_of(survey)
-    named = parameters(model, estimate)
+    named = list_parameters(model, estimate)
     deviation = np.repeat([survey.position_m, survey.orientation_rad], 3)[: survey.rows]
     scale = (
         np.array([parameter.plausible for _, parameter in named]) / deviation[:, None]
@@ -209,7 +214,7 @@ def information(
         part = slice(start, start + at_once)
         seen = observe(survey, reported_angles[part], force[part])
         line = linearize(
-            model, estimate, seen, conditions(model, estimate, seen.states)
+            model, estimate, seen, evaluate_conditions(model, estimate, seen.states)
         )
         found[part] = (line.sensitivities * scale).reshape(-1, numbers, len(named))
     return found
@@ -230,7 +235,7 @@ def accuracy_rows(
     parameter.
     """
     model, estimate = model_of(survey)
-    count = len(parameters(model, estimate))
+    count = len(list_parameters(model, estimate))
     noise = Noise(
         "declared",
         survey.position_m,
@@ -258,7 +263,7 @@ def accuracy_rows(
     plausible = np.array(
         [
             parameter.plausible
-            for _, parameter in parameters(robot.model, robot.estimate)
+            for _, parameter in list_parameters(robot.model, robot.estimate)
         ]
     )
     found = np.zeros((len(moved), 3, count))
@@ -349,7 +354,7 @@ def find_allowed_candidates(
     good = np.flatnonzero(np.all(list(fine.values()), axis=0))[:count]
     if not len(good):
         least = min(fine, key=lambda name: fine[name].mean())
-        found = f"none of {counted(len(reported), 'configuration')} allowed: {_FORBIDDEN[least]}"
+        found = f"none of {format_count(len(reported), 'configuration')} allowed: {_FORBIDDEN[least]}"
         raise InputError("plan", least, found, "room for the arm and its targets")
     return Candidates(
         reported[good], survey.forces(len(good), np.random.default_rng(seed))
@@ -368,12 +373,12 @@ def choose_plan(
     count = len(some.joint_angles)
     draws = np.random.default_rng(seed)
     if count < poses + held_out:
-        found = f"{poses + held_out} of {counted(count, 'allowed configuration')}"
+        found = f"{poses + held_out} of {format_count(count, 'allowed configuration')}"
         raise InputError("plan", "poses", found, f"at most {count}, or more candidates")
-    listed = parameters(*model_of(survey))
+    listed = list_parameters(*model_of(survey))
     fewest = max(-(-len(listed) // survey.numbers), FEWEST_TRAINING_POSES)
     if poses < fewest:
-        found = f"{poses}, which measure {counted(poses * survey.numbers, 'number')} for {counted(len(listed), 'parameter')}"
+        found = f"{poses}, which measure {format_count(poses * survey.numbers, 'number')} for {format_count(len(listed), 'parameter')}"
         raise InputError("plan", "poses", found, f"at least {fewest}")
     rows = information(survey, some.joint_angles, some.force)
     if (
@@ -475,11 +480,11 @@ def build_sheet(survey: Survey, plan: Plan) -> pd.DataFrame:
     for pose, (angles, force) in enumerate(configurations, 1):
         # What is typed at the controller is what is planned.
         shown = {
-            f"q{j}_{of}": round(q / SHOWN[of], 3) + 0.0
+            f"q{j}_{of}": round(q / DISPLAY_UNITS[of], 3) + 0.0
             for j, (q, of) in enumerate(zip(angles, endings, strict=True), 1)
         }
         exact = {
-            name.partition("_")[0]: value * SHOWN[name.partition("_")[2]]
+            name.partition("_")[0]: value * DISPLAY_UNITS[name.partition("_")[2]]
             for name, value in shown.items()
         }
         for repeat in range(REPEATS if pose <= min(REPEATED_POSES, fitted) else 1):
@@ -498,7 +503,7 @@ def build_sheet(survey: Survey, plan: Plan) -> pd.DataFrame:
                         "load": load,
                         "repeat": repeat,
                         "target": target.name,
-                        TICK: "",
+                        TICK_COLUMN: "",
                     }
                     rows.append(head | shown | exact | wrench)
     empty = ["x", "y", "z", *(["rx", "ry", "rz"] if survey.measured == "pose" else [])]

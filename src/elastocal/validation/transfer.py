@@ -10,18 +10,18 @@ import numpy as np
 from scipy.linalg import blas
 from scipy.spatial.transform import Rotation
 
-from elastocal.campaigns.holdout import beyond_range, find_repeated
-from elastocal.counting import counted
+from elastocal.campaigns.holdout import find_poses_beyond_range, find_repeated
+from elastocal.counting import format_count
 from elastocal.effects.protocol import LOADED_JOINTS
-from elastocal.fitting.least_squares import evaluated, fit_frames
+from elastocal.fitting.least_squares import evaluate_as_fit, fit_placement
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.model import conditions, of_placement
+from elastocal.fitting.model import evaluate_conditions, find_placement_parameters
 from elastocal.fitting.observations import (
-    groups_by_size,
-    parts_of,
-    sample_of,
+    batch_groups_by_size,
+    index_poses,
+    sample_observations,
     select_states,
-    state_clusters,
+    split_into_blocks,
 )
 
 if TYPE_CHECKING:
@@ -37,30 +37,30 @@ _MOST_FITTED = 10_000
 _ROUNDING = 1e-3
 
 
-def placed(fitted: Fit, case: Case, part: Case) -> tuple[Model, Estimate]:
+def transfer_fit(fitted: Fit, case: Case, part: Case) -> tuple[Model, Estimate]:
     """Model and estimate for other measurements: as fitted, or with frames and targets
     of another campaign.
 
     `case`: which it was fitted to. `part`: measurements of the same campaign or of
     another one.
     """
-    if same_campaign(case, part):
-        return fitted.model, placed_estimate(fitted, part.observations)
-    carried = carried_over(fitted, part.model, part.observations.states)
+    if is_same_campaign(case, part):
+        return fitted.model, place_unseen_sessions(fitted, part.observations)
+    carried = keep_transferable_effects(fitted, part.model, part.observations.states)
     model = replace(
         part.model,
         nominal_compliance=fitted.model.nominal_compliance,
         effects=carried.model.effects,
     )
-    return model, fit_frames(carried, model, part.observations)
+    return model, fit_placement(carried, model, part.observations)
 
 
-def same_campaign(case: Case, part: Case) -> bool:
+def is_same_campaign(case: Case, part: Case) -> bool:
     """Whether two cases are parts of one campaign."""
     return part is case or part.campaign.name == case.campaign.name
 
 
-def placed_estimate(fitted: Fit, observations: Observations) -> Estimate:
+def place_unseen_sessions(fitted: Fit, observations: Observations) -> Estimate:
     """The estimate of a fit for other observations of its targets, whose sessions it
     may not have seen.
 
@@ -78,7 +78,7 @@ def placed_estimate(fitted: Fit, observations: Observations) -> Estimate:
         replace(target, offset_m=tuple(at), rotation=tuple(turn))
         for target, at, turn in places
     ]
-    there = fit_frames(
+    there = fit_placement(
         fitted,
         replace(fitted.model, targets=tuple(known)),
         select_states(observations, unseen),
@@ -97,13 +97,13 @@ def placed_estimate(fitted: Fit, observations: Observations) -> Estimate:
     )
 
 
-def carried_over(fitted: Fit, model: Model, states: States) -> Fit:
+def keep_transferable_effects(fitted: Fit, model: Model, states: States) -> Fit:
     """A fit without the effects that another campaign cannot have, or does not record:
     a wandering tracker, a temperature.
 
     `states`: of the other campaign.
     """
-    there = model.offered(states) | {*LOADED_JOINTS, "external load"}
+    there = model.available_inputs(states) | {*LOADED_JOINTS, "external load"}
     estimate = fitted.estimate
     kept = [
         n
@@ -122,12 +122,12 @@ def carried_over(fitted: Fit, model: Model, states: States) -> Fit:
     )
 
 
-def outside_poses(fitted: Fit, case: Case, held_out: Case) -> np.ndarray:
+def find_extrapolated_poses(fitted: Fit, case: Case, held_out: Case) -> np.ndarray:
     """Which poses lie outside the range of those that a model was fitted to, where it
     has to extrapolate.
 
     Either a joint stands beyond the fitted poses by more than chance explains, see
-    `holdout.beyond_range`; or the model predicts the position less surely than it would
+    `holdout.find_poses_beyond_range`; or the model predicts the position less surely than it would
     have predicted any pose it was fitted to, had that pose been left out. The second
     finds what ranges joint by joint miss: corners between the poses, loads, times and
     temperatures beyond those fitted. Poses drawn like the fitted ones pass that maximum
@@ -137,18 +137,18 @@ def outside_poses(fitted: Fit, case: Case, held_out: Case) -> np.ndarray:
     `case`: which it was fitted to. Returns (P,) of bool: by `Observations.cluster`.
     """
     unseen = held_out.observations
-    if not same_campaign(case, held_out):
-        fitted = carried_over(fitted, held_out.model, unseen.states)
-    own, other = predictive_variances(
-        fitted, case.observations, *placed(fitted, case, held_out), unseen
+    if not is_same_campaign(case, held_out):
+        fitted = keep_transferable_effects(fitted, held_out.model, unseen.states)
+    own, other = compute_predictive_variances(
+        fitted, case.observations, *transfer_fit(fitted, case, held_out), unseen
     )
-    outside = beyond_campaign(
+    outside = find_beyond_campaign(
         case.observations.states, unseen.states.joint_angles, None
     ) | (other > own.max(initial=0.0))
-    return np.bincount(state_clusters(unseen.states), outside) > 0
+    return np.bincount(index_poses(unseen.states), outside) > 0
 
 
-def repeat_warnings(
+def warn_of_repeated_poses(
     fitted_states: States | Measurements, states: States | Measurements
 ) -> list[str]:
     """What to say of poses for the test whose configurations were fitted as well, see
@@ -156,7 +156,7 @@ def repeat_warnings(
     again = find_repeated(_angles_of_poses(fitted_states), _angles_of_poses(states))
     if not again.any():
         return []
-    many = counted(len(again), "validation pose")
+    many = format_count(len(again), "validation pose")
     count = f"{again.sum()} of {many}" if not again.all() else f"all {many}"
     return [
         f"{count} repeat configurations that were fitted: these errors say nothing of other poses"
@@ -165,10 +165,10 @@ def repeat_warnings(
 
 def _angles_of_poses(states: States | Measurements) -> np.ndarray:
     """Joint angles of each pose, (P, n): its loads and repeats share them."""
-    return states.joint_angles[np.unique(state_clusters(states), return_index=True)[1]]
+    return states.joint_angles[np.unique(index_poses(states), return_index=True)[1]]
 
 
-def beyond_campaign(
+def find_beyond_campaign(
     fitted_states: States, joint_angles: np.ndarray, wrench: np.ndarray | None
 ) -> np.ndarray:
     """Poses and loads beyond those that a campaign measured, before any fit is at hand.
@@ -177,11 +177,15 @@ def beyond_campaign(
     nothing loads the robot. Returns (N,) of bool: by the joint angles as in
     `outside_poses`, or by its loads.
     """
-    outside = beyond_range(_angles_of_poses(fitted_states), joint_angles)
-    return outside if wrench is None else outside | beyond_loads(fitted_states, wrench)
+    outside = find_poses_beyond_range(_angles_of_poses(fitted_states), joint_angles)
+    return (
+        outside
+        if wrench is None
+        else outside | find_larger_loads(fitted_states, wrench)
+    )
 
 
-def beyond_loads(
+def find_larger_loads(
     fitted_states: States, wrench: np.ndarray, times: float = 1.0
 ) -> np.ndarray:
     """Forces or moments, of wrenches (N, 6), that are larger than so many times any of
@@ -195,7 +199,7 @@ def beyond_loads(
     )
 
 
-def predictive_variances(
+def compute_predictive_variances(
     fitted: Fit,
     observations: Observations,
     model: Model,
@@ -221,30 +225,30 @@ def predictive_variances(
     shared = model.targets == fitted.model.targets and set(
         unseen.states.session
     ) <= set(observations.states.session)
-    kept = shared | ~of_placement(owner for owner, _ in listed)
+    kept = shared | ~find_placement_parameters(owner for owner, _ in listed)
     plausible = np.array(
         [parameter.prior_std or parameter.plausible for _, parameter in listed]
     )
     if not listed:
         return _largest(own, observations.cluster), _largest(other, unseen.state)
-    some = sample_of(observations, _MOST_FITTED)
+    some = sample_observations(observations, _MOST_FITTED)
     gram = np.zeros((len(listed),) * 2)
     if len(some) < len(observations):
-        fitted = evaluated(fitted.model, some, fitted.noise, fitted.estimate)
+        fitted = evaluate_as_fit(fitted.model, some, fitted.noise, fitted.estimate)
         own = np.zeros(len(some))
-    for _, _, white in fitted.sensitivities(some):
+    for _, _, white in fitted.iterate_sensitivities(some):
         rows = (white * plausible).reshape(-1, len(listed))
         gram += rows.T @ rows
     gram *= len(observations) / len(some)
     root = np.linalg.inv(np.linalg.cholesky(gram + np.eye(len(listed))))
     cluster = some.cluster
-    for seen, plain, white in fitted.sensitivities(some):
+    for seen, plain, white in fitted.iterate_sensitivities(some):
         projected = _through(root, plain[:, :3] * (plausible * kept))
         rows = _through(root, white * plausible)
         own[seen] = _variances_left_out(projected, rows, cluster[seen])
-    for _, seen, part in parts_of(unseen, len(listed)):
+    for _, seen, part in split_into_blocks(unseen, len(listed)):
         there = linearize(
-            model, estimate, part, conditions(model, estimate, part.states)
+            model, estimate, part, evaluate_conditions(model, estimate, part.states)
         ).sensitivities[:, :3]
         # Effects come last in the order of the parameters, whatever frames and targets
         # stand before them.
@@ -269,7 +273,7 @@ def _variances_left_out(
     root, plain (M, 3, P) and whitened."""
     variance = (projected**2).sum(axis=(1, 2))
     width = projected.shape[2]
-    for members in groups_by_size(cluster):
+    for members in batch_groups_by_size(cluster):
         own, asked = (
             each[members].reshape(len(members), -1, width) for each in (rows, projected)
         )

@@ -9,22 +9,22 @@ import pytest
 from planted import planted
 from synthetic import made_estimate, made_model, made_states, seen_exactly, with_noise
 
-from elastocal.fitting.least_squares import fit
+from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.model import conditions
+from elastocal.fitting.model import evaluate_conditions
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import select_states
-from elastocal.validation import placing
-from elastocal.validation.held_out import position_errors
-from elastocal.validation.placing import (
-    beyond_campaign,
-    beyond_loads,
-    carried_over,
-    outside_poses,
-    placed,
-    placed_estimate,
-    predictive_variances,
-    repeat_warnings,
+from elastocal.validation import transfer
+from elastocal.validation.held_out import compute_position_errors
+from elastocal.validation.transfer import (
+    compute_predictive_variances,
+    find_beyond_campaign,
+    find_extrapolated_poses,
+    find_larger_loads,
+    keep_transferable_effects,
+    place_unseen_sessions,
+    transfer_fit,
+    warn_of_repeated_poses,
 )
 
 FOUND = ("joint_offset@2", "joint_offset@3", "payload", "base_compliance")
@@ -41,10 +41,10 @@ def test_a_session_that_the_fit_has_not_seen_gets_a_frame_of_its_own_and_nothing
     states.session[:] = np.repeat([2, 5, 7], [20, 3, 22])
     seen = with_noise(seen_exactly(model, true, states), np.random.default_rng(5))
     known = states.session != 5
-    fitted = fit(
+    fitted = fit_model(
         model, select_states(seen, known), Noise("declared", 6e-5, 6e-5, np.zeros(6))
     )
-    placed = placed_estimate(fitted, seen)
+    placed = place_unseen_sessions(fitted, seen)
     assert placed.sessions == (2, 5, 7)
     np.testing.assert_array_equal(placed.target_offset, fitted.estimate.target_offset)
     np.testing.assert_array_equal(
@@ -53,13 +53,13 @@ def test_a_session_that_the_fit_has_not_seen_gets_a_frame_of_its_own_and_nothing
     np.testing.assert_allclose(
         placed.frame_position[1], true.frame_position[1], atol=4e-4
     )
-    distance = position_errors(model, placed, seen).distance
+    distance = compute_position_errors(model, placed, seen).distance
     assert np.sqrt((distance[~known] ** 2).mean()) < 1.3 * np.sqrt(3) * 6e-5
     if rows == 6:
         np.testing.assert_allclose(
             placed.frame_rotation[1].T @ true.frame_rotation[1], np.eye(3), atol=2e-4
         )
-    assert placed_estimate(fitted, select_states(seen, known)) is fitted.estimate
+    assert place_unseen_sessions(fitted, select_states(seen, known)) is fitted.estimate
     # Of a target that has moved by 1 mm the frame takes up what it can, which it could
     # not were the target fitted anew.
     moved = replace(
@@ -68,7 +68,10 @@ def test_a_session_that_the_fit_has_not_seen_gets_a_frame_of_its_own_and_nothing
     )
     off = select_states(seen_exactly(model, moved, states), ~known)
     assert (
-        position_errors(model, placed_estimate(fitted, off), off).distance.min() < 8e-4
+        compute_position_errors(
+            model, place_unseen_sessions(fitted, off), off
+        ).distance.min()
+        < 8e-4
     )
 
 
@@ -82,7 +85,7 @@ def fitted_part(robot, seed, fitted, unseen, **model):
     added = [campaign.candidates[key] for key in FOUND]
     declared = campaign.declared
     return (
-        fit(
+        fit_model(
             declared.model.with_effects(added),
             own,
             declared.noise,
@@ -96,11 +99,11 @@ def fitted_part(robot, seed, fitted, unseen, **model):
 @pytest.mark.parametrize("rows", [3, 6])
 def test_variances_are_those_without_the_measurements_of_the_pose(rows, fanuc):
     fitted, own, other = fitted_part(fanuc, 1, 9, 4, rows=rows)
-    found, there = predictive_variances(
+    found, there = compute_predictive_variances(
         fitted, own, fitted.model, fitted.estimate, other
     )
     line = linearize(fitted.model, fitted.estimate, own, fitted.conditions)
-    white = fitted.whitened(line.sensitivities)
+    white = fitted.whiten(line.sensitivities)
     prior = [p.plausible**-2.0 for _, p in fitted.parameters]
     for pose in range(9):
         rest = white[own.cluster != pose]
@@ -112,7 +115,7 @@ def test_variances_are_those_without_the_measurements_of_the_pose(rows, fanuc):
             np.einsum("mrp,pq,mrq->m", here, covariance, here).max(), rel=1e-6
         )
     covariance = np.linalg.inv(np.einsum("mrp,mrq->pq", white, white) + np.diag(prior))
-    around = conditions(fitted.model, fitted.estimate, other.states)
+    around = evaluate_conditions(fitted.model, fitted.estimate, other.states)
     away = linearize(fitted.model, fitted.estimate, other, around).sensitivities[:, :3]
     variance = np.einsum("mrp,pq,mrq->m", away, covariance, away)
     np.testing.assert_allclose(
@@ -124,11 +127,11 @@ def test_a_sample_says_nearly_how_surely_very_many_poses_are_predicted(
     fanuc, monkeypatch
 ):
     fitted, own, other = fitted_part(fanuc, 1, 60, 9)
-    own_variance, variance = predictive_variances(
+    own_variance, variance = compute_predictive_variances(
         fitted, own, fitted.model, fitted.estimate, other
     )
-    monkeypatch.setattr(placing, "_MOST_FITTED", len(own) // 2)
-    some, there = predictive_variances(
+    monkeypatch.setattr(transfer, "_MOST_FITTED", len(own) // 2)
+    some, there = compute_predictive_variances(
         fitted, own, fitted.model, fitted.estimate, other
     )
     assert len(some) == 30 and there == pytest.approx(variance, rel=0.5)
@@ -151,7 +154,7 @@ def test_what_goes_with_the_setup_or_was_not_recorded_is_not_carried_to_another_
     model = declared.model.with_effects(added)
     estimate = declared.estimate.with_effects(added)
     states = replace(campaign.observations.states, temperature_c=None)
-    there = carried_over(
+    there = keep_transferable_effects(
         replace(declared, model=model, estimate=estimate), declared.model, states
     )
     assert there.model.effects == (*declared.model.effects, added[0], added[2])
@@ -175,8 +178,8 @@ def test_another_campaign_has_its_own_frame_and_targets_and_the_effects_of_the_f
         )
         for n in "cd"
     )
-    assert placed(fitted, case, case)[1] is fitted.estimate
-    model, estimate = placed(fitted, case, part)
+    assert transfer_fit(fitted, case, case)[1] is fitted.estimate
+    model, estimate = transfer_fit(fitted, case, part)
     assert (
         model.effects == fitted.model.effects
         and model.nominal_compliance is fitted.model.nominal_compliance
@@ -197,7 +200,7 @@ def outside(fitted, own, other, **changes):
         SimpleNamespace(campaign=SimpleNamespace(name="c"), observations=part)
         for part in (own, unseen)
     ]
-    return outside_poses(fitted, *cases)
+    return find_extrapolated_poses(fitted, *cases)
 
 
 def test_poses_drawn_alike_are_seldom_outside_and_larger_loads_and_far_angles_always(
@@ -237,9 +240,9 @@ def test_frames_of_other_sessions_do_not_count(fanuc):
     own, other = (
         select_states(observations, states.session == number) for number in (0, 4)
     )
-    fitted = fit(campaign.declared.model, own, campaign.declared.noise)
+    fitted = fit_model(campaign.declared.model, own, campaign.declared.noise)
     elsewhere = replace(fitted.estimate, sessions=(4,))
-    own_variance, variance = predictive_variances(
+    own_variance, variance = compute_predictive_variances(
         fitted, own, fitted.model, elsewhere, other
     )
     assert own_variance.shape == (15,) and variance.shape == (10,)
@@ -248,11 +251,11 @@ def test_frames_of_other_sessions_do_not_count(fanuc):
     assert (variance[other.states.load == 0] == 0).all()
     # Nor is anything unsure of a model that leaves nothing open.
     known = replace(campaign.declared.model, fitted_frames=False, effects=())
-    bare = fit(known, own, campaign.declared.noise)
+    bare = fit_model(known, own, campaign.declared.noise)
     assert (
         not bare.parameters
         and not np.concatenate(
-            predictive_variances(bare, own, known, bare.estimate, other)
+            compute_predictive_variances(bare, own, known, bare.estimate, other)
         ).any()
     )
 
@@ -261,7 +264,7 @@ def test_poses_forces_and_moments_beyond_those_of_a_campaign_are_marked(fanuc):
     states = planted(fanuc, {}, seed=3, poses=20).observations.states
     angles = states.joint_angles[:4].copy()
     wrench = np.zeros((4, 6))
-    assert not beyond_campaign(states, angles, None).any()
+    assert not find_beyond_campaign(states, angles, None).any()
     force, moment = (
         np.linalg.norm(states.wrench[:, part], axis=1).max()
         for part in (slice(0, 3), slice(3, 6))
@@ -270,11 +273,16 @@ def test_poses_forces_and_moments_beyond_those_of_a_campaign_are_marked(fanuc):
     wrench[2, 4] = 1.1 * moment
     wrench[3, 0] = force
     angles[0, 2] = states.joint_angles[:, 2].max() + 1.0
-    assert beyond_campaign(states, angles, wrench).tolist() == [True, True, True, False]
-    assert beyond_loads(
+    assert find_beyond_campaign(states, angles, wrench).tolist() == [
+        True,
+        True,
+        True,
+        False,
+    ]
+    assert find_larger_loads(
         states, np.tile([0.0, 1.5 * force, 0, 0, 0, 2.1 * moment], (1, 1)), 2.0
     ).all()
-    assert not beyond_loads(
+    assert not find_larger_loads(
         states, np.tile([0.0, 1.5 * force, 0, 0, 0, 1.9 * moment], (1, 1)), 2.0
     ).any()
 
@@ -288,5 +296,5 @@ def test_poses_that_repeat_fitted_configurations_are_told(seed, poses, words):
     states = made_states(6, poses, seed=seed)
     if poses > 8:
         states.joint_angles[:8] = fitted.joint_angles
-    warnings = repeat_warnings(fitted, states)
+    warnings = warn_of_repeated_poses(fitted, states)
     assert [each[: len(words)] for each in warnings] == ([words] if words else [])
