@@ -9,7 +9,12 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import elastocal
-from elastocal.campaigns.importers import campaign_sources, importer, named_league, user_campaign
+from elastocal.campaigns.importers import (
+    read_campaign_sources,
+    find_importer,
+    find_user_campaign,
+    list_league_data,
+)
 from elastocal.errors import InputError
 from elastocal.io.origin import SOURCES_DIGEST, Origin, configuration_sha256, environment
 from elastocal.io.records import compute_sha256
@@ -82,9 +87,9 @@ try:
         CONFIG,
         " with --config ".join(["config.yaml", *(entry.partition("=")[0] for entry in CHANGES)]),
     )
-    SOURCES = campaign_sources(config, CONFIG)
+    SOURCES = read_campaign_sources(config, CONFIG)
     # The user's own campaign by its name, if one is given.
-    OWN = user_campaign(config, f"{CONFIG}/robots", "results/loop")
+    OWN = find_user_campaign(config, f"{CONFIG}/robots", "results/loop")
     if snakemake_internals.is_starting_run(workflow):
         RUN = begin(Path(".snakemake"), ["data", "results", "reports"])
 except InputError as error:
@@ -179,7 +184,7 @@ def sources(step):
     return [ancient(placed(file)) for file in files]
 
 
-checksum_once = cache(checksum)
+checksum_once = cache(compute_sha256)
 
 
 def digest_of(files):
@@ -311,7 +316,7 @@ def files_of_campaign(campaign):
 
 def robots_of_import(wildcards):
     """Return the files of the robots that an importer reads or names."""
-    source = importer(
+    source = find_importer(
         SOURCES[wildcards.campaign]["importer"], CONFIG, f"campaign {wildcards.campaign}"
     )
     return expand(f"{CONFIG}/robots/{{robot}}.yaml", robot=source.robots)

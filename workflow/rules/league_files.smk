@@ -1,6 +1,6 @@
 """Available data sets of the league, and the names of its files: functions for league.smk."""
 
-from elastocal.campaigns.importers import find_missing
+from elastocal.campaigns.importers import find_importer, find_missing
 
 LEAGUE = config["league"]
 
@@ -20,7 +20,7 @@ def missing_data(names):
     return {name: file for name, file in files.items() if file}
 
 
-MISSING_DATA = missing_data(named_league(config))
+MISSING_DATA = missing_data(list_league_data(config))
 
 
 def available_data(robots):
