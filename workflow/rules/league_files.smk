@@ -11,7 +11,7 @@ def missing_data(names):
     files = {
         name: find_missing(
             source["files"],
-            importer(source["importer"], CONFIG, name).files,
+            find_importer(source["importer"], CONFIG, name).files,
             "data/public",
             INCLUDED_DATA,
         )
