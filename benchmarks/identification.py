@@ -16,6 +16,7 @@ from elastocal.study.equation_11 import (
 )
 from elastocal.study.simulation import (
     Loading,
+    RandomDesign,
     compute_true_deflections,
     draw_measurement_noise,
     draw_random_experiments,
@@ -104,15 +105,9 @@ def rows(work: Path, setting: Setting) -> list[Row]:
 def _measurements(
     robot: Robot, strategy: Strategy, sets: Sequence[int], configurations: int
 ) -> dict[str, Measurements]:
+    design = RandomDesign(robot.chain, robot.joint_limits, LOADING, "kuka")
     experiments = draw_random_experiments(
-        robot.chain,
-        robot.joint_limits,
-        1,
-        "kuka",
-        LOADING,
-        "identification",
-        sets,
-        configurations,
+        design, 1, "identification", sets, configurations
     )
     point = robot.chain.end_effector
     noise = NOISE * draw_measurement_noise(1, "kuka", point.name, sets, configurations)

@@ -25,8 +25,8 @@ INTERFACE = {
         "elastocal.campaigns.simulation": ("Plan", "draw_measurements")
     },
     "Plan measurements": {
+        "elastocal.application.planning.survey": ("Survey",),
         "elastocal.application.planning.plan": (
-            "Survey",
             "find_allowed_candidates",
             "choose_plan",
         ),
@@ -44,6 +44,7 @@ INTERFACE = {
         ),
         "elastocal.application.accuracy": ("predict_errors",),
         "elastocal.application.compensation": ("find_joint_targets",),
+        "elastocal.application.path_correction": ("correct_path",),
     },
     "Judge predictions": {
         "elastocal.validation.held_out": ("position_errors", "intervals")

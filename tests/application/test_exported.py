@@ -1,4 +1,4 @@
-"""The calibrated robot as files: what a robot file can say, and what it leaves out."""
+"""The calibrated robot as files: what a robot file can hold, and what it leaves out."""
 
 import numpy as np
 import pytest
@@ -8,9 +8,12 @@ from made_calibrated import made_calibrated, plain_estimate, plain_model
 from elastocal.application.calibrated import (
     calibrate_by_model,
     predict_poses,
-    without,
+    remove_effects,
 )
-from elastocal.application.exported import find_left_out_m, fold_effects
+from elastocal.application.exported import (
+    compute_left_out_displacements_m,
+    fold_effects,
+)
 from elastocal.effects.catalogue import candidates_on
 from elastocal.mechanics.robot_file import document_of, robot_from_document
 from elastocal.mechanics.sites import sites_of
@@ -26,72 +29,73 @@ GEOMETRY = (
 
 
 def draw_states(robot, count=20):
-    draws = np.random.default_rng(5)
+    """Reported angles within the limits, and a load for each."""
+    stream = np.random.default_rng(5)
     low, high = robot.joint_limits.T
-    angles = low + (high - low) * draws.random((count, robot.joints))
-    wrench = draws.standard_normal((count, 6)) * 50.0
+    angles = low + (high - low) * stream.random((count, robot.joints))
+    wrench = stream.standard_normal((count, 6)) * 50.0
     return robot.reported_angles(angles), wrench
 
 
-def read_file_model(robot):
-    """The calibrated robot that a robot file alone describes: its springs, its weight,
-    no effect."""
+def calibrate_by_file(robot):
+    """The calibrated robot that a robot file alone describes, with its springs and
+    weights and without effects."""
     model = plain_model(robot)
-    values = [
-        robot.compliance
-        if e.effect == "joint_compliance"
-        else np.zeros(len(e.parameters))
-        for e in model.effects
-    ]
-    count = sum(len(value) for value in values)
+    coefficients = []
+    for effect in model.effects:
+        is_compliance = effect.effect == "joint_compliance"
+        zeros = np.zeros(len(effect.parameters))
+        coefficients.append(robot.compliance if is_compliance else zeros)
+    count = sum(len(values) for values in coefficients)
+    estimate = plain_estimate(model, coefficients)
     noise = made_calibrated(robot).noise
-    return calibrate_by_model(
-        robot, model, plain_estimate(model, values), np.zeros((count, count)), noise
-    )
+    return calibrate_by_model(robot, model, estimate, np.zeros((count, count)), noise)
 
 
 @pytest.mark.parametrize(
-    ("name", "more"),
+    ("name", "additional"),
     [
-        *(
-            (name, ())
-            for name in ("gp180", "iiwa14", "fanuc_static", "fanuc_cpa", "ur10", "abb")
-        ),
-        *(("fanuc_cpa", (f"transmission_ratio@{joint}",)) for joint in (1, 3)),
+        ("gp180", ()),
+        ("iiwa14", ()),
+        ("fanuc_static", ()),
+        ("fanuc_cpa", ()),
+        ("ur10", ()),
+        ("abb", ()),
+        ("fanuc_cpa", ("transmission_ratio@1",)),
+        ("fanuc_cpa", ("transmission_ratio@3",)),
     ],
 )
-def test_poses_of_a_robot_file_under_load_are_those_of_the_calibrated_robot(name, more):
+def test_poses_of_a_robot_file_under_load_are_those_of_the_calibrated_robot(
+    name, additional
+):
     robot = analysed(name)
-    known = candidates_on(sites_of(robot))
+    candidates = candidates_on(sites_of(robot))
+    keys = (*GEOMETRY, "link_geometry@6", *additional)
     calibrated = made_calibrated(
-        robot,
-        *(key for key in (*GEOMETRY, "link_geometry@6", *more) if key in known),
-        size=1.0,
+        robot, *(key for key in keys if key in candidates), size=1.0
     )
-    found = fold_effects(calibrated)
-    assert found.left_out == ()
-    angles, wrench = draw_states(robot)
-    through_file = robot_from_document(document_of(found.robot))
-    for mine, theirs in zip(
-        predict_poses(read_file_model(through_file), angles, wrench),
-        predict_poses(calibrated, angles, wrench),
-        strict=True,
-    ):
-        np.testing.assert_allclose(mine, theirs, atol=1e-9)
+    folded = fold_effects(calibrated)
+    assert folded.left_out == ()
+    commands, wrench = draw_states(robot)
+    robot_of_file = robot_from_document(document_of(folded.robot))
+    from_file = predict_poses(calibrate_by_file(robot_of_file), commands, wrench)
+    expected = predict_poses(calibrated, commands, wrench)
+    np.testing.assert_allclose(from_file[0], expected[0], atol=1e-9)
+    np.testing.assert_allclose(from_file[1], expected[1], atol=1e-9)
 
 
-def test_what_a_robot_file_cannot_say_is_left_out_and_changes_nothing_else():
+def test_effects_that_a_robot_file_cannot_hold_are_left_out_and_change_nothing_else():
     keys = ["lost_motion@2", "transmission_harmonic@1[orders 1-2]"]
     calibrated = made_calibrated(analysed("gp180"), *GEOMETRY, *keys)
-    found = fold_effects(calibrated)
-    assert [calibrated.model.effects[number].key for number in found.left_out] == keys
-    angles, wrench = draw_states(calibrated.robot)
-    bare = without(calibrated, set(found.left_out))
-    ends = [
-        predict_poses(each, angles, wrench)[0]
-        for each in (read_file_model(found.robot), bare, calibrated)
-    ]
-    np.testing.assert_allclose(ends[0], ends[1], atol=1e-9)
-    off = find_left_out_m(calibrated, angles, wrench)
-    np.testing.assert_allclose(off, np.linalg.norm(ends[2] - ends[1], axis=1))
-    assert off.max() > 1e-6
+    folded = fold_effects(calibrated)
+    assert [calibrated.model.effects[number].key for number in folded.left_out] == keys
+    commands, wrench = draw_states(calibrated.robot)
+    reduced = remove_effects(calibrated, set(folded.left_out))
+    from_file, _ = predict_poses(calibrate_by_file(folded.robot), commands, wrench)
+    without_effects, _ = predict_poses(reduced, commands, wrench)
+    with_effects, _ = predict_poses(calibrated, commands, wrench)
+    np.testing.assert_allclose(from_file, without_effects, atol=1e-9)
+    displacements = compute_left_out_displacements_m(calibrated, commands, wrench)
+    expected = np.linalg.norm(with_effects - without_effects, axis=1)
+    np.testing.assert_allclose(displacements, expected)
+    assert displacements.max() > 1e-6

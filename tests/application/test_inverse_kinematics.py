@@ -10,8 +10,9 @@ from analysed_robots import analysed
 
 from elastocal.application.inverse_kinematics import (
     SOLVED_M,
-    _least_motion,
-    allowed_steps,
+    _find_least_motion,
+    _PathCandidates,
+    compute_allowed_steps,
     find_beyond_limits,
     solve_path,
 )
@@ -69,7 +70,12 @@ def test_the_least_motion_is_the_best_of_all_ways_through_all_postures_and_turns
                 (ways[:, row] > limits[:, 1]).any(axis=1), np.inf, 0.0
             )
         step = np.abs(
-            np.diff(_least_motion(copies, limits, np.zeros((2, 4)), allowed), axis=0)
+            np.diff(
+                _find_least_motion(
+                    _PathCandidates(copies, limits, np.zeros((2, 4)), allowed)
+                ),
+                axis=0,
+            )
         )
         assert (step + weight * np.maximum(step - allowed, 0.0)).sum() == pytest.approx(
             shortest.min(), abs=1e-2
@@ -80,5 +86,7 @@ def test_a_step_may_be_five_times_what_the_path_turns_and_ten_degrees():
     robot = analysed("gp180")
     angles = np.tile(robot.joint_limits.mean(axis=1) + BENT, (2, 1))
     angles[1, 0] += np.radians(3.0)
-    found = allowed_steps(robot, *poses(robot.chain, angles, robot.chain.end_effector))
+    found = compute_allowed_steps(
+        robot, *poses(robot.chain, angles, robot.chain.end_effector)
+    )
     np.testing.assert_allclose(np.degrees(found), 25.0)

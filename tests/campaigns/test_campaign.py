@@ -91,7 +91,12 @@ def test_residuals_of_poses_stand_beside_the_measurements_in_the_positions_that_
     position = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
     beyond = np.array([False, True])
     columns = tabulate_residuals(
-        some, False, False, beyond, position, {"before": before, "after": after[:, :3]}
+        some,
+        beyond,
+        position,
+        {"before": before, "after": after[:, :3]},
+        held_out=False,
+        gross_errors=False,
     )
     for number, component in enumerate(("dx", "dy", "dz", "rx", "ry", "rz")):
         np.testing.assert_array_equal(columns[f"before_{component}"], before[:, number])

@@ -135,8 +135,8 @@ def run(elastocal, tmp_path, monkeypatch):
         )
         stand_in.chmod(0o755)
         monkeypatch.setattr(campaign.sys, "executable", str(stand_in))
-        monkeypatch.setattr(campaign, "pipeline", lambda: pipeline)
-        monkeypatch.setattr(campaign, "workplace", lambda: tmp_path)
+        monkeypatch.setattr(campaign, "find_pipeline", lambda: pipeline)
+        monkeypatch.setattr(campaign, "find_workplace", lambda: tmp_path)
         return elastocal("diagnose", tmp_path / "cell7", "-j", 1)
 
     return called

@@ -28,7 +28,7 @@ def test_what_is_printed_is_what_is_run_until_a_step_fails(
         return 3 if args[0] == fails else 0
 
     monkeypatch.setattr(main.InOrder, "main", main_of_the_rest)
-    monkeypatch.setattr(demo, "workplace", lambda: tmp_path)
+    monkeypatch.setattr(demo, "find_workplace", lambda: tmp_path)
     missed = {
         name: np.full(3, off)
         for name, off in (

@@ -14,13 +14,13 @@ from support import refused
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.command import terminal as module
 from elastocal.command.terminal import (
-    angle_rad,
-    length_m,
+    find_pipeline,
+    find_robots_folder,
+    find_workplace,
     load_diagnosed_campaign,
-    pipeline,
+    parse_angle_rad,
+    parse_length_m,
     print_lines,
-    robots,
-    workplace,
 )
 from elastocal.errors import InputError
 from elastocal.io.origin import environment
@@ -30,7 +30,7 @@ from elastocal.io.origin import environment
     ("read", "text", "value"),
     [
         *(
-            (length_m, *pair)
+            (parse_length_m, *pair)
             for pair in (
                 ("0.2mm", 2e-4),
                 ("60um", 6e-5),
@@ -40,7 +40,7 @@ from elastocal.io.origin import environment
             )
         ),
         *(
-            (angle_rad, *pair)
+            (parse_angle_rad, *pair)
             for pair in (
                 ("0.01deg", 1.745329e-4),
                 ("0.1mrad", 1e-4),
@@ -70,7 +70,7 @@ def test_a_quantity_is_read_with_its_unit(read, text, value):
     ],
 )
 def test_a_quantity_without_a_unit_or_of_no_sense_is_refused(text):
-    for read in (length_m, angle_rad):
+    for read in (parse_length_m, parse_angle_rad):
         with refused("--tolerance", "", "with its unit"):
             read("--tolerance", text)
 
@@ -103,24 +103,26 @@ def test_an_installed_package_has_its_pipeline_and_the_results_are_in_the_workin
     (installed / "Snakefile").write_text("")
     (tmp_path / "mine").mkdir()
     monkeypatch.chdir(tmp_path / "mine")
-    assert pipeline() == installed and workplace() == tmp_path / "mine"
+    assert find_pipeline() == installed and find_workplace() == tmp_path / "mine"
     (installed / "Snakefile").unlink()
     with pytest.raises(InputError, match="no Snakefile here or above"):
-        pipeline()
+        find_pipeline()
 
 
 def test_a_checkout_above_the_working_directory_is_found_before_that_of_the_package(
     tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
-    assert (pipeline() / "src" / "elastocal").is_dir() and workplace() == pipeline()
+    assert (
+        find_pipeline() / "src" / "elastocal"
+    ).is_dir() and find_workplace() == find_pipeline()
     for folder in ("config/robots", "campaigns/cell7"):
         (tmp_path / folder).mkdir(parents=True)
     (tmp_path / "Snakefile").write_text("")
     monkeypatch.chdir(tmp_path / "campaigns" / "cell7")
     assert (
-        pipeline() == workplace() == tmp_path
-        and robots() == tmp_path / "config" / "robots"
+        find_pipeline() == find_workplace() == tmp_path
+        and find_robots_folder() == tmp_path / "config" / "robots"
     )
 
 

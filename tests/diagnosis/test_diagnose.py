@@ -177,7 +177,7 @@ def test_frames_alone_are_kept_where_they_predict_left_out_poses_better(
         squares = np.full(25, 3.0), 3.0 + off + excess
         monkeypatch.setattr(
             module,
-            "left_out_squares",
+            "predict_left_out_squares",
             lambda each, _, squares=squares: squares[bool(each.model.effects)],
         )
         found = diagnose(case, settings, 1)
@@ -229,6 +229,5 @@ def test_an_effect_that_is_not_expected_to_help_is_named_and_the_model_stays_as_
         and verdict["effects"][0]["heldout_gain"] is None
     )
     # And the next experiment can be planned.
-    assert propose_experiment(diagnosis, np.random.default_rng(0))[1]["best"] == [
-        "joint_offset"
-    ]
+    _, experiment = propose_experiment(diagnosis, np.random.default_rng(0))
+    assert experiment.best == ("joint_offset",)

@@ -206,7 +206,7 @@ def test_moments_have_the_noise_that_a_model_leaves_where_that_is_more_than_was_
         np.zeros(1, int),
     )
     ((_, variance),) = joint.moments()
-    inner = one.between(np.arange(2), np.arange(2))[0] + np.eye(2) / scale**2
+    inner = one.gram_blocks(np.arange(2))[0] + np.eye(2) / scale**2
     left = one.residual_squares[0] - one.score[0, :2] @ np.linalg.solve(
         inner, one.score[0, :2]
     )

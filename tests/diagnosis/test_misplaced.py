@@ -97,13 +97,13 @@ def test_a_wrong_target_or_length_is_found_with_its_size(
         misdeclared_folder(tmp_path / "made", analysed(name), name, place, shift_m)
     )
     # Of parallel axes one link says as well as the other.
-    assert place in (found["place"], *found["alternatives"])
-    assert np.linalg.norm(found["shift_m"]) == pytest.approx(
+    assert place in (found.place, *found.alternatives)
+    assert np.linalg.norm(found.shift_m) == pytest.approx(
         np.linalg.norm(shift_m), rel=0.2
     )
     if place == "tool":
-        np.testing.assert_allclose(found["shift_m"], shift_m, atol=1e-3)
-        assert "the flange is not certified, the reflector is" in found["sentence"]
+        np.testing.assert_allclose(found.shift_m, shift_m, atol=1e-3)
+        assert "the flange is not certified, the reflector is" in found.sentence
 
 
 @pytest.mark.parametrize("name", ARMS)

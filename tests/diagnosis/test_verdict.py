@@ -9,9 +9,10 @@ import pytest
 from made_problems import made_problem, made_rows, made_unit
 from planted import planted
 
+from elastocal.diagnosis.alarm import Alarm
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.model_averaging import ModelAverage, compute_extra_squares
-from elastocal.diagnosis.search import Alarm, Posterior, ScoredModel
+from elastocal.diagnosis.search import Posterior, ScoredModel
 from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.verdict import (
     ADEQUATE,

@@ -17,7 +17,7 @@ def arm():
 @pytest.mark.parametrize("name", list_bundled_effects())
 def test_every_effect_of_the_catalogue_displaces_the_reflector_somewhere(name, arm):
     shown = compute_signature(name, arm)
-    moved = shown.moved.values()
+    moved = shown.displacement_mm.values()
     assert all(np.isfinite(each).all() and each.shape[1] == 3 for each in moved)
     # By more than a tracker's noise and by less than would be seen without one.
     assert 5e-3 < max(np.abs(each).max() for each in moved) < 50
@@ -27,8 +27,8 @@ def test_every_effect_of_the_catalogue_displaces_the_reflector_somewhere(name, a
 
 
 def test_a_drift_begins_at_nothing_and_a_step_happens_in_the_middle(arm):
-    drift = compute_signature("frame_drift", arm).moved["by time"]
-    step = compute_signature("setup_step", arm).moved["by time"]
+    drift = compute_signature("frame_drift", arm).displacement_mm["by time"]
+    step = compute_signature("setup_step", arm).displacement_mm["by time"]
     assert not drift[0].any() and drift[-1].any()
     half = len(step) // 2
     assert not step[:half].any() and np.abs(step[half:]).max(axis=1).all()

@@ -1,5 +1,5 @@
-"""Schemes of robots: joints stand on the arm and links follow one another, all names
-are there, and none hides another."""
+"""Schemes of robots: joints lie on the arm, links follow one another, all names are
+present, and none hides another."""
 
 from itertools import combinations
 from pathlib import Path
@@ -28,16 +28,18 @@ CHAINS = {
     "three axes that meet": "Tz(0.5) Rx(q1) Ry(q2) Rz(q3) Tx(0.4) Ry(-q4) Ty(0.1) Tx(0.3) [EE]",
     "pitch about x": "Tz(0.34) Rz(q1) Rx(q2) Tz(0.4) Rz(q3) Rx(-q4) Tz(0.4) Rz(q5) Rx(q6) Rz(q7) Tz(0.126) [flange]",
 }
-for words, chain in CHAINS.items():
-    joints = chain.count("q")
-    known = {
-        "joint_limits_deg": [[-180, 180]] * joints,
-        "compliance_urad_per_Nm": [1.0] * joints,
+for description, chain in CHAINS.items():
+    joint_count = chain.count("q")
+    document = {
+        "name": "made up",
+        "chain": chain,
+        "joint_limits_deg": [[-180, 180]] * joint_count,
+        "compliance_urad_per_Nm": [1.0] * joint_count,
     }
-    ROBOTS[words] = robot_from_document({"name": "made up", "chain": chain, **known})
+    ROBOTS[description] = robot_from_document(document)
 each_robot = pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
-# A fault of the layout: six shifts of a few millimetres between the Gen3's joints crowd
-# its names. No page shows its scheme.
+# The layout has a known fault: six shifts of a few millimetres between the joints of the
+# Gen3 crowd its names. No page shows the scheme of this robot.
 CROWDED = pytest.param(
     ROBOTS["gen3"],
     marks=pytest.mark.xfail(strict=True, reason="names of tiny shifts crowd"),
@@ -64,8 +66,8 @@ def assert_no_overlap(figure):
         if text.get_text():
             frame = text.get_bbox_patch()
             boxes.append((text.get_text(), (frame or text).get_window_extent(renderer)))
-    for (one, first), (other, second) in combinations(boxes, 2):
-        assert not first.overlaps(second), f"{one!r} on {other!r}"
+    for (first_text, first), (second_text, second) in combinations(boxes, 2):
+        assert not first.overlaps(second), f"{first_text!r} on {second_text!r}"
     for text, box in boxes:
         assert figure.bbox.contains(*box.min) and figure.bbox.contains(*box.max), (
             f"{text!r} is cut off"
@@ -91,26 +93,24 @@ def test_no_text_of_a_scheme_hides_another_and_each_joint_length_and_point_has_i
 def test_no_text_of_a_spring_scheme_hides_another_and_each_spring_has_its_name(robot):
     figure = draw_spring_scheme(robot)
     assert_no_overlap(figure)
-    found = texts(figure)
-    models = 2 if robot.links else 1
+    written = texts(figure)
+    model_count = 2 if robot.links else 1
     assert all(
-        found.count(f"$\\theta_{{{joint}}}$") == models
+        written.count(f"$\\theta_{{{joint}}}$") == model_count
         for joint in range(1, robot.joints + 1)
     )
-    assert found.count("6D") == len(robot.links)
+    assert written.count("6D") == len(robot.links)
 
 
 @each_legible
 def test_every_joint_is_drawn_once_on_the_arm_and_apart_from_the_others(robot):
     layout, _ = lay_out_chain(robot.chain)
-    assert [number for number, _, _ in layout.joints] == list(
-        range(1, robot.joints + 1)
-    )
-    ends = [end for start, end, _ in layout.links for end in (start, end)]
-    for _, place, axis in layout.joints:
-        reach = 0 if axis is None else np.linalg.norm(axis) / 2
-        assert min(np.linalg.norm(place - end) for end in ends) == pytest.approx(
-            reach, abs=1e-9
-        )
-    for (_, one, _), (_, other, _) in combinations(layout.joints, 2):
-        assert np.linalg.norm(one - other) > 7
+    joints = layout.joints
+    assert [joint.number for joint in joints] == list(range(1, robot.joints + 1))
+    ends = [end for link in layout.links for end in (link.start, link.end)]
+    for joint in joints:
+        half_length = 0 if joint.axis is None else np.linalg.norm(joint.axis) / 2
+        nearest = min(np.linalg.norm(joint.centre - end) for end in ends)
+        assert nearest == pytest.approx(half_length, abs=1e-9)
+    for first, second in combinations(joints, 2):
+        assert np.linalg.norm(first.centre - second.centre) > 7

@@ -198,7 +198,7 @@ def test_a_fit_to_more_than_it_starts_from_is_that_to_all_of_them(long, monkeypa
     for name, count in (
         ("START_SAMPLE_SIZE", 20),
         ("LARGE_FIT_SIZE", long),
-        ("_STEPPING_STONE", 40),
+        ("_INTERMEDIATE_SAMPLE_SIZE", 40),
     ):
         monkeypatch.setattr(f"elastocal.fitting.least_squares.{name}", count)
     fitted_to = []
@@ -258,7 +258,7 @@ def robust_objective(found):
     return (
         rows
         * norm.rho(
-            np.sqrt((found.whitener.apply(found.residual) ** 2).mean(axis=1))
+            np.sqrt((found.whitening.apply(found.residual) ** 2).mean(axis=1))
         ).sum()
     )
 
@@ -270,7 +270,7 @@ def test_steps_that_do_not_help_are_halved_until_the_fit_converges(
     model, seen = bent(fanuc, seed, lag)
     found = fit_model(model, seen, NOISE)
     assert found.converged
-    monkeypatch.setattr("elastocal.fitting.least_squares._HALVINGS", 0)
+    monkeypatch.setattr("elastocal.fitting.least_squares._MAX_HALVINGS", 0)
     whole = fit_model(model, seen, NOISE)
     assert not whole.converged
     assert robust_objective(found) < robust_objective(whole) - 0.01
@@ -378,7 +378,7 @@ def test_a_small_step_leaves_its_gram_matrix_to_the_next_one_and_the_fit_ends_wh
 
     monkeypatch.setattr(LeastSquaresProblem, "normal_equations", counted)
     for near in (0.3, 0.0):
-        monkeypatch.setattr("elastocal.fitting.least_squares._NEAR", near)
+        monkeypatch.setattr("elastocal.fitting.least_squares._REUSE_THRESHOLD", near)
         taken_anew.append(0)
         found.append(fit_model(model, seen, SENSOR))
     assert taken_anew[0] < taken_anew[1]
@@ -413,7 +413,7 @@ def test_a_fit_has_converged_where_its_step_is_below_a_share_of_the_standard_err
         made_estimate(model, size=0.0),
         coefficients=(np.array([best + share * settled * scale * deviation]),),
     )
-    monkeypatch.setattr("elastocal.fitting.least_squares._STEPS", 1)
+    monkeypatch.setattr("elastocal.fitting.least_squares._MAX_STEPS", 1)
     found = fit_model(
         model, seen, SENSOR, start, reweight_first_step=True, tolerance=settled
     )
@@ -510,8 +510,8 @@ def test_a_fit_of_more_states_than_are_kept_is_the_same_and_keeps_no_jacobian(
     seen.position[[5, 20]] += 3e-3
     noise = replace(NOISE, joint_rad=np.full(6, joint_rad))
     kept = fit_model(model, seen, noise)
-    monkeypatch.setattr("elastocal.fitting.normal_equations._MOST_STATES", 10)
-    monkeypatch.setattr("elastocal.fitting.observations._MOST_HELD", 16 * 180)
+    monkeypatch.setattr("elastocal.fitting.normal_equations._MAX_STATES_IN_MEMORY", 10)
+    monkeypatch.setattr("elastocal.fitting.observations._MAX_SENSITIVITIES", 16 * 180)
     found = fit_model(model, seen, noise)
     assert (
         kept.joint_jacobian is not None

@@ -38,6 +38,7 @@ from elastocal.fitting.model import (
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.normal_equations import (
     LeastSquaresProblem,
+    ParameterScales,
     compute_whitening,
     find_identifiable_parameters,
     solve_normal_equations,
@@ -45,12 +46,23 @@ from elastocal.fitting.normal_equations import (
 from elastocal.fitting.observations import Observations
 
 
-def solved(left, right, plausible, *given):
+def solved(
+    left, right, plausible, frozen=False, penalty=0.0, present=0.0, nonlinear=False
+):
     """By the normal equations of whitened sensitivities and residual."""
     scaled = left * plausible
-    return solve_normal_equations(
-        scaled.T @ scaled, scaled.T @ right, plausible, *given
+    frozen, penalty, present, nonlinear = (
+        np.broadcast_to(values, len(plausible))
+        for values in (frozen, penalty, present, nonlinear)
     )
+    solution = solve_normal_equations(
+        scaled.T @ scaled,
+        scaled.T @ right,
+        ParameterScales(plausible, penalty, nonlinear),
+        present,
+        frozen,
+    )
+    return solution.step, solution.covariance, solution.unidentifiable
 
 
 def test_solution_with_a_prior_is_that_of_numpy_with_a_row_for_each_prior():
@@ -296,7 +308,7 @@ def test_products_by_factors_are_those_of_the_columns_written_out(
     found = []
     for fewest in (0, 1000):
         monkeypatch.setattr(
-            "elastocal.fitting.normal_equations._COLUMNS_A_COORDINATE", fewest
+            "elastocal.fitting.normal_equations._COLUMNS_PER_COORDINATE", fewest
         )
         measurements = LeastSquaresProblem(model, seen, noise, estimate, plausible)
         measurements.linearize(estimate)
@@ -329,7 +341,7 @@ def test_normal_equations_of_a_linear_problem_are_those_written_out(
     one."""
     if at_once:
         monkeypatch.setattr(
-            "elastocal.fitting.observations._MOST_HELD", 3 * 60 * at_once
+            "elastocal.fitting.observations._MAX_SENSITIVITIES", 3 * 60 * at_once
         )
     noise = GANTRY_NOISES[kind]
     states = gantry_states(20, 8)
@@ -344,7 +356,7 @@ def test_normal_equations_of_a_linear_problem_are_those_written_out(
         made_estimate(model), coefficients=(np.array([1e-4, -2e-4, 3e-5]),)
     )
     parts = LeastSquaresProblem(model, seen, noise, estimate, plausible)
-    assert len(parts.parts) == 1 if at_once is None else len(parts.parts) > 2
+    assert len(parts.blocks) == 1 if at_once is None else len(parts.blocks) > 2
     parts.linearize(estimate)
     parts.whiten()
     residual = off - left @ estimate.coefficients[0]
@@ -393,9 +405,10 @@ def test_squares_of_another_estimate_are_whitened_in_the_axes_in_which_the_step_
     )
     turned = residual @ there.frame_rotation[0].T @ estimate.frame_rotation[0]
     expected = (
-        compute_whitening(seen, parts.parts[0].jacobian, OF_JOINTS).apply(turned) ** 2
+        compute_whitening(seen, parts.blocks[0].joint_jacobian, OF_JOINTS).apply(turned)
+        ** 2
     ).sum()
     assert parts.squares(np.ones(len(seen)), there) == pytest.approx(expected, rel=1e-6)
     assert parts.squares(np.ones(len(seen)), there) != pytest.approx(
-        (parts.parts[0].whitener.apply(residual) ** 2).sum(), rel=1e-3
+        (parts.blocks[0].whitening.apply(residual) ** 2).sum(), rel=1e-3
     )

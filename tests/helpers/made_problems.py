@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from elastocal.diagnosis.hypotheses import OTHER, OWN, Discrepancy, ModelTerm
+from elastocal.diagnosis.discrepancy import OWN, Discrepancy
+from elastocal.diagnosis.hypotheses import OTHER, ModelTerm
 from elastocal.diagnosis.search import SearchProblem
 from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.statistics import (

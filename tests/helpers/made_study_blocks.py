@@ -8,6 +8,7 @@ from elastocal.study.equation_11 import identify_blocks, pair_blocks
 from elastocal.study.metrics import make_validation_set
 from elastocal.study.simulation import (
     Loading,
+    RandomDesign,
     add_noise_to_blocks,
     draw_random_experiments,
     pack_experiments,
@@ -27,11 +28,12 @@ def experiments_of(
     robot, sets=5, configurations=4, purpose="identification", key="kuka"
 ):
     """Blocks of the experiments table."""
-    drawn = (robot.chain, robot.joint_limits, 1, key, PAPER, purpose)
+    design = RandomDesign(robot.chain, robot.joint_limits, PAPER, key)
     blocks = split_data_sets(sets)
     return [
         pack_experiments(
-            numbers, draw_random_experiments(*drawn, numbers, configurations)
+            numbers,
+            draw_random_experiments(design, 1, purpose, numbers, configurations),
         )
         for numbers in blocks
     ]

@@ -4,7 +4,8 @@ import numpy as np
 from analysed_robots import analysed
 
 from elastocal.application.planning.cell import Cell
-from elastocal.application.planning.plan import Survey, find_allowed_candidates
+from elastocal.application.planning.plan import find_allowed_candidates
+from elastocal.application.planning.survey import Survey
 from elastocal.campaigns.campaign import Target
 
 OPEN = Cell((), None, 0.1)

@@ -74,7 +74,7 @@ def test_the_regression_comes_back_and_physics_alone_has_its_own_accuracy(
     heldout = whole.verdict["heldout"]
     assert heldout["delivered"]["rms_m"] < 0.6 * heldout["after"]["rms_m"]
     assert (
-        physics.calibrated.remainder is None
+        physics.calibrated.residual_model is None
         and physics.verdict["heldout"]["delivered"] == heldout["after"]
     )
     assert (

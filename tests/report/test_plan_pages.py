@@ -7,7 +7,8 @@ import numpy as np
 from drawn_figures import empty_pictures
 from made_surveys import made_candidates, made_survey
 
-from elastocal.application.planning.plan import build_sheet, choose_plan
+from elastocal.application.planning.plan import choose_plan
+from elastocal.application.planning.sheet import build_sheet
 from elastocal.campaigns.campaign import Target
 from elastocal.report.plan_pages import plan_facts
 from elastocal.report.typesetting import compile_document

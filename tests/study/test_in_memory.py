@@ -19,7 +19,7 @@ def test_data_sets_of_studies_follow_on_each_other_without_overlap(kuka):
     whole = study_of(kuka).measure(np.arange(8), ("6DoF",))["6DoF"]
     np.testing.assert_array_equal(later.deflection, whole.deflection[..., 4:])
     assert len(np.unique(whole.deflection[0, 0])) == 8
-    assert [sets.tolist() for sets in study_of(kuka).blocks(2)] == [[8, 9, 10, 11]]
+    assert [sets.tolist() for sets in study_of(kuka).list_blocks(2)] == [[8, 9, 10, 11]]
 
 
 def test_measurements_are_those_of_the_pipelines_steps(kuka):
@@ -33,7 +33,7 @@ def test_measurements_are_those_of_the_pipelines_steps(kuka):
 
 
 def test_the_score_sheet_of_the_study_of_the_tables_is_the_pipelines(kuka):
-    found = study_of(kuka).judge()
+    found = study_of(kuka).make_validation_set()
     models = 1.1 * kuka.compliance[None]
     np.testing.assert_allclose(
         compute_position_errors(found, models),

@@ -16,7 +16,11 @@ from elastocal.study.ladder import (
     compute_spring_columns,
     form_normal_equations,
 )
-from elastocal.study.simulation import compute_true_deflections, draw_random_experiments
+from elastocal.study.simulation import (
+    RandomDesign,
+    compute_true_deflections,
+    draw_random_experiments,
+)
 
 FOLDS = 4
 
@@ -24,11 +28,8 @@ FOLDS = 4
 @pytest.fixture(scope="module")
 def seen(kuka_extended):
     drawn = draw_random_experiments(
-        kuka_extended.chain,
-        kuka_extended.joint_limits,
+        RandomDesign(kuka_extended.chain, kuka_extended.joint_limits, PAPER, "x"),
         1,
-        "x",
-        PAPER,
         "identification",
         range(3),
         24,

@@ -12,7 +12,7 @@ from elastocal.study.points import (
     build_paired_table,
     evaluate_point_sets,
     interpolate_configurations,
-    mean_of,
+    score_rms,
 )
 
 POINT_SETS = {"E": ["E"], "E twice": ["E", "E"], "three": ["A", "B", "E"]}
@@ -61,7 +61,7 @@ def test_the_interval_of_a_ratio_is_that_of_the_bootstrap_over_data_sets():
     expected = np.quantile(
         np.sqrt(ours[drawn].mean(axis=1) / theirs[drawn].mean(axis=1)), [0.025, 0.975]
     )
-    assert mean_of(ours, True).ratio(mean_of(theirs, True))[1:] == pytest.approx(
+    assert score_rms(ours).compute_ratio(score_rms(theirs))[1:] == pytest.approx(
         expected, rel=0.02
     )
 

@@ -24,6 +24,7 @@ from elastocal.study.simulation import (
     DATA_SETS,
     TESTS,
     Loading,
+    RandomDesign,
     draw_bootstrap_weights,
     draw_measurement_noise,
     draw_random_experiments,
@@ -45,16 +46,8 @@ def draw(
     data_sets=range(4),
     configurations=5,
 ):
-    return draw_random_experiments(
-        robot.chain,
-        robot.joint_limits,
-        seed,
-        key,
-        loading,
-        purpose,
-        data_sets,
-        configurations,
-    )
+    design = RandomDesign(robot.chain, robot.joint_limits, loading, key)
+    return draw_random_experiments(design, seed, purpose, data_sets, configurations)
 
 
 @pytest.mark.parametrize(

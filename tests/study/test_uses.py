@@ -128,7 +128,7 @@ def test_scores_are_in_the_units_of_people_with_roots_of_means_of_squares(found)
     ].value == pytest.approx(1.5 * rms["A"].value)
     # Half the relative error of a mean of 50 squares in 200 data sets, which is known
     # to 5 %.
-    assert rms["A"].std_error() == pytest.approx(
+    assert rms["A"].compute_std_error() == pytest.approx(
         50 * np.sqrt(2 / (50 * 200)) / 2, rel=0.2
     )
     assert found["arm"]["pooled_p95_um"]["A"].value == pytest.approx(

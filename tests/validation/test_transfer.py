@@ -130,7 +130,7 @@ def test_a_sample_says_nearly_how_surely_very_many_poses_are_predicted(
     own_variance, variance = compute_predictive_variances(
         fitted, own, fitted.model, fitted.estimate, other
     )
-    monkeypatch.setattr(transfer, "_MOST_FITTED", len(own) // 2)
+    monkeypatch.setattr(transfer, "_MAX_FITTED", len(own) // 2)
     some, there = compute_predictive_variances(
         fitted, own, fitted.model, fitted.estimate, other
     )

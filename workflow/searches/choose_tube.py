@@ -17,6 +17,7 @@ from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.simulation import (
     Experiments,
     Loading,
+    RandomDesign,
     compute_true_deflections,
     draw_random_experiments,
 )
@@ -54,12 +55,10 @@ if __name__ == "__main__":
     measurements = {
         key: config["interpretations"][key] for key in ("offset_frame", "joint_range")
     }
+    loading = Loading(**config["loading"], **measurements)
     experiments = draw_random_experiments(
-        robot.chain,
-        robot.joint_limits,
+        RandomDesign(robot.chain, robot.joint_limits, loading, "kuka_extended"),
         config["seed"],
-        "kuka_extended",
-        Loading(**config["loading"], **measurements),
         "identification",
         range(config["data_sets"]),
         config["configurations"],

@@ -1,5 +1,2 @@
-"""What a fitted model is good for: forward model, corrected joint targets, planned
-measurements, a certificate.
-
-Imports `diagnosis` and what that imports, and `exchange`.
-"""
+"""What a fitted model is good for: predicted poses, corrected joint targets, planned
+measurements, statements of accuracy."""

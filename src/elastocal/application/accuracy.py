@@ -1,97 +1,89 @@
-"""What is meant by the accuracy of a robot that is commanded by its calibrated model:
-one definition for all commands.
+"""The accuracy of a robot that is commanded by its calibrated model, defined once for
+all commands.
 
-The error at a pose is the real robot less the commanded model, in a frame (`frames`).
-Predicted, it has four parts: what the uncertainty of the parameters leaves; the
-repeatability of the joints and the error that each new pose has of its own; what the
-form of the model leaves open, by what other models of the diagnosis predict, or
-held-out poses where these show more; and all of what the fit ascribes to effects that
-no command contains, such as hysteresis or a step of the set-up, for nothing shows that
-they leave the robot alone. Where a regression on the remainder acts, the first two are
-no smaller than poses left out of it say, and what is open of the form is in them unless
-held-out poses show more. Nothing of the tracker's noise is in it.
+The error at a pose is the pose of the real robot less that of the commanded model, in a
+frame of `frames`. The predicted error has four parts:
+
+- the uncertainty of the fitted parameters;
+- the repeatability of the joints and the random error of each new pose;
+- the uncertainty about the form of the model: differences between the models of the
+  diagnosis, or held-out poses if these show more;
+- all that the fit ascribes to effects that no command contains, such as hysteresis or a
+  step of the set-up, because nothing shows that they leave the robot alone.
+
+If a regression on the residuals corrects a pose, the first two parts are at least as
+large as its cross-validated errors, and these contain the uncertainty about the form
+unless held-out poses show more. The tracker's noise is in none of the parts.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import gammaincinv
 
 from elastocal.application.calibrated import (
-    Remainder,
-    calibrate_by_model,
     compute_nominal_poses,
     compute_pose_sensitivities,
-    move_to_end_effector,
-    observations_of,
+    factor_covariance,
     predict_poses,
-    regression_at,
-    square_root,
+    select_regression_inputs,
+    split_into_chunks,
 )
 from elastocal.application.frames import (
-    BASE,
-    FRAMES,
-    ROBOT,
     Scope,
     compute_placement_columns,
-    fit_placement,
-    free_parts,
     root_mean_square,
 )
-from elastocal.fitting.linearization import linearize
-from elastocal.fitting.model import (
-    compute_displaced_coordinates,
-    evaluate_conditions,
-    list_parameters,
-)
-from elastocal.fitting.noise import estimate_joint_repeatability
-from elastocal.mechanics.kinematics import jacobians, pose_differences, poses
-from elastocal.remainder.corrected import is_commanded
+from elastocal.application.scope import set_form_error
+from elastocal.mechanics.kinematics import jacobians, pose_differences
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from elastocal.application.calibrated import CalibratedRobot
-    from elastocal.fitting.model import Case, Estimate, Model
-    from elastocal.fitting.noise import Noise
-    from elastocal.fitting.observations import States
-    from elastocal.remainder.regressions import Predictor
+    from elastocal.fitting.model import Case
 
 REGION = "the poses and loads that were fitted"
-# Of every bound, one-sided, as GUM and JCGM 106 have it; and how sure held-out poses
-# must be that a prediction is too small before they raise it: of honest campaigns one
-# in twenty is.
+# One-sided confidence of every bound, as in GUM and JCGM 106. Held-out poses must reach
+# the same confidence before they raise a prediction, so that this happens by chance to
+# one correctly predicted campaign in twenty.
 CONFIDENCE = 0.95
-# Robots drawn from what the fit leaves possible: so many tell a risk of 5 % to half a
-# percent.
+# Number of simulated robots; it determines a risk of 5 % to half a percent.
 _DRAWS = 2000
 _SEED = 1
-# Square at the worst pose over the mean square of all, of an error of form: 7 to 9 on
-# the plant.
+# Squared model-form error at the worst pose over its mean square: 7 to 9 on simulated
+# robots.
 _WORST_OF_FORM = 9.0
-# Poses at a time, of so many draws.
-_AT_ONCE = 200
-# States of a campaign over which its accuracy is stated: more change no digit.
+# Poses for which the errors of all simulated robots are in memory at once.
+_CHUNK = 200
+# Upper bound on the states over which the accuracy of a campaign is stated; more states
+# do not change a printed digit.
 _MOST_STATES = 1000
 
 
 @dataclass(frozen=True)
 class Accuracy:
-    """How large a predicted error is, of what, how surely; lengths in m, without the
-    tracker's noise; `asdict` is its JSON.
+    """Predicted errors over some poses, without the tracker's noise; `asdict` is its
+    JSON.
 
-    `frame`: "robot" or "base". `rms_m`, `worst_m`: root mean square over the poses, and
-    at the worst of them; with one-sided confidence below `rms_bound_m`,
-    `worst_bound_m`, None where nothing says so. `region`: which poses these are.
-    `offset_removed`, `left_out`, `contradicted`: as in `frames.Scope`. Of `rms_m` are
-    `left_out_m` by what is left out, `form_m` by what the form of the model leaves
-    open, `repeated_m` by the repeatability of the joints and the error that each pose
-    has of its own, `regression_m` by what a regression on the remainder leaves beyond
-    parameters and repeatability. `fitted`: whether anything of the robot was; without,
-    no error of 0 is one.
+    Attributes
+    ----------
+    frame : "robot" or "base", the frame in which errors are stated.
+    rms_m, worst_m : root mean square over the poses, and RMS at the worst pose.
+    rms_bound_m, worst_bound_m : one-sided confidence bounds on them; None if unknown.
+    poses : number of poses.
+    region : which poses these are, in words.
+    offset_removed, left_out, contradicted : as in `frames.Scope`.
+    left_out_m, form_m : contributions to `rms_m` of effects that no command contains
+        and of the uncertain form of the model.
+    repeated_m : contribution of the joints' repeatability and the random error of each
+        pose.
+    regression_m : error of a regression on the residuals beyond parameters and
+        repeatability.
+    confidence : of the bounds.
+    fitted : whether any parameter of the robot was fitted. If none was, an error of 0
+        is no prediction.
     """
 
     frame: str
@@ -113,15 +105,20 @@ class Accuracy:
 
 
 @dataclass(frozen=True)
-class Prediction:
+class ErrorPrediction:
     """Predicted errors at N poses.
 
-    `parameters_m`, `repeated_m` (N,): root mean square by the uncertainty of the
-    parameters, and by what each approach and each pose has of its own. `regression_m`,
-    `form_m` (N,): by what a regression leaves beyond both, and by the form of the
-    model. `error_m` (N,): by all of these and by what is not commanded. `bound_m` (N,):
-    below which each error is with `CONFIDENCE`. `rms_m`, `worst_m` (draws,): over the
-    poses, of robots that the fit leaves possible.
+    Attributes
+    ----------
+    parameters_m : (N,) RMS error by the uncertainty of the parameters.
+    repeated_m : (N,) RMS error by the repeatability and the random error of each pose.
+    regression_m : (N,) RMS error of a regression on the residuals beyond both.
+    form_m : (N,) RMS error by the uncertain form of the model.
+    error_m : (N,) RMS error by all of these and by effects that no command contains.
+    bound_m : (N,) upper bound on each error with `CONFIDENCE`.
+    rms_m, worst_m : (draws,) RMS and maximum over the poses, for simulated robots that
+        the fit does not rule out.
+    scope : meaning of the errors.
     """
 
     parameters_m: np.ndarray
@@ -134,8 +131,8 @@ class Prediction:
     worst_m: np.ndarray
     scope: Scope
 
-    def accuracy(self, region: str) -> Accuracy:
-        """The statement over these poses, named in words."""
+    def summarize(self, region: str) -> Accuracy:
+        """Summarize the errors over all poses; `region` names these in words."""
         scope = self.scope
         return Accuracy(
             frame=scope.frame,
@@ -161,460 +158,315 @@ def predict_errors(
     reported_angles: np.ndarray,
     wrench: np.ndarray,
     draws: int = _DRAWS,
-) -> Prediction:
-    """Predicted errors of the corrected robot where it is commanded to joint angles (N,
-    n) under loads (N, 6).
+) -> ErrorPrediction:
+    """Predict the errors of the corrected robot at commanded joint angles under loads.
 
-    Drawn robots, most of the work, are for errors over all poses; where those of each
-    pose are enough, none (0) need be.
+    Parameters
+    ----------
+    calibrated : the robot, with its parameter covariance, noise and scope.
+    reported_angles : (N, n) commands as the controller reports them, rad.
+    wrench : (N, 6) loads, N and N m, as in `calibrated.predict_poses`.
+    draws : number of simulated robots. They take most of the time and are needed only
+        for errors over all poses; 0 is enough for the errors of each pose.
     """
     scope = calibrated.scope
-    robot = calibrated.robot
-    root = square_root(calibrated.covariance)
-    repeated = np.hypot(calibrated.noise.joint_rad, calibrated.noise.pose_rad)
-    stream = np.random.default_rng(_SEED)
-    drawn = stream.standard_normal((root.shape[1], draws))
-    freedom = scope.repeated_freedom
-    size = (
-        np.sqrt(stream.gamma(0.5 * freedom, 2.0 / freedom, draws))
-        if freedom
-        else np.ones(draws)
-    )
-    total = np.zeros(draws)
-    worst = np.zeros(draws)
-    acts, stated = _by_regression(calibrated, reported_angles, wrench)
-    parts = []
-    more = np.zeros_like(stated)
-    for start in range(0, len(reported_angles), _AT_ONCE):
-        part = slice(start, start + _AT_ONCE)
-        angles = reported_angles[part]
-        under = wrench[part]
-        columns = compute_placement_columns(
-            scope, *predict_poses(calibrated, angles, under)
+    regression = _predict_regression_errors(calibrated, reported_angles, wrench)
+    robots = _draw_robots(calibrated, draws)
+    chunks = [
+        _predict_chunk(
+            calibrated,
+            reported_angles[chunk],
+            wrench[chunk],
+            regression.select(chunk),
+            robots,
         )
-        moved = (
-            compute_pose_sensitivities(calibrated, angles, under)
-            - columns @ scope.absorbed
-        ) @ root
-        apart = (
-            jacobians(robot.chain, robot.model_angles(angles), robot.chain.end_effector)
-            * repeated
-        )
-        parts.append([each @ each.transpose(0, 2, 1) for each in (moved, apart)])
-        known = np.trace((parts[-1][0] + parts[-1][1])[:, :3, :3], axis1=1, axis2=2)
-        more[:, part] = np.maximum(stated[:, part] - known, 0.0)
-        off = moved[:, :3] @ drawn + apart[:, :3] @ (
-            size * stream.standard_normal((len(angles), apart.shape[2], draws))
-        )
-        if acts[part].any():
-            off += np.sqrt(more[0, part] / 3.0)[:, None, None] * stream.standard_normal(
-                off.shape
-            )
-        squares = (off**2).sum(axis=1)
-        total += squares.sum(axis=0)
-        worst = np.maximum(worst, squares.max(axis=0))
-    covariances = [np.concatenate(each) for each in zip(*parts, strict=True)]
-    ours, own = (
-        np.diagonal(covariance, axis1=1, axis2=2) for covariance in covariances
-    )
+        for chunk in split_into_chunks(len(reported_angles), _CHUNK)
+    ]
+    sum_of_squares = np.zeros(draws)
+    largest_square = np.zeros(draws)
+    for chunk in chunks:
+        sum_of_squares += chunk.sum_of_squares
+        largest_square = np.maximum(largest_square, chunk.largest_square)
+    by_parameters = np.concatenate([chunk.parameter_covariance for chunk in chunks])
+    by_repeats = np.concatenate([chunk.repeat_covariance for chunk in chunks])
+    additional = np.concatenate([chunk.additional for chunk in chunks], axis=1)
+    parameter_variance = np.diagonal(by_parameters, axis1=1, axis2=2)
+    repeat_variance = np.diagonal(by_repeats, axis1=1, axis2=2)
+    variance = (parameter_variance + repeat_variance)[:, :3].sum(axis=1)
     left_out = scope.left_out_m**2
-    form = np.where(acts & (not scope.contradicted), 0.0, scope.form_m**2)
-    alike = (more[1] + form) / 3.0
-    # An error of form is one law over all poses: what is open is how large it is.
-    unknown = form.mean() * stream.standard_normal(draws) ** 2
-    return Prediction(
-        parameters_m=np.sqrt(ours[:, :3].sum(axis=1)),
-        repeated_m=np.sqrt(own[:, :3].sum(axis=1)),
-        regression_m=np.sqrt(more[0]),
+    covered = regression.active & (not scope.contradicted)
+    form = np.where(covered, 0.0, scope.form_m**2)
+    isotropic = ((additional[1] + form) / 3.0)[:, None, None] * np.eye(3)
+    quantile = compute_length_quantiles(
+        (by_parameters + by_repeats)[:, :3, :3] + isotropic
+    )
+    # A model-form error is one function over all poses; only its size is unknown.
+    drawn_form = form.mean() * robots.stream.standard_normal(draws) ** 2
+    mean_square = sum_of_squares / len(reported_angles)
+    return ErrorPrediction(
+        parameters_m=np.sqrt(parameter_variance[:, :3].sum(axis=1)),
+        repeated_m=np.sqrt(repeat_variance[:, :3].sum(axis=1)),
+        regression_m=np.sqrt(additional[0]),
         form_m=np.sqrt(form),
-        error_m=np.sqrt((ours + own)[:, :3].sum(axis=1) + more[0] + left_out + form),
-        bound_m=np.sqrt(
-            quantile_of_length(
-                (covariances[0] + covariances[1])[:, :3, :3]
-                + alike[:, None, None] * np.eye(3)
-            )
-            ** 2
-            + left_out
+        error_m=np.sqrt(variance + additional[0] + left_out + form),
+        bound_m=np.sqrt(quantile**2 + left_out),
+        rms_m=np.sqrt(mean_square + left_out + drawn_form),
+        worst_m=np.sqrt(
+            largest_square + scope.left_out_worst_m**2 + _WORST_OF_FORM * drawn_form
         ),
-        rms_m=np.sqrt(total / len(reported_angles) + left_out + unknown),
-        worst_m=np.sqrt(worst + scope.left_out_worst_m**2 + _WORST_OF_FORM * unknown),
         scope=scope,
     )
 
 
-def _by_regression(
+@dataclass(frozen=True)
+class _RegressionErrors:
+    """Cross-validated errors of a regression on the residuals at N poses.
+
+    Attributes
+    ----------
+    active : (N,) bool, poses that the regression corrects.
+    squares : (2, N) squared errors without the tracker's noise, m^2: mean squares, and
+        those that belong to confidence intervals; 0 at all other poses.
+    """
+
+    active: np.ndarray
+    squares: np.ndarray
+
+    def select(self, chunk: slice) -> _RegressionErrors:
+        """Select some of the poses."""
+        return _RegressionErrors(self.active[chunk], self.squares[:, chunk])
+
+
+def _predict_regression_errors(
     calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Where a regression acts, (N,), and the squared error that it leaves there without
-    the tracker's noise, (2, N), m²: on the average, and for intervals."""
-    acts, asked = regression_at(calibrated, reported_angles, wrench)
-    found = np.zeros((2, len(acts)))
-    more = calibrated.remainder
-    if more is not None and asked is not None:
-        std = more.predictor.std(asked)
-        for number, times in enumerate((more.typical, 1.0)):
-            found[number, acts] = np.maximum(
-                (times**2 * std**2 - more.sensor_m**2).sum(axis=1), 0.0
-            )
-    return acts, found
+) -> _RegressionErrors:
+    active, inputs = select_regression_inputs(calibrated, reported_angles, wrench)
+    squares = np.zeros((2, len(active)))
+    residual_model = calibrated.residual_model
+    if residual_model is not None and inputs is not None:
+        std = residual_model.predictor.std(inputs)
+        for row, factor in enumerate((residual_model.typical, 1.0)):
+            variance = factor**2 * std**2 - residual_model.sensor_m**2
+            squares[row, active] = np.maximum(variance.sum(axis=1), 0.0)
+    return _RegressionErrors(active, squares)
 
 
-def quantile_of_length(covariance: np.ndarray) -> np.ndarray:
-    """95 % quantile of the length of normal vectors of some covariances (N, 3, 3),
-    ndarray (N,).
+@dataclass(frozen=True)
+class _RandomRobots:
+    """Robots that are drawn from the parameter covariance.
 
-    By the gamma distribution that has the first two moments of the square [1].
+    Attributes
+    ----------
+    stream : random numbers; each pose takes its repeatability from it.
+    covariance_factor : (P, P) factor of the parameter covariance.
+    standard_normal : (P, draws) parameters in units of this factor.
+    repeatability_scale : (draws,) repeatability of each robot over its estimate.
+    joint_std_rad : (n,) standard deviation of each joint, by its repeatability and the
+        random error of each pose.
+    """
 
+    stream: np.random.Generator
+    covariance_factor: np.ndarray
+    standard_normal: np.ndarray
+    repeatability_scale: np.ndarray
+    joint_std_rad: np.ndarray
+
+
+def _draw_robots(calibrated: CalibratedRobot, draws: int) -> _RandomRobots:
+    noise = calibrated.noise
+    dof = calibrated.scope.repeatability_dof
+    factor = factor_covariance(calibrated.covariance)
+    stream = np.random.default_rng(_SEED)
+    standard_normal = stream.standard_normal((factor.shape[1], draws))
+    scale = np.ones(draws)
+    if dof:
+        scale = np.sqrt(stream.gamma(0.5 * dof, 2.0 / dof, draws))
+    joint_std_rad = np.hypot(noise.joint_rad, noise.pose_rad)
+    return _RandomRobots(stream, factor, standard_normal, scale, joint_std_rad)
+
+
+@dataclass(frozen=True)
+class _ChunkErrors:
+    """Predicted errors at a chunk of K poses.
+
+    Attributes
+    ----------
+    parameter_covariance, repeat_covariance : (K, 6, 6) covariances of the pose errors.
+    additional : (2, K) squared errors of the regression beyond these, m^2, as in
+        `_RegressionErrors.squares`.
+    sum_of_squares, largest_square : (draws,) sum and maximum over the poses of the
+        squared position errors of each random robot, m^2.
+    """
+
+    parameter_covariance: np.ndarray
+    repeat_covariance: np.ndarray
+    additional: np.ndarray
+    sum_of_squares: np.ndarray
+    largest_square: np.ndarray
+
+
+def _predict_chunk(
+    calibrated: CalibratedRobot,
+    reported_angles: np.ndarray,
+    wrench: np.ndarray,
+    regression: _RegressionErrors,
+    robots: _RandomRobots,
+) -> _ChunkErrors:
+    """Predict the errors at a chunk of poses, and simulate those of random robots."""
+    scope = calibrated.scope
+    robot = calibrated.robot
+    placement = compute_placement_columns(
+        scope, *predict_poses(calibrated, reported_angles, wrench)
+    )
+    sensitivities = compute_pose_sensitivities(calibrated, reported_angles, wrench)
+    by_parameters = (
+        sensitivities - placement @ scope.absorbed
+    ) @ robots.covariance_factor
+    angles = robot.model_angles(reported_angles)
+    by_repeats = (
+        jacobians(robot.chain, angles, robot.chain.end_effector) * robots.joint_std_rad
+    )
+    parameter_covariance = by_parameters @ by_parameters.transpose(0, 2, 1)
+    repeat_covariance = by_repeats @ by_repeats.transpose(0, 2, 1)
+    covariance = (parameter_covariance + repeat_covariance)[:, :3, :3]
+    additional = np.maximum(
+        regression.squares - np.trace(covariance, axis1=1, axis2=2), 0.0
+    )
+    stream = robots.stream
+    shape = (len(angles), by_repeats.shape[2], len(robots.repeatability_scale))
+    repeats = robots.repeatability_scale * stream.standard_normal(shape)
+    errors = by_parameters[:, :3] @ robots.standard_normal + by_repeats[:, :3] @ repeats
+    if regression.active.any():
+        std = np.sqrt(additional[0] / 3.0)
+        errors += std[:, None, None] * stream.standard_normal(errors.shape)
+    squares = (errors**2).sum(axis=1)
+    return _ChunkErrors(
+        parameter_covariance,
+        repeat_covariance,
+        additional,
+        squares.sum(axis=0),
+        squares.max(axis=0),
+    )
+
+
+def compute_length_quantiles(covariance: np.ndarray) -> np.ndarray:
+    """Compute the quantile with `CONFIDENCE` of the length of normal vectors.
+
+    The squared length is approximated by the gamma distribution with the same mean and
+    variance [1].
+
+    Parameters
+    ----------
+    covariance : (N, 3, 3) covariances of the vectors.
+
+    Returns
+    -------
+    (N,) quantiles, in the unit of the vectors.
+
+    References
+    ----------
     [1] Satterthwaite, F. E., An approximate distribution of estimates of variance
     components, Biometrics Bulletin 2, 1946.
     """
     mean = np.trace(covariance, axis1=1, axis2=2)
     variance = 2.0 * (covariance**2).sum(axis=(1, 2))
-    safe = np.where(mean > 0.0, mean, 1.0)
-    shape = np.where(mean > 0.0, safe**2 / np.where(variance > 0.0, variance, 1.0), 1.5)
+    positive_mean = np.where(mean > 0.0, mean, 1.0)
+    positive_variance = np.where(variance > 0.0, variance, 1.0)
+    shape = np.where(mean > 0.0, positive_mean**2 / positive_variance, 1.5)
     return np.sqrt(gammaincinv(shape, CONFIDENCE) * mean / shape)
 
 
-def before_m(
+def compute_uncorrected_errors_m(
     calibrated: CalibratedRobot,
     position: np.ndarray,
     rotation: np.ndarray,
-    off: np.ndarray,
+    differences: np.ndarray,
 ) -> np.ndarray:
-    """How far an uncorrected robot misses poses, ndarray (N,), m.
+    """Compute the position errors of an uncorrected robot after its best placement.
 
-    `off` (N, 6) is the pose less that of the calibrated robot, base axes; what a
-    placement takes up is no error.
+    Parameters
+    ----------
+    calibrated : the robot; its scope says how it is placed.
+    position, rotation : (N, 3), m, and (N, 3, 3) poses of the end effector, base axes.
+    differences : (N, 6) these poses less those of the calibrated robot, m and rad, base
+        axes.
+
+    Returns
+    -------
+    (N,) errors, m.
     """
     scope = calibrated.scope
-    return np.linalg.norm(
-        (
-            off
-            - compute_placement_columns(scope, position, rotation)
-            @ scope.absorbed_before
-        )[:, :3],
-        axis=1,
-    )
+    columns = compute_placement_columns(scope, position, rotation)
+    errors = differences - columns @ scope.absorbed_before
+    return np.linalg.norm(errors[:, :3], axis=1)
 
 
 def compute_uncorrected_rms_m(
     calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray
 ) -> float:
-    """RMS error of the uncorrected robot at commands (N, n) under loads (N, 6), m, in
-    the frame of the corrected one."""
+    """Compute the RMS error of the uncorrected robot at commands (N, n) under loads
+    (N, 6), m, in the frame of the corrected one."""
     pose = predict_poses(calibrated, reported_angles, wrench)
-    off = pose_differences(
-        *compute_nominal_poses(calibrated.robot, reported_angles), *pose
+    nominal_pose = compute_nominal_poses(calibrated.robot, reported_angles)
+    differences = pose_differences(*nominal_pose, *pose)
+    return root_mean_square(
+        compute_uncorrected_errors_m(calibrated, *pose, differences)
     )
-    return root_mean_square(before_m(calibrated, *pose, off))
-
-
-def calibrate_on_case(
-    case: Case,
-    model: Model,
-    estimate: Estimate,
-    covariance: np.ndarray,
-    noise: Noise,
-    remainder: Remainder | None = None,
-) -> CalibratedRobot:
-    """A calibrated robot from a model that was fitted to a case, as
-    `calibrate_by_model`, that knows what its errors mean.
-
-    `remainder`: of `regression_on`. Where the sensor hides how well each joint repeats,
-    all are taken to repeat alike, by what the repeats leave possible.
-    """
-    robot = case.campaign.robot
-    states = case.observations.states
-    freedom = 0.0
-    if noise.source == "repeats" and not noise.joint_rad.any():
-        alike, freedom = estimate_joint_repeatability(
-            model, estimate, case.campaign.measurements
-        )
-        noise = replace(noise, joint_rad=np.full(robot.joints, alike))
-    found = replace(
-        calibrate_by_model(robot, model, estimate, covariance, noise),
-        fitted=states,
-        remainder=remainder,
-    )
-    scope = scope_of(found, model, estimate, covariance, states)
-    return replace(found, scope=replace(scope, repeated_freedom=freedom))
-
-
-def build_residual_model(
-    case: Case, estimate: Estimate, predictor: Predictor, typical: float, noise_m: float
-) -> Remainder | None:
-    """A regression on what a model leaves of a case, for the end effector; none where
-    no target was on it.
-
-    `noise_m`: of the tracker, as the campaign knows it: where the model leaves
-    something, the fit takes it for noise.
-    """
-    end = case.campaign.robot.chain.end_effector
-    mine = [
-        number
-        for number, target in enumerate(case.campaign.targets)
-        if target.point == end.name
-    ]
-    if not mine:
-        return None
-    place = min(
-        estimate.target_offset[mine],
-        key=lambda offset: float(np.linalg.norm(offset - end.offset_m)),
-    )
-    sensor = noise_m * float(np.sqrt((1.0 / case.observations.states.repeats).mean()))
-    return Remainder(predictor, place, sensor, typical)
-
-
-def scope_of(
-    calibrated: CalibratedRobot,
-    model: Model,
-    estimate: Estimate,
-    covariance: np.ndarray,
-    states: States,
-) -> Scope:
-    """The scope of a fit with all of its effects to some states: in the base's frame
-    where that was declared."""
-    robot = calibrated.robot
-    end = model.sites.chain.end_effector.name
-    base = model.fitted_frames
-    there = [target for target in model.targets if target.point == end]
-    offset = bool(there) and all(target.offset_m is None for target in there)
-    turn = bool(there) and all(target.rotation is None for target in there)
-    free = free_parts(base, offset, turn and model.rows == 6)
-    reported = robot.reported_angles(states.joint_angles)
-    position, rotation = predict_poses(calibrated, reported, states.wrench)
-    scope = Scope(ROBOT if base else BASE, position.mean(axis=0), offset_removed=offset)
-    columns = compute_placement_columns(scope, position, rotation)
-    before = pose_differences(
-        *compute_nominal_poses(robot, reported), position, rotation
-    )[..., None]
-
-    def size(fields: np.ndarray) -> tuple[float, float]:
-        squares = (
-            (fields - columns @ fit_placement(columns, fields, free))[:, :3] ** 2
-        ).sum(axis=(1, 2))
-        return float(np.sqrt(squares.mean())), float(np.sqrt(squares.max()))
-
-    sensitivities = compute_pose_sensitivities(calibrated, reported, states.wrench)
-    absorbed, absorbed_before = (
-        fit_placement(columns, fields, free) for fields in (sensitivities, before)
-    )
-    scope = replace(scope, absorbed=absorbed, absorbed_before=absorbed_before[:, 0])
-    dropped = tuple(effect.key for effect in model.effects if not is_commanded(effect))
-    if not dropped:
-        return scope
-    if model.row_span is None and states.row is not None:
-        # Progress counts from the campaign's first row to its last, whichever of its
-        # states are asked.
-        model = replace(model, row_span=(int(states.row.min()), int(states.row.max())))
-    epochs = [states]
-    if not base:
-        # Nobody places the base anew: also as if all of the campaign had been at its
-        # end.
-        row, time = (
-            None if each is None else np.full_like(each, each.max())
-            for each in (states.row, states.time_s)
-        )
-        epochs.append(replace(states, row=row, time_s=time))
-    sizes = [size(_find_left_out(model, estimate, covariance, each)) for each in epochs]
-    rms, worst = map(max, zip(*sizes, strict=True))
-    return replace(scope, left_out=dropped, left_out_m=rms, left_out_worst_m=worst)
 
 
 def select_campaign_commands(
     calibrated: CalibratedRobot,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Commands (N, n) and loads (N, 6) of a campaign over which its accuracy is stated:
-    all, or evenly some of very many."""
+    """Select commands (N, n) and loads (N, 6) of the campaign over which its accuracy is
+    stated: all, or evenly spaced ones of a very large campaign."""
     states = calibrated.states
-    chosen = np.unique(
-        np.linspace(0, len(states) - 1, min(len(states), _MOST_STATES)).astype(int)
-    )
-    return calibrated.robot.reported_angles(states.joint_angles[chosen]), states.wrench[
-        chosen
-    ]
+    count = min(len(states), _MOST_STATES)
+    chosen = np.unique(np.linspace(0, len(states) - 1, count).astype(int))
+    commands = calibrated.robot.reported_angles(states.joint_angles[chosen])
+    return commands, states.wrench[chosen]
 
 
 def predict_campaign_accuracy(calibrated: CalibratedRobot) -> Accuracy:
-    """Predicted accuracy over the poses of a campaign: what it says of its robot as a
-    whole."""
-    return predict_errors(calibrated, *select_campaign_commands(calibrated)).accuracy(
-        REGION
-    )
-
-
-def set_form_error(
-    calibrated: CalibratedRobot, form_m: float, contradicted: bool = False
-) -> CalibratedRobot:
-    """A calibrated robot of which it is known how much the form of its model leaves
-    open."""
-    return replace(
-        calibrated,
-        scope=replace(calibrated.scope, form_m=form_m, contradicted=contradicted),
-    )
+    """Predict the accuracy over the poses of the campaign, which describes the robot as
+    a whole."""
+    commands = select_campaign_commands(calibrated)
+    return predict_errors(calibrated, *commands).summarize(REGION)
 
 
 def inflate_to_held_out_errors(
     calibrated: CalibratedRobot, held_out: Case, residual: np.ndarray, noise_m: float
 ) -> CalibratedRobot:
-    """A calibrated robot whose predicted errors are as large as its held-out poses say,
-    where these contradict them.
+    """Raise the predicted errors of a robot if its held-out poses contradict them.
 
-    `residual` (M, 3): what it leaves of them, m. `noise_m`: of the tracker in a
-    coordinate.
+    The test statistic is the mean squared residual of the targets at the end effector.
+    It is compared with those of simulated robots and simulated noise. The excess counts
+    as error of the model's form. Nothing changes if the noise is unknown.
 
-    By the mean square over targets at the end effector: it must be larger than those of
-    robots and of noise that are drawn as predicted. What it is more counts as error of
-    the model's form. Nothing changes where the noise is not known.
+    Parameters
+    ----------
+    calibrated : the robot with its predicted errors.
+    held_out : poses that were not fitted.
+    residual : (M, 3) residuals of the robot's model there, m.
+    noise_m : standard deviation of the tracker in a coordinate.
     """
-    end = calibrated.robot.chain.end_effector.name
-    seen = held_out.observations
-    states = held_out.observations.states
-    mine = np.array([target.point == end for target in held_out.campaign.targets])[
-        seen.target
-    ]
-    if calibrated.noise.source == "residual" or not mine.any():
+    end_effector = calibrated.robot.chain.end_effector.name
+    observations = held_out.observations
+    states = observations.states
+    targets = held_out.campaign.targets
+    at_end = np.array([target.point == end_effector for target in targets])
+    tested = at_end[observations.target]
+    if calibrated.noise.source == "residual" or not tested.any():
         return calibrated
-    state = seen.state[mine]
-    found = predict_errors(
-        calibrated, calibrated.robot.reported_angles(states.joint_angles), states.wrench
-    )
-    sensor = noise_m**2 / states.repeats[state]
-    drawn = (
-        sensor
-        @ np.random.default_rng(_SEED).chisquare(3, (len(state), len(found.rms_m)))
-        / len(state)
-    )
-    square = float((residual[mine] ** 2).sum(axis=1).mean())
-    if (found.rms_m**2 + drawn < square).mean() <= CONFIDENCE:
+    state = observations.state[tested]
+    commands = calibrated.robot.reported_angles(states.joint_angles)
+    predicted = predict_errors(calibrated, commands, states.wrench)
+    sensor_variance = noise_m**2 / states.repeats[state]
+    stream = np.random.default_rng(_SEED)
+    chi_squares = stream.chisquare(3, (len(state), len(predicted.rms_m)))
+    drawn_noise = sensor_variance @ chi_squares / len(state)
+    mean_square = float((residual[tested] ** 2).sum(axis=1).mean())
+    if (predicted.rms_m**2 + drawn_noise < mean_square).mean() <= CONFIDENCE:
         return calibrated
-    known = (found.error_m[state] ** 2 - found.form_m[state] ** 2).mean()
-    return set_form_error(
-        calibrated,
-        float(np.sqrt(square - 3.0 * sensor.mean() - known)),
-        contradicted=True,
-    )
-
-
-def _find_left_out(
-    model: Model, estimate: Estimate, covariance: np.ndarray, states: States
-) -> np.ndarray:
-    """What effects that are not commanded do to the end effector, (S, 6, 1 + D): all of
-    it, and a factor of its covariance."""
-    moved, values = move_to_end_effector(model, estimate)
-    states = replace(states, session=np.zeros_like(states.session))
-    kept = [is_commanded(effect) for effect in model.effects]
-    commanded = tuple(
-        value if moves else 0.0 * value
-        for moves, value in zip(kept, estimate.coefficients, strict=True)
-    )
-    chain = model.sites.chain
-    ends = []
-    for each in (values, replace(values, coefficients=commanded)):
-        coordinates = compute_displaced_coordinates(
-            moved, each, evaluate_conditions(moved, each, states)
-        )
-        ends.append(poses(chain, coordinates, chain.end_effector))
-    keys = {
-        effect.key
-        for effect, moves in zip(model.effects, kept, strict=True)
-        if not moves
-    }
-    ours, theirs = (
-        np.array([owner in keys for owner, _ in list_parameters(*each)])
-        for each in ((moved, values), (model, estimate))
-    )
-    line = linearize(
-        moved,
-        values,
-        observations_of(states),
-        evaluate_conditions(moved, values, states),
-    )
-    spread = line.sensitivities[..., ours] @ square_root(
-        covariance[np.ix_(theirs, theirs)]
-    )
-    return np.concatenate(
-        [pose_differences(*ends[0], *ends[1])[..., None], spread], axis=2
-    )
-
-
-def format_accuracy(accuracy: Accuracy) -> str:
-    """One sentence with everything that an accuracy statement has, the same wherever it
-    stands."""
-    offset = (
-        " and of a constant offset at the end effector"
-        if accuracy.offset_removed
-        else ""
-    )
-
-    def value(size: float, bound: float | None) -> str:
-        sure = (
-            ""
-            if bound is None
-            else f" ({100 * accuracy.confidence:g} % sure: below {millimetres(bound)})"
-        )
-        return millimetres(size) + sure
-
-    frame = FRAMES[accuracy.frame]
-    frame = (
-        frame[:-1] + offset + ")"
-        if accuracy.frame == ROBOT
-        else frame + (" (after" + offset[4:] + ")" if offset else "")
-    )
-    if not accuracy.fitted and not accuracy.form_m:
-        return (
-            f"No position error is predicted {frame}: nothing of the robot was fitted."
-        )
-    rms = value(accuracy.rms_m, accuracy.rms_bound_m)
-    worst = value(accuracy.worst_m, accuracy.worst_bound_m)
-    text = (
-        f"Predicted position error of the corrected robot {frame}: {rms} RMS over {accuracy.region} "
-        f"({accuracy.poses}), {worst} at the worst of them; the tracker's noise is not in it."
-    )
-    if accuracy.left_out:
-        names = ", ".join(accuracy.left_out)
-        text += f" {millimetres(accuracy.left_out_m)} of it stand for {names}, which no command contains."
-    # What rounds to nothing is not said.
-    if round(accuracy.form_m, 6):
-        why = (
-            "validation poses were missed by more than the fit says"
-            if accuracy.contradicted
-            else "other models fit as well"
-        )
-        text += f" {millimetres(accuracy.form_m)} of it stand for the form of the model: {why}."
-    return text
-
-
-def tabulate_errors(verdict: Mapping[str, Any]) -> list[list[str]]:
-    """How far the robot is off before and after its correction: one table, the same in
-    report and certificate.
-
-    What is measured and what is predicted, over which poses and in which frame, are
-    different errors; each row says which. Columns: which RMS error, of the uncorrected
-    robot, of the corrected one; no row where the data are at fault. `verdict`: contents
-    of verdict.json.
-    """
-    if not verdict.get("accuracy"):
-        return []
-    heldout = verdict["heldout"]
-    measured = "measured at validation poses, noise included, after the best placement of the base"
-    stated = Accuracy(**verdict["accuracy"])
-    before = millimetres(verdict["uncorrected_m"])
-    return [
-        [
-            measured,
-            millimetres(heldout["uncalibrated"]["rms_m"]),
-            millimetres(heldout["delivered"]["rms_m"]),
-        ],
-        [
-            f"predicted over {stated.region}, {FRAMES[stated.frame]}",
-            before,
-            millimetres(stated.rms_m),
-        ],
-    ]
-
-
-def millimetres(length_m: float) -> str:
-    """A length as it is printed, to the micrometre, so that one error has one form
-    everywhere."""
-    return f"{1e3 * length_m:.3f} mm"
+    explained = (predicted.error_m[state] ** 2 - predicted.form_m[state] ** 2).mean()
+    excess = mean_square - 3.0 * sensor_variance.mean() - explained
+    return set_form_error(calibrated, float(np.sqrt(excess)), contradicted=True)

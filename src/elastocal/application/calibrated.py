@@ -1,16 +1,16 @@
-"""The robot as corrected: the final model of a diagnosis without what belongs to one
-campaign's set-up and its instruments.
+"""The calibrated robot: the final model of a diagnosis without the effects that belong
+to the set-up of one campaign or to its instruments.
 
-A command states joint angles and a load. What goes with the sense in which a joint is
-approached, with time or temperature is in no command either, and counts as an error
-that is left (`accuracy`).
+A command states joint angles and a load. Effects of the approach direction, of time or
+of temperature are in no command either, and count as errors of the corrected robot
+(`accuracy`).
 
-All that uses it (`accuracy`, `compensation`, `exported`) asks the same of it: where it
-comes to rest (`come_to_rest` and `regressed`, `forward`), how surely
-(`pose_sensitivities` with its covariance, noise and scope), and where it was fitted
-(`beyond_fitted`). Poses are those of the end effector's measuring point in the robot's
-base frame: that of the chain, which the fit placed under the tracker. How far tool and
-work frame are known is another matter, and in no figure here.
+`accuracy`, `compensation` and `exported` ask it the same questions: where it comes to
+rest (`predict_poses`), how certain that is (`compute_pose_sensitivities` with its
+covariance, noise and scope), and which commands are extrapolations
+(`find_extrapolated`). Poses are those of the end effector's measuring point in the
+robot's base frame: the frame of the chain, which the fit placed in the tracker's frame.
+The uncertainty of tool and work frames is not included.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ import numpy as np
 
 from elastocal.application.frames import (
     BASE,
+    PLACEMENT_PARAMETERS,
     Scope,
     root_mean_square,
     subtract_placement,
@@ -45,42 +46,54 @@ if TYPE_CHECKING:
     from elastocal.mechanics.robot import Robot
     from elastocal.remainder.regressions import Inputs, Predictor
 
-# States at a time: what a walk along all sites makes of them stays in the processor's
-# cache.
-_AT_ONCE = 1024
-# Names of what costs something and is no effect of the catalogue.
+# States at a time, so that the intermediate results of a walk along all sites stay in
+# the processor's cache.
+_CHUNK = 1024
+# Names of contributions that are no effects of the catalogue.
 SPRINGS = "joint_compliance"
 REGRESSION = "regression"
 
 
 @dataclass(frozen=True)
-class Remainder:
-    """A regression on what the model leaves, added to it where joints and loads were
-    fitted.
+class ResidualModel:
+    """A regression on the residuals of the model, which is added within the fitted range
+    of joints and loads.
 
-    `place` (3,): of the target in the end effector's measuring point for which it was
-    fitted, m. `sensor_m`: deviation of the tracker's noise in a coordinate of what it
-    was fitted to, which its intervals contain. `typical`: see `corrected.spread_of`.
+    Attributes
+    ----------
+    predictor : the regression.
+    target_offset_m : (3,) offset of the target for which it was fitted, in the frame of
+        the end effector's measuring point.
+    sensor_m : standard deviation of the tracker's noise in a coordinate of the fitted
+        data, which the regression's intervals contain.
+    typical : factor from the width of intervals to RMS errors, see
+        `corrected.spread_of`.
     """
 
     predictor: Predictor
-    place: np.ndarray
+    target_offset_m: np.ndarray
     sensor_m: float
     typical: float
 
 
 @dataclass(frozen=True)
 class CalibratedRobot:
-    """A robot and what a campaign found of it.
+    """A robot with the model that a campaign has identified.
 
-    `robot`: as its file declares it; `robot.model_angles(reported)` gives the angles of
-    the chain. `model`: the final model with the effects that move the robot. Its one
-    target is the end effector's measuring point. `estimate`: its values; the frame is
-    the robot's base. `covariance` (P, P): of the parameters of the effects (linear,
-    then shapes, effect by effect), marginal over frames, targets and all effects that
-    are left out; zero where held. `noise`: of the campaign, with the repeatability of
-    the joints. `scope`: what its errors mean. `fitted`: the campaign's states; None
-    where they are not known. `remainder`: None where physics alone corrects.
+    Attributes
+    ----------
+    robot : as its file declares it; `robot.model_angles` converts angles of the
+        controller to those of the chain.
+    model : the final model with the effects that move the robot. Its only target is the
+        end effector's measuring point.
+    estimate : values of its parameters; the frame is the robot's base.
+    covariance : (P, P) covariance of the parameters of the effects (linear, then
+        nonlinear, effect by effect), marginal over frames, targets and all effects that
+        are left out; zero for fixed parameters.
+    noise : of the campaign, with the repeatability of the joints.
+    scope : meaning of its errors.
+    fitted : states of the campaign; None if unknown.
+    residual_model : None if no regression corrects the residuals.
     """
 
     robot: Robot
@@ -90,11 +103,11 @@ class CalibratedRobot:
     noise: Noise
     scope: Scope
     fitted: States | None = None
-    remainder: Remainder | None = None
+    residual_model: ResidualModel | None = None
 
     @property
     def states(self) -> States:
-        """The campaign's states, of a robot that has them."""
+        """The campaign's states, which must be known."""
         assert self.fitted is not None, (
             "a robot that was read from its export has no campaign"
         )
@@ -102,15 +115,22 @@ class CalibratedRobot:
 
 
 def calibrate_by_fit(fit: Fit, robot: Robot) -> CalibratedRobot:
-    """A calibrated robot from the final fit of a diagnosis of that robot's campaign."""
+    """Build a calibrated robot from the final fit of a diagnosis of its campaign."""
     return calibrate_by_model(robot, fit.model, fit.estimate, fit.covariance, fit.noise)
 
 
 def calibrate_by_model(
     robot: Robot, model: Model, estimate: Estimate, covariance: np.ndarray, noise: Noise
 ) -> CalibratedRobot:
-    """A calibrated robot from a fitted model; `covariance` (P, P): of all its
-    `parameters`."""
+    """Build a calibrated robot from a fitted model.
+
+    Parameters
+    ----------
+    robot : as its file declares it.
+    model, estimate : fitted model.
+    covariance : (P, P) covariance of all its `parameters`.
+    noise : of the campaign.
+    """
     kept = [
         number for number, effect in enumerate(model.effects) if is_commanded(effect)
     ]
@@ -118,25 +138,28 @@ def calibrate_by_model(
     rows = np.flatnonzero(
         [owner in keys for owner, _ in list_parameters(model, estimate)]
     )
-    bare, values = move_to_end_effector(model, estimate)
-    bare = replace(bare, effects=tuple(model.effects[number] for number in kept))
-    values = replace(
-        values,
+    end_model, end_estimate = move_to_end_effector(model, estimate)
+    end_model = replace(
+        end_model, effects=tuple(model.effects[number] for number in kept)
+    )
+    end_estimate = replace(
+        end_estimate,
         coefficients=tuple(estimate.coefficients[number] for number in kept),
         shapes=tuple(estimate.shapes[number] for number in kept),
     )
-    scope = Scope(BASE, np.zeros(3), np.zeros((12, len(rows))))
+    scope = Scope(BASE, np.zeros(3), np.zeros((PLACEMENT_PARAMETERS, len(rows))))
+    kept_covariance = covariance[np.ix_(rows, rows)]
     return CalibratedRobot(
-        robot, bare, values, covariance[np.ix_(rows, rows)], noise, scope
+        robot, end_model, end_estimate, kept_covariance, noise, scope
     )
 
 
 def move_to_end_effector(model: Model, estimate: Estimate) -> tuple[Model, Estimate]:
-    """A model with all its effects whose one target is the end effector's measuring
-    point, in the robot's base frame."""
+    """Return a model with the same effects whose only target is the end effector's
+    measuring point, measured in the robot's base frame."""
     end = model.sites.chain.end_effector
     target = Target("end effector", end.name, end.offset_m)
-    values = replace(
+    end_estimate = replace(
         estimate,
         sessions=(0,),
         frame_rotation=np.eye(3)[None],
@@ -144,56 +167,67 @@ def move_to_end_effector(model: Model, estimate: Estimate) -> tuple[Model, Estim
         target_offset=np.array([end.offset_m]),
         target_rotation=np.eye(3)[None],
     )
-    return replace(model, targets=(target,), fitted_frames=False, rows=6), values
+    end_model = replace(model, targets=(target,), fitted_frames=False, rows=6)
+    return end_model, end_estimate
 
 
-def without(calibrated: CalibratedRobot, numbers: set[int]) -> CalibratedRobot:
-    """A robot without some effects of its model, by their numbers there: their linear
-    parameters are zero."""
-    values = tuple(
-        0.0 * v if number in numbers else v
-        for number, v in enumerate(calibrated.estimate.coefficients)
+def zero_coefficients(estimate: Estimate, effects: set[int]) -> Estimate:
+    """Set the linear parameters of effects, by their numbers in the model, to zero."""
+    coefficients = tuple(
+        0.0 * values if number in effects else values
+        for number, values in enumerate(estimate.coefficients)
     )
-    return replace(
-        calibrated, estimate=replace(calibrated.estimate, coefficients=values)
-    )
+    return replace(estimate, coefficients=coefficients)
+
+
+def remove_effects(calibrated: CalibratedRobot, effects: set[int]) -> CalibratedRobot:
+    """Return a robot without effects, by their numbers in its model."""
+    return replace(calibrated, estimate=zero_coefficients(calibrated.estimate, effects))
 
 
 def compute_effect_contributions(
     calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray
 ) -> dict[str, float]:
-    """RMS error in m over commands (N, n) under loads (N, 6) if one effect alone were
-    left out of the correction, by effect.
+    """Compute the RMS error that a correction without one effect would have.
 
-    Compliances come after effects, and a regression on the remainder last. In the frame
-    of the robot's scope: what a new placement of its base takes up is no error there.
+    Parameters
+    ----------
+    calibrated : the robot; its scope says which placement is free in each comparison.
+    reported_angles, wrench : (N, n) commands, rad, and (N, 6) loads, N and N m.
+
+    Returns
+    -------
+    RMS errors in m: by effect, then by the joint compliances, last by the regression on
+    the residuals if there is one.
     """
     pose = predict_poses(calibrated, reported_angles, wrench)
-    costs = {}
-    names = [effect.effect for effect in calibrated.model.effects]
-    for name in dict.fromkeys(
-        [*names, SPRINGS, *([REGRESSION] if calibrated.remainder else [])]
-    ):
-        other = without(
-            calibrated, {number for number, each in enumerate(names) if each == name}
-        )
-        if name == REGRESSION:
-            other = replace(calibrated, remainder=None)
-        elif name not in names:
-            # Compliances as declared are no effect of the model.
-            other = replace(
-                other,
-                model=replace(
-                    other.model, nominal_compliance=0.0 * other.model.nominal_compliance
-                ),
-            )
-        apart = pose_differences(*pose, *predict_poses(other, reported_angles, wrench))[
-            ..., None
-        ]
-        costs[name] = root_mean_square(
-            subtract_placement(calibrated.scope, *pose, apart)[:, :3, 0]
-        )
-    return costs
+    effect_names = [effect.effect for effect in calibrated.model.effects]
+    reduced = {name: _without_effect(calibrated, name) for name in effect_names}
+    if SPRINGS not in reduced:
+        reduced[SPRINGS] = _without_declared_springs(calibrated)
+    if calibrated.residual_model:
+        reduced[REGRESSION] = replace(calibrated, residual_model=None)
+    contributions = {}
+    for name, robot in reduced.items():
+        reduced_pose = predict_poses(robot, reported_angles, wrench)
+        differences = pose_differences(*pose, *reduced_pose)[..., None]
+        errors = subtract_placement(calibrated.scope, *pose, differences)
+        contributions[name] = root_mean_square(errors[:, :3, 0])
+    return contributions
+
+
+def _without_effect(calibrated: CalibratedRobot, name: str) -> CalibratedRobot:
+    effects = enumerate(calibrated.model.effects)
+    return remove_effects(
+        calibrated, {number for number, effect in effects if effect.effect == name}
+    )
+
+
+def _without_declared_springs(calibrated: CalibratedRobot) -> CalibratedRobot:
+    """Remove compliances that are declared, and so are no effect of the model."""
+    compliance = 0.0 * calibrated.model.nominal_compliance
+    model = replace(calibrated.model, nominal_compliance=compliance)
+    return replace(calibrated, model=model)
 
 
 def predict_poses(
@@ -201,77 +235,106 @@ def predict_poses(
     reported_angles: np.ndarray,
     wrench: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where the robot really is: exact poses of the end effector's measuring point.
+    """Predict the real poses of the end effector's measuring point.
 
-    `reported_angles` (N, n): as the controller reports them, rad (m for prismatic
-    joints). `wrench` (N, 6): N, N m, at the last measuring point's origin, base axes,
-    beside the weights that the robot file declares; None for none. Returns position (N,
-    3), m, and rotation (N, 3, 3), base axes.
+    Parameters
+    ----------
+    calibrated : the robot.
+    reported_angles : (N, n) joint angles as the controller reports them, rad (m for
+        prismatic joints).
+    wrench : (N, 6) loads in addition to the weights that the robot file declares, N and
+        N m, at the last measuring point's origin, base axes; None for no loads.
+
+    Returns
+    -------
+    Position (N, 3), m, and rotation (N, 3, 3), base axes.
     """
-    wrench = np.zeros((len(reported_angles), 6)) if wrench is None else wrench
-    position = np.empty((len(reported_angles), 3))
-    rotation = np.empty((len(reported_angles), 3, 3))
-    for part in parts(len(reported_angles)):
-        _, position[part], rotation[part] = come_to_rest(
-            calibrated, reported_angles[part], wrench[part]
+    count = len(reported_angles)
+    wrench = np.zeros((count, 6)) if wrench is None else wrench
+    position = np.empty((count, 3))
+    rotation = np.empty((count, 3, 3))
+    for chunk in split_into_chunks(count):
+        _, position[chunk], rotation[chunk] = find_equilibrium(
+            calibrated, reported_angles[chunk], wrench[chunk]
         )
-    return position + regressed(calibrated, reported_angles, wrench), rotation
+    displacement = predict_residual_displacements(calibrated, reported_angles, wrench)
+    return position + displacement, rotation
 
 
-def regressed(
+def predict_residual_displacements(
     calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray
 ) -> np.ndarray:
-    """Displacement of the end effector by the regression on the remainder, ndarray (N,
-    3), m, base axes; 0 where none acts."""
-    found = np.zeros((len(reported_angles), 3))
-    acts, asked = regression_at(calibrated, reported_angles, wrench)
-    if calibrated.remainder is not None and asked is not None:
-        found[acts] = calibrated.remainder.predictor.mean(asked)
-    return found
+    """Predict the displacement of the end effector by the regression on the residuals.
+
+    Returns (N, 3), m, base axes; 0 at commands where it is not added. Arguments as in
+    `predict_poses`.
+    """
+    displacements = np.zeros((len(reported_angles), 3))
+    active, inputs = select_regression_inputs(calibrated, reported_angles, wrench)
+    if calibrated.residual_model is not None and inputs is not None:
+        displacements[active] = calibrated.residual_model.predictor.mean(inputs)
+    return displacements
 
 
-def regression_at(
+def select_regression_inputs(
     calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray
 ) -> tuple[np.ndarray, Inputs | None]:
-    """At which commands (N, n) a regression on the remainder is added, ndarray of bool
-    (N,), and what it is shown there."""
-    more = calibrated.remainder
-    if more is None:
+    """Select the commands at which the regression on the residuals is added.
+
+    Returns (N,) bool and the inputs of the regression at these commands; None for the
+    inputs if there is no regression. Arguments as in `predict_poses`.
+    """
+    residual_model = calibrated.residual_model
+    if residual_model is None:
         return np.zeros(len(reported_angles), bool), None
-    every = observations_of(states_of(calibrated, reported_angles, wrench))
-    acts = ~beyond_regressed(calibrated.states, every.states.joint_angles, wrench)
-    asked = inputs_of(calibrated.model, calibrated.estimate, select_states(every, acts))
-    place = np.broadcast_to(more.place, (len(asked), 3))
-    return acts, replace(asked, others=np.hstack([asked.others[:, :-3], place]))
+    observations = build_observations(build_states(calibrated, reported_angles, wrench))
+    active = ~beyond_regressed(
+        calibrated.states, observations.states.joint_angles, wrench
+    )
+    inputs = inputs_of(
+        calibrated.model, calibrated.estimate, select_states(observations, active)
+    )
+    offset_m = np.broadcast_to(residual_model.target_offset_m, (len(inputs), 3))
+    inputs = replace(inputs, others=np.hstack([inputs.others[:, :-3], offset_m]))
+    return active, inputs
 
 
-def come_to_rest(
+def find_equilibrium(
     calibrated: CalibratedRobot,
     reported_angles: np.ndarray,
     wrench: np.ndarray,
-    near: np.ndarray | None = None,
+    nearby_coordinates: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where the robot yields to by its model: coordinates (N, C) of its sites, and
-    position and rotation as by `forward`.
+    """Find where the robot comes to rest under loads, by its physical model alone.
 
-    `near` (N, C): coordinates at which the loads are taken, of states that differ
-    little. Without, loads act where the robot has yielded to them, by the fixed-point
-    iteration of `model.evaluate_conditions`.
+    Parameters
+    ----------
+    calibrated, reported_angles, wrench : as in `predict_poses`.
+    nearby_coordinates : (N, C) coordinates of nearly the same states, at which the loads
+        are evaluated. None evaluates the loads at the deflected pose, by the fixed-point
+        iteration of `model.evaluate_conditions`.
+
+    Returns
+    -------
+    Coordinates (N, C) of the sites, and position and rotation as in `predict_poses`.
     """
-    fitted = (calibrated.model, calibrated.estimate)
-    states = states_of(calibrated, reported_angles, wrench)
-    coordinates = compute_displaced_coordinates(
-        *fitted, evaluate_conditions(*fitted, states, near)
-    )
-    chain = calibrated.model.sites.chain
+    model = calibrated.model
+    estimate = calibrated.estimate
+    states = build_states(calibrated, reported_angles, wrench)
+    around = evaluate_conditions(model, estimate, states, nearby_coordinates)
+    coordinates = compute_displaced_coordinates(model, estimate, around)
+    chain = model.sites.chain
     return coordinates, *poses(chain, coordinates, chain.end_effector)
 
 
 def compute_nominal_poses(
     robot: Robot, reported_angles: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where the end effector of the robot file is, taken as rigid: position (N, 3), m,
-    and rotation (N, 3, 3), base axes."""
+    """Compute the poses of the rigid robot of the file.
+
+    Returns position (N, 3), m, and rotation (N, 3, 3) of the end effector's measuring
+    point, base axes, at angles (N, n) as the controller reports them.
+    """
     return poses(
         robot.chain, robot.model_angles(reported_angles), robot.chain.end_effector
     )
@@ -280,67 +343,70 @@ def compute_nominal_poses(
 def compute_pose_sensitivities(
     calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray
 ) -> np.ndarray:
-    """Displacement and rotation of the poses of `forward` by the parameters, ndarray
-    (N, 6, P), m and rad, base axes."""
+    """Compute the derivatives of the poses by the parameters of the effects.
+
+    Returns (N, 6, P): displacement and rotation, m and rad, base axes. Arguments as in
+    `predict_poses`.
+    """
     model = calibrated.model
     estimate = calibrated.estimate
-    found = np.zeros((len(reported_angles), 6, len(calibrated.covariance)))
-    for part in parts(len(reported_angles)):
-        seen = observations_of(
-            states_of(calibrated, reported_angles[part], wrench[part])
-        )
-        found[part] = linearize(
-            model, estimate, seen, evaluate_conditions(model, estimate, seen.states)
-        ).sensitivities
-    return found
+    count = len(reported_angles)
+    sensitivities = np.zeros((count, 6, len(calibrated.covariance)))
+    for chunk in split_into_chunks(count):
+        states = build_states(calibrated, reported_angles[chunk], wrench[chunk])
+        around = evaluate_conditions(model, estimate, states)
+        linearization = linearize(model, estimate, build_observations(states), around)
+        sensitivities[chunk] = linearization.sensitivities
+    return sensitivities
 
 
-def beyond_fitted(
+def find_extrapolated(
     calibrated: CalibratedRobot,
     reported_angles: np.ndarray,
     wrench: np.ndarray,
-    times: float = 1.0,
+    load_factor: float = 1.0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Which commands (N, n) stand beyond the joint angles that were fitted, and which
-    are loaded so many times more: (N,)."""
-    joints = find_beyond_campaign(
-        calibrated.states, calibrated.robot.model_angles(reported_angles), None
-    )
-    return joints, find_larger_loads(calibrated.states, wrench, times)
+    """Find commands (N, n) and loads (N, 6) beyond the campaign.
+
+    Returns (N,) bool of joint angles outside the fitted range, and (N,) bool of loads
+    larger than `load_factor` times the fitted ones.
+    """
+    angles = calibrated.robot.model_angles(reported_angles)
+    joints = find_beyond_campaign(calibrated.states, angles, None)
+    return joints, find_larger_loads(calibrated.states, wrench, load_factor)
 
 
-def states_of(
+def build_states(
     calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray
 ) -> States:
-    """Commands, reported joint angles (N, n) and loads (N, 6), as states of the
-    model."""
-    nothing = np.zeros(len(reported_angles), int)
+    """Build states of the model from commands (N, n), rad, and loads (N, 6)."""
+    zeros = np.zeros(len(reported_angles), int)
     angles = calibrated.robot.model_angles(np.asarray(reported_angles, float))
-    return States(
-        nothing, np.arange(len(nothing)), nothing, angles, wrench, nothing + 1
+    return States(zeros, np.arange(len(zeros)), zeros, angles, wrench, zeros + 1)
+
+
+def build_observations(states: States) -> Observations:
+    """Build observations of the end effector in each state, without measured values."""
+    count = len(states)
+    return Observations(
+        states,
+        np.arange(count),
+        np.zeros(count, int),
+        np.zeros((count, 3)),
+        np.broadcast_to(np.eye(3), (count, 3, 3)),
     )
 
 
-def observations_of(states: States) -> Observations:
-    """The end effector in each state, not measured."""
-    count = len(states)
-    nowhere = np.zeros((count, 3)), np.broadcast_to(np.eye(3), (count, 3, 3))
-    return Observations(states, np.arange(count), np.zeros(count, int), *nowhere)
+def split_into_chunks(count: int, size: int = _CHUNK) -> list[slice]:
+    """Split a number of rows into slices of at most `size`."""
+    return [slice(start, min(start + size, count)) for start in range(0, count, size)]
 
 
-def parts(count: int) -> list[slice]:
-    """So many states in parts that fit the cache."""
-    return [
-        slice(start, min(start + _AT_ONCE, count))
-        for start in range(0, count, _AT_ONCE)
-    ]
+def factor_covariance(covariance: np.ndarray) -> np.ndarray:
+    """Factor a covariance (P, P), which is singular if parameters are fixed, as L L'.
 
-
-def square_root(covariance: np.ndarray) -> np.ndarray:
-    """A factor L (P, P) with L L' a covariance, singular where parameters are held.
-
-    By the eigenvectors of the correlations: parameters in kilograms would drown those
-    in radians per newton metre.
+    L comes from the eigenvectors of the correlation matrix, because the covariance
+    itself is badly scaled: kilograms would drown radians per newton metre.
     """
     deviation = np.sqrt(np.diag(covariance))
     scale = np.where(deviation > 0, deviation, 1.0)

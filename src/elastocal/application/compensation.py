@@ -1,10 +1,11 @@
 """Corrected joint targets: what to command so that the loaded, sagging, imperfect robot
 comes to rest at the wanted poses.
 
-Newton's method on the forward model of the calibrated robot. The Jacobian is that of
-the rigid chain, a simplified Newton method [1]: it errs by what the robot deviates over
-its reach, some 1 / 500, and each step leaves so much less. The error of a target that
-is commanded as the rigid robot of the file would have it is predicted beside it [2].
+They are found by Newton's method on the forward model of the calibrated robot, with the
+Jacobian of the rigid chain (a simplified Newton method [1]). The error of this Jacobian
+is the robot's deviation over its reach, some 1 / 500, and each step reduces the pose
+error by this factor. The errors of uncorrected targets, which the rigid robot of the
+file would be commanded, are predicted for comparison [2].
 
 [1] Deuflhard, P., Newton Methods for Nonlinear Problems, section 2.1.2, Springer, 2011.
 [2] Mooring, B. W., Roth, Z. S. and Driels, M. R., Fundamentals of Manipulator
@@ -14,17 +15,21 @@ Calibration, chapter 7, Wiley, 1991.
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.calibrated import come_to_rest, parts, regressed
+from elastocal.application.calibrated import (
+    find_equilibrium,
+    predict_residual_displacements,
+    split_into_chunks,
+)
 from elastocal.application.inverse_kinematics import (
     SOLVED_M,
-    allowed_steps,
+    compute_allowed_steps,
+    compute_reach_m,
     find_beyond_limits,
-    reach_m,
     solve_path,
     solve_poses,
 )
@@ -39,35 +44,39 @@ OUTSIDE_LIMITS = "outside limits"
 UNREACHABLE = "unreachable"
 SINGULAR = "singular"
 OTHER_POSTURE = "not in the stated posture"
-# Newton's steps: each leaves a five-hundredth, and more near singular postures. What a
-# regression adds is taken anew after the first so many of them: each leaves a
-# thousandth of it, and what has jumps would keep others from settling.
+# Upper bound on Newton's steps. Each reduces the error to a five-hundredth, and less
+# near singular postures.
 _STEPS = 8
-_REGRESSED = 2
-# What may be left of a corrected target: far below any robot's repeatability.
-_CORRECTED_M = 1e-9
-# A correction turns joints by milliradians. Where one must turn by this much (rad, or
-# m) the robot stands so near a singular posture that the correction is another posture.
+# Steps after which the regression's displacement is evaluated again. Each reduces its
+# error to a thousandth; a regression with jumps would keep later steps from converging.
+_REGRESSION_STEPS = 2
+# Largest pose error of a converged target: far below the repeatability of any robot.
+_CONVERGED_M = 1e-9
+# A correction turns joints by milliradians. A larger change (rad, or m) means that the
+# robot is near a singular posture, and that the correction is another posture.
 _LARGEST_CORRECTION = 0.1
-# A posture is kept where every joint stays within this of where it is stated (rad), or
-# within so much of the reach: enough for one posture to stand for a stretch of a path,
-# while other postures differ by more or lie behind a singular one.
-_NEAR_RAD = np.radians(45.0)
-# Determinants of the Jacobian, angles at the reach and over it, below which a posture
-# is singular and on neither side.
+# A posture counts as the stated one if every joint stays within this angle (rad), or
+# within this share of the reach. One stated posture can then stand for a stretch of a
+# path, while other postures differ by more or lie behind a singular one.
+_POSTURE_RAD = np.radians(45.0)
+# A posture counts as singular if the normalised determinant of its Jacobian is below
+# this value; the sign of the determinant then does not identify a posture.
 _SINGULAR_DETERMINANT = 1e-6
 
 
 @dataclass(frozen=True)
 class Correction:
-    """Joint targets for N wanted poses; lengths in m, angles in rad.
+    """Joint targets for N wanted poses.
 
-    `joint_angles` (N, n): to command, as the controller counts them. `uncorrected` (N,
-    n): what the rigid robot of the file would be commanded. `error_before`,
-    `error_after` (N, 6): wanted less predicted pose, displacement and rotation vector
-    in base axes: uncorrected, and with the correction. How far both are from the truth
-    `accuracy` says. `status` (N,) of str: "ok", "outside limits", "unreachable",
-    "singular" or "not in the stated posture".
+    Attributes
+    ----------
+    joint_angles : (N, n) corrected commands, as the controller reports them, rad.
+    uncorrected : (N, n) commands of the rigid robot of the file, rad.
+    error_before, error_after : (N, 6) wanted less predicted pose without and with the
+        correction, displacement in m and rotation vector in rad, base axes. Module
+        `accuracy` predicts how far they are from the real errors.
+    status : (N,) of str: "ok", "outside limits", "unreachable", "singular" or "not in
+        the stated posture".
     """
 
     joint_angles: np.ndarray
@@ -77,6 +86,34 @@ class Correction:
     status: np.ndarray
 
 
+@dataclass(frozen=True)
+class _NominalTargets:
+    """Wanted poses of the end effector with the joint angles of the rigid robot.
+
+    Attributes
+    ----------
+    position, rotation : (N, 3), m, and (N, 3, 3), base axes.
+    wrench : (N, 6), N and N m.
+    angles : (N, n) angles of the chain, rad.
+    residual_m : (N,) pose error of the rigid robot at these angles, m.
+    """
+
+    position: np.ndarray
+    rotation: np.ndarray
+    wrench: np.ndarray
+    angles: np.ndarray
+    residual_m: np.ndarray
+
+    def select(self, rows: slice) -> _NominalTargets:
+        return _NominalTargets(
+            self.position[rows],
+            self.rotation[rows],
+            self.wrench[rows],
+            self.angles[rows],
+            self.residual_m[rows],
+        )
+
+
 def find_joint_targets(
     calibrated: CalibratedRobot,
     position: np.ndarray,
@@ -84,138 +121,165 @@ def find_joint_targets(
     wrench: np.ndarray,
     start: np.ndarray | None = None,
 ) -> Correction:
-    """Joint targets that bring the end effector to wanted poses.
+    """Find joint targets that bring the end effector to wanted poses.
 
-    `calibrated`: of six joints or more; of more, joints move as little as possible from
-    where the rigid robot would have them. `position`, `rotation` (N, 3), (N, 3, 3):
-    wanted pose of the last measuring point, m, base axes. `wrench` (N, 6): N, N m,
-    there, base axes. `start` (N, n): joint angles near which each target lies, as the
-    controller reports them, rad: posture and turns are kept, or the target refused.
-    Without, both are chosen for the path as a whole, see `along_path`.
+    Parameters
+    ----------
+    calibrated : robot with six joints or more. With more, the joints move as little as
+        possible away from the solution of the rigid robot.
+    position, rotation : (N, 3), m, and (N, 3, 3) wanted poses of the last measuring
+        point, base axes.
+    wrench : (N, 6) loads there, N and N m, base axes.
+    start : (N, n) joint angles near each target, as the controller reports them, rad.
+        Their posture and turns are kept, or the target gets the status "not in the
+        stated posture". None chooses both for the path as a whole, see `solve_path`.
     """
     robot = calibrated.robot
+    in_other_posture = np.zeros(len(position), bool)
     if start is None:
-        nominal, left = solve_path(robot, position, rotation)
-        other = np.zeros(len(position), bool)
+        angles, residual_m = solve_path(robot, position, rotation)
     else:
-        near = robot.model_angles(start)
-        nominal, left = solve_poses(robot, position, rotation, near)
-        nominal -= np.where(
-            robot.chain.prismatic,
-            0.0,
-            2 * np.pi * np.round((nominal - near) / (2 * np.pi)),
-        )
-        other = _find_other_postures(robot, near, nominal)
-
-    def of(part: slice) -> Correction:
-        return _find_chunk_targets(
-            calibrated,
-            position[part],
-            rotation[part],
-            wrench[part],
-            nominal[part],
-            left[part],
-        )
-
+        stated = robot.model_angles(start)
+        angles, residual_m = solve_poses(robot, position, rotation, stated)
+        turns = np.round((angles - stated) / (2 * np.pi))
+        angles -= np.where(robot.chain.prismatic, 0.0, 2 * np.pi * turns)
+        in_other_posture = _find_other_postures(robot, stated, angles)
+    targets = _NominalTargets(position, rotation, wrench, angles, residual_m)
+    chunks = [targets.select(rows) for rows in split_into_chunks(len(position))]
     with ThreadPoolExecutor(2) as pool:
-        done = [*pool.map(of, parts(len(position)))]
-    found = Correction(
-        *(
-            np.concatenate([getattr(each, name) for each in done])
-            for name in vars(done[0])
+        corrections = [
+            *pool.map(lambda chunk: _correct_chunk(calibrated, chunk), chunks)
+        ]
+    arrays = {}
+    for field in fields(Correction):
+        arrays[field.name] = np.concatenate(
+            [getattr(correction, field.name) for correction in corrections]
         )
-    )
-    found.status[other & (found.status != UNREACHABLE)] = OTHER_POSTURE
-    return found
+    reached = arrays["status"] != UNREACHABLE
+    arrays["status"][in_other_posture & reached] = OTHER_POSTURE
+    return Correction(**arrays)
 
 
 def _find_other_postures(
-    robot: Robot, stated: np.ndarray, found: np.ndarray
+    robot: Robot, stated: np.ndarray, solution: np.ndarray
 ) -> np.ndarray:
-    """Which postures (N, n) are others than stated: far from them or, of six joints,
-    behind a singular one; bool (N,)."""
-    far = (
-        np.abs(found - stated)
-        > np.where(robot.chain.prismatic, reach_m(robot), 1.0) * _NEAR_RAD
-    )
+    """Find solutions that are not in the stated posture.
+
+    They are far from it or, with six joints, behind a singular posture. Takes angles
+    (N, n) of the chain, returns (N,) bool.
+    """
+    largest = np.where(robot.chain.prismatic, compute_reach_m(robot), 1.0)
+    is_far = (np.abs(solution - stated) > largest * _POSTURE_RAD).any(axis=1)
     if robot.joints != 6:
-        return np.asarray(far.any(axis=1))
-    scale = np.repeat([1.0 / reach_m(robot), 1.0], 3)[:, None]
-    sides = [
-        np.linalg.det(jacobians(robot.chain, each, robot.chain.end_effector) * scale)
-        for each in (stated, found)
-    ]
-    sides = [
-        np.where(np.abs(side) < _SINGULAR_DETERMINANT, 0.0, np.sign(side))
-        for side in sides
-    ]
-    return np.asarray(far.any(axis=1) | (sides[0] * sides[1] < 0))
+        return np.asarray(is_far)
+    sides = _find_side(robot, stated) * _find_side(robot, solution)
+    return np.asarray(is_far | (sides < 0))
 
 
-def large_steps(
+def _find_side(robot: Robot, angles: np.ndarray) -> np.ndarray:
+    """Return the sign of the Jacobian's determinant at angles (N, 6), 0 if singular.
+
+    Angles count as lengths at the reach, in which the Jacobian is normalised.
+    """
+    scale = np.repeat([1.0 / compute_reach_m(robot), 1.0], 3)[:, None]
+    jacobian = jacobians(robot.chain, angles, robot.chain.end_effector)
+    determinant = np.linalg.det(jacobian * scale)
+    is_singular = np.abs(determinant) < _SINGULAR_DETERMINANT
+    return np.where(is_singular, 0.0, np.sign(determinant))
+
+
+@dataclass(frozen=True)
+class LargeStep:
+    """A joint that moves too far from one target to the next.
+
+    Attributes
+    ----------
+    row : number of the target to which it moves, from 0.
+    joint : number of the joint, from 0.
+    size, allowed : size of the step and largest allowed size, rad (m if prismatic).
+    """
+
+    row: int
+    joint: int
+    size: float
+    allowed: float
+
+
+def find_large_steps(
     robot: Robot, position: np.ndarray, rotation: np.ndarray, joint_angles: np.ndarray
-) -> list[tuple[int, int, float, float]]:
-    """Steps from pose to pose that are larger than `allowed_steps`: row to which, joint
-    (from 0), its step and what is allowed.
+) -> list[LargeStep]:
+    """Find steps from pose to pose that are larger than `compute_allowed_steps`.
 
-    `joint_angles` (N, n): commands, as the controller reports them.
+    Parameters
+    ----------
+    robot : the robot.
+    position, rotation : (N, 3), m, and (N, 3, 3) poses of the path, base axes.
+    joint_angles : (N, n) commands, as the controller reports them, rad.
     """
     steps = np.abs(np.diff(robot.model_angles(joint_angles), axis=0))
-    allowed = allowed_steps(robot, position, rotation)
+    allowed = compute_allowed_steps(robot, position, rotation)
     return [
-        (row + 1, joint, steps[row, joint], allowed[row, joint])
+        LargeStep(row + 1, joint, steps[row, joint], allowed[row, joint])
         for row, joint in np.argwhere(steps > allowed).tolist()
     ]
 
 
-def _find_chunk_targets(
-    calibrated: CalibratedRobot,
-    position: np.ndarray,
-    rotation: np.ndarray,
-    wrench: np.ndarray,
-    nominal: np.ndarray,
-    left: np.ndarray,
-) -> Correction:
-    robot, joints = calibrated.robot, calibrated.robot.joints
-    reached = left <= SOLVED_M
-    scale = np.repeat([1.0, reach_m(robot)], 3)
-    uncorrected = robot.reported_angles(nominal)
-    coordinates, at, turned = come_to_rest(calibrated, uncorrected, wrench)
-    added = regressed(calibrated, uncorrected, wrench)
-    before = pose_differences(position, rotation, at + added, turned)
-    inverse = np.linalg.pinv(jacobians(robot.chain, nominal, robot.chain.end_effector))
-    angles = nominal.copy()
-    off = before.copy()
-    singular = np.zeros(len(angles), bool)
+def _correct_chunk(calibrated: CalibratedRobot, targets: _NominalTargets) -> Correction:
+    """Correct targets by Newton's method from the solution of the rigid robot."""
+    robot = calibrated.robot
+    reached = targets.residual_m <= SOLVED_M
+    uncorrected = robot.reported_angles(targets.angles)
+    coordinates, position, rotation = find_equilibrium(
+        calibrated, uncorrected, targets.wrench
+    )
+    displacement = predict_residual_displacements(
+        calibrated, uncorrected, targets.wrench
+    )
+    before = pose_differences(
+        targets.position, targets.rotation, position + displacement, rotation
+    )
+    jacobian = jacobians(robot.chain, targets.angles, robot.chain.end_effector)
+    inverse = np.linalg.pinv(jacobian)
+    angles = targets.angles.copy()
+    error = before.copy()
+    is_singular = np.zeros(len(angles), bool)
     # Rows that need another step: near singular postures more than elsewhere.
-    moving = np.flatnonzero(reached)
-    for number in range(_STEPS):
-        step = (inverse[moving] @ off[moving, :, None])[..., 0]
-        far = (
-            np.abs(angles[moving] + step - nominal[moving]).max(axis=1)
-            > _LARGEST_CORRECTION
+    rows = np.flatnonzero(reached)
+    for iteration in range(_STEPS):
+        step = (inverse[rows] @ error[rows, :, None])[..., 0]
+        change = np.abs(angles[rows] + step - targets.angles[rows]).max(axis=1)
+        too_far = change > _LARGEST_CORRECTION
+        is_singular[rows[too_far]] = True
+        rows = rows[~too_far]
+        angles[rows] += step[~too_far]
+        coordinates[rows, : robot.joints] += step[~too_far]
+        commands = robot.reported_angles(angles[rows])
+        wrench = targets.wrench[rows]
+        coordinates[rows], position, rotation = find_equilibrium(
+            calibrated, commands, wrench, coordinates[rows]
         )
-        singular[moving[far]] = True
-        moving = moving[~far]
-        step = step[~far]
-        angles[moving] += step
-        coordinates[moving, :joints] += step
-        commands = robot.reported_angles(angles[moving])
-        under = wrench[moving]
-        coordinates[moving], at, turned = come_to_rest(
-            calibrated, commands, under, coordinates[moving]
+        if iteration < _REGRESSION_STEPS:
+            displacement[rows] = predict_residual_displacements(
+                calibrated, commands, wrench
+            )
+        error[rows] = pose_differences(
+            targets.position[rows],
+            targets.rotation[rows],
+            position + displacement[rows],
+            rotation,
         )
-        if number < _REGRESSED:
-            added[moving] = regressed(calibrated, commands, under)
-        off[moving] = pose_differences(
-            position[moving], rotation[moving], at + added[moving], turned
-        )
-        moving = moving[np.linalg.norm(off[moving] * scale, axis=1) > _CORRECTED_M]
-        if not len(moving):
+        rows = rows[_measure_length(robot, error[rows]) > _CONVERGED_M]
+        if not len(rows):
             break
-    singular[moving] = True
+    is_singular[rows] = True
     status = np.full(len(angles), OK, dtype=f"U{len(OTHER_POSTURE)}")
-    status[singular] = SINGULAR
+    status[is_singular] = SINGULAR
     status[find_beyond_limits(robot, angles).any(axis=1)] = OUTSIDE_LIMITS
     status[~reached] = UNREACHABLE
-    return Correction(robot.reported_angles(angles), uncorrected, before, off, status)
+    return Correction(robot.reported_angles(angles), uncorrected, before, error, status)
+
+
+def _measure_length(robot: Robot, error: np.ndarray) -> np.ndarray:
+    """Return the size of pose errors (N, 6), m; angles count as lengths at the reach."""
+    scale = np.repeat([1.0, compute_reach_m(robot)], 3)
+    return np.linalg.norm(error * scale, axis=1)

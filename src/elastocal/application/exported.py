@@ -1,9 +1,9 @@
 """The calibrated robot as files.
 
-A robot file can say offsets and ratios of the joints, in what the controller's angles
-mean, q = M r + o; errors of a link, as six elementary transforms at its far end in the
-order in which the fit moved it there; compliances and masses. What it cannot say, such
-as a gear's harmonics or a regression on the remainder, stands in none.
+A robot file can hold offsets and ratios of the joints, as the meaning q = M r + o of the
+controller's angles r; errors of a link, as six elementary transforms at its far end in
+the order in which the fit moved it there; compliances and masses. It cannot hold the
+harmonics of a gear or a regression on the residuals, for example; these are in no file.
 """
 
 from __future__ import annotations
@@ -13,52 +13,47 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.calibrated import predict_poses, without
+from elastocal.application.calibrated import predict_poses, remove_effects
 from elastocal.effects.conditions import MASS_PARAMETERS
+from elastocal.exchange.urdf import read_urdf
+from elastocal.exchange.urdf_writing import nominal_chain
 from elastocal.mechanics.chain import Chain, MeasuringPoint, Transform
+from elastocal.mechanics.kinematics import poses
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from elastocal.application.calibrated import CalibratedRobot
+    from elastocal.exchange.urdf_writing import CorrectedUrdf
     from elastocal.mechanics.robot import Robot
 
 
-def find_left_out_m(
-    calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray
-) -> np.ndarray:
-    """How far the effects that a robot file cannot hold move the end effector, ndarray
-    (N,), m; as in `forward`."""
-    bare = without(calibrated, set(fold_effects(calibrated).left_out))
-    positions = [
-        predict_poses(each, reported_angles, wrench)[0] for each in (calibrated, bare)
-    ]
-    return np.linalg.norm(positions[0] - positions[1], axis=1)
-
-
 @dataclass(frozen=True)
-class Folded:
-    """A calibrated robot as a robot file has it, rigid or with its springs, under its
-    weight; and what that leaves out.
+class FoldedRobot:
+    """A calibrated robot as a robot file describes it: geometry, springs and weights.
 
-    `left_out`: places in the model of the effects that it does not have. Without them
-    its poses are those of the calibrated robot, exactly.
+    Attributes
+    ----------
+    robot : contents of the file.
+    left_out : numbers, in the calibrated model, of the effects that the file cannot
+        hold. Without them the poses of the calibrated robot are exactly those of
+        `robot`.
     """
 
     robot: Robot
     left_out: tuple[int, ...]
 
 
-def fold_effects(calibrated: CalibratedRobot) -> Folded:
-    """Put into the robot what its file can say."""
+def fold_effects(calibrated: CalibratedRobot) -> FoldedRobot:
+    """Fold the effects that a robot file can hold into the robot."""
     robot = calibrated.robot
     model = calibrated.model
-    estimate = calibrated.estimate
     offset = np.zeros(robot.joints)
     ratio = np.eye(robot.joints)
-    at_ends: dict[int, np.ndarray] = {}
+    link_errors: dict[int, np.ndarray] = {}
     left_out = []
-    for number, (effect, values) in enumerate(
-        zip(model.effects, estimate.coefficients, strict=True)
-    ):
+    for number, effect in enumerate(model.effects):
+        values = calibrated.estimate.coefficients[number]
         joint = effect.joints[0] - 1 if effect.joints else 0
         match effect.effect:
             case "joint_offset":
@@ -67,58 +62,105 @@ def fold_effects(calibrated: CalibratedRobot) -> Folded:
                 for parameter, value in zip(effect.parameters, values, strict=True):
                     ratio[joint, int(parameter.name.removeprefix("per_q")) - 1] += value
             case "link_geometry":
-                at_ends[joint + 1] = at_ends.get(joint + 1, np.zeros(6)) + values
+                previous = link_errors.get(joint + 1, np.zeros(6))
+                link_errors[joint + 1] = previous + values
             case "joint_compliance":
                 robot = replace(robot, compliance=values.copy(), compliance_known=True)
             case "declared_weight":
-                robot = _reweigh(robot, values)
+                robot = _correct_masses(robot, values)
             case _:
                 left_out.append(number)
-    matrix = ratio @ robot.reported_matrix
-    zeros = ratio @ robot.reported_offset + offset
-    chain = _add_link_errors(robot.chain, at_ends)
-    return Folded(
-        replace(
-            robot, chain=chain, links=(), reported_matrix=matrix, reported_offset=zeros
-        ),
-        tuple(left_out),
+    folded = replace(
+        robot,
+        chain=_add_link_errors(robot.chain, link_errors),
+        links=(),
+        reported_matrix=ratio @ robot.reported_matrix,
+        reported_offset=ratio @ robot.reported_offset + offset,
     )
+    return FoldedRobot(folded, tuple(left_out))
 
 
-def _reweigh(robot: Robot, corrections: np.ndarray) -> Robot:
-    """A robot whose masses and first moments are those that were found."""
+def _correct_masses(robot: Robot, corrections: np.ndarray) -> Robot:
+    """Apply identified corrections, mass and first moment of each weight in turn."""
     masses = []
-    for mass, (heavier, *moment) in zip(
-        robot.masses, corrections.reshape(-1, MASS_PARAMETERS), strict=True
-    ):
-        total = mass.mass_kg + heavier
-        centre = np.array(mass.centre_m) + np.array(moment) / total
+    per_mass = corrections.reshape(-1, MASS_PARAMETERS)
+    for mass, (additional_kg, *moment) in zip(robot.masses, per_mass, strict=True):
+        total_kg = mass.mass_kg + additional_kg
+        centre = np.array(mass.centre_m) + np.array(moment) / total_kg
         masses.append(
-            replace(mass, mass_kg=float(total), centre_m=tuple(centre.tolist()))
+            replace(mass, mass_kg=float(total_kg), centre_m=tuple(centre.tolist()))
         )
     return replace(robot, masses=tuple(masses))
 
 
-def _add_link_errors(chain: Chain, at_ends: dict[int, np.ndarray]) -> Chain:
-    """A chain with small transforms at the far ends of links, 1 for that behind the
-    first joint."""
+def _add_link_errors(chain: Chain, link_errors: dict[int, np.ndarray]) -> Chain:
+    """Insert small transforms at the far ends of links.
+
+    Parameters
+    ----------
+    chain : the nominal chain.
+    link_errors : by link (1 is behind the first joint) three shifts, m, and three
+        rotations, rad.
+    """
     transforms: list[Transform] = []
-    moved: dict[int, int] = {}
-    seen = 0
-    for place in range(len(chain.transforms) + 1):
-        transform = chain.transforms[place] if place < len(chain.transforms) else None
-        ends = transform is None or transform.coordinate is not None
-        if ends and seen in at_ends:
-            error = at_ends.pop(seen)
+    # New index of each index in the nominal chain.
+    moved: list[int] = []
+    link = 0
+    for transform in (*chain.transforms, None):
+        ends_link = transform is None or transform.coordinate is not None
+        if ends_link and link in link_errors:
             transforms += [
                 Transform("TR"[axis // 3], axis % 3, float(value))
-                for axis, value in enumerate(error)
+                for axis, value in enumerate(link_errors[link])
             ]
-        moved[place] = len(transforms)
+        moved.append(len(transforms))
         if transform is not None:
             transforms.append(transform)
-            seen += transform.coordinate is not None
+            link += transform.coordinate is not None
     points = tuple(
-        MeasuringPoint(p.name, moved[p.after], p.offset_m) for p in chain.points
+        MeasuringPoint(point.name, moved[point.after], point.offset_m)
+        for point in chain.points
     )
     return Chain(tuple(transforms), points, chain.coordinates)
+
+
+def compute_left_out_displacements_m(
+    calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray
+) -> np.ndarray:
+    """Compute how far the effects that a robot file cannot hold move the end effector,
+    (N,), m. Arguments as in `predict_poses`."""
+    folded = remove_effects(calibrated, set(fold_effects(calibrated).left_out))
+    position, _ = predict_poses(calibrated, reported_angles, wrench)
+    folded_position, _ = predict_poses(folded, reported_angles, wrench)
+    return np.linalg.norm(position - folded_position, axis=1)
+
+
+def compute_urdf_deviation_m(
+    urdf: CorrectedUrdf,
+    path: Path,
+    nominal: Robot,
+    folded: Robot,
+    reported_angles: np.ndarray,
+) -> float:
+    """Compute the largest distance between the end effectors of a corrected URDF and of
+    the robot file.
+
+    Parameters
+    ----------
+    urdf, path : the corrected URDF and the file to which it was written.
+    nominal : robot before the calibration, whose joint angles the URDF keeps.
+    folded : robot of the file.
+    reported_angles : (N, n) commands at which both are compared, rad.
+
+    Returns
+    -------
+    Distance, m.
+    """
+    _, chain = nominal_chain(read_urdf(path), urdf.base, urdf.tip, path.as_posix())
+    urdf_position, _ = poses(
+        chain, nominal.model_angles(reported_angles), chain.end_effector
+    )
+    position, _ = poses(
+        folded.chain, folded.model_angles(reported_angles), folded.chain.end_effector
+    )
+    return float(np.linalg.norm(urdf_position - position, axis=1).max())

@@ -1,11 +1,13 @@
-"""In which frame errors of a robot are stated, and what of them is none there.
+"""The coordinate frame in which errors of a robot are stated, and the motions that are
+not format_count as errors in it.
 
-`BASE`, that of the declared base, where measurements were taken in it. `ROBOT`, the
-robot's own, is after the best rigid placement of the base over the campaign's poses
-[1]. In both, where the offset of the target on the end effector was fitted, a constant
-offset there is no error. Data and use have these freedoms in common: what the data
-cannot say of them costs the use nothing. They are taken up over the campaign's poses,
-so that a single new pose has an error too.
+In the frame `BASE` the base is declared, because the measurements were taken in it. In
+the frame `ROBOT` errors are format_count after the best rigid placement of the base over the
+campaign's poses [1]. In both frames a constant offset at the end effector is not an
+error if the offset of the target there was fitted. Calibration data and use of the
+robot have these degrees of freedom in common: the use does not need what the data
+cannot determine. The placement is fitted to the campaign's poses as a whole, so that a
+single new pose has an error, too.
 
 [1] Kabsch, W., A solution for the best rotation to relate two sets of vectors, Acta
 Crystallographica A32, 1976.
@@ -23,92 +25,151 @@ FRAMES = {
     ROBOT: "in the robot's own frame (after the best placement of its base)",
     BASE: "in the frame of the declared base",
 }
+# Parameters of a placement: shift and rotation of the base, offset and rotation at the
+# end effector, with three components each.
+PLACEMENT_PARAMETERS = 12
 
 
 @dataclass(frozen=True)
 class Scope:
-    """What the errors of a robot mean.
+    """Meaning of the errors of a robot: their frame and what else they contain.
 
-    `frame`: "robot" or "base". `origin` (3,): about which the placement turns, m.
-    `absorbed` (12, P): motion of the base (m, rad), constant offset and turn of the end
-    effector that take up each parameter. `absorbed_before` (12,): the same of the
-    nominal robot less the calibrated one. `left_out`: effects of the fit that no
-    command contains, with what they contribute at the campaign's poses, RMS and at the
-    worst. `form_m`: what the form of the model leaves open there, RMS. `contradicted`:
-    whether held-out poses showed that to be more than other models say.
-    `repeated_freedom`: degrees of freedom of the square of the joints' repeatability; 0
-    where it is taken as known.
+    Attributes
+    ----------
+    frame : "robot" or "base".
+    origin : (3,) point about which the placement rotates the base, m.
+    absorbed : (12, P) change of the placement (m, rad) that compensates a unit change
+        of each parameter best.
+    absorbed_before : (12,) placement that compensates the pose of the nominal robot
+        less that of the calibrated one best.
+    offset_removed : whether a constant offset at the end effector is not an error.
+    left_out : keys of the effects of the fit that no command contains.
+    left_out_m, left_out_worst_m : contribution of these effects at the campaign's
+        poses, RMS and maximum.
+    form_m : RMS error at the campaign's poses because the form of the model is
+        uncertain.
+    contradicted : whether held-out poses showed `form_m` to be larger than the
+        differences between models.
+    repeatability_dof : degrees of freedom of the estimated variance of the joints'
+        repeatability; 0 if it counts as known.
     """
 
     frame: str
     origin: np.ndarray
-    absorbed: np.ndarray = field(default_factory=lambda: np.zeros((12, 0)))
-    absorbed_before: np.ndarray = field(default_factory=lambda: np.zeros(12))
+    absorbed: np.ndarray = field(
+        default_factory=lambda: np.zeros((PLACEMENT_PARAMETERS, 0))
+    )
+    absorbed_before: np.ndarray = field(
+        default_factory=lambda: np.zeros(PLACEMENT_PARAMETERS)
+    )
     offset_removed: bool = False
     left_out: tuple[str, ...] = ()
     left_out_m: float = 0.0
     left_out_worst_m: float = 0.0
     form_m: float = 0.0
     contradicted: bool = False
-    repeated_freedom: float = 0.0
+    repeatability_dof: float = 0.0
 
 
 def compute_placement_columns(
     scope: Scope, position: np.ndarray, rotation: np.ndarray
 ) -> np.ndarray:
-    """Displacement and turn of poses by shift and turn of the base, offset and turn of
-    the end effector, (N, 6, 12)."""
+    """Compute the derivatives of poses by the parameters of a placement.
+
+    Parameters
+    ----------
+    scope : gives the point about which the base rotates.
+    position, rotation : (N, 3), m, and (N, 3, 3) poses of the end effector, base axes.
+
+    Returns
+    -------
+    (N, 6, 12) displacement and rotation by shift and rotation of the base (base axes),
+    then by offset and rotation at the end effector (its own axes).
+    """
     x, y, z = (position - scope.origin).T
-    found = np.zeros((len(position), 6, 12))
-    found[:, :3, :3] = found[:, 3:, 3:6] = np.eye(3)
-    found[:, 0, 4] = z
-    found[:, 0, 5] = -y
-    found[:, 1, 3] = -z
-    found[:, 1, 5] = x
-    found[:, 2, 3] = y
-    found[:, 2, 4] = -x
-    found[:, :3, 6:9] = found[:, 3:, 9:] = rotation
-    return found
+    columns = np.zeros((len(position), 6, PLACEMENT_PARAMETERS))
+    columns[:, :3, :3] = columns[:, 3:, 3:6] = np.eye(3)
+    columns[:, 0, 4] = z
+    columns[:, 0, 5] = -y
+    columns[:, 1, 3] = -z
+    columns[:, 1, 5] = x
+    columns[:, 2, 3] = y
+    columns[:, 2, 4] = -x
+    columns[:, :3, 6:9] = columns[:, 3:, 9:] = rotation
+    return columns
 
 
 def fit_placement(
-    columns: np.ndarray, field: np.ndarray, free: np.ndarray
+    columns: np.ndarray, displacements: np.ndarray, free: np.ndarray
 ) -> np.ndarray:
-    """How much of the free columns of `placement` takes up most of a field (N, 6, K) of
-    displacements, ndarray (12, K).
+    """Fit the free parameters of a placement to fields of displacements, by least
+    squares.
 
-    Positions decide on all but the constant turn of the end effector, which takes up
-    what is left of orientations.
+    Positions determine all of them except the constant rotation of the end effector,
+    which is then fitted to the residual orientations.
+
+    Parameters
+    ----------
+    columns : (N, 6, 12) result of `compute_placement_columns`.
+    displacements : (N, 6, K) K fields of displacements and rotations, m and rad.
+    free : (12,) bool, parameters that are fitted; the rest stay zero.
+
+    Returns
+    -------
+    (12, K) fitted parameters, m and rad.
     """
-    found = np.zeros((12, field.shape[2]))
-    for rows, first, last in ((slice(0, 3), 0, 9), (slice(3, 6), 9, 12)):
-        mine = np.flatnonzero(free[first:last]) + first
-        if len(mine):
-            left = (field - columns @ found)[:, rows].reshape(
-                3 * len(field), field.shape[2]
+    fitted = np.zeros((PLACEMENT_PARAMETERS, displacements.shape[2]))
+    positions = slice(0, 3), 0, 9
+    orientations = slice(3, 6), 9, PLACEMENT_PARAMETERS
+    for rows, first, last in (positions, orientations):
+        parameters = np.flatnonzero(free[first:last]) + first
+        if len(parameters):
+            residual = (displacements - columns @ fitted)[:, rows].reshape(
+                3 * len(displacements), displacements.shape[2]
             )
-            found[mine] = np.linalg.lstsq(
-                columns[:, rows, mine].reshape(len(left), -1), left, rcond=None
-            )[0]
-    return found
+            design = columns[:, rows, parameters].reshape(len(residual), -1)
+            fitted[parameters] = np.linalg.lstsq(design, residual, rcond=None)[0]
+    return fitted
 
 
-def free_parts(base: bool, offset: bool, turn: bool = False) -> np.ndarray:
-    """Which columns of `placement` are free, ndarray of bool (12,): of the base,
-    constant offset and turn at its end."""
-    return np.repeat([base, base, offset, turn], 3)
+def select_free_parameters(
+    *, base: bool, offset: bool, rotation: bool = False
+) -> np.ndarray:
+    """Select the parameters of a placement that are free, (12,) bool.
+
+    Parameters
+    ----------
+    base : whether shift and rotation of the base are free.
+    offset, rotation : whether a constant offset and a constant rotation at the end
+        effector are.
+    """
+    return np.repeat([base, base, offset, rotation], 3)
 
 
 def subtract_placement(
-    scope: Scope, position: np.ndarray, rotation: np.ndarray, fields: np.ndarray
+    scope: Scope, position: np.ndarray, rotation: np.ndarray, displacements: np.ndarray
 ) -> np.ndarray:
-    """Displacements (N, 6, K) of poses less what the placement that a scope leaves free
-    takes up of each over these poses."""
+    """Subtract from each field its best placement over the given poses.
+
+    Parameters
+    ----------
+    scope : says which parameters of the placement are free.
+    position, rotation : (N, 3), m, and (N, 3, 3) poses, base axes.
+    displacements : (N, 6, K) K fields of displacements and rotations there, m and rad.
+
+    Returns
+    -------
+    (N, 6, K) residual fields.
+    """
     columns = compute_placement_columns(scope, position, rotation)
-    free = free_parts(scope.frame == ROBOT, scope.offset_removed)
-    return np.asarray(fields - columns @ fit_placement(columns, fields, free))
+    free = select_free_parameters(
+        base=scope.frame == ROBOT, offset=scope.offset_removed
+    )
+    absorbed = columns @ fit_placement(columns, displacements, free)
+    return np.asarray(displacements - absorbed)
 
 
 def root_mean_square(lengths: np.ndarray) -> float:
-    """Root mean square of lengths (N,), or of those of displacements (N, 3)."""
+    """Return the root mean square of lengths (N,), or of the lengths of vectors
+    (N, 3)."""
     return float(np.sqrt((lengths**2).sum() / len(lengths)))

@@ -1,19 +1,20 @@
-"""Joint angles of the rigid robot for wanted poses: damped least squares from several
-starts, and a path without jumps.
+"""Joint angles of the rigid robot for wanted poses, by damped least squares from several
+starts, and a path through them without jumps.
 
-Each step is that of Levenberg and Marquardt [1] on the pose error, whose rotations
-count at the reach of the arm as lengths; batched over targets and starts. All solutions
-of all rows, and their copies whole turns away, are candidates of one path: that without
-large steps where there is one, and of these that along which the joints move least, by
-dynamic programming (Viterbi's algorithm [2]).
+Each step is that of Levenberg and Marquardt [1] on the pose error, in which rotations
+count as lengths at the reach of the arm; it is batched over targets and starts. All
+solutions of all rows, and their copies whole turns away, are candidates for the path.
+Chosen is a path without large steps if there is one, and among these the path along
+which the joints move least, by dynamic programming (Viterbi's algorithm [2]).
 
-[1] Siciliano, B., Sciavicco, L., Villani, L. and Oriolo, G., Robotics: Modelling, Planning and Control, section 3.7, Springer,
-    2009.
+[1] Siciliano, B., Sciavicco, L., Villani, L. and Oriolo, G., Robotics: Modelling,
+Planning and Control, section 3.7, Springer, 2009.
 [2] Forney, G. D., The Viterbi algorithm, Proceedings of the IEEE 61, 1973.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -24,314 +25,380 @@ from elastocal.mechanics.kinematics import pose_differences, poses_and_jacobians
 if TYPE_CHECKING:
     from elastocal.mechanics.robot import Robot
 
-# Steps after which a start has converged or will not: Newton's method doubles the
-# digits in the last few.
-_STEPS = 60
-# Of the pose error, m and as length at the reach: converged, a thousand times the
-# rounding of poses of some metres; and beyond which a pose is out of reach. Of joint
-# limits, rad or m; and of solutions that are one.
+# Upper bound on iterations: Newton's method doubles the digits in the last few of them,
+# so a start that has not converged by then never will.
+_ITERATIONS = 60
+# Pose error (m, rotations as lengths at the reach) below which a start has converged: a
+# thousand times the rounding errors of poses of some metres.
 _CONVERGED_M = 1e-10
+# Pose error above which a pose is out of reach.
 SOLVED_M = 1e-7
+# Rounding errors of joint angles at their limits (rad, or m).
 _ROUNDING = 1e-9
+# Solutions that differ by less (rad, or m) are one.
 _SAME = 1e-6
-# Damping in parts of the largest squared singular value, and by how much a step that
-# fails or succeeds changes it.
+# Initial damping in units of the trace of J J', factors after a step that fails or
+# succeeds, and bounds: above the largest damping a start has failed.
 _DAMPING = 1e-2
-_GROWS = 8.0
-_SHRINKS = 0.15
-_LEAST = 1e-14
-# Solutions of a row are sought from so many starts: an arm of six joints has eight
-# postures as a rule.
+_DAMPING_AFTER_FAILURE = 8.0
+_DAMPING_AFTER_SUCCESS = 0.15
+_SMALLEST_DAMPING = 1e-14
+_LARGEST_DAMPING = 1e6
+# Starts for each row: an arm of six joints usually has eight postures.
 _STARTS = 12
-# A joint may turn so many times as far from target to target as the path itself, and by
-# so much (rad) beside: wrists turn a few times as far as what they hold unless they are
-# near a singular posture, and targets that are shifted alone need some turn too. A
-# change of posture or of turns is far beyond both.
+# A joint may turn from target to target by this multiple of the rotation of the path,
+# and by a constant (rad): wrists turn a few times as far as what they hold unless they
+# are near a singular posture, and targets that differ in position alone need some
+# rotation, too. A change of posture or of turns is far larger than both.
 STEP_PER_TURN = 5.0
-STEP_BESIDE = np.radians(10.0)
-# Copies of a solution whole turns away, nearest the middle of the limits: all that fit
-# into two turns either way.
+STEP_ALLOWANCE = np.radians(10.0)
+# Copies of a solution whole turns away that are candidates: those within two turns
+# either way of the middle of the limits.
 _MOST_TURNS = 4
-# What steps are too large by comes first, then the way, then how far from the middle of
-# the limits it lies.
-_TOO_LARGE = 1e4
-_OFF_MIDDLE = 1e-5
-# No joint turns farther in a step, rad or m: beyond it the linearization means nothing.
+# Weights of the path's cost beside its length: the excess of steps that are too large
+# comes first, the distance from the middle of the limits last.
+_EXCESS_WEIGHT = 1e4
+_MIDDLE_WEIGHT = 1e-5
+# Longest step of a joint in an iteration, rad or m; the linearization is valid for no
+# longer ones.
 _LONGEST_STEP = 0.5
 
 
-def reach_m(robot: Robot) -> float:
-    """Length of the chain stretched out, at which an angle counts as a length, m."""
-    return max(
-        sum(abs(t.constant) for t in robot.chain.transforms if t.kind == "T"), 1e-3
-    )
+def compute_reach_m(robot: Robot) -> float:
+    """Compute the length of the stretched chain, at which an angle counts as a length,
+    m."""
+    lengths = (abs(t.constant) for t in robot.chain.transforms if t.kind == "T")
+    return max(sum(lengths), 1e-3)
 
 
 def solve_poses(
     robot: Robot, position: np.ndarray, rotation: np.ndarray, start: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Joint angles by damped least squares from one start for each target.
+    """Solve for joint angles by damped least squares from one start for each target.
 
-    `position`, `rotation` (N, 3), (N, 3, 3): wanted, of the end effector's measuring
-    point, m, base axes. `start` (N, n): angles of the chain, rad. Returns `angles` (N,
-    n): of the chain, rad; the best that was found; `error_m` (N,): what is left,
-    rotations as lengths at the reach.
+    Parameters
+    ----------
+    robot : the robot, taken as rigid.
+    position, rotation : (N, 3), m, and (N, 3, 3) wanted poses of the end effector's
+        measuring point, base axes.
+    start : (N, n) angles of the chain, rad.
+
+    Returns
+    -------
+    angles : (N, n) angles of the chain with the smallest error, rad.
+    error_m : (N,) pose errors, rotations as lengths at the reach.
     """
+    count = len(start)
+    scale = np.repeat([1.0, compute_reach_m(robot)], 3)
     angles = start.copy()
-    scale = np.repeat([1.0, reach_m(robot)], 3)
-    error = np.full(len(angles), np.inf)
-    damping = np.full(len(angles), _DAMPING)
-    trial = angles.copy()
-    open_rows = np.arange(len(angles))
-    step_of = np.zeros((len(angles), 6)), np.zeros((len(angles), 6, robot.joints))
-    for _ in range(_STEPS):
-        at, turned, jacobian = poses_and_jacobians(
-            robot.chain, trial[open_rows], robot.chain.end_effector
+    trial = start.copy()
+    error_m = np.full(count, np.inf)
+    damping = np.full(count, _DAMPING)
+    pose_error = np.zeros((count, 6))
+    jacobian = np.zeros((count, 6, robot.joints))
+    rows = np.arange(count)
+    for _ in range(_ITERATIONS):
+        trial_position, trial_rotation, trial_jacobian = poses_and_jacobians(
+            robot.chain, trial[rows], robot.chain.end_effector
         )
-        off = (
-            pose_differences(position[open_rows], rotation[open_rows], at, turned)
-            * scale
+        differences = pose_differences(
+            position[rows], rotation[rows], trial_position, trial_rotation
         )
-        left = np.sqrt((off**2).sum(axis=1))
-        better = left < error[open_rows]
-        rows = open_rows[better]
-        angles[rows] = trial[rows]
-        error[rows] = left[better]
-        step_of[0][rows] = off[better]
-        step_of[1][rows] = jacobian[better] * scale[:, None]
-        damping[open_rows] = np.maximum(
-            damping[open_rows] * np.where(better, _SHRINKS, _GROWS), _LEAST
-        )
-        open_rows = np.flatnonzero((error > _CONVERGED_M) & (damping < 1e6))
-        if not len(open_rows):
+        trial_pose_error = differences * scale
+        trial_error_m = np.sqrt((trial_pose_error**2).sum(axis=1))
+        better = trial_error_m < error_m[rows]
+        improved = rows[better]
+        angles[improved] = trial[improved]
+        error_m[improved] = trial_error_m[better]
+        pose_error[improved] = trial_pose_error[better]
+        jacobian[improved] = trial_jacobian[better] * scale[:, None]
+        factor = np.where(better, _DAMPING_AFTER_SUCCESS, _DAMPING_AFTER_FAILURE)
+        damping[rows] = np.maximum(damping[rows] * factor, _SMALLEST_DAMPING)
+        rows = np.flatnonzero((error_m > _CONVERGED_M) & (damping < _LARGEST_DAMPING))
+        if not len(rows):
             break
-        trial[open_rows] = angles[open_rows] + _step_damped(
-            step_of[1][open_rows], step_of[0][open_rows], damping[open_rows]
+        trial[rows] = angles[rows] + _compute_damped_steps(
+            jacobian[rows], pose_error[rows], damping[rows]
         )
-    return angles, error
+    return angles, error_m
 
 
-def _step_damped(
-    jacobian: np.ndarray, off: np.ndarray, damping: np.ndarray
+def _compute_damped_steps(
+    jacobian: np.ndarray, pose_error: np.ndarray, damping: np.ndarray
 ) -> np.ndarray:
-    """Steps (N, n) by damped least squares in the space of the poses, J' (J J' + d
-    I)^-1 e, no longer than the bound."""
+    """Compute steps (N, n) in the space of the poses, J' (J J' + d I)^-1 e, shortened to
+    the longest allowed step."""
     gram = jacobian @ jacobian.transpose(0, 2, 1)
-    size = np.trace(gram, axis1=1, axis2=2)
-    gram += (damping * size)[:, None, None] * np.eye(6)
-    step = (jacobian.transpose(0, 2, 1) @ np.linalg.solve(gram, off[..., None]))[..., 0]
+    trace = np.trace(gram, axis1=1, axis2=2)
+    gram += (damping * trace)[:, None, None] * np.eye(6)
+    solution = np.linalg.solve(gram, pose_error[..., None])
+    step = (jacobian.transpose(0, 2, 1) @ solution)[..., 0]
     longest = np.abs(step).max(axis=1, keepdims=True)
     return step * np.minimum(1.0, _LONGEST_STEP / np.maximum(longest, 1e-300))
 
 
 def find_beyond_limits(robot: Robot, angles: np.ndarray) -> np.ndarray:
-    """Whether each joint is outside of its limits, by more than rounding, ndarray of
-    bool (..., n)."""
+    """Find joints outside of their limits by more than rounding, (..., n) bool."""
     low, high = robot.joint_limits.T
     return (angles < low - _ROUNDING) | (angles > high + _ROUNDING)
 
 
-def allowed_steps(
+def compute_allowed_steps(
     robot: Robot, position: np.ndarray, rotation: np.ndarray
 ) -> np.ndarray:
-    """How far each joint may move from each of N poses to the next, ndarray (N - 1, n),
-    rad or m.
+    """Compute how far each joint may move from each of N poses to the next.
 
-    Joints that turn by the rotation between the poses, see `STEP_PER_TURN`; that shift
-    by their distance, angles at the reach.
+    A revolute joint may move in proportion to the rotation between the poses, see
+    `STEP_PER_TURN`, a prismatic one in proportion to their distance; angles count as
+    lengths at the reach. Returns (N - 1, n), rad or m.
     """
-    apart = pose_differences(position[1:], rotation[1:], position[:-1], rotation[:-1])
-    shift, turn = (
-        np.linalg.norm(part, axis=1)[:, None] for part in (apart[:, :3], apart[:, 3:])
+    differences = pose_differences(
+        position[1:], rotation[1:], position[:-1], rotation[:-1]
     )
+    shift = np.linalg.norm(differences[:, :3], axis=1)[:, None]
+    turn = np.linalg.norm(differences[:, 3:], axis=1)[:, None]
     return np.where(
         robot.chain.prismatic,
-        STEP_PER_TURN * shift + STEP_BESIDE * reach_m(robot),
-        STEP_PER_TURN * turn + STEP_BESIDE,
+        STEP_PER_TURN * shift + STEP_ALLOWANCE * compute_reach_m(robot),
+        STEP_PER_TURN * turn + STEP_ALLOWANCE,
     )
+
+
+@dataclass(frozen=True)
+class _Solutions:
+    """K solutions of each of N rows of a path.
+
+    Attributes
+    ----------
+    angles : (K, N, n) angles of the chain, rad.
+    error_m : (K, N) pose errors.
+    """
+
+    angles: np.ndarray
+    error_m: np.ndarray
 
 
 def solve_path(
     robot: Robot, position: np.ndarray, rotation: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Joint angles for the poses of a path, within the limits where there are such,
-    moving as little as possible.
+    """Solve for joint angles along a path, within the limits if possible, that move as
+    little as possible.
 
-    `robot`, `position`, `rotation`: as in `refine`. Returns `angles`, `error_m` (N, n),
-    (N,): as by `refine`.
+    Parameters
+    ----------
+    robot, position, rotation : as in `solve_poses`.
+
+    Returns
+    -------
+    angles, error_m : (N, n) and (N,) as in `solve_poses`.
     """
     low, high = robot.joint_limits.T
-    drawn = low + (high - low) * np.random.default_rng(0).random(
-        (_STARTS, robot.joints)
-    )
-    drawn[0] = 0.5 * (low + high)
-    starts = np.repeat(drawn, len(position), axis=0)
-    found, left = solve_poses(
+    shares = np.random.default_rng(0).random((_STARTS, robot.joints))
+    starts = low + (high - low) * shares
+    starts[0] = 0.5 * (low + high)
+    angles, error_m = solve_poses(
         robot,
         np.tile(position, (_STARTS, 1)),
         np.tile(rotation, (_STARTS, 1, 1)),
-        starts,
+        np.repeat(starts, len(position), axis=0),
     )
-    first = found.reshape(_STARTS, -1, robot.joints), left.reshape(_STARTS, -1)
-    angles, error = _shortest_path(robot, position, rotation, *first)
-    large = np.abs(np.diff(angles, axis=0)) > allowed_steps(robot, position, rotation)
+    solutions = _Solutions(
+        angles.reshape(_STARTS, -1, robot.joints), error_m.reshape(_STARTS, -1)
+    )
+    path, path_error_m = _choose_path(robot, position, rotation, solutions)
+    steps = np.abs(np.diff(path, axis=0))
     if (
-        large.any()
-        or (error > SOLVED_M).any()
-        or find_beyond_limits(robot, angles).any()
+        (steps <= compute_allowed_steps(robot, position, rotation)).all()
+        and (path_error_m <= SOLVED_M).all()
+        and not find_beyond_limits(robot, path).any()
     ):
-        # Postures that the starts of a row missed, from its neighbours; and the ways of
-        # an arm with more joints than it needs.
-        ways = [
-            first,
-            *(_continued(robot, position, rotation, *first, way) for way in (1, -1)),
-        ]
-        return _shortest_path(
+        return path, path_error_m
+    # Continue the solutions from row to row in both directions. This finds postures that
+    # the starts of a row have missed, and nearby solutions of an arm with more joints
+    # than it needs.
+    rows = np.arange(len(position))
+    forward = _continue_solutions(robot, position, rotation, solutions, rows)
+    backward = _continue_solutions(robot, position, rotation, solutions, rows[::-1])
+    every = (solutions, forward, backward)
+    extended = _Solutions(
+        np.concatenate([candidates.angles for candidates in every]),
+        np.concatenate([candidates.error_m for candidates in every]),
+    )
+    return _choose_path(robot, position, rotation, extended)
+
+
+def _continue_solutions(
+    robot: Robot,
+    position: np.ndarray,
+    rotation: np.ndarray,
+    solutions: _Solutions,
+    rows: np.ndarray,
+) -> _Solutions:
+    """Solve each row again, from the solutions of the row before it in `rows`."""
+    angles = solutions.angles.copy()
+    error_m = solutions.error_m.copy()
+    for previous, row in pairwise(rows):
+        starts = np.flatnonzero(error_m[:, previous] <= SOLVED_M)
+        continued, continued_error_m = solve_poses(
             robot,
-            position,
-            rotation,
-            *(np.concatenate(each) for each in zip(*ways, strict=True)),
+            np.repeat(position[[row]], len(starts), axis=0),
+            np.repeat(rotation[[row]], len(starts), axis=0),
+            angles[starts, previous],
         )
-    return angles, error
+        solved = continued_error_m <= SOLVED_M
+        angles[starts[solved], row] = continued[solved]
+        error_m[starts[solved], row] = continued_error_m[solved]
+    return _Solutions(angles, error_m)
 
 
-def _continued(
-    robot: Robot,
-    position: np.ndarray,
-    rotation: np.ndarray,
-    angles: np.ndarray,
-    error: np.ndarray,
-    way: int,
+def _choose_path(
+    robot: Robot, position: np.ndarray, rotation: np.ndarray, solutions: _Solutions
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Solutions (K, N, n) and what is left (K, N), each from that of the row before; of
-    the row behind where `way` is -1."""
-    angles = angles.copy()
-    error = error.copy()
-    rows = np.arange(len(position))[::way]
-    for before, row in pairwise(rows):
-        good = np.flatnonzero(error[:, before] <= SOLVED_M)
-        wanted = (
-            np.repeat(position[[row]], len(good), axis=0),
-            np.repeat(rotation[[row]], len(good), axis=0),
-        )
-        found, left = solve_poses(robot, *wanted, angles[good, before])
-        kept = good[left <= SOLVED_M]
-        angles[kept, row] = found[left <= SOLVED_M]
-        error[kept, row] = left[left <= SOLVED_M]
-    return angles, error
+    """Choose one of the solutions of each row, or a copy of it whole turns away.
 
-
-def _shortest_path(
-    robot: Robot,
-    position: np.ndarray,
-    rotation: np.ndarray,
-    angles: np.ndarray,
-    error: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """The path through one of K solutions of each row, or a copy of it whole turns
-    away: `angles` (N, n), `error_m` (N,).
-
-    Rows that no solution reaches within the limits are no part of it, and get what
-    leaves least.
+    Rows without a solution within the limits are not part of the path and get the
+    solution with the smallest error. Returns `angles` (N, n) and `error_m` (N,).
     """
-    low, high = robot.joint_limits.T
     period = np.where(robot.chain.prismatic, np.inf, 2 * np.pi)
+    limits = _narrow_limits(robot, period)
+    turns = np.floor((solutions.angles - limits[:, 0] + _ROUNDING) / period)
+    shift = np.where(robot.chain.prismatic, 0.0, 2 * np.pi * turns)
+    lowest = solutions.angles - shift
+    error_m = solutions.error_m
+    usable = _find_usable(robot, lowest, error_m)
+    best = np.argmin(error_m, axis=0), np.arange(error_m.shape[1])
+    path = lowest[best]
+    is_solved = usable.any(axis=0)
+    rows = np.flatnonzero(is_solved)
+    if len(rows):
+        most = usable.sum(axis=0).max()
+        order = np.argsort(~usable[:, rows], axis=0, kind="stable")[:most]
+        postures = lowest[order, rows]
+        width = limits[:, 1] - limits[:, 0]
+        counts = np.maximum(1, np.ceil(width / period - _ROUNDING)).astype(int)
+        candidates = _PathCandidates(
+            copies=[
+                postures[..., joint, None] + 2 * np.pi * np.arange(count)
+                for joint, count in enumerate(counts)
+            ],
+            limits=limits,
+            exclusion=np.where(usable[order, rows], 0.0, np.inf),
+            allowed=compute_allowed_steps(robot, position[rows], rotation[rows]),
+        )
+        path[rows] = _find_least_motion(candidates)
+    largest_error_m = np.where(usable, error_m, 0.0).max(axis=0)
+    return path, np.where(is_solved, largest_error_m, error_m[best])
+
+
+def _narrow_limits(robot: Robot, period: np.ndarray) -> np.ndarray:
+    """Narrow the joint limits to the largest number of turns, (n, 2), rad or m."""
+    low, high = robot.joint_limits.T
     low = np.maximum(low, 0.5 * (low + high - _MOST_TURNS * period))
     high = np.minimum(high, low + _MOST_TURNS * period)
-    turns = np.floor((angles - low + _ROUNDING) / period)
-    lowest = angles - np.where(robot.chain.prismatic, 0.0, 2 * np.pi * turns)
-    usable = (error <= SOLVED_M) & ~find_beyond_limits(robot, lowest).any(axis=-1)
+    return np.stack([low, high], axis=1)
+
+
+def _find_usable(robot: Robot, angles: np.ndarray, error_m: np.ndarray) -> np.ndarray:
+    """Find the solutions (K, N, n) of each row that reach the pose within the limits,
+    each once; (K, N) bool."""
+    usable = (error_m <= SOLVED_M) & ~find_beyond_limits(robot, angles).any(axis=-1)
     for number in range(1, len(usable)):
-        same = np.abs(lowest[:number] - lowest[number]).max(axis=-1) < _SAME
-        usable[number] &= ~(same & usable[:number]).any(axis=0)
-    best = np.argmin(error, axis=0), np.arange(error.shape[1])
-    path = lowest[best]
-    rows = np.flatnonzero(usable.any(axis=0))
-    if len(rows):
-        order = np.argsort(~usable[:, rows], axis=0, kind="stable")[
-            : usable.sum(axis=0).max()
-        ]
-        postures = lowest[order, rows]
-        never = np.where(usable[order, rows], 0.0, np.inf)
-        counts = np.maximum(1, np.ceil((high - low) / period - _ROUNDING)).astype(int)
-        copies = [
-            postures[..., j, None] + 2 * np.pi * np.arange(count)
-            for j, count in enumerate(counts)
-        ]
-        path[rows] = _least_motion(
-            copies,
-            np.stack([low, high], axis=1),
-            never,
-            allowed_steps(robot, position[rows], rotation[rows]),
-        )
-    return path, np.where(
-        usable.any(axis=0), np.where(usable, error, 0.0).max(axis=0), error[best]
-    )
+        distance = np.abs(angles[:number] - angles[number]).max(axis=-1)
+        repeated = (distance < _SAME) & usable[:number]
+        usable[number] &= ~repeated.any(axis=0)
+    return usable
 
 
-def _least_motion(
-    copies: list[np.ndarray], limits: np.ndarray, never: np.ndarray, allowed: np.ndarray
-) -> np.ndarray:
-    """Angles (N, n) along which steps exceed what is allowed (N - 1, n) by least, and
-    then the sum of all steps is least.
+@dataclass(frozen=True)
+class _PathCandidates:
+    """Up to K postures of each of N rows, each with copies whole turns away, and what a
+    path through them costs.
 
-    `copies`: of each joint its angle and those whole turns above (K, N, turns), none
-    above its `limits` (n, 2). `never` (K, N): infinite where there is no such posture.
-    A sum, so that the best turns of each joint are found apart: of two turns each, 2^n
-    copies cost 2 n.
+    Attributes
+    ----------
+    copies : for each joint, its angles (K, N, turns): the lowest one within the limits,
+        and those whole turns above.
+    limits : (n, 2), rad or m; copies above them are excluded.
+    exclusion : (K, N) infinite if a row has fewer postures, else 0.
+    allowed : (N - 1, n) largest steps without an additional cost, rad or m.
     """
-    counts = [each.shape[-1] for each in copies]
-    joints = len(copies)
 
-    def along(values: np.ndarray, joint: int) -> np.ndarray:
-        """Values (K, turns) of a joint as (K, turns of all joints)."""
-        return values.reshape(
-            len(values),
-            *(counts[joint] if axis == joint else 1 for axis in range(joints)),
-        )
+    copies: list[np.ndarray]
+    limits: np.ndarray
+    exclusion: np.ndarray
+    allowed: np.ndarray
 
-    def steps(row: int, joint: int) -> np.ndarray:
-        """What the steps of a joint to a row cost, (K, turns) of the row before by (K,
-        turns) of this one."""
-        step = np.abs(copies[joint][:, row - 1, :, None, None] - copies[joint][:, row])
-        return step + _TOO_LARGE * np.maximum(step - allowed[row - 1, joint], 0.0)
+    @property
+    def turns(self) -> list[int]:
+        """Number of copies of each joint."""
+        return [copies.shape[-1] for copies in self.copies]
 
-    def standing(row: int) -> np.ndarray:
-        """What it costs to stand at each copy of a row, (K, turns of all joints)."""
-        found = never[:, row].reshape(-1, *[1] * joints)
-        for joint, (low, high) in enumerate(limits):
-            angle = copies[joint][:, row]
-            off = _OFF_MIDDLE * np.abs(angle - 0.5 * (low + high))
-            found = found + along(
-                np.where(angle > high + _ROUNDING, np.inf, off), joint
-            )
-        return found
+    def broadcast(self, values: np.ndarray, joint: int) -> np.ndarray:
+        """Reshape values (K, turns) of a joint for arrays (K, turns of all joints)."""
+        shape = [1] * len(self.copies)
+        shape[joint] = self.turns[joint]
+        return values.reshape(len(values), *shape)
 
-    totals = [standing(0)]
-    for row in range(1, never.shape[1]):
-        # (K before, K, turns of all joints): those before go from the front, joint by
-        # joint, and those of the row to the end.
-        way = np.broadcast_to(totals[-1][:, None], (len(never), len(never), *counts))
-        for joint in range(joints):
-            cost = steps(row, joint).transpose(0, 2, 1, 3)
-            way = (
-                way[..., None] + np.expand_dims(cost, tuple(range(3, joints + 2)))
-            ).min(axis=2)
-        totals.append(way.min(axis=0) + standing(row))
-    found = np.empty((never.shape[1], joints))
-    way = totals[-1]
-    for row in range(len(found) - 1, -1, -1):
-        posture, *turn = np.unravel_index(np.argmin(way), way.shape)
-        found[row] = [
-            each[posture, row, chosen]
-            for each, chosen in zip(copies, turn, strict=True)
-        ]
+    def motion_cost(self, row: int, joint: int) -> np.ndarray:
+        """Cost of the steps of a joint to a row: (K, turns) of the row before by (K,
+        turns) of this row."""
+        copies = self.copies[joint]
+        step = np.abs(copies[:, row - 1, :, None, None] - copies[:, row])
+        excess = np.maximum(step - self.allowed[row - 1, joint], 0.0)
+        return step + _EXCESS_WEIGHT * excess
+
+    def posture_cost(self, row: int) -> np.ndarray:
+        """Cost of each posture of a row, (K, turns of all joints)."""
+        cost = self.exclusion[:, row].reshape(-1, *[1] * len(self.copies))
+        for joint, (low, high) in enumerate(self.limits):
+            angle = self.copies[joint][:, row]
+            distance = _MIDDLE_WEIGHT * np.abs(angle - 0.5 * (low + high))
+            joint_cost = np.where(angle > high + _ROUNDING, np.inf, distance)
+            cost = cost + self.broadcast(joint_cost, joint)
+        return cost
+
+
+def _find_least_motion(candidates: _PathCandidates) -> np.ndarray:
+    """Find the path with the least cost: first the excess of steps above the allowed
+    ones, then the sum of all steps.
+
+    The cost is a sum over joints, so the best turns of each joint are found separately:
+    with two turns each, the 2^n copies of a posture take 2 n operations.
+
+    Returns
+    -------
+    (N, n) angles of the chain, rad.
+    """
+    totals = _accumulate_costs(candidates)
+    joints = range(len(candidates.copies))
+    path = np.empty((len(totals), len(candidates.copies)))
+    total = totals[-1]
+    for row in range(len(path) - 1, -1, -1):
+        posture, *turns = np.unravel_index(np.argmin(total), total.shape)
+        for joint in joints:
+            path[row, joint] = candidates.copies[joint][posture, row, turns[joint]]
         if row:
-            costs = [
-                steps(row, joint)[:, :, posture, turn[joint]] for joint in range(joints)
-            ]
-            way = sum(
-                (along(cost, joint) for joint, cost in enumerate(costs)),
-                totals[row - 1],
-            )
-    return found
+            total = totals[row - 1]
+            for joint in joints:
+                cost = candidates.motion_cost(row, joint)[:, :, posture, turns[joint]]
+                total = total + candidates.broadcast(cost, joint)
+    return path
+
+
+def _accumulate_costs(candidates: _PathCandidates) -> list[np.ndarray]:
+    """Accumulate the least cost of a path from the first row to each posture of each
+    row, (K, turns of all joints)."""
+    count, rows = candidates.exclusion.shape
+    joints = len(candidates.copies)
+    totals = [candidates.posture_cost(0)]
+    for row in range(1, rows):
+        # Axes: K of the row before, K, turns of all joints. The first of the turns
+        # belongs to the row before; minimising over it appends that of this row, so
+        # after all joints the turns are those of this row.
+        cost = np.broadcast_to(totals[-1][:, None], (count, count, *candidates.turns))
+        for joint in range(joints):
+            motion = candidates.motion_cost(row, joint).transpose(0, 2, 1, 3)
+            motion = np.expand_dims(motion, tuple(range(3, joints + 2)))
+            cost = (cost[..., None] + motion).min(axis=2)
+        totals.append(cost.min(axis=0) + candidates.posture_cost(row))
+    return totals

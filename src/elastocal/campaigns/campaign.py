@@ -1,5 +1,5 @@
-"""What a measured campaign is: its targets, its measurements and what it declares of
-itself, also as columns of tables."""
+"""A measured campaign: its targets, its measurements, what it declares, and the columns
+of tables in which the measurements are stored."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from elastocal.mechanics.robot import Robot
 
 DOCUMENT = "campaign.yaml"
 DEFAULT_HOLDOUT = {"fraction": 0.3, "seed": 1}
+# Values of ``remainder``: no residual model, or the one with the best validation error.
 NO_REMAINDER = "none"
 BEST_REMAINDER = "auto"
 UNKNOWN = "unknown"
@@ -27,11 +28,14 @@ NO_ROTATION = (0.0, 0.0, 0.0)
 class Target:
     """What is tracked.
 
-    `point`: measuring point of the chain on which it sits. `offset_m`: in the frame of
-    the point; None where unknown and fitted. `rotation`: rotation vector (rad) of the
-    target's axes in the frame of the point, which orientations have beside those of the
-    point; None where unknown and fitted. Left out, it is unknown where the offset is,
-    else none.
+    Attributes
+    ----------
+    name : name of the target.
+    point : measuring point of the chain on which the target sits.
+    offset_m : position in the frame of the point; None if unknown and fitted.
+    rotation : rotation vector (rad) from the frame of the point to the axes of the
+        target, to which measured orientations refer; None if unknown and fitted. If it
+        is left out, it is unknown if the offset is, else zero.
     """
 
     name: str
@@ -41,25 +45,31 @@ class Target:
 
     def __post_init__(self) -> None:
         if self.rotation == ():
-            object.__setattr__(
-                self, "rotation", None if self.offset_m is None else NO_ROTATION
-            )
+            rotation = None if self.offset_m is None else NO_ROTATION
+            object.__setattr__(self, "rotation", rotation)
 
 
 @dataclass(frozen=True)
 class Measurements:
-    """One entry for each measurement of one target; arrays of N.
+    """N measurements, each of one target.
 
-    `session`, `pose`, `load`, `repeat` (N,): session 0 where the file has no such
-    column; load 0 is unloaded. `target` (N,): index into the campaign's targets.
-    `joint_angles` (N, n): the model's, rad, not the controller's: `Robot.model_angles`
-    of what it reports. `wrench` (N, 6): external wrench at the origin of the last
-    measuring point, base axes; N, N m. `position` (N, 3): m, in the campaign's frame.
-    `rotation_vector` (N, 3): rad; None where positions are measured. `approach` (N, n):
-    sense in which each of the model's joints was approached, -1, 0 (not known) or +1.
-    `time_s`, `temperature_c` (N,). `u95_m` (N,): expanded uncertainty of the position,
-    95 % of one coordinate; None where it is not stated for each measurement. `row`
-    (N,): row in the file, 1 for the first of data; for messages.
+    Attributes
+    ----------
+    session, pose, load, repeat : (N,) int arrays; session 0 if the file has no such
+        column; load 0 is unloaded.
+    target : (N,) int array, index into the campaign's targets.
+    joint_angles : (N, n) angles of the model's joints, rad: `Robot.model_angles` of
+        the angles that the controller reports.
+    wrench : (N, 6) external wrench at the origin of the last measuring point, base
+        axes; N, N m.
+    position : (N, 3) m, in the campaign's frame.
+    rotation_vector : (N, 3) rad; None if positions are measured.
+    approach : (N, n) direction from which each of the model's joints was approached,
+        -1, 0 (unknown) or +1.
+    time_s, temperature_c : (N,).
+    row : (N,) int array, row in the file, 1 for the first row of data; for messages.
+    u95_m : (N,) expanded uncertainty of the position, 95 % of one coordinate; None if
+        the file does not state it.
     """
 
     session: np.ndarray
@@ -81,24 +91,37 @@ class Measurements:
         return len(self.pose)
 
     def select(self, mask_or_index: np.ndarray) -> Measurements:
-        """The measurements of a mask (N,) or of an index array (M,), in its order."""
-        arrays = vars(self).items()
-        chosen: dict[str, Any] = {
+        """Return the measurements of a bool mask (N,), or of an index array (M,) in its
+        order."""
+        selected: dict[str, Any] = {
             name: None if array is None else array[mask_or_index]
-            for name, array in arrays
+            for name, array in vars(self).items()
         }
-        return Measurements(**chosen)
+        return Measurements(**selected)
 
 
 @dataclass(frozen=True)
 class Campaign:
-    """A campaign that holds together; its schema explains what it declares.
+    """A campaign that was checked as a whole; the schema of ``campaign.yaml`` explains
+    its keys.
 
-    `robot`: with rigid joints where `compliance` is nominal and the robot file states
-    none. `frame`: of a tracker: the placement of the base in it is unknown, and another
-    one in each session. `remainder`: regression on what the final model leaves, a name
-    in `remainder.corrected`, "auto" or "none". `table`, `header_line`: name of the file
-    of measurements, empty for none, and the line of its header, where it is a text.
+    Attributes
+    ----------
+    name : name of the campaign.
+    robot : nominal robot; its joints are rigid if `compliance` is nominal and the robot
+        file states none.
+    measured : "position" or "pose".
+    frame : "base", or "tracker": the placement of the base is unknown, and different in
+        each session.
+    targets : what is tracked.
+    compliance : "nominal" or "identify".
+    declared : effects that the declared model has.
+    noise : declared noise, if any.
+    holdout : rule that selects the held-out poses.
+    measurements : the measurements.
+    remainder : residual model, a name in `remainder.corrected`, "auto" or "none".
+    table : name of the file of measurements; empty if there is none.
+    header_line : line of the header if the file is text.
     """
 
     name: str
@@ -116,30 +139,33 @@ class Campaign:
     header_line: int | None = None
 
     def place_of(self, row: int) -> str:
-        """Where a row of the measurements stands, in words: by its line where it has
-        one."""
-        line = (
-            f"row {row}"
-            if self.header_line is None
-            else f"line {row + self.header_line}"
-        )
-        return f"{line} of {self.table}" if self.table else line
+        """Return where a row of the measurements is, by its line if the file is text."""
+        place = f"row {row}"
+        if self.header_line is not None:
+            place = f"line {row + self.header_line}"
+        return f"{place} of {self.table}" if self.table else place
 
 
 def assemble_campaign(
     document: Mapping[str, Any], robot: Robot, measurements: Measurements, source: str
 ) -> Campaign:
-    """A campaign from its parts, checked before; `source`, the file of its document, is
-    named in errors."""
+    """Return a campaign made of parts that were checked before.
+
+    Parameters
+    ----------
+    document : contents of ``campaign.yaml``; may also have ``table`` and
+        ``header_line`` of `Campaign`.
+    robot : robot as its file describes it.
+    measurements : the measurements.
+    source : file of the document, for messages.
+    """
     compliance = document.get("compliance", "nominal")
-    rigid = compliance == "nominal" and not robot.compliance_known
+    if compliance == "nominal" and not robot.compliance_known:
+        # Without known compliances the joints are rigid, and masses have no effect.
+        robot = replace(robot, compliance=np.zeros(robot.joints), masses=())
     return Campaign(
         name=document["campaign"],
-        # What is left without known compliances: joints that do not yield, which no
-        # mass turns.
-        robot=replace(robot, compliance=np.zeros(robot.joints), masses=())
-        if rigid
-        else robot,
+        robot=robot,
         measured=document["measured"],
         frame=document["frame"],
         targets=parse_targets(document["targets"], robot.chain, source),
@@ -157,105 +183,118 @@ def assemble_campaign(
 def parse_targets(
     described: Mapping[str, Any], chain: Chain, source: str
 ) -> tuple[Target, ...]:
-    """``targets`` of ``campaign.yaml``, which `source`, named in errors, describes; an
-    unknown measuring point is refused."""
+    """Return the targets of a campaign.
+
+    Parameters
+    ----------
+    described : ``targets`` of ``campaign.yaml``.
+    chain : chain with the measuring points.
+    source : file, for messages.
+
+    Raises
+    ------
+    InputError
+        If a name is not text or a measuring point is unknown.
+    """
     points = [point.name for point in chain.points]
     targets = []
     for name, target in described.items():
         if not isinstance(name, str):
-            allowed = "a name, in quotes where need be"
+            found = f"the name {name!r}, which YAML takes for no text"
             raise InputError(
-                source,
-                "targets",
-                f"the name {name!r}, which YAML takes for no text",
-                allowed,
+                source, "targets", found, "a name, in quotes where need be"
             )
-        if target["point"] not in points:
-            allowed = f"a measuring point of the chain: {suggest_names(target['point'], points)}"
-            raise InputError(
-                source, f"targets.{name}.point", repr(target["point"]), allowed
-            )
-        stated = (target["offset_m"], target.get("rotation", ()))
-        targets.append(
-            Target(
-                name,
-                target["point"],
-                *(
-                    None if value == UNKNOWN else tuple(map(float, value))
-                    for value in stated
-                ),
-            )
-        )
+        point = target["point"]
+        if point not in points:
+            allowed = f"a measuring point of the chain: {suggest_names(point, points)}"
+            raise InputError(source, f"targets.{name}.point", repr(point), allowed)
+        offset_m = _parse_vector(target["offset_m"])
+        rotation = _parse_vector(target.get("rotation", ()))
+        targets.append(Target(name, point, offset_m, rotation))
     return tuple(targets)
+
+
+def _parse_vector(stated: str | Sequence[float]) -> tuple[float, ...] | None:
+    return None if stated == UNKNOWN else tuple(map(float, stated))
 
 
 _IDENTITY = ("session", "pose", "load", "repeat", "target", "row")
 
 
-def _columns_by_part(joints: int) -> dict[str, Sequence[str]]:
-    """Columns of the measurements table by the part of `Measurements` that they
-    hold."""
-    angles, approach = (
-        [f"{letter}{j}" for j in range(1, joints + 1)] for letter in ("q", "approach")
-    )
-    parts = {name: (name,) for name in _IDENTITY} | {
-        "joint_angles": angles,
+def _columns_by_field(joints: int) -> dict[str, Sequence[str]]:
+    """Return the columns of the measurements table that hold each field of
+    `Measurements`."""
+    numbers = range(1, joints + 1)
+    columns: dict[str, Sequence[str]] = {name: (name,) for name in _IDENTITY}
+    return columns | {
+        "joint_angles": [f"q{joint}" for joint in numbers],
         "wrench": WRENCH_NAMES,
         "position": "xyz",
+        "rotation_vector": ("rx", "ry", "rz"),
+        "approach": [f"approach{joint}" for joint in numbers],
+        "time_s": ("time_s",),
+        "temperature_c": ("temperature_c",),
+        "u95_m": ("u95_m",),
     }
-    parts |= {"rotation_vector": ("rx", "ry", "rz"), "approach": approach}
-    return parts | {name: (name,) for name in ("time_s", "temperature_c", "u95_m")}
 
 
 def tabulate_measurements(
-    measurements: Measurements, parts: Collection[str] = ()
+    measurements: Measurements, fields: Collection[str] = ()
 ) -> dict[str, np.ndarray]:
-    """Columns of the measurements table, dict of str to ndarray (N,); of some parts
-    alone where they are named."""
+    """Return columns (N,) of the measurements table; a field that is None becomes NaN.
+
+    Parameters
+    ----------
+    measurements : N measurements.
+    fields : fields of `Measurements`; all if empty.
+    """
     count, joints = measurements.joint_angles.shape
     columns: dict[str, np.ndarray] = {}
-    for part, names in _columns_by_part(joints).items():
-        values = getattr(measurements, part)
-        if not parts or part in parts:
-            whole = (
-                np.full((count, len(names)), np.nan)
-                if values is None
-                else values.reshape(count, len(names))
-            )
-            columns |= dict(zip(names, whole.T, strict=True))
+    for field, names in _columns_by_field(joints).items():
+        if fields and field not in fields:
+            continue
+        values = getattr(measurements, field)
+        if values is None:
+            values = np.full((count, len(names)), np.nan)
+        columns |= dict(zip(names, values.reshape(count, len(names)).T, strict=True))
     return columns
 
 
 def build_measurements(columns: Mapping[str, np.ndarray]) -> Measurements:
-    """Measurements from the columns of their table, dict of str to ndarray (N,)."""
-    found: dict[str, Any] = {}
-    for part, names in _columns_by_part(
-        sum(name.startswith("approach") for name in columns)
-    ).items():
-        whole = (
-            columns[part]
-            if part in columns
-            else np.column_stack([columns[name] for name in names])
-        )
-        found[part] = (
-            None if whole.dtype.kind == "f" and np.isnan(whole).all() else whole
-        )
-    return Measurements(**found)
+    """Return the measurements of the columns (N,) of their table, as
+    `tabulate_measurements` makes them."""
+    joints = sum(name.startswith("approach") for name in columns)
+    fields: dict[str, Any] = {}
+    for field, names in _columns_by_field(joints).items():
+        if field in columns:
+            values = columns[field]
+        else:
+            values = np.column_stack([columns[name] for name in names])
+        is_empty = values.dtype.kind == "f" and np.isnan(values).all()
+        fields[field] = None if is_empty else values
+    return Measurements(**fields)
 
 
 def tabulate_residuals(
     measurements: Measurements,
-    held_out: bool,
-    gross_errors: bool,
     outside: np.ndarray,
     position: np.ndarray,
     stages: Mapping[str, np.ndarray],
+    *,
+    held_out: bool,
+    gross_errors: bool,
 ) -> dict[str, np.ndarray]:
-    """Columns of the residuals table.
+    """Return columns (N,) of the residuals table.
 
-    `outside` (N,) of bool: whether each lies outside of the range of the poses fitted.
-    `position` (N, 3): m, base axes. `stages` (N, rows): residuals "before", of the
-    declared model, and "after", of the found one, m and rad. Returns (N,).
+    Parameters
+    ----------
+    measurements : N measurements.
+    outside : (N,) bool array, whether each is outside the range of the fitted poses.
+    position : (N, 3) m, base axes.
+    stages : (N, rows) residuals "before", of the declared model, and "after", of the
+        final one; m and rad.
+    held_out : whether the measurements are held out.
+    gross_errors : whether they are gross errors.
     """
     count = len(measurements)
     columns = tabulate_measurements(measurements, _IDENTITY)
@@ -264,38 +303,43 @@ def tabulate_residuals(
         "gross_error": np.full(count, gross_errors),
         "outside_range": outside,
     }
-    columns |= tabulate_measurements(measurements, ("time_s",)) | tabulate_measurements(
-        measurements, ("joint_angles", "wrench")
-    )
+    columns |= tabulate_measurements(measurements, ("time_s",))
+    columns |= tabulate_measurements(measurements, ("joint_angles", "wrench"))
     columns |= dict(zip("xyz", position.T, strict=True))
     for stage, residual in stages.items():
-        whole = np.full((count, 6), np.nan)
-        whole[:, : residual.shape[1]] = residual
-        columns |= {
-            f"{stage}_{name}": whole[:, k] for k, name in enumerate(COMPONENT_NAMES)
-        }
+        components = np.full((count, 6), np.nan)
+        components[:, : residual.shape[1]] = residual
+        for component, name in enumerate(COMPONENT_NAMES):
+            columns[f"{stage}_{name}"] = components[:, component]
     return columns
 
 
 def group_equal_rows(keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Group equal rows: `numpy.unique` along the first axis, many times as fast.
+    """Group equal rows: `numpy.unique` along the first axis, but many times as fast.
 
-    `keys` (N, k). Returns `first` (G,) of int: first row of each group; groups in
-    lexicographic order; `group` (N,) of int: of each row.
+    Parameters
+    ----------
+    keys : (N, k) array.
+
+    Returns
+    -------
+    first : (G,) int array, first row of each group; groups in lexicographic order.
+    group : (N,) int array, group of each row.
     """
     order = np.argsort(keys[:, 0], kind="stable")
-    order = order if np.diff(keys[order, 0]).all() else np.lexsort(keys.T[::-1])
-    rising = keys[order]
-    new = np.concatenate(
-        [np.ones(min(len(keys), 1), bool), (rising[1:] != rising[:-1]).any(axis=1)]
-    )
+    if not np.diff(keys[order, 0]).all():
+        # The first column does not decide the order.
+        order = np.lexsort(keys.T[::-1])
+    sorted_keys = keys[order]
+    starts_group = np.ones(len(keys), bool)
+    starts_group[1:] = (sorted_keys[1:] != sorted_keys[:-1]).any(axis=1)
     group = np.empty(len(keys), int)
-    group[order] = np.cumsum(new) - 1
-    return order[new], group
+    group[order] = np.cumsum(starts_group) - 1
+    return order[starts_group], group
 
 
 def average_by_group(values: np.ndarray, group: np.ndarray) -> np.ndarray:
-    """Mean of the values (N, ...) of each group (N,), 0 .. G-1, ndarray (G, ...)."""
+    """Return the mean of the values (N, ...) of each group (N,), 0 .. G-1: (G, ...)."""
     columns = values.reshape(len(values), math.prod(values.shape[1:])).T
     total = np.column_stack([np.bincount(group, column) for column in columns])
     return (total / np.bincount(group)[:, None]).reshape(-1, *values.shape[1:])

@@ -138,10 +138,8 @@ def read_campaign_folder(path: str | Path, robots_folder: str | Path) -> Campaig
     check_document(document, "campaign", source)
     robot = document["robot"]
     named_robots = sorted(file.stem for file in robots_folder.glob("*.yaml"))
-    if robot in named_robots:
-        robot_file = robots_folder / f"{robot}.yaml"
-    else:
-        robot_file = path / robot
+    is_named = robot in named_robots
+    robot_file = robots_folder / f"{robot}.yaml" if is_named else path / robot
     if not is_file_in(robot_file, path, robots_folder):
         listed = f"{robots_folder.as_posix()}: {suggest_names(robot, named_robots)}"
         allowed = (

@@ -1,10 +1,9 @@
-"""The campaigns that a configuration names: public measurements of real robots, read as
-campaigns, and the user's own.
+"""Find the campaigns that a configuration names: public measurements of real robots,
+which are imported, simulated ones, and the user's own.
 
-config/public_data.yaml says where public measurements are, what their contents must be
-and how each table is read, see its schema, but for two MAT files that are read here.
-All are targets on an unloaded flange, measured by a tracker in a frame that nobody
-knows.
+config/public_data.yaml states where public measurements are, their digests, and how
+each table is read; two MAT files are read by functions of this module. All are targets
+on an unloaded flange, measured by a tracker whose frame is unknown.
 """
 
 from __future__ import annotations
@@ -35,8 +34,11 @@ from elastocal.io.documents import (
 from elastocal.io.json_files import read_json
 from elastocal.io.plugins import IMPORTERS, load_plugins
 
-# Names a folder that already has the files, for machines without a network.
+# Environment variable: a folder that already has the files, for machines without a
+# network.
 FOLDER_VARIABLE = "ELASTOCAL_DATA"
+# Robots with more joints than this are the last of an importer's robots.
+_JOINTS_OF_FIRST_ROBOT = 6
 
 
 @dataclass(frozen=True)
@@ -44,8 +46,14 @@ class PublicFile:
     """One file of a public repository, or an excerpt of it that comes with this
     project.
 
-    `repository`: owner/name on GitHub. `path`: in the repository. `local`: where the
-    file stands below a folder that has it.
+    Attributes
+    ----------
+    repository : owner/name on GitHub.
+    commit : version of the repository.
+    path : file in the repository.
+    sha256 : digest of the contents.
+    local : path of the file below a folder that has it.
+    licence : licence of the data.
     """
 
     repository: str
@@ -67,149 +75,170 @@ def find_missing(
     kept: str | Path,
     box: str | Path,
 ) -> str | None:
-    """The first of some files that is missing where `FOLDER_VARIABLE` stands for a
-    network, see `fetch`; None without it."""
-    offline = os.environ.get(FOLDER_VARIABLE)
-    return next(
-        (
-            files[name].local
-            for name in names
-            if offline and not _at_hand(name, files[name], kept, box)
-        ),
-        None,
-    )
+    """Find the first file that is missing on a machine without a network.
+
+    Parameters
+    ----------
+    names : files to look for.
+    files : all files of the importer, by name.
+    kept : folder with downloads.
+    box : folder with the files that come with this project.
+
+    Returns
+    -------
+    Path of the file below a folder that has it; None if all files are present, or if
+    `FOLDER_VARIABLE` is not set and missing files are downloaded.
+    """
+    if not os.environ.get(FOLDER_VARIABLE):
+        return None
+    for name in names:
+        if _find_copy(name, files[name], kept, box) is None:
+            return files[name].local
+    return None
 
 
-def _at_hand(
+def _find_copy(
     name: str, file: PublicFile, kept: str | Path, box: str | Path
 ) -> Path | None:
-    """The file in the project's own folder, in that of `FOLDER_VARIABLE`, or as it was
-    downloaded."""
-    given = os.environ.get(FOLDER_VARIABLE)
-    places = [
-        Path(box, file.local),
-        *([Path(given, file.local)] if given else []),
-        Path(kept, _name_copy(name, file)),
-    ]
-    return next((path for path in places if path.is_file()), None)
+    """Find the file in the project's own folder, in that of `FOLDER_VARIABLE`, or among
+    the downloads."""
+    candidates = [Path(box, file.local)]
+    if folder := os.environ.get(FOLDER_VARIABLE):
+        candidates.append(Path(folder, file.local))
+    candidates.append(Path(kept, _name_download(name, file)))
+    return next((path for path in candidates if path.is_file()), None)
 
 
-def _name_copy(name: str, file: PublicFile) -> str:
+def _name_download(name: str, file: PublicFile) -> str:
     return f"{name}{Path(file.path).suffix}"
 
 
 def fetch(
     name: str, files: Mapping[str, PublicFile], folder: str | Path, box: str | Path
 ) -> Path:
-    """A file of public data with the contents that this project knows: from `box` or
-    `FOLDER_VARIABLE`, else downloaded once.
+    """Return a file of public data: from `box` or `FOLDER_VARIABLE`, or downloaded once.
 
-    `files`: those of the importer that reads it. `folder`: keeps what is downloaded.
-    `box`: has what comes with this project. Raises `InputError`: an unknown name, a
-    file of other contents, or no way to get it.
+    Parameters
+    ----------
+    name : name of the file.
+    files : all files of the importer, by name.
+    folder : folder that keeps downloads.
+    box : folder with the files that come with this project.
+
+    Raises
+    ------
+    InputError
+        If the name is unknown, if the file has other contents than this project knows,
+        or if it cannot be downloaded.
     """
     if name not in files:
         raise InputError("public data", "", repr(name), ", ".join(files))
     file = files[name]
-    if path := _at_hand(name, file, folder, box):
-        if (found := hashlib.sha256(path.read_bytes()).hexdigest()) != file.sha256:
-            raise InputError(
-                path, "", f"SHA-256 {found}", f"{file.sha256}, of {file.address}"
-            )
+    if path := _find_copy(name, file, folder, box):
+        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+        if digest != file.sha256:
+            allowed = f"{file.sha256}, of {file.address}"
+            raise InputError(path, "", f"SHA-256 {digest}", allowed)
         return path
-    # Loads what asks a network, which the rules, who look for files alone, do without.
+    # The rules only look for files, so that they need no library for downloads.
     import pooch
 
     pooch.get_logger().setLevel(logging.ERROR)
+    download = _name_download(name, file)
     try:
         return Path(
-            pooch.retrieve(
-                file.address, f"sha256:{file.sha256}", _name_copy(name, file), folder
-            )
+            pooch.retrieve(file.address, f"sha256:{file.sha256}", download, folder)
         )
     except ValueError as error:
-        raise InputError(
-            file.address, "", f"other contents ({error})", f"SHA-256 {file.sha256}"
-        ) from None
+        found = f"other contents ({error})"
+        allowed = f"SHA-256 {file.sha256}"
+        raise InputError(file.address, "", found, allowed) from None
     except OSError as error:
         allowed = f"a network, or the folder in {FOLDER_VARIABLE} with {file.local}"
         raise InputError(file.address, "", f"no download ({error})", allowed) from None
 
 
 class PublicMeasurements(NamedTuple):
-    """N measurements: `angles` (N, n) as the controller reports them, rad; `positions`
-    (N, 3) by target, m; `others` (N,)."""
+    """N measurements of each target.
+
+    Attributes
+    ----------
+    angles : (N, n) joint angles as the controller reports them, rad.
+    positions : (N, 3) by target, m.
+    others : further columns (N,) of the file of measurements.
+    """
 
     angles: np.ndarray
     positions: Mapping[str, np.ndarray]
     others: Mapping[str, np.ndarray]
 
 
-def _read_text(table: Mapping[str, Any], path: str | Path) -> PublicMeasurements:
-    """A table of text as its entry, `table`, says; an `InputError` names what is no
-    such table, or a column that is missing."""
-    # Neither pandas nor the parts of scipy load at each start of Snakemake, whose rules
-    # ask importers for their files alone.
+def _read_text(entry: Mapping[str, Any], path: str | Path) -> PublicMeasurements:
+    """Read a text table as ``table`` of its entry in ``public_data.yaml`` states.
+
+    An `InputError` refuses a file that is not such a table or lacks a column.
+    """
+    # Each start of Snakemake imports this module, but only asks importers for their
+    # files. Neither pandas nor scipy.spatial is needed for that.
     import pandas as pd
 
-    separator = (
-        r"\s+" if table.get("separator") == "blanks" else table.get("separator", ",")
-    )
-    others: dict[str, np.ndarray] = {}
+    separator = entry.get("separator", ",")
+    further: dict[str, np.ndarray] = {}
     try:
-        text = pd.read_csv(
+        table = pd.read_csv(
             path,
-            sep=separator,
-            decimal=table.get("decimal", "."),
-            names=table.get("names"),
+            sep=r"\s+" if separator == "blanks" else separator,
+            decimal=entry.get("decimal", "."),
+            names=entry.get("names"),
             index_col=False,
         )
-        angles = text[[name for name in table["angles"] if name in text]].to_numpy(
-            float
-        )
+        joints = [name for name in entry["angles"] if name in table]
+        angles = table[joints].to_numpy(float)
         positions = {
-            target: 1e-3 * sum(text[part].to_numpy(float) for part in parts)
-            for target, parts in table["positions"].items()
+            target: 1e-3 * sum(table[columns].to_numpy(float) for columns in summands)
+            for target, summands in entry["positions"].items()
         }
-        if turn := table.get("orientation"):
-            vectors = scipy.spatial.transform.Rotation.from_euler(
-                "XYZ", text[turn].to_numpy(float), degrees=True
-            ).as_rotvec()
-            others |= dict(zip(("rx", "ry", "rz"), vectors.T, strict=True))
-        if table.get("temperature") in text:
-            others["temperature_c"] = text[table["temperature"]].to_numpy(float)
+        if euler_columns := entry.get("orientation"):
+            euler_deg = table[euler_columns].to_numpy(float)
+            rotation = scipy.spatial.transform.Rotation.from_euler(
+                "XYZ", euler_deg, degrees=True
+            )
+            vectors = rotation.as_rotvec()
+            further |= dict(zip(("rx", "ry", "rz"), vectors.T, strict=True))
+        if entry.get("temperature") in table:
+            further["temperature_c"] = table[entry["temperature"]].to_numpy(float)
     except (KeyError, ValueError, OSError) as error:
-        raise InputError(path, "", str(error), table["kind"]) from None
-    # Where a spreadsheet has cut the stamps down to 2,02011E+13 there are none.
-    if table.get("time") in text and pd.api.types.is_integer_dtype(text[table["time"]]):
-        stamps = pd.to_datetime(text[table["time"]].astype(str), format="%Y%m%d%H%M%S")
-        others["time_s"] = (stamps - stamps[0]).dt.total_seconds().to_numpy()
-    return PublicMeasurements(
-        angles if table.get("angles_in") == "rad" else np.radians(angles),
-        positions,
-        others,
-    )
+        raise InputError(path, "", str(error), entry["kind"]) from None
+    # A spreadsheet may have shortened the time stamps to 2,02011E+13. They are useless
+    # then, and not integers.
+    time = entry.get("time")
+    if time in table and pd.api.types.is_integer_dtype(table[time]):
+        stamps = pd.to_datetime(table[time].astype(str), format="%Y%m%d%H%M%S")
+        further["time_s"] = (stamps - stamps[0]).dt.total_seconds().to_numpy()
+    if entry.get("angles_in") != "rad":
+        angles = np.radians(angles)
+    return PublicMeasurements(angles, positions, further)
 
 
 def _read_fanuc_static(path: str | Path) -> PublicMeasurements:
-    found = scipy.io.loadmat(path)
-    return PublicMeasurements(
-        found["q"], {target: found[f"m{target}"] for target in "ABC"}, {}
-    )
+    arrays = scipy.io.loadmat(path)
+    positions = {target: arrays[f"m{target}"] for target in "ABC"}
+    return PublicMeasurements(arrays["q"], positions, {})
 
 
 def _read_motoman(path: str | Path) -> PublicMeasurements:
-    """A row for each camera image that was taken of a pose; rows of one pose repeat its
-    joint angles and its reflector.
+    """Read a file with a row for each camera image of a pose; rows of one pose repeat
+    its joint angles and its reflector.
 
-    Poses whose reflector the tracker did not see are left out, and so is the 13th of
-    the larger file's 587, which the source's own reader (loadNewLeicaDataset.m) leaves
-    out. The turntable stands still; its encoder's last digits move.
+    Poses whose reflector the tracker did not see are left out. So is the 13th of the
+    larger file's 587 poses, as in the source's own reader (loadNewLeicaDataset.m). The
+    turntable stands still; the last digits of its encoder change.
     """
     rows = scipy.io.loadmat(path)["dataset"]
     rows = rows[np.unique(rows[:, 0], return_index=True)[1]]
     rows = rows[np.isfinite(rows[:, 19:22]).all(axis=1)]
-    rows = np.delete(rows, 12, axis=0) if len(rows) == 587 else rows
+    if len(rows) == 587:
+        rows = np.delete(rows, 12, axis=0)
     return PublicMeasurements(rows[:, 7:13], {"reflector": rows[:, 19:22]}, {})
 
 
@@ -218,12 +247,18 @@ _MAT_FILES = {"fanuc_static": _read_fanuc_static, "motoman": _read_motoman}
 
 @dataclass(frozen=True)
 class Importer:
-    """What makes campaigns of a public source: an entry of ``public_data.yaml``, whose
-    schema says what its keys mean.
+    """Writes campaigns from a public source: an entry of ``public_data.yaml``, whose
+    schema defines its keys.
 
-    `files`: by the names that campaigns have for them, those of its parts too. `read`:
-    makes measurements of a file; of an importer with parts each has its own. `robots`:
-    that its campaigns name, and those of its parts, which it reads.
+    Attributes
+    ----------
+    files : files by the names that campaigns have for them, including those of the
+        parts.
+    read : reads a file; each part of an importer with parts has its own.
+    robots : robots that the campaigns name, including those of the parts.
+    noise : noise that the campaigns declare.
+    same_pose_rad : largest difference of joint angles within a pose.
+    parts : importers whose files are the sessions of one campaign.
     """
 
     files: Mapping[str, PublicFile]
@@ -243,100 +278,152 @@ class Importer:
     ) -> None:
         """Write one file, or one of each part, as a campaign's folder.
 
-        `test`: ``holdout`` as in ``campaign.yaml``, or ``fold``: which `number`, from
-        1, `of` so many folds is held out, whose poses are dealt out in turn:
-        cross-validation by whole poses (Geisser, The predictive sample reuse method
-        with applications, JASA 70, 1975).
-        """
-        import pandas as pd
+        Parameters
+        ----------
+        paths : files.
+        folder : folder of the new campaign.
+        robots_folder : folder with the robot files.
+        name : name of the campaign.
+        test : ``holdout`` as in ``campaign.yaml``, or ``fold``: ``number``, from 1, of
+            the fold that is held out, ``of`` so many. Poses are assigned to folds in
+            turn: cross-validation by whole poses [1].
 
-        tables = []
-        targets = list[str]()
-        joints = 6
-        for session, (part, path) in enumerate(
-            zip(self.parts or (self,), paths, strict=True)
-        ):
-            angles, positions, others = part.read(path)
-            joints = angles.shape[1]
-            # Poses are numbered as they first come.
-            pose = number_close_points(angles, part.same_pose_rad)
-            repeat = pd.Series(pose).groupby(pose).cumcount().to_numpy()
-            if self.parts:
-                angles = read_robot(
-                    Path(robots_folder) / f"{part.robots[0]}.yaml"
-                ).model_angles(angles)
-            # One row for each target of each measurement.
-            names = list(positions)
-            rows = np.repeat(np.arange(len(pose)), len(positions))
-            table = {"session": np.full(len(rows), session)} if self.parts else {}
-            table |= {
-                "pose": pose[rows],
-                "load": np.zeros(len(rows), int),
-                "repeat": repeat[rows],
-            }
-            table |= {"target": np.tile(names, len(pose))} | {
-                f"q{j + 1}": column[rows] for j, column in enumerate(angles.T)
-            }
-            place = np.stack([*positions.values()], axis=1).reshape(-1, 3)
-            tables.append(table | dict(zip("xyz", place.T, strict=True)) | dict(others))
-            targets += names
-        whole = {
+        References
+        ----------
+        [1] Geisser, S., The predictive sample reuse method with applications, Journal
+            of the American Statistical Association 70, 1975.
+        """
+        measured = [
+            part.read(path)
+            for part, path in zip(self.parts or (self,), paths, strict=True)
+        ]
+        joints = measured[-1].angles.shape[1]
+        if self.parts:
+            tables = [
+                part._tabulate_session(session, measurements, robots_folder)
+                for session, (part, measurements) in enumerate(
+                    zip(self.parts, measured, strict=True)
+                )
+            ]
+        else:
+            tables = [_tabulate(measured[0], self.same_pose_rad)]
+        table = {
             column: np.concatenate([table[column] for table in tables])
             for column in tables[0]
         }
+        targets = [
+            target for measurements in measured for target in measurements.positions
+        ]
+        has_first_robot = joints <= _JOINTS_OF_FIRST_ROBOT
         document: dict[str, Any] = {
             "campaign": name,
-            "robot": self.robots[-1] if joints > 6 else self.robots[0],
-            "measured": "pose" if "rx" in whole else "position",
+            "robot": self.robots[0] if has_first_robot else self.robots[-1],
+            "measured": "pose" if "rx" in table else "position",
             "frame": "tracker",
             "targets": {
                 target: {"point": f"{joints}DoF", "offset_m": "unknown"}
                 for target in targets
             },
             "compliance": "nominal",
-            # What such data can be fitted with at all before any physics is looked for.
+            # Without these no such data can be fitted at all.
             "declared": ["joint_offset", "link_geometry"],
         }
-        document |= {"noise": dict(self.noise)} if self.noise else {}
+        if self.noise:
+            document["noise"] = dict(self.noise)
         if fold := test.get("fold"):
-            pairs = np.unique(
-                np.column_stack(
-                    [whole.get("session", 0 * whole["pose"]), whole["pose"]]
-                ),
-                axis=0,
-            )
-            test = {
-                "holdout": {"poses": pairs[fold["number"] - 1 :: fold["of"]].tolist()}
-            }
+            test = {"holdout": {"poses": _poses_of_fold(table, **fold)}}
         document |= {key: dict(value) for key, value in test.items()}
-        write_campaign(folder, document, whole, joints)
+        write_campaign(folder, document, table, joints)
+
+    def _tabulate_session(
+        self, session: int, measured: PublicMeasurements, robots_folder: str | Path
+    ) -> dict[str, np.ndarray]:
+        """Return the columns of one session, with the angles of the model's joints:
+        parts may have different controllers."""
+        robot = read_robot(Path(robots_folder) / f"{self.robots[0]}.yaml")
+        table = _tabulate(measured, self.same_pose_rad)
+        angles = robot.model_angles(measured.angles)
+        rows = np.repeat(np.arange(len(angles)), len(measured.positions))
+        return (
+            {"session": np.full(len(rows), session)}
+            | table
+            | _joint_table(angles[rows])
+        )
+
+
+def _tabulate(
+    measured: PublicMeasurements, same_pose_rad: float
+) -> dict[str, np.ndarray]:
+    """Return the columns of a file of measurements, one row for each target of each
+    measurement. Poses are numbered in the order of the file."""
+    import pandas as pd
+
+    pose = number_close_points(measured.angles, same_pose_rad)
+    repeat = pd.Series(pose).groupby(pose).cumcount().to_numpy()
+    targets = list(measured.positions)
+    rows = np.repeat(np.arange(len(pose)), len(targets))
+    position = np.stack([*measured.positions.values()], axis=1).reshape(-1, 3)
+    return {
+        "pose": pose[rows],
+        "load": np.zeros(len(rows), int),
+        "repeat": repeat[rows],
+        "target": np.tile(targets, len(pose)),
+        **_joint_table(measured.angles[rows]),
+        **dict(zip("xyz", position.T, strict=True)),
+        **measured.others,
+    }
+
+
+def _joint_table(angles: np.ndarray) -> dict[str, np.ndarray]:
+    return {f"q{joint}": column for joint, column in enumerate(angles.T, 1)}
+
+
+def _poses_of_fold(
+    table: Mapping[str, np.ndarray], number: int, of: int
+) -> list[list[int]]:
+    """Return session and pose of the poses of a fold, from 1, of several folds."""
+    session = table.get("session", 0 * table["pose"])
+    labels = np.unique(np.column_stack([session, table["pose"]]), axis=0)
+    poses: list[list[int]] = labels[number - 1 :: of].tolist()
+    return poses
 
 
 @cache
 def read_importers(path: Path) -> dict[str, Importer]:
-    """Importers of ``public_data.yaml`` by the names that ``find_importer`` of a campaign
-    may have."""
+    """Read the importers of ``public_data.yaml``, by the names that ``importer`` of a
+    campaign may have."""
     document = read_document(path)
     check_document(document, "public_data", path.as_posix())
-    found: dict[str, Importer] = {}
+    importers: dict[str, Importer] = {}
     for name, entry in document.items():
         files = {
-            each: PublicFile(**(entry["source"] | file))
-            for each, file in entry.get("files", {}).items()
+            file_name: PublicFile(**(entry["source"] | file))
+            for file_name, file in entry.get("files", {}).items()
         }
-        parts = tuple(found[part] for part in entry.get("parts", ()))
-        own = (
-            partial(_read_text, entry["table"])
-            if "table" in entry
-            else _MAT_FILES.get(name)
-        )
-        if (read := parts[0].read if parts else own) is None:
-            raise InputError(path, name, "no format", "a table, or parts that have one")
-        files |= {each: file for part in parts for each, file in part.files.items()}
-        stated = {key: entry[key] for key in ("noise", "same_pose_rad") if key in entry}
-        robots = (*entry["robots"], *(robot for part in parts for robot in part.robots))
-        found[name] = Importer(files, read, robots, **stated, parts=parts)
-    return found
+        robots = [*entry["robots"]]
+        parts = tuple(importers[part] for part in entry.get("parts", ()))
+        for part in parts:
+            files |= part.files
+            robots += part.robots
+        options = {
+            key: entry[key] for key in ("noise", "same_pose_rad") if key in entry
+        }
+        read = _find_reader(name, entry, parts, path)
+        importers[name] = Importer(files, read, tuple(robots), **options, parts=parts)
+    return importers
+
+
+def _find_reader(
+    name: str, entry: Mapping[str, Any], parts: Sequence[Importer], path: Path
+) -> Callable[[str | Path], PublicMeasurements]:
+    """Return the function that reads a file of an entry of ``public_data.yaml``."""
+    if parts:
+        return parts[0].read
+    if "table" in entry:
+        return partial(_read_text, entry["table"])
+    if name in _MAT_FILES:
+        return _MAT_FILES[name]
+    raise InputError(path, name, "no format", "a table, or parts that have one")
 
 
 def find_importer(name: str, config: str | Path, source: str | Path) -> Importer:
@@ -357,13 +444,20 @@ def find_importer(name: str, config: str | Path, source: str | Path) -> Importer
 def read_campaign_sources(
     config: Mapping[str, Any], folder: str | Path, source: str = "config.yaml"
 ) -> dict[str, dict[str, Any]]:
-    """Documents of the campaigns that a configuration names, by the names of their
-    files in `folder`, checked.
+    """Read and check the documents of the campaigns that a configuration names.
 
-    A simulated one has the document of its robot under ``robot_document``. `source`:
-    file of the configuration.
+    Parameters
+    ----------
+    config : configuration.
+    folder : folder of the documents.
+    source : file of the configuration, for messages.
+
+    Returns
+    -------
+    Documents by the names of their files. That of a simulated campaign has the document
+    of its robot under ``robot_document``.
     """
-    found = {}
+    documents = {}
     for name in list_campaigns(config):
         document = read_named_document(
             folder, "campaigns", "campaign_source", name, source
@@ -378,31 +472,26 @@ def read_campaign_sources(
             read_named_document(
                 folder, "robots", "robot", document["declared_robot"], path
             )
-        found[name] = document
-    return found
+        documents[name] = document
+    return documents
 
 
 def list_campaigns(config: Mapping[str, Any]) -> list[str]:
-    """Campaigns that a configuration names, each once: simulated, measured, of the
-    default run and of the league."""
-    looped = (
-        name
-        for key in ("campaigns", "measured", "main")
-        for name in config["loop"][key]
-    )
-    return list(dict.fromkeys((*looped, *list_league_data(config))))
+    """List the campaigns that a configuration names, each once: simulated, measured, of
+    the default run and of the league."""
+    names = []
+    for key in ("campaigns", "measured", "main"):
+        names += config["loop"][key]
+    return list(dict.fromkeys([*names, *list_league_data(config)]))
 
 
 def list_league_data(config: Mapping[str, Any]) -> list[str]:
-    """Data sets of all leagues, each once."""
-    return list(
-        dict.fromkeys(
-            data
-            for robots in config["league"]["data"].values()
-            for names in robots.values()
-            for data in names
-        )
-    )
+    """List the data sets of all leagues, each once."""
+    data_sets = []
+    for robots in config["league"]["data"].values():
+        for names in robots.values():
+            data_sets += names
+    return list(dict.fromkeys(data_sets))
 
 
 def find_user_campaign(

@@ -1,5 +1,5 @@
-"""Files of measurements: their columns, read cell by cell with the row of every fault,
-and written."""
+"""Read and write files of measurements, as CSV or Parquet. Each fault is reported with
+its row and column."""
 
 import csv
 import itertools
@@ -22,87 +22,76 @@ from elastocal.io.storage import Column
 from elastocal.io.texts import describe_file_kind
 from elastocal.mechanics.components import WRENCH, WRENCH_NAMES
 
-# A diagnosis of a million measurements takes 2 GB (benchmarks); a tracker's stream is
-# averaged before.
+# Upper bounds on a file. The diagnosis of a million measurements takes 2 GB (see
+# benchmarks); a tracker's stream is averaged before it is written to a file.
 MOST_MEASUREMENTS = 2_000_000
 _MOST_BYTES = 500 * MOST_MEASUREMENTS
+# Each row group takes memory of its own.
 _MOST_ROW_GROUPS = 2_000
-# A file names no more.
+# Upper bound on the number of joints for which a file has columns.
 MOST_JOINTS = 99
 
 CSV = "measurements.csv"
 PARQUET = "measurements.parquet"
 ROTATION = ("rx", "ry", "rz")
-# Columns of a sheet for people: a place to tick, which is not read, and joint angles as
-# controllers show them, q1_deg or q1_mm, with the SI value of one unit. They must agree
-# with q1 .. qn to what is shown.
+# A sheet for people has more columns. One is to be ticked and is not read.
 TICK_COLUMN = "done"
+# The others are joint angles as controllers display them, such as q1_deg or q1_mm. Here
+# is the SI value of each unit. The angles must agree with q1 .. qn to the tolerance, in
+# the displayed unit.
 DISPLAY_UNITS = {"deg": math.radians(1.0), "mm": 1e-3}
 DISPLAY_TOLERANCE = 2e-3
-
-# A turn and a half, of a rotation vector; nor does a joint of a serial arm report more,
-# unless its limits say so.
+# A turn and a half. No rotation vector is longer, and no joint of a serial arm reports
+# more, unless its limits are wider.
 LARGEST_ROTATION_RAD = 3.0 * np.pi
 
 
 def describe_columns(joints: int) -> dict[str, Column]:
-    """Every column that a file of measurements may have."""
+    """Return every column that a file of measurements may have, by its name."""
     numbers = range(1, joints + 1)
+
+    def integer(name: str, meaning: str) -> Column:
+        return Column(name, "int32", "", meaning)
+
+    def number(name: str, unit: str, meaning: str) -> Column:
+        return Column(name, "float64", unit, meaning)
+
     columns = [
-        Column(
+        integer(
             "session",
-            "int32",
-            "",
             "sessions have each their own tracker frame; 0 throughout where absent",
         ),
-        Column("pose", "int32", "", "number of the pose in its session"),
-        Column("load", "int32", "", "number of the load, 0 where unloaded"),
-        Column(
-            "repeat", "int32", "", "number of the fresh approach to this pose and load"
-        ),
+        integer("pose", "number of the pose in its session"),
+        integer("load", "number of the load, 0 where unloaded"),
+        integer("repeat", "number of the fresh approach to this pose and load"),
         Column("target", "string", "", "name of the target that was read"),
         *(
-            Column(
-                f"q{j}",
-                "float64",
+            number(
+                f"q{joint}",
                 "rad",
-                f"angle of joint {j} as the controller reports it",
+                f"angle of joint {joint} as the controller reports it",
             )
-            for j in numbers
+            for joint in numbers
         ),
         *(
-            Column(
-                name,
-                "float64",
-                unit,
-                f"external {meaning}, at the last measuring point",
-            )
+            number(name, unit, f"external {meaning}, at the last measuring point")
             for name, unit, meaning in WRENCH
         ),
+        *(number(axis, "m", f"measured position along {axis}") for axis in "xyz"),
         *(
-            Column(axis, "float64", "m", f"measured position along {axis}")
+            number(f"r{axis}", "rad", f"measured rotation vector about {axis}")
             for axis in "xyz"
         ),
         *(
-            Column(
-                f"r{axis}", "float64", "rad", f"measured rotation vector about {axis}"
+            number(
+                f"approach{joint}", "", f"sense of approach of joint {joint}: -1, 0, +1"
             )
-            for axis in "xyz"
+            for joint in numbers
         ),
-        *(
-            Column(
-                f"approach{j}",
-                "float64",
-                "",
-                f"sense of approach of joint {j}: -1, 0, +1",
-            )
-            for j in numbers
-        ),
-        Column("time_s", "float64", "s", "time since any instant"),
-        Column("temperature_c", "float64", "°C", "temperature"),
-        Column(
+        number("time_s", "s", "time since any instant"),
+        number("temperature_c", "°C", "temperature"),
+        number(
             "u95_m",
-            "float64",
             "m",
             "expanded uncertainty of this position: 95 % of one coordinate",
         ),
@@ -111,17 +100,18 @@ def describe_columns(joints: int) -> dict[str, Column]:
 
 
 def is_file(path: str | Path) -> bool:
-    """Whether a path is that of a regular file; False too for what no path can be."""
+    """Return whether a path is that of a regular file; False also for an impossible
+    path."""
     try:
         return Path(path).is_file()
     except (OSError, ValueError):
-        # A name that is too long, or with a null character.
+        # The name is too long or has a null character.
         return False
 
 
 def is_file_in(path: str | Path, *folders: str | Path) -> bool:
-    """Whether a path is that of a regular file in or below one of some folders; links
-    are followed, on both sides."""
+    """Return whether a path is that of a regular file in or below one of the folders.
+    Links are followed, in the path and in the folders."""
     return is_file(path) and any(
         Path(path).resolve().is_relative_to(Path(folder).resolve())
         for folder in folders
@@ -129,140 +119,149 @@ def is_file_in(path: str | Path, *folders: str | Path) -> bool:
 
 
 def find_files(folder: str | Path, *names: str) -> list[Path]:
-    """Files of these names in a folder; a link out of it, a pipe and the like are
-    refused."""
-    there = [path for name in names if os.path.lexists(path := Path(folder) / name)]
-    for path in there:
+    """Find the files of these names in a folder.
+
+    An `InputError` refuses a link out of the folder, a pipe and anything else that is
+    not a regular file.
+    """
+    candidates = [Path(folder) / name for name in names]
+    paths = [path for path in candidates if os.path.lexists(path)]
+    for path in paths:
         if not is_file(path):
+            kind = describe_file_kind(os.lstat(path).st_mode)
             raise InputError(
-                path,
-                "",
-                f"{describe_file_kind(os.lstat(path).st_mode)} that leads to no file",
-                "the file itself",
+                path, "", f"{kind} that leads to no file", "the file itself"
             )
         if not is_file_in(path, folder):
-            raise InputError(
-                path, "", "a link out of the campaign's folder", "the file itself"
-            )
-    return there
+            found = "a link out of the campaign's folder"
+            raise InputError(path, "", found, "the file itself")
+    return paths
 
 
 def read_measurements(folder: Path, joints: int, measured: str) -> Cells:
-    """The measurements of a campaign, with all columns that it needs.
+    """Read the measurements of a campaign, with all columns that it needs.
 
-    `folder`: holds either `CSV` or `PARQUET`. `measured`: one of "position", "pose".
-    Raises `InputError`: no file or two, a file that cannot be read, a column that is
-    missing, unknown or there twice, a row of another length, more than
-    `MOST_MEASUREMENTS` rows, or angles that are others than those shown beside.
+    Parameters
+    ----------
+    folder : folder with either `CSV` or `PARQUET`.
+    joints : number of joints of the robot.
+    measured : "position" or "pose".
+
+    Raises
+    ------
+    InputError
+        If there is no file or both; if the file cannot be read; if a column is missing,
+        unknown or there twice; if a row has another length; if there are more than
+        `MOST_MEASUREMENTS` rows; or if displayed angles differ from the others.
     """
-    there = find_files(folder, CSV, PARQUET)
-    if len(there) != 1:
-        found = f"both {CSV} and {PARQUET}" if there else f"neither {CSV} nor {PARQUET}"
+    paths = find_files(folder, CSV, PARQUET)
+    if len(paths) != 1:
+        found = f"both {CSV} and {PARQUET}" if paths else f"neither {CSV} nor {PARQUET}"
         raise InputError(folder.as_posix(), "", found, "one of them")
-    table = _read(there[0], joints)
-    known = describe_columns(joints)
+    table = _read(paths[0], joints)
     if len(table.rows) == 0:
-        raise InputError(
-            there[0], "", "no row of data", "one row for each measurement of one target"
-        )
-    angles, approach = (
-        [f"{letter}{j}" for j in range(1, joints + 1)] for letter in ("q", "approach")
-    )
-    required = [
-        "pose",
-        "load",
-        "repeat",
-        "target",
-        *angles,
-        "x",
-        "y",
-        "z",
-        *(ROTATION if measured == "pose" else ()),
-    ]
-    required += [
-        name
-        for group in (WRENCH_NAMES, approach)
-        if {*group} & table.columns.keys()
-        for name in group
-    ]
-    if missing := next((name for name in required if name not in table.columns), None):
-        unit = f" in {known[missing].unit}" if known[missing].unit else ""
+        allowed = "one row for each measurement of one target"
+        raise InputError(paths[0], "", "no row of data", allowed)
+    _check_required_columns(table, joints, measured)
+    _check_displayed_angles(table, joints)
+    return table
+
+
+def _check_required_columns(table: Cells, joints: int, measured: str) -> None:
+    """Refuse a table that lacks a column, or some of the columns of wrench or approach."""
+    present = table.columns.keys()
+    numbers = range(1, joints + 1)
+    approach = [f"approach{joint}" for joint in numbers]
+    required = ["pose", "load", "repeat", "target"]
+    required += [f"q{joint}" for joint in numbers]
+    required += ["x", "y", "z"]
+    if measured == "pose":
+        required += ROTATION
+    for optional in (WRENCH_NAMES, approach):
+        if present & {*optional}:
+            required += optional
+    missing = next((name for name in required if name not in present), None)
+    if missing is not None:
+        column = describe_columns(joints)[missing]
+        unit = f" in {column.unit}" if column.unit else ""
         raise InputError(
             table.path,
             "header",
             f"no column {missing!r}",
-            f"{missing}: {known[missing].meaning}{unit}",
+            f"{missing}: {column.meaning}{unit}",
         )
-    for name, unit in itertools.product(angles, DISPLAY_UNITS):
-        if (beside := f"{name}_{unit}") in table.columns:
-            wrong = (
-                np.abs(
-                    table.numbers(name) / DISPLAY_UNITS[unit] - table.numbers(beside)
-                )
-                > DISPLAY_TOLERANCE
+
+
+def _check_displayed_angles(table: Cells, joints: int) -> None:
+    """Refuse an angle in a displayed unit that differs from the angle in rad."""
+    for joint, unit in itertools.product(range(1, joints + 1), DISPLAY_UNITS):
+        name = f"q{joint}"
+        displayed = f"{name}_{unit}"
+        if displayed in table.columns:
+            expected = table.numbers(name) / DISPLAY_UNITS[unit]
+            wrong = np.abs(expected - table.numbers(displayed)) > DISPLAY_TOLERANCE
+            allowed = (
+                f"what is {name} in {unit}, or a file without the column {displayed}"
             )
-            table.refuse(
-                wrong,
-                [beside],
-                f"what is {name} in {unit}, or a file without the column {beside}",
-            )
-    return table
+            table.refuse(wrong, [displayed], allowed)
 
 
 def read_measured_targets(folder: Path) -> tuple[list[str], str]:
-    """Targets that the measurements of a folder are of, in their order, and whether
-    each is a "position" or a "pose".
+    """Read which targets the measurements of a folder are of.
 
-    No targets where there is no measurement. Raises `InputError`: a file that is no
-    table of measurements.
+    Returns
+    -------
+    targets : names in the order of the file; empty if there is no measurement.
+    measured : "position" or "pose".
+
+    Raises
+    ------
+    InputError
+        If a file is not a table of measurements.
     """
-    try:
-        table = next(
-            (_read(path, MOST_JOINTS) for path in find_files(folder, CSV, PARQUET)),
-            None,
-        )
-    except InputError as error:
-        if error.found != HEADER_WITHOUT_ROWS:
-            raise
-        table = None
-    if table is None:
+    paths = find_files(folder, CSV, PARQUET)
+    if not paths:
         return [], "position"
-    names = dict.fromkeys(
-        name
-        for name in (table.texts("target") if "target" in table.columns else ())
-        if name
-    )
-    return list(names), "pose" if {*ROTATION} <= table.columns.keys() else "position"
+    try:
+        table = _read(paths[0], MOST_JOINTS)
+    except InputError as error:
+        if error.found == HEADER_WITHOUT_ROWS:
+            return [], "position"
+        raise
+    texts = table.texts("target") if "target" in table.columns else []
+    targets = [name for name in dict.fromkeys(texts) if name]
+    has_rotation = table.columns.keys() >= {*ROTATION}
+    return targets, "pose" if has_rotation else "position"
 
 
 def check_column_names(names: Collection[str], joints: int, path: str) -> None:
     """Refuse the first column that is there twice, or that neither the format nor a
-    sheet has; `path` is named in errors."""
+    sheet has.
+
+    Parameters
+    ----------
+    names : columns in the order of the file.
+    joints : number of joints of the robot.
+    path : file, for messages.
+    """
     known = describe_columns(joints)
-    allowed = {
-        *known,
-        TICK_COLUMN,
-        *(f"q{j}_{unit}" for j in range(1, joints + 1) for unit in DISPLAY_UNITS),
+    displayed = {
+        f"q{joint}_{unit}" for joint in range(1, joints + 1) for unit in DISPLAY_UNITS
     }
-    if twice := next(
-        (name for place, name in enumerate(names) if name in [*names][:place]), None
-    ):
-        raise InputError(path, "header", f"column {twice!r} twice", "each column once")
-    if name := next((name for name in names if name not in allowed), None):
-        # That q7 is unknown helps little where it is not stated how many joints the
-        # robot has.
-        of = (
-            f", for {joints} joints"
-            if name.rstrip("0123456789") in ("q", "approach")
-            else ""
-        )
-        missing = [other for other in known if other not in names]
-        raise InputError(
-            path,
-            "header",
-            f"the unknown column {name!r}",
-            suggest_names(name, missing) + of,
-        )
+    earlier = set()
+    for name in names:
+        if name in earlier:
+            found = f"column {name!r} twice"
+            raise InputError(path, "header", found, "each column once")
+        earlier.add(name)
+    for name in names:
+        if name not in known and name not in displayed and name != TICK_COLUMN:
+            missing = [column for column in known if column not in names]
+            allowed = suggest_names(name, missing)
+            if name.rstrip("0123456789") in ("q", "approach"):
+                # An unknown q7 is puzzling unless the message has the number of joints.
+                allowed += f", for {joints} joints"
+            raise InputError(path, "header", f"the unknown column {name!r}", allowed)
 
 
 def write_measurements(
@@ -270,8 +269,11 @@ def write_measurements(
 ) -> None:
     """Write the measurements of a campaign.
 
-    `path`: holds CSV where its name is `CSV`, else Parquet. `table`: columns of one
-    length, named as in `describe_columns`.
+    Parameters
+    ----------
+    path : file; CSV if its name is `CSV`, else Parquet.
+    table : columns of one length, named as in `describe_columns`.
+    joints : number of joints of the robot.
     """
     columns = [
         column for name, column in describe_columns(joints).items() if name in table
@@ -279,33 +281,45 @@ def write_measurements(
     cells = [np.asarray(table[column.name]).tolist() for column in columns]
     with atomic_write(path) as partial:
         if Path(path).name == CSV:
-            with open(partial, "w", encoding="utf-8", newline="") as file:
-                # repr of a float is the shortest text that reads back as the same
-                # number.
-                rows = zip(*cells, strict=True)
-                csv.writer(file, lineterminator="\n").writerows(
-                    itertools.chain([[column.name for column in columns]], rows)
-                )
-            return
-        schema = [
-            pa.field(
-                c.name,
-                pa.type_for_alias(c.type),
-                False,
-                {"unit": c.unit, "meaning": c.meaning},
-            )
-            for c in columns
-        ]
-        arrays = [
-            pa.array(values, field.type)
-            for values, field in zip(cells, schema, strict=True)
-        ]
-        whole = pa.Table.from_arrays(arrays, schema=pa.schema(schema))
-        pq.write_table(whole, partial, compression="zstd", write_page_checksum=True)
+            _write_csv(partial, columns, cells)
+        else:
+            _write_parquet(partial, columns, cells)
+
+
+def _write_csv(
+    path: str, columns: Sequence[Column], cells: Sequence[Sequence[Any]]
+) -> None:
+    with open(path, "w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow([column.name for column in columns])
+        # The writer uses repr, the shortest text that is read back as the same number.
+        writer.writerows(zip(*cells, strict=True))
+
+
+def _write_parquet(
+    path: str, columns: Sequence[Column], cells: Sequence[Sequence[Any]]
+) -> None:
+    fields = [
+        pa.field(
+            column.name,
+            pa.type_for_alias(column.type),
+            nullable=False,
+            metadata={"unit": column.unit, "meaning": column.meaning},
+        )
+        for column in columns
+    ]
+    arrays = [
+        pa.array(values, field.type)
+        for values, field in zip(cells, fields, strict=True)
+    ]
+    table = pa.Table.from_arrays(arrays, schema=pa.schema(fields))
+    pq.write_table(table, path, compression="zstd", write_page_checksum=True)
 
 
 def _read(path: Path, joints: int) -> Cells:
-    return (_read_csv if path.name == CSV else _read_parquet)(path.as_posix(), joints)
+    if path.name == CSV:
+        return _read_csv(path.as_posix(), joints)
+    return _read_parquet(path.as_posix(), joints)
 
 
 def _read_csv(path: str, joints: int) -> Cells:
@@ -317,68 +331,62 @@ def _read_csv(path: str, joints: int) -> Cells:
     check_column_names(text.columns, joints, path)
     table = text.cells({name: name for name in text.columns}, {})
     header = text.dialect.header or 0
-    return replace(
-        table, rows=(table.rows - header).astype(np.int32), header_line=header
-    )
+    rows = (table.rows - header).astype(np.int32)
+    return replace(table, rows=rows, header_line=header)
 
 
 def _read_parquet(path: str, joints: int) -> Cells:
-    texts = {
-        TICK_COLUMN,
-        *(
-            name
-            for name, column in describe_columns(joints).items()
-            if column.type == "string"
-        ),
-    }
-    if (size := os.path.getsize(path)) > _MOST_BYTES:
-        raise InputError(
-            path,
-            "",
-            format_count(size, "byte"),
-            f"at most {_MOST_BYTES}, which hold {MOST_MEASUREMENTS} measurements",
-        )
+    """Read a Parquet file after its metadata have shown that it is of bounded size."""
+    size = os.path.getsize(path)
+    if size > _MOST_BYTES:
+        allowed = f"at most {_MOST_BYTES}, which hold {MOST_MEASUREMENTS} measurements"
+        raise InputError(path, "", format_count(size, "byte"), allowed)
+    text_names = {TICK_COLUMN}
+    for name, column in describe_columns(joints).items():
+        if column.type == "string":
+            text_names.add(name)
     try:
-        # pyarrow's own complaint of a column that is there twice is a list of all
-        # columns.
         with pq.ParquetFile(path) as file:
             fields = file.schema_arrow
-            count = file.metadata.num_rows
-            groups = file.metadata.num_row_groups
+            metadata = file.metadata
+        # pyarrow's own complaint of a column that is there twice lists all columns.
         check_column_names(fields.names, joints, path)
-        # A kilobyte may hold a list of a billion numbers; each row group takes memory
-        # of its own beside its rows.
         for field in fields:
-            kind = field.type
-            is_number = (
-                pa.types.is_floating(kind)
-                or pa.types.is_integer(kind)
-                or pa.types.is_null(kind)
-            )
-            word = kind.value_type if pa.types.is_dictionary(kind) else kind
-            if not (is_number or (pa.types.is_string(word) and field.name in texts)):
-                allowed = "numbers, or text" if field.name in texts else "numbers"
-                raise InputError(
-                    path, f"column {field.name}", f"type {field.type}", allowed
-                )
-        for number, what, most in (
-            (groups, "row groups", _MOST_ROW_GROUPS),
-            (count, "rows of data", MOST_MEASUREMENTS),
-        ):
-            if number > most:
-                raise InputError(path, "", f"{number} {what}", f"at most {most}")
-        # As dictionaries texts take the memory that they take in the file.
-        there = [name for name in fields.names if name in texts]
+            _check_type(field, text_names, path)
+        _check_at_most(metadata.num_row_groups, "row groups", _MOST_ROW_GROUPS, path)
+        _check_at_most(metadata.num_rows, "rows of data", MOST_MEASUREMENTS, path)
         table = pq.read_table(
             path,
-            read_dictionary=there,
+            # Read as dictionaries, texts take no more memory than in the file.
+            read_dictionary=[name for name in fields.names if name in text_names],
             page_checksum_verification=True,
             partitioning=None,
         )
         table.validate(full=True)
     except (OSError, pa.ArrowException, UnicodeDecodeError) as error:
-        raise InputError(
-            path, "", f"no readable Parquet file ({error})", "a Parquet file"
-        ) from None
+        found = f"no readable Parquet file ({error})"
+        raise InputError(path, "", found, "a Parquet file") from None
     columns = dict(zip(table.column_names, table.columns, strict=True))
     return Cells(path, columns, np.arange(1, table.num_rows + 1, dtype=np.int32))
+
+
+def _check_type(field: pa.Field, text_names: Collection[str], path: str) -> None:
+    """Refuse a column of anything but numbers, or texts where they belong. A kilobyte
+    may hold a list of a billion numbers."""
+    kind = field.type
+    is_number = (
+        pa.types.is_floating(kind)
+        or pa.types.is_integer(kind)
+        or pa.types.is_null(kind)
+    )
+    text_kind = kind.value_type if pa.types.is_dictionary(kind) else kind
+    may_be_text = field.name in text_names
+    is_text = may_be_text and pa.types.is_string(text_kind)
+    if not is_number and not is_text:
+        allowed = "numbers, or text" if may_be_text else "numbers"
+        raise InputError(path, f"column {field.name}", f"type {kind}", allowed)
+
+
+def _check_at_most(count: int, noun: str, largest: int, path: str) -> None:
+    if count > largest:
+        raise InputError(path, "", f"{count} {noun}", f"at most {largest}")

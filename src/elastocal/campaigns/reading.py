@@ -1,9 +1,7 @@
-"""A campaign's folder, read and checked before anything is fitted to it.
+"""Read a campaign's measurements and check the campaign before anything is fitted to it.
 
-A campaign is a folder of ``campaign.yaml`` and ``measurements.csv`` or
-``measurements.parquet``, one row for each measurement of one target. All that is wrong
-on its face is refused here, in one line; a unit that only a fit can show to be wrong is
-left for the diagnosis to trace.
+Each fault that the files alone show is refused with a message of one line. A unit that
+only a fit can prove wrong is left to the diagnosis.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -40,6 +38,18 @@ from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.robot_file import robot_from_document
 
+# A joint angle this far beyond the limits is not the angle of a joint at its limit.
+_BEYOND_LIMITS_RAD = 0.5
+# A wrong unit affects a whole file. If at most this share of the rows is implausible,
+# they are gross errors, which the diagnosis names.
+_GROSS_ERROR_SHARE = 0.2
+# Positions that spread over more than this multiple of the reach are not in metres.
+# Positions in millimetres do, unless all lie within a few centimetres.
+_LARGEST_SPREAD_REACHES = 10.0
+# Distance of a target from its measuring point, if no offset is stated. Few targets sit
+# farther away.
+_UNKNOWN_OFFSET_M = 1.0
+
 
 def read_campaign(
     folder: CampaignFolder, effects: Collection[str] | None = None
@@ -63,26 +73,22 @@ def read_campaign(
     targets = parse_targets(document["targets"], robot.chain, source)
     # Refuse a folder that cannot validate this campaign before reading measurements.
     _ = folder.held_out_path
-    for index, name in enumerate(document.get("declared", ())):
-        if effects is not None and name not in set(effects):
-            raise InputError(
-                source,
-                f"declared[{index}]",
-                repr(name),
-                suggest_names(name, sorted(effects)),
-            )
+    if effects is not None:
+        _check_declared(document, effects, source)
     table = read_measurements(folder.path, robot.joints, document["measured"])
-    measurements = _measurements(table, robot, targets, document["measured"])
-    _check_measurements(measurements, table, robot, targets, source)
-    _check_stated(document, measurements, robot, folder.robot_file.name, source)
+    measurements = _build_measurements(table, robot, targets, document["measured"])
+    _check_measurements(measurements, table, robot, targets)
+    _check_targets_measured(measurements, table, targets, source)
+    _check_compliance(folder, measurements)
+    _check_noise(document.get("noise"), measurements, robot, source)
     select_held_out(folder.holdout, measurements, robot.reported_offset, source)
-    place = {"table": Path(table.path).name, "header_line": table.header_line}
-    return assemble_campaign(document | place, robot, measurements, source)
+    file = {"table": Path(table.path).name, "header_line": table.header_line}
+    return assemble_campaign(document | file, robot, measurements, source)
 
 
 def read_robot(path: str | Path) -> Robot:
-    """Read a robot file; an `InputError` is as in `robot_from_document`, or names what
-    the schema refuses."""
+    """Read a robot file; an `InputError` names what its schema or
+    `robot_from_document` refuses."""
     return robot_from_document(read_robot_document(path), Path(path).as_posix())
 
 
@@ -102,235 +108,271 @@ def read_held_out_campaign(
         allowed = f"a campaign of the same chain, {folder.robot.name}"
         found = f"another chain, of {held_out.robot.name}"
         raise InputError(folder.source, key, found, allowed)
-    poses = len(list_poses(held_out.measurements)[0])
-    if poses < FEWEST_HELD_OUT_POSES:
-        found = f"{format_count(poses, 'pose')} there"
+    pose_count = len(list_poses(held_out.measurements)[0])
+    if pose_count < FEWEST_HELD_OUT_POSES:
+        found = f"{format_count(pose_count, 'pose')} there"
         allowed = f"{FEWEST_HELD_OUT_POSES} or more"
         raise InputError(folder.source, key, found, allowed)
     return held_out
 
 
-def _check_stated(
-    document: Mapping[str, Any],
+def find_degrees(reported: np.ndarray, robot: Robot) -> np.ndarray:
+    """Find joint angles that are probably in degrees.
+
+    Such an angle has more turns than a joint makes, or is far beyond the limits of its
+    joint and within them if it is converted to radians.
+
+    Parameters
+    ----------
+    reported : (N, n) joint angles as the controller reports them.
+    robot : robot with the joint limits.
+
+    Returns
+    -------
+    (N, n) bool array.
+    """
+    low, high = robot.joint_limits.T
+
+    def excess(reported_angles: np.ndarray) -> np.ndarray:
+        """Return by how much angles exceed the limits; negative within them."""
+        angles = robot.model_angles(reported_angles)
+        return np.asarray(np.maximum(low - angles, angles - high))
+
+    largest = max(LARGEST_ROTATION_RAD, np.abs(robot.joint_limits).max())
+    in_degrees = np.abs(reported) > largest
+    rows = (excess(reported) > _BEYOND_LIMITS_RAD).any(axis=1)
+    suspects = reported[rows]
+    # If the opposite angle is within the limits, the sign is probably wrong, which the
+    # diagnosis finds.
+    smallest_excess = np.minimum(excess(suspects), excess(-suspects))
+    within_as_degrees = excess(np.radians(suspects)) <= 0
+    in_degrees[rows] |= (smallest_excess > _BEYOND_LIMITS_RAD) & within_as_degrees
+    return in_degrees
+
+
+def _check_declared(
+    document: Mapping[str, Any], effects: Collection[str], source: str
+) -> None:
+    """Refuse a declared effect that the catalogue does not have."""
+    for index, name in enumerate(document.get("declared", ())):
+        if name not in effects:
+            allowed = suggest_names(name, sorted(effects))
+            raise InputError(source, f"declared[{index}]", repr(name), allowed)
+
+
+def _check_compliance(folder: CampaignFolder, measurements: Measurements) -> None:
+    """Refuse loads on joints whose compliances are neither stated nor identified."""
+    nominal = folder.document.get("compliance", "nominal") == "nominal"
+    if nominal and not folder.robot.compliance_known and measurements.wrench.any():
+        file = folder.robot_file.name
+        found = f"nominal, but no compliance_urad_per_Nm in {file}, and loads"
+        allowed = "identify, or nominal with compliance_urad_per_Nm in the robot file"
+        raise InputError(folder.source, "compliance", found, allowed)
+
+
+def _check_noise(
+    noise: Mapping[str, Any] | None,
     measurements: Measurements,
     robot: Robot,
-    robot_file: str,
     source: str,
 ) -> None:
-    """Refuse loads on unknown compliances that are not identified, noise declared twice
-    or not at all, or of other joints."""
-    nominal = document.get("compliance", "nominal") == "nominal"
-    if nominal and not robot.compliance_known and measurements.wrench.any():
-        found = f"nominal, but no compliance_urad_per_Nm in {robot_file}, and loads"
-        raise InputError(
-            source,
-            "compliance",
-            found,
-            "identify, or nominal with compliance_urad_per_Nm in the robot file",
-        )
-    if (declared := document.get("noise")) is None:
+    """Refuse a declared noise of positions that contradicts or lacks a column of
+    uncertainties, and a noise of another number of joints."""
+    if noise is None:
         return
-    if "position_m" in declared and measurements.u95_m is not None:
-        raise InputError(
-            source,
-            "noise.position_m",
-            "beside a column u95_m of the measurements",
-            "one of them",
-        )
-    if "position_m" not in declared and measurements.u95_m is None:
-        raise InputError(
-            source,
-            "noise",
-            "no position_m",
-            "position_m, or a column u95_m of the measurements",
-        )
-    each = declared.get("joint_rad", 0.0)
-    if isinstance(each, list) and len(each) != robot.joints:
-        raise InputError(
-            source,
-            "noise.joint_rad",
-            format_count(len(each), "number"),
-            f"one for all joints, or {robot.joints}",
-        )
+    if "position_m" in noise and measurements.u95_m is not None:
+        found = "beside a column u95_m of the measurements"
+        raise InputError(source, "noise.position_m", found, "one of them")
+    if "position_m" not in noise and measurements.u95_m is None:
+        allowed = "position_m, or a column u95_m of the measurements"
+        raise InputError(source, "noise", "no position_m", allowed)
+    joint_rad = noise.get("joint_rad", 0.0)
+    if isinstance(joint_rad, list) and len(joint_rad) != robot.joints:
+        found = format_count(len(joint_rad), "number")
+        allowed = f"one for all joints, or {robot.joints}"
+        raise InputError(source, "noise.joint_rad", found, allowed)
 
 
-def _measurements(
+def _build_measurements(
     table: Cells, robot: Robot, targets: Sequence[Target], measured: str
 ) -> Measurements:
-    reported = table.matrix(f"q{j}" for j in range(1, robot.joints + 1))
-    degrees = find_degrees(reported, robot)
-    if degrees.any(axis=1).mean() > _SINGLE_ROWS:
-        index, joint = np.argwhere(degrees)[0]
-        limits = "from {:.2f} to {:.2f} rad".format(*robot.joint_limits[joint])
-        allowed = f"rad, not degrees, of a joint that goes {limits} (counted otherwise: reported_joints of the robot file)"
-        raise table.fault(index, f"q{joint + 1}", allowed)
-    names = {target.name: index for index, target in enumerate(targets)}
-    labels = table.texts("target")
-    unknown = next(
-        (index for index, label in enumerate(labels) if label not in names), None
-    )
-    if unknown is not None:
-        raise table.fault(
-            unknown,
-            "target",
-            f"a target of {DOCUMENT}: {suggest_names(labels[unknown], list(names))}",
-        )
-    approach = None
-    if "approach1" in table.columns:
-        approach = table.matrix(f"approach{j}" for j in range(1, robot.joints + 1))
-        table.refuse(
-            ~np.isin(approach, (-1.0, 0.0, 1.0)),
-            [f"approach{j}" for j in range(1, robot.joints + 1)],
-            "-1, 0 or 1",
-        )
-        # Where a joint of the model follows two reported ones that came from opposite
-        # sides, its own sense is not known.
-        approach = np.sign(approach @ robot.reported_matrix.T)
+    """Return the measurements of a table; angles in degrees and unknown targets are
+    refused."""
+    reported = table.matrix(_joint_columns("q", robot))
+    _refuse_degrees(reported, table, robot)
+    count = len(table.rows)
+
+    def optional(name: str) -> np.ndarray | None:
+        return table.numbers(name) if name in table.columns else None
+
+    has_session = "session" in table.columns
+    has_wrench = "fx" in table.columns
     return Measurements(
-        session=table.integers("session")
-        if "session" in table.columns
-        else np.zeros(len(table.rows), np.int32),
+        session=table.integers("session") if has_session else np.zeros(count, np.int32),
         pose=table.integers("pose"),
         load=table.integers("load"),
         repeat=table.integers("repeat"),
-        target=np.array([names[label] for label in labels], np.int32),
+        target=_target_indices(table, targets),
         joint_angles=robot.model_angles(reported),
-        wrench=table.matrix(WRENCH_NAMES)
-        if "fx" in table.columns
-        else np.zeros((len(table.rows), 6)),
+        wrench=table.matrix(WRENCH_NAMES) if has_wrench else np.zeros((count, 6)),
         position=table.matrix("xyz"),
         rotation_vector=table.matrix(ROTATION) if measured == "pose" else None,
-        approach=approach,
-        **{
-            name: table.numbers(name) if name in table.columns else None
-            for name in ("time_s", "temperature_c", "u95_m")
-        },
+        approach=_approach_directions(table, robot),
+        time_s=optional("time_s"),
+        temperature_c=optional("temperature_c"),
+        u95_m=optional("u95_m"),
         row=table.rows,
     )
 
 
-# A joint this far beyond its limits is no joint at its limit.
-_BEYOND_LIMITS_RAD = 0.5
-# A unit is wrong in a whole file. What is off in fewer rows than this is a gross error
-# of theirs, which the diagnosis names.
-_SINGLE_ROWS = 0.2
-# Positions spread over more reaches than this are not in metres. Millimetres spread so
-# unless all lie within centimetres.
-_FARTHEST_REACHES = 10.0
-# A target sits at most about this far from its measuring point.
-_LONGEST_TOOL_M = 1.0
+def _joint_columns(prefix: str, robot: Robot) -> list[str]:
+    return [f"{prefix}{joint}" for joint in range(1, robot.joints + 1)]
 
 
-def find_degrees(reported: np.ndarray, robot: Robot) -> np.ndarray:
-    """Angles that look like degrees: more turns than a joint has, or far beyond limits
-    that a 57th of the angle keeps.
-
-    `reported` (N, n): joint angles as the controller reports them. Returns (N, n) of
-    bool.
-    """
-    low, high = robot.joint_limits.T
-
-    def off(reported: np.ndarray) -> np.ndarray:
-        angles = robot.model_angles(reported)
-        return np.asarray(np.maximum(low - angles, angles - high))
-
-    found = np.abs(reported) > max(
-        LARGEST_ROTATION_RAD, np.abs(robot.joint_limits).max()
+def _refuse_degrees(reported: np.ndarray, table: Cells, robot: Robot) -> None:
+    """Refuse a table whose reported angles (N, n) are in degrees in many rows."""
+    in_degrees = find_degrees(reported, robot)
+    if in_degrees.any(axis=1).mean() <= _GROSS_ERROR_SHARE:
+        return
+    row, joint = np.argwhere(in_degrees)[0]
+    limits = "from {:.2f} to {:.2f} rad".format(*robot.joint_limits[joint])
+    allowed = (
+        f"rad, not degrees, of a joint that goes {limits} "
+        "(counted otherwise: reported_joints of the robot file)"
     )
-    some = (off(reported) > _BEYOND_LIMITS_RAD).any(axis=1)
-    # An angle that its opposite would bring inside the limits has rather a wrong sign,
-    # which is for the diagnosis to trace.
-    beyond = np.minimum(off(reported[some]), off(-reported[some])) > _BEYOND_LIMITS_RAD
-    found[some] |= beyond & (off(np.radians(reported[some])) <= 0)
-    return found
+    raise table.fault(row, f"q{joint + 1}", allowed)
+
+
+def _target_indices(table: Cells, targets: Sequence[Target]) -> np.ndarray:
+    """Return the index of the target of each row, (N,)."""
+    indices = {target.name: index for index, target in enumerate(targets)}
+    labels = table.texts("target")
+    for row, label in enumerate(labels):
+        if label not in indices:
+            names = suggest_names(label, list(indices))
+            raise table.fault(row, "target", f"a target of {DOCUMENT}: {names}")
+    return np.array([indices[label] for label in labels], np.int32)
+
+
+def _approach_directions(table: Cells, robot: Robot) -> np.ndarray | None:
+    """Return the direction from which each of the model's joints was approached, (N, n)
+    of -1, 0 or 1; None if the table does not state it."""
+    if "approach1" not in table.columns:
+        return None
+    names = _joint_columns("approach", robot)
+    approach = table.matrix(names)
+    table.refuse(~np.isin(approach, (-1.0, 0.0, 1.0)), names, "-1, 0 or 1")
+    # If a joint of the model is the sum of two reported joints that came from opposite
+    # sides, its own direction is unknown.
+    return np.sign(approach @ robot.reported_matrix.T)
 
 
 def _check_measurements(
-    measurements: Measurements,
-    table: Cells,
-    robot: Robot,
-    targets: Sequence[Target],
-    source: str,
+    measurements: Measurements, table: Cells, robot: Robot, targets: Sequence[Target]
 ) -> None:
-    """Refuse measurements that cannot be of one campaign, `source`, in the units of the
-    format, by their places there."""
+    """Refuse measurements that cannot belong to one campaign or are in other units than
+    those of the format."""
+    _refuse_duplicates(measurements, table, targets)
+    _refuse_undeclared_loads(measurements, table)
+    _refuse_poses_of_different_angles(measurements, table, robot)
+    _refuse_millimetres(measurements, table, robot, targets)
+    if measurements.rotation_vector is not None:
+        _refuse_large_rotations(measurements.rotation_vector, table)
+
+
+def _refuse_duplicates(
+    measurements: Measurements, table: Cells, targets: Sequence[Target]
+) -> None:
+    """Refuse a second measurement of the same session, pose, load, repeat and
+    target."""
     names = ("session", "pose", "load", "repeat", "target")
-    key = np.column_stack([getattr(measurements, name) for name in names])
-    first, group = group_equal_rows(key)
-    again = first[group] != np.arange(len(measurements))
-    if again.any():
-        index = int(np.argmax(again))
-        words = [
-            f"{name} {value}"
-            for name, value in zip(names, key[index], strict=True)
-            if name in table.columns
-        ]
-        found = f"{', '.join(words[:-1])}, target {targets[key[index, -1]].name} again"
-        raise table.fault(
-            index, "", f"each once (first in {table.place(first[group[index]])})", found
-        )
+    keys = np.column_stack([getattr(measurements, name) for name in names])
+    first, group = group_equal_rows(keys)
+    duplicate = first[group] != np.arange(len(measurements))
+    if not duplicate.any():
+        return
+    row = int(np.argmax(duplicate))
+    numbers = [
+        f"{name} {value}"
+        for name, value in zip(names[:-1], keys[row, :-1], strict=True)
+        if name in table.columns
+    ]
+    target = targets[keys[row, -1]].name
+    found = f"{', '.join(numbers)}, target {target} again"
+    allowed = f"each once (first in {table.place(first[group[row]])})"
+    raise table.fault(row, "", allowed, found)
+
+
+def _refuse_undeclared_loads(measurements: Measurements, table: Cells) -> None:
+    """Refuse a loaded measurement without a wrench, and a wrench without a load."""
     unloaded = measurements.load == 0
     if "fx" not in table.columns:
-        table.refuse(
-            ~unloaded,
-            ["load"],
-            f"0 where there are no columns {', '.join(WRENCH_NAMES)}",
-        )
-    table.refuse(
-        unloaded[:, None] & (measurements.wrench != 0),
-        WRENCH_NAMES,
-        "0 where load is 0",
-    )
-    pose_of = list_poses(measurements)[1]
-    angles = [f"q{j}" for j in range(1, robot.joints + 1)]
-    reported = table.matrix(angles)
-    first = np.unique(pose_of, return_index=True)[1]
-    apart = np.abs(reported - reported[first[pose_of]]) > SAME_POSE_RAD
+        columns = ", ".join(WRENCH_NAMES)
+        table.refuse(~unloaded, ["load"], f"0 where there are no columns {columns}")
+    wrong = unloaded[:, None] & (measurements.wrench != 0)
+    table.refuse(wrong, WRENCH_NAMES, "0 where load is 0")
+
+
+def _refuse_poses_of_different_angles(
+    measurements: Measurements, table: Cells, robot: Robot
+) -> None:
+    """Refuse measurements of one pose whose joint angles differ by more than a servo
+    error."""
+    pose = list_poses(measurements)[1]
+    names = _joint_columns("q", robot)
+    reported = table.matrix(names)
+    first = np.unique(pose, return_index=True)[1]
+    apart = np.abs(reported - reported[first[pose]]) > SAME_POSE_RAD
     if apart.any():
-        earlier = table.place(first[pose_of[np.argwhere(apart)[0, 0]]])
-        table.refuse(
-            apart,
-            angles,
-            f"within {SAME_POSE_RAD} rad of {earlier}, which is of the same pose",
-        )
-    tool = max(
-        (
-            np.linalg.norm(target.offset_m)
-            for target in targets
-            if target.offset_m is not None
-        ),
-        default=_LONGEST_TOOL_M,
-    )
-    reach = tool + sum(
+        row = np.argwhere(apart)[0, 0]
+        earlier = table.place(first[pose[row]])
+        allowed = f"within {SAME_POSE_RAD} rad of {earlier}, which is of the same pose"
+        table.refuse(apart, names, allowed)
+
+
+def _refuse_millimetres(
+    measurements: Measurements, table: Cells, robot: Robot, targets: Sequence[Target]
+) -> None:
+    """Refuse positions of a session that spread far beyond the robot's reach."""
+    reach = _longest_offset_m(targets) + sum(
         abs(transform.constant)
         for transform in robot.chain.transforms
         if transform.kind == "T"
     )
     for session in np.unique(measurements.session):
-        position = np.where(
-            (measurements.session == session)[:, None], measurements.position, np.nan
-        )
-        away = np.abs(position - np.nanmedian(position, axis=0))
-        if (
-            np.nanquantile(away.max(axis=1), 1.0 - _SINGLE_ROWS)
-            > _FARTHEST_REACHES * reach
-        ):
+        in_session = (measurements.session == session)[:, None]
+        position = np.where(in_session, measurements.position, np.nan)
+        distance = np.abs(position - np.nanmedian(position, axis=0))
+        spread = np.nanquantile(distance.max(axis=1), 1.0 - _GROSS_ERROR_SHARE)
+        if spread > _LARGEST_SPREAD_REACHES * reach:
             allowed = f"metres, not millimetres; the robot reaches {reach:.3g} m"
-            table.refuse(away == np.nanmax(away), "xyz", allowed)
-    if measurements.rotation_vector is not None:
-        angle = np.linalg.norm(measurements.rotation_vector, axis=1)
-        allowed = (
-            f"a rotation vector in rad, not degrees, {LARGEST_ROTATION_RAD:.3g} at most"
-        )
-        table.refuse(
-            angle == max(angle.max(), LARGEST_ROTATION_RAD),
-            ["rx, ry, rz"],
-            allowed,
-            f"a turn of {angle.max():.4g}",
-        )
+            table.refuse(distance == np.nanmax(distance), "xyz", allowed)
+
+
+def _longest_offset_m(targets: Sequence[Target]) -> float:
+    """Return the largest known distance of a target from its measuring point."""
+    offsets = [target.offset_m for target in targets if target.offset_m is not None]
+    lengths = [float(np.linalg.norm(offset)) for offset in offsets]
+    return max(lengths, default=_UNKNOWN_OFFSET_M)
+
+
+def _refuse_large_rotations(rotation_vector: np.ndarray, table: Cells) -> None:
+    """Refuse the largest rotation vector of (N, 3) if no rotation is that large."""
+    angle = np.linalg.norm(rotation_vector, axis=1)
+    table.refuse(
+        angle == max(angle.max(), LARGEST_ROTATION_RAD),
+        ["rx, ry, rz"],
+        f"a rotation vector in rad, not degrees, {LARGEST_ROTATION_RAD:.3g} at most",
+        f"a turn of {angle.max():.4g}",
+    )
+
+
+def _check_targets_measured(
+    measurements: Measurements, table: Cells, targets: Sequence[Target], source: str
+) -> None:
+    """Refuse a target that was not measured."""
     for index, target in enumerate(targets):
         if not (measurements.target == index).any():
             allowed = f"targets that {Path(table.path).name} has measurements of"
-            raise InputError(
-                source, f"targets.{target.name}", "no measurement of it", allowed
-            )
+            key = f"targets.{target.name}"
+            raise InputError(source, key, "no measurement of it", allowed)

@@ -1,6 +1,7 @@
-"""Campaigns of a simulated robot: ladders of loads at random poses, read with noise, as
-a calibrator would measure them."""
+"""Simulate the campaign of a robot: several loads at random poses, measured with noise
+as a calibrator would measure them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,12 +23,15 @@ from elastocal.random_streams import open_stream
 class Plan:
     """What is measured.
 
-    `points`: measuring points with a target each. `force_N`: largest force of the
-    ladder; the direction is random in each pose. `ladder`: shares of it, 0 first: each
-    is a load. `offset_m`: from the end-effector to where the force acts, base axes.
-    `repeats`, `repeated_poses`: how often the loads 0 and 1 of the first poses are
-    approached. `noise_m`, `noise_rad`: standard deviation of each component of a
-    measurement.
+    Attributes
+    ----------
+    points : measuring points; each has a target.
+    poses : number of poses.
+    force_N : largest force; its direction is random in each pose.
+    ladder : shares of the largest force, 0 first; each is a load.
+    offset_m : from the end effector to the point where the force acts, base axes.
+    repeats, repeated_poses : how often loads 0 and 1 are approached, in the first poses.
+    noise_m, noise_rad : standard deviation of each component of a measurement.
     """
 
     points: tuple[str, ...]
@@ -44,56 +48,92 @@ class Plan:
 def draw_measurements(
     robot: Robot, plan: Plan, seed: int, name: str
 ) -> dict[str, np.ndarray]:
-    """Measurements of a robot with elastic joints and, where it has them, elastic
-    links.
+    """Measure a simulated robot with elastic joints and, if it has them, elastic links.
 
-    Springs yield by the virtual joint method, see `mechanics.elastostatics`; poses are
-    exact.
+    The springs deflect by the virtual joint method, see `mechanics.elastostatics`;
+    joint angles have no error.
 
-    `name`: of the campaign; part of the name of the random stream. Returns columns of a
-    file of measurements.
+    Parameters
+    ----------
+    robot : robot that is measured.
+    plan : what is measured.
+    seed, name : seed and name of the campaign, which name the random stream.
+
+    Returns
+    -------
+    Columns of a file of measurements.
     """
     draws = open_stream(seed, name, "campaign", 0)
-    low, high = robot.joint_limits.T
-    angles = low + (high - low) * draws.random((plan.poses, robot.joints))
+    angles_of_pose = _draw_angles(robot, plan.poses, draws)
     direction = draws.standard_normal((plan.poses, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    visits = [
-        (pose, load, repeat)
-        for pose in range(plan.poses)
-        for load in range(len(plan.ladder))
-        for repeat in range(
-            plan.repeats if pose < plan.repeated_poses and load < 2 else 1
-        )
-    ]
-    pose, load, repeat = np.array(visits).T
+    pose, load, repeat = _list_approaches(plan).T
+    angles = angles_of_pose[pose]
     force = plan.force_N * np.array(plan.ladder)[load, None] * direction[pose]
     wrench = wrench_of_offset_force(force, plan.offset_m)
-    chain = extended_chain(robot)
-    coordinates = chain.at(angles[pose])
-    jacobian = poses_and_jacobians(
-        chain, coordinates, replace(chain.end_effector, offset_m=(0.0, 0.0, 0.0))
-    )[2]
-    deflected = coordinates + generalized_forces(jacobian, wrench) @ spring_compliance(
-        robot
-    )
-    position, rotation = poses_of_points(
-        chain, deflected, [chain.point(point) for point in plan.points]
-    )
+    position, rotation = _deflected_poses(robot, plan.points, angles, wrench)
     noise = draws.standard_normal((len(plan.points), 2, len(pose), 3))
-    shift, turn = np.moveaxis(noise, 1, 0).reshape(2, -1, 3)
-    turned = Rotation.from_rotvec(plan.noise_rad * turn) * Rotation.from_matrix(
-        rotation.reshape(-1, 3, 3)
-    )
-    read = np.column_stack(
-        [position.reshape(-1, 3) + plan.noise_m * shift, turned.as_rotvec()]
-    )
-    columns = {"pose": pose, "load": load, "repeat": repeat} | dict(
-        zip(WRENCH_NAMES, wrench.T, strict=True)
-    )
-    columns |= {f"q{joint}": column for joint, column in enumerate(angles[pose].T, 1)}
+    measured = _add_noise(position, rotation, noise, plan)
+    columns = {"pose": pose, "load": load, "repeat": repeat}
+    columns |= dict(zip(WRENCH_NAMES, wrench.T, strict=True))
+    columns |= {f"q{joint}": column for joint, column in enumerate(angles.T, 1)}
+    # One block of rows for each measuring point.
     table = {
         name: np.tile(column, len(plan.points)) for name, column in columns.items()
     }
-    table |= dict(zip(("x", "y", "z", "rx", "ry", "rz"), read.T, strict=True))
+    table |= dict(zip(("x", "y", "z", "rx", "ry", "rz"), measured.T, strict=True))
     return table | {"target": np.repeat(plan.points, len(pose))}
+
+
+def _draw_angles(robot: Robot, poses: int, draws: np.random.Generator) -> np.ndarray:
+    """Draw joint angles (poses, n), rad, uniformly within the limits."""
+    low, high = robot.joint_limits.T
+    return np.asarray(low + (high - low) * draws.random((poses, robot.joints)))
+
+
+def _list_approaches(plan: Plan) -> np.ndarray:
+    """Return the pose, load and repeat of each approach, (A, 3) int array."""
+    approaches = []
+    for pose in range(plan.poses):
+        for load in range(len(plan.ladder)):
+            is_repeated = pose < plan.repeated_poses and load < 2
+            repeats = plan.repeats if is_repeated else 1
+            approaches += [(pose, load, repeat) for repeat in range(repeats)]
+    return np.array(approaches)
+
+
+def _deflected_poses(
+    robot: Robot, points: Sequence[str], angles: np.ndarray, wrench: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the positions (P, A, 3), m, and rotation matrices (P, A, 3, 3) of P
+    measuring points at angles (A, n) under wrenches (A, 6)."""
+    chain = extended_chain(robot)
+    coordinates = chain.at(angles)
+    end_effector = replace(chain.end_effector, offset_m=(0.0, 0.0, 0.0))
+    jacobian = poses_and_jacobians(chain, coordinates, end_effector)[2]
+    forces = generalized_forces(jacobian, wrench)
+    deflected = coordinates + forces @ spring_compliance(robot)
+    return poses_of_points(chain, deflected, [chain.point(point) for point in points])
+
+
+def _add_noise(
+    position: np.ndarray, rotation: np.ndarray, noise: np.ndarray, plan: Plan
+) -> np.ndarray:
+    """Return measured positions (m) and rotation vectors (rad), one row for each point
+    and approach, (P A, 6).
+
+    Parameters
+    ----------
+    position, rotation : as of `_deflected_poses`.
+    noise : (P, 2, A, 3) standard normal numbers, of positions and of rotations.
+    plan : with the standard deviations.
+    """
+    shift, turn = np.moveaxis(noise, 1, 0).reshape(2, -1, 3)
+    exact_rotation = Rotation.from_matrix(rotation.reshape(-1, 3, 3))
+    measured_rotation = Rotation.from_rotvec(plan.noise_rad * turn) * exact_rotation
+    return np.column_stack(
+        [
+            position.reshape(-1, 3) + plan.noise_m * shift,
+            measured_rotation.as_rotvec(),
+        ]
+    )

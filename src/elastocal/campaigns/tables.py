@@ -1,8 +1,8 @@
-"""Tables of numbers as text, in whatever dialect: encoding, separator, decimal mark,
-lines before the header, comments.
+"""Read tables of numbers from text files of any dialect: encoding, separator, decimal
+mark, lines before the header and comments are found out.
 
-Neither `csv.Sniffer`, which guesses, nor pandas, which knows no lines, can ask where a
-table may be read in two ways.
+`csv.Sniffer` guesses, and pandas does not report line numbers. This module refuses a
+table that can be read in two ways, and names the line.
 """
 
 import codecs
@@ -27,31 +27,31 @@ from elastocal.io.texts import (
     read_bytes,
 )
 
-# In this order: a header that holds a semicolon is not separated by its commas.
+# Tried in this order: commas do not separate a header that has a semicolon.
 SEPARATORS = {"tab": "\t", "semicolon": ";", "bar": "|", "comma": ",", "space": " "}
 DECIMALS = {"point": ".", "comma": ","}
-_MARKS = (
+_BYTE_ORDER_MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
-_COMMENTS = ("#", "%", "//")
-_DECIMAL = {
+_COMMENT_MARKS = ("#", "%", "//")
+_DECIMAL_NUMBER = {
     name: re.compile(rf"[+-]?\d*[{mark}]\d+([eE][+-]?\d+)?", re.ASCII)
     for name, mark in DECIMALS.items()
 }
-# Three digits behind a comma may stand between thousands; these do not.
-_SURE = re.compile(
-    rf"(?![+-]?[1-9]\d{{0,2}},\d{{3}}$){_DECIMAL['comma'].pattern}", re.ASCII
+# In 1,234 the comma may stand between thousands. This pattern matches the numbers in
+# which it must be the decimal mark.
+_CERTAIN_DECIMAL_COMMA = re.compile(
+    rf"(?![+-]?[1-9]\d{{0,2}},\d{{3}}$){_DECIMAL_NUMBER['comma'].pattern}", re.ASCII
 )
 HEADER_WITHOUT_ROWS = "a header alone"
-# The whole of it is in memory, as text and as cells: some 2 GB at most.
+# Upper bounds on the size of a text table. The whole table is in memory, as text and
+# as cells, which takes up to some 2 GB at these bounds.
 LARGEST_BYTES = 100_000_000
 MOST_LINES = 500_000
-# Lines of a file with their numbers, from 1.
-_Lines = Sequence[tuple[int, str]]
-# Least and largest value of a column, in its unit, and why. Generous: whatever lies
-# beyond is in another unit, or no reading of an instrument beside a robot.
+# Smallest and largest value of a column, in its unit, with the reason. The bounds are
+# generous: a value beyond them is in another unit, or no instrument on a robot gives it.
 BOUNDS: Mapping[str, tuple[float, float, str]] = {
     **dict.fromkeys(
         ("fx", "fy", "fz"), (-1e6, 1e6, "N, the weight of a hundred tonnes")
@@ -70,18 +70,28 @@ BOUNDS: Mapping[str, tuple[float, float, str]] = {
     "u95_m": (
         1e-8,
         0.1,
-        "m, more than 0: a sixtieth of a laser's wavelength at least, at most what a robot is off by",
+        (
+            "m, more than 0: at least a sixtieth of a laser's wavelength, "
+            "at most the error of a robot"
+        ),
     ),
 }
+# Lines of a file with their numbers, from 1.
+_NumberedLines = Sequence[tuple[int, str]]
+# Rows of a table: number of the line and cells.
+_Rows = list[tuple[int, list[str]]]
 
 
 @dataclass(frozen=True)
 class Dialect:
-    """How a table is written; what is None is found out, or refused where it is
-    ambiguous.
+    """How a table is written. A field that is None is found out; an ambiguous table is
+    refused.
 
-    `separator`, `decimal`: names in `SEPARATORS` and `DECIMALS`. `header`: line of the
-    names of columns, from 1. `encoding`: as Python calls it.
+    Attributes
+    ----------
+    separator, decimal : names in `SEPARATORS` and `DECIMALS`.
+    header : line with the names of the columns, from 1.
+    encoding : as Python names it.
     """
 
     separator: str | None = None
@@ -91,21 +101,28 @@ class Dialect:
 
 
 _UNSTATED = Dialect()
-_WANTED = (
-    "columns x, y, z or such; --header LINE and --column x=NAME say which line and which columns they are, "
-    "--columns q1,q2,… what the columns of a table without a header are"
+_HEADER_ALLOWED = (
+    "columns x, y, z or such; --header LINE and --column x=NAME say which line and "
+    "which columns they are, --columns q1,q2,… what the columns of a table without a "
+    "header are"
 )
 
 
 @dataclass(frozen=True)
 class Cells:
-    """Columns of a table by name, as numbers in SI units or as texts; an `InputError`
-    names the place of what is neither.
+    """Columns of a table as numbers in SI units or as texts.
 
-    `columns`: cells as they stand in the file. `rows` (N,): number of each row in the
-    file, 1 for the first of data. `header_line`: line of the header, 0 where `rows` has
-    lines, None where the file is no text. `headers`: what the file calls columns, if
-    otherwise. `scales`: SI values of their units, if not 1.
+    An `InputError` names the row and column of a cell that is neither.
+
+    Attributes
+    ----------
+    path : file of the table, for messages.
+    columns : cells as they are in the file, by name.
+    rows : (N,) int array, number of each row in the file, from 1 for the first row of
+        data; numbers of lines if `header_line` is 0.
+    header_line : line of the header; None if the file is not text.
+    headers : names of columns in the file, where they differ from those in `columns`.
+    scales : SI value of the unit of a column, where it is not 1.
     """
 
     path: str
@@ -118,17 +135,21 @@ class Cells:
     def fault(
         self, index: int, name: str, allowed: str, found: str | None = None
     ) -> InputError:
-        """InputError of one cell, or without `name` of a row; `index` counts the
-        rows."""
-        place = self.place(index) + (
-            f", column {self.headers.get(name, name)}" if name else ""
-        )
-        return InputError(
-            self.path,
-            place,
-            _show(self.columns[name][index].as_py()) if found is None else found,
-            allowed,
-        )
+        """Return the InputError of one cell.
+
+        Parameters
+        ----------
+        index : row, from 0.
+        name : column; empty if the whole row is at fault.
+        allowed : what the cell may hold.
+        found : what is at fault, if not the contents of the cell.
+        """
+        key = self.place(index)
+        if name:
+            key += f", column {self.headers.get(name, name)}"
+        if found is None:
+            found = _quote_cell(self.columns[name][index].as_py())
+        return InputError(self.path, key, found, allowed)
 
     def refuse(
         self,
@@ -137,51 +158,54 @@ class Cells:
         allowed: str,
         found: str | None = None,
     ) -> None:
-        """Refuse the first cell that is wrong, of bool (N, len(names)) or of one column
-        (N,)."""
+        """Raise the InputError of the first wrong cell, if any.
+
+        Parameters
+        ----------
+        wrong : (N, len(names)) bool array, or (N,) of one column.
+        names : columns.
+        allowed, found : as in `fault`.
+        """
         if wrong.any():
             index, column = np.argwhere(wrong.reshape(len(wrong), -1))[0]
             raise self.fault(int(index), names[column], allowed, found)
 
     def place(self, index: int) -> str:
-        """Where a row stands in the file."""
+        """Return where a row, counted from 0, is in the file."""
         row = int(self.rows[index])
-        return (
-            f"row {row}"
-            if self.header_line is None
-            else f"line {row + self.header_line}"
-        )
+        if self.header_line is None:
+            return f"row {row}"
+        return f"line {row + self.header_line}"
 
     def numbers(self, name: str) -> np.ndarray:
-        """ndarray (N,) of finite numbers."""
+        """Return a column as an (N,) array of finite numbers within its bounds."""
         try:
             values = self.columns[name].cast(pa.float64()).to_numpy()
         except pa.ArrowInvalid:
-            # A cell is none, or written as a spreadsheet does.
-            found = [parse_number(str(cell)) for cell in self.columns[name].to_pylist()]
+            # A cell is not a number, or is written as a spreadsheet writes it.
+            parsed = [
+                parse_number(str(cell)) for cell in self.columns[name].to_pylist()
+            ]
             values = np.array(
-                [np.nan if number is None else number for number in found]
+                [np.nan if number is None else number for number in parsed]
             )
-        # Not a number is no more than anything either.
+        # The comparison is false for NaN, which is therefore refused too.
         self.refuse(~(np.abs(values) <= LARGEST_NUMBER), [name], NUMBER_ALLOWED)
         return self.bounded(name, values * self.scales.get(name, 1.0))
 
     def bounded(self, name: str, values: np.ndarray) -> np.ndarray:
-        """The same values (N,) of a column, all of which physics allows."""
-        least, largest, why = BOUNDS.get(name, (-np.inf, np.inf, ""))
-        self.refuse(
-            ~((values >= least) & (values <= largest)),
-            [name],
-            f"{least:g} to {largest:g} {why}",
-        )
+        """Return the values (N,) of a column; refuse one beyond its `BOUNDS`."""
+        lowest, largest, reason = BOUNDS.get(name, (-np.inf, np.inf, ""))
+        outside = ~((values >= lowest) & (values <= largest))
+        self.refuse(outside, [name], f"{lowest:g} to {largest:g} {reason}")
         return values
 
     def matrix(self, names: Iterable[str]) -> np.ndarray:
-        """ndarray (N, len(names)) of finite numbers."""
+        """Return columns as an (N, len(names)) array of finite numbers."""
         return np.column_stack([self.numbers(name) for name in names])
 
     def integers(self, name: str) -> np.ndarray:
-        """ndarray of int32 (N,)."""
+        """Return a column as an (N,) array of int32."""
         values = self.numbers(name)
         self.refuse(
             (values != np.round(values)) | (np.abs(values) >= 2**31),
@@ -191,31 +215,34 @@ class Cells:
         return values.astype(np.int32)
 
     def texts(self, name: str) -> list[str]:
-        """list of str (N,)."""
+        """Return the texts of a column without the blanks around them."""
         column = self.columns[name]
-        encoded = (
-            column
-            if pa.types.is_dictionary(column.type)
-            else column.cast(pa.string()).dictionary_encode()
-        )
-        whole = encoded.unify_dictionaries().combine_chunks()
-        words = [str(word).strip() for word in whole.dictionary.to_pylist()]
+        if not pa.types.is_dictionary(column.type):
+            column = column.cast(pa.string()).dictionary_encode()
+        encoded = column.unify_dictionaries().combine_chunks()
+        texts = [str(text).strip() for text in encoded.dictionary.to_pylist()]
         return [
-            "" if code is None else words[code] for code in whole.indices.to_pylist()
+            "" if code is None else texts[code] for code in encoded.indices.to_pylist()
         ]
 
 
-def _show(cell: Any) -> str:
+def _quote_cell(cell: Any) -> str:
+    """Return the contents of a cell for a message."""
     text = "" if cell is None else str(cell).strip().removesuffix(".0")
     return repr(text[:40]) if text else "nothing"
 
 
 @dataclass(frozen=True)
 class TextTable:
-    """Cells of a table: decimal points throughout; `lines` has the line of the file of
-    each row.
+    """Cells of a text table, all with decimal points.
 
-    `units`: of the columns that have one in a row of units under the header.
+    Attributes
+    ----------
+    path : file of the table.
+    dialect : how the file is written.
+    columns : cells by the names of the columns.
+    lines : line of each row in the file.
+    units : units of the columns that have one in a row of units under the header.
     """
 
     path: str
@@ -230,14 +257,40 @@ class TextTable:
         scales: Mapping[str, float],
         kept: np.ndarray | None = None,
     ) -> Cells:
-        """Columns by other names, their headers by these; SI values of their units; of
-        the rows kept, if not all."""
+        """Return columns under other names.
+
+        Parameters
+        ----------
+        columns : names in the file by the new names.
+        scales : SI values of the units, by the new names.
+        kept : rows to take; all if None.
+        """
         rows = np.arange(len(self.lines)) if kept is None else kept
         chosen = {
-            name: pa.chunked_array([[self.columns[header][row] for row in rows]])
-            for name, header in columns.items()
+            name: _take(self.columns[header], rows) for name, header in columns.items()
         }
         return Cells(self.path, chosen, np.array(self.lines)[rows], 0, columns, scales)
+
+
+def _take(cells: Sequence[str], rows: np.ndarray) -> pa.ChunkedArray:
+    return pa.chunked_array([[cells[row] for row in rows]])
+
+
+@dataclass(frozen=True)
+class _Header:
+    """Names of the columns, and how they and all other rows are separated.
+
+    `line` is 0 if the file has no header and the user stated the names.
+    """
+
+    separator: str
+    line: int
+    names: list[str]
+
+    @property
+    def place(self) -> str:
+        """Where the names of the columns come from, for messages."""
+        return f"line {self.line}" if self.line else "--columns"
 
 
 def read_text_table(
@@ -245,37 +298,37 @@ def read_text_table(
     is_header: Callable[[Sequence[str]], bool],
     stated: Dialect = _UNSTATED,
     ignored: Collection[str] = (),
-    wanted: str = _WANTED,
+    wanted: str = _HEADER_ALLOWED,
     units_in: Callable[[Sequence[str]], Sequence[str] | None] = lambda cells: None,
     names: Sequence[str] = (),
 ) -> TextTable:
-    """Read a table, finding out what is not stated of its dialect.
+    """Read a table and find out everything about its dialect that is not stated.
 
-    Columns without a name are called ``column 3`` by their place; those of empty cells
-    are left out, and so are such rows.
+    A column without a name gets one from its place, such as ``column 3``. Empty columns
+    without a name and empty rows are left out.
 
-    `is_header`: of the cells of a line, whether they name the columns; the first such
-    line does where no line is stated, else one behind a comment mark. `wanted`: what a
-    header has, for messages. `ignored`: names of columns that are left out whatever
-    they hold. `units_in`: the units of a row of cells that is nothing but units, such
-    as one under the header. `names`: of all columns of a table without a header. Raises
-    `InputError`: a file that cannot be read or has no header, a row of another length,
-    or numbers that may be read in two ways.
+    Parameters
+    ----------
+    path : file of the table.
+    is_header : whether the cells of a line name the columns. If no line is stated, the
+        first such line is the header, or else the first such comment.
+    stated : what the user says of the dialect.
+    ignored : columns to leave out whatever they hold.
+    wanted : what a header looks like, for messages.
+    units_in : units of a row that consists of units alone, such as one under the
+        header; None for any other row.
+    names : names of all columns of a table without a header.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, has no header or a row of another length, or if its
+        numbers can be read in two ways.
     """
     source = Path(path).as_posix()
     lines, encoding = _read_lines(path, stated.encoding)
-    filled = [(number, line) for number, line in enumerate(lines, 1) if line.strip()]
-    kept = [
-        (number, line)
-        for number, line in filled
-        if not line.lstrip().startswith(_COMMENTS)
-    ]
-    comments = [
-        (number, line.lstrip().lstrip("#%/").strip())
-        for number, line in filled
-        if line.lstrip().startswith(_COMMENTS)
-    ]
-    if not kept:
+    data_lines, comments = _separate_comments(lines)
+    if not data_lines:
         raise InputError(
             source,
             "",
@@ -283,105 +336,53 @@ def read_text_table(
             "a header and one row for each measurement",
         )
     if names:
-        separator = _marks_in(kept[0][1], stated, "comma")[0]
-        header = 0
+        separator = _possible_separators(data_lines[0][1], stated, "comma")[0]
+        header = _Header(separator, 0, list(names))
     else:
-        separator, header, line = _find_header(
-            kept, comments, is_header, stated, wanted, source
-        )
-        names = _split_cells(line, separator, source, header)
-    names = [name or f"column {place}" for place, name in enumerate(names, 1)]
-    where = f"line {header}" if header else "--columns"
-    split = (
-        (number, _split_cells(line, separator, source, number))
-        for number, line in kept
-        if number > header
-    )
-    rows = [(number, cells) for number, cells in split if any(cells)]
-    for number, cells in rows:
-        # Separators at the end of the rows and not of the header are common.
-        while len(cells) > len(names) and not cells[-1]:
-            cells.pop()
-        if len(cells) != len(names):
-            allowed = f"{len(names)}, one for each column of {where}"
-            raise InputError(
-                source, f"line {number}", format_count(len(cells), "cell"), allowed
-            )
-    units = dict(zip(names, (rows and units_in(rows[0][1])) or (), strict=False))
-    rows = rows[1:] if units else rows
+        header = _find_header(data_lines, comments, is_header, stated, wanted, source)
+    header = _name_unnamed_columns(header)
+    rows = _read_rows(data_lines, header, source)
+    units: dict[str, str] = {}
+    if rows and (row_of_units := units_in(rows[0][1])):
+        units = dict(zip(header.names, row_of_units, strict=False))
+        rows = rows[1:]
     if not rows:
-        raise InputError(
-            source, "", HEADER_WITHOUT_ROWS, "one row for each measurement"
-        )
-    if unknown := next((name for name in ignored if name not in names), None):
-        raise InputError(
-            source,
-            where,
-            f"no column {unknown!r} to ignore",
-            suggest_names(unknown, list(dict.fromkeys(names))),
-        )
-    numbers = [number for number, _ in rows]
-    cells_of = zip(*(cells for _, cells in rows), strict=True)
-    there = [
-        (name, cells)
-        for place, (name, cells) in enumerate(zip(names, cells_of, strict=True), 1)
-        if name not in ignored and (any(cells) or name != f"column {place}")
-    ]
-    columns = dict(there)
-    if len(columns) < len(there):
-        twice = Counter(name for name, _ in there).most_common(1)[0][0]
-        allowed = f"each column once (import csv --ignore {twice!r} leaves out those that nobody needs)"
-        raise InputError(source, where, f"column {twice!r} twice", allowed)
-    decimal = stated.decimal or _find_decimal(columns, numbers, separator, source)
-    comma = _DECIMAL["comma"]
+        allowed = "one row for each measurement"
+        raise InputError(source, "", HEADER_WITHOUT_ROWS, allowed)
+    columns = _collect_columns(rows, header, ignored, source)
+    line_numbers = [number for number, _ in rows]
+    decimal = stated.decimal or _find_decimal(
+        columns, line_numbers, header.separator, source
+    )
     if decimal == "comma":
-        columns = {
-            name: tuple(
-                cell.replace(",", ".") if comma.fullmatch(cell) else cell
-                for cell in cells
-            )
-            for name, cells in columns.items()
-        }
-    below = {name: unit for name, unit in units.items() if unit and name in columns}
+        columns = _with_decimal_points(columns)
     return TextTable(
         source,
-        Dialect(separator, decimal, header or None, encoding),
+        Dialect(header.separator, decimal, header.line or None, encoding),
         columns,
-        tuple(numbers),
-        below,
+        tuple(line_numbers),
+        {name: unit for name, unit in units.items() if unit and name in columns},
     )
 
 
 def _read_lines(path: str | Path, encoding: str | None) -> tuple[list[str], str]:
-    """Lines as editors count them, and the encoding: the stated one, that of a byte
-    order mark, or UTF-8.
+    """Return the lines as editors count them, and the encoding.
 
-    Refused are control characters and marks that turn the order of letters.
+    The encoding is the stated one, that of a byte order mark, or UTF-8. Control
+    characters and marks that change the direction of writing are refused.
     """
     content = read_bytes(
         path, LARGEST_BYTES, "a table with a line for each measurement"
     )
-    found = encoding or next(
-        (name for mark, name in _MARKS if content.startswith(mark)), "utf-8"
-    )
-    try:
-        text = decode_text(content, path, found).removeprefix("\ufeff")
-    except InputError as error:
-        allowed = "UTF-8 (iconv -f cp1252 -t utf-8), or in import csv --encoding cp1252, shift_jis, gb18030 or such"
-        raise InputError(
-            path, error.key, error.found, allowed if found == "utf-8" else error.allowed
-        ) from None
-    except (LookupError, ValueError) as error:
-        known = "an encoding as Python calls it, such as utf-8, cp1252, cp437, mac-roman, shift_jis, gb18030 or utf-16-le"
-        raise InputError("--encoding", "", f"{encoding!r}: {error}", known) from None
-    count = (
-        text.count("\n")
-        + text.count("\r")
-        - text.count("\r\n")
-        + (text[-1:] not in ("\n", "\r"))
-    )
+    text, encoding = _decode_table(content, path, encoding)
+    count = text.count("\n") + text.count("\r") - text.count("\r\n")
+    if text[-1:] not in ("\n", "\r"):
+        count += 1
     if count > MOST_LINES:
-        allowed = f"at most {MOST_LINES} (the mean of a tracker's stream at each pose is one measurement)"
+        allowed = (
+            f"at most {MOST_LINES} (average the tracker's stream at each pose "
+            "to one measurement)"
+        )
         raise InputError(path, "", format_count(count, "line"), allowed)
     lines = re.split(r"\r\n|\n|\r", text)
     for number, line in enumerate(lines, 1):
@@ -392,88 +393,187 @@ def _read_lines(path: str | Path, encoding: str | None) -> tuple[list[str], str]
             raise InputError(
                 path, f"line {number}", f"the character {character!a}", allowed
             )
-    return lines, found
+    return lines, encoding
 
 
-def _marks_in(line: str, stated: Dialect, *otherwise: str) -> list[str]:
-    """Separators that a line may have: the stated one, else those that stand in it."""
-    return (
-        [stated.separator]
-        if stated.separator
-        else [*(n for n, mark in SEPARATORS.items() if mark in line), *otherwise]
+def _decode_table(
+    content: bytes, path: str | Path, stated: str | None
+) -> tuple[str, str]:
+    """Return the text of a file, without its byte order mark, and its encoding."""
+    encoding = stated or next(
+        (name for mark, name in _BYTE_ORDER_MARKS if content.startswith(mark)), "utf-8"
     )
+    try:
+        text = decode_text(content, path, encoding)
+    except InputError as error:
+        allowed = error.allowed
+        if encoding == "utf-8":
+            allowed = (
+                "UTF-8 (iconv -f cp1252 -t utf-8), or in import csv --encoding cp1252, "
+                "shift_jis, gb18030 or such"
+            )
+        raise InputError(path, error.key, error.found, allowed) from None
+    except (LookupError, ValueError) as error:
+        allowed = (
+            "an encoding as Python calls it, such as utf-8, cp1252, cp437, mac-roman, "
+            "shift_jis, gb18030 or utf-16-le"
+        )
+        raise InputError("--encoding", "", f"{stated!r}: {error}", allowed) from None
+    return text.removeprefix("\ufeff"), encoding
+
+
+def _separate_comments(
+    lines: Iterable[str],
+) -> tuple[_NumberedLines, _NumberedLines]:
+    """Return the lines with data or a header, and the comments without their marks;
+    blank lines are in neither."""
+    data_lines = []
+    comments = []
+    for number, line in enumerate(lines, 1):
+        text = line.lstrip()
+        if text.startswith(_COMMENT_MARKS):
+            comments.append((number, text.lstrip("#%/").strip()))
+        elif text:
+            data_lines.append((number, line))
+    return data_lines, comments
+
+
+def _possible_separators(line: str, stated: Dialect, *default: str) -> list[str]:
+    """Return the separators that a line may have: the stated one, or those that occur
+    in it, and then the default."""
+    if stated.separator:
+        return [stated.separator]
+    return [*(name for name, mark in SEPARATORS.items() if mark in line), *default]
 
 
 def _find_header(
-    kept: _Lines,
-    comments: _Lines,
+    data_lines: _NumberedLines,
+    comments: _NumberedLines,
     is_header: Callable[[Sequence[str]], bool],
     stated: Dialect,
     wanted: str,
     source: str,
-) -> tuple[str, int, str]:
-    """Separator, and number and text of the line that names the columns."""
+) -> _Header:
+    """Find the line that names the columns."""
+    candidates = (*data_lines, *comments)
     if stated.header is not None:
-        if line := dict((*kept, *comments)).get(stated.header):
-            return _marks_in(line, stated, "comma")[0], stated.header, line
-        raise InputError(
-            source,
-            f"line {stated.header}",
-            "no header",
-            "the line that names the columns",
-        )
-    for number, line in (*kept, *comments):
-        if name := next(
-            (
-                name
-                for name in _marks_in(line, stated)
-                if is_header(_split_cells(line, name))
-            ),
-            None,
-        ):
-            return name, number, line
-    raise InputError(source, f"line {kept[0][0]}", repr(kept[0][1][:60]), wanted)
+        line = dict(candidates).get(stated.header)
+        if not line:
+            allowed = "the line that names the columns"
+            raise InputError(source, f"line {stated.header}", "no header", allowed)
+        separator = _possible_separators(line, stated, "comma")[0]
+        cells = _split_cells(line, separator, source, stated.header)
+        return _Header(separator, stated.header, cells)
+    for number, line in candidates:
+        for separator in _possible_separators(line, stated):
+            if is_header(_split_title(line, separator)):
+                cells = _split_cells(line, separator, source, number)
+                return _Header(separator, number, cells)
+    number, line = data_lines[0]
+    raise InputError(source, f"line {number}", repr(line[:60]), wanted)
 
 
-def _split_cells(
-    line: str, separator: str, source: str = "", number: int = 0
-) -> list[str]:
-    """Cells of one line; quotes that are not in pairs and a cell of more than 100,000
-    characters are refused.
+def _name_unnamed_columns(header: _Header) -> _Header:
+    names = [
+        name or _default_name(number) for number, name in enumerate(header.names, 1)
+    ]
+    return _Header(header.separator, header.line, names)
 
-    Without its number a line is a comment or a title, in which quotes need not be in
-    pairs: it has no cells.
-    """
+
+def _default_name(number: int) -> str:
+    return f"column {number}"
+
+
+def _split_cells(line: str, separator: str, source: str, number: int) -> list[str]:
+    """Return the cells of a line; unpaired quotes and a cell of more than 100,000
+    characters are refused."""
     mark = SEPARATORS[separator]
     if mark == " ":
         return line.split()
     try:
-        row = next(
-            csv.reader([line], delimiter=mark, skipinitialspace=True, strict=True)
-        )
+        reader = csv.reader([line], delimiter=mark, skipinitialspace=True, strict=True)
+        return [cell.strip() for cell in next(reader)]
     except csv.Error as error:
-        if not number:
-            return []
+        allowed = "cells separated by one mark, quotes in pairs"
+        raise InputError(source, f"line {number}", str(error), allowed) from None
+
+
+def _split_title(line: str, separator: str) -> list[str]:
+    """Return the cells of a line that may be a comment or a title. Its quotes need not
+    be in pairs; it has no cells then."""
+    try:
+        return _split_cells(line, separator, "", 0)
+    except InputError:
+        return []
+
+
+def _read_rows(data_lines: _NumberedLines, header: _Header, source: str) -> _Rows:
+    """Return the rows below the header that are not empty, all of the header's
+    length."""
+    length = len(header.names)
+    rows = []
+    for number, line in data_lines:
+        if number <= header.line:
+            continue
+        cells = _split_cells(line, header.separator, source, number)
+        if not any(cells):
+            continue
+        # Rows often end with separators that the header does not have.
+        while len(cells) > length and not cells[-1]:
+            cells.pop()
+        if len(cells) != length:
+            found = format_count(len(cells), "cell")
+            allowed = f"{length}, one for each column of {header.place}"
+            raise InputError(source, f"line {number}", found, allowed)
+        rows.append((number, cells))
+    return rows
+
+
+def _collect_columns(
+    rows: _Rows, header: _Header, ignored: Collection[str], source: str
+) -> dict[str, tuple[str, ...]]:
+    """Return the cells of each column by its name, without ignored columns and empty
+    ones that have no name."""
+    names = header.names
+    unknown = next((name for name in ignored if name not in names), None)
+    if unknown is not None:
         raise InputError(
             source,
-            f"line {number}",
-            str(error),
-            "cells separated by one mark, quotes in pairs",
-        ) from None
-    return [cell.strip() for cell in row]
+            header.place,
+            f"no column {unknown!r} to ignore",
+            suggest_names(unknown, list(dict.fromkeys(names))),
+        )
+    cells_by_column = zip(*(cells for _, cells in rows), strict=True)
+    columns: dict[str, tuple[str, ...]] = {}
+    counts = Counter[str]()
+    for number, cells in enumerate(cells_by_column, 1):
+        name = names[number - 1]
+        is_empty = name == _default_name(number) and not any(cells)
+        if name not in ignored and not is_empty:
+            counts[name] += 1
+            columns[name] = cells
+    name, count = counts.most_common(1)[0] if counts else ("", 0)
+    if count > 1:
+        allowed = (
+            f"each column once (import csv --ignore {name!r} leaves out those that "
+            "nobody needs)"
+        )
+        raise InputError(source, header.place, f"column {name!r} twice", allowed)
+    return columns
 
 
 def _find_decimal(
-    columns: dict[str, tuple[str, ...]],
-    lines: Sequence[int],
+    columns: Mapping[str, tuple[str, ...]],
+    line_numbers: Sequence[int],
     separator: str,
     source: str,
 ) -> str:
-    """The decimal mark that all numbers have; refused are numbers that may be read in
-    two ways."""
+    """Return the decimal mark of all numbers, as in `DECIMALS`; refuse numbers that can
+    be read in two ways."""
 
-    def first(pattern: re.Pattern[str], mark: str) -> tuple[int, str] | None:
-        rows = zip(lines, zip(*columns.values(), strict=True), strict=True)
+    def find_first(pattern: re.Pattern[str], mark: str) -> tuple[int, str] | None:
+        """Return the line and text of the first cell that matches."""
+        rows = zip(line_numbers, zip(*columns.values(), strict=True), strict=True)
         return next(
             (
                 (number, cell)
@@ -484,16 +584,33 @@ def _find_decimal(
             None,
         )
 
-    point, comma = (first(_DECIMAL[name], mark) for name, mark in DECIMALS.items())
-    if point and comma:
-        allowed = "one decimal mark, and none between thousands; --decimal point or comma says which"
-        raise InputError(
-            source,
-            "",
-            f"{point[1]!r} in line {point[0]} and {comma[1]!r} in line {comma[0]}",
-            allowed,
+    point = find_first(_DECIMAL_NUMBER["point"], ".")
+    comma = find_first(_DECIMAL_NUMBER["comma"], ",")
+    if comma is None:
+        return "point"
+    if point is not None:
+        found = f"{point[1]!r} in line {point[0]} and {comma[1]!r} in line {comma[0]}"
+        allowed = (
+            "one decimal mark, and none between thousands; --decimal point or comma "
+            "says which"
         )
-    if comma and (separator == "comma" or not first(_SURE, ",")):
-        allowed = "--decimal comma where the comma is the decimal mark, or numbers without marks between thousands"
+        raise InputError(source, "", found, allowed)
+    if separator == "comma" or not find_first(_CERTAIN_DECIMAL_COMMA, ","):
+        allowed = (
+            "--decimal comma where the comma is the decimal mark, or numbers without "
+            "marks between thousands"
+        )
         raise InputError(source, f"line {comma[0]}", repr(comma[1]), allowed)
-    return "comma" if comma else "point"
+    return "comma"
+
+
+def _with_decimal_points(
+    columns: Mapping[str, tuple[str, ...]],
+) -> dict[str, tuple[str, ...]]:
+    """Return the same cells with a point for the comma of each number."""
+    number = _DECIMAL_NUMBER["comma"]
+
+    def convert(cell: str) -> str:
+        return cell.replace(",", ".") if number.fullmatch(cell) else cell
+
+    return {name: tuple(map(convert, cells)) for name, cells in columns.items()}

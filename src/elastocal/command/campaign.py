@@ -1,4 +1,4 @@
-"""A campaign's folder: `elastocal init` begins it, `check` says what it can show,
+"""A campaign's folder: `elastocal init` creates it, `check` says what its data can show,
 `diagnose` runs its Snakemake target."""
 
 from __future__ import annotations
@@ -6,26 +6,31 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from typer import Argument, Option
 
 from elastocal.command.terminal import (
     MOST_ROWS,
-    pipeline,
+    find_pipeline,
+    find_robots_folder,
+    find_workplace,
     print_answer,
     print_lines,
-    robots,
-    workplace,
 )
 from elastocal.counting import format_count
 from elastocal.errors import InputError, find_control_character
 
+if TYPE_CHECKING:
+    from rich.console import Console
+
 _ROBOT = "robot.yaml"
-# Snakemake prints the second before its logger begins.
-_NOTHING = "Nothing to be done"
-_NO_NEWS = "Using workflow specific profile"
+# Snakemake prints the second line before its logger begins.
+_NOTHING_TO_DO = "Nothing to be done"
+_PROFILE_NOTICE = "Using workflow specific profile"
+# Braces are wildcards of Snakemake; the last two are a mapping and a comment in YAML.
+_REFUSED_IN_PATHS = ("{", "}", ": ", " #")
 
 
 def init(
@@ -35,6 +40,7 @@ def init(
             help="New folder, or one that has measurements or a robot file already."
         ),
     ],
+    *,
     robot: Annotated[
         Path | None, Option(help="Robot file to copy there, where there is none.")
     ] = None,
@@ -58,23 +64,12 @@ def init(
     from elastocal.io.texts import read_text
 
     check_places(*(folder / name for name in (_ROBOT, DOCUMENT, CSV, PARQUET)))
-    if (folder / DOCUMENT).exists():
-        raise InputError(
-            folder / DOCUMENT,
-            "",
-            "a campaign that is there already",
-            "a folder without campaign.yaml",
-        )
-    if (folder / _ROBOT).exists() == (robot is not None):
-        found = "a robot that is there already" if robot else "no robot file"
-        raise InputError(
-            folder / _ROBOT, "", found, "one robot file: there, or with --robot"
-        )
-    arm, (targets, measured) = (
-        read_robot(robot or folder / _ROBOT),
-        read_measured_targets(folder),
-    )
-    files = {} if robot is None else {_ROBOT: read_text(robot, LARGEST_BYTES)}
+    _check_new_campaign(folder / DOCUMENT, folder / _ROBOT, robot)
+    arm = read_robot(robot or folder / _ROBOT)
+    targets, measured = read_measured_targets(folder)
+    files = {}
+    if robot is not None:
+        files[_ROBOT] = read_text(robot, LARGEST_BYTES)
     if not (folder / CSV).exists() and not (folder / PARQUET).exists():
         files[CSV] = format_sheet_header(arm.joints)
     files[DOCUMENT] = format_campaign_template(
@@ -83,15 +78,30 @@ def init(
     with write_together(folder, files) as partial:
         for name, text in files.items():
             write_text(partial / name, text)
-    first = (
-        "check campaign.yaml for the frame and where targets sit"
-        if targets
-        else "fill in measurements.csv"
-    )
-    following = f"{first}, then elastocal check {folder.as_posix()}"
+    task = "fill in measurements.csv"
+    if targets:
+        task = "check campaign.yaml for the frame and where targets sit"
     print_answer(
-        True, f"{folder.as_posix()}: {', '.join(files)}", [], following, Console()
+        f"{folder.as_posix()}: {', '.join(files)}",
+        [],
+        f"{task}, then elastocal check {folder.as_posix()}",
+        Console(),
     )
+
+
+def _check_new_campaign(document: Path, robot_file: Path, robot: Path | None) -> None:
+    """Refuse a campaign that exists, and more or less than one robot file."""
+    if document.exists():
+        raise InputError(
+            document,
+            "",
+            "a campaign that is there already",
+            "a folder without campaign.yaml",
+        )
+    if robot_file.exists() == (robot is not None):
+        fault = "a robot that is there already" if robot else "no robot file"
+        allowed = "one robot file: there, or with --robot"
+        raise InputError(robot_file, "", fault, allowed)
 
 
 def check(folder: Annotated[Path, Argument(help="Folder of the campaign.")]) -> None:
@@ -103,31 +113,25 @@ def check(folder: Annotated[Path, Argument(help="Folder of the campaign.")]) -> 
 
     from elastocal.loop.overview import overview
 
-    found = overview(folder, robots())
-    console = Console()
-    answer = f"{found.campaign} cannot be diagnosed: the data are at fault"
-    if found.diagnosable:
-        more = (
-            f"; {format_count(len(found.attention), 'remark')} below"
-            if found.attention
-            else ""
-        )
-        answer = f"{found.campaign} can be diagnosed: {format_count(found.testable, 'candidate effect')} can be tested{more}"
-    details = [
-        *(f"{name:<16}{words}" for name, words in found.rows),
-        *(f"! {sentence}" for sentence in found.attention),
-    ]
-    following = (
-        f"elastocal diagnose {folder}"
-        if found.diagnosable
-        else "mend the data, then check again"
-    )
-    print_answer(found.diagnosable, answer, details, following, console)
-    raise typer.Exit(0 if found.diagnosable else 1)
+    report = overview(folder, find_robots_folder())
+    if report.diagnosable:
+        testable = format_count(report.testable, "candidate effect")
+        answer = f"{report.campaign} can be diagnosed: {testable} can be tested"
+        if report.attention:
+            answer += f"; {format_count(len(report.attention), 'remark')} below"
+        next_step = f"elastocal diagnose {folder}"
+    else:
+        answer = f"{report.campaign} cannot be diagnosed: the data are at fault"
+        next_step = "mend the data, then check again"
+    details = [f"{name:<16}{sentence}" for name, sentence in report.rows]
+    details += [f"! {sentence}" for sentence in report.attention]
+    print_answer(answer, details, next_step, Console(), passed=report.diagnosable)
+    raise typer.Exit(0 if report.diagnosable else 1)
 
 
 def diagnose(
     folder: Annotated[Path, Argument(help="Folder of the campaign.")],
+    *,
     cores: Annotated[
         int,
         Option("--cores", "-j", min=1, max=MOST_ROWS, help="Jobs that run at a time."),
@@ -140,48 +144,51 @@ def diagnose(
     """
     from rich.console import Console
 
-    campaign = str(folder.resolve())
     console = Console(stderr=True)
-    # Braces are wildcards to Snakemake, the others mapping and comment of YAML.
-    if mark := next(
-        (mark for mark in ("{", "}", ": ", " #") if mark in campaign),
-        find_control_character(campaign),
-    ):
+    campaign = str(folder.resolve())
+    _check_path(folder, campaign)
+    workplace = find_workplace()
+    snakefile = find_pipeline() / "Snakefile"
+    arguments = ["-m", "snakemake", f"-j{cores}", "diagnose"]
+    arguments += ["--config", f"campaign={campaign}"]
+    # An installed pipeline runs in the working directory.
+    if snakefile.parent != workplace:
+        arguments += ["--snakefile", str(snakefile)]
+    nothing_to_do = False
+    with subprocess.Popen(
+        [sys.executable, *arguments],
+        cwd=workplace,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    ) as process:
+        for line in map(str.rstrip, process.stdout or ()):
+            nothing_to_do = nothing_to_do or line.startswith(_NOTHING_TO_DO)
+            if not line.startswith(_PROFILE_NOTICE):
+                print_lines([line], console)
+    # If there is nothing to do, Snakemake prints no outcome.
+    if nothing_to_do and not process.returncode:
+        _print_outcome(folder, workplace, console)
+    raise typer.Exit(process.returncode)
+
+
+def _check_path(folder: Path, path: str) -> None:
+    """Refuse a path with characters that mean something else to Snakemake."""
+    marks = [mark for mark in _REFUSED_IN_PATHS if mark in path]
+    mark = marks[0] if marks else find_control_character(path)
+    if mark:
         raise InputError(
             folder,
             "",
             repr(mark),
             "a path without it, which Snakemake does not take for a path",
         )
-    place = workplace()
-    snakefile = pipeline() / "Snakefile"
-    words = [
-        "-m",
-        "snakemake",
-        f"-j{cores}",
-        "diagnose",
-        "--config",
-        f"campaign={campaign}",
-    ]
-    # What is installed beside the package runs in the working directory.
-    words += [] if snakefile.parent == place else ["--snakefile", str(snakefile)]
-    current = False
-    with subprocess.Popen(
-        [sys.executable, *words],
-        cwd=place,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    ) as run:
-        for line in map(str.rstrip, run.stdout or ()):
-            current = current or line.startswith(_NOTHING)
-            if not line.startswith(_NO_NEWS):
-                print_lines([line], console)
-    # Where there is nothing to do, Snakemake prints no outcome.
-    if current and not run.returncode:
-        from elastocal.campaigns.campaign_folder import read_campaign_folder
-        from elastocal.report.outcome import outcome
 
-        name = read_campaign_folder(folder, robots()).name
-        print_lines(outcome([f"reports/loop/{name}/report.pdf"], place), console)
-    raise typer.Exit(run.returncode)
+
+def _print_outcome(folder: Path, workplace: Path, console: Console) -> None:
+    """Print the outcome of a diagnosis that is up to date."""
+    from elastocal.campaigns.campaign_folder import read_campaign_folder
+    from elastocal.report.outcome import outcome
+
+    name = read_campaign_folder(folder, find_robots_folder()).name
+    print_lines(outcome([f"reports/loop/{name}/report.pdf"], workplace), console)

@@ -10,20 +10,23 @@ from typer import Argument, Option
 
 from elastocal.command.terminal import (
     LARGEST_SEED,
+    find_robots_folder,
+    find_workplace,
     print_answer,
     print_lines,
-    robots,
-    workplace,
 )
 from elastocal.counting import format_count
 
 # Fewer candidates than a real plan takes, for a demonstration of a minute.
 _PLAN = (
-    "--poses 25 --candidates 2000 --force 1000 --pull --base-known --measured pose --noise 60um --orientation-noise 60urad "
-    "--target 6DoF=0,0,0 --target 3DoF=0,0,0"
+    "--poses 25 --candidates 2000 --force 1000 --pull --base-known --measured pose"
+    " --noise 60um --orientation-noise 60urad --target 6DoF=0,0,0 --target 3DoF=0,0,0"
 )
-# Of every real robot it is true, and so no secret.
-_WEIGHTS = "gravity sag in the verdict is right too: the robot bends under its own weight, and its file declares none"
+# This is true of every real robot, so it gives no secret away.
+_WEIGHTS = (
+    "gravity sag in the verdict is right too: the robot bends under its own weight,"
+    " and its file declares none"
+)
 
 
 def demo(
@@ -31,6 +34,7 @@ def demo(
     folder: Annotated[Path, Argument(help="New folder for the campaign.")] = Path(
         "elastocal-demo"
     ),
+    *,
     effect: Annotated[
         list[str] | None,
         Option(help="Hidden effect, such as joint_tilt; may be repeated."),
@@ -63,52 +67,50 @@ def demo(
     )
 
     console = Console(stderr=True)
-    file = robots() / "kuka.yaml"
+    robot_file = find_robots_folder() / "kuka.yaml"
     path = folder / "path.csv"
     targets = folder / "targets.csv"
-    robot, defects = hidden_robot(file, seed, effect or ["transmission_harmonic"])
+    robot, defects = hidden_robot(robot_file, seed, effect or ["transmission_harmonic"])
     command = context.find_root().command
 
-    def run(*words: str | Path, may_fail: bool = False) -> None:
-        print_lines(["", f"$ {shlex.join(['elastocal', *map(str, words)])}"], console)
-        # Without the standalone mode click returns the exit code.
-        code = command.main(
-            [*map(str, words)], prog_name="elastocal", standalone_mode=False
-        )
+    def run(*arguments: str | Path, may_fail: bool = False) -> None:
+        """Print a command and run it; end the demonstration if it fails."""
+        texts = [*map(str, arguments)]
+        print_lines(["", f"$ {shlex.join(['elastocal', *texts])}"], console)
+        # Outside of its standalone mode click returns the exit code.
+        code = command.main(texts, prog_name="elastocal", standalone_mode=False)
         if code and not may_fail:
             raise typer.Exit(code)
 
-    run("plan", file, "--folder", folder, *_PLAN.split())
-    count = fill_sheet(
-        folder / CSV, read_campaign_folder(folder, robots()).document, robot, seed
-    )
-    print_lines(
-        [
-            "",
-            f"# The simulated robot is measured: {format_count(count, 'measurement')} in {folder / CSV}",
-        ],
-        console,
-    )
+    run("plan", robot_file, "--folder", folder, *_PLAN.split())
+    document = read_campaign_folder(folder, find_robots_folder()).document
+    count = format_count(fill_sheet(folder / CSV, document, robot, seed), "measurement")
+    note = f"# The simulated robot is measured: {count} in {folder / CSV}"
+    print_lines(["", note], console)
     run("check", folder)
     run("diagnose", folder)
-    write_milling_path(path, read_robot(file), robot, seed)
+    write_milling_path(path, read_robot(robot_file), robot, seed)
     run("correct", folder, path, "--output", targets)
     run("certificate", folder, "--tolerance", "0.2mm", may_fail=True)
-    missed = {
-        name: 1e3 * root_mean_square(off)
-        for name, off in measured_errors(path, targets, robot, seed).items()
+    errors_mm = {
+        name: 1e3 * root_mean_square(errors)
+        for name, errors in measured_errors(path, targets, robot, seed).items()
     }
-    answer = (
-        f"The simulated robot follows a milling path under load: position error {missed['uncorrected']:.2f} mm RMS before, "
-        f"{missed['corrected']:.3f} mm after (noise and repeatability alone: {missed['noise alone']:.3f} mm)"
-    )
-    details = [
-        f"hidden in it: {hidden_words(defects, effect or ())}, beside errors of every link, joint zero, gear and weight",
-        _WEIGHTS,
-        f"report: {workplace() / 'reports' / 'loop' / folder.resolve().name / 'report.html'}",
-    ]
+    defects_in_words = hidden_words(defects, effect or ())
+    report = find_workplace() / "reports" / "loop" / folder.resolve().name
     print_lines([""], console)
-    better = missed["corrected"] < missed["uncorrected"]
     print_answer(
-        better, answer, details, "the same with your robot: elastocal --help", console
+        "The simulated robot follows a milling path under load:"
+        f" position error {errors_mm['uncorrected']:.2f} mm RMS before,"
+        f" {errors_mm['corrected']:.3f} mm after"
+        f" (noise and repeatability alone: {errors_mm['noise alone']:.3f} mm)",
+        [
+            f"hidden in it: {defects_in_words},"
+            " beside errors of every link, joint zero, gear and weight",
+            _WEIGHTS,
+            f"report: {report / 'report.html'}",
+        ],
+        "the same with your robot: elastocal --help",
+        console,
+        passed=errors_mm["corrected"] < errors_mm["uncorrected"],
     )

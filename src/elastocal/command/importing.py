@@ -1,5 +1,5 @@
-"""`elastocal import`: what people have, robots and measurements, to the files that
-elastocal reads."""
+"""`elastocal import`: converts robots and measurements to the files that elastocal
+reads."""
 
 from __future__ import annotations
 
@@ -9,7 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 from typer import Argument, Option
 
-from elastocal.command.terminal import MOST_ROWS, example, print_lines, robots
+from elastocal.command.terminal import (
+    MOST_ROWS,
+    find_robots_folder,
+    format_example,
+    print_lines,
+)
 from elastocal.counting import format_count
 from elastocal.errors import InputError
 
@@ -28,7 +33,7 @@ def import_() -> None:
 
 
 @importing.command(
-    epilog=example(
+    epilog=format_example(
         "elastocal import urdf arm.urdf --base base_link --tip tool0 -o robot.yaml"
     )
 )
@@ -36,6 +41,7 @@ def urdf(
     file: Annotated[
         Path, Argument(help="The URDF; of a xacro file, what xacro makes of it.")
     ],
+    *,
     base: Annotated[str, Option(help="Link whose frame is the robot's base frame.")],
     tip: Annotated[
         str, Option(help="Link at the end; its frame is the last measuring point.")
@@ -55,10 +61,10 @@ def urdf(
     from elastocal.exchange.urdf import robot_from_urdf
 
     refuse_existing(output, force)
-    _write(robot_from_urdf(file, base, tip, point or ()), output)
+    _write_robot(robot_from_urdf(file, base, tip, point or ()), output)
 
 
-@importing.command(epilog=example("elastocal import dh arm.csv -o robot.yaml"))
+@importing.command(epilog=format_example("elastocal import dh arm.csv -o robot.yaml"))
 def dh(
     file: Annotated[
         Path,
@@ -66,6 +72,7 @@ def dh(
             help="The table, .csv; or the kinematics file of the ROS driver, .yaml."
         ),
     ],
+    *,
     output: _Output,
     modified: Annotated[
         bool,
@@ -110,16 +117,17 @@ def dh(
 
     refuse_existing(output, force)
     options = DhOptions(angles, lengths, decimal, tuple(ignore or ()))
-    _write(robot_from_dh(file, modified, options, name), output)
+    _write_robot(robot_from_dh(file, modified, options, name), output)
 
 
 @importing.command(
-    epilog=example(
+    epilog=format_example(
         "elastocal import csv tracker.csv --folder campaigns/cell --target SMR1"
     )
 )
 def csv(
     file: Annotated[Path, Argument(help="The table: CSV, tabs, semicolons, spaces.")],
+    *,
     folder: Annotated[
         Path, Option(help="Folder of the campaign; measurements.csv goes there.")
     ],
@@ -132,14 +140,16 @@ def csv(
     rotation: Annotated[
         str | None,
         Option(
-            help="none, vector, quaternion, matrix, homogeneous, euler:ZYX (moving axes), euler:xyz (fixed)."
+            help="none, vector, quaternion, matrix, homogeneous, euler:ZYX (moving"
+            " axes), euler:xyz (fixed)."
         ),
     ] = None,
     names: Annotated[
         str | None,
         Option(
             "--columns",
-            help="Of a table without a header: names in order, q1,q2,…; none to leave one out.",
+            help="Of a table without a header: names in order, q1,q2,…; none to leave"
+            " one out.",
         ),
     ] = None,
     column: Annotated[
@@ -156,7 +166,8 @@ def csv(
     target: Annotated[
         list[str] | None,
         Option(
-            help="Name of the target where no column has it; of each of several in a row NAME=X,Y,Z, its columns."
+            help="Name of the target where no column has it; of each of several in a row"
+            " NAME=X,Y,Z, its columns."
         ),
     ] = None,
     wrench: Annotated[
@@ -192,79 +203,58 @@ def csv(
     Columns are found by their usual names (q1 or J1 or Axis 1, x, y, z, qw .. qz, r11
     .. r33, t11 .. t34, fx .. mz, pose, load, repeat, target, time) or as the robot's
     file calls its joints, units by brackets or endings ("X [mm]", x_mm). What is
-    ambiguous is asked for. Poses, loads and repeats are counted where no column numbers
+    ambiguous is asked for. Poses, loads and repeats are format_count where no column numbers
     them. The end of the output states what was read, how, and what was left out.
     """
     from rich.console import Console
 
-    from elastocal.campaigns.campaign import DOCUMENT
-    from elastocal.campaigns.campaign_folder import read_campaign_folder
-    from elastocal.campaigns.measurements import CSV, PARQUET, write_measurements
+    from elastocal.campaigns.measurements import CSV, write_measurements
     from elastocal.campaigns.reading import read_robot
     from elastocal.exchange.measurement_table import (
         ImportOptions,
         read_measurement_table,
     )
-    from elastocal.io.atomic_writes import check_places, write_together
+    from elastocal.io.atomic_writes import write_together
 
-    check_places(folder / CSV, folder / PARQUET)
-    if (folder / PARQUET).exists() or (
-        (folder / CSV).exists() and not force and _is_filled(folder / CSV)
-    ):
-        allowed = "another folder, or --force to replace measurements.csv"
-        raise InputError(folder, "", "measurements that are there already", allowed)
-    alone = target is not None and len(target) == 1 and "=" not in target[0]
-    targets = {
-        name: [header.strip() for header in headers.split(",")]
-        for name, headers in _pairs("--target", None if alone else target).items()
-    }
-    if wrong := next(
-        (name for name, headers in targets.items() if len({*headers}) != 3), None
-    ):
-        raise InputError(
-            "--target",
-            "",
-            f"{wrong}={','.join(targets[wrong])}",
-            "NAME=X,Y,Z, the columns of its position",
-        )
+    _check_replaceable(folder, force=force)
+    units = _parse_pairs("--unit", unit)
+    if angles:
+        units["angles"] = angles
+    if lengths:
+        units["lengths"] = lengths
+    target_name, target_columns = _parse_targets(target or [])
     options = ImportOptions(
         decimal=decimal,
         header=header,
         encoding=encoding,
-        columns=_pairs("--column", column),
-        units=_pairs("--unit", unit)
-        | {
-            kind: word
-            for kind, word in (("angles", angles), ("lengths", lengths))
-            if word
-        },
+        columns=_parse_pairs("--column", column),
+        units=units,
         rotation=rotation,
-        target=target[0] if target and alone else None,
+        target=target_name,
         wrench=wrench,
         skip_empty=skip_empty,
         ignore=ignore or [],
-        targets=targets,
+        targets=target_columns,
         names=[name.strip() for name in names.split(",")] if names else (),
     )
-    known: set[str] = set()
-    if (folder / DOCUMENT).is_file():
-        campaign = read_campaign_folder(folder, robots())
-        robot = robot or campaign.robot_file
-        known = {*campaign.document["targets"]}
-    found = read_measurement_table(
-        file, options, None if robot is None else read_robot(robot)
+    declared_targets, declared_robot = _read_declared(folder)
+    robot_file = robot or declared_robot
+    imported = read_measurement_table(
+        file, options, read_robot(robot_file) if robot_file else None
     )
     with write_together(folder, (CSV,)) as partial:
-        write_measurements(partial / CSV, found.table, found.joints)
-    lines = [*_summary(found), f"written: {(folder / CSV).as_posix()}"]
-    if known and (new := ", ".join(sorted({*found.table["target"].tolist()} - known))):
+        write_measurements(partial / CSV, imported.table, imported.joints)
+    lines = [*_describe_import(imported), f"written: {(folder / CSV).as_posix()}"]
+    unknown = sorted({*imported.table["target"].tolist()} - declared_targets)
+    if declared_targets and unknown:
         lines.append(
-            f"! campaign.yaml there has no target {new}: name it there, or in place of one of its own"
+            f"! campaign.yaml there has no target {', '.join(unknown)}:"
+            " name it there, or in place of one of its own"
         )
     print_lines(lines, Console())
 
 
-def _write(result: Imported, output: Path) -> None:
+def _write_robot(result: Imported, output: Path) -> None:
     """Write the robot file, and print what was read."""
     from rich.console import Console
 
@@ -274,74 +264,126 @@ def _write(result: Imported, output: Path) -> None:
     print_lines([*summary(result), f"written: {output.as_posix()}"], Console())
 
 
-def _pairs(option: str, texts: list[str] | None) -> dict[str, str]:
-    found: dict[str, str] = {}
-    for text in texts or ():
-        name, _, value = map(str.strip, text.partition("="))
-        if not (name and value) or name in found:
-            raise InputError(option, "", repr(text), "NAME=VALUE, each name once")
-        found[name] = value
-    return found
+def _check_replaceable(folder: Path, *, force: bool) -> None:
+    """Refuse a folder whose measurements would be lost."""
+    from elastocal.campaigns.measurements import CSV, PARQUET
+    from elastocal.io.atomic_writes import check_places
+
+    sheet = folder / CSV
+    check_places(sheet, folder / PARQUET)
+    is_lost = sheet.exists() and not force and _is_filled(sheet)
+    if is_lost or (folder / PARQUET).exists():
+        raise InputError(
+            folder,
+            "",
+            "measurements that are there already",
+            "another folder, or --force to replace measurements.csv",
+        )
 
 
 def _is_filled(path: Path) -> bool:
-    """Whether a sheet holds a measurement: one of `init` or `plan`, without a position
-    in any row, may be replaced."""
+    """Whether a sheet holds a measurement. One of `init` or `plan` without a position in
+    any row may be replaced."""
     import pandas as pd
 
     try:
         sheet = pd.read_csv(path, comment="#", dtype=str, skipinitialspace=True)
     except ValueError:
         return True
-    places = sheet.filter(regex=r"^r?[xyz] *$")
-    # Rows of a file without such columns may hold anything.
-    return len(sheet) > 0 and (
-        places.empty or bool(places.fillna("").map(str.strip).any(axis=None))
-    )
+    cells = sheet.filter(regex=r"^r?[xyz] *$")
+    if cells.empty:
+        # A file with rows but without these columns may hold anything.
+        return len(sheet) > 0
+    return bool(cells.fillna("").map(str.strip).any(axis=None))
 
 
-def _summary(found: ImportedMeasurements) -> list[str]:
-    """What was read, how, and what was left out."""
-    import numpy as np
+def _parse_pairs(option: str, texts: list[str] | None) -> dict[str, str]:
+    """Parse options ``NAME=VALUE``, each name once."""
+    pairs: dict[str, str] = {}
+    for text in texts or ():
+        name, _, value = map(str.strip, text.partition("="))
+        if not (name and value) or name in pairs:
+            raise InputError(option, "", repr(text), "NAME=VALUE, each name once")
+        pairs[name] = value
+    return pairs
 
+
+def _parse_targets(texts: list[str]) -> tuple[str | None, dict[str, list[str]]]:
+    """Parse the option --target: one name for all rows, or the columns ``NAME=X,Y,Z`` of
+    each of several targets in a row."""
+    if len(texts) == 1 and "=" not in texts[0]:
+        return texts[0], {}
+    targets = {}
+    for name, columns in _parse_pairs("--target", texts).items():
+        headers = [header.strip() for header in columns.split(",")]
+        if len({*headers}) != 3:
+            raise InputError(
+                "--target",
+                "",
+                f"{name}={','.join(headers)}",
+                "NAME=X,Y,Z, the columns of its position",
+            )
+        targets[name] = headers
+    return None, targets
+
+
+def _read_declared(folder: Path) -> tuple[set[str], Path | None]:
+    """Read the targets and the robot file of a campaign.yaml that is there already."""
+    from elastocal.campaigns.campaign import DOCUMENT
+    from elastocal.campaigns.campaign_folder import read_campaign_folder
+
+    if not (folder / DOCUMENT).is_file():
+        return set(), None
+    campaign = read_campaign_folder(folder, find_robots_folder())
+    return {*campaign.document["targets"]}, campaign.robot_file
+
+
+def _describe_import(imported: ImportedMeasurements) -> list[str]:
+    """Describe what was read, how, and what was left out."""
     from elastocal.mechanics.components import WRENCH_NAMES
 
-    table = found.table
-    options = found.options
+    options = imported.options
     columns = options.columns
-    units = options.units
-    poses = len(
-        np.unique(
-            np.column_stack(
-                [table.get("session", np.zeros_like(table["pose"])), table["pose"]]
-            ),
-            axis=0,
-        )
-    )
-    targets = ", ".join(sorted(set(table["target"].tolist())))
-    joints = format_count(found.joints, "joint")
-    read = [
-        f"{name} from {header!r}{f' in {units[name]}' if name in units else ''}"
-        for name, header in columns.items()
-    ]
+    header = f"in line {options.header}" if options.header else "as stated"
+    readings = []
+    for name, column in columns.items():
+        unit = f" in {options.units[name]}" if name in options.units else ""
+        readings.append(f"{name} from {column!r}{unit}")
+    skipped = []
+    if imported.skipped:
+        skipped.append(f"{format_count(imported.skipped, 'row')} without a position")
     lists = {
-        "left out": [f"{format_count(found.skipped, 'row')} without a position"]
-        if found.skipped
-        else [],
-        "counted, as no column has it": [
+        "left out": skipped,
+        "format_count, as no column has it": [
             name for name in ("pose", "load", "repeat") if name not in columns
         ],
         "taken for zero, as no column has it": [
             name for name in WRENCH_NAMES if name not in columns
         ],
-        "not used": found.ignored,
+        "not used": imported.ignored,
     }
-    return [
-        f"{format_count(len(table['pose']), 'measurement')} of {targets} at {format_count(poses, 'pose')}, {joints}",
-        f"file: names of columns {f'in line {options.header}' if options.header else 'as stated'}, "
-        f"separator {options.separator}, decimal {options.decimal}, encoding {options.encoding}",
-        f"read: {'; '.join(read)}",
+    lines = [
+        _describe_size(imported),
+        f"file: names of columns {header}, separator {options.separator},"
+        f" decimal {options.decimal}, encoding {options.encoding}",
+        f"read: {'; '.join(readings)}",
         f"orientations: {options.rotation}",
-        *(f"{what}: {', '.join(names)}" for what, names in lists.items() if names),
-        *(f"note: {note}" for note in found.notes),
     ]
+    for title, names in lists.items():
+        if names:
+            lines.append(f"{title}: {', '.join(names)}")
+    return lines + [f"note: {note}" for note in imported.notes]
+
+
+def _describe_size(imported: ImportedMeasurements) -> str:
+    """Count measurements, poses and joints, and name the targets."""
+    import numpy as np
+
+    pose = imported.table["pose"]
+    session = imported.table.get("session", np.zeros_like(pose))
+    poses = len(np.unique(np.column_stack([session, pose]), axis=0))
+    targets = ", ".join(sorted(set(imported.table["target"].tolist())))
+    return (
+        f"{format_count(len(pose), 'measurement')} of {targets}"
+        f" at {format_count(poses, 'pose')}, {format_count(imported.joints, 'joint')}"
+    )

@@ -1,4 +1,4 @@
-"""The application of all subcommands, in the order of the work; bad input ends in one
+"""The application of all subcommands, in the order of the work. Bad input ends in one
 line."""
 
 import sys
@@ -11,15 +11,17 @@ from typer.core import TyperGroup
 
 import elastocal
 from elastocal.command.campaign import check, diagnose, init
+from elastocal.command.certificate import certificate
+from elastocal.command.correct import correct
 from elastocal.command.demo import demo
+from elastocal.command.export import export
 from elastocal.command.importing import importing
 from elastocal.command.plan import plan
-from elastocal.command.results import certificate, correct, export
-from elastocal.command.terminal import example
+from elastocal.command.terminal import format_example
 from elastocal.errors import InputError, describe_system_fault
 
-# Each subcommand with an example, in the order in which a calibration needs them;
-# `import` is a group of its own.
+# Each subcommand with the words of an example, in the order in which a calibration needs
+# them; `import` is a group of its own.
 COMMANDS: dict[Callable[..., None], str] = {
     demo: "",
     init: "campaigns/cell --robot robot.yaml",
@@ -36,12 +38,9 @@ class InOrder(TyperGroup):
     """Lists subcommands in the order of the work; typer would list groups last."""
 
     def list_commands(self, ctx: Any) -> list[str]:
-        """Names of all subcommands."""
-        return [
-            "demo",
-            "import",
-            *(command.__name__ for command in COMMANDS if command is not demo),
-        ]
+        """Return the names of all subcommands."""
+        names = [command.__name__ for command in COMMANDS if command is not demo]
+        return ["demo", "import", *names]
 
 
 # Without the boxes of rich the last line says what is wrong with an option.
@@ -52,17 +51,17 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
-    epilog=example("elastocal demo"),
+    epilog=format_example("elastocal demo"),
 )
-for _command, _typed in COMMANDS.items():
-    app.command(epilog=example(f"elastocal {_command.__name__} {_typed}".strip()))(
-        _command
-    )
+for _command, _example in COMMANDS.items():
+    _line = f"elastocal {_command.__name__} {_example}".strip()
+    app.command(epilog=format_example(_line))(_command)
 app.add_typer(importing)
 
 
 @app.callback(invoke_without_command=True)
 def with_version(
+    *,
     version: Annotated[
         bool, Option("--version", help="Print the version and exit.")
     ] = False,
@@ -77,8 +76,11 @@ def with_version(
 
 
 def main() -> None:
-    """Run the command; exit code 1 with one line on standard error where the input is
-    wrong, or the machine fails."""
+    """Run the command.
+
+    If the input is wrong, or the machine fails, the exit code is 1 and standard error
+    has one line.
+    """
     try:
         app()
     except InputError as error:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -15,9 +16,9 @@ from elastocal.command.terminal import (
     LARGEST_SEED,
     MOST_POSES,
     MOST_ROWS,
-    angle_rad,
-    length_m,
-    numbers,
+    parse_angle_rad,
+    parse_length_m,
+    parse_numbers,
     print_answer,
 )
 from elastocal.counting import format_count
@@ -27,7 +28,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from elastocal.application.planning.cell import Cell
-    from elastocal.application.planning.plan import Plan, Survey
+    from elastocal.application.planning.plan import Plan
+    from elastocal.application.planning.survey import Sensor, Survey
     from elastocal.campaigns.campaign import Target
     from elastocal.mechanics.chain import Chain
     from elastocal.mechanics.robot import Robot
@@ -35,13 +37,15 @@ if TYPE_CHECKING:
 ROBOT = "robot.yaml"
 SHEET = "plan.pdf"
 PICTURE = "plan.png"
-# Of a target, as in campaign.yaml.
+# Upper bound on the name of a target, as in campaign.yaml.
 _LONGEST_NAME = 80
-_LOWEST_FLOOR_M = 1e3
+# Bound on the height of the floor, either way.
+_FARTHEST_FLOOR_M = 1e3
 
 
 def plan(
     robot: Annotated[Path, Argument(help="Robot file.")],
+    *,
     folder: Annotated[
         Path, Option(help="New campaign folder, with a sheet to fill in.")
     ],
@@ -73,7 +77,8 @@ def plan(
     measured: Annotated[
         Literal["position", "pose"],
         Option(
-            help="What is read of a target, and by default with which noise: of a laser tracker, or of its 6DoF probe."
+            help="What is read of a target, and by default with which noise: of a laser"
+            " tracker, or of its 6DoF probe."
         ),
     ] = "position",
     base_known: Annotated[
@@ -82,7 +87,8 @@ def plan(
     target: Annotated[
         list[str] | None,
         Option(
-            help="A target and its measuring point: POINT, POINT=x,y,z in m, or with a name of its own A:POINT=x,y,z."
+            help="A target and its measuring point: POINT, POINT=x,y,z in m, or with a"
+            " name of its own A:POINT=x,y,z."
         ),
     ] = None,
     tracker: Annotated[
@@ -97,9 +103,10 @@ def plan(
     floor: Annotated[
         float,
         Option(
-            min=-_LOWEST_FLOOR_M,
-            max=_LOWEST_FLOOR_M,
-            help="Height in m, base axes, that forearm and targets stay above: the plane that the base stands on.",
+            min=-_FARTHEST_FLOOR_M,
+            max=_FARTHEST_FLOOR_M,
+            help="Height in m, base axes, that forearm and targets stay above: the plane"
+            " that the base stands on.",
         ),
     ] = 0.0,
     noise: Annotated[
@@ -111,7 +118,8 @@ def plan(
     orientation_noise: Annotated[
         str | None,
         Option(
-            help="Standard deviation of a rotation about an axis, such as 0.01deg. Default: usual."
+            help="Standard deviation of a rotation about an axis, such as 0.01deg."
+            " Default: usual."
         ),
     ] = None,
     seed: Annotated[
@@ -126,23 +134,55 @@ def plan(
     """
     from rich.console import Console
 
-    from elastocal.application.planning.plan import (
-        SENSORS,
-        Survey,
-        choose_plan,
-        find_allowed_candidates,
-    )
+    from elastocal.application.planning.plan import choose_plan, find_allowed_candidates
+    from elastocal.application.planning.survey import Survey
     from elastocal.campaigns.measurements import CSV
     from elastocal.campaigns.reading import read_robot
-    from elastocal.io.texts import describe_file_kind
 
-    arm, console, (_, position_m, orientation_rad) = (
-        read_robot(robot),
-        Console(stderr=True),
-        SENSORS[measured],
+    arm = read_robot(robot)
+    console = Console(stderr=True)
+    sensor = _choose_sensor(measured, noise, orientation_noise)
+    survey = Survey(
+        arm,
+        _read_targets(target or [arm.chain.end_effector.name], arm.chain),
+        not base_known,
+        measured,
+        sensor.position_m,
+        sensor.orientation_rad,
+        force,
+        pull,
     )
+    cell = _read_cell(arm, box or (), tracker, floor)
+    _check_new_folder(folder)
+    with console.status("planning"):
+        candidates = find_allowed_candidates(survey, cell, number, seed)
+        chosen = choose_plan(survey, candidates, poses, held_out, seed)
+    sentences = _describe_plan(survey, chosen, sensor)
+    rows = _write_campaign(folder, robot, _PlannedCell(survey, cell, chosen), sentences)
+    print_answer(
+        f"{format_count(poses, 'pose')} to fit and {held_out} held out, of"
+        f" {len(candidates.joint_angles):,} that the cell allows:"
+        f" {format_count(rows, 'measurement')}",
+        [*sentences, f"sheet to print: {folder / SHEET}"],
+        f"measure, fill in {folder / CSV}, then elastocal check {folder}",
+        console,
+    )
+
+
+def _choose_sensor(
+    measured: str, noise: str | None, orientation_noise: str | None
+) -> Sensor:
+    """Return the usual sensor with the noise that the user states.
+
+    Its description is empty if all of its noise is stated.
+    """
+    from elastocal.application.planning.survey import SENSORS, Sensor
+
+    usual = SENSORS[measured]
+    position_m = usual.position_m
+    orientation_rad = usual.orientation_rad
     if noise is not None:
-        position_m = length_m("--noise", noise)
+        position_m = parse_length_m("--noise", noise)
     if orientation_noise is not None:
         if measured != "pose":
             raise InputError(
@@ -151,167 +191,176 @@ def plan(
                 "positions, which have no orientation",
                 "--measured pose beside it",
             )
-        orientation_rad = angle_rad("--orientation-noise", orientation_noise)
-    targets = _read_targets(target or [arm.chain.end_effector.name], arm.chain)
-    survey = Survey(
-        arm, targets, not base_known, measured, position_m, orientation_rad, force, pull
-    )
-    cell = _cell(arm, box or (), tracker, floor)
+        orientation_rad = parse_angle_rad("--orientation-noise", orientation_noise)
+    all_stated = noise and (orientation_noise or measured == "position")
+    description = "" if all_stated else usual.description
+    return Sensor(description, position_m, orientation_rad)
+
+
+def _check_new_folder(folder: Path) -> None:
+    """Refuse a folder that exists."""
+    from elastocal.io.texts import describe_file_kind
+
     if os.path.lexists(folder):
-        raise InputError(
-            folder,
-            "",
-            f"{describe_file_kind(os.lstat(folder).st_mode)} that is there",
-            "a new one",
-        )
-    with console.status("planning"):
-        some = find_allowed_candidates(survey, cell, number, seed)
-        found = choose_plan(survey, some, poses, held_out, seed)
-    worth = _worth(
-        survey, found, bool(noise and (orientation_noise or measured == "position"))
-    )
-    rows = _write(folder, robot, survey, cell, found, worth)
-    answer = (
-        f"{format_count(poses, 'pose')} to fit and {held_out} held out, of {len(some.joint_angles):,} that the cell allows: "
-        f"{format_count(rows, 'measurement')}"
-    )
-    following = f"measure, fill in {folder / CSV}, then elastocal check {folder}"
-    print_answer(
-        True, answer, [*worth, f"sheet to print: {folder / SHEET}"], following, console
-    )
+        kind = describe_file_kind(os.lstat(folder).st_mode)
+        raise InputError(folder, "", f"{kind} that is there", "a new one")
 
 
-def _cell(arm: Robot, boxed: Iterable[str], tracker: str | None, floor: float) -> Cell:
-    from elastocal.application.inverse_kinematics import reach_m
+def _read_cell(
+    arm: Robot, boxes: Iterable[str], tracker: str | None, floor_m: float
+) -> Cell:
+    """Read boxes and the tracker's position; radii are shares of the arm's reach."""
+    from elastocal.application.inverse_kinematics import compute_reach_m
     from elastocal.application.planning.cell import COLUMN_SHARE, RADIUS_SHARE, Cell
 
-    boxes = tuple(numbers("--box", text, 6).reshape(3, 2) for text in boxed)
-    if wrong := [
-        corner.ravel().tolist()
-        for corner in boxes
-        if (corner[:, 0] >= corner[:, 1]).any()
-    ]:
-        raise InputError(
-            "--box",
-            "",
-            str(wrong[0]),
-            "xmin,xmax,ymin,ymax,zmin,zmax with each min below its max",
-        )
-    place = None if tracker is None else numbers("--tracker", tracker, 3)
-    reach = reach_m(arm)
-    return Cell(boxes, place, RADIUS_SHARE * reach, floor, COLUMN_SHARE * reach)
+    corners = []
+    for text in boxes:
+        box = parse_numbers("--box", text, 6).reshape(3, 2)
+        if (box[:, 0] >= box[:, 1]).any():
+            raise InputError(
+                "--box",
+                "",
+                str(box.ravel().tolist()),
+                "xmin,xmax,ymin,ymax,zmin,zmax with each min below its max",
+            )
+        corners.append(box)
+    tracker_m = None if tracker is None else parse_numbers("--tracker", tracker, 3)
+    reach_m = compute_reach_m(arm)
+    return Cell(
+        tuple(corners),
+        tracker_m,
+        RADIUS_SHARE * reach_m,
+        floor_m,
+        COLUMN_SHARE * reach_m,
+    )
 
 
-def _read_targets(described: list[str], chain: Chain) -> tuple[Target, ...]:
-    """Reflectors on measuring points, at a known offset or an unknown one, each by a
-    name of its own."""
+def _read_targets(descriptions: list[str], chain: Chain) -> tuple[Target, ...]:
+    """Read targets on measuring points, ``POINT``, ``NAME:POINT`` or either with
+    ``=x,y,z``, the known offset; each has a name of its own."""
     from elastocal.campaigns.campaign import Target
 
-    known = [place.name for place in chain.points]
-    found: dict[str, Target] = {}
-    for text in described:
-        place, equals, offset = (text, "", "") if text in known else text.partition("=")
-        name, colon, point = (
-            (place, "", place)
-            if place in known
-            else map(str.strip, place.partition(":"))
-        )
-        if point not in known:
-            allowed = f"{', '.join(known)}, with a name before: A:{known[-1]}"
-            raise InputError("--target", "", repr(point if colon else place), allowed)
-        if not 0 < len(name) <= _LONGEST_NAME:
-            raise InputError(
-                "--target",
-                "",
-                f"a name of {len(name)} characters",
-                f"1 to {_LONGEST_NAME}, such as A:{point}",
-            )
-        if fault := find_text_fault(name):
-            raise InputError("--target", "", *fault)
-        if name in found:
+    targets: dict[str, Target] = {}
+    for text in descriptions:
+        name, point, offset = _split_target(text, [p.name for p in chain.points])
+        if name in targets:
             raise InputError(
                 "--target",
                 "",
                 f"{name!r} twice",
                 f"a name for each target, such as A:{point} and B:{point}",
             )
-        at = (
-            tuple(numbers("--target", offset, 3, FARTHEST_TARGET_M).tolist())
-            if equals
-            else None
+        offset_m = None
+        if offset is not None:
+            numbers = parse_numbers("--target", offset, 3, FARTHEST_TARGET_M)
+            offset_m = tuple(numbers.tolist())
+        targets[name] = Target(name, point, offset_m)
+    return tuple(targets.values())
+
+
+def _split_target(text: str, points: list[str]) -> tuple[str, str, str | None]:
+    """Split the description of a target into name, measuring point and offset, None if
+    it has none. Names of points may contain ``=`` and ``:``."""
+    label = text
+    offset = None
+    if text not in points and "=" in text:
+        label, _, offset = text.partition("=")
+    name = point = label
+    if label not in points and ":" in label:
+        name, _, point = map(str.strip, label.partition(":"))
+    if point not in points:
+        allowed = f"{', '.join(points)}, with a name before: A:{points[-1]}"
+        raise InputError("--target", "", repr(point), allowed)
+    if not 0 < len(name) <= _LONGEST_NAME:
+        raise InputError(
+            "--target",
+            "",
+            f"a name of {len(name)} characters",
+            f"1 to {_LONGEST_NAME}, such as A:{point}",
         )
-        found[name] = Target(name, point, at)
-    return tuple(found.values())
+    if fault := find_text_fault(name):
+        raise InputError("--target", "", *fault)
+    return name, point, offset
 
 
-def _worth(survey: Survey, found: Plan, stated: bool) -> list[str]:
-    """What a plan is worth, in sentences; `stated`: whether the noise is."""
+def _describe_plan(survey: Survey, chosen: Plan, sensor: Sensor) -> list[str]:
+    """State the accuracy that a plan gives, and the noise on which it is based."""
     import numpy as np
 
-    from elastocal.application.accuracy import millimetres
     from elastocal.application.frames import BASE, FRAMES, ROBOT
-    from elastocal.application.planning.plan import SENSORS
+    from elastocal.application.statements import format_millimetres
 
-    random = 1e3 * np.quantile(found.random_m[:, -1], [0.05, 0.5, 0.95])
+    low, median, high = 1e3 * np.quantile(chosen.random_m[:, -1], [0.05, 0.5, 0.95])
+    frame = FRAMES[ROBOT if survey.unknown_base else BASE]
+    noise = f"{1e6 * survey.position_m:.3g} µm"
+    if survey.measured == "pose":
+        noise += f", {1e6 * survey.orientation_rad:.3g} µrad"
+    source = f"; {sensor.description}" if sensor.description else ""
     return [
-        f"Predicted position error of a robot that is corrected by the fit, {FRAMES[ROBOT if survey.unknown_base else BASE]}: "
-        f"{millimetres(found.accuracy_m[-1])} RMS over configurations that the cell allows; with as many random poses "
-        f"{random[1]:.3f} mm ({random[0]:.3f} to {random[2]:.3f}).",
-        "It is a standard error by the uncertainty of the parameters alone, without the tracker's noise.",
-        f"Assumed noise: {1e6 * survey.position_m:.3g} µm"
-        + (
-            f", {1e6 * survey.orientation_rad:.3g} µrad"
-            if survey.measured == "pose"
-            else ""
-        )
-        + ("." if stated else f"; {SENSORS[survey.measured][0]}."),
+        "Predicted position error of a robot that is corrected by the fit,"
+        f" {frame}: {format_millimetres(chosen.accuracy_m[-1])} RMS over configurations"
+        " that the cell allows; with as many random poses"
+        f" {median:.3f} mm ({low:.3f} to {high:.3f}).",
+        "It is a standard error by the uncertainty of the parameters alone,"
+        " without the tracker's noise.",
+        f"Assumed noise: {noise}{source}.",
     ]
 
 
-def _write(
-    folder: Path, robot: Path, survey: Survey, cell: Cell, found: Plan, worth: list[str]
+@dataclass(frozen=True)
+class _PlannedCell:
+    """A plan with what it was made for."""
+
+    survey: Survey
+    cell: Cell
+    chosen: Plan
+
+
+def _write_campaign(
+    folder: Path, robot_file: Path, planned: _PlannedCell, sentences: list[str]
 ) -> int:
-    """Write the campaign to fill in: descriptions, a sheet whose measurement columns
-    are empty, and its pages; its rows."""
+    """Write the campaign to fill in: descriptions, a sheet whose measurement columns are
+    empty, and its pages with sentences. Returns the number of rows."""
     import yaml
 
-    from elastocal.application.planning.plan import build_sheet, campaign_document
+    from elastocal.application.planning.sheet import (
+        build_campaign_document,
+        build_sheet,
+    )
     from elastocal.campaigns.campaign import DOCUMENT
     from elastocal.campaigns.measurements import CSV
-    from elastocal.figures.arms import draw_plan, draw_poses
-    from elastocal.figures.style import save_all
     from elastocal.io.atomic_writes import write_text, write_together
     from elastocal.io.data_frames import write_csv
     from elastocal.io.documents import LARGEST_BYTES
     from elastocal.io.texts import read_text
     from elastocal.report.plan_pages import plan_facts
+
+    survey = planned.survey
+    table = build_sheet(survey, planned.chosen)
+    facts = plan_facts(survey, planned.chosen, table, sentences)
+    document = build_campaign_document(folder.name, ROBOT, survey, planned.chosen)
+    with write_together(folder, (ROBOT, CSV, SHEET, PICTURE, DOCUMENT)) as partial:
+        write_text(partial / ROBOT, read_text(robot_file, LARGEST_BYTES))
+        write_csv(partial / CSV, table)
+        _write_pages(partial, planned, facts)
+        text = yaml.safe_dump(
+            document, sort_keys=False, default_flow_style=None, width=120
+        )
+        write_text(partial / DOCUMENT, text)
+    return len(table)
+
+
+def _write_pages(folder: Path, planned: _PlannedCell, facts: dict[str, object]) -> None:
+    """Write the sheet to print, with pictures of the cell and of the poses."""
+    from elastocal.figures.arms import draw_plan, draw_poses
+    from elastocal.figures.style import save_all
     from elastocal.report.typesetting import compile_document
 
-    table = build_sheet(survey, found)
-    names = (ROBOT, CSV, SHEET, PICTURE, DOCUMENT)
-    with (
-        write_together(folder, names) as partial,
-        tempfile.TemporaryDirectory() as scratch,
-    ):
-        write_text(partial / ROBOT, read_text(robot, LARGEST_BYTES))
-        write_csv(partial / CSV, table)
-        pages = {
-            f"poses{page}": figure
-            for page, figure in enumerate(draw_poses(survey.robot, found))
-        }
-        pictures = save_all(
-            {"overview": draw_plan(survey.robot, cell, found), **pages}, scratch
-        )
-        facts = plan_facts(survey, found, table, worth)
-        compile_document(
-            partial / SHEET, "plan.typ", {"facts": facts}, pictures.values()
-        )
-        shutil.copyfile(f"{scratch}/overview.png", partial / PICTURE)
-        document = campaign_document(folder.name, ROBOT, survey, found)
-        write_text(
-            partial / DOCUMENT,
-            yaml.safe_dump(
-                document, sort_keys=False, default_flow_style=None, width=120
-            ),
-        )
-    return len(table)
+    robot = planned.survey.robot
+    figures = {"overview": draw_plan(robot, planned.cell, planned.chosen)}
+    for page, figure in enumerate(draw_poses(robot, planned.chosen)):
+        figures[f"poses{page}"] = figure
+    with tempfile.TemporaryDirectory() as scratch:
+        pictures = save_all(figures, scratch).values()
+        compile_document(folder / SHEET, "plan.typ", {"facts": facts}, pictures)
+        shutil.copyfile(f"{scratch}/overview.png", folder / PICTURE)

@@ -1,6 +1,6 @@
-"""What subcommands share: quantities with units and lists of numbers, how an answer is
-printed, where the pipeline is that they run, with its robots, where its results are,
-and a diagnosed campaign among them."""
+"""What several subcommands need: parsing of quantities and of lists of numbers, output
+to the terminal, the folders of the pipeline, of its robots and of its results, and
+diagnosed campaigns."""
 
 from __future__ import annotations
 
@@ -30,109 +30,115 @@ _RADIANS = {
     "µrad": 1e-6,
 }
 _QUANTITY = re.compile(r"(\d+(?:\.\d*)?|\.\d+)\s*([a-zµ°]+)")
-# m and rad: no instrument repeats better (`fitting.noise.FINEST_RESOLUTION`).
-_LEAST = 1e-8
-# Trackers stand at up to a hundred metres, targets within an arm's reach of where they
-# are fixed, as in a campaign.
-_FARTHEST_PLACE_M = 1e3
+# Lower bound on lengths (m) and angles (rad): no instrument repeats better
+# (`fitting.noise.FINEST_RESOLUTION`).
+_SMALLEST = 1e-8
+# Upper bounds on lengths and angles: tolerances and noise are never larger.
+_LARGEST_M = 0.1
+_LARGEST_RAD = 0.2
+# Upper bounds on coordinates, as in a campaign: trackers stand up to a hundred metres
+# away, targets within an arm's reach of their measuring point.
+_FARTHEST_POINT_M = 1e3
 FARTHEST_TARGET_M = 10.0
-# Draws are numbered in 32 bits; more poses, rows or lines than these are slips of the
-# keyboard.
+# Upper bounds on options. Seeds have 32 bits; larger numbers of poses, rows or lines are
+# typing errors.
 LARGEST_SEED = 2**32 - 1
 MOST_POSES = 10_000
 MOST_ROWS = 10_000_000
-
-
 _SNAKEFILE = "Snakefile"
-# Where a wheel has the Snakefile, rules and configuration; see `data-files` in
+# Where a wheel installs the Snakefile, rules and configuration; see `data-files` in
 # pyproject.toml.
-_INSTALLED = f"share/elastocal/{_SNAKEFILE}"
+_INSTALLED_SNAKEFILE = f"share/elastocal/{_SNAKEFILE}"
 
 
-def length_m(option: str, text: str) -> float:
-    """A length such as ``0.2mm`` in metres; refused without its unit, or of a size that
-    no instrument or robot has."""
-    return _quantity(
-        option,
-        text,
-        _METRES,
-        0.1,
-        "a length with its unit such as 0.2mm or 60um, 0.01 um to 0.1 m",
-    )
+def parse_length_m(option: str, text: str) -> float:
+    """Parse a length such as ``0.2mm``; refuse one without a unit, or of a size that no
+    instrument or robot has."""
+    allowed = "a length with its unit such as 0.2mm or 60um, 0.01 um to 0.1 m"
+    return _parse_quantity(option, text, _METRES, _LARGEST_M, allowed)
 
 
-def angle_rad(option: str, text: str) -> float:
-    """An angle such as ``0.01deg`` in rad; refused without its unit, or of a size that
+def parse_angle_rad(option: str, text: str) -> float:
+    """Parse an angle such as ``0.01deg``; refuse one without a unit, or of a size that
     no noise has."""
-    return _quantity(
-        option,
-        text,
-        _RADIANS,
-        0.2,
-        "an angle with its unit such as 0.01deg or 60urad, 0.01 urad to 0.2 rad",
-    )
+    allowed = "an angle with its unit such as 0.01deg or 60urad, 0.01 urad to 0.2 rad"
+    return _parse_quantity(option, text, _RADIANS, _LARGEST_RAD, allowed)
 
 
-def _quantity(
+def _parse_quantity(
     option: str, text: str, units: Mapping[str, float], largest: float, allowed: str
 ) -> float:
     match = _QUANTITY.fullmatch(text.strip())
     value = float(match[1]) * units.get(match[2], 0.0) if match else 0.0
-    if not _LEAST <= value <= largest:
+    if not _SMALLEST <= value <= largest:
         raise InputError(option, "", repr(text), allowed)
     return value
 
 
-def numbers(
-    option: str, text: str, count: int, largest: float = _FARTHEST_PLACE_M
+def parse_numbers(
+    option: str, text: str, count: int, largest: float = _FARTHEST_POINT_M
 ) -> np.ndarray:
-    """So many numbers separated by commas, metres, each of at most a size; anything
-    else is refused."""
+    """Parse coordinates in metres that are separated by commas.
+
+    Parameters
+    ----------
+    option : name of the option, for messages.
+    text : text of its value.
+    count : required number of coordinates.
+    largest : upper bound on their sizes.
+    """
     import numpy as np
 
     try:
-        found = np.array([float(part) for part in text.split(",")])
+        numbers = np.array([float(cell) for cell in text.split(",")])
     except ValueError:
-        found = np.zeros(0)
-    # Not a number is no more than anything either.
-    if len(found) != count or not (np.abs(found) <= largest).all():
+        numbers = np.zeros(0)
+    # The comparison is false for NaN, so NaN is refused, too.
+    if len(numbers) != count or not (np.abs(numbers) <= largest).all():
         raise InputError(
             option,
             "",
             repr(text),
             f"{count} numbers separated by commas, each up to {largest:g} m",
         )
-    return found
+    return numbers
 
 
-def example(command: str) -> str:
-    """The end of a help text: a command to type, on a line that is not wrapped."""
+def format_example(command: str) -> str:
+    """Format the end of a help text: a command to type, on a line that is not
+    wrapped."""
     # \b keeps click from joining the lines of a paragraph.
     return f"\b\nExample:\n  {command}"
 
 
 def print_answer(
-    passed: bool, answer: str, details: Iterable[str], following: str, console: Console
+    answer: str,
+    details: Iterable[str],
+    next_step: str,
+    console: Console,
+    *,
+    passed: bool = True,
 ) -> None:
-    """Print an answer with its mark, ✓ or !, then its details and the command that
-    comes next, if any.
+    """Print an answer with its mark, then details and the next command.
 
-    A detail that asks for attention begins with "! " already.
+    Parameters
+    ----------
+    answer : first line; the mark is ✓ if `passed`, else !.
+    details : lines below it; a warning begins with "! " already.
+    next_step : the command that comes next, empty if there is none.
+    console : where to print.
     """
-    shown = [line if line.startswith("! ") else f"  {line}" for line in details]
-    print_lines(
-        [
-            f"{'✓' if passed else '!'} {answer}",
-            *shown,
-            *([f"next: {following}"] if following else []),
-        ],
-        console,
-    )
+    lines = [f"{'✓' if passed else '!'} {answer}"]
+    for detail in details:
+        lines.append(detail if detail.startswith("! ") else f"  {detail}")
+    if next_step:
+        lines.append(f"next: {next_step}")
+    print_lines(lines, console)
 
 
 def print_lines(lines: Iterable[str], console: Console) -> None:
-    """Print lines as they are, with what would steer a terminal as escapes: they hold
-    names and paths of other people."""
+    """Print lines as they are, but escape control characters, because the lines hold
+    names and paths that other people have chosen."""
     for line in lines:
         console.print(
             escape_control_characters(line),
@@ -142,41 +148,42 @@ def print_lines(lines: Iterable[str], console: Console) -> None:
         )
 
 
-def pipeline() -> Path:
-    """The folder with the Snakefile: of the checkout, where there is one, else what
-    this package installed; none is refused."""
-    if found := _checkout():
-        return found
+def find_pipeline() -> Path:
+    """Find the folder with the Snakefile: the checkout if there is one, else what this
+    package has installed. An InputError is raised if there is none."""
+    if checkout := _find_checkout():
+        return checkout
     try:
         files = metadata.distribution("elastocal").files or []
     except metadata.PackageNotFoundError:
         files = []
-    # Wherever the installer has put it.
-    for file in (
-        Path(str(each.locate())).resolve()
-        for each in files
-        if each.as_posix().endswith(_INSTALLED)
-    ):
-        if file.is_file():
-            return file.parent
-    allowed = "a folder inside of a checkout of elastocal, or its wheel installed in an environment"
+    # The record of the wheel says where the installer has put the Snakefile.
+    for file in files:
+        if file.as_posix().endswith(_INSTALLED_SNAKEFILE):
+            path = Path(str(file.locate())).resolve()
+            if path.is_file():
+                return path.parent
+    allowed = (
+        "a folder inside of a checkout of elastocal,"
+        " or its wheel installed in an environment"
+    )
     raise InputError(Path.cwd(), "", "no Snakefile here or above", allowed)
 
 
-def robots() -> Path:
-    """The folder of the robot files that campaigns name."""
-    return pipeline() / "config" / "robots"
+def find_robots_folder() -> Path:
+    """Find the folder of the robot files that campaigns name."""
+    return find_pipeline() / "config" / "robots"
 
 
-def workplace() -> Path:
-    """The folder in which results/ and reports/ are: the checkout, where there is one,
-    else the working directory."""
-    return _checkout() or Path.cwd()
+def find_workplace() -> Path:
+    """Find the folder of results/ and reports/: the checkout if there is one, else the
+    working directory."""
+    return _find_checkout() or Path.cwd()
 
 
-def _checkout() -> Path | None:
-    """The working directory or one above it, else the one that this package is run
-    from."""
+def _find_checkout() -> Path | None:
+    """Find a checkout at the working directory or above it, else the one from which this
+    package is run."""
     for folder in (Path.cwd(), *Path.cwd().parents, *Path(__file__).resolve().parents):
         if (folder / _SNAKEFILE).is_file() and (folder / "config" / "robots").is_dir():
             return folder
@@ -184,23 +191,27 @@ def _checkout() -> Path | None:
 
 
 def load_diagnosed_campaign(folder: Path) -> Diagnosed:
-    """A campaign with what its diagnosis found, as `load_diagnosed`; results by other
-    libraries or pins come with a warning."""
+    """Load a campaign with the results of its diagnosis, as `load_diagnosed`.
+
+    Results of other versions of libraries come with a warning.
+    """
     from rich.console import Console
 
     from elastocal.io.origin import environment
     from elastocal.loop.calibrated_files import load_diagnosed
 
-    found = load_diagnosed(folder, robots(), workplace())
-    was = found.origin["environment"]
-    now = environment(pipeline())
-    if other := [name for name in sorted(was | now) if was.get(name) != now.get(name)]:
-        there, here = (
-            ", ".join(f"{name} {each.get(name, 'none')[:12]}" for name in other)
-            for each in (was, now)
+    campaign = load_diagnosed(folder, find_robots_folder(), find_workplace())
+    then = campaign.origin["environment"]
+    now = environment(find_pipeline())
+    changed = [name for name in sorted(then | now) if then.get(name) != now.get(name)]
+    if changed:
+        warning = (
+            f"warning: {folder} was diagnosed with {_list_versions(then, changed)};"
+            f" here are {_list_versions(now, changed)}"
         )
-        print_lines(
-            [f"warning: {folder} was diagnosed with {there}; here are {here}"],
-            Console(stderr=True),
-        )
-    return found
+        print_lines([warning], Console(stderr=True))
+    return campaign
+
+
+def _list_versions(environment: Mapping[str, str], names: Iterable[str]) -> str:
+    return ", ".join(f"{name} {environment.get(name, 'none')[:12]}" for name in names)

@@ -1,22 +1,18 @@
-"""From a fit to the problem that is searched: columns of everything that its model
-might lack, whitened, and their products."""
+"""From a fit to the problem that is searched: the whitened columns of everything that
+the fitted model might lack, and their products."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import chdtri
 
+from elastocal.diagnosis.discrepancy import Discrepancy, build_discrepancies
 from elastocal.diagnosis.evidence import TermBlock
-from elastocal.diagnosis.hypotheses import (
-    Discrepancy,
-    ModelTerm,
-    build_discrepancies,
-    build_terms,
-)
+from elastocal.diagnosis.hypotheses import ModelTerm, build_terms
 from elastocal.diagnosis.search import SearchProblem, select_pose_errors
 from elastocal.diagnosis.statistics import (
     CrossProducts,
@@ -36,249 +32,291 @@ if TYPE_CHECKING:
 
     from elastocal.diagnosis.settings import Settings
     from elastocal.effects.conditions import Conditions
-    from elastocal.effects.protocol import Candidate
+    from elastocal.effects.protocol import Candidate, Shape
     from elastocal.fitting.least_squares import Fit
 
-    Shapes = tuple[float, ...]
+    ShapeValues = list[tuple[float, ...]]
 
-# Values of a shape that are tried: neighbours differ by less than measurements show at
-# the sizes that matter.
+# Number of values of a shape that are tried: neighbours differ by less than the
+# measurements show at the sizes that matter.
 _SHAPES_TRIED = 3
-# Of one pose about the joints, 1/rad^2: below it the targets move by rounding only.
+# Least information of one pose on the joint angles, 1/rad^2: below it only rounding
+# moves the targets.
 _LEAST_INFORMATION = 1e-6
-# Values that a closer look tries to either side of the best, short of its neighbours.
-# Where the fit has the candidate already, a step is looked for within a quarter of the
-# spacing to either side.
+# Number of values that a refinement tries to either side of the best value, within its
+# neighbours. If the fit has the candidate already, the values lie within this share of
+# the spacing to either side.
 _SHAPES_CLOSER = 3
 _CLOSER_STILL = 0.25
-# A candidate is looked at more closely whose log odds come so near to those of the best
-# and whose log Bayes factor is so large: below, its shape hardly matters.
+# The shapes of a term are refined if its log odds are this close to the best ones and
+# its log Bayes factor is at least this large; below, its shape hardly matters.
 _NEAR_THE_BEST = 10.0
 _WORTH_A_LOOK = 5.0
-# Declared parameters without a prior of their own get one this many times their
-# plausible size: it decides nothing, and keeps well posed what the measurements do not
-# determine.
+# Declared parameters without a prior get one of this many times their plausible size.
+# It decides nothing, but keeps well posed what the measurements do not determine.
 _WIDE = 10.0
-# Beyond so many rows a sample tells which sizes of the pose error are out of question:
-# several for each parameter.
+# Above this number of rows, a sample decides which sizes of the pose error can matter.
+# The sample has several rows for each parameter.
 _MANY_ROWS = 8000
 _SAMPLE_ROWS = 1500
 
 
 @dataclass(frozen=True)
-class CandidateDesign:
-    """A model about a fit, and everything that it might lack; what asks for more work
-    is done when it is first asked for.
+class WhitenedFit:
+    """A fit linearised about its estimate for some observations, and whitened.
 
-    Coefficients count from zero, not from the fit: what candidates and declared
-    geometry contribute to the prediction is given back to the residual, so that their
-    priors mean what they say. `around`: of the states looked at. `tried`: candidates
-    that can be tested at all, each with values of its shape; `lacking`: why not others.
-    `candidates`: keys of all: parameters of the fit that they own are coefficients of
-    units here. `against`: laws of the competitor.
+    The prediction of candidates that the fit has already is given back to the residual,
+    so that their coefficients count from zero. The rows are computed when they are
+    first asked for.
+
+    Attributes
+    ----------
+    fitted : the fit, whose weights and noise whiten the rows
+    observations : M observations
+    conditions : conditions of their states, loads at the undeflected robot
+    candidate_keys : keys of all candidates
     """
 
-    reference_fit: Fit
+    fitted: Fit
     observations: Observations
-    settings: Settings
-    around: Conditions
-    tried: dict[str, tuple[Candidate, list[Shapes]]]
-    lacking: dict[str, str]
-    candidates: frozenset[str]
-    against: list[Discrepancy]
-    max_pose_error_rad: float
-
-    def alike(self, **changes: Any) -> CandidateDesign:
-        """The same but for what does not change the whitened rows of the fit, which are
-        not made again."""
-        found = replace(self, **changes)
-        vars(found).update({"_fitted": self._fitted})
-        return found
-
-    @property
-    def without_rows(self) -> CandidateDesign:
-        """The same where nothing but the statistics and what goes with them is needed
-        any more."""
-        found = replace(self)
-        kept = {name: value for name, value in vars(self).items() if name != "_fitted"}
-        vars(found).update(kept | {"products": self.products.without_rows})
-        return found
+    conditions: Conditions
+    candidate_keys: frozenset[str]
 
     @cached_property
-    def terms(self) -> tuple[ModelTerm, ...]:
-        """Of candidates and competitors, in the order of their columns."""
-        return build_terms(self.tried.values(), self.against, self.settings)
-
-    @property
-    def priors(self) -> tuple[np.ndarray, np.ndarray]:
-        """Standard deviation of the prior of each declared parameter, wide where it has
-        none, and its present value, (P,)."""
-        pairs = zip(self.reference_fit.parameters, self._values, strict=True)
-        kept = [
-            (p, value) for (owner, p), value in pairs if owner not in self.candidates
-        ]
-        deviation = np.array(
-            [
-                _WIDE * p.plausible if p.prior_std is None else p.prior_std
-                for p, _ in kept
-            ]
-        )
-        return deviation, np.array(
-            [value if p.prior_std is not None else 0.0 for p, value in kept]
-        )
-
-    @property
-    def _values(self) -> np.ndarray:
-        """Of all parameters of the fit in which the prediction is linear; zero for
-        shapes, (P,)."""
-        model = self.reference_fit.model
-        estimate = self.reference_fit.estimate
-        return np.where(
-            find_nonlinear_parameters(model, estimate),
-            0.0,
-            get_parameter_values(model, estimate),
-        )
+    def is_candidate(self) -> np.ndarray:
+        """Which parameters of the fit belong to candidates, bool."""
+        owners = [owner for owner, _ in self.fitted.parameters]
+        return np.isin(owners, list(self.candidate_keys))
 
     @cached_property
-    def _fitted(self) -> tuple[WhitenedRows, Conditions]:
-        """Whitened rows without candidates, but for the Jacobian of the coordinates,
-        and where the robot has yielded to.
-
-        What errs together is of one state, and a candidate displaces states: the
-        Jacobian is whitened, not every column.
-        """
-        fitted = self.reference_fit
-        some = self.observations
-        line = linearize(fitted.model, fitted.estimate, some, self.around)
-        jacobian = line.joint_jacobian
-        root = np.sqrt(fitted.weights)
-        whitener = compute_whitening(some, jacobian, fitted.noise.without_pose_error)
-
-        def white(values: np.ndarray) -> np.ndarray:
-            return whitener.apply(values * root.reshape(-1, *[1] * (values.ndim - 1)))
-
-        found = np.isin(
-            [owner for owner, _ in fitted.parameters], list(self.candidates)
-        )
-        residual = (
-            line.residual
-            + line.columns.select_columns(found).dense() @ self._values[found]
-        )
-        nothing = FactoredSensitivities.of(
-            [], white(line.coordinate_jacobian), some.state, len(some.states)
-        )
-        rows = WhitenedRows(
-            white(line.columns.select_columns(~found).dense()),
-            nothing,
-            white(residual),
-            white(jacobian),
-            some.cluster,
-        )
-        return rows, line.conditions
+    def linear_values(self) -> np.ndarray:
+        """Values of all parameters of the fit; zero if the prediction is not linear in
+        them (shapes)."""
+        model = self.fitted.model
+        estimate = self.fitted.estimate
+        is_nonlinear = find_nonlinear_parameters(model, estimate)
+        return np.where(is_nonlinear, 0.0, get_parameter_values(model, estimate))
 
     @property
     def rows(self) -> WhitenedRows:
-        """Whitened rows, candidates in the order of the units."""
-        rows, conditions = self._fitted
-        tried = [
-            (candidate, each)
-            for candidate, shapes in self.tried.values()
-            for each in shapes
-        ]
-        laws = [
-            law
-            for candidate, shapes in tried
-            for law in candidate.displacement(conditions, *shapes)
-        ]
-        laws += [
-            law for against in self.against for law in against.displacement(conditions)
-        ]
-        sizes = np.concatenate([unit.sizes for unit in self.terms])
-        jacobian = rows.candidates.jacobian
-        state = rows.candidates.state
-        return replace(
-            rows,
-            candidates=FactoredSensitivities.of(
-                laws, jacobian, state, len(self.observations.states), sizes
-            ),
+        """Whitened rows whose candidates hold only the Jacobian of the coordinates.
+
+        A candidate displaces the coordinates of a state, and correlated errors are of
+        one state. So it is the Jacobian that is whitened, not every column.
+        """
+        return self._rows_and_conditions[0]
+
+    @property
+    def deflected_conditions(self) -> Conditions:
+        """Conditions at the deflected robot."""
+        return self._rows_and_conditions[1]
+
+    @cached_property
+    def _rows_and_conditions(self) -> tuple[WhitenedRows, Conditions]:
+        fitted = self.fitted
+        observations = self.observations
+        linearization = linearize(
+            fitted.model, fitted.estimate, observations, self.conditions
         )
+        root_weights = np.sqrt(fitted.weights)
+        whitener = compute_whitening(
+            observations, linearization.joint_jacobian, fitted.noise.without_pose_error
+        )
+
+        def whiten(values: np.ndarray) -> np.ndarray:
+            trailing_axes = [1] * (values.ndim - 1)
+            return whitener.apply(values * root_weights.reshape(-1, *trailing_axes))
+
+        columns = linearization.columns
+        contribution = (
+            columns.select_columns(self.is_candidate).dense()
+            @ self.linear_values[self.is_candidate]
+        )
+        no_candidates = FactoredSensitivities.of(
+            [],
+            whiten(linearization.coordinate_jacobian),
+            observations.state,
+            len(observations.states),
+        )
+        rows = WhitenedRows(
+            whiten(columns.select_columns(~self.is_candidate).dense()),
+            no_candidates,
+            whiten(linearization.residual + contribution),
+            whiten(linearization.joint_jacobian),
+            observations.cluster,
+        )
+        return rows, linearization.conditions
+
+
+@dataclass(frozen=True)
+class _Precomputed:
+    """Results of a design that remain after its rows were released."""
+
+    products: CrossProducts
+    problem: SearchProblem
+    pose_std_error_rad: float
+
+
+@dataclass(frozen=True)
+class CandidateDesign:
+    """A model about a fit, and everything that it might lack.
+
+    Costly parts are computed when they are first asked for. Designs that share one
+    `WhitenedFit` share its rows.
+
+    Attributes
+    ----------
+    reference_fit : the fit, whose model has the priors of the declared parameters
+    whitened : its whitened rows for the observations of the search
+    settings : settings of the diagnosis
+    tried : candidates that can be tested at all, by key, each with the values of its
+        shape
+    untestable_by_data : by key, why other candidates cannot be tested
+    discrepancies : competitors of the candidates
+    max_pose_error_rad : largest size of the pose error to be considered
+    precomputed : results that are kept after the rows were released
+    """
+
+    reference_fit: Fit
+    whitened: WhitenedFit
+    settings: Settings
+    tried: dict[str, tuple[Candidate, ShapeValues]]
+    untestable_by_data: dict[str, str]
+    discrepancies: list[Discrepancy]
+    max_pose_error_rad: float
+    precomputed: _Precomputed | None = None
+
+    @property
+    def without_rows(self) -> CandidateDesign:
+        """The same with the results of the search problem, but without the arrays that
+        grow with the measurements."""
+        results = _Precomputed(
+            self.products.without_rows, self.problem, self.pose_std_error_rad
+        )
+        return replace(self, whitened=replace(self.whitened), precomputed=results)
+
+    @cached_property
+    def terms(self) -> tuple[ModelTerm, ...]:
+        """Terms of candidates and discrepancies, in the order of their columns."""
+        return build_terms(self.tried.values(), self.discrepancies, self.settings)
+
+    @property
+    def priors(self) -> tuple[np.ndarray, np.ndarray]:
+        """Standard deviation (P,) of the prior of each declared parameter, wide if it
+        has none, and its present value (P,), zero if it has none."""
+        deviations = []
+        present = []
+        for (_, parameter), value, is_candidate in zip(
+            self.reference_fit.parameters,
+            self.whitened.linear_values,
+            self.whitened.is_candidate,
+            strict=True,
+        ):
+            if is_candidate:
+                continue
+            has_prior = parameter.prior_std is not None
+            deviations.append(
+                parameter.prior_std if has_prior else _WIDE * parameter.plausible
+            )
+            present.append(value if has_prior else 0.0)
+        return np.array(deviations), np.array(present)
+
+    @property
+    def rows(self) -> WhitenedRows:
+        """Whitened rows with the candidate columns in the order of the terms."""
+        conditions = self.whitened.deflected_conditions
+        displacements = [
+            column
+            for candidate, shape_values in self.tried.values()
+            for shapes in shape_values
+            for column in candidate.displacement(conditions, *shapes)
+        ]
+        for discrepancy in self.discrepancies:
+            displacements += discrepancy.displacement(conditions)
+        rows = self.whitened.rows
+        candidates = FactoredSensitivities.of(
+            displacements,
+            rows.candidates.jacobian,
+            rows.candidates.state,
+            len(self.whitened.observations.states),
+            np.concatenate([term.sizes for term in self.terms]),
+        )
+        return replace(rows, candidates=candidates)
 
     @cached_property
     def products(self) -> CrossProducts:
-        """Of the rows."""
+        """Products of the rows."""
+        if self.precomputed:
+            return self.precomputed.products
         return compute_cross_products(self.rows, *self.priors)
 
     @cached_property
     def pose_std_error_rad(self) -> float:
-        """Standard error with which the measurements of one pose tell a joint angle."""
-        rows, _ = self._fitted
-        shown = float(
-            np.median(
-                np.bincount(
-                    rows.pose,
-                    (rows.jacobian**2).sum(axis=(1, 2)) / rows.jacobian.shape[-1],
-                )
-            )
-        )
-        if shown < _LEAST_INFORMATION:
+        """Standard error with which the measurements of one pose determine a joint
+        angle."""
+        if self.precomputed:
+            return self.precomputed.pose_std_error_rad
+        rows = self.whitened.rows
+        by_observation = (rows.jacobian**2).sum(axis=(1, 2)) / rows.jacobian.shape[-1]
+        information = float(np.median(np.bincount(rows.pose, by_observation)))
+        if information < _LEAST_INFORMATION:
             found = "measurements that no joint moves"
             allowed = "targets on what moves, off a lone axis"
             raise InputError("campaign", "targets", found, allowed)
-        return 1.0 / np.sqrt(shown)
+        return 1.0 / np.sqrt(information)
 
     @property
     def candidate_pose_errors_rad(self) -> np.ndarray:
-        """Sizes of the pose error that are thought of, zero first."""
-        return np.unique(
-            np.minimum(
-                self.pose_std_error_rad * np.array(self.settings.pose_steps),
-                self.max_pose_error_rad,
-            )
-        )
+        """Sizes of the pose error that are considered, zero first."""
+        sizes = self.pose_std_error_rad * np.array(self.settings.pose_steps)
+        return np.unique(np.minimum(sizes, self.max_pose_error_rad))
 
     @cached_property
     def problem(self) -> SearchProblem:
-        """What is searched. Columns of units that could not be seen stay in the
-        statistics, where nothing refers to them."""
-        grid = self.candidate_pose_errors_rad
-        products = self.products
-        settings = self.settings
-        grid = grid[
-            select_pose_errors(
-                compute_statistics(products.without_candidates, grid), settings
-            )
-        ]
-        if products.rows.residual.size > _MANY_ROWS:
-            some = select_spread_poses(
-                self.observations, _SAMPLE_ROWS // self.observations.rows
-            )[self.observations.state]
-            sample = compute_cross_products(products.rows.at(some), *self.priors)
-            # Zero, to which Gram matrices refer, always.
-            grid = np.union1d(
-                0.0,
-                SearchProblem(
-                    compute_statistics(sample, grid), self.terms, settings
-                ).started.statistics.pose_error_rad,
-            )
-        statistics = compute_statistics(products, grid)
-        smallest = find_smallest_detectable_sizes(statistics, self.terms, settings)
-        pairs = zip(self.terms, smallest.tolist(), strict=True)
-        shown = tuple(
-            replace(unit, smallest=number)
-            for unit, number in pairs
-            if number <= unit.largest
+        """The problem that is searched.
+
+        Columns of terms that the measurements cannot show stay in the statistics, where
+        no term refers to them.
+        """
+        if self.precomputed:
+            return self.precomputed.problem
+        statistics = compute_statistics(self.products, self._select_pose_errors())
+        smallest = find_smallest_detectable_sizes(statistics, self.terms, self.settings)
+        detectable = tuple(
+            replace(term, smallest=index)
+            for term, index in zip(self.terms, smallest.tolist(), strict=True)
+            if index <= term.largest
         )
-        return SearchProblem(statistics, shown, settings)
+        return SearchProblem(statistics, detectable, self.settings)
+
+    def _select_pose_errors(self) -> np.ndarray:
+        """Sizes of the pose error that can matter for any model, zero first."""
+        products = self.products
+        sizes = self.candidate_pose_errors_rad
+        declared_only = compute_statistics(products.without_candidates, sizes)
+        sizes = sizes[select_pose_errors(declared_only, self.settings)]
+        if products.rows.residual.size <= _MANY_ROWS:
+            return sizes
+        observations = self.whitened.observations
+        chosen = select_spread_poses(observations, _SAMPLE_ROWS // observations.rows)
+        sample = compute_cross_products(
+            products.rows.at(chosen[observations.state]), *self.priors
+        )
+        sample_problem = SearchProblem(
+            compute_statistics(sample, sizes), self.terms, self.settings
+        )
+        likely = sample_problem.initial_search.statistics.pose_error_rad
+        # The grid always contains zero, because the stored Gram matrices belong to a
+        # pose error of zero.
+        return np.union1d(0.0, likely)
 
     @property
     def untestable(self) -> dict[str, str]:
-        """Why a candidate is not tested."""
-        small = set(self.tried) - {
-            unit.candidate.key for unit in self.problem.terms if unit.candidate
-        }
-        return self.lacking | dict.fromkeys(
-            sorted(small), "too small to be seen at any size that such an effect has"
-        )
+        """Why a candidate is not tested, by key."""
+        tested = {term.candidate.key for term in self.problem.terms if term.candidate}
+        too_small = sorted(set(self.tried) - tested)
+        reason = "too small to be seen at any size that such an effect has"
+        return self.untestable_by_data | dict.fromkeys(too_small, reason)
 
 
 def build_candidate_design(
@@ -288,60 +326,73 @@ def build_candidate_design(
     settings: Settings,
     max_pose_error_rad: float = np.inf,
 ) -> CandidateDesign:
-    """Gather what the measurements say of a fit to them and of all candidates."""
-    around = fitted.get_conditions(observations.states)
-    there = fitted.model.available_inputs(observations.states)
-    why = {
-        candidate.key: explain_untestable(
-            candidate, there, observations.states.joint_angles
+    """Gather everything that a fitted model might lack, for some observations.
+
+    Parameters
+    ----------
+    fitted : the fit
+    observations : observations of the search
+    candidates : candidates of the catalogue
+    settings : settings of the diagnosis
+    max_pose_error_rad : largest size of the pose error to be considered
+    """
+    conditions = fitted.get_conditions(observations.states)
+    available = fitted.model.available_inputs(observations.states)
+    tried = {}
+    untestable = {}
+    for candidate in candidates:
+        reason = explain_untestable(
+            candidate, available, observations.states.joint_angles
         )
-        for candidate in candidates
-    }
-    tried = {
-        c.key: (c, choose_shape_values(c, fitted)) for c in candidates if not why[c.key]
-    }
-    # Beside no candidate nothing competes.
-    against = build_discrepancies(around, settings.other_features) if candidates else []
-    missing = {key: reason for key, reason in why.items() if reason}
+        if reason:
+            untestable[candidate.key] = reason
+        else:
+            tried[candidate.key] = candidate, choose_shape_values(candidate, fitted)
+    # Without candidates there is nothing to compete with.
+    discrepancies = (
+        build_discrepancies(conditions, settings.other_features) if candidates else []
+    )
+    keys = frozenset(candidate.key for candidate in candidates)
     return CandidateDesign(
         fitted,
-        observations,
+        WhitenedFit(fitted, observations, conditions, keys),
         settings,
-        around,
         tried,
-        missing,
-        frozenset(why),
-        against,
+        untestable,
+        discrepancies,
         max_pose_error_rad,
     )
 
 
 def find_smallest_detectable_sizes(
-    statistics: SufficientStatistics, units: Sequence[ModelTerm], settings: Settings
+    statistics: SufficientStatistics, terms: Sequence[ModelTerm], settings: Settings
 ) -> np.ndarray:
-    """The smallest size at which each unit would be found with a power of one half,
-    were it the only candidate.
+    """Find the smallest scale at which each term would be found with a power of one
+    half, were it the only candidate.
 
-    A test for one direction, with a Bonferroni correction for all units, reaches that
-    where the non-centrality is the critical value. A smaller effect counts as not
-    there. Returns places among the sizes (number of units,); their number where even
-    the largest is too small to be seen.
+    A test in one direction, with a Bonferroni correction for all terms, reaches that
+    power if the non-centrality is the critical value. A smaller effect counts as
+    absent.
+
+    Returns
+    -------
+    (number of terms,) int, index of the scale; the number of scales if even the largest
+    one is too small to be detected
     """
-    critical = chdtri(1, settings.alarm_level / max(len(units), 1))
-    largest = np.zeros(len(units))
-    for block in TermBlock.of(statistics.at(slice(1)), units):
-        largest[block.numbers] = block.axes[0][0].max(axis=1)
-    return np.searchsorted(
-        np.array(settings.scales) ** 2, critical / np.maximum(largest, 1e-9 * critical)
-    )
+    critical = chdtri(1, settings.alarm_level / max(len(terms), 1))
+    largest_eigenvalue = np.zeros(len(terms))
+    for block in TermBlock.group(statistics.at(slice(1)), terms):
+        largest_eigenvalue[block.numbers] = block.eigenvalues[0].max(axis=1)
+    needed = critical / np.maximum(largest_eigenvalue, 1e-9 * critical)
+    return np.searchsorted(np.array(settings.scales) ** 2, needed)
 
 
-def choose_shape_values(candidate: Candidate, fitted: Fit) -> list[Shapes]:
-    """Values of the shape of a candidate over its range, list of tuple.
+def choose_shape_values(candidate: Candidate, fitted: Fit) -> ShapeValues:
+    """Choose values of the shape of a candidate over its range.
 
-    Where the fit has the candidate, its value alone; or, where a search must try many
-    lest it step over the law, which is a law that no fit can follow, values close to
-    that of the fit.
+    If the fit has the candidate, its value alone is chosen. Some shapes change the
+    prediction in steps, so that no fit can follow them and many values must be tried;
+    for these, values close to that of the fit are chosen as well.
     """
     if not candidate.shapes:
         return [()]
@@ -352,81 +403,89 @@ def choose_shape_values(candidate: Candidate, fitted: Fit) -> list[Shapes]:
         reach = _CLOSER_STILL * np.diff(values[:2]).sum()
         values = np.array([value])
         if shape.tried > 1:
-            about = shape.between(value - reach, value + reach, 2 * _SHAPES_CLOSER + 1)
-            values = np.unique(np.clip(about, shape.lowest, shape.highest))
+            near = shape.between(value - reach, value + reach, 2 * _SHAPES_CLOSER + 1)
+            values = np.unique(np.clip(near, shape.lowest, shape.highest))
     return [(float(value),) for value in values]
 
 
-def refine_shapes(line: CandidateDesign, alone: np.ndarray) -> CandidateDesign:
-    """The same with more shapes of the best candidates, closer to each other about the
-    best value of each.
+def refine_shapes(
+    design: CandidateDesign, log_bayes_factors: np.ndarray
+) -> CandidateDesign:
+    """Try more values of the shapes of the best candidates, close to the best value of
+    each.
 
-    `alone` (number of units,): log Bayes factor of each unit alone. Returns itself
-    where no shape matters.
+    Parameters
+    ----------
+    design : the present values
+    log_bayes_factors : (number of terms,), of each single term
+
+    Returns
+    -------
+    The refined design, or the same object if no shape matters
     """
-    units = line.problem.terms
-    tried = dict(line.tried)
-    odds = alone + line.problem.started.first
-    near = (
-        (odds > odds.max() - _NEAR_THE_BEST) & (alone > _WORTH_A_LOOK)
-        if len(units)
-        else []
+    terms = design.problem.terms
+    if not len(terms):
+        return design
+    log_odds = log_bayes_factors + design.problem.initial_search.single_term_log_prior
+    matters = (log_odds > log_odds.max() - _NEAR_THE_BEST) & (
+        log_bayes_factors > _WORTH_A_LOOK
     )
-    for unit in (units[number] for number in np.argsort(-odds) if near[number]):
+    refined: dict[str, tuple[Candidate, ShapeValues]] = {}
+    for number in np.argsort(-log_odds).tolist():
+        term = terms[number]
+        candidate = term.candidate
+        # The first term of a candidate has the best value of its shape.
         if (
-            unit.shapes
-            and unit.candidate
-            and tried[unit.candidate.key] is line.tried[unit.candidate.key]
+            matters[number]
+            and term.shapes
+            and candidate
+            and candidate.key not in refined
         ):
-            (shape,), (best,), key = (
-                unit.candidate.shapes,
-                unit.shapes,
-                unit.candidate.key,
+            values = sorted(
+                variant.shapes[0]
+                for variant in terms
+                if variant.candidate and variant.candidate.key == candidate.key
             )
-            known = sorted(
-                each.shapes[0]
-                for each in units
-                if each.candidate and each.candidate.key == key
-            )
-            place = known.index(best)
-            below = [shape.lowest, *known][place]
-            above = [*known, shape.highest][place + 1]
-            # The best may lie at an end of the range.
-            sides = [
-                edges for edges in ((below, best), (best, above)) if edges[0] < edges[1]
-            ]
-            closer = [
-                value
-                for edges in sides
-                for value in shape.between(*edges, _SHAPES_CLOSER)
-            ]
-            tried[key] = (
-                unit.candidate,
-                [(float(value),) for value in sorted({*known, *closer})],
-            )
-    return line if tried == line.tried else line.alike(tried=tried)
+            values = _refine_values(candidate.shapes[0], values, term.shapes[0])
+            refined[candidate.key] = candidate, [(value,) for value in values]
+    tried = design.tried | refined
+    return design if tried == design.tried else replace(design, tried=tried)
+
+
+def _refine_values(shape: Shape, values: list[float], best: float) -> list[float]:
+    """Values of a shape, rising, and more of them between the best one and its
+    neighbours; the best one may lie at an end of the range."""
+    index = values.index(best)
+    below = [shape.lowest, *values][index]
+    above = [*values, shape.highest][index + 1]
+    refined = set(values)
+    for low, high in ((below, best), (best, above)):
+        if low < high:
+            refined.update(shape.between(low, high, _SHAPES_CLOSER))
+    return [float(value) for value in sorted(refined)]
 
 
 def explain_untestable(
-    candidate: Candidate, there: frozenset[str], joint_angles: np.ndarray
+    candidate: Candidate, available: frozenset[str], joint_angles: np.ndarray
 ) -> str:
-    """Why measurements at some joint angles (S, n) cannot test a candidate at all;
-    empty where they might.
+    """Explain why measurements cannot test a candidate at all; empty if they might.
 
-    `there`: of what it may need, as of `Model.offered`.
+    Parameters
+    ----------
+    candidate : the candidate
+    available : names of the data that a candidate may need, as of `Model.available_inputs`
+    joint_angles : (S, n), at which was measured
     """
-    if missing := sorted(candidate.needs - there):
+    missing = sorted(candidate.needs - available)
+    if missing:
         return f"no {' and no '.join(missing)} in the data"
-    for joint in (
-        (candidate.joints or candidate.turning) if candidate.distinct_angles else ()
-    ):
-        angles = len(
-            np.unique(np.round(np.mod(joint_angles[:, joint - 1], 2 * np.pi), 3))
-        )
-        if angles < candidate.distinct_angles:
-            return (
-                f"joint {joint} stood still"
-                if angles == 1
-                else "too few different angles of a joint"
-            )
+    if not candidate.distinct_angles:
+        return ""
+    for joint in candidate.joints or candidate.turning:
+        angles = np.mod(joint_angles[:, joint - 1], 2 * np.pi)
+        distinct = len(np.unique(np.round(angles, 3)))
+        if distinct == 1 < candidate.distinct_angles:
+            return f"joint {joint} stood still"
+        if distinct < candidate.distinct_angles:
+            return "too few different angles of a joint"
     return ""

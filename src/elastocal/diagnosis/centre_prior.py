@@ -1,4 +1,12 @@
-"""Prior of the declared centres of mass: stated by the robot file, or unknown."""
+"""Prior of the declared centres of mass: stated by the robot file, or as wide as the
+links' girth.
+
+Most robot files state centres of mass as well as masses, but some of these centres were
+never measured. Priors as wide as the links' girth for all robots would hide a payload;
+narrow ones would let a payload stand in for a centre off the link axis. So both are
+hypotheses with equal prior probability, and the measurements choose by the evidence of
+each, with none or any single mechanism in the model.
+"""
 
 from __future__ import annotations
 
@@ -24,89 +32,92 @@ if TYPE_CHECKING:
     from elastocal.fitting.model import Model
 
 
-def choose_centre_prior(part: FittedSubset, settings: Settings) -> FittedSubset:
-    """The kept part of a case, fitted with the prior of its centres of mass that is
-    more probable; itself without masses.
+def choose_centre_prior(subset: FittedSubset, settings: Settings) -> FittedSubset:
+    """Choose the more probable prior of the centres of mass.
 
-    Most robot files state centres of mass as well as masses; of some nobody ever asked.
-    Priors as wide as the links' girth for all robots would hide a payload, narrow ones
-    would take a centre off its link for one. So both are hypotheses, equally probable
-    beforehand, and the measurements choose by the evidence of each, whatever single
-    mechanism may be beside it.
+    Parameters
+    ----------
+    subset : part of a case, fitted with the wide prior
+    settings : settings of the diagnosis
 
-    `part`: with the wide prior.
+    Returns
+    -------
+    The same part fitted with the chosen prior; the same object if that is the wide one,
+    or if no masses are declared
     """
-    stated = apply_stated_centre_prior(part.declared.model)
-    if stated is part.declared.model:
-        return part
-    line = build_candidate_design(part.declared, part.search_sample, (), settings)
-    lines = [line, line.alike(reference_fit=replace(line.reference_fit, model=stated))]
-    wide, narrow = (
-        _log_evidence(each, compute_cross_products(each._fitted[0], *each.priors))
-        for each in lines
-    )
-    # A prior that is better without any mechanism is not worse with one, for a
-    # mechanism explains what it leaves.
-    if wide > narrow:
-        every = build_candidate_design(
-            part.declared,
-            part.search_sample,
-            list(part.case.candidates.values()),
-            settings,
-        )
-        lines = [each.alike(tried=every.tried, against=every.against) for each in lines]
-        wide, narrow = (
-            _log_evidence(each, each.products, each.problem) for each in lines
-        )
-        if wide > narrow:
-            return part
+    wide_model = subset.declared.model
+    stated_model = apply_stated_centre_prior(wide_model)
+    if stated_model is wide_model:
+        return subset
+    if _is_wide_more_probable(subset, stated_model, settings):
+        return subset
     fitted = fit_model(
-        stated,
-        part.search_sample,
-        part.noise,
-        part.declared.estimate,
+        stated_model,
+        subset.search_sample,
+        subset.noise,
+        subset.declared.estimate,
         reweight_first_step=True,
     )
-    return replace(
-        part,
-        case=replace(part.case, model=apply_stated_centre_prior(part.case.model)),
-        declared=fitted,
+    case = replace(subset.case, model=apply_stated_centre_prior(subset.case.model))
+    return replace(subset, case=case, declared=fitted)
+
+
+def _is_wide_more_probable(
+    subset: FittedSubset, stated_model: Model, settings: Settings
+) -> bool:
+    wide = build_candidate_design(subset.declared, subset.search_sample, (), settings)
+    stated = replace(
+        wide, reference_fit=replace(wide.reference_fit, model=stated_model)
     )
+    # A prior that is worse without any mechanism is not better with one, because a
+    # mechanism explains a part of what the prior leaves.
+    if _log_evidence_alone(wide) <= _log_evidence_alone(stated):
+        return False
+    candidates = list(subset.case.candidates.values())
+    tested = build_candidate_design(
+        subset.declared, subset.search_sample, candidates, settings
+    )
+    wide, stated = (
+        replace(design, tried=tested.tried, discrepancies=tested.discrepancies)
+        for design in (wide, stated)
+    )
+    wide_evidence = _log_evidence(wide, wide.products, wide.problem)
+    return wide_evidence > _log_evidence(stated, stated.products, stated.problem)
 
 
 def apply_stated_centre_prior(model: Model) -> Model:
-    """A declared model whose first moments are known as well as the robot file says;
-    itself without declared masses."""
-    weight = next(
-        (effect for effect in model.effects if effect.effect == DECLARED_WEIGHT), None
-    )
-    if weight is None:
-        return model
-    stated = replace(
-        weight,
-        parameters=tuple(replace(p, prior_std=p.plausible) for p in weight.parameters),
-    )
-    return replace(
-        model,
-        effects=tuple(
-            stated if effect is weight else effect for effect in model.effects
-        ),
-    )
+    """Give the first moments of a model the prior that the robot file states; the same
+    object if no masses are declared."""
+    effects = list(model.effects)
+    for index, effect in enumerate(effects):
+        if effect.effect == DECLARED_WEIGHT:
+            parameters = tuple(
+                replace(parameter, prior_std=parameter.plausible)
+                for parameter in effect.parameters
+            )
+            effects[index] = replace(effect, parameters=parameters)
+            return replace(model, effects=tuple(effects))
+    return model
+
+
+def _log_evidence_alone(design: CandidateDesign) -> float:
+    """Log evidence of the measurements without any mechanism, as `_log_evidence`."""
+    products = compute_cross_products(design.whitened.rows, *design.priors)
+    statistics = compute_statistics(products, design.candidate_pose_errors_rad)
+    problem = SearchProblem(statistics, (), design.settings)
+    return _log_evidence(design, products, problem)
 
 
 def _log_evidence(
-    line: CandidateDesign, products: CrossProducts, problem: SearchProblem | None = None
+    design: CandidateDesign, products: CrossProducts, problem: SearchProblem
 ) -> float:
-    """Of the measurements, up to what any prior of the declared parameters shares; with
-    none or one mechanism of a problem."""
-    if problem is None:
-        problem = SearchProblem(
-            compute_statistics(products, line.candidate_pose_errors_rad),
-            (),
-            line.settings,
-        )
-    of_declared = (
-        np.linalg.slogdet(products.basis_transform)[1] - np.log(line.priors[0]).sum()
+    """Log evidence of the measurements with none or one mechanism of a problem, up to
+    what all priors of the declared parameters share."""
+    deviations, _ = design.priors
+    log_volume = np.linalg.slogdet(products.basis_transform)[1]
+    of_declared = log_volume - np.log(deviations).sum()
+    search = problem.initial_search
+    log_odds = np.array(list(search.log_odds.values()))
+    return float(
+        of_declared + search.empty_evidence.log_evidence + log_sum_exp(log_odds)
     )
-    met = np.array(list(problem.started.met.values()))
-    return float(of_declared + problem.started.empty.log_evidence + log_sum_exp(met))

@@ -11,6 +11,7 @@ import numpy as np
 from elastocal.counting import format_count
 from elastocal.data_checks.faults import faults
 from elastocal.diagnosis import model_averaging, refit, verdict
+from elastocal.diagnosis.alarm import run_alarm_test
 from elastocal.diagnosis.candidate_design import build_candidate_design, refine_shapes
 from elastocal.diagnosis.centre_prior import choose_centre_prior
 from elastocal.diagnosis.fitted_subset import (
@@ -24,7 +25,7 @@ from elastocal.diagnosis.gross_errors import (
     describe_gross_errors,
     find_gross_errors,
 )
-from elastocal.diagnosis.search import run_alarm_test, screen_terms, search_models
+from elastocal.diagnosis.search import screen_terms, search_models
 from elastocal.diagnosis.training_verdict import TrainingResult, state_training_verdict
 from elastocal.diagnosis.verdict import Evidence
 from elastocal.effects.catalogue import list_effects
@@ -141,7 +142,12 @@ def diagnose(
         # search is made.
         some = sample_for_search(case, case.select(remaining), settings)
         about = fit_model(
-            about.model, some, about.noise, about.estimate, True, INTERMEDIATE_TOLERANCE
+            about.model,
+            some,
+            about.noise,
+            about.estimate,
+            reweight_first_step=True,
+            tolerance=INTERMEDIATE_TOLERANCE,
         )
         errors = find_gross_errors(about, part.noise, measurements, remaining, settings)
         good |= ~remaining & ~errors.gross
@@ -160,8 +166,8 @@ def diagnose(
                     part.search_sample,
                     about.noise,
                     about.estimate,
-                    True,
-                    INTERMEDIATE_TOLERANCE,
+                    reweight_first_step=True,
+                    tolerance=INTERMEDIATE_TOLERANCE,
                 )
             moved = np.subtract(
                 *(
@@ -359,8 +365,8 @@ def _explained(
             searched,
             about.noise,
             about.estimate,
-            True,
-            INTERMEDIATE_TOLERANCE,
+            reweight_first_step=True,
+            tolerance=INTERMEDIATE_TOLERANCE,
         )
     for round_number in range(1 if start else 0, settings.linearizations):
         problem = build_candidate_design(
@@ -439,7 +445,12 @@ def _explained(
             if large:
                 noise = refit.limit_pose_error(about, searched, most_pose_error_rad)
                 about = fit_model(
-                    about.model, searched, noise, about.estimate, True, enough
+                    about.model,
+                    searched,
+                    noise,
+                    about.estimate,
+                    reweight_first_step=True,
+                    tolerance=enough,
                 )
         before = named
         if round_number + 1 < settings.linearizations:

@@ -1,27 +1,27 @@
 """Bayes factors of models (Kass and Raftery, JASA 1995) from sufficient statistics.
 
-Coefficients of a unit are normal about zero with standard deviation s times their
-plausible size, one size s for the unit: a local prior beside the probability that the
-unit is not there, spike and slab (Mitchell and Beauchamp, JASA 1988). With D the
-diagonal of all s^2,
+Coefficients of a term are normal about zero with standard deviation s times their
+plausible size, where the term has one scale s. This is a local prior next to the
+probability that the term is absent: spike and slab (Mitchell and Beauchamp, JASA 1988).
+With D the diagonal matrix of all s^2 and G the Gram matrix,
 
     ln p(y | model, s, tau) = -1/2 ln |I + D^1/2 G D^1/2| + l(y'My - b'(G + D^-1)^-1 b),
 
-where l(rss) = -nu/2 ln sigma^2 - rss / (2 sigma^2) at sigma^2 = max(rss / nu, 1): the
-noise is at least what repeats or the campaign say, or else a smooth competitor could
-interpolate. Above one it is profiled, and the priors widen with it as conjugate ones
-do. Sizes and tau are averaged over, never maximised, as g is in mixtures of g priors
-(Liang et al., JASA 2008).
+where l(rss) = -nu/2 ln sigma^2 - rss / (2 sigma^2) at sigma^2 = max(rss / nu, 1). The
+noise is at least as large as the repeats or the campaign state; otherwise a smooth
+discrepancy could interpolate the data. Above one the noise is profiled, and the priors
+widen with it as conjugate ones do. The evidence is averaged over scales and tau, never
+maximised, as over g in mixtures of g priors (Liang et al., JASA 2008).
 
-Where physics gives a coefficient its sign, the prior is half-normal: the Bayes factor
-of the normal one times twice the posterior probability of that sign, as against an
-encompassing model (Klugkist et al., Psychological Methods 2005); of several such
-coefficients as if they were independent.
+If physics fixes the sign of a coefficient, its prior is half-normal. The Bayes factor
+is then that of the normal prior times twice the posterior probability of the sign, as
+against an encompassing model (Klugkist et al., Psychological Methods 2005). Several
+such coefficients are treated as independent.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -36,14 +36,22 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.settings import Settings
     from elastocal.diagnosis.statistics import SufficientStatistics
 
+# A step of the ascent must raise the log density by more than rounding does.
+_NO_GAIN = 1e-9
+# If moving all terms at once does not raise the density, this many times fewer are
+# moved in the next attempt.
+_FEWER = 4
+# From this many columns on, one call of LAPACK for each positive matrix is faster than
+# numpy's stacked inverse.
+_MANY_COLUMNS = 30
+
 
 def log_sum_exp(
     values: np.ndarray, axis: int | tuple[int, ...] | None = None
 ) -> np.ndarray:
-    """ln of the sum of exponentials, as scipy's logsumexp without its cost on small
-    arrays.
+    """ln of a sum of exponentials over some axes, or over all.
 
-    Returns without these axes; of no dimension where all are summed.
+    The same as scipy's logsumexp, without its overhead on small arrays.
     """
     highest = np.max(values, axis=axis, keepdims=True)
     highest = np.where(np.isfinite(highest), highest, 0.0)
@@ -54,39 +62,45 @@ def log_sum_exp(
 
 @dataclass(frozen=True)
 class SizeGrid:
-    """Sizes that are averaged over, with the logarithms of their weights. `scales`,
-    `log_weights` (S,)."""
+    """Scales over which the evidence of a term is averaged.
+
+    Attributes
+    ----------
+    scales : (S,), in plausible sizes, rising
+    log_weights : (S,), logarithms of their prior weights
+    """
 
     scales: np.ndarray
     log_weights: np.ndarray
 
     @classmethod
     def from_settings(cls, settings: Settings) -> SizeGrid:
-        """Sizes whose logarithms have normal pieces below and above the most likely
-        size."""
-        off = np.log(np.asarray(settings.scales) / settings.scale_center)
-        log_weights = -0.5 * (off / np.where(off < 0, *settings.scale_spread)) ** 2
+        """Weights of a split normal distribution of the log scale about the most likely
+        one."""
+        distance = np.log(np.asarray(settings.scales) / settings.scale_center)
+        spread = np.where(distance < 0, *settings.scale_spread)
+        log_weights = -0.5 * (distance / spread) ** 2
         return cls(np.array(settings.scales), log_weights - log_sum_exp(log_weights))
 
-    def of(self, unit: ModelTerm) -> np.ndarray:
-        """Logarithms of the weights for one unit: sizes from its smallest to its
-        largest share them, ndarray (S,)."""
-        return self.between(unit.smallest, unit.largest)
+    def log_weights_of(self, term: ModelTerm) -> np.ndarray:
+        """Log weights (S,) of the scales of one term, from its smallest to its
+        largest."""
+        return self.log_weights_between(term.smallest, term.largest)
 
-    def between(self, smallest: int, largest: int) -> np.ndarray:
-        """The same by the places of both sizes."""
-        return self._between[smallest, largest]
+    def log_weights_between(self, smallest: int, largest: int) -> np.ndarray:
+        """Log weights (S,), shared out among the scales between two indices."""
+        return self._log_weights_by_range[smallest, largest]
 
-    def root_mean_square(self, unit: ModelTerm) -> float:
-        """Standard deviation of a coefficient of a unit before the measurements, over
-        all its sizes, in plausible sizes."""
-        return float(np.sqrt(np.exp(self.of(unit)) @ self.scales**2))
+    def root_mean_square(self, term: ModelTerm) -> float:
+        """Prior standard deviation of a coefficient of a term over all its scales, in
+        plausible sizes."""
+        return float(np.sqrt(np.exp(self.log_weights_of(term)) @ self.scales**2))
 
     @cached_property
-    def _between(self) -> np.ndarray:
-        """Weights from each size to each, ndarray (S, S, S)."""
-        places = np.arange(len(self.scales))
-        outside = (places < places[:, None, None]) | (places > places[:, None])
+    def _log_weights_by_range(self) -> np.ndarray:
+        """Log weights (S, S, S) by smallest scale, largest scale and scale."""
+        index = np.arange(len(self.scales))
+        outside = (index < index[:, None, None]) | (index > index[:, None])
         weights = np.where(outside, -np.inf, self.log_weights)
         with np.errstate(invalid="ignore"):
             return weights - log_sum_exp(weights, axis=2)[..., None]
@@ -95,377 +109,536 @@ class SizeGrid:
 def compute_pose_error_log_prior(
     pose_error_rad: np.ndarray, settings: Settings
 ) -> np.ndarray:
-    """Logarithms of the prior weights of sizes of the pose error, one of which is zero,
-    (T,)."""
-    there = pose_error_rad > 0
-    share = settings.pose_error_probability / max(there.sum(), 1)
-    return np.log(np.where(there, share, 1.0 - settings.pose_error_probability))
+    """Log prior weights (T,) of the sizes of the pose error, one of which is zero."""
+    is_present = pose_error_rad > 0
+    share = settings.pose_error_probability / max(is_present.sum(), 1)
+    return np.log(np.where(is_present, share, 1.0 - settings.pose_error_probability))
 
 
-def log_likelihood(squares: np.ndarray, freedom: int) -> np.ndarray:
-    """l(rss): the profiled likelihood of the noise, which is at least one."""
-    variance = np.maximum(squares / freedom, 1.0)
-    return -0.5 * freedom * np.log(variance) - 0.5 * squares / variance
+def log_likelihood(squares: np.ndarray, degrees_of_freedom: int) -> np.ndarray:
+    """l(rss), the likelihood with the profiled noise, which is at least one."""
+    variance = np.maximum(squares / degrees_of_freedom, 1.0)
+    return -0.5 * degrees_of_freedom * np.log(variance) - 0.5 * squares / variance
+
+
+def decompose_grams(gram: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Eigenvalues (..., d), not negative, and eigenvectors (..., d, d) of Gram matrices
+    (..., d, d)."""
+    if gram.shape[-1] > 1:
+        values, vectors = np.linalg.eigh(gram)
+    else:
+        values = gram[..., 0]
+        vectors = np.ones_like(gram)
+    return np.clip(values, 0.0, None), vectors
 
 
 @dataclass(frozen=True)
 class TermBlock:
-    """Units of one width d: their `numbers` (U,), `columns` (U, d), and W'MW of the
-    columns of each, `gram` (T, U, d, d)."""
+    """Terms that have the same number d of columns.
+
+    Attributes
+    ----------
+    numbers : (U,) int, indices of the terms
+    columns : (U, d) int
+    gram : (T, U, d, d), W'MW of the columns of each term
+    eigenvalues : (T, U, d), of these
+    eigenvectors : (T, U, d, d)
+    """
 
     numbers: np.ndarray
     columns: np.ndarray
     gram: np.ndarray
+    eigenvalues: np.ndarray
+    eigenvectors: np.ndarray
 
     @classmethod
-    def of(
-        cls, statistics: SufficientStatistics, units: Sequence[ModelTerm]
+    def group(
+        cls,
+        statistics: SufficientStatistics,
+        terms: Sequence[ModelTerm],
+        first_number: int = 0,
     ) -> list[TermBlock]:
-        """Units in the order of their widths."""
-        width = np.array([len(unit.columns) for unit in units], int)
-        found = []
-        for size in np.unique(width):
-            numbers = np.flatnonzero(width == size)
-            columns = np.array([units[number].columns for number in numbers.tolist()])
-            found.append(cls(numbers, columns, statistics.between(columns, columns)))
-        return found
+        """Group terms, numbered from `first_number`, by their number of columns."""
+        widths = np.array([len(term.columns) for term in terms], int)
+        blocks = []
+        for width in np.unique(widths):
+            numbers = np.flatnonzero(widths == width)
+            columns = np.array([terms[number].columns for number in numbers.tolist()])
+            gram = statistics.gram_blocks(columns)
+            blocks.append(
+                cls(numbers + first_number, columns, gram, *decompose_grams(gram))
+            )
+        return blocks
 
     def at(self, chosen: np.ndarray | slice) -> TermBlock:
-        """The same at some of the sizes of the pose error only."""
-        found = TermBlock(self.numbers, self.columns, self.gram[chosen])
-        vars(found)["axes"] = tuple(part[chosen] for part in self.axes)
-        return found
-
-    @cached_property
-    def axes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Principal axes of the blocks, V diag(values) V': values (T, U, d), V (T, U,
-        d, d)."""
-        values, vectors = (
-            np.linalg.eigh(self.gram)
-            if self.gram.shape[-1] > 1
-            else (self.gram[..., 0], np.ones_like(self.gram))
+        """Select sizes of the pose error."""
+        return TermBlock(
+            self.numbers,
+            self.columns,
+            self.gram[chosen],
+            self.eigenvalues[chosen],
+            self.eigenvectors[chosen],
         )
-        return np.clip(values, 0.0, None), vectors
 
 
-def _with_priors(
+def _scaled_precision(
     statistics: SufficientStatistics, columns: np.ndarray, deviations: np.ndarray
 ) -> np.ndarray:
-    """I + D^1/2 G D^1/2 of some columns, ndarray (T, D, D)."""
-    inner = statistics.between(columns, columns)
-    inner *= deviations[:, None]
-    inner *= deviations
-    inner[:, np.arange(len(columns)), np.arange(len(columns))] += 1.0
-    return inner
+    """I + D^1/2 G D^1/2 (T, D, D), the posterior precision of the coefficients in units
+    of their prior standard deviations."""
+    precision = statistics.gram_blocks(columns)
+    precision *= deviations[:, None]
+    precision *= deviations
+    diagonal = np.arange(len(columns))
+    precision[:, diagonal, diagonal] += 1.0
+    return precision
 
 
 def evaluate_extensions(
     statistics: SufficientStatistics,
     base: np.ndarray,
-    given: tuple[np.ndarray, np.ndarray],
+    scaled_columns: tuple[np.ndarray, np.ndarray],
     blocks: Sequence[TermBlock],
     grid: SizeGrid,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Log evidence of a model, and of the same with each single unit added, at every
-    size of that unit.
+    """Compute the log evidence of a model, and of the model with each single term added
+    at every scale of that term.
 
-    `base` (T,): what each tau contributes alone, with its prior. `given` (D,): columns
-    of the model, and the prior standard deviation of each, in plausible sizes.
-    `blocks`: of all units. Returns (T,); (T, number of units, S), not weighted by size.
+    Parameters
+    ----------
+    statistics : sufficient statistics
+    base : (T,), what each tau contributes by itself, with its prior
+    scaled_columns : columns (D,) of the model, and the prior standard deviation of
+        each, in plausible sizes
+    blocks : all terms
+    grid : scales of a term
+
+    Returns
+    -------
+    (T,) of the model; (T, number of terms, S) of its extensions, not weighted by scale
     """
-    columns, deviations = given
-    factor = np.linalg.cholesky(_with_priors(statistics, columns, deviations))
-    # Rows of W'MW of these columns, and of W'My, divided by the factor: what they take
-    # from all others.
+    model = _condition_on_model(statistics, base, scaled_columns)
+    degrees_of_freedom = statistics.degrees_of_freedom
+    term_count = sum(len(block.numbers) for block in blocks)
+    log_evidence = np.empty((len(base), term_count, len(grid.scales)))
+    for block in blocks:
+        eigenvalues = block.eigenvalues
+        eigenvectors = block.eigenvectors
+        if model.cross.shape[1]:
+            shared = model.cross[:, :, block.columns].transpose(0, 2, 1, 3)
+            gram = block.gram - shared.swapaxes(-1, -2) @ shared
+            eigenvalues, eigenvectors = decompose_grams(gram)
+        score = model.score[:, block.columns, None]
+        by_axis = (eigenvectors.swapaxes(-1, -2) @ score)[..., 0]
+        gains, occam = _integrate_coefficients(eigenvalues, by_axis**2, grid.scales**2)
+        likelihood = log_likelihood(
+            model.squares[:, None, None] - gains, degrees_of_freedom
+        )
+        log_evidence[:, block.numbers] = (
+            model.log_occam[:, None, None] + occam + likelihood
+        )
+    likelihood = log_likelihood(model.squares, degrees_of_freedom)
+    return model.log_occam + likelihood, log_evidence
+
+
+@dataclass(frozen=True)
+class _ModelConditional:
+    """Statistics of all K columns, the D coefficients of a model integrated out.
+
+    Attributes
+    ----------
+    cross : (T, D, K), whose product with itself is subtracted from the Gram matrix
+    score : (T, K)
+    squares : (T,), residual sum of squares
+    log_occam : (T,), log Occam factor of the model, with what each tau contributes
+    """
+
+    cross: np.ndarray
+    score: np.ndarray
+    squares: np.ndarray
+    log_occam: np.ndarray
+
+
+def _condition_on_model(
+    statistics: SufficientStatistics,
+    base: np.ndarray,
+    scaled_columns: tuple[np.ndarray, np.ndarray],
+) -> _ModelConditional:
+    """Integrate out the coefficients of a model; arguments as of
+    `evaluate_extensions`."""
+    columns, deviations = scaled_columns
+    factor = np.linalg.cholesky(_scaled_precision(statistics, columns, deviations))
+    # Rows of the Gram matrix and of the score, divided by the factor.
     right = deviations[:, None] * np.concatenate(
-        [statistics.between(columns), statistics.score[:, columns, None]], axis=2
+        [statistics.gram_rows(columns), statistics.score[:, columns, None]], axis=2
     )
     if len(columns):
-        pairs = zip(factor, right, strict=True)
         right = np.array(
-            [solve_triangular(*pair, lower=True, check_finite=False) for pair in pairs]
+            [
+                solve_triangular(lower, rows, lower=True, check_finite=False)
+                for lower, rows in zip(factor, right, strict=True)
+            ]
         )
     cross = right[..., :-1]
     fitted = right[..., -1]
-    along_all = statistics.score - (fitted[:, None] @ cross)[:, 0]
-    squares = statistics.residual_squares - (fitted**2).sum(axis=1)
-    log_occam = base - np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
-    found = np.empty(
-        (len(base), sum(len(each.numbers) for each in blocks), len(grid.scales))
+    log_diagonal = np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
+    return _ModelConditional(
+        cross,
+        statistics.score - (fitted[:, None] @ cross)[:, 0],
+        statistics.residual_squares - (fitted**2).sum(axis=1),
+        base - log_diagonal,
     )
-    variances = grid.scales**2
-    for each in blocks:
-        mine = cross[:, :, each.columns].transpose(0, 2, 1, 3)
-        left = (
-            replace(each, gram=each.gram - mine.swapaxes(-1, -2) @ mine)
-            if len(columns)
-            else each
-        )
-        values, vectors = left.axes
-        turned = (vectors.swapaxes(-1, -2) @ along_all[:, each.columns, None])[
-            ..., 0
-        ] ** 2
-        widened = 1.0 + values[..., None] * variances
-        gains = (turned[..., None] * (variances / widened)).sum(axis=2)
-        occam = -0.5 * np.log(widened).sum(axis=2)
-        likelihood = log_likelihood(
-            squares[:, None, None] - gains, statistics.degrees_of_freedom
-        )
-        found[:, each.numbers] = log_occam[:, None, None] + occam + likelihood
-    return log_occam + log_likelihood(squares, statistics.degrees_of_freedom), found
+
+
+def _integrate_coefficients(
+    eigenvalues: np.ndarray, squared_score: np.ndarray, variances: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Reduction of the residual sum of squares, and log Occam factor, of terms at every
+    prior variance (S,).
+
+    Both are (T, U, S); `eigenvalues` and `squared_score` along them are (T, U, d).
+    """
+    widened = 1.0 + eigenvalues[..., None] * variances
+    gains = (squared_score[..., None] * (variances / widened)).sum(axis=2)
+    return gains, -0.5 * np.log(widened).sum(axis=2)
 
 
 @dataclass(frozen=True)
 class ModelEvidence:
-    """A model with its evidence, averaged over sizes and tau.
+    """Evidence of a model, averaged over scales and tau.
 
-    `scales` (m,): most probable size of each unit. `log_pose` (T,): log posterior
-    weight of each tau at these. `without` (m,): log evidence of the model without each
-    of its units, the sizes of the others as they are.
+    Attributes
+    ----------
+    log_evidence : its logarithm
+    scales : (m,), most probable scale of each term
+    log_pose_posterior : (T,), log posterior weight of each tau at these scales
+    without : (m,), log evidence of the model without each of its terms, at the scales
+        of the other terms
     """
 
     log_evidence: float
     scales: np.ndarray
-    log_pose: np.ndarray
+    log_pose_posterior: np.ndarray
     without: np.ndarray
 
 
 def evaluate_model(
     statistics: SufficientStatistics,
-    units: Sequence[ModelTerm],
+    terms: Sequence[ModelTerm],
     grid: SizeGrid,
-    log_pose: np.ndarray,
+    log_pose_prior: np.ndarray,
     start: Iterable[float],
 ) -> ModelEvidence:
-    """Evidence of one model, averaged over the sizes of its units.
+    """Compute the evidence of one model, averaged over the scales of its terms.
 
-    The sum over all combinations of sizes is taken as the product of the sums over each
-    size about the mode; exact for one unit, and where sizes are independent given the
-    measurements. The mode is found by coordinate ascent (iterated conditional modes;
-    Besag, JRSS B 1986), all units at once where that raises the density and else those
-    that gain most. One inverse gives what every unit sees given all others: with C the
-    posterior covariance of the scaled coefficients, C_uu^-1 = I + s^2 G_uu|rest.
+    The sum over all combinations of scales is approximated by the product of the sums
+    over each scale about the mode. That is exact for one term, and if the scales are
+    independent given the measurements. The mode is found by coordinate ascent (iterated
+    conditional modes; Besag, JRSS B 1986). A step moves all terms at once if that
+    raises the density, and otherwise those that gain most. One inverse gives the
+    conditional information of every term given all others: with C the posterior
+    covariance of the scaled coefficients, C_uu^-1 = I + s^2 G_uu|rest.
 
-    `log_pose` (T,): logarithm of the prior weight of each size of the pose error.
-    `start`: sizes from which the search for the mode starts; each in its grid.
+    Parameters
+    ----------
+    statistics : sufficient statistics
+    terms : terms of the model
+    grid : scales of a term
+    log_pose_prior : (T,), log prior weight of each size of the pose error
+    start : scale of each term at which the ascent starts; the nearest one that the
+        term may have is taken
     """
-    off = [
-        np.where(np.isfinite(grid.of(u)), np.abs(grid.scales - size), np.inf)
-        for size, u in zip(start, units, strict=True)
+    distances = [
+        np.where(
+            np.isfinite(grid.log_weights_of(term)), np.abs(grid.scales - scale), np.inf
+        )
+        for scale, term in zip(start, terms, strict=True)
     ]
-    places = np.array([np.argmin(distances) for distances in off], int)
-    present = ModelDensity(
-        statistics, units, grid, statistics.log_likelihood + log_pose, places
+    scale_indices = np.array([np.argmin(by_scale) for by_scale in distances], int)
+    base = statistics.log_likelihood + log_pose_prior
+    density = ModelDensity(statistics, terms, grid, base, scale_indices)
+    profiles = density.profiles()
+    while (ascended := _ascend(statistics, density, profiles)) is not None:
+        density = ascended
+        profiles = density.profiles()
+    numbers = np.arange(len(terms))
+    sums = (
+        log_sum_exp(profiles[:, 1:], axis=1)
+        - profiles[numbers, 1 + density.scale_indices]
     )
-    profiles = present.profiles()
-    while (moved := _ascended(statistics, present, profiles)) is not None:
-        present = moved
-        profiles = moved.profiles()
-    numbers = np.arange(len(units))
-    sums = log_sum_exp(profiles[:, 1:], axis=1) - profiles[numbers, 1 + present.places]
-    log_posterior = present.by_pose_error - log_sum_exp(present.by_pose_error)
-    without = profiles[:, 0] - sums + sums.sum()
     return ModelEvidence(
-        float(present.log_density + sums.sum()), present.scales, log_posterior, without
+        float(density.log_density + sums.sum()),
+        density.scales,
+        density.by_pose_error - log_sum_exp(density.by_pose_error),
+        profiles[:, 0] - sums + sums.sum(),
     )
 
 
-# Of what the steps of an ascent take, that which rounding may make.
-_NO_GAIN = 1e-9
-# So many times fewer units are moved where all at once do not raise the density.
-_FEWER = 4
-
-
-def _ascended(
-    statistics: SufficientStatistics, present: ModelDensity, profiles: np.ndarray
+def _ascend(
+    statistics: SufficientStatistics, density: ModelDensity, profiles: np.ndarray
 ) -> ModelDensity | None:
-    """A step of the ascent: as many units as raise the density, those that gain most
-    first; None at the mode.
+    """One step of the ascent, None at the mode.
 
-    Sizes lie on a grid and the density rises, so that steps end.
+    It moves as many terms as raise the density, those that gain most first. The scales
+    lie on a grid and the density rises with every step, so that the ascent ends.
     """
     best = profiles[:, 1:].argmax(axis=1)
-    gains = (
-        profiles[:, 1:].max(axis=1) - profiles[np.arange(len(best)), 1 + present.places]
-    )
+    current = profiles[np.arange(len(best)), 1 + density.scale_indices]
+    gains = profiles[:, 1:].max(axis=1) - current
     order = np.argsort(-gains)
     count = int((gains > _NO_GAIN).sum())
     while count:
-        places = present.places.copy()
-        places[order[:count]] = best[order[:count]]
+        moved_terms = order[:count]
+        scale_indices = density.scale_indices.copy()
+        scale_indices[moved_terms] = best[moved_terms]
         moved = ModelDensity(
-            statistics, present.terms, present.grid, present.base, places
+            statistics, density.terms, density.grid, density.base, scale_indices
         )
-        if moved.log_density > present.log_density:
+        if moved.log_density > density.log_density:
             return moved
         count = 0 if count == 1 else max(count // _FEWER, 1)
     return None
 
 
-# Above so many columns LAPACK's inverse of positive matrices, called for each of them,
-# costs less than all of numpy's together.
-_MANY_COLUMNS = 30
-
-
-def _inverses(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _invert_positive(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Inverses (T, D, D) of symmetric positive matrices, and the logarithms of their
     determinants (T,)."""
     if matrices.shape[1] < _MANY_COLUMNS:
         return np.linalg.inv(matrices), np.linalg.slogdet(matrices)[1]
-    found = np.empty_like(matrices)
+    inverses = np.empty_like(matrices)
     log_dets = np.empty(len(matrices))
     for number, matrix in enumerate(matrices):
-        # The transpose is laid out as LAPACK wants it.
+        # The transpose has the column order that LAPACK expects.
         factor = lapack.dpotrf(matrix.T, lower=0, clean=1)[0]
         log_dets[number] = 2.0 * np.log(np.diag(factor)).sum()
         upper = lapack.dpotri(factor, lower=0, overwrite_c=1)[0]
-        np.add(upper, upper.T, out=found[number])
-        np.fill_diagonal(found[number], np.diag(upper))
-    return found, log_dets
+        np.add(upper, upper.T, out=inverses[number])
+        np.fill_diagonal(inverses[number], np.diag(upper))
+    return inverses, log_dets
+
+
+@dataclass(frozen=True)
+class _ScaleProfile:
+    """Terms of one width d at every scale, the other terms at their present scales.
+
+    Attributes
+    ----------
+    numbers : (u,) int, indices of the terms
+    log_density : (1 + S, T, u), for scale zero first
+    eigenvectors : (T, u, d, d), principal axes of the coefficients
+    mean, variance : (S, T, u, d), of the coefficients along these, the variance for
+        unit noise
+    noise_variance : (S, T, u)
+    """
+
+    numbers: np.ndarray
+    log_density: np.ndarray
+    eigenvectors: np.ndarray
+    mean: np.ndarray
+    variance: np.ndarray
+    noise_variance: np.ndarray
+
+
+@dataclass(frozen=True)
+class _ConditionalStatistics:
+    """What the measurements say of u terms of one width d, each given all other terms
+    of the model.
+
+    Attributes
+    ----------
+    eigenvectors : (T, u, d, d), of the conditional Gram matrix G of each term
+    eigenvalues : (T, u, d)
+    score : (T, u, d), along the eigenvectors
+    squares : (T, u), residual sum of squares without the term
+    log_det : (T, u), log determinant of the precision without the term
+    """
+
+    eigenvectors: np.ndarray
+    eigenvalues: np.ndarray
+    score: np.ndarray
+    squares: np.ndarray
+    log_det: np.ndarray
 
 
 class ModelDensity:
-    """Density of the measurements under one model with one size for each unit.
+    """Density of the measurements under one model with one scale for each term.
 
-    `base` (T,): what each tau contributes alone, with its prior. `places` (m,) of int:
-    size of each unit in the grid.
+    Parameters
+    ----------
+    statistics : sufficient statistics
+    terms : terms of the model
+    grid : scales of a term
+    base : (T,), what each tau contributes by itself, with its prior
+    scale_indices : (m,) int, scale of each term in the grid
+
+    Attributes
+    ----------
+    by_pose_error : (T,), log density at each size of the pose error
+    log_density : over all sizes, with the prior weights of the scales
     """
 
     def __init__(
         self,
         statistics: SufficientStatistics,
-        units: Sequence[ModelTerm],
+        terms: Sequence[ModelTerm],
         grid: SizeGrid,
         base: np.ndarray,
-        places: np.ndarray,
+        scale_indices: np.ndarray,
     ) -> None:
-        self.terms = units
+        self.terms = terms
         self.grid = grid
         self.base = base
-        self.places = places
-        self.freedom = statistics.degrees_of_freedom
-        self.weights = np.array([grid.of(unit) for unit in units]).reshape(
-            len(units), len(grid.scales)
+        self.scale_indices = scale_indices
+        self.scales = grid.scales[scale_indices]
+        self._degrees_of_freedom = statistics.degrees_of_freedom
+        self._log_weights_by_scale = np.array(
+            [grid.log_weights_of(term) for term in terms]
+        ).reshape(len(terms), len(grid.scales))
+        self._log_weights = self._log_weights_by_scale[
+            np.arange(len(terms)), scale_indices
+        ]
+        widths = [len(term.columns) for term in terms]
+        self._starts = np.concatenate([[0], np.cumsum(widths, dtype=int)])
+        no_columns = np.zeros(0, int)
+        columns = np.concatenate([no_columns, *(term.columns for term in terms)])
+        deviations = np.repeat(self.scales, np.diff(self._starts))
+        self._covariance, self._log_det = _invert_positive(
+            _scaled_precision(statistics, columns, deviations)
         )
-        self.scales = grid.scales[places]
-        self.log_weights = self.weights[np.arange(len(units)), places]
-        columns = np.concatenate([np.zeros(0, int), *(unit.columns for unit in units)])
-        signs = np.concatenate([np.zeros(0, int), *(unit.signs for unit in units)])
-        self.starts = np.concatenate(
-            [[0], np.cumsum([len(unit.columns) for unit in units], dtype=int)]
+        score = deviations * statistics.score[:, columns]
+        self._mean = (self._covariance @ score[..., None])[..., 0]
+        self._squares = statistics.residual_squares - (score * self._mean).sum(axis=1)
+        log_densities = (
+            self.base
+            - 0.5 * self._log_det
+            + log_likelihood(self._squares, self._degrees_of_freedom)
         )
-        deviations = np.repeat(self.scales, np.diff(self.starts))
-        self.covariance, self.log_det = _inverses(
-            _with_priors(statistics, columns, deviations)
-        )
-        along = deviations * statistics.score[:, columns]
-        self.mean = (self.covariance @ along[..., None])[..., 0]
-        self.squares = statistics.residual_squares - (along * self.mean).sum(axis=1)
-        values = (
-            self.base - 0.5 * self.log_det + log_likelihood(self.squares, self.freedom)
-        )
-        self.sign_factors = np.zeros((len(units), len(base)))
-        for number in np.flatnonzero([unit.signs.any() for unit in units]):
-            mine = slice(self.starts[number], self.starts[number + 1])
-            variance = np.diagonal(self.covariance[:, mine, mine], axis1=1, axis2=2)
-            self.sign_factors[number] = _log_sign_factor(
-                self.mean[:, mine], variance, signs[mine], self.squares, self.freedom
-            )
-        self.by_pose_error = values + self.sign_factors.sum(axis=0)
+        self._sign_factors = self._compute_sign_factors()
+        self.by_pose_error = log_densities + self._sign_factors.sum(axis=0)
         self.log_density = float(
-            log_sum_exp(self.by_pose_error) + self.log_weights.sum()
+            log_sum_exp(self.by_pose_error) + self._log_weights.sum()
         )
+
+    def _compute_sign_factors(self) -> np.ndarray:
+        """Log factors (m, T) of the terms whose signs physics gives."""
+        factors = np.zeros((len(self.terms), len(self.base)))
+        for number, term in enumerate(self.terms):
+            if term.signs.any():
+                columns = slice(self._starts[number], self._starts[number + 1])
+                variance = np.diagonal(
+                    self._covariance[:, columns, columns], axis1=1, axis2=2
+                )
+                factors[number] = _log_sign_factor(
+                    self._mean[:, columns],
+                    variance,
+                    term.signs,
+                    self._squares,
+                    self._degrees_of_freedom,
+                )
+        return factors
 
     def profiles(self) -> np.ndarray:
-        """Log density over the sizes of each unit, the others as they are, for size
-        zero first, ndarray (m, 1 + S)."""
-        found = np.empty((len(self.terms), 1 + len(self.grid.scales)))
-        for numbers, density, _, _ in self._over_sizes():
-            found[numbers] = log_sum_exp(density, axis=1).T
-        return found
+        """Log density (m, 1 + S) over the scales of each term, for scale zero first,
+        the other terms at their present scales."""
+        profiles = np.empty((len(self.terms), 1 + len(self.grid.scales)))
+        for profile in self._scale_profiles():
+            profiles[profile.numbers] = log_sum_exp(profile.log_density, axis=1).T
+        return profiles
 
     def moments(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Mean and variance of the coefficients of each unit, averaged over its sizes
-        and tau; list of two ndarray (d,)."""
-        found: dict[int, tuple[np.ndarray, np.ndarray]] = {}
-        for numbers, density, coefficients, noise in self._over_sizes():
-            weights = np.exp(density[1:] - log_sum_exp(density[1:], axis=(0, 1)))[
-                ..., None
-            ]
-            means, variances = _turned_back(*coefficients)
-            variances *= noise[..., None]
+        """Mean (d,) and variance (d,) of the coefficients of each term, averaged over
+        its scales and tau."""
+        moments: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+        for profile in self._scale_profiles():
+            log_density = profile.log_density[1:]
+            weights = np.exp(log_density - log_sum_exp(log_density, axis=(0, 1)))
+            weights = weights[..., None]
+            means, variances = _rotate_back(
+                profile.eigenvectors, profile.mean, profile.variance
+            )
+            variances *= profile.noise_variance[..., None]
             centers = (weights * means).sum(axis=(0, 1))
             spreads = (weights * (variances + (means - centers) ** 2)).sum(axis=(0, 1))
-            found |= dict(
-                zip(numbers.tolist(), zip(centers, spreads, strict=True), strict=True)
-            )
-        return [found[number] for number in range(len(self.terms))]
+            for number, center, spread in zip(
+                profile.numbers.tolist(), centers, spreads, strict=True
+            ):
+                moments[number] = center, spread
+        return [moments[number] for number in range(len(self.terms))]
 
-    def _over_sizes(
-        self,
-    ) -> Iterator[
-        tuple[
-            np.ndarray,
-            np.ndarray,
-            tuple[np.ndarray, np.ndarray, np.ndarray],
-            np.ndarray,
-        ]
-    ]:
-        """What the u units of one width d say at every size, the others at theirs:
-        numbers; log density (1 + S, T, u), for size zero first; their coefficients, as
-        `_turned_back` takes them; variance (S, T, u) of the noise."""
-        widths = np.diff(self.starts)
-        sizes = np.concatenate([[0.0], self.grid.scales**2])[:, None, None, None]
+    def _scale_profiles(self) -> Iterator[_ScaleProfile]:
+        widths = np.diff(self._starts)
         for width in set(widths.tolist()):
-            numbers = np.flatnonzero(widths == width)
-            mine = self.starts[numbers][:, None] + np.arange(width)
-            scales = self.scales[numbers][:, None]
-            # With the others integrated out: the precision is I + s^2 G.
-            left_over, vectors = np.linalg.eigh(
-                self.covariance[:, mine[:, :, None], mine[:, None, :]]
-            )
-            mean = (vectors.swapaxes(-1, -2) @ self.mean[:, mine, None])[..., 0]
-            squares = self.squares[:, None] + (mean**2 / left_over).sum(axis=-1)
-            log_det = self.log_det[:, None] + np.log(left_over).sum(axis=-1)
-            values = np.clip(1.0 / left_over - 1.0, 0.0, None) / scales**2
-            turned = mean / (left_over * scales)
-            widened = 1.0 + sizes * values
-            left = squares - (sizes * turned**2 / widened).sum(axis=-1)
-            density = (
-                self.base[:, None]
-                - 0.5 * (log_det + np.log(widened).sum(axis=-1))
-                + log_likelihood(left, self.freedom)
-            )
-            density += (self.sign_factors.sum(axis=0) - self.sign_factors[numbers]).T
-            along = (sizes * turned / widened)[1:]
-            widths_left = (sizes / widened)[1:]
-            for place, number in enumerate(numbers.tolist()):
-                signs = self.terms[number].signs
-                if signs.any():
-                    seen = _turned_back(
-                        vectors[:, place], along[:, :, place], widths_left[:, :, place]
-                    )
-                    density[1:, :, place] += _log_sign_factor(
-                        *seen, signs, left[1:, :, place], self.freedom
-                    )
-            density[1:] += self.weights[numbers].T[:, None]
-            density += self.log_weights.sum() - self.log_weights[numbers]
-            yield (
-                numbers,
-                density,
-                (vectors, along, widths_left),
-                np.maximum(left[1:] / self.freedom, 1.0),
-            )
+            yield self._scale_profile(np.flatnonzero(widths == width), width)
+
+    def _condition_on_other_terms(
+        self, numbers: np.ndarray, width: int
+    ) -> _ConditionalStatistics:
+        """Statistics of some terms of one width, the other terms integrated out.
+
+        The precision of a term is then I + s^2 G; the eigenvalues of G and the score
+        along its eigenvectors follow from the covariance.
+        """
+        columns = self._starts[numbers][:, None] + np.arange(width)
+        scales = self.scales[numbers][:, None]
+        variances, eigenvectors = np.linalg.eigh(
+            self._covariance[:, columns[:, :, None], columns[:, None, :]]
+        )
+        mean = (eigenvectors.swapaxes(-1, -2) @ self._mean[:, columns, None])[..., 0]
+        return _ConditionalStatistics(
+            eigenvectors,
+            eigenvalues=np.clip(1.0 / variances - 1.0, 0.0, None) / scales**2,
+            score=mean / (variances * scales),
+            squares=self._squares[:, None] + (mean**2 / variances).sum(axis=-1),
+            log_det=self._log_det[:, None] + np.log(variances).sum(axis=-1),
+        )
+
+    def _scale_profile(self, numbers: np.ndarray, width: int) -> _ScaleProfile:
+        terms = self._condition_on_other_terms(numbers, width)
+        # At scale zero a term is absent.
+        prior_variances = np.concatenate([[0.0], self.grid.scales**2])
+        prior_variances = prior_variances[:, None, None, None]
+        widened = 1.0 + prior_variances * terms.eigenvalues
+        squares = terms.squares - (prior_variances * terms.score**2 / widened).sum(
+            axis=-1
+        )
+        log_density = (
+            self.base[:, None]
+            - 0.5 * (terms.log_det + np.log(widened).sum(axis=-1))
+            + log_likelihood(squares, self._degrees_of_freedom)
+        )
+        other_signs = self._sign_factors.sum(axis=0) - self._sign_factors[numbers]
+        log_density += other_signs.T
+        mean = (prior_variances * terms.score / widened)[1:]
+        variance = (prior_variances / widened)[1:]
+        for index, number in enumerate(numbers.tolist()):
+            signs = self.terms[number].signs
+            if signs.any():
+                coefficients = _rotate_back(
+                    terms.eigenvectors[:, index],
+                    mean[:, :, index],
+                    variance[:, :, index],
+                )
+                log_density[1:, :, index] += _log_sign_factor(
+                    *coefficients,
+                    signs,
+                    squares[1:, :, index],
+                    self._degrees_of_freedom,
+                )
+        log_density[1:] += self._log_weights_by_scale[numbers].T[:, None]
+        log_density += self._log_weights.sum() - self._log_weights[numbers]
+        noise_variance = np.maximum(squares[1:] / self._degrees_of_freedom, 1.0)
+        return _ScaleProfile(
+            numbers, log_density, terms.eigenvectors, mean, variance, noise_variance
+        )
 
 
-def _turned_back(
-    vectors: np.ndarray, mean: np.ndarray, variance: np.ndarray
+def _rotate_back(
+    eigenvectors: np.ndarray, mean: np.ndarray, variance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Mean and variance (S, ..., d) of coefficients, from those along eigenvectors
     (..., d, d)."""
-    return (vectors @ mean[..., None])[..., 0], (vectors**2 @ variance[..., None])[
-        ..., 0
-    ]
+    coefficients = (eigenvectors @ mean[..., None])[..., 0]
+    return coefficients, (eigenvectors**2 @ variance[..., None])[..., 0]
 
 
 def _log_sign_factor(
@@ -473,11 +646,11 @@ def _log_sign_factor(
     variance: np.ndarray,
     signs: np.ndarray,
     squares: np.ndarray,
-    freedom: int,
+    degrees_of_freedom: int,
 ) -> np.ndarray:
-    """Half-normal priors where physics gives the sign: ln 2 Phi(mean / std) of each
-    such coefficient, summed."""
+    """ln 2 Phi(mean / std) of each coefficient whose sign physics gives, summed: the
+    factor of its half-normal prior."""
     signed = np.flatnonzero(signs)
-    sigma = np.sqrt(np.maximum(squares / freedom, 1.0))[..., None]
+    sigma = np.sqrt(np.maximum(squares / degrees_of_freedom, 1.0))[..., None]
     ratio = signs[signed] * mean[..., signed] / (np.sqrt(variance[..., signed]) * sigma)
     return (np.log(2.0) + log_ndtr(ratio)).sum(axis=-1)

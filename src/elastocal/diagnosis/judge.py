@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -14,11 +14,11 @@ from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.gross_errors import (
     OutlierTest,
     describe_gross_errors,
-    estimate_prediction_uncertainty,
     find_held_out_gross_errors,
     format_gross_error_warnings,
 )
 from elastocal.diagnosis.settings import Settings
+from elastocal.diagnosis.studentized_residuals import estimate_prediction_uncertainty
 from elastocal.fitting.model import (
     Case,
     compute_residuals,
@@ -27,6 +27,7 @@ from elastocal.fitting.model import (
 )
 from elastocal.fitting.noise import parse_noise
 from elastocal.fitting.observations import index_poses, separate_measurements
+from elastocal.io.typed_json import to_document
 from elastocal.random_streams import open_stream
 from elastocal.remainder.corrected import Corrected, corrected, remainder_facts
 from elastocal.validation import held_out as figures
@@ -130,7 +131,7 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
         ],
         "heldout": heldout,
         "remainder": remainder,
-        "gross_errors": [*found["gross_errors"], *left_out],
+        "gross_errors": [*found["gross_errors"], *map(to_document, left_out)],
         "warnings": [
             *found["warnings"],
             *format_gross_error_warnings(left_out),
@@ -186,16 +187,19 @@ def remove_gross_errors(
         return errors, part, poses
     settings = Settings()
     noise = parse_noise(diagnosis.document).without_pose_error
-    yardstick = estimate_prediction_uncertainty(
+    fitted_uncertainty = estimate_prediction_uncertainty(
         final, noise, diagnosis.case.campaign.measurements
     )
     outside = poses[index_poses(measurements)]
     for _ in range(settings.gross_error_rounds):
         # Frames of another campaign are fitted to what is kept of it.
-        there = transfer_fit(final, diagnosis.case, part)
+        model, estimate = transfer_fit(final, diagnosis.case, part)
+        uncertainty = fitted_uncertainty
+        if model is not final.model or estimate is not final.estimate:
+            uncertainty = replace(fitted_uncertainty, parameter_covariance=None)
         last = errors.gross
         errors = find_held_out_gross_errors(
-            final, there, yardstick, held_out, outside, settings
+            model, estimate, uncertainty, held_out, outside, settings
         )
         part = held_out.select(~errors.gross) if errors.gross.any() else held_out
         if (errors.gross == last).all():
@@ -348,5 +352,10 @@ def generate_residual_blocks(
             }
             position = transform_to_base(there[-1][1], observations)[0]
             yield tabulate_residuals(
-                some, unseen, some is left_out, beyond, position, off
+                some,
+                beyond,
+                position,
+                off,
+                held_out=unseen,
+                gross_errors=some is left_out,
             )

@@ -1,22 +1,24 @@
-"""What was declared wrongly rather than made inexactly: a target, a tool, a base, a
-pedestal, links of another variant.
+"""Find frames that were declared wrongly rather than made inexactly: a target, a tool,
+a base, a pedestal, or links of another variant of the robot.
 
-A fit takes up in lengths of links what a declaration has wrong by millimetres, and its
-errors on held-out poses show nothing of it; but the flange is then elsewhere than the
-reflector says. Along each axis of each place is asked whether a shift of any size
-there, beside geometry of one usual size everywhere else, makes the measurements more
-probable. The size of all else is the most probable one, as in `fitting.noise`: of a
-robot that was made badly everywhere nothing is misplaced.
+A fit absorbs a wrong declaration of millimetres in the lengths of links, and its errors
+on held-out poses show nothing of it; but the flange is then not where the reflector
+says. For each axis of each frame the question is whether a shift of any size there,
+with geometry of one usual size everywhere else, makes the measurements more probable.
+The size of all other geometry is the most probable one, as in `fitting.noise`: on a
+robot that was made badly everywhere, nothing is misplaced.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.fitting.model import get_parameter_values
 from elastocal.fitting.noise import PRIOR_SCALES
+from elastocal.verdict import MisplacedFrame
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,21 +26,24 @@ if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Target
     from elastocal.fitting.least_squares import Fit
 
-# Usual sizes that a bad case reaches (`effects.sizes.Size.most`).
+# A shift counts as a wrong declaration from this many usual sizes on, which is as much
+# as a badly made robot reaches (`effects.sizes.Size.most`).
 _MOST_SIZES = 3.0
-# Least gain of the logarithm of the evidence: one declaration in twenty is wrong, along
-# one of a dozen axes.
+# Least gain of the log evidence: one declaration in twenty is wrong, along one of a
+# dozen axes.
 _LEAST_GAIN = 5.5
 _MOST_AXES = 6
-# Places that say it as well as the best, in the same unit.
+# Shifts whose log evidence is this close to the best one explain the measurements as
+# well.
 _AS_WELL = 3.0
-# What is declared wrongly is wrong by so much at least, m: millimetres, a mistaken
-# digit; another variant by what was fitted.
+# Standard deviation of a wrong declaration, m: some millimetres for a mistaken digit,
+# more for another variant. It is at least as large as the largest shift that was
+# fitted.
 _WRONG_M = 0.03
-# Beyond such a turn, rad, the geometry is not linear, and what a fit has of it means
-# nothing.
+# If the fit has turned a frame by more than this, rad, the geometry is not linear and
+# its parameters mean nothing.
 _LARGEST_TURN = 0.1
-# From this share of its length on a shift is along one axis.
+# From this share of its length on, a shift is reported as along one axis.
 _ALONG = 0.95
 TOOL = "tool"
 BASE = "base"
@@ -47,181 +52,321 @@ _LINK = "link_geometry"
 _OFFSET = "joint_offset"
 
 
-def find_misplaced_frames(fitted: Fit, campaign: Campaign) -> list[dict[str, Any]]:
-    """Findings, the surest first.
+@dataclass(frozen=True)
+class _FreeParameters:
+    """The N free parameters of a fit.
 
-    Returns of each ``place``: "tool", "base" or "link 3"; ``alternatives``, which say
-    it as well; ``shift_m`` (3,) in the axes of the base or of the far end of the link;
-    ``sizes``, its length over the usual one; ``sentence``.
+    Attributes
+    ----------
+    values : (N,), m or rad
+    usual_sizes : (N,), plausible sizes
+    axes : for shifts "x", "y" or "z"; meaningless for the others
+    is_geometry : (N,) bool, placements of the base, links and joint offsets
+    is_turn : (N,) bool, turns among these
+    places : by index of a shift of the base or of a link, the frame that it moves
     """
-    free = np.flatnonzero(~fitted.unidentifiable)
-    effects = {effect.key: effect.effect for effect in fitted.model.effects}
-    owners, listed = (
-        zip(*(fitted.parameters[at] for at in free), strict=True)
-        if len(free)
-        else ((), ())
-    )
-    kinds = [effects.get(owner) for owner in owners]
-    geometry = np.array([kind in (_BASE, _LINK, _OFFSET) for kind in kinds], bool)
-    usual = np.array([parameter.plausible for parameter in listed])
-    values = get_parameter_values(fitted.model, fitted.estimate)[free]
-    shifts = [
-        n
-        for n, kind in enumerate(kinds)
-        if kind in (_BASE, _LINK) and listed[n].unit == "m"
-    ]
-    turns = geometry & np.array([parameter.unit == "rad" for parameter in listed], bool)
-    if (
-        not shifts
-        or (np.abs(values) < usual)[shifts].all()
-        or (np.abs(values[turns]) > _LARGEST_TURN).any()
-    ):
-        return []
-    wrong_m = max(_WRONG_M, float(np.abs(values[shifts]).max()))
-    # What the measurements say, without the prior of the fit, and no more surely than
-    # the model explains them.
-    off = fitted.whiten(fitted.residual)
-    misfit = max(1.0, float((off**2).sum()) / max(off.size - len(free), 1))
-    precision = np.linalg.inv(fitted.covariance[np.ix_(free, free)])
-    weighted = precision @ values
-    precision[np.diag_indices(len(free))] -= np.where(
-        geometry, fitted.prior_std[free] ** -2.0, 0.0
-    )
-    precision = precision / misfit
-    weighted = weighted / misfit
 
-    def explained(wrong: list[int]) -> tuple[float, np.ndarray]:
-        """Log evidence with the most probable size of all else, but for a constant, and
-        the parameters then."""
-        found = []
+    values: np.ndarray
+    usual_sizes: np.ndarray
+    axes: list[str]
+    is_geometry: np.ndarray
+    is_turn: np.ndarray
+    places: dict[int, str]
+
+    @classmethod
+    def of_fit(cls, fitted: Fit, campaign: Campaign) -> _FreeParameters:
+        """Sort the free parameters of a fit."""
+        free = np.flatnonzero(~fitted.unidentifiable)
+        owners = [fitted.parameters[index][0] for index in free]
+        parameters = [fitted.parameters[index][1] for index in free]
+        effects = {effect.key: effect.effect for effect in fitted.model.effects}
+        kinds = [effects.get(owner) for owner in owners]
+        is_geometry = np.array(
+            [kind in (_BASE, _LINK, _OFFSET) for kind in kinds], bool
+        )
+        is_angle = np.array([p.unit == "rad" for p in parameters], bool)
+        has_reflector = any(t.offset_m is not None for t in _end_targets(campaign))
+        tool = f"{_LINK}@{campaign.robot.joints}" if has_reflector else ""
+        places = {}
+        for index, (owner, kind) in enumerate(zip(owners, kinds, strict=True)):
+            if kind in (_BASE, _LINK) and parameters[index].unit == "m":
+                places[index] = f"link {owner.partition('@')[2]}"
+                if owner == tool:
+                    places[index] = TOOL
+                elif kind == _BASE:
+                    places[index] = BASE
+        return cls(
+            get_parameter_values(fitted.model, fitted.estimate)[free],
+            np.array([parameter.plausible for parameter in parameters]),
+            [parameter.name[-1] for parameter in parameters],
+            is_geometry,
+            is_geometry & is_angle,
+            places,
+        )
+
+    @property
+    def shifts(self) -> list[int]:
+        """Indices of the shifts of the base and of links."""
+        return list(self.places)
+
+    @property
+    def is_plausible(self) -> bool:
+        """Whether no shift exceeds its usual size, so that nothing can be misplaced."""
+        return bool((np.abs(self.values) < self.usual_sizes)[self.shifts].all())
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether all turns are so small that the geometry is linear."""
+        return not (np.abs(self.values[self.is_turn]) > _LARGEST_TURN).any()
+
+
+@dataclass(frozen=True)
+class _Explanation:
+    """Measurements explained with some shifts declared wrongly.
+
+    `log_evidence`: with the most probable size of all other geometry, up to a constant.
+    `values` (N,): most probable parameters.
+    """
+
+    log_evidence: float
+    values: np.ndarray
+
+
+@dataclass(frozen=True)
+class _NormalEquations:
+    """Normal equations of the measurements, without the prior of the geometry.
+
+    Attributes
+    ----------
+    parameters : the N free parameters
+    precision : (N, N)
+    score : (N,), precision times the estimate
+    wrong_m : standard deviation of a shift that was declared wrongly, m
+    """
+
+    parameters: _FreeParameters
+    precision: np.ndarray
+    score: np.ndarray
+    wrong_m: float
+
+    @classmethod
+    def of_fit(cls, fitted: Fit, parameters: _FreeParameters) -> _NormalEquations:
+        """Normal equations of a fit.
+
+        The noise is scaled up if the model does not explain the measurements.
+        """
+        free = np.flatnonzero(~fitted.unidentifiable)
+        residual = fitted.whiten(fitted.residual)
+        degrees_of_freedom = max(residual.size - len(free), 1)
+        misfit = max(1.0, float((residual**2).sum()) / degrees_of_freedom)
+        precision = np.linalg.inv(fitted.covariance[np.ix_(free, free)])
+        score = precision @ parameters.values
+        precision[np.diag_indices(len(free))] -= np.where(
+            parameters.is_geometry, fitted.prior_std[free] ** -2.0, 0.0
+        )
+        largest_m = float(np.abs(parameters.values[parameters.shifts]).max())
+        return cls(
+            parameters, precision / misfit, score / misfit, max(_WRONG_M, largest_m)
+        )
+
+    def explain(self, wrong: Sequence[int]) -> _Explanation:
+        """Explain the measurements with some shifts declared wrongly, and all other
+        geometry of its most probable size."""
+        is_geometry = self.parameters.is_geometry
+        explanations = []
         for size in PRIOR_SCALES:
-            prior = size * usual
-            prior[wrong] = wrong_m
-            whole = precision + np.diag(np.where(geometry, prior**-2.0, 0.0))
-            best = np.linalg.solve(whole, weighted)
-            found.append(
-                (
-                    0.5 * (weighted @ best - np.linalg.slogdet(whole)[1])
-                    - np.log(prior[geometry]).sum(),
-                    best,
+            prior_std = size * self.parameters.usual_sizes
+            prior_std[list(wrong)] = self.wrong_m
+            precision = self.precision + np.diag(
+                np.where(is_geometry, prior_std**-2.0, 0.0)
+            )
+            values = np.linalg.solve(precision, self.score)
+            log_evidence = (
+                0.5 * (self.score @ values - np.linalg.slogdet(precision)[1])
+                - np.log(prior_std[is_geometry]).sum()
+            )
+            explanations.append(_Explanation(log_evidence, values))
+        return max(explanations, key=lambda explanation: explanation.log_evidence)
+
+
+def find_misplaced_frames(fitted: Fit, campaign: Campaign) -> list[MisplacedFrame]:
+    """Find the frames that were declared wrongly, the surest first.
+
+    Parameters
+    ----------
+    fitted : fit of the declared model, with geometry
+    campaign : its campaign
+
+    Returns
+    -------
+    Frames; a shift is in the axes of the base, or of the far end of the link
+    """
+    parameters = _FreeParameters.of_fit(fitted, campaign)
+    if not parameters.shifts or parameters.is_plausible or not parameters.is_linear:
+        return []
+    wrong = _find_wrong_shifts(_NormalEquations.of_fit(fitted, parameters))
+    frames = []
+    for place, alternatives in wrong.alternatives.items():
+        indices = [n for n in wrong.indices if parameters.places[n] == place]
+        shift_m = np.zeros(3)
+        axes = ["xyz".index(parameters.axes[n]) for n in indices]
+        shift_m[axes] = wrong.values[indices]
+        usual_m = parameters.usual_sizes[indices].max()
+        sizes = float(np.linalg.norm(shift_m) / usual_m)
+        if sizes > _MOST_SIZES:
+            sentence = _describe_frame(place, alternatives, shift_m, sizes, campaign)
+            frames.append(
+                MisplacedFrame(
+                    place, alternatives, tuple(shift_m.tolist()), sizes, sentence
                 )
             )
-        return max(found, key=lambda each: each[0])
+    return frames
 
-    reflector = any(target.offset_m is not None for target in _at_end(campaign))
-    tool = f"{_LINK}@{campaign.robot.joints}" if reflector else ""
-    places = {
-        n: TOOL
-        if owners[n] == tool
-        else BASE
-        if kinds[n] == _BASE
-        else f"link {owners[n].split('@')[1]}"
-        for n in shifts
-    }
-    taken: list[int] = []
-    others: dict[str, set[str]] = {}
-    last, at = explained(taken)
-    # Along one axis of a place, or along all of them.
-    ways: list[tuple[int, ...]] = [(n,) for n in shifts]
-    ways += [
-        tuple(n for n in shifts if places[n] == place) for place in set(places.values())
-    ]
-    while len(taken) < _MOST_AXES and (
-        left := [way for way in ways if not set(way) & set(taken)]
-    ):
-        tried = {way: explained([*taken, *way]) for way in left}
-        most = max(gain for gain, _ in tried.values())
-        if most - last < _LEAST_GAIN:
+
+@dataclass(frozen=True)
+class _WrongShifts:
+    """Shifts that were declared wrongly.
+
+    Attributes
+    ----------
+    indices : of their parameters
+    values : (N,), most probable parameters with these shifts
+    alternatives : by place, the other places whose shift explains the measurements as
+        well
+    """
+
+    indices: list[int]
+    values: np.ndarray
+    alternatives: dict[str, tuple[str, ...]]
+
+
+def _find_wrong_shifts(equations: _NormalEquations) -> _WrongShifts:
+    """Declare shifts as wrong, one after the other, as long as each makes the
+    measurements more probable."""
+    places = equations.parameters.places
+    wrong: list[int] = []
+    equivalent_places: dict[str, set[str]] = {}
+    explanation = equations.explain(wrong)
+    while len(wrong) < _MOST_AXES:
+        tried = {
+            shift: equations.explain([*wrong, *shift])
+            for shift in _list_shifts(places)
+            if not set(shift) & set(wrong)
+        }
+        most = max((e.log_evidence for e in tried.values()), default=-np.inf)
+        if most - explanation.log_evidence < _LEAST_GAIN:
             break
-        # Of places that say it as well: targets and tools are misplaced before bases,
-        # and these before links.
-        alike = [way for way in tried if tried[way][0] > most - _AS_WELL]
-        best = min(
-            alike,
-            key=lambda way: (
-                {TOOL: 0, BASE: 1}.get(places[way[0]], 2),
-                len(way),
-                -tried[way][0],
-            ),
+        equivalent = {
+            shift: explained
+            for shift, explained in tried.items()
+            if explained.log_evidence > most - _AS_WELL
+        }
+        shift = _choose_shift(equivalent, places)
+        explanation = tried[shift]
+        wrong += shift
+        equivalent_places.setdefault(places[shift[0]], set()).update(
+            places[indices[0]] for indices in equivalent
         )
-        last, at = tried[best]
-        taken += best
-        others.setdefault(places[best[0]], set()).update(
-            places[way[0]] for way in alike
-        )
-    found = []
-    for place, alternatives in others.items():
-        mine = [n for n in taken if places[n] == place]
-        shift = np.zeros(3)
-        shift[["xyz".index(listed[n].name[-1]) for n in mine]] = at[mine]
-        sizes = float(np.linalg.norm(shift) / usual[mine].max())
-        if sizes > _MOST_SIZES:
-            facts = {
-                "place": place,
-                "alternatives": sorted(alternatives - {place}),
-                "shift_m": shift.tolist(),
-                "sizes": sizes,
-            }
-            found.append(facts | {"sentence": _sentence(facts, campaign)})
-    return found
+    alternatives = {
+        place: tuple(sorted(equivalent - {place}))
+        for place, equivalent in equivalent_places.items()
+    }
+    return _WrongShifts(wrong, explanation.values, alternatives)
+
+
+def _list_shifts(places: dict[int, str]) -> list[tuple[int, ...]]:
+    """Ways to shift a frame, as indices of parameters: along one axis, or along all."""
+    single = [(index,) for index in places]
+    whole = [
+        tuple(index for index in places if places[index] == place)
+        for place in dict.fromkeys(places.values())
+    ]
+    return list(dict.fromkeys([*single, *whole]))
+
+
+def _choose_shift(
+    equivalent: dict[tuple[int, ...], _Explanation], places: dict[int, str]
+) -> tuple[int, ...]:
+    """Choose among shifts that explain the measurements as well as each other.
+
+    Targets and tools are misplaced more often than bases, and these more often than
+    links; a shift along one axis is simpler than one along all.
+    """
+    order = {TOOL: 0, BASE: 1}
+    return min(
+        equivalent,
+        key=lambda shift: (
+            order.get(places[shift[0]], 2),
+            len(shift),
+            -equivalent[shift].log_evidence,
+        ),
+    )
 
 
 def describe_reference_point(campaign: Campaign) -> str:
-    """Of which point a corrected robot is known: that of its end effector, as the
-    targets on it were declared."""
+    """Say to which point the errors of a corrected robot refer: that of its end
+    effector, as the targets on it were declared."""
     end = campaign.robot.chain.end_effector.name
-    targets = _at_end(campaign)
+    targets = _end_targets(campaign)
     if not targets:
         names = ", ".join(
             f"{target.name} on {target.point}" for target in campaign.targets
         )
         between = "what lies between is the robot file's."
-        return f"All errors are those of {end}, on which no target was measured ({names}): {between}"
-    fitted = ", whose offset was fitted"
-    each = [
-        t.name
-        + (fitted if t.offset_m is None else f" at {_millimetres(t.offset_m)} of it")
-        for t in targets
-    ]
-    return f"All errors are those of {end}, measured by the target {'; '.join(each)}."
-
-
-def _at_end(campaign: Campaign) -> list[Target]:
-    return [
-        target
-        for target in campaign.targets
-        if target.point == campaign.robot.chain.end_effector.name
-    ]
-
-
-def _millimetres(at: Sequence[float] | np.ndarray) -> str:
-    return f"({', '.join(f'{1e3 * value:.1f}' for value in at)}) mm"
-
-
-def _sentence(facts: dict[str, Any], campaign: Campaign) -> str:
-    shift = np.array(facts["shift_m"])
-    place = facts["place"]
-    end = campaign.robot.chain.end_effector.name
-    largest = np.abs(shift).max()
-    whole = np.linalg.norm(shift)
-    along = (
-        f"along {'xyz'[np.argmax(np.abs(shift))]}"
-        if largest > _ALONG * whole
-        else f"by {_millimetres(shift)}"
-    )
-    length = f"{1e3 * whole:.1f} mm"
-    others = " or ".join(facts["alternatives"])
-    text = f"{place} ends {length} from where the robot file has it, {along} of its far end: a wrong length, or another variant of"
-    text += " the robot" + (
-        ", or a wrong height of base or pedestal" if place == "link 1" else ""
-    )
-    if place == TOOL:
-        text = f"reflector or tool sits {length} from where it is declared, {along} of {end}: the flange is not certified, the"
-        text += " reflector is"
-    elif place == BASE:
-        text = (
-            f"the base stands {length} from where it is declared, {along} of the base"
+        return (
+            f"All errors are those of {end}, on which no target was measured ({names}): "
+            f"{between}"
         )
-    if others:
-        text += f" (or it is {others}: these measurements do not distinguish them)"
-    return f"{text}. It is {facts['sizes']:.0f} times what such a length is usually off"
+    descriptions = []
+    for target in targets:
+        if target.offset_m is None:
+            descriptions.append(f"{target.name}, whose offset was fitted")
+        else:
+            offset = _format_millimetres(target.offset_m)
+            descriptions.append(f"{target.name} at {offset} of it")
+    return f"All errors are those of {end}, measured by the target {'; '.join(descriptions)}."
+
+
+def _end_targets(campaign: Campaign) -> list[Target]:
+    """Targets on the measuring point of the end effector."""
+    end = campaign.robot.chain.end_effector.name
+    return [target for target in campaign.targets if target.point == end]
+
+
+def _format_millimetres(vector_m: Sequence[float] | np.ndarray) -> str:
+    return f"({', '.join(f'{1e3 * value:.1f}' for value in vector_m)}) mm"
+
+
+def _describe_frame(
+    place: str,
+    alternatives: tuple[str, ...],
+    shift_m: np.ndarray,
+    sizes: float,
+    campaign: Campaign,
+) -> str:
+    """What a report says of a misplaced frame; arguments as of `MisplacedFrame`."""
+    length_m = np.linalg.norm(shift_m)
+    length = f"{1e3 * length_m:.1f} mm"
+    direction = f"by {_format_millimetres(shift_m)}"
+    axis = np.argmax(np.abs(shift_m))
+    if np.abs(shift_m[axis]) > _ALONG * length_m:
+        direction = f"along {'xyz'[axis]}"
+    if place == TOOL:
+        end = campaign.robot.chain.end_effector.name
+        text = (
+            f"reflector or tool sits {length} from where it is declared, {direction} of {end}: "
+            "the flange is not certified, the reflector is"
+        )
+    elif place == BASE:
+        text = f"the base stands {length} from where it is declared, {direction} of the base"
+    else:
+        text = (
+            f"{place} ends {length} from where the robot file has it, {direction} of its far end: "
+            "a wrong length, or another variant of the robot"
+        )
+        if place == "link 1":
+            text += ", or a wrong height of base or pedestal"
+    if alternatives:
+        names = " or ".join(alternatives)
+        text += f" (or it is {names}: these measurements do not distinguish them)"
+    return f"{text}. It is {sizes:.0f} times what such a length is usually off"

@@ -1,29 +1,32 @@
-"""The next experiment: poses and loads after which the measurements, most probably, say
-which hypothesis holds.
+"""The next experiment: poses and loads after which the measurements most probably
+decide which hypothesis holds.
 
-Each pose is read at the campaign's targets without its load and under it. Loads are
-those of the campaign, made as large as its largest or as the rated payload.
+Each pose is measured at the campaign's targets without its load and under it. The loads
+are those of the campaign, scaled up to its largest one or to the rated payload.
 
-A hypothesis, in its most probable model, is linear in its coefficients: where present
+A hypothesis, in its most probable model, is linear in its coefficients. If the present
 measurements leave these normal with mean m and covariance C, new rows A are expected
-with mean A m and covariance I + A C A'. How far the best hypothesis and another one are
-apart is eight times the Bhattacharyya distance of both predictions (Kailath, IEEE
-Transactions on Communication Technology 1967): their squared Mahalanobis distance, or
-twice the expected log Bayes factor, where both predict as surely. Of random poses those
-are chosen, one after the other, that make the bound on the probability of a wrong
-choice least, the sum of sqrt(p q) exp(-separation / 8). What earlier poses will tell is
-taken off by conditioning on them, as a Kalman filter does.
+with mean A m and covariance I + A C A'. The separation of the best hypothesis from
+another one is eight times the Bhattacharyya distance of both predictions (Kailath, IEEE
+Transactions on Communication Technology 1967). If both predict with the same covariance
+it is their squared Mahalanobis distance, or twice the expected log Bayes factor.
+
+Poses are chosen one after the other from random ones, each so that it minimises the
+bound on the probability of a wrong decision, the sum of sqrt(p q) exp(-separation / 8).
+What the earlier poses will show is accounted for by conditioning on them, as a Kalman
+filter does.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.constants import g as standard_gravity
 from scipy.special import ndtr
 
+from elastocal.diagnosis.candidate_design import WhitenedFit
 from elastocal.diagnosis.refit import predict_reduced_chi_square
 from elastocal.diagnosis.statistics import assemble_normal_equations
 from elastocal.diagnosis.verdict import (
@@ -36,6 +39,7 @@ from elastocal.diagnosis.verdict import (
 from elastocal.fitting.model import evaluate_conditions
 from elastocal.fitting.observations import Observations, States
 from elastocal.mechanics.components import WRENCH_NAMES
+from elastocal.verdict import NextExperiment
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,365 +50,494 @@ if TYPE_CHECKING:
     from elastocal.fitting.model import Model as FittedModel
     from elastocal.mechanics.robot import Robot
 
-# Said where nothing within reach helps.
+    Table = dict[str, np.ndarray]
+
+# Reasons why there is nothing to measure.
 NOT_DISTINGUISHABLE = "not distinguishable with this robot and tracker"
 NOTHING_MISSING = "nothing is missing"
 NOTHING_AMBIGUOUS = "nothing is ambiguous"
 DATA_AT_FAULT = "the data are at fault"
 NOTHING_TESTABLE = "the measurements can test no mechanism"
-# Random poses that are chosen from, and hypotheses between which they decide; the
-# others hold a few per cent.
-_DRAWN = 200
+# Number of random experiments to choose from.
+_CANDIDATE_EXPERIMENTS = 200
+# Number of hypotheses between which to decide; others hold a few per cent.
 _HYPOTHESES = 6
-# Poses after which nobody goes on: some two days with a tracker.
+# No experiment has more poses than this: they take some two days with a tracker.
 _MOST_POSES = 100
-# Odds of the right hypothesis against another one with which it counts as resolved.
+# An ambiguity counts as resolved if the right hypothesis gets these odds against the
+# other one.
 _SURE_ODDS = 19.0
 
 
 def draw_candidate_experiments(
     states: States, robot: Robot, count: int, stream: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Random joint angles (E, n), rad, within reach, and the heavier loads of a
-    campaign at its last measuring point (E, 6)."""
+    """Draw random joint angles within the limits, with the heavier loads of a campaign.
+
+    Parameters
+    ----------
+    states : states of the campaign
+    robot : the robot
+    count : number E of experiments
+    stream : random numbers
+
+    Returns
+    -------
+    joint_angles : (E, n), rad
+    wrench : (E, 6), at the last measuring point, N and N m
+    """
     low, high = np.clip(robot.joint_limits, -np.pi, np.pi).T
     angles = low + (high - low) * stream.random((count, len(low)))
-    size = np.linalg.norm(states.wrench[:, :3], axis=1)
-    if not size.any():
+    force = np.linalg.norm(states.wrench[:, :3], axis=1)
+    if not force.any():
         return angles, np.zeros((count, 6))
-    heavy = np.flatnonzero(size >= np.median(size[size > 0]))
+    heavy = np.flatnonzero(force >= np.median(force[force > 0]))
     chosen = heavy[stream.integers(0, len(heavy), count)]
-    largest = max(size.max(), (robot.payload_kg or 0.0) * standard_gravity)
-    return angles, states.wrench[chosen] * (largest / size[chosen])[:, None]
+    largest = max(force.max(), (robot.payload_kg or 0.0) * standard_gravity)
+    return angles, states.wrench[chosen] * (largest / force[chosen])[:, None]
 
 
 def build_planned_observations(
-    model: FittedModel, own: States, angles: np.ndarray, wrench: np.ndarray
+    model: FittedModel, states: States, angles: np.ndarray, wrench: np.ndarray
 ) -> Observations:
-    """Entries as observations with zeros measured, those of an entry together, joints
-    approached from either side in turn.
+    """Build observations of planned experiments, with zeros for what is measured.
 
-    `own`: states of the campaign, which go on where the last of them is.
+    The joints are approached from either side in turn. Clock and temperature stay as in
+    the last state of the campaign.
+
+    Parameters
+    ----------
+    model : the fitted model, whose targets are measured
+    states : states of the campaign
+    angles : (E, n), joint angles, rad
+    wrench : (E, 6), load of each experiment
+
+    Returns
+    -------
+    Observations of one experiment are consecutive: without its load, and under it.
     """
-    # Without the load, and under it.
-    shares = np.array([0.0, 1.0] if own.wrench[:, :3].any() else [1.0])
-    entry = np.repeat(np.arange(len(angles)), len(shares))
+    has_loads = states.wrench[:, :3].any()
+    shares = np.array([0.0, 1.0] if has_loads else [1.0])
+    experiment = np.repeat(np.arange(len(angles)), len(shares))
     load = np.tile(np.arange(len(shares)), len(angles))
-    count = len(entry)
-    targets = len(model.targets)
-    side = np.where(
-        np.add.outer(np.arange(count), np.arange(angles.shape[1])) % 2, -1.0, 1.0
-    )
-    last = {
+    count = len(experiment)
+    columns = {
         name: np.repeat(values[-1:], count, axis=0)
-        for name, values in vars(own).items()
+        for name, values in vars(states).items()
         if values is not None
     }
-    new = {
-        "pose": entry,
+    columns |= {
+        "pose": experiment,
         "load": load,
-        "joint_angles": angles[entry],
-        "wrench": wrench[entry] * shares[load, None],
+        "joint_angles": angles[experiment],
+        "wrench": wrench[experiment] * shares[load, None],
+        "repeats": np.ones(count, int),
     }
-    new |= {"repeats": np.ones(count, int)} | (
-        {} if own.approach is None else {"approach": side}
-    )
+    if states.approach is not None:
+        parity = np.add.outer(np.arange(count), np.arange(angles.shape[1])) % 2
+        columns["approach"] = np.where(parity, -1.0, 1.0)
+    targets = len(model.targets)
     state = np.repeat(np.arange(count), targets)
     target = np.tile(np.arange(targets), count)
     rotation = np.tile(np.eye(3), (len(target), 1, 1)) if model.rows == 6 else None
     return Observations(
-        States(**last | new), state, target, np.zeros((len(target), 3)), rotation
+        States(**columns), state, target, np.zeros((len(target), 3)), rotation
     )
 
 
 def compute_whitened_rows(
-    linearized: CandidateDesign,
+    design: CandidateDesign,
     observations: Observations,
     columns: np.ndarray,
     pose_error_rad: float,
 ) -> np.ndarray:
-    """Sensitivities of entries to declared parameters and some columns, in those of
-    `products`, over the noise, (E, R, U)."""
-    about = linearized.reference_fit
-    products = linearized.products
-    # Nothing comes after the last row of the campaign but these.
-    around = evaluate_conditions(about.model, about.estimate, observations.states)
-    around = replace(around, progress=np.ones(len(observations.states)))
-    about = replace(about, weights=np.ones(len(observations)))
-    seen = replace(
-        linearized, reference_fit=about, observations=observations, around=around
-    ).rows
-    basis = seen.declared @ products.basis_transform
-    beside = (
-        seen.candidates.dense()[..., columns] - basis @ products.projections[:, columns]
+    """Compute whitened sensitivities of planned experiments.
+
+    Parameters
+    ----------
+    design : design of the campaign
+    observations : observations of E experiments with R numbers each
+    columns : (D,) int, candidate columns
+    pose_error_rad : error that the measurements of an experiment have in common
+
+    Returns
+    -------
+    (E, R, P + D), sensitivities to the orthonormal declared columns of the design's
+    products, and to the candidate columns orthogonal to them
+    """
+    fitted = design.reference_fit
+    products = design.products
+    conditions = evaluate_conditions(fitted.model, fitted.estimate, observations.states)
+    # The experiments follow the last row of the campaign.
+    conditions = replace(conditions, progress=np.ones(len(observations.states)))
+    planned = WhitenedFit(
+        replace(fitted, weights=np.ones(len(observations))),
+        observations,
+        conditions,
+        design.whitened.candidate_keys,
     )
-    entries = seen.pose.max() + 1
-    rows = np.concatenate([basis, beside], axis=-1).reshape(
-        entries, -1, basis.shape[-1] + len(columns)
+    rows = replace(design, whitened=planned).rows
+    basis = rows.declared @ products.basis_transform
+    candidates = (
+        rows.candidates.dense()[..., columns] - basis @ products.projections[:, columns]
     )
-    jacobian = seen.jacobian.reshape(entries, rows.shape[1], -1)
-    covariance = np.eye(
-        rows.shape[1]
-    ) + pose_error_rad**2 * jacobian @ jacobian.swapaxes(1, 2)
-    return np.linalg.solve(np.linalg.cholesky(covariance), rows)
+    experiments = rows.pose.max() + 1
+    width = basis.shape[-1] + len(columns)
+    sensitivities = np.concatenate([basis, candidates], axis=-1).reshape(
+        experiments, -1, width
+    )
+    numbers = sensitivities.shape[1]
+    jacobian = rows.jacobian.reshape(experiments, numbers, -1)
+    common = pose_error_rad**2 * jacobian @ jacobian.swapaxes(1, 2)
+    factor = np.linalg.cholesky(np.eye(numbers) + common)
+    return np.linalg.solve(factor, sensitivities)
 
 
 def compute_coefficient_posteriors(
-    linearized: CandidateDesign,
+    design: CandidateDesign,
     columns: np.ndarray,
     models: Sequence[ScoredModel],
-    factor: float,
+    noise_factor: float,
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Mean (U,) and covariance (U, U) of declared parameters and columns under each
-    model; zero for what it does not have.
+    """Compute the posterior of the declared parameters and some columns (D,) under each
+    model, zero for columns that the model does not have.
 
-    At the pose error of the first one, in units of `factor` times the noise taken.
     Half-normal priors count as normal ones.
+
+    Parameters
+    ----------
+    design : design of the campaign
+    columns : (D,) int, rising
+    models : models; the pose error is that of the first one
+    noise_factor : the true noise over the noise that whitened the rows, in whose units
+        the coefficients are
+
+    Returns
+    -------
+    Mean (P + D,) and covariance (P + D, P + D) for each model
     """
-    count = linearized.products.declared_count
-    found = []
+    count = design.products.declared_count
     declared = np.arange(count)
-    total = (
-        assemble_normal_equations(
-            linearized.products, models[0].pose_error_rad, columns
-        )
-        / factor**2
+    equations = (
+        assemble_normal_equations(design.products, models[0].pose_error_rad, columns)
+        / noise_factor**2
     )
+    posteriors = []
     for model in models:
-        mine, deviations = linearized.problem.scaled_columns(
+        of_model, deviations = design.problem.scaled_columns(
             model.term_indices, model.scales
         )
-        at = np.append(declared, count + np.searchsorted(columns, mine))
-        precision = total[np.ix_(at, at)] + np.diag(
-            np.append(0.0 * declared, (factor * deviations) ** -2)
-        )
-        covariance = np.zeros((len(total) - 1, len(total) - 1))
-        covariance[np.ix_(at, at)] = np.linalg.inv(precision)
-        found.append((covariance @ total[:-1, -1], covariance))
-    return found
+        indices = np.append(declared, count + np.searchsorted(columns, of_model))
+        prior = np.append(0.0 * declared, (noise_factor * deviations) ** -2)
+        precision = equations[np.ix_(indices, indices)] + np.diag(prior)
+        covariance = np.zeros((len(equations) - 1, len(equations) - 1))
+        covariance[np.ix_(indices, indices)] = np.linalg.inv(precision)
+        posteriors.append((covariance @ equations[:-1, -1], covariance))
+    return posteriors
 
 
 @dataclass(frozen=True)
 class HypothesisPair:
     """Two hypotheses after some experiments.
 
-    `apart` (U,): difference of their means. `covariances` (3, U, U): the mean of both,
-    and each. `separation`: of what was measured.
+    Attributes
+    ----------
+    mean_difference : (U,), difference of the means of their coefficients
+    covariances : (3, U, U), the average of both covariances, and each
+    separation : by the experiments so far
     """
 
-    apart: np.ndarray
+    mean_difference: np.ndarray
     covariances: np.ndarray
     separation: float = 0.0
 
     @classmethod
     def of(
-        cls, one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray]
+        cls, first: tuple[np.ndarray, np.ndarray], second: tuple[np.ndarray, np.ndarray]
     ) -> HypothesisPair:
-        """Of two normal distributions of the coefficients."""
-        return cls(
-            one[0] - other[0], np.array([(one[1] + other[1]) / 2, one[1], other[1]])
-        )
+        """Pair two normal distributions, each with mean and covariance."""
+        average = (first[1] + second[1]) / 2
+        return cls(first[0] - second[0], np.array([average, first[1], second[1]]))
 
-    def gained(self, rows: np.ndarray) -> np.ndarray:
-        """By how much each of some further experiments (E, R, U) separates them more,
-        (E,)."""
-        predicted = np.eye(rows.shape[1]) + rows @ self.covariances[
-            :, None
-        ] @ rows.swapaxes(1, 2)
-        off = (rows @ self.apart)[..., None]
-        squares = (off * np.linalg.solve(predicted[0], off)).sum(axis=(1, 2))
-        return squares + np.array([4.0, -2.0, -2.0]) @ np.linalg.slogdet(predicted)[1]
+    def separation_gains(self, rows: np.ndarray) -> np.ndarray:
+        """Separation (E,) that each of some further experiments (E, R, U) would add."""
+        covariances = self.covariances[:, None]
+        predicted = np.eye(rows.shape[1]) + rows @ covariances @ rows.swapaxes(1, 2)
+        difference = (rows @ self.mean_difference)[..., None]
+        solved = np.linalg.solve(predicted[0], difference)
+        squares = (difference * solved).sum(axis=(1, 2))
+        log_dets = np.linalg.slogdet(predicted)[1]
+        return squares + np.array([4.0, -2.0, -2.0]) @ log_dets
 
-    def after(self, rows: np.ndarray) -> HypothesisPair:
-        """Both after one experiment (R, U), on average over what it may measure."""
-        seen = rows @ self.covariances
-        gain = np.linalg.solve(np.eye(len(rows)) + seen @ rows.T, seen).swapaxes(1, 2)
-        separation = self.separation + float(self.gained(rows[None])[0])
+    def condition_on(self, rows: np.ndarray) -> HypothesisPair:
+        """The pair after one experiment (R, U), on average over what it may measure."""
+        projected = rows @ self.covariances
+        innovation = np.eye(len(rows)) + projected @ rows.T
+        gain = np.linalg.solve(innovation, projected).swapaxes(1, 2)
+        difference = self.mean_difference - gain[0] @ (rows @ self.mean_difference)
+        added = float(self.separation_gains(rows[None])[0])
         return HypothesisPair(
-            self.apart - gain[0] @ (rows @ self.apart),
-            self.covariances - gain @ seen,
-            separation,
+            difference, self.covariances - gain @ projected, self.separation + added
         )
 
 
 def select_experiments(
     pairs: Sequence[HypothesisPair], weights: np.ndarray, rows: np.ndarray, count: int
 ) -> tuple[list[int], np.ndarray]:
-    """So many experiments, each the best after those before it, and the separation of
-    each pair after each, (count, pairs).
+    """Select experiments, each the best one given those before it.
 
-    `weights` (pairs,): of each pair in the bound. `rows` (E, R, U): of what is chosen
-    from.
+    Parameters
+    ----------
+    pairs : pairs of hypotheses to separate
+    weights : (pairs,), weight of each pair in the bound
+    rows : (E, R, U), experiments to choose from
+    count : number of experiments to select
+
+    Returns
+    -------
+    chosen : indices of the experiments
+    separations : (count, pairs), of each pair after each experiment
     """
-    chosen = list[int]()
+    chosen: list[int] = []
     separations = []
     present = list(pairs)
     for _ in range(count):
-        bound = weights @ np.exp(
-            [-(pair.separation + pair.gained(rows)) / 8.0 for pair in present]
-        )
+        exponents = [
+            -(pair.separation + pair.separation_gains(rows)) / 8.0 for pair in present
+        ]
+        bound = weights @ np.exp(exponents)
         bound[chosen] = np.inf
-        chosen.append(int(np.argmin(bound)))
-        present = [pair.after(rows[chosen[-1]]) for pair in present]
+        best = int(np.argmin(bound))
+        chosen.append(best)
+        present = [pair.condition_on(rows[best]) for pair in present]
         separations.append([pair.separation for pair in present])
     return chosen, np.array(separations)
 
 
 def compute_resolution_probability(separation: np.ndarray | float) -> np.ndarray:
-    """Probability that the right one of two hypotheses gets odds of 19:1 from even
-    ones: the log Bayes factor is normal with this variance and half of it as its mean,
-    where both predict as surely."""
-    size = np.maximum(separation, 1e-12)
-    return np.asarray(ndtr((0.5 * size - np.log(_SURE_ODDS)) / np.sqrt(size)))
+    """Compute the probability that the right one of two hypotheses gets odds of 19:1
+    from even ones.
+
+    The log Bayes factor is normal with the separation as its variance, and half of it
+    as its mean, if both hypotheses predict with the same covariance.
+    """
+    variance = np.maximum(separation, 1e-12)
+    excess = 0.5 * variance - np.log(_SURE_ODDS)
+    return np.asarray(ndtr(excess / np.sqrt(variance)))
 
 
 def propose_experiment(
     diagnosis: Diagnosis, stream: np.random.Generator, poses: int = 10
-) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """Choose the poses and loads that most probably resolve what a diagnosis leaves
+) -> tuple[Table, NextExperiment]:
+    """Propose the poses and loads that most probably resolve what a diagnosis leaves
     ambiguous.
 
-    Returns columns of the table of poses, in the order of their worth: ``effect``, the
-    best hypothesis and the nearest other; ``pose``; ``point``, at which targets are
-    read; joint angles as the controller reports them (rad); the load; and what they and
-    all before them promise, ``separation`` from the nearest other and the probability
-    ``resolved`` that follows from it. And what verdict.json says: ``reason`` why there
-    is nothing to measure, and what is ``indistinguishable`` from the best by any
-    experiment within reach, which the promise leaves aside.
+    Parameters
+    ----------
+    diagnosis : the diagnosis
+    stream : random numbers
+    poses : number of poses
+
+    Returns
+    -------
+    table : columns of the proposed poses, the most valuable first: ``effect``, the best
+        hypothesis and the nearest alternative; ``pose``; ``point``, where the targets
+        are measured; joint angles as the controller reports them, rad; the load;
+        ``separation`` from the nearest alternative by this pose and all before it; and
+        the probability ``resolved`` that follows from it
+    summary : what verdict.json says. The promise leaves aside hypotheses that no
+        experiment within reach distinguishes from the best one.
     """
-    campaign = diagnosis.case.campaign
+    robot = diagnosis.case.campaign.robot
     evidence = diagnosis.evidence
     if evidence is None:
-        return _stated(campaign.robot, (), DATA_AT_FAULT)
-    kept, reason = _ambiguous(evidence)
+        return _explain_no_experiment(robot, (), DATA_AT_FAULT)
     best = evidence.conclusion.best.mechanisms
-    others = kept[1:]
+    reason = _find_reason_against(evidence)
     if reason:
-        return _stated(campaign.robot, best, reason)
-    linearized = evidence.linearized
+        return _explain_no_experiment(robot, best, reason)
+    hypotheses = _select_hypotheses(evidence)
     model = diagnosis.final.model
     states = diagnosis.case.observations.states
-    models = [evidence.posterior.models[each.model] for each in kept]
-    factor = float(
-        np.sqrt(max(predict_reduced_chi_square(linearized.problem, models[0]), 1.0))
+    angles, wrench = draw_candidate_experiments(
+        states, robot, _CANDIDATE_EXPERIMENTS, stream
     )
-    columns = np.unique(
-        np.concatenate(
-            [
-                linearized.problem.scaled_columns(each.term_indices, each.scales)[0]
-                for each in models
-            ]
+    planned = build_planned_observations(model, states, angles, wrench)
+    pairs, rows = _predict_experiments(evidence, hypotheses, planned)
+    plan = _Plan.choose(hypotheses, pairs, rows, poses)
+    if plan.unreachable and plan.certainty >= evidence.linearized.settings.credible:
+        return _explain_no_experiment(
+            robot, best, NOT_DISTINGUISHABLE, plan.unreachable
         )
+    table = _build_table(
+        robot, angles[plan.chosen], wrench[plan.chosen], plan.least_separations
     )
-    angles, wrench = draw_candidate_experiments(states, campaign.robot, _DRAWN, stream)
-    rows = (
-        compute_whitened_rows(
-            linearized,
-            build_planned_observations(model, states, angles, wrench),
-            columns,
-            models[0].pose_error_rad,
-        )
-        / factor
+    points = dict.fromkeys(target.point for target in model.targets)
+    table["effect"] = np.full(
+        poses, f"{' + '.join(best)} or {' + '.join(plan.nearest)}"
     )
-    leading, *following = compute_coefficient_posteriors(
-        linearized, columns, models, factor
+    table["point"] = np.full(poses, " ".join(points))
+    return table, NextExperiment(
+        poses,
+        reason="",
+        best=best,
+        nearest=plan.nearest,
+        indistinguishable=plan.unreachable,
+        separation=float(table["separation"][-1]),
+        resolved=float(table["resolved"][-1]),
     )
-    pairs = [HypothesisPair.of(leading, each) for each in following]
-    probabilities = np.array([each.probability for each in others])
-    chosen, separations = select_experiments(
-        pairs, np.sqrt(kept[0].probability * probabilities), rows, poses
-    )
-    whole = np.sqrt(_MOST_POSES / poses) * rows[chosen].reshape(1, -1, rows.shape[-1])
-    reached = np.array(
-        [
-            bool(compute_resolution_probability(pair.gained(whole)[0]) >= 0.5)
-            for pair in pairs
-        ]
-    )
-    unreachable = [
-        each.mechanisms
-        for each, within in zip(others, reached, strict=True)
-        if not within
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """Chosen experiments, and what they promise.
+
+    Attributes
+    ----------
+    hypotheses : the best one and its alternatives
+    chosen : indices of the experiments
+    separations : (experiments, alternatives), after each experiment
+    within_reach : (alternatives,) bool, alternatives that some experiment can resolve
+    """
+
+    hypotheses: list[Hypothesis]
+    chosen: list[int]
+    separations: np.ndarray
+    within_reach: np.ndarray
+
+    @classmethod
+    def choose(
+        cls,
+        hypotheses: list[Hypothesis],
+        pairs: Sequence[HypothesisPair],
+        rows: np.ndarray,
+        poses: int,
+    ) -> _Plan:
+        """Choose experiments from some rows (E, R, U)."""
+        probabilities = np.array([h.probability for h in hypotheses])
+        weights = np.sqrt(probabilities[0] * probabilities[1:])
+        chosen, separations = select_experiments(pairs, weights, rows, poses)
+        within_reach = _find_resolvable(pairs, rows[chosen])
+        return cls(hypotheses, chosen, separations, within_reach)
+
+    @property
+    def unreachable(self) -> tuple[tuple[str, ...], ...]:
+        """Mechanisms of the alternatives that no experiment within reach resolves."""
+        pairs = zip(self.hypotheses[1:], self.within_reach, strict=True)
+        return tuple(h.mechanisms for h, is_within in pairs if not is_within)
+
+    @property
+    def certainty(self) -> float:
+        """Probability of the best hypothesis against the alternatives within reach.
+
+        If it is as large as an unambiguous diagnosis asks for, nothing that can be
+        resolved is ambiguous.
+        """
+        leading, *others = (h.probability for h in self.hypotheses)
+        return leading / (leading + np.array(others)[self.within_reach].sum())
+
+    @property
+    def nearest(self) -> tuple[str, ...]:
+        """Mechanisms of the alternative within reach that is separated least."""
+        separations = np.where(self.within_reach, self.separations[-1], np.inf)
+        return self.hypotheses[1 + int(np.argmin(separations))].mechanisms
+
+    @property
+    def least_separations(self) -> np.ndarray:
+        """Separation (experiments,) of the alternatives within reach."""
+        return self.separations[:, self.within_reach].min(axis=1)
+
+
+def _predict_experiments(
+    evidence: Evidence, hypotheses: Sequence[Hypothesis], planned: Observations
+) -> tuple[list[HypothesisPair], np.ndarray]:
+    """Pairs of the best hypothesis with each alternative, and the rows (E, R, U) of
+    planned experiments in units of the noise that the best one leaves."""
+    design = evidence.linearized
+    models = [evidence.posterior.models[h.model] for h in hypotheses]
+    misfit = predict_reduced_chi_square(design.problem, models[0])
+    noise_factor = float(np.sqrt(max(misfit, 1.0)))
+    of_models = [
+        design.problem.scaled_columns(model.term_indices, model.scales)[0]
+        for model in models
     ]
-    # What is distinguishable from the best holds no more probability than is left open
-    # where nothing is ambiguous.
-    left = kept[0].probability / (kept[0].probability + probabilities[reached].sum())
-    if unreachable and left >= linearized.settings.credible:
-        return _stated(campaign.robot, best, NOT_DISTINGUISHABLE, unreachable)
-    nearest = int(np.argmin(np.where(reached, separations[-1], np.inf)))
-    point = " ".join(dict.fromkeys(target.point for target in model.targets))
-    table = angles[chosen], wrench[chosen], point, separations[:, reached].min(axis=1)
-    return _stated(
-        campaign.robot, best, "", unreachable, others[nearest].mechanisms, table
+    columns = np.unique(np.concatenate(of_models))
+    rows = compute_whitened_rows(design, planned, columns, models[0].pose_error_rad)
+    leading, *following = compute_coefficient_posteriors(
+        design, columns, models, noise_factor
     )
+    pairs = [HypothesisPair.of(leading, posterior) for posterior in following]
+    return pairs, rows / noise_factor
 
 
-def _stated(
-    robot: Robot,
-    best: tuple[str, ...],
-    reason: str,
-    indistinguishable: Sequence[tuple[str, ...]] = (),
-    nearest: tuple[str, ...] = (),
-    table: tuple[np.ndarray, np.ndarray, str, np.ndarray] | None = None,
-) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    angles, wrench, point, separation = table or (
-        np.zeros((0, robot.joints)),
-        np.zeros((0, 6)),
-        "",
-        np.zeros(0),
-    )
+def _find_resolvable(pairs: Sequence[HypothesisPair], rows: np.ndarray) -> np.ndarray:
+    """Which pairs (pairs,) bool some experiments (E, R, U) would more likely than not
+    resolve if they were repeated up to the largest number of poses."""
+    repeated = np.sqrt(_MOST_POSES / len(rows)) * rows.reshape(1, -1, rows.shape[-1])
+    gains = np.array([pair.separation_gains(repeated)[0] for pair in pairs])
+    return compute_resolution_probability(gains) >= 0.5
+
+
+def _build_table(
+    robot: Robot, angles: np.ndarray, wrench: np.ndarray, separation: np.ndarray
+) -> Table:
+    """Columns of proposed poses; effect and point are empty."""
     count = len(angles)
-    columns = {
-        "effect": np.full(count, f"{' + '.join(best)} or {' + '.join(nearest)}"),
+    reported = robot.reported_angles(angles).T
+    return {
+        "effect": np.full(count, ""),
         "pose": np.arange(count),
-        "point": np.full(count, point),
-        **{
-            f"q{joint}": angle
-            for joint, angle in enumerate(robot.reported_angles(angles).T, 1)
-        },
+        "point": np.full(count, ""),
+        **{f"q{joint}": angle for joint, angle in enumerate(reported, 1)},
         **dict(zip(WRENCH_NAMES, wrench.T, strict=True)),
         "separation": separation,
         "resolved": compute_resolution_probability(separation),
     }
-    last = {
-        name: float(columns[name][-1]) if count else None
-        for name in ("separation", "resolved")
-    }
-    names = {
-        "best": list(best),
-        "nearest": list(nearest),
-        "indistinguishable": [list(name) for name in indistinguishable],
-    }
-    return columns, {"poses": count, "reason": reason} | names | last
 
 
-def _ambiguous(evidence: Evidence) -> tuple[list[Hypothesis], str]:
-    """Credible hypotheses, the best first; or why there is nothing to resolve."""
+def _explain_no_experiment(
+    robot: Robot,
+    best: tuple[str, ...],
+    reason: str,
+    indistinguishable: tuple[tuple[str, ...], ...] = (),
+) -> tuple[Table, NextExperiment]:
+    """An empty table, and the reason why there is nothing to measure."""
+    table = _build_table(
+        robot, np.zeros((0, robot.joints)), np.zeros((0, 6)), np.zeros(0)
+    )
+    return table, NextExperiment(
+        0,
+        reason,
+        best,
+        nearest=(),
+        indistinguishable=indistinguishable,
+        separation=None,
+        resolved=None,
+    )
+
+
+def _find_reason_against(evidence: Evidence) -> str:
+    """Why there is nothing to resolve; empty if there is."""
     conclusion = evidence.conclusion
-    if conclusion.verdict in (ADEQUATE, NOT_TESTABLE):
-        return (
-            [],
-            NOTHING_MISSING if conclusion.verdict == ADEQUATE else NOTHING_TESTABLE,
-        )
-    there = [
-        each for each in conclusion.hypotheses if each.mechanisms and each.model >= 0
-    ]
-    reached = np.cumsum([each.probability for each in there])
-    credible = there[
-        : int(
-            np.searchsorted(
-                reached, evidence.linearized.settings.credible * reached[-1]
-            )
-        )
-        + 1
-    ]
+    if conclusion.verdict == ADEQUATE:
+        return NOTHING_MISSING
+    if conclusion.verdict == NOT_TESTABLE:
+        return NOTHING_TESTABLE
+    best = set(conclusion.best.mechanisms)
+    alternatives = _select_hypotheses(evidence)[1:]
+    # If the verdict names one mechanism, the name is not ambiguous because of what else
+    # may act as well.
+    if conclusion.verdict == NAMED:
+        alternatives = [h for h in alternatives if not set(h.mechanisms) >= best]
+    return "" if alternatives else NOTHING_AMBIGUOUS
+
+
+def _select_hypotheses(evidence: Evidence) -> list[Hypothesis]:
+    """The best hypothesis, and the other credible ones by their probability."""
+    conclusion = evidence.conclusion
+    present = [h for h in conclusion.hypotheses if h.mechanisms and h.model >= 0]
+    cumulative = np.cumsum([h.probability for h in present])
+    least = evidence.linearized.settings.credible * cumulative[-1]
+    credible = present[: int(np.searchsorted(cumulative, least)) + 1]
     best = conclusion.best
-    found = [best, *(each for each in credible if each != best)][:_HYPOTHESES]
-    # Where the verdict names one mechanism, whatever else is beside it does not make
-    # the name ambiguous.
-    instead = [
-        each for each in found[1:] if not set(each.mechanisms) >= set(best.mechanisms)
-    ]
-    if len(found) < 2 or (conclusion.verdict == NAMED and not instead):
-        return [], NOTHING_AMBIGUOUS
-    return found, ""
+    return [best, *(h for h in credible if h != best)][:_HYPOTHESES]

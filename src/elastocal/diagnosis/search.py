@@ -1,21 +1,11 @@
-"""Posterior over models: extend the best, drop what is not needed, weigh all that were
-met.
+"""Posterior over models: a beam search that extends the best models by single terms,
+drops terms that are not needed, and weighs all models that it met.
 
-A model is a set of units. From the declared model on, and from each mechanism at all
-its locations, the best few models met are extended by every unit and shrunk by each of
-theirs: a beam search over the neighbours of shotgun stochastic search (Hans, Dobra and
-West, JASA 2007). What lies in Occam's window (Madigan and Raftery, JASA 1994) is
-evaluated in full.
-
-Whether anything is missing at all is one Monte Carlo test (`alarm_of`). Its statistic
-is the log of the average Bayes factor, over all units and all whole mechanisms, against
-"nothing" (Good, The Bayes/non-Bayes compromise, JASA 1992); its null distribution that
-of simulated measurements of the same design at the pose error that fits best, averaged
-over anew each time: a parametric bootstrap (Davison and Hinkley, Bootstrap Methods,
-1997, 4.2), without a correction for many tests. Sizes begin a step below those of the
-posterior: what lies between may be seen. Where nothing is missing a Bayes factor
-exceeds b with a probability of at most 1/b (Markov's inequality): where b is far beyond
-the number of draws, none is made.
+A model is a set of terms. From the declared model on, and from each mechanism at all
+its locations, the best few models met so far are extended by every term and shrunk by
+each of theirs: a beam search over the neighbourhoods of shotgun stochastic search
+(Hans, Dobra and West, JASA 2007). The models in Occam's window (Madigan and Raftery,
+JASA 1994) are evaluated in full.
 """
 
 from __future__ import annotations
@@ -23,7 +13,7 @@ from __future__ import annotations
 from bisect import bisect
 from collections import Counter
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from heapq import nlargest
 from typing import TYPE_CHECKING
@@ -38,7 +28,6 @@ from elastocal.diagnosis.evidence import (
     compute_pose_error_log_prior,
     evaluate_extensions,
     evaluate_model,
-    log_likelihood,
     log_sum_exp,
 )
 from elastocal.diagnosis.hypotheses import (
@@ -47,43 +36,39 @@ from elastocal.diagnosis.hypotheses import (
     ModelTerm,
     build_model_prior,
 )
-from elastocal.diagnosis.statistics import (
-    CrossProducts,
-    SufficientStatistics,
-    simulate_null_statistics,
-)
+from elastocal.diagnosis.statistics import SufficientStatistics
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Sequence
 
     from elastocal.diagnosis.settings import Settings
 
-# Models below the best by more than this, in log odds, hold nothing.
-_NEGLIGIBLE = 9.0
-# A round that raises the best by less than this brings nothing.
+    TermSet = tuple[int, ...]
+
+# Occam's window in log odds: models this far below the best one hold no probability
+# that is reported.
+_OCCAM_WINDOW = 9.0
+# A round counts as an improvement if it raises the best log odds by more than this.
 _BETTER = 0.1
-# Sizes of the pose error with less than this, in log probability, under all of so many
-# good single units are left out.
+# Sizes of the pose error are dropped if their log weight is below this under the
+# declared model and under each of the best single terms, of which this many count.
 NEGLIGIBLE_LOG_WEIGHT = -9.0
-_TELLING_UNITS = 10
-# Sizes with less than this under the best model met so far are left out from there on:
-# what comes near to that model differs from it by a few units, which over a hundred
-# orders of magnitude do not hang on.
-_OUT_OF_QUESTION = -300.0
-# Terms of Bayes factors that are in a cache at once.
-_AT_ONCE = 10_000
-# Steps of the grid of the pose error to either side that measurements simulated with
-# one size can make likely.
-_REACH = 2
-# Bayes factor over the number of draws, the measurements' own included, beyond which
-# none is made. The mean of one is that over the prior of the pose error; at the fitted
-# one it is larger by at most the inverse of that one's prior probability.
-_BEYOND_DRAWS = 1e4
+_TELLING_TERMS = 10
+# Sizes of the pose error with a log weight below this under the best model met so far
+# are dropped for the rest of the search. Models that come near to the best one differ
+# from it by a few terms, which cannot make up for a hundred orders of magnitude.
+_HOPELESS_LOG_WEIGHT = -300.0
+# Steps in the grid of the pose error, to either side of its size, that measurements
+# simulated with this size can make likely.
+POSE_ERROR_REACH = 2
 
 
 @dataclass(frozen=True)
 class SearchProblem:
-    """Everything that a search needs."""
+    """Everything that a search needs: statistics of the data, and terms to choose from.
+
+    What is derived from them is computed when it is first asked for.
+    """
 
     statistics: SufficientStatistics
     terms: tuple[ModelTerm, ...]
@@ -91,63 +76,71 @@ class SearchProblem:
 
     @cached_property
     def prior(self) -> ModelPrior:
-        """Of all models that the units can form."""
+        """Prior of all models that the terms can form."""
         return build_model_prior(self.terms, self.settings)
 
     @cached_property
     def grid(self) -> SizeGrid:
-        """Sizes of a unit."""
+        """Scales of a term."""
         return SizeGrid.from_settings(self.settings)
 
     @cached_property
     def blocks(self) -> list[TermBlock]:
-        """Of all units."""
-        return TermBlock.of(self.statistics, self.terms)
+        """The terms by their number of columns."""
+        return TermBlock.group(self.statistics, self.terms)
 
     @property
     def log_pose(self) -> np.ndarray:
-        """Logarithm of the prior weight of each size of the pose error, ndarray
-        (T,)."""
+        """Log prior weight (T,) of each size of the pose error."""
         return compute_pose_error_log_prior(
             self.statistics.pose_error_rad, self.settings
         )
 
     @cached_property
-    def started(self) -> _Searcher:
-        """A search that has met the declared model and each unit alone."""
-        return _Searcher(self)
+    def initial_search(self) -> BeamSearch:
+        """A search that has met the declared model and each single term."""
+        return BeamSearch(self)
 
     def scaled_columns(
         self, numbers: Sequence[int], scales: Sequence[float] | np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Columns of some units of given sizes, (D,), and the prior standard deviation
-        of each, in plausible sizes."""
+        """Columns (D,) of some terms of given scales, and the prior standard deviation
+        (D,) of each, in plausible sizes."""
         columns = [self.terms[number].columns for number in numbers]
-        return np.concatenate([np.zeros(0, int), *columns]), np.repeat(
-            scales, [len(each) for each in columns]
-        )
+        widths = [len(of_term) for of_term in columns]
+        return np.concatenate([np.zeros(0, int), *columns]), np.repeat(scales, widths)
 
     def find_mode(self, model: ScoredModel) -> tuple[np.ndarray, np.ndarray, int]:
-        """Columns of a model (D,), their most probable coefficients at its sizes, and
-        the place of its pose error."""
+        """Find the most probable coefficients of a model at its scales.
+
+        Returns
+        -------
+        columns : (D,) int
+        coefficients : (D,), in plausible sizes
+        pose_error_index : index of the model's pose error
+        """
         columns, deviations = self.scaled_columns(model.term_indices, model.scales)
-        place = self.statistics.nearest(model.pose_error_rad)
-        gram = self.statistics.at(slice(place, place + 1)).between(columns, columns)[0]
-        inner = deviations[:, None] * gram * deviations + np.eye(len(columns))
-        along = deviations * self.statistics.score[place, columns]
-        return columns, deviations * solve_positive_definite(inner, along), place
+        index = self.statistics.nearest(model.pose_error_rad)
+        gram = self.statistics.at(slice(index, index + 1)).gram_blocks(columns)[0]
+        precision = deviations[:, None] * gram * deviations + np.eye(len(columns))
+        score = deviations * self.statistics.score[index, columns]
+        scaled = solve_positive_definite(precision, score)
+        return columns, deviations * scaled, index
 
 
 @dataclass(frozen=True)
 class ScoredModel:
-    """One set of units, rising, with its posterior log odds against the declared model
-    alone.
+    """One set of terms, evaluated in full.
 
-    `scales` (m,), `pose_error_rad`: most probable sizes of each unit, and of the error
-    common to the measurements of a pose.
+    Attributes
+    ----------
+    term_indices : indices of its m terms, rising
+    log_odds : posterior log odds against the declared model alone
+    scales : (m,), most probable scale of each term
+    pose_error_rad : most probable error that the measurements of a pose have in common
     """
 
-    term_indices: tuple[int, ...]
+    term_indices: TermSet
     log_odds: float
     scales: np.ndarray
     pose_error_rad: float
@@ -155,8 +148,13 @@ class ScoredModel:
 
 @dataclass(frozen=True)
 class Posterior:
-    """Models in the order of their probability. `probabilities` (M,): "Nothing" among
-    them."""
+    """Models, the most probable first, among them the declared model alone.
+
+    Attributes
+    ----------
+    models : M models
+    probabilities : (M,)
+    """
 
     models: tuple[ScoredModel, ...]
     probabilities: np.ndarray
@@ -168,385 +166,337 @@ class Posterior:
 
 
 def solve_positive_definite(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Solution of equations with a symmetric positive matrix, by Cholesky's factor; of
-    none, at which LAPACK balks, nothing."""
+    """Solve equations with a symmetric positive matrix by Cholesky's method.
+
+    LAPACK rejects empty systems; their solution is empty.
+    """
     return lapack.dposv(matrix, right)[1] if len(matrix) else right
 
 
 def screen_terms(problem: SearchProblem) -> tuple[ScoredModel, np.ndarray]:
-    """The declared model alone, and each unit alone against it. Returns
-    `log_bayes_factors` (number of units,)."""
-    met = [problem.started.met[number,] for number in range(len(problem.terms))]
-    return problem.started.measured[()], np.array(met) - problem.started.first
+    """Return the declared model alone, and the log Bayes factor of each single term
+    against it (number of terms,)."""
+    search = problem.initial_search
+    log_odds = [search.log_odds[number,] for number in range(len(problem.terms))]
+    return search.evaluated[()], np.array(log_odds) - search.single_term_log_prior
 
 
-def search_models(problem: SearchProblem, known: Collection[str] = ()) -> Posterior:
-    """Search the models. `known`: keys of the candidates of a good model, from which
-    the search starts, too."""
-    searcher = problem.started.again()
-    units = problem.terms
-    # Each mechanism at all its locations, and the model that is known, each with the
-    # best variant at each place.
+def search_models(
+    problem: SearchProblem, known_keys: Collection[str] = ()
+) -> Posterior:
+    """Search the models.
+
+    Parameters
+    ----------
+    problem : statistics and terms
+    known_keys : keys of the candidates of a good model, at which the search starts, too
+    """
+    search = problem.initial_search.duplicate()
+    terms = problem.terms
+    # Start at each mechanism with the best variant at each of its locations.
     mechanisms = dict.fromkeys(
-        unit.mechanism for unit in units if unit.mechanism != OTHER
+        term.mechanism for term in terms if term.mechanism != OTHER
     )
-    starts = [
-        searcher.best_variants(
-            n for n, unit in enumerate(units) if unit.mechanism == name
-        )
-        for name in mechanisms
-    ]
-    starts = [
-        start for start in starts if 1 < len(start) <= problem.settings.largest_model
-    ]
-    starts.append(
-        searcher.best_variants(
-            n
-            for n, unit in enumerate(units)
-            if unit.candidate and unit.candidate.key in known
-        )
+    starts = []
+    for mechanism in mechanisms:
+        numbers = (n for n, term in enumerate(terms) if term.mechanism == mechanism)
+        start = search.choose_best_variants(numbers)
+        if 1 < len(start) <= problem.settings.largest_model:
+            starts.append(start)
+    known = (
+        n
+        for n, term in enumerate(terms)
+        if term.candidate and term.candidate.key in known_keys
     )
-    for start in filter(None, starts):
-        searcher.measure(start)
-    searcher.grow()
-    return searcher.weigh()
+    starts.append(search.choose_best_variants(known))
+    for start in starts:
+        if start:
+            search.evaluate(start)
+    search.grow()
+    return search.weigh()
 
 
 def select_pose_errors(
     statistics: SufficientStatistics, settings: Settings
 ) -> np.ndarray:
-    """Which sizes of the pose error "nothing" makes likely, or smaller, (T,) of bool:
-    what a model adds leaves no more to it.
+    """Select sizes of the pose error, (T,) bool, that can matter for any model.
 
-    And up to `_REACH` steps beyond the most likely, for measurements that are simulated
-    with that may look like more.
+    These are all sizes up to the largest one that the declared model alone makes
+    likely, because whatever a model adds leaves less to the pose error. Simulated
+    measurements may show more of it, so that the selection reaches at least a few steps
+    beyond the most likely size.
 
-    `statistics`: of the declared model alone.
+    Parameters
+    ----------
+    statistics : of the declared model alone
+    settings : settings of the diagnosis
     """
-    weights = SearchProblem(statistics, (), settings).started.empty.log_pose
-    largest = max(
-        np.flatnonzero(weights > weights.max() + NEGLIGIBLE_LOG_WEIGHT)[-1],
-        np.argmax(weights) + _REACH,
-    )
+    weights = BeamSearch(
+        SearchProblem(statistics, (), settings)
+    ).empty_evidence.log_pose_posterior
+    largest_likely = np.flatnonzero(weights > weights.max() + NEGLIGIBLE_LOG_WEIGHT)[-1]
+    largest = max(largest_likely, np.argmax(weights) + POSE_ERROR_REACH)
     return np.arange(len(weights)) <= largest
 
 
-class _Searcher:
-    """Models met so far with their approximate log odds, and the sizes at which they
-    were met."""
+class BeamSearch:
+    """A search over sets of terms, with all models that it has met.
+
+    Attributes
+    ----------
+    statistics : those of the problem, at the sizes of the pose error that remain likely
+    single_term_log_prior : (number of terms,), log prior odds of each single term
+    empty_evidence : of the declared model alone
+    log_odds : approximate posterior log odds of each model that was met
+    scales : scale of each term at which the log odds were obtained
+    evaluated : models that were evaluated in full
+    extended : models that were extended by every term
+    """
 
     def __init__(self, problem: SearchProblem) -> None:
-        self.problem, self.grid = problem, problem.grid
+        self.problem = problem
         self.statistics = problem.statistics
-        self.log_pose = problem.log_pose
-        self.blocks = problem.blocks
-        self.weights = np.array([self.grid.of(unit) for unit in problem.terms]).reshape(
-            -1, len(self.grid.scales)
+        self.single_term_log_prior = np.array(
+            [problem.prior.log_odds_change(term, 0) for term in problem.terms]
         )
-        self.first = np.array([problem.prior.added(unit, 0) for unit in problem.terms])
-        numbers: dict[object, int] = {}
-        self.places = np.array(
-            [numbers.setdefault(unit.place, len(numbers)) for unit in problem.terms],
-            int,
+        self._log_pose = problem.log_pose
+        self._blocks = problem.blocks
+        self._log_weights = np.array(
+            [problem.grid.log_weights_of(term) for term in problem.terms]
+        ).reshape(-1, len(problem.grid.scales))
+        slots: dict[object, int] = {}
+        self._slots = np.array(
+            [slots.setdefault(term.slot, len(slots)) for term in problem.terms], int
         )
-        self.empty = self.evaluated((), ())
-        self.met: dict[tuple[int, ...], float] = {(): 0.0}
-        self.sizes: dict[tuple[int, ...], tuple[float, ...]] = {(): ()}
-        self.measured: dict[tuple[int, ...], ScoredModel] = {}
-        self.extended: set[tuple[int, ...]] = set()
+        self.empty_evidence = self._evaluate_in_full((), ())
+        self.log_odds: dict[TermSet, float] = {(): 0.0}
+        self.scales: dict[TermSet, tuple[float, ...]] = {(): ()}
+        self.evaluated: dict[TermSet, ScoredModel] = {}
+        self.extended: set[TermSet] = set()
         self.extend(())
-        self.measure(())
+        self.evaluate(())
 
-    def again(self) -> _Searcher:
-        """One that goes on from here, and leaves this one as it is."""
-        found = copy(self)
-        vars(found).update(
-            {
-                name: each.copy()
-                for name, each in vars(self).items()
-                if isinstance(each, dict | set)
-            }
-        )
-        return found
+    def duplicate(self) -> BeamSearch:
+        """A search that continues from here and leaves this one as it is."""
+        duplicate = copy(self)
+        duplicate.log_odds = self.log_odds.copy()
+        duplicate.scales = self.scales.copy()
+        duplicate.evaluated = self.evaluated.copy()
+        duplicate.extended = self.extended.copy()
+        return duplicate
 
-    def evaluated(
-        self, model: tuple[int, ...], start: Iterable[float]
-    ) -> ModelEvidence:
-        """Evidence of a model in full."""
-        return evaluate_model(
-            self.statistics,
-            [self.problem.terms[n] for n in model],
-            self.grid,
-            self.log_pose,
-            start,
-        )
-
-    def extend(self, model: tuple[int, ...]) -> None:
-        """Meet a model with each single unit added."""
+    def extend(self, model: TermSet) -> None:
+        """Meet a model with each single term added."""
         if len(model) >= self.problem.settings.largest_model:
             return
         self.extended.add(model)
-        units = self.problem.terms
-        sizes = self.sizes[model]
-        open_units = np.flatnonzero(~np.isin(self.places, self.places[list(model)]))
-        if not len(open_units):
+        open_terms = self._find_open_terms(model)
+        if not len(open_terms):
             return
-        base = self.statistics.log_likelihood + self.log_pose
-        given = self.problem.scaled_columns(model, sizes)
-        before, by_pose_error = evaluate_extensions(
-            self.statistics, base, given, self.blocks, self.grid
-        )
-        by_pose_error += self.weights
-        found = log_sum_exp(by_pose_error, axis=0)
-        total = log_sum_exp(found, axis=1)
+        log_evidence, by_pose_error = self._evaluate_extensions(model)
+        by_scale = log_sum_exp(by_pose_error, axis=0)
         if not model:
-            # Without the sizes of the pose error that neither "nothing" nor any good
-            # single unit makes likely.
-            weights = log_sum_exp(
-                by_pose_error[:, np.argsort(-total)[:_TELLING_UNITS]], axis=2
-            )
-            weights = np.column_stack(
-                [weights - log_sum_exp(weights, axis=0), self.empty.log_pose]
-            )
-            self.keep_pose_errors(
-                np.flatnonzero((weights > NEGLIGIBLE_LOG_WEIGHT).any(axis=1))
-            )
-            self.empty = self.evaluated((), self.empty.scales)
-        # What the sizes already in the model are worth as they are, against their
-        # average: the same for all extensions.
-        gained = (total + (self.met[model] - log_sum_exp(before))).tolist()
+            self._drop_unlikely_pose_errors(by_pose_error, by_scale)
+        self._meet_extensions(model, open_terms, log_evidence, by_scale)
+
+    def _drop_unlikely_pose_errors(
+        self, by_pose_error: np.ndarray, by_scale: np.ndarray
+    ) -> None:
+        """Drop the sizes of the pose error that neither the declared model nor any good
+        single term makes likely.
+
+        Parameters
+        ----------
+        by_pose_error : (T, number of terms, S), log evidence with each single term
+        by_scale : (number of terms, S), its sum over T
+        """
+        best_terms = np.argsort(-log_sum_exp(by_scale, axis=1))[:_TELLING_TERMS]
+        weights = log_sum_exp(by_pose_error[:, best_terms], axis=2)
+        weights = np.column_stack(
+            [
+                weights - log_sum_exp(weights, axis=0),
+                self.empty_evidence.log_pose_posterior,
+            ]
+        )
+        self._keep_pose_errors((weights > NEGLIGIBLE_LOG_WEIGHT).any(axis=1))
+        self.empty_evidence = self._evaluate_in_full((), ())
+
+    def _find_open_terms(self, model: TermSet) -> np.ndarray:
+        """Indices of the terms that may join a model: none of their slot is in it."""
+        return np.flatnonzero(~np.isin(self._slots, self._slots[list(model)]))
+
+    def _evaluate_extensions(self, model: TermSet) -> tuple[float, np.ndarray]:
+        """Log evidence of a model at the scales at which it was met, and that of the
+        model with each term added (T, number of terms, S), weighted by scale."""
+        before, by_pose_error = evaluate_extensions(
+            self.statistics,
+            self.statistics.log_likelihood + self._log_pose,
+            self.problem.scaled_columns(model, self.scales[model]),
+            self._blocks,
+            self.problem.grid,
+        )
+        by_pose_error += self._log_weights
+        return float(log_sum_exp(before)), by_pose_error
+
+    def _meet_extensions(
+        self,
+        model: TermSet,
+        open_terms: np.ndarray,
+        log_evidence: float,
+        by_scale: np.ndarray,
+    ) -> None:
+        """Record a model with each open term added, if it was not met with better odds.
+
+        Parameters
+        ----------
+        model : terms
+        open_terms : indices of the terms that may join
+        log_evidence : of the model at the scales at which it was met
+        by_scale : (number of terms, S), log evidence with each term added
+        """
+        terms = self.problem.terms
         prior = self.problem.prior
-        mechanisms = Counter(units[n].mechanism for n in model)
-        first = self.first.tolist()
-        best = self.grid.scales[found.argmax(axis=1)].tolist()
-        for number in open_units.tolist():
-            count = mechanisms.get(units[number].mechanism)
-            odds = gained[number] + (
-                prior.added(units[number], count) if count else first[number]
-            )
-            place = bisect(model, number)
-            key = (*model[:place], number, *model[place:])
-            if odds > self.met.get(key, -np.inf):
-                self.met[key] = odds
-                self.sizes[key] = (*sizes[:place], best[number], *sizes[place:])
+        # The model's own scales count as fixed here, as they are not averaged over. The
+        # difference is the same for all extensions.
+        offset = self.log_odds[model] - log_evidence
+        gains = (log_sum_exp(by_scale, axis=1) + offset).tolist()
+        best_scales = self.problem.grid.scales[by_scale.argmax(axis=1)].tolist()
+        first_location = self.single_term_log_prior.tolist()
+        locations = Counter(terms[n].mechanism for n in model)
+        scales = self.scales[model]
+        for number in open_terms.tolist():
+            log_prior = first_location[number]
+            count = locations.get(terms[number].mechanism)
+            if count:
+                log_prior = prior.log_odds_change(terms[number], count)
+            index = bisect(model, number)
+            larger = (*model[:index], number, *model[index:])
+            log_odds = gains[number] + log_prior
+            if log_odds > self.log_odds.get(larger, -np.inf):
+                self.log_odds[larger] = log_odds
+                self.scales[larger] = (
+                    *scales[:index],
+                    best_scales[number],
+                    *scales[index:],
+                )
 
-    def keep_pose_errors(self, kept: np.ndarray) -> None:
-        """Go on with some of the sizes of the pose error alone; their statistics are
-        copied where there are others."""
-        if len(kept) < len(self.log_pose):
-            self.statistics = self.statistics.at(kept)
-            self.log_pose = self.log_pose[kept]
-            self.blocks = [each.at(kept) for each in self.blocks]
+    def _keep_pose_errors(self, kept: np.ndarray | np.bool_) -> None:
+        """Continue with some of the sizes of the pose error only, (T,) bool.
 
-    def measure(self, model: tuple[int, ...]) -> ScoredModel:
-        """Meet a model as it is, in full, and what it would be without each of its
-        units."""
-        found = self.evaluated(
+        Their statistics are copied if they are not consecutive.
+        """
+        indices = np.flatnonzero(kept)
+        if len(indices) < len(self._log_pose):
+            self.statistics = self.statistics.at(indices)
+            self._log_pose = self._log_pose[indices]
+            self._blocks = [block.at(indices) for block in self._blocks]
+
+    def _evaluate_in_full(
+        self, model: TermSet, start: Iterable[float]
+    ) -> ModelEvidence:
+        return evaluate_model(
+            self.statistics,
+            [self.problem.terms[n] for n in model],
+            self.problem.grid,
+            self._log_pose,
+            start,
+        )
+
+    def evaluate(self, model: TermSet) -> ScoredModel:
+        """Evaluate a model in full, and meet it without each of its terms."""
+        default_scales = (self.problem.settings.scale_center,) * len(model)
+        evidence = self._evaluate_in_full(model, self.scales.get(model, default_scales))
+        terms = self.problem.terms
+        log_prior = self.problem.prior.compute_log_odds(terms[n] for n in model)
+        log_odds = evidence.log_evidence - self.empty_evidence.log_evidence + log_prior
+        best_pose_error = np.argmax(evidence.log_pose_posterior)
+        scored = ScoredModel(
             model,
-            self.sizes.get(model, (self.problem.settings.scale_center,) * len(model)),
+            log_odds,
+            evidence.scales,
+            float(self.statistics.pose_error_rad[best_pose_error]),
         )
-        units = self.problem.terms
-        prior = self.problem.prior
-        whole = prior.compute_log_odds(units[n] for n in model)
-        counts = Counter(units[n].mechanism for n in model)
-        odds = found.log_evidence - self.empty.log_evidence + whole
-        self.met[model] = odds
-        self.sizes[model] = tuple(found.scales.tolist())
-        pose_error_rad = float(
-            self.statistics.pose_error_rad[np.argmax(found.log_pose)]
-        )
-        self.measured[model] = ScoredModel(model, odds, found.scales, pose_error_rad)
-        if odds == max(self.met.values()):
-            self.keep_pose_errors(np.flatnonzero(found.log_pose > _OUT_OF_QUESTION))
-        for place, number in enumerate(model):
-            smaller = model[:place] + model[place + 1 :]
-            if smaller not in self.met:
-                left = found.without[place] - self.empty.log_evidence
-                self.met[smaller] = (
-                    left
-                    + whole
-                    - prior.added(units[number], counts[units[number].mechanism] - 1)
-                )
-                self.sizes[smaller] = (
-                    self.sizes[model][:place] + self.sizes[model][place + 1 :]
-                )
-        return self.measured[model]
+        self.log_odds[model] = log_odds
+        self.scales[model] = tuple(evidence.scales.tolist())
+        self.evaluated[model] = scored
+        if log_odds == max(self.log_odds.values()):
+            self._keep_pose_errors(evidence.log_pose_posterior > _HOPELESS_LOG_WEIGHT)
+        self._meet_smaller_models(model, evidence, log_prior)
+        return scored
 
-    def best_variants(self, numbers: Iterable[int]) -> tuple[int, ...]:
-        """Of some units the best at each place, rising."""
-        best: dict[tuple[str, tuple[int | str, ...], str], tuple[int]] = {}
+    def _meet_smaller_models(
+        self, model: TermSet, evidence: ModelEvidence, log_prior: float
+    ) -> None:
+        """Record a model without each of its terms, if that was not met yet."""
+        terms = self.problem.terms
+        locations = Counter(terms[n].mechanism for n in model)
+        scales = self.scales[model]
+        for index, number in enumerate(model):
+            smaller = model[:index] + model[index + 1 :]
+            if smaller not in self.log_odds:
+                term = terms[number]
+                gain = evidence.without[index] - self.empty_evidence.log_evidence
+                log_prior_change = self.problem.prior.log_odds_change(
+                    term, locations[term.mechanism] - 1
+                )
+                self.log_odds[smaller] = gain + log_prior - log_prior_change
+                self.scales[smaller] = scales[:index] + scales[index + 1 :]
+
+    def choose_best_variants(self, numbers: Iterable[int]) -> TermSet:
+        """Of some terms, choose the best single one of each slot; rising indices."""
+        best: dict[object, int] = {}
         for number in numbers:
-            place = self.problem.terms[number].place
-            best[place] = max(
-                best.get(place, (number,)), (number,), key=self.met.__getitem__
-            )
-        return tuple(sorted(number for (number,) in best.values()))
+            slot = self.problem.terms[number].slot
+            present = best.setdefault(slot, number)
+            if self.log_odds[number,] > self.log_odds[present,]:
+                best[slot] = number
+        return tuple(sorted(best.values()))
 
     def grow(self) -> None:
-        """Extend the best models that have not been, in rounds, until rounds bring
-        nothing better.
+        """Extend the best models in rounds until rounds bring no improvement.
 
-        There are as many as lead to the largest model and back at most: extensions are
-        met at sizes of the others that they may not keep, and where they promise more
-        than they hold something seems to get better without an end.
+        The number of rounds is bounded by the way to the largest model and back.
+        Extensions are met at scales of the other terms that they may not keep. If such
+        a model promises more than it holds, the rounds would seem to improve for ever.
         """
         settings = self.problem.settings
-        idle = 0
-        rising = False
+        idle_rounds = 0
+        is_rising = False
         for _ in range(2 * settings.largest_model):
-            if idle >= settings.patience:
+            if idle_rounds >= settings.patience:
                 break
-            best = max(self.met.values())
+            best = max(self.log_odds.values())
             waiting = [
-                m
-                for m, odds in self.met.items()
-                if m not in self.extended and odds > best - _NEGLIGIBLE
+                model for model in self._occams_window() if model not in self.extended
             ]
             if not waiting:
                 break
-            # While the best gets better, it alone is followed; where it does not, there
-            # is time for others.
-            for model in nlargest(
-                1 if rising else settings.beam, waiting, key=self.met.__getitem__
-            ):
-                if model not in self.measured:
-                    self.measure(model)
+            # Extend only the best model while it keeps improving. Once it stops, spend
+            # the remaining rounds on its competitors, too.
+            width = 1 if is_rising else settings.beam
+            for model in nlargest(width, waiting, key=self.log_odds.__getitem__):
+                if model not in self.evaluated:
+                    self.evaluate(model)
                 self.extend(model)
-            gained = max(self.met.values()) - best
-            rising = gained > _BETTER
-            idle = 0 if rising else idle + 1
+            is_rising = max(self.log_odds.values()) - best > _BETTER
+            idle_rounds = 0 if is_rising else idle_rounds + 1
+
+    def _occams_window(self) -> list[TermSet]:
+        """Models whose log odds are close enough to the best ones met so far."""
+        least = max(self.log_odds.values()) - _OCCAM_WINDOW
+        return [model for model, log_odds in self.log_odds.items() if log_odds > least]
 
     def weigh(self) -> Posterior:
-        """Evaluate the best models in full."""
-        best = max(self.met.values())
-        good = [model for model, odds in self.met.items() if odds > best - _NEGLIGIBLE]
-        order = nlargest(
-            self.problem.settings.kept_models, good, key=self.met.__getitem__
+        """Evaluate the best models in full, and return their probabilities."""
+        best = nlargest(
+            self.problem.settings.kept_models,
+            self._occams_window(),
+            key=self.log_odds.__getitem__,
         )
-        models = [self.measured.get(model) or self.measure(model) for model in order]
-        if () not in order:
-            models.append(self.measured[()])
+        models = [self.evaluated.get(model) or self.evaluate(model) for model in best]
+        if () not in best:
+            models.append(self.evaluated[()])
         models.sort(key=lambda model: -model.log_odds)
-        odds = np.array([model.log_odds for model in models])
-        return Posterior(tuple(models), np.exp(odds - log_sum_exp(odds)))
-
-
-@dataclass(frozen=True)
-class Alarm:
-    """Outcome of the test; `statistic`: log of the average Bayes factor against
-    "nothing"."""
-
-    p_value: float
-    statistic: float
-    raised: bool
-
-
-def run_alarm_test(
-    problem: SearchProblem,
-    products: CrossProducts,
-    pose_error_rad: float,
-    stream: np.random.Generator,
-) -> Alarm:
-    """Test whether the declared model lacks anything.
-
-    `pose_error_rad`: pose error of the declared model at which measurements are
-    simulated.
-    """
-    settings = problem.settings
-    statistics = problem.statistics
-    # Sizes that draws of the fitted one can make likely: its own, and some to either
-    # side.
-    place = statistics.nearest(pose_error_rad)
-    chosen = slice(max(place - _REACH, 0), place + _REACH + 1)
-    statistics, base = (
-        statistics.at(chosen),
-        (statistics.log_likelihood + problem.log_pose)[chosen],
-    )
-    tested, log_priors = _alternatives(problem)
-    of_others = TermBlock.of(statistics, tested[len(problem.terms) :])
-    blocks = [each.at(chosen) for each in problem.blocks]
-    blocks += [
-        replace(each, numbers=each.numbers + len(problem.terms)) for each in of_others
-    ]
-
-    def average_bayes_factors(along: np.ndarray, squares: np.ndarray) -> np.ndarray:
-        """Logarithms of N sets of measurements, ndarray (N,). `along` (T, K, N),
-        `squares` (T, N)."""
-        nothing = log_sum_exp(
-            base[:, None] + log_likelihood(squares, statistics.degrees_of_freedom),
-            axis=0,
-        )
-        total = np.full(len(nothing), -np.inf)
-        variances = problem.grid.scales**2
-        step = max(_AT_ONCE // (squares.size * len(variances)), 1)
-        for block, (values, vectors) in ((block, block.axes) for block in blocks):
-            for start in range(0, len(block.numbers), step):
-                some = slice(start, start + step)
-                units = [tested[number] for number in block.numbers[some].tolist()]
-                # A step below the sizes of the posterior.
-                firsts = [max(unit.smallest - 1, 0) for unit in units]
-                sizes = slice(min(firsts), None)
-                weights = [
-                    problem.grid.between(first, unit.largest)[sizes]
-                    for first, unit in zip(firsts, units, strict=True)
-                ]
-                widened = 1.0 + variances[sizes, None] * values[:, some, None]
-                turned = (
-                    vectors[:, some].swapaxes(-1, -2) @ along[:, block.columns[some]]
-                ) ** 2
-                left = (
-                    squares[:, None, None] - (variances[sizes, None] / widened) @ turned
-                )
-                known = (
-                    base[:, None, None]
-                    - 0.5 * np.log(widened).sum(axis=3)
-                    + np.array(weights)
-                )
-                known += log_priors[block.numbers[some], None]
-                terms = (
-                    log_likelihood(left, statistics.degrees_of_freedom)
-                    + known[..., None]
-                )
-                total = np.logaddexp(total, log_sum_exp(terms, axis=(0, 1, 2)))
-        return total - nothing
-
-    statistic = float(
-        average_bayes_factors(
-            statistics.score[..., None], statistics.residual_squares[:, None]
-        )[0]
-    )
-    reached = 0
-    if statistic <= np.log(_BEYOND_DRAWS * (1 + settings.alarm_draws)):
-        drawn = simulate_null_statistics(
-            products,
-            pose_error_rad,
-            statistics.pose_error_rad,
-            settings.alarm_draws,
-            stream,
-        )
-        reached = int((average_bayes_factors(*drawn) >= statistic).sum())
-    p_value = (1 + reached) / (1 + settings.alarm_draws)
-    return Alarm(p_value, statistic, p_value <= settings.alarm_level)
-
-
-def _alternatives(problem: SearchProblem) -> tuple[list[ModelTerm], np.ndarray]:
-    """Every unit, and every mechanism with one law at all its locations in one size;
-    with their log prior odds."""
-    prior = problem.prior
-    alternatives = list(problem.terms)
-    log_priors = problem.started.first.tolist()
-    laws: dict[tuple[str, str, tuple[float, ...]], list[ModelTerm]] = {}
-    for unit in problem.terms:
-        if unit.candidate:
-            laws.setdefault(
-                (unit.mechanism, unit.candidate.detail, unit.shapes), []
-            ).append(unit)
-    for units in laws.values():
-        if len({unit.location for unit in units}) == len(units) > 1:
-            columns = np.concatenate([unit.columns for unit in units])
-            smallest = min(unit.smallest for unit in units)
-            alternatives.append(replace(units[0], columns=columns, smallest=smallest))
-            log_priors.append(
-                prior.compute_log_odds(units) - (len(units) - 1) * units[0].log_prior
-            )
-    return alternatives, np.array(log_priors)
+        log_odds = np.array([model.log_odds for model in models])
+        probabilities = np.exp(log_odds - log_sum_exp(log_odds))
+        return Posterior(tuple(models), probabilities)

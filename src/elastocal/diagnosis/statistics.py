@@ -1,25 +1,26 @@
-"""All that the measurements say of a linearised model, in numbers whose count does not
-grow with the measurements.
+"""Sufficient statistics of a linearised model: all that the measurements say of it, in
+arrays whose size does not grow with the number of measurements.
 
-Measurements y = X beta + W gamma + e, with X the declared model's sensitivities and W
-those of all candidates, both whitened by the noise of the measurements. The
-measurements of a pose may have an error in common as well: that of the joints when the
-pose was taken, of variance tau^2 I, seen through the Jacobian. By the matrix inversion
-lemma (Hager, SIAM Review 1989)
+The measurements are y = X beta + W gamma + e, where X holds the sensitivities of the
+declared model and W those of all candidates, both whitened by the measurement noise.
+The measurements of a pose may also have an error in common: the joint errors when the
+pose was taken, of covariance tau^2 I, seen through the Jacobian J_p of the pose. By the
+matrix inversion lemma (Hager, SIAM Review 1989)
 
-    Z' Sigma(tau)^-1 Z = Z'Z - sum over poses B_p' (I / tau^2 + C_p)^-1 B_p,   B_p = J_p' Z_p,   C_p = J_p' J_p,   Z = [X W y],
+    Z' Sigma(tau)^-1 Z = Z'Z - sum over poses B_p' (I / tau^2 + C_p)^-1 B_p,
+    B_p = J_p' Z_p,   C_p = J_p' J_p,   Z = [X W y],
 
-so that one pass over the poses serves every tau. Columns are first made orthogonal to X
-by a QR decomposition of the scaled rows: the condition number of X is not squared.
-Marginalising beta gives W'MW, W'My, y'My with M = Sigma^-1 - Sigma^-1 X (X'Sigma^-1
-X)^-1 X'Sigma^-1 and the determinants of restricted maximum likelihood (REML; Harville,
-JASA 1977).
+so that one pass over the poses serves every tau. Candidate columns are first made
+orthogonal to X by a QR decomposition of the scaled rows, so that the condition number
+of X is not squared. Marginalising beta gives W'MW, W'My and y'My with M = Sigma^-1 -
+Sigma^-1 X (X'Sigma^-1 X)^-1 X'Sigma^-1, and the determinants of restricted maximum
+likelihood (REML; Harville, JASA 1977).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -31,12 +32,14 @@ if TYPE_CHECKING:
 
     from elastocal.fitting.linearization import FactoredSensitivities
 
-# Products of one pose with all columns that are in memory at once.
+# Upper bound on the products of poses with all columns that are in memory at once: 8 MB.
 _AT_ONCE = 1_000_000
-# Of a square from which another one was taken, less than this share is rounding.
+# A column is spanned by the declared ones if less than this share of its square is
+# left: that is rounding.
 _INSIDE = 1e-12
-# Columns for each row that a pose error takes from their products, from which on these
-# cost less as they are.
+# If there are more columns than this many times the rows of the low-rank correction for
+# the pose error, the correction is stored in factors. Below this ratio a dense Gram
+# matrix for each size of the pose error is cheaper.
 _COLUMNS_A_ROW = 4
 
 
@@ -44,10 +47,14 @@ _COLUMNS_A_ROW = 4
 class WhitenedRows:
     """Whitened rows of M observations in some whole poses.
 
-    `declared` (M, rows, P): sensitivities to the declared parameters. `candidates`:
-    sensitivities to the K columns of all candidates, in units of their plausible sizes.
-    `residual` (M, rows). `jacobian` (M, rows, n): with respect to the joints. `pose`
-    (M,) of int: from 0.
+    Attributes
+    ----------
+    declared : (M, rows, P) sensitivities to the declared parameters
+    candidates : sensitivities to the K columns of all candidates, in units of their
+        plausible sizes
+    residual : (M, rows)
+    jacobian : (M, rows, n) derivatives with respect to the joint angles
+    pose : (M,) int, number of the pose of each observation, from 0
     """
 
     declared: np.ndarray
@@ -56,32 +63,91 @@ class WhitenedRows:
     jacobian: np.ndarray
     pose: np.ndarray
 
-    def at(self, seen: np.ndarray) -> WhitenedRows:
-        """Those of some whole poses, ndarray of bool (M,), which are numbered anew."""
-        if seen.all():
+    def at(self, selected: np.ndarray) -> WhitenedRows:
+        """Select whole poses by a (M,) bool array, and number them anew."""
+        if selected.all():
             return self
-        pose = np.unique(self.pose[seen], return_inverse=True)[1]
+        pose = np.unique(self.pose[selected], return_inverse=True)[1]
         return WhitenedRows(
-            self.declared[seen],
-            self.candidates.at(seen),
-            self.residual[seen],
-            self.jacobian[seen],
+            self.declared[selected],
+            self.candidates.at(selected),
+            self.residual[selected],
+            self.jacobian[selected],
             pose,
         )
 
 
 @dataclass(frozen=True)
-class CrossProducts:
-    """What `statistics_of` makes `Statistics` of, at any size of the pose error, and
-    `null_draws` simulated ones.
+class PoseBlock:
+    """Products of the Jacobian with all columns, for G whole poses.
 
-    `beside` (M, rows, P + 1): declared columns of the rows made orthonormal, and the
-    residual. `declared`: P. `gram` (P + K + 1 square): Z'Z of Z = [X W y], with the
-    priors' rows. `freedom`: numbers measured less what the declared model fits.
-    `into_basis` (P, P): turns declared columns into orthonormal ones. `projected` (P, K
-    + 1): what these have in the others. `inside` (K,) of bool: columns of which these
-    leave nothing. `met`: by sizes of the pose error, factors of what is left, and what
-    is left of all other columns and the residual, as of `Statistics`.
+    Attributes
+    ----------
+    selected : (M,) bool, which of all observations are of these poses
+    rows : their whitened rows; its Jacobian is along the principal axes of each pose
+    products : (G, a, P + K + 1), B_p along a principal axes of C_p
+    eigenvalues : (G, a), of C_p
+    """
+
+    selected: np.ndarray
+    rows: WhitenedRows
+    products: np.ndarray
+    eigenvalues: np.ndarray
+
+
+@dataclass(frozen=True)
+class Elimination:
+    """Normal equations at one size of the pose error, after the P declared parameters
+    have been eliminated by Cholesky's method.
+
+    Attributes
+    ----------
+    factor : (P, P) lower Cholesky factor of the block of the declared parameters
+    coupling : (P, K + 1), the factor's inverse times the block that couples them with
+        the candidate columns and the residual
+    gram : (K + 1, K + 1), products of the latter
+    low_rank : (K + 1, R), to be squared and subtracted from `gram`
+    """
+
+    factor: np.ndarray
+    coupling: np.ndarray
+    gram: np.ndarray
+    low_rank: np.ndarray
+
+
+class EliminationCache:
+    """Cache of eliminations by the size of the pose error, so that normal equations at
+    a size that was met need no second pass over the poses, nor the rows themselves."""
+
+    def __init__(self) -> None:
+        self._by_pose_error: dict[float, Elimination] = {}
+
+    def store(self, pose_error_rad: float, elimination: Elimination) -> None:
+        """Keep the elimination at one size of the pose error."""
+        self._by_pose_error[pose_error_rad] = elimination
+
+    def get(self, pose_error_rad: float) -> Elimination | None:
+        """Return the elimination at one size of the pose error, None if not met."""
+        return self._by_pose_error.get(pose_error_rad)
+
+
+@dataclass(frozen=True)
+class CrossProducts:
+    """Products of all columns, from which statistics follow at any size of the pose
+    error, those of simulated measurements too.
+
+    Attributes
+    ----------
+    rows : the whitened rows
+    basis_and_residual : (M, rows, P + 1), the declared columns made orthonormal, and
+        the residual
+    declared_count : P
+    gram : (P + K + 1, P + K + 1), Z'Z of Z = [X W y] with the rows of the priors
+    degrees_of_freedom : measured numbers less those that the declared model fits
+    basis_transform : (P, P), turns declared columns into orthonormal ones
+    projections : (P, K + 1), coordinates of the other columns in the orthonormal ones
+    spanned : (K,) bool, candidate columns of which the declared ones leave nothing
+    eliminations : cache that `compute_statistics` and `assemble_normal_equations` share
     """
 
     rows: WhitenedRows
@@ -91,343 +157,345 @@ class CrossProducts:
     degrees_of_freedom: int
     basis_transform: np.ndarray
     projections: np.ndarray
-    inside: np.ndarray
-    met: dict[float, tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = field(
-        default_factory=dict, repr=False
+    spanned: np.ndarray
+    eliminations: EliminationCache = field(
+        default_factory=EliminationCache, repr=False, compare=False
     )
 
     @property
     def without_candidates(self) -> CrossProducts:
-        """Of the declared model alone."""
+        """The products of the declared model alone."""
         kept = np.append(np.arange(self.declared_count), -1)
-        rows = replace(
-            self.rows,
-            candidates=self.rows.candidates.select_columns(
-                np.zeros(len(self.inside), bool)
+        no_columns = np.zeros(len(self.spanned), bool)
+        return replace(
+            self,
+            rows=replace(
+                self.rows, candidates=self.rows.candidates.select_columns(no_columns)
             ),
+            gram=self.gram[np.ix_(kept, kept)],
+            projections=self.projections[:, -1:],
+            spanned=self.spanned[:0],
+            eliminations=EliminationCache(),
         )
-        some: dict[str, Any] = {
-            "gram": self.gram[np.ix_(kept, kept)],
-            "projections": self.projections[:, -1:],
-        }
-        return replace(self, rows=rows, inside=self.inside[:0], met={}, **some)
 
     @property
     def without_rows(self) -> CrossProducts:
-        """Without what grows with the measurements; normal equations at other sizes
-        than those met are lost with it."""
+        """The same without the arrays that grow with the measurements.
+
+        Normal equations are then available only at sizes of the pose error that are in
+        the cache.
+        """
+        no_rows = np.zeros(len(self.basis_and_residual), bool)
         return replace(
             self,
-            rows=self.rows.at(np.zeros(len(self.basis_and_residual), bool)),
+            rows=self.rows.at(no_rows),
             basis_and_residual=self.basis_and_residual[:0],
         )
 
     @property
     def axes(self) -> int:
-        """Of each pose: as many as joints, or as numbers that are measured in any pose,
-        if these are fewer."""
-        rows = self.rows
-        return min(
-            rows.jacobian.shape[2],
-            int(np.bincount(rows.pose).max()) * rows.jacobian.shape[1],
-        )
+        """Number of principal axes of each pose: the number of joints, or that of the
+        numbers measured in any pose if these are fewer."""
+        components = self.rows.jacobian.shape[1]
+        most_observations = int(np.bincount(self.rows.pose).max())
+        return min(self.rows.jacobian.shape[2], most_observations * components)
 
-    def iterate_poses(
-        self,
-    ) -> Iterator[tuple[np.ndarray, WhitenedRows, np.ndarray, np.ndarray]]:
-        """B_p (G, a, P + K + 1) along principal axes of C_p, and its eigenvalues (G,
-        a), of some poses at a time.
-
-        With which of all rows are theirs, and these, their Jacobian along the same
-        axes.
-        """
-        rows = self.rows
-        count = self.declared_count
-        axes = self.axes
-        width = self.gram.shape[0]
-        poses = int(rows.pose.max()) + 1
-        step = max(_AT_ONCE // (width * axes), 1)
+    def iterate_poses(self) -> Iterator[PoseBlock]:
+        """Yield the products of poses with all columns, some poses at a time."""
+        poses = int(self.rows.pose.max()) + 1
+        step = max(_AT_ONCE // (self.gram.shape[0] * self.axes), 1)
         for start in range(0, poses, step):
-            seen = (rows.pose >= start) & (rows.pose < start + step)
-            part = rows.at(seen)
-            beside = (
-                self.basis_and_residual
-                if poses <= step
-                else self.basis_and_residual[seen]
+            selected = (self.rows.pose >= start) & (self.rows.pose < start + step)
+            basis_and_residual = self.basis_and_residual
+            if poses > step:
+                basis_and_residual = basis_and_residual[selected]
+            count = min(step, poses - start)
+            yield self._pose_block(selected, basis_and_residual, count)
+
+    def _pose_block(
+        self, selected: np.ndarray, basis_and_residual: np.ndarray, poses: int
+    ) -> PoseBlock:
+        rows = self.rows.at(selected)
+        declared = self.declared_count
+        axes = self.axes
+        jacobian = np.empty((*rows.jacobian.shape[:2], axes))
+        products = np.empty((poses, axes, self.gram.shape[0]))
+        eigenvalues = np.empty((poses, axes))
+        for members in batch_groups_by_size(rows.pose):
+            pose = rows.pose[members[:, 0]]
+            flat = (len(members), members.shape[1] * rows.jacobian.shape[1], -1)
+            by_joint = rows.jacobian[members].reshape(flat)
+            values, vectors = np.linalg.eigh(by_joint.transpose(0, 2, 1) @ by_joint)
+            eigenvalues[pose] = values[:, -axes:]
+            by_axis = by_joint @ vectors[..., -axes:]
+            jacobian[members] = by_axis.reshape(*members.shape, *jacobian.shape[1:])
+            dense = by_axis.transpose(0, 2, 1) @ basis_and_residual[members].reshape(
+                flat
             )
-            groups = batch_groups_by_size(part.pose)
-            jacobian = np.empty((*part.jacobian.shape[:2], axes))
-            found = np.empty((min(step, poses - start), axes, width))
-            values = np.empty((min(step, poses - start), axes))
-            for members in groups:
-                mine = part.pose[members[:, 0]]
-                flat = (len(members), members.shape[1] * beside.shape[1], -1)
-                each = part.jacobian[members].reshape(flat)
-                squares, directions = np.linalg.eigh(each.transpose(0, 2, 1) @ each)
-                values[mine] = squares[:, -axes:]
-                turned = each @ directions[..., -axes:]
-                jacobian[members] = turned.reshape(*members.shape, *jacobian.shape[1:])
-                together = turned.transpose(0, 2, 1) @ beside[members].reshape(flat)
-                found[mine, :, :count] = together[..., :-1]
-                found[mine, :, -1] = together[..., -1]
-            found[..., count:-1] = part.candidates.multiply_by_pose(jacobian, part.pose)
-            every = found.reshape(-1, width)
-            every[:, count:] -= every[:, :count] @ self.projections
-            found[..., count:-1][..., self.inside] = 0.0
-            yield seen, replace(part, jacobian=jacobian), found, np.maximum(values, 0.0)
+            products[pose, :, :declared] = dense[..., :-1]
+            products[pose, :, -1] = dense[..., -1]
+        products[..., declared:-1] = rows.candidates.multiply_by_pose(
+            jacobian, rows.pose
+        )
+        flat_products = products.reshape(-1, products.shape[2])
+        flat_products[:, declared:] -= flat_products[:, :declared] @ self.projections
+        products[..., declared:-1][..., self.spanned] = 0.0
+        return PoseBlock(
+            selected,
+            replace(rows, jacobian=jacobian),
+            products,
+            np.maximum(eigenvalues, 0.0),
+        )
 
 
 def compute_cross_products(
     rows: WhitenedRows, prior_std: np.ndarray, present: np.ndarray
 ) -> CrossProducts:
-    """Gather the products of whitened rows.
-
-    `prior_std` (P,): standard deviation of the prior of each declared parameter; wide
-    ones keep the problem well posed. `present` (P,): present value of each less the
-    mean of its prior.
+    """Compute the products of whitened rows.
 
     The declared columns are made orthonormal by QR of the scaled rows, so that no
-    condition number is squared; what candidates have in them is taken off their
-    products by Pythagoras' theorem, which costs 1e-16 of the square of a candidate:
-    nothing beside noise of one. What the declared model fits are its effective degrees
-    of freedom, the trace of its hat matrix (Hastie and Tibshirani, Generalized Additive
-    Models, 1990).
+    condition number is squared. The candidates' share in them is subtracted from their
+    products by Pythagoras' theorem. That costs 1e-16 of the square of a candidate,
+    which is nothing compared with noise of one. The number of parameters that the
+    declared model fits is its effective degrees of freedom, the trace of its hat matrix
+    (Hastie and Tibshirani, Generalized Additive Models, 1990).
+
+    Parameters
+    ----------
+    rows : whitened rows
+    prior_std : (P,), standard deviation of the prior of each declared parameter; wide
+        priors keep the problem well posed
+    present : (P,), present value of each declared parameter less its prior mean
     """
-    observed, components, count = rows.declared.shape
-    declared = rows.declared.reshape(observed * components, count)
-    scaled = np.concatenate([declared, np.diag(1.0 / prior_std)])
-    norms = np.linalg.norm(scaled, axis=0)
-    basis, triangle = np.linalg.qr(scaled / norms)
-    seen = basis[: len(declared)]
+    declared_count = rows.declared.shape[2]
+    declared = rows.declared.reshape(-1, declared_count)
+    augmented = np.concatenate([declared, np.diag(1.0 / prior_std)])
+    norms = np.linalg.norm(augmented, axis=0)
+    basis, triangle = np.linalg.qr(augmented / norms)
+    measured_basis = basis[: len(declared)]
     residual = np.concatenate([rows.residual.ravel(), -present / prior_std])
-    beside = np.concatenate([seen, rows.residual.reshape(-1, 1)], axis=1).reshape(
-        observed, components, count + 1
-    )
-    products = rows.candidates.times(beside)
-    projected = np.concatenate(
+    basis_and_residual = np.concatenate(
+        [measured_basis, rows.residual.reshape(-1, 1)], axis=1
+    ).reshape(*rows.residual.shape, declared_count + 1)
+    products = rows.candidates.times(basis_and_residual)
+    projections = np.concatenate(
         [products[:, :-1].T, (basis.T @ residual)[:, None]], axis=1
     )
-    left = residual - basis @ projected[:, -1]
-    left -= basis @ (basis.T @ left)
-    gram, squares = np.eye(projected.shape[1] + count), rows.candidates.gram()
-    own = gram[count:-1, count:-1]
-    along = products[:, -1] - projected[:, :-1].T @ projected[:, -1]
-    np.subtract(squares, projected[:, :-1].T @ projected[:, :-1], out=own)
-    inside = np.diag(own) <= _INSIDE * np.diag(squares)
-    own[inside] = 0.0
-    own[:, inside] = 0.0
-    along[inside] = 0.0
-    gram[count:-1, -1] = gram[-1, count:-1] = along
-    gram[-1, -1] = left @ left
-    freedom = max(round(len(declared) - (seen**2).sum()), 1)
-    into_basis = np.linalg.inv(triangle) / norms[:, None]
-    return CrossProducts(
-        rows, beside, count, gram, freedom, into_basis, projected, inside
+    gram = np.eye(projections.shape[1] + declared_count)
+    spanned = _fill_candidate_products(
+        gram[declared_count:, declared_count:],
+        rows.candidates.gram(),
+        products[:, -1],
+        projections,
     )
+    residual -= basis @ projections[:, -1]
+    # A second projection removes the rounding of the first.
+    residual -= basis @ (basis.T @ residual)
+    gram[-1, -1] = residual @ residual
+    return CrossProducts(
+        rows,
+        basis_and_residual,
+        declared_count,
+        gram,
+        degrees_of_freedom=max(round(len(declared) - (measured_basis**2).sum()), 1),
+        basis_transform=np.linalg.inv(triangle) / norms[:, None],
+        projections=projections,
+        spanned=spanned,
+    )
+
+
+def _fill_candidate_products(
+    gram: np.ndarray,
+    candidate_gram: np.ndarray,
+    candidate_residual: np.ndarray,
+    projections: np.ndarray,
+) -> np.ndarray:
+    """Write the products of the candidates, orthogonal to the declared columns, into
+    `gram` (K + 1, K + 1), and return which columns are spanned by those (K,)."""
+    shares = projections[:, :-1]
+    orthogonal = gram[:-1, :-1]
+    score = candidate_residual - shares.T @ projections[:, -1]
+    np.subtract(candidate_gram, shares.T @ shares, out=orthogonal)
+    spanned = np.diag(orthogonal) <= _INSIDE * np.diag(candidate_gram)
+    orthogonal[spanned] = 0.0
+    orthogonal[:, spanned] = 0.0
+    score[spanned] = 0.0
+    gram[:-1, -1] = score
+    gram[-1, :-1] = score
+    return spanned
 
 
 @dataclass(frozen=True)
 class SufficientStatistics:
-    """Sufficient statistics at T sizes of the pose error, for K columns.
+    """Sufficient statistics at T sizes of the pose error, for K candidate columns.
 
-    `pose_error_rad` (T,): tau. `gram` (T or 1, K, K), `taken` (T, K, R): W'MW is the
-    one less the product of the other with itself. Of few poses the one is of no pose
-    error, for all tau; of many R is 0. `along` (T, K): W'My. `squares` (T,): y'My.
-    `log_likelihood` (T,): what tau contributes alone: -1/2 ln |Sigma| - 1/2 ln
-    |X'Sigma^-1 X|. `freedom`: rows less what the declared model fits.
+    Attributes
+    ----------
+    pose_error_rad : (T,), tau
+    gram : (T, K, K) or (1, K, K)
+    low_rank : (T, K, R); W'MW is `gram` less the product of `low_rank` with its
+        transpose. If the poses are few, `gram` is that without a pose error and serves
+        all tau; if they are many, R is 0.
+    score : (T, K), W'My, the gradient of the log likelihood where no candidate acts
+    residual_squares : (T,), y'My
+    log_likelihood : (T,), what tau contributes by itself, -1/2 ln |Sigma| -
+        1/2 ln |X'Sigma^-1 X|
+    degrees_of_freedom : rows less those that the declared model fits
     """
 
     pose_error_rad: np.ndarray
     gram: np.ndarray
-    taken: np.ndarray
+    low_rank: np.ndarray
     score: np.ndarray
     residual_squares: np.ndarray
     log_likelihood: np.ndarray
     degrees_of_freedom: int
 
     def at(self, chosen: np.ndarray | slice) -> SufficientStatistics:
-        """The same at some of the sizes of the pose error only; those beside each other
-        are not copied."""
-        if (
-            not isinstance(chosen, slice)
-            and len(chosen)
-            and np.ptp(chosen) == len(chosen) - 1
-        ):
-            chosen = slice(int(chosen[0]), int(chosen[-1]) + 1)
-        of_each = {
-            name: each
-            for name, each in vars(self).items()
-            if name != "degrees_of_freedom" and len(each) == len(self.residual_squares)
-        }
-        return replace(self, **{name: each[chosen] for name, each in of_each.items()})
+        """Select sizes of the pose error; consecutive ones are views, not copies."""
+        if not isinstance(chosen, slice):
+            chosen = np.asarray(chosen)
+            if len(chosen) and np.ptp(chosen) == len(chosen) - 1:
+                chosen = slice(int(chosen[0]), int(chosen[-1]) + 1)
+        # One Gram matrix may serve all sizes.
+        shared_gram = len(self.gram) != len(self.residual_squares)
+        return SufficientStatistics(
+            self.pose_error_rad[chosen],
+            self.gram if shared_gram else self.gram[chosen],
+            self.low_rank[chosen],
+            self.score[chosen],
+            self.residual_squares[chosen],
+            self.log_likelihood[chosen],
+            self.degrees_of_freedom,
+        )
 
     def nearest(self, pose_error_rad: float) -> int:
-        """Place of the size of the pose error that is nearest to one."""
+        """Index of the size of the pose error that is nearest to a given one."""
         return int(np.argmin(np.abs(self.pose_error_rad - pose_error_rad)))
 
-    def between(self, left: np.ndarray, right: np.ndarray | None = None) -> np.ndarray:
-        """W'MW of some columns (..., d) with others (..., e), or with all, ndarray (T,
-        ..., d, e)."""
-        taken = self.taken[:, left]
-        others = (
-            self.taken
-            if right is None
-            else taken
-            if right is left
-            else self.taken[:, right]
-        )
-        found = (
-            self.gram[:, left]
-            if right is None
-            else self.gram[:, left[..., None], right[..., None, :]]
-        )
-        return found - taken @ others.swapaxes(-1, -2)
+    def gram_rows(self, columns: np.ndarray) -> np.ndarray:
+        """Rows (T, D, K) of W'MW of some columns (D,)."""
+        low_rank = self.low_rank[:, columns]
+        return self.gram[:, columns] - low_rank @ self.low_rank.swapaxes(-1, -2)
+
+    def gram_blocks(self, columns: np.ndarray) -> np.ndarray:
+        """Blocks (T, ..., D, D) of W'MW of some columns (..., D)."""
+        low_rank = self.low_rank[:, columns]
+        gram = self.gram[:, columns[..., None], columns[..., None, :]]
+        return gram - low_rank @ low_rank.swapaxes(-1, -2)
+
+
+class _PoseErrorEquations:
+    """Normal equations at T sizes of the pose error, from which the correction for the
+    pose error is subtracted one block of poses after the other.
+
+    The rows of the declared parameters are dense. The block of the K candidates and the
+    residual is dense for each size, or shared by all with the correction in factors.
+    """
+
+    def __init__(self, products: CrossProducts, sizes: np.ndarray) -> None:
+        declared = products.declared_count
+        columns = len(products.gram) - declared
+        correction_rows = (int(products.rows.pose.max()) + 1) * products.axes + declared
+        self.sizes = sizes
+        self.declared_count = declared
+        self.is_factored = correction_rows * _COLUMNS_A_ROW < columns
+        # Without a pose error the declared columns are orthonormal, and orthogonal to
+        # all others.
+        self.declared_rows = np.tile(products.gram[:declared], (len(sizes), 1, 1))
+        self.gram = products.gram[None, declared:, declared:]
+        if not self.is_factored:
+            self.gram = np.tile(self.gram, (len(sizes), 1, 1))
+        rank = correction_rows if self.is_factored else 0
+        self.low_rank = np.zeros((len(sizes), columns, rank))
+        self.log_dets = np.zeros(len(sizes))
+        self._first_row = 0
+
+    def _subtract_square(self, number: int, rows: np.ndarray) -> None:
+        """Subtract the product of some rows (r, K + 1) with themselves."""
+        if self.is_factored:
+            chosen = slice(self._first_row, self._first_row + len(rows))
+            self.low_rank[number, :, chosen] = rows.T
+        else:
+            self.gram[number] -= rows.T @ rows
+
+    def subtract_correction(self, block: PoseBlock) -> None:
+        """Subtract the correction for the pose error of some poses."""
+        declared = self.declared_count
+        for number in np.flatnonzero(self.sizes).tolist():
+            tau = self.sizes[number]
+            widened = 1.0 + tau**2 * block.eigenvalues
+            scaled = block.products * (tau / np.sqrt(widened))[..., None]
+            rows = scaled.reshape(-1, scaled.shape[2])
+            self.declared_rows[number] -= rows[:, :declared].T @ rows
+            self._subtract_square(number, np.ascontiguousarray(rows[:, declared:]))
+            self.log_dets[number] += np.log1p(tau**2 * block.eigenvalues).sum()
+        self._first_row += block.eigenvalues.size
+
+    def eliminate_declared(self) -> list[Elimination]:
+        """Eliminate the declared parameters at each size of the pose error."""
+        declared = self.declared_count
+        factors = np.linalg.cholesky(self.declared_rows[:, :, :declared])
+        eliminations = []
+        for number, tau in enumerate(self.sizes):
+            coupling = self.declared_rows[number, :, declared:]
+            if tau:
+                coupling = solve_triangular(factors[number], coupling, lower=True)
+                self._subtract_square(number, coupling)
+            eliminations.append(
+                Elimination(
+                    factors[number],
+                    coupling,
+                    self.gram[0 if self.is_factored else number],
+                    self.low_rank[number],
+                )
+            )
+        return eliminations
 
 
 def compute_statistics(
     products: CrossProducts, pose_error_rad: np.ndarray
 ) -> SufficientStatistics:
-    """Sufficient statistics at some sizes of the pose error (T,)."""
-    count = products.declared_count
+    """Compute the sufficient statistics at some sizes of the pose error (T,)."""
     sizes = np.asarray(pose_error_rad)
-    # Without a pose error declared columns are orthonormal, and the others have nothing
-    # in them.
-    above = np.tile(products.gram[:count], (len(sizes), 1, 1))
-    rest = products.gram[None, count:, count:]
-    rows = (int(products.rows.pose.max()) + 1) * products.axes
-    few = (rows + count) * _COLUMNS_A_ROW < rest.shape[1]
-    rest = rest if few else np.tile(rest, (len(sizes), 1, 1))
-    taken = np.zeros((len(sizes), rest.shape[1], few * (rows + count)))
-    start = 0
-    log_dets = np.zeros(len(sizes))
-    for _, _, found, values in products.iterate_poses() if sizes.any() else ():
-        part = slice(start, start := start + values.size)
-        for number in np.flatnonzero(sizes).tolist():
-            tau = sizes[number]
-            each = (found * (tau / np.sqrt(1.0 + tau**2 * values))[..., None]).reshape(
-                -1, found.shape[2]
-            )
-            above[number] -= each[:, :count].T @ each
-            beside = np.ascontiguousarray(each[:, count:])
-            if few:
-                taken[number, :, part] = beside.T
-            else:
-                rest[number] -= beside.T @ beside
-            log_dets[number] += np.log1p(tau**2 * values).sum()
-    factors = np.linalg.cholesky(above[:, :, :count])
-    for number, tau in enumerate(sizes):
-        fitted = above[number, :, count:]
-        if tau:
-            fitted = solve_triangular(factors[number], fitted, lower=True)
-            if few:
-                taken[number, :, start:] = fitted.T
-            else:
-                rest[number] -= fitted.T @ fitted
-        products.met[float(tau)] = (
-            factors[number],
-            fitted,
-            rest[0 if few else number],
-            taken[number],
-        )
-    logs = -0.5 * log_dets - np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
-    last = rest[:, -1] - (taken @ taken[:, -1, :, None])[..., 0]
+    equations = _PoseErrorEquations(products, sizes)
+    if sizes.any():
+        for block in products.iterate_poses():
+            equations.subtract_correction(block)
+    eliminations = equations.eliminate_declared()
+    for tau, elimination in zip(sizes, eliminations, strict=True):
+        products.eliminations.store(float(tau), elimination)
+    factors = np.array([elimination.factor for elimination in eliminations])
+    log_factors = np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
+    gram = equations.gram
+    low_rank = equations.low_rank
+    last_row = gram[:, -1] - (low_rank @ low_rank[:, -1, :, None])[..., 0]
     return SufficientStatistics(
         sizes,
-        rest[:, :-1, :-1],
-        taken[:, :-1],
-        last[:, :-1],
-        last[:, -1],
-        logs,
-        products.degrees_of_freedom,
+        gram[:, :-1, :-1],
+        low_rank[:, :-1],
+        score=last_row[:, :-1],
+        residual_squares=last_row[:, -1],
+        log_likelihood=-0.5 * equations.log_dets - log_factors,
+        degrees_of_freedom=products.degrees_of_freedom,
     )
 
 
 def assemble_normal_equations(
     products: CrossProducts, tau: float, columns: np.ndarray
 ) -> np.ndarray:
-    """Z'Sigma(tau)^-1 Z of declared columns, some of the others (D,) and the residual,
-    ndarray (P + D + 1, P + D + 1)."""
-    if tau not in products.met:
+    """Assemble Z'Sigma(tau)^-1 Z of the declared columns, some candidate columns (D,)
+    and the residual, (P + D + 1, P + D + 1)."""
+    elimination = products.eliminations.get(tau)
+    if elimination is None:
         compute_statistics(products, np.array([tau]))
-    some, (factor, fitted, rest, taken) = np.append(columns, -1), products.met[tau]
-    fitted = fitted[:, some]
-    taken = taken[some]
-    across = factor @ fitted
-    return np.block(
-        [
-            [factor @ factor.T, across],
-            [across.T, rest[np.ix_(some, some)] - taken @ taken.T + fitted.T @ fitted],
-        ]
-    )
-
-
-def simulate_null_statistics(
-    products: CrossProducts,
-    tau: float,
-    pose_error_rad: np.ndarray,
-    count: int,
-    stream: np.random.Generator,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Statistics of simulated measurements of the declared model, in which nothing is
-    missing: a parametric bootstrap.
-
-    `tau`: pose error with which to simulate, rad. `pose_error_rad` (T,): at which the
-    statistics are wanted. Returns `along` (T, K, N); `squares` (T, N): as in
-    `Statistics`, for N draws of unit variance.
-    """
-    rows = products.rows
-    declared = products.declared_count
-    joints = rows.jacobian.shape[2]
-    sizes = np.asarray(pose_error_rad)
-    white = stream.standard_normal((*rows.residual.shape, count))
-    fitted = np.tensordot(
-        products.basis_and_residual[..., :-1], white, ((0, 1), (0, 1))
-    )
-    along = np.concatenate(
-        [fitted, rows.candidates.times(white) - products.projections[:, :-1].T @ fitted]
-    )
-    squares = (white**2).sum(axis=(0, 1))
-    known = np.tile(products.gram[:declared, :-1], (len(sizes), 1, 1))
-    taken = np.zeros((len(sizes), *along.shape))
-    off = np.zeros((len(sizes), count))
-    for chosen, part, each, values in products.iterate_poses():
-        flat = each.reshape(-1, each.shape[2])[:, :-1]
-        values = values.reshape(-1, 1)
-        drawn = white[chosen]
-        by_pose = np.empty((*each.shape[:2], count))
-        axes = each.shape[1]
-        for members in batch_groups_by_size(part.pose):
-            turned = (
-                part.jacobian[members]
-                .reshape(len(members), -1, axes)
-                .transpose(0, 2, 1)
-            )
-            by_pose[part.pose[members[:, 0]]] = turned @ drawn[members].reshape(
-                len(members), -1, count
-            )
-        seen = by_pose.reshape(-1, count)
-        if tau:
-            # Along the principal axes of a pose the errors of its joints are as
-            # independent as they are themselves.
-            errors = stream.standard_normal((len(each), joints, count))
-            common = tau * errors[:, -axes:].reshape(seen.shape)
-            squares += (common * (2 * seen + values * common)).sum(axis=0)
-            along += flat.T @ common
-            seen += values * common
-        for number, size in enumerate(sizes):
-            if size:
-                share = size**2 / (1.0 + size**2 * values)
-                solved = share * seen
-                taken[number] += flat.T @ solved
-                off[number] += (seen * solved).sum(axis=0)
-                known[number] -= flat[:, :declared].T @ (share * flat)
-    found_along = np.empty((len(sizes), len(along) - declared, count))
-    found_squares = squares - off
-    for number, total in enumerate(known):
-        these = along - taken[number]
-        factor = np.linalg.cholesky(total[:, :declared])
-        fitted = solve_triangular(factor, these[:declared], lower=True)
-        cross = solve_triangular(factor, total[:, declared:], lower=True)
-        np.subtract(these[declared:], cross.T @ fitted, out=found_along[number])
-        found_squares[number] -= (fitted**2).sum(axis=0)
-    return found_along, found_squares
+        elimination = products.eliminations.get(tau)
+        assert elimination is not None
+    chosen = np.append(columns, -1)
+    factor = elimination.factor
+    coupling = elimination.coupling[:, chosen]
+    low_rank = elimination.low_rank[chosen]
+    across = factor @ coupling
+    candidates = elimination.gram[np.ix_(chosen, chosen)]
+    candidates = candidates - low_rank @ low_rank.T + coupling.T @ coupling
+    return np.block([[factor @ factor.T, across], [across.T, candidates]])

@@ -12,6 +12,7 @@ from elastocal.diagnosis import model_averaging, refit, verdict
 from elastocal.diagnosis.gross_errors import format_gross_error_warnings
 from elastocal.fitting.model import get_joint_compliances
 from elastocal.fitting.noise import serialize_noise
+from elastocal.io.typed_json import to_document
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.model import Case
     from elastocal.fitting.noise import Noise
     from elastocal.remainder.repeatable import Repeatable
+    from elastocal.verdict import GrossError
 
 
 @dataclass(frozen=True)
@@ -50,8 +52,8 @@ class TrainingResult:
         Reasons why the declared model is not called adequate.
     repeatable : Repeatable or None
         What the kept model leaves that is a function of the joints.
-    gross_errors : tuple of dict
-        Entries of the rows that were left out.
+    gross_errors : tuple of GrossError
+        Rows that were left out.
     """
 
     case: Case
@@ -63,7 +65,7 @@ class TrainingResult:
     warnings: tuple[str, ...]
     contradictions: tuple[str, ...]
     repeatable: Repeatable | None
-    gross_errors: tuple[dict[str, Any], ...]
+    gross_errors: tuple[GrossError, ...]
 
 
 def state_training_verdict(
@@ -82,7 +84,7 @@ def state_training_verdict(
     )
     document |= {
         "contradictions": list(result.contradictions),
-        "gross_errors": list(result.gross_errors),
+        "gross_errors": [to_document(error) for error in result.gross_errors],
         "repeatable": result.repeatable and asdict(result.repeatable),
     }
     document["warnings"] += format_gross_error_warnings(list(result.gross_errors))

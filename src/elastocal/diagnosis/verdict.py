@@ -31,8 +31,9 @@ from elastocal.fitting.model import get_joint_compliances
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
+    from elastocal.diagnosis.alarm import Alarm
     from elastocal.diagnosis.candidate_design import CandidateDesign
-    from elastocal.diagnosis.search import Alarm, Posterior, ScoredModel, SearchProblem
+    from elastocal.diagnosis.search import Posterior, ScoredModel, SearchProblem
     from elastocal.diagnosis.settings import Settings
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.noise import Noise

@@ -1,4 +1,4 @@
-"""Figures of study and loop: tables in, PDF out.
+"""Figures of the study and of campaigns: tables in, figures out.
 
-Imports tables' contents and names from `study` and `diagnosis`; computes nothing.
+Nothing is computed here but positions on the paper.
 """

@@ -1,8 +1,9 @@
-"""Figures of a campaign: errors as arrows and model by model, hypotheses and candidates
-one by one, what each effect costs."""
+"""Figures of a campaign: residuals as arrows, errors by model, hypotheses and candidates,
+and the contributions to the error."""
 
 import textwrap
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -33,30 +34,38 @@ from elastocal.report.words import (
     unit_of,
 )
 
-# Of more states than this only one is drawn in each cell of a grid of so many columns.
-_MOST_ARROWS = 320
-_CELLS = 18
+# Above this number of states, only one state is drawn in each cell of a square grid
+# with this number of columns.
+_MAX_ARROWS = 320
+_GRID_COLUMNS = 18
 # Length of the arrow of a large residual, as a share of the workspace.
-_ARROW = 0.13
+_ARROW_SHARE = 0.13
+# The views of the workspace: the axes that are drawn to the right and upwards.
+_VIEWS = {"from the side": [0, 2], "from above": [0, 1]}
 
 METRICS = {"mean": "mean", "rms": "RMS", "p95": "95th percentile", "max": "maximum"}
+# Colour and label of each kind of model.
 MODEL_STYLES = {
     "frames": ("#b9b9b9", "frames and targets only"),
     "declared": STAGES["before"][::-1],
     "effect": STAGES["after"][::-1],
     "kept": ("#777777", "frames and targets only, kept"),
 }
-# Beyond this ratio the smallest bars would be lost on a linear axis.
-_LARGEST_RATIO = 25
-_LINE = 26
-_NAMES = 3
-_DIAMOND: dict[str, Any] = {
+# Above this ratio of the largest to the smallest error, the axis is logarithmic, because
+# the smallest bars would be invisible on a linear one.
+_MAX_LINEAR_RATIO = 25
+# Characters in a line of a model's label, and the effects that it names.
+_MODEL_LABEL_WIDTH = 26
+_NAMED_EFFECTS = 3
+_DIAMOND_STYLE: dict[str, Any] = {
     "linestyle": "",
     "marker": "D",
     "color": "white",
     "markeredgecolor": "black",
     "markersize": 3.4,
 }
+_INTERVAL_STYLE: dict[str, Any] = {"color": "black", "linewidth": 1.1}
+_NOISE_STYLE: dict[str, Any] = {"color": "black", "linestyle": ":", "linewidth": 1.2}
 FAMILY_COLOURS = dict(
     zip(
         ("geometry", "gravity", "transmission", "elastic", "gearbox", "load", "drift"),
@@ -64,20 +73,30 @@ FAMILY_COLOURS = dict(
         strict=False,
     )
 )
-# Hypotheses and candidates with a bar of their own.
-_HYPOTHESES = 8
-_NAMED = 15
+# Numbers of hypotheses and candidates that get a bar of their own.
+_SHOWN_HYPOTHESES = 8
+_SHOWN_CANDIDATES = 15
 _ALL_ELSE = "Everything else"
-# Letters in a line of a label, and in the longest label.
-_LABEL = 44
-_LONGEST = 80
-# Height of a row of one line, and of each further line.
+# The smallest probability of all further hypotheses that gets a bar.
+_SMALLEST_SHOWN_PROBABILITY = 0.001
+# Characters in a line of a hypothesis' label, of a candidate's label, and in the longest
+# name of a candidate.
+_HYPOTHESIS_LABEL_WIDTH = 44
+_CANDIDATE_LABEL_WIDTH = 48
+_LONGEST_NAME = 80
+# Height of a row with one line of text, and of each further line.
 _ROW_MM = 4.6
 _LINE_MM = 3.0
-# Why nothing is tested where the data are at fault, as tables.candidate_rows notes it.
+# Note of every candidate if the data are at fault, see `tables.candidate_rows`.
 _AT_FAULT = "the measurements are at fault"
-# What is left however well the robot is corrected.
-_REST = (
+# Outline of the candidates of the most probable model.
+_CHOSEN_STYLE: dict[str, Any] = {
+    "facecolor": "none",
+    "edgecolor": "black",
+    "linewidth": 1.3,
+}
+# Contributions that remain after the best correction of the robot.
+_RESIDUAL_CONTRIBUTIONS = (
     "uncertainty of the parameters",
     "repeatability",
     "form of the model",
@@ -85,135 +104,188 @@ _REST = (
     "left by the regression",
 )
 TRACKER = "tracker"
-_SHARES = {
+# Colour and label of each kind of contribution to an error budget.
+_CONTRIBUTION_STYLES = {
     "uncorrected": ("#b9b9b9", "without any correction"),
     "effect": (PALETTE[0], "if this alone were left out"),
-    "rest": (PALETTE[2], "left after correction"),
+    "residual": (PALETTE[2], "left after correction"),
     TRACKER: ("#ffffff", "in no robot: noise of a single measurement"),
 }
+
+
+@dataclass(frozen=True)
+class _States:
+    """Measured states, repeats averaged.
+
+    Attributes
+    ----------
+    positions : (N, 3) array, m
+    residuals : dict of (N, 3) arrays, m
+        Residuals by stage, before and after.
+    """
+
+    positions: np.ndarray
+    residuals: dict[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class _ArrowScale:
+    """Scale of the arrows: a residual of `largest_m` is drawn `length_m` long."""
+
+    largest_m: float
+    length_m: float
 
 
 @styled
 def draw_residual_arrows(
     table: Mapping[str, np.ndarray], arm: np.ndarray | None = None
 ) -> Figure:
-    """Residuals as arrows where the measurements were taken, from the side and from
-    above.
+    """Draw residuals as arrows at the measured positions, from the side and from above.
 
-    `table`: columns of the residuals table. `arm` (K, 3): corners of the robot in one
-    pose, m. Repeats are averaged; where states are still many, one of each cell of a
-    grid is drawn.
+    Repeats are averaged. If there are many states, one state of each cell of a grid is
+    drawn.
+
+    Parameters
+    ----------
+    table
+        Columns of the residuals table.
+    arm : (K, 3) array, m
+        Corners of the robot in one pose; drawn behind the arrows.
     """
-    place, off = _states(table)
-    # The first alone where nothing was found that changes a residual.
-    stages = tuple(STAGES)[
-        : 1 if np.allclose(off["before"], off["after"], rtol=0, atol=1e-9) else 2
-    ]
-    size = np.linalg.norm(off["before"], axis=1)
-    largest = max(np.quantile(size, 0.95), 1e-9)
-    extent = np.maximum(np.ptp(place, axis=0), 1e-3)
-    # One digit: the side of a cell is a number that can be quoted.
-    digit = 10.0 ** np.floor(np.log10(extent.max() / _CELLS))
-    cell_m = (
-        float(np.ceil(extent.max() / _CELLS / digit) * digit)
-        if len(place) > _MOST_ARROWS
-        else None
-    )
-    views = {"from the side": (0, 2), "from above": (0, 1)}
-    figure, axes = create_panels(
-        1, 2, 26 + float(np.clip(66 * extent[1:].max() / extent[0], 40, 56))
-    )
-    length = _ARROW * extent.max()
-    for axis, (title, seen) in zip(axes[0], views.items(), strict=True):
-        shown = (
-            np.arange(len(place))
-            if cell_m is None
-            else select_median_states(place[:, seen], size, cell_m)
-        )
-        at = place[shown][:, seen]
-        for order, stage in enumerate(stages):
-            tips = at + off[stage][shown][:, seen] * length / largest
-            head = {
-                "width": 0.006 - 0.0025 * order,
-                "headwidth": 3.2,
-                "headlength": 4,
-                "headaxislength": 3.6,
-                "minlength": 0.3,
-            }
-            arrow = axis.quiver(
-                *at.T,
-                *(tips - at).T,
-                angles="xy",
-                scale_units="xy",
-                scale=1,
-                color=STAGES[stage][1],
-                **head,
-            )
-            arrow.set(zorder=3 + order, gid=stage)
-            axis.update_datalim(tips)
-        if arm is not None:
-            ends: dict[str, Any] = {
-                "solid_capstyle": "round",
-                "solid_joinstyle": "round",
-                "gid": "arm",
-            }
-            axis.plot(*arm[:, seen].T, color="#c8c8c8", linewidth=6, zorder=1, **ends)
-        axis.plot(0, 0, "+", color="black", markersize=8, gid="base")
-        axis.annotate("base", (0, 0), (4, 4), textcoords="offset points", fontsize=7)
+    states = _average_repeats(table)
+    sizes = np.linalg.norm(states.residuals["before"], axis=1)
+    largest_m = max(np.quantile(sizes, 0.95), 1e-9)
+    extent = np.maximum(np.ptp(states.positions, axis=0), 1e-3)
+    scale = _ArrowScale(largest_m, _ARROW_SHARE * extent.max())
+    cell_m = None
+    explanation = "each arrow: mean of the repeats"
+    if len(sizes) > _MAX_ARROWS:
+        cell_m = _choose_cell_size(extent.max())
+        explanation = f"one state of each cell of {1e3 * cell_m:g} mm, that of the middle residual"
+    height_mm = 26 + float(np.clip(66 * extent[1:].max() / extent[0], 40, 56))
+    figure, axes = create_panels(1, 2, height_mm)
+    for axis, (title, view) in zip(axes[0], _VIEWS.items(), strict=True):
+        drawn = np.arange(len(sizes))
+        if cell_m is not None:
+            drawn = select_median_states(states.positions[:, view], sizes, cell_m)
+        _draw_arrows(axis, states, drawn, view, scale)
+        _draw_robot(axis, arm, view)
         axis.set_title(title, loc="left")
-        axis.set(xlabel="x (m)", ylabel=f"{'xyz'[seen[1]]} (m)", aspect="equal")
+        axis.set(xlabel="x (m)", ylabel=f"{'xyz'[view[1]]} (m)", aspect="equal")
         axis.margins(0.06)
         axis.set_anchor("N")
         axis.set_axisbelow(True)
-    _scale_arrow(axes[0, 1], largest, length)
-    of_cells = f"one state of each cell of {1e3 * (cell_m or 0.0):g} mm, that of the middle residual"
-    which = of_cells if cell_m else "each arrow: mean of the repeats"
+    _draw_scale_arrow(axes[0, 1], scale)
     handles = [
         Line2D([], [], color=STAGES[stage][1], linewidth=2, label=STAGES[stage][0])
-        for stage in stages
+        for stage in _list_stages(states)
     ]
-    figure.legend(handles=handles, title=which, loc="outside lower center", ncols=2)
+    figure.legend(
+        handles=handles, title=explanation, loc="outside lower center", ncols=2
+    )
     return figure
 
 
-def select_median_states(at: np.ndarray, size: np.ndarray, side: float) -> np.ndarray:
-    """The state of middle size in each cell of a grid.
+def _average_repeats(table: Mapping[str, np.ndarray]) -> _States:
+    """Mean position and residuals of each state and target."""
+    keys = ["held_out", "session", "pose", "load", "target"]
+    columns = {stage: [f"{stage}_d{axis}" for axis in "xyz"] for stage in STAGES}
+    names = [*keys, *"xyz", *columns["before"], *columns["after"]]
+    frame = pd.DataFrame({name: table[name] for name in names})
+    means = frame.groupby(keys, dropna=False, observed=True).mean()
+    residuals = {stage: means[columns[stage]].to_numpy() for stage in STAGES}
+    return _States(means[[*"xyz"]].to_numpy(), residuals)
 
-    `at` (N, 2): m. `size` (N,). `side`: m. Returns (cells,) of int: one for each cell
-    that is not empty.
+
+def _list_stages(states: _States) -> list[str]:
+    """The stages to draw: only the first if no effect changed a residual."""
+    before, after = (states.residuals[stage] for stage in STAGES)
+    if np.allclose(before, after, rtol=0, atol=1e-9):
+        return [*STAGES][:1]
+    return [*STAGES]
+
+
+def _choose_cell_size(extent_m: float) -> float:
+    """Side of a cell in m, rounded up to one digit so that the figure can state it."""
+    side = extent_m / _GRID_COLUMNS
+    digit = 10.0 ** np.floor(np.log10(side))
+    return float(np.ceil(side / digit) * digit)
+
+
+def select_median_states(
+    positions: np.ndarray, sizes: np.ndarray, side: float
+) -> np.ndarray:
+    """Select the state with the median residual in each cell of a square grid.
+
+    Parameters
+    ----------
+    positions : (N, 2) array, m
+    sizes : (N,) array
+        Sizes of the residuals.
+    side : float, m
+        Side of a cell.
+
+    Returns
+    -------
+    (cells,) array of int
+        One index for each cell that is not empty.
     """
-    _, cell = np.unique(np.floor(at / side).astype(int), axis=0, return_inverse=True)
-    order = np.lexsort((size, cell.ravel()))
+    cells = np.floor(positions / side).astype(int)
+    _, cell = np.unique(cells, axis=0, return_inverse=True)
+    order = np.lexsort((sizes, cell.ravel()))
     counts = np.bincount(cell.ravel())
     return order[np.cumsum(counts) - counts + (counts - 1) // 2]
 
 
-def _states(
-    table: Mapping[str, np.ndarray],
-) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Mean place and residuals of each state and target."""
-    keys = ["held_out", "session", "pose", "load", "target"]
-    seen = [*"xyz", *(f"{stage}_d{axis}" for stage in STAGES for axis in "xyz")]
-    means = (
-        pd.DataFrame({name: table[name] for name in keys + seen})
-        .groupby(keys, dropna=False, observed=True)
-        .mean()
-    )
-    off = {
-        stage: means[[f"{stage}_d{axis}" for axis in "xyz"]].to_numpy()
-        for stage in STAGES
-    }
-    return means[[*"xyz"]].to_numpy(), off
+def _draw_arrows(
+    axis: Axes, states: _States, drawn: np.ndarray, view: list[int], scale: _ArrowScale
+) -> None:
+    """Draw the residuals of some states in one view, stage over stage."""
+    starts = states.positions[drawn][:, view]
+    for order, stage in enumerate(_list_stages(states)):
+        residuals = states.residuals[stage][drawn][:, view]
+        tips = starts + residuals * scale.length_m / scale.largest_m
+        arrows = axis.quiver(
+            *starts.T,
+            *(tips - starts).T,
+            angles="xy",
+            scale_units="xy",
+            scale=1,
+            color=STAGES[stage][1],
+            width=0.006 - 0.0025 * order,
+            headwidth=3.2,
+            headlength=4,
+            headaxislength=3.6,
+            minlength=0.3,
+        )
+        arrows.set(zorder=3 + order, gid=stage)
+        axis.update_datalim(tips)
 
 
-def _scale_arrow(axis: Axes, largest: float, length: float) -> None:
-    """An arrow of a round length beside the title."""
-    digit = 10.0 ** np.floor(np.log10(largest))
-    shown = (
-        max(step for step in (1, 2, 5) if step * digit <= largest * (1 + 1e-9)) * digit
-    )
-    scale, unit = unit_of(shown)
-    key = axis.quiver(
+def _draw_robot(axis: Axes, arm: np.ndarray | None, view: list[int]) -> None:
+    """Draw the arm, if there is one, and mark the base."""
+    if arm is not None:
+        axis.plot(
+            *arm[:, view].T,
+            color="#c8c8c8",
+            linewidth=6,
+            zorder=1,
+            solid_capstyle="round",
+            solid_joinstyle="round",
+            gid="arm",
+        )
+    axis.plot(0, 0, "+", color="black", markersize=8, gid="base")
+    axis.annotate("base", (0, 0), (4, 4), textcoords="offset points", fontsize=7)
+
+
+def _draw_scale_arrow(axis: Axes, scale: _ArrowScale) -> None:
+    """Draw an arrow of a round length next to the title."""
+    digit = 10.0 ** np.floor(np.log10(scale.largest_m))
+    limit = scale.largest_m * (1 + 1e-9)
+    shown_m = max(step for step in (1, 2, 5) if step * digit <= limit) * digit
+    factor, unit = unit_of(shown_m)
+    # A quiver key needs a quiver; this one stays invisible.
+    arrow = axis.quiver(
         [0],
         [0],
         [0],
@@ -225,71 +297,51 @@ def _scale_arrow(axis: Axes, largest: float, length: float) -> None:
         width=0.006,
         minlength=0,
     )
-    place = {"labelpos": "W", "coordinates": "axes", "fontproperties": {"size": 8}}
     axis.quiverkey(
-        key, 0.88, 1.035, shown * length / largest, f"{scale * shown:g} {unit}", **place
+        arrow,
+        0.88,
+        1.035,
+        shown_m * scale.length_m / scale.largest_m,
+        f"{factor * shown_m:g} {unit}",
+        labelpos="W",
+        coordinates="axes",
+        fontproperties={"size": 8},
     )
-    key.set_visible(False)
+    arrow.set_visible(False)
 
 
 @styled
 def draw_before_after(
     steps: Sequence[Mapping[str, Any]], noise_floor_m: float | None = None
 ) -> Figure:
-    """Bars of the errors on held-out poses, one for each model.
+    """Draw bars of the errors on held-out poses, one row for each model.
 
-    `steps`: rows of before_after.csv. `noise_floor_m`: RMS error that the noise alone
-    leaves.
+    Parameters
+    ----------
+    steps
+        Rows of before_after.csv.
+    noise_floor_m : float, m
+        RMS error that the noise alone leaves.
     """
-    # Words, with the ends of long lists left out, in lines that fit beside the bars.
-    labels = [
-        textwrap.fill(list_first(in_words(step["step"]).split(", "), _NAMES), _LINE)
-        for step in steps
-    ]
-    lines = [label.count("\n") + 1 for label in labels]
-    figure, axes = create_panels(
-        1, len(METRICS), 30 + 4.0 * sum(lines) + 4.5 * len(steps), sharey=True
-    )
-    # Rows as high as their names are long.
-    heights = np.array([0.55 + 0.45 * count for count in lines])
+    labels = [_label_model(step["step"]) for step in steps]
+    line_counts = [label.count("\n") + 1 for label in labels]
+    height_mm = 30 + 4.0 * sum(line_counts) + 4.5 * len(steps)
+    figure, axes = create_panels(1, len(METRICS), height_mm, sharey=True)
+    heights = np.array([0.55 + 0.45 * count for count in line_counts])
     rows = np.cumsum(heights) - heights / 2
-    values = np.array(
-        [[step[f"heldout_{metric}_m"] for metric in METRICS] for step in steps]
-    )
-    scale, unit = unit_of(values.max())
-    trained = np.array(
-        [[step[f"train_{metric}_m"] for metric in METRICS] for step in steps]
-    )
-    known = [*values[values > 0], *([noise_floor_m] if noise_floor_m else [])]
-    logarithmic = max(known) > _LARGEST_RATIO * min(known)
+    held_out = _collect_errors(steps, "heldout")
+    factor, unit = unit_of(held_out.max())
+    positive = [*held_out[held_out > 0], *([noise_floor_m] if noise_floor_m else [])]
+    logarithmic = max(positive) > _MAX_LINEAR_RATIO * min(positive)
+    largest = max(held_out.max(), _collect_errors(steps, "train").max())
     for axis, (metric, title) in zip(axes[0], METRICS.items(), strict=True):
-        for row, step in zip(rows, steps, strict=True):
-            value, low, high = (
-                scale * step[f"heldout_{metric}_m{end}"]
-                for end in ("", "_low", "_high")
-            )
-            axis.barh(row, value, height=0.42, color=MODEL_STYLES[step["kind"]][0])
-            axis.plot(
-                [low, high], [row, row], color="black", linewidth=1.1, gid="interval"
-            )
-            axis.plot(scale * step[f"train_{metric}_m"], row, **_DIAMOND)
+        _draw_model_bars(axis, steps, metric, rows, factor)
         if noise_floor_m:
-            axis.axvline(
-                scale * noise_floor_m,
-                color="black",
-                linestyle=":",
-                linewidth=1.2,
-                gid="noise floor",
-            )
+            axis.axvline(factor * noise_floor_m, gid="noise floor", **_NOISE_STYLE)
         axis.set(title=title, xlabel=f"error ({unit})")
         if logarithmic:
-            axis.set(
-                xscale="log",
-                xlim=(
-                    0.5 * scale * min(known),
-                    1.6 * scale * max(values.max(), trained.max()),
-                ),
-            )
+            axis.set_xscale("log")
+            axis.set_xlim(0.5 * factor * min(positive), 1.6 * factor * largest)
             axis.xaxis.set_major_formatter("{x:g}")
         else:
             axis.set_xlim(0, None)
@@ -297,55 +349,81 @@ def draw_before_after(
         axis.set_axisbelow(True)
     axes[0, 0].set(yticks=rows, ylim=(heights.sum(), 0))
     axes[0, 0].set_yticklabels(labels, fontsize=7.5)
-    kinds = {step["kind"] for step in steps}
-    handles: list[Artist] = [
-        Patch(color=color, label=label)
-        for kind, (color, label) in MODEL_STYLES.items()
-        if kind in kinds
-    ]
-    handles.append(
-        Line2D([], [], color="black", linewidth=1.1, label="95 % interval over poses")
-    )
-    handles.append(Line2D([], [], **_DIAMOND, label="on fitted poses"))
+    handles = _explain_model_bars({step["kind"] for step in steps})
     if noise_floor_m:
-        handles.append(
-            Line2D(
-                [],
-                [],
-                color="black",
-                linestyle=":",
-                linewidth=1.2,
-                label="RMS that noise alone leaves",
-            )
-        )
+        label = "RMS that noise alone leaves"
+        handles.append(Line2D([], [], label=label, **_NOISE_STYLE))
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
 
 
+def _label_model(step: str) -> str:
+    """The effects of a model in words, in lines that fit next to the bars; the end of a
+    long list is left out."""
+    effects = in_words(step).split(", ")
+    return textwrap.fill(list_first(effects, _NAMED_EFFECTS), _MODEL_LABEL_WIDTH)
+
+
+def _collect_errors(steps: Sequence[Mapping[str, Any]], poses: str) -> np.ndarray:
+    """Errors (models, metrics) in m on the held-out or the training poses."""
+    return np.array(
+        [[step[f"{poses}_{metric}_m"] for metric in METRICS] for step in steps]
+    )
+
+
+def _draw_model_bars(
+    axis: Axes,
+    steps: Sequence[Mapping[str, Any]],
+    metric: str,
+    rows: np.ndarray,
+    factor: float,
+) -> None:
+    """Draw each model's error by one metric with its interval, and a diamond for the
+    error on fitted poses; `factor` converts m to the unit of the axis."""
+    for row, step in zip(rows, steps, strict=True):
+        key = f"heldout_{metric}_m"
+        colour = MODEL_STYLES[step["kind"]][0]
+        axis.barh(row, factor * step[key], height=0.42, color=colour)
+        interval = [factor * step[f"{key}_low"], factor * step[f"{key}_high"]]
+        axis.plot(interval, [row, row], gid="interval", **_INTERVAL_STYLE)
+        axis.plot(factor * step[f"train_{metric}_m"], row, **_DIAMOND_STYLE)
+
+
+def _explain_model_bars(kinds: set[str]) -> list[Artist]:
+    """Entries of the legend for bars of these kinds of models."""
+    bars = [
+        Patch(color=color, label=label)
+        for kind, (color, label) in MODEL_STYLES.items()
+        if kind in kinds
+    ]
+    return [
+        *bars,
+        Line2D([], [], label="95 % interval over poses", **_INTERVAL_STYLE),
+        Line2D([], [], label="on fitted poses", **_DIAMOND_STYLE),
+    ]
+
+
 @styled
 def draw_errors_by_campaign(table: pd.DataFrame) -> Figure:
-    """Root mean square errors with their intervals, a line for each campaign.
+    """Draw root mean square errors with their intervals, one row for each campaign.
 
-    `table`: ``campaign``, ``poses``, and ``before_rms_mm``, ``before_rms_low_mm``,
-    ``before_rms_high_mm``, the same for after: mm.
+    Parameters
+    ----------
+    table
+        ``campaign``, ``poses``, and ``before_rms_mm``, ``before_rms_low_mm``,
+        ``before_rms_high_mm``, the same for after; in mm.
     """
     rows = np.arange(len(table))[::-1]
     figure, axes = create_panels(1, 1, 24 + 6 * len(table))
     axis = axes[0, 0]
-    axis.hlines(
-        rows,
-        table["after_rms_mm"],
-        table["before_rms_mm"],
-        color="#c8c8c8",
-        lw=2.5,
-        zorder=1,
-    )
-    for stage, (words, color) in STAGES.items():
+    after = table["after_rms_mm"]
+    axis.hlines(rows, after, table["before_rms_mm"], color="#c8c8c8", lw=2.5, zorder=1)
+    for stage, (label, color) in STAGES.items():
         rms, low, high = (
             table[f"{stage}_rms{end}_mm"].to_numpy(float)
             for end in ("", "_low", "_high")
         )
-        # An interval that is open above is drawn to the value alone.
+        # An interval without an upper bound is drawn up to the value.
         span = [rms - low, np.where(np.isfinite(high), high - rms, 0.0)]
         axis.errorbar(
             rms,
@@ -356,18 +434,10 @@ def draw_errors_by_campaign(table: pd.DataFrame) -> Figure:
             ms=4,
             lw=1.2,
             capsize=2,
-            label=words,
+            label=label,
             zorder=2,
         )
-    # Robots and series in capitals, as people write them.
-    names = table["campaign"].str.replace("_on_", ", judged on ").str.replace("_", " ")
-    names = names.str.replace(r"^\w+|\b\w\b", lambda word: word[0].upper(), regex=True)
-    # A campaign with two sessions has two lines.
-    names = names.where(
-        ~names.duplicated(keep=False),
-        names + ", " + table["poses"].map(lambda count: format_count(count, "pose")),
-    )
-    axis.set_yticks(rows, names)
+    axis.set_yticks(rows, _name_campaigns(table))
     axis.set(
         xscale="log",
         xlabel="RMS position error of held-out poses (mm), with 95 % intervals",
@@ -378,97 +448,128 @@ def draw_errors_by_campaign(table: pd.DataFrame) -> Figure:
     return figure
 
 
+def _name_campaigns(table: pd.DataFrame) -> pd.Series:
+    """Names of campaigns as people write them, with capitals for robots and series.
+
+    Two sessions of one campaign are distinguished by their numbers of poses.
+    """
+    names = table["campaign"].str.replace("_on_", ", judged on ").str.replace("_", " ")
+    names = names.str.replace(r"^\w+|\b\w\b", lambda word: word[0].upper(), regex=True)
+    poses = table["poses"].map(lambda count: format_count(count, "pose"))
+    return names.where(~names.duplicated(keep=False), names + ", " + poses)
+
+
 @styled
 def draw_probabilities(
-    stated: Mapping[str, Any] | None, table: Mapping[str, np.ndarray]
+    posterior: Mapping[str, Any] | None, table: Mapping[str, np.ndarray]
 ) -> Figure:
-    """Posterior probabilities of the leading hypotheses, and Bayes factors of the
-    leading candidates alone.
+    """Draw the posterior probabilities of the leading hypotheses, and the Bayes factors
+    of the leading candidates alone.
 
-    `stated`: ``probabilities`` of a diagnosis; None where the data are at fault.
-    `table`: columns of the candidates table.
+    Parameters
+    ----------
+    posterior
+        ``probabilities`` of a diagnosis; None if the data are at fault.
+    table
+        Columns of the candidates table.
     """
-    order = rank_candidates(table)
-    if stated is None or not len(order):
-        count = len(set(table["candidate"]))
-        faulty = count and set(table["note"]) == {_AT_FAULT}
-        nothing = (
-            f"None of {count} candidate causes can be tested with these measurements."
-        )
-        return draw_note(
-            "The data are at fault: no cause in the robot was looked for."
-            if faulty
-            else nothing
-        )
-    sets = stated["sets"][:_HYPOTHESES]
-    named = order[:_NAMED]
-    labels = [textwrap.fill(capital(words), _LABEL) for words in hypotheses_words(sets)]
-    values = [entry["probability"] for entry in sets]
-    if (rest := 1.0 - sum(values)) > 0.001:
-        labels = [*labels, _ALL_ELSE]
-        values = [*values, rest]
-    names = [shorten_candidate_name(table["candidate"][index]) for index in named]
-    upper = _heights_mm(labels)
-    lower = _heights_mm(names)
-    sizes = [34 + upper.sum(), 22 + lower.sum()]
-    figure, axes = create_panels(2, 1, sum(sizes), height_ratios=sizes)
-    colours = [PALETTE[0] if label != _ALL_ELSE else "#d9d9d9" for label in labels]
-    rows = _label_rows(axes[0, 0], labels, upper)
-    axes[0, 0].barh(
-        rows, 100 * np.array(values), height=0.62 * upper, color=colours, zorder=2
-    )
-    for row, value in zip(rows, values, strict=True):
-        place = {
-            "xytext": (3, 0),
-            "textcoords": "offset points",
-            "va": "center",
-            "fontsize": 7.5,
-        }
-        axes[0, 0].annotate(probability_words(value), (100 * value, row), **place)
-    axes[0, 0].set(
-        xlim=(0, 112), xticks=range(0, 101, 20), xlabel="posterior probability (%)"
-    )
-    axes[0, 0].set_title("What is missing in the declared model", loc="left")
-    _factors(axes[1, 0], table, named, _label_rows(axes[1, 0], names, lower))
-    present = [
-        family for family in FAMILY_COLOURS if family in set(table["family"][named])
-    ]
-    handles = [Patch(color=FAMILY_COLOURS[family], label=family) for family in present]
-    if table["chosen"].any():
-        handles.append(
-            Patch(
-                facecolor="none",
-                edgecolor="black",
-                linewidth=1.3,
-                label="in the most probable model",
+    ranked = rank_candidates(table)
+    candidate_count = len(set(table["candidate"]))
+    if posterior is None or not len(ranked):
+        if candidate_count and set(table["note"]) == {_AT_FAULT}:
+            return draw_note(
+                "The data are at fault: no cause in the robot was looked for."
             )
+        return draw_note(
+            f"None of {candidate_count} candidate causes can be tested with these "
+            "measurements."
         )
-    untestable = len(set(table["candidate"])) - len(order)
-    words = f"{len(order)} candidate causes tested; {untestable} more cannot be tested with these measurements"
-    figure.legend(handles=handles, title=words, loc="outside lower center", ncols=4)
+    shown = ranked[:_SHOWN_CANDIDATES]
+    hypotheses = _list_hypotheses(posterior["sets"][:_SHOWN_HYPOTHESES])
+    names = [shorten_candidate_name(table["candidate"][index]) for index in shown]
+    upper_heights = _compute_row_heights([label for label, _ in hypotheses])
+    lower_heights = _compute_row_heights(names)
+    sizes = [34 + upper_heights.sum(), 22 + lower_heights.sum()]
+    figure, axes = create_panels(2, 1, sum(sizes), height_ratios=sizes)
+    _draw_hypotheses(axes[0, 0], hypotheses, upper_heights)
+    rows = _label_rows(axes[1, 0], names, lower_heights)
+    _draw_factors(axes[1, 0], table, shown, rows)
+    families = set(table["family"][shown])
+    handles = [
+        Patch(color=colour, label=family)
+        for family, colour in FAMILY_COLOURS.items()
+        if family in families
+    ]
+    if table["chosen"].any():
+        handles.append(Patch(label="in the most probable model", **_CHOSEN_STYLE))
+    title = (
+        f"{len(ranked)} candidate causes tested; {candidate_count - len(ranked)} more "
+        "cannot be tested with these measurements"
+    )
+    figure.legend(handles=handles, title=title, loc="outside lower center", ncols=4)
     return figure
 
 
-def _factors(
-    axis: Axes, table: Mapping[str, np.ndarray], named: np.ndarray, rows: np.ndarray
+def _list_hypotheses(sets: Sequence[Mapping[str, Any]]) -> list[tuple[str, float]]:
+    """Label and probability of each hypothesis, then of all others together."""
+    labels = [
+        textwrap.fill(capital(words), _HYPOTHESIS_LABEL_WIDTH)
+        for words in hypotheses_words(sets)
+    ]
+    values = [entry["probability"] for entry in sets]
+    hypotheses = [*zip(labels, values, strict=True)]
+    remaining = 1.0 - sum(values)
+    if remaining > _SMALLEST_SHOWN_PROBABILITY:
+        hypotheses.append((_ALL_ELSE, remaining))
+    return hypotheses
+
+
+def _draw_hypotheses(
+    axis: Axes, hypotheses: Sequence[tuple[str, float]], heights_mm: np.ndarray
 ) -> None:
-    """Bayes factors of single candidates, coloured by family."""
-    factors = table["log_bayes_factor"][named]
-    chosen = table["chosen"][named].astype(bool)
+    """Draw a bar for each hypothesis with its probability in words."""
+    labels = [label for label, _ in hypotheses]
+    values = [probability for _, probability in hypotheses]
+    colours = [PALETTE[0] if label != _ALL_ELSE else "#d9d9d9" for label in labels]
+    rows = _label_rows(axis, labels, heights_mm)
+    widths = 100 * np.array(values)
+    axis.barh(rows, widths, height=0.62 * heights_mm, color=colours, zorder=2)
+    for row, value in zip(rows, values, strict=True):
+        axis.annotate(
+            probability_words(value),
+            (100 * value, row),
+            xytext=(3, 0),
+            textcoords="offset points",
+            va="center",
+            fontsize=7.5,
+        )
+    axis.set(
+        xlim=(0, 112), xticks=range(0, 101, 20), xlabel="posterior probability (%)"
+    )
+    axis.set_title("What is missing in the declared model", loc="left")
+
+
+def _draw_factors(
+    axis: Axes, table: Mapping[str, np.ndarray], shown: np.ndarray, rows: np.ndarray
+) -> None:
+    """Draw the Bayes factors of single candidates, coloured by family."""
+    factors = table["log_bayes_factor"][shown]
+    chosen = table["chosen"][shown].astype(bool)
     colours = [
-        FAMILY_COLOURS.get(family, PALETTE[-1]) for family in table["family"][named]
+        FAMILY_COLOURS.get(family, PALETTE[-1]) for family in table["family"][shown]
     ]
     axis.barh(rows, factors, color=colours, height=2.6, zorder=2)
     if chosen.any():
-        style: dict[str, Any] = {
-            "facecolor": "none",
-            "edgecolor": "black",
-            "linewidth": 1.3,
-            "zorder": 3,
-            "gid": "chosen",
-        }
-        axis.barh(rows[chosen], factors[chosen], height=2.6, **style)
-    # Roots keep the small ones in sight; symmetric, since a factor may be below zero.
+        axis.barh(
+            rows[chosen],
+            factors[chosen],
+            height=2.6,
+            zorder=3,
+            gid="chosen",
+            **_CHOSEN_STYLE,
+        )
+    # A square-root scale keeps small factors visible; it is symmetric because a
+    # logarithm may be below zero.
     axis.set_xscale(
         "function",
         functions=(
@@ -478,31 +579,32 @@ def _factors(
     )
     low = min(factors.min(), 0.0)
     high = max(factors.max(), 2.0)
-    # Squares of evenly spaced roots.
-    ends = np.linspace(-np.sqrt(-low), np.sqrt(high), 7)
-    ticks = {float(f"{root * abs(root):.2g}") for root in ends} | {0.0}
+    # The ticks are squares of evenly spaced roots.
+    roots = np.linspace(-np.sqrt(-low), np.sqrt(high), 7)
+    ticks = {float(f"{root * abs(root):.2g}") for root in roots} | {0.0}
     axis.set(
         xlim=(1.08 * low, 1.06 * high),
         xticks=sorted(tick for tick in ticks if low <= tick <= high),
     )
     axis.xaxis.set_major_formatter("{x:g}")
     axis.set_xlabel(
-        "Bayes factor against the declared model\n(natural logarithm; above 0 it explains more)"
+        "Bayes factor against the declared model\n"
+        "(natural logarithm; above 0 it explains more)"
     )
     axis.axvline(0, color="black", linewidth=0.8, zorder=4)
     axis.set_title("Each candidate cause alone", loc="left")
 
 
-def _heights_mm(labels: Sequence[str]) -> np.ndarray:
-    """Heights of rows in which labels of one or more lines fit."""
+def _compute_row_heights(labels: Sequence[str]) -> np.ndarray:
+    """Heights (N,) in mm of rows that labels of one or more lines need."""
     return np.array([_ROW_MM + _LINE_MM * label.count("\n") for label in labels])
 
 
 def _label_rows(
     axis: Axes, labels: Sequence[str], heights_mm: np.ndarray
 ) -> np.ndarray:
-    """Label rows from above, in an axis whose unit is a millimetre; returns their
-    middles."""
+    """Label rows from the top, on an axis with one unit a millimetre; returns the
+    middles of the rows."""
     rows = np.cumsum(heights_mm) - heights_mm / 2
     axis.set(yticks=rows, ylim=(heights_mm.sum(), 0))
     axis.set_yticklabels(labels, fontsize=7, linespacing=1.0)
@@ -511,8 +613,11 @@ def _label_rows(
 
 
 def rank_candidates(table: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Indices (tested,) of the tested candidates by falling Bayes factor; each at the
-    best value of its shape."""
+    """Rank the tested candidates by falling Bayes factor.
+
+    Of a candidate with a shape parameter, only its best value counts. Returns indices
+    (tested,) into the candidates table.
+    """
     tested = np.flatnonzero(np.isfinite(table["log_bayes_factor"]))
     order = tested[np.argsort(-table["log_bayes_factor"][tested], kind="stable")]
     _, first = np.unique(table["candidate"][order].astype(str), return_index=True)
@@ -520,15 +625,13 @@ def rank_candidates(table: Mapping[str, np.ndarray]) -> np.ndarray:
 
 
 def shorten_candidate_name(key: str) -> str:
-    """A candidate's key as words, in two lines where it is long and cut in the middle
-    where it is very long."""
-    words = capital(candidate_words(key))
-    words = (
-        words
-        if len(words) <= _LONGEST
-        else f"{words[: _LONGEST // 2]} … {words[-(_LONGEST // 2 - 2) :]}"
-    )
-    return textwrap.fill(words, 48)
+    """Word a candidate's key, in two lines if it is long; the middle of a very long name
+    is left out."""
+    name = capital(candidate_words(key))
+    if len(name) > _LONGEST_NAME:
+        half = _LONGEST_NAME // 2
+        name = f"{name[:half]} … {name[-(half - 2) :]}"
+    return textwrap.fill(name, _CANDIDATE_LABEL_WIDTH)
 
 
 @styled
@@ -538,64 +641,43 @@ def draw_budget_bars(
     tolerance_m: float,
     tracker_m: float,
 ) -> Figure:
-    """Lines of an error budget as bars, the largest first, against the tolerance.
+    """Draw the contributions to an error budget as bars against the tolerance, the
+    largest first.
 
-    `budget`: ``name, rms_m``. `names`: of the lines, in words. `tracker_m`: RMS
-    position error that the tracker's noise alone shows.
+    Parameters
+    ----------
+    budget
+        Contributions: ``name``, ``rms_m``.
+    names
+        The contributions in words.
+    tolerance_m : float, m
+    tracker_m : float, m
+        RMS position error that the tracker's noise alone shows.
     """
-    own = {"name": TRACKER, "rms_m": tracker_m}
-    lines = [*zip(names, budget, strict=True), ("noise of the tracker alone", own)]
-    shown = sorted(
-        (line for line in lines if line[1]["rms_m"] > 0.0),
-        key=lambda line: -line[1]["rms_m"],
-    )
+    tracker = {"name": TRACKER, "rms_m": tracker_m}
+    pairs = [*zip(names, budget, strict=True), ("noise of the tracker alone", tracker)]
+    shown = [(name, entry) for name, entry in pairs if entry["rms_m"] > 0.0]
+    shown.sort(key=lambda pair: -pair[1]["rms_m"])
     figure, axes = create_panels(1, 1, 26 + 6.5 * len(shown))
     axis = axes[0, 0]
-    kinds = []
-    for row, (_, line) in enumerate(shown):
-        kind = (
-            line["name"]
-            if line["name"] in _SHARES
-            else "rest"
-            if line["name"] in _REST
-            else "effect"
-        )
-        kinds.append(kind)
-        size = MILLI * line["rms_m"]
-        axis.barh(
-            row,
-            size,
-            height=0.6,
-            color=_SHARES[kind][0],
-            edgecolor="black" if kind == TRACKER else None,
-            linewidth=0.6,
-        )
-        style: dict[str, Any] = {
-            "fontsize": 7,
-            "bbox": {"facecolor": "white", "edgecolor": "none", "pad": 0.6},
-        }
-        axis.annotate(
-            f"{size:.3f}",
-            (size, row),
-            (4, 0),
-            textcoords="offset points",
-            va="center",
-            **style,
-        )
-    axis.axvline(
-        MILLI * tolerance_m,
+    for row, (_, entry) in enumerate(shown):
+        _draw_contribution(axis, row, entry)
+    tolerance_mm = MILLI * tolerance_m
+    tolerance_line = axis.axvline(
+        tolerance_mm,
         color=PALETTE[1],
         ls="--",
         zorder=0,
-        label=f"tolerance {MILLI * tolerance_m:g} mm",
+        label=f"tolerance {tolerance_mm:g} mm",
     )
     axis.set(
-        xlim=(0, 1.1 * max(axis.get_xlim()[1], MILLI * tolerance_m)),
+        xlim=(0, 1.1 * max(axis.get_xlim()[1], tolerance_mm)),
         xlabel="predicted RMS position error (mm)",
     )
     axis.set_yticks(range(len(shown)), [name for name, _ in shown])
     axis.invert_yaxis()
     axis.grid(visible=False, axis="y")
+    kinds = {_classify_contribution(entry["name"]) for _, entry in shown}
     handles: list[Artist] = [
         Patch(
             facecolor=color,
@@ -603,12 +685,41 @@ def draw_budget_bars(
             linewidth=0.6,
             label=label,
         )
-        for kind, (color, label) in _SHARES.items()
+        for kind, (color, label) in _CONTRIBUTION_STYLES.items()
         if kind in kinds
     ]
-    figure.legend(
-        handles=[*handles, *axis.get_legend_handles_labels()[0]],
-        loc="outside lower center",
-        ncols=3,
-    )
+    handles.append(tolerance_line)
+    figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
+
+
+def _classify_contribution(name: str) -> str:
+    """Kind of a contribution, a key of `_CONTRIBUTION_STYLES`."""
+    if name in _CONTRIBUTION_STYLES:
+        return name
+    if name in _RESIDUAL_CONTRIBUTIONS:
+        return "residual"
+    return "effect"
+
+
+def _draw_contribution(axis: Axes, row: int, entry: Mapping[str, Any]) -> None:
+    """Draw the bar of one contribution with its value in mm."""
+    kind = _classify_contribution(entry["name"])
+    size_mm = MILLI * entry["rms_m"]
+    axis.barh(
+        row,
+        size_mm,
+        height=0.6,
+        color=_CONTRIBUTION_STYLES[kind][0],
+        edgecolor="black" if kind == TRACKER else None,
+        linewidth=0.6,
+    )
+    axis.annotate(
+        f"{size_mm:.3f}",
+        (size_mm, row),
+        (4, 0),
+        textcoords="offset points",
+        va="center",
+        fontsize=7,
+        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6},
+    )

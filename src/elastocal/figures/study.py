@@ -1,8 +1,13 @@
 """Figures of the study: strategies over the data set length, the study against the
-paper, and the research questions."""
+paper, and the research questions.
+
+The functions that start with ``draw_`` are named in workflow/rules/figures.smk.
+"""
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -23,70 +28,195 @@ from elastocal.figures.style import (
 )
 from elastocal.study.printed import SIGNIFICANCE_LEVEL
 
-# Of the linear panels of the noise impact: what a reader compares with the wanted
-# accuracy.
-_LINEAR_UM = 20.0
-_LENGTH = "configurations in the data set"
-_BANDS = "bands: ± one Monte Carlo standard error; one estimator under several names is drawn once"
-_HEADS = {
+# Range of the linear panels of the noise impact: readers compare it with the accuracy
+# that they want.
+_LINEAR_RANGE_UM = 20.0
+_LENGTH_LABEL = "configurations in the data set"
+_BANDS_TITLE = (
+    "bands: ± one Monte Carlo standard error; "
+    "one estimator under several names is drawn once"
+)
+_QUANTITY_TITLES = {
     "k_sigma_20": "$k_\\Sigma$ at 20 (%)",
     "n_k_sigma_1_percent": "length until 1 %",
     "dev_20": "dev at 20 (µm)",
     "n_dev_2_um": "length until 2 µm",
 }
-_DESIGNS = {"random": "random", "A": "A-optimal", "D": "D-optimal", "I": "I-optimal"}
+_DESIGN_LABELS = {
+    "random": "random",
+    "A": "A-optimal",
+    "D": "D-optimal",
+    "I": "I-optimal",
+}
+_DIAMOND: dict[str, Any] = {
+    "marker": "D",
+    "linestyle": "",
+    "markeredgecolor": "black",
+    "markersize": 4,
+}
+
+
+@dataclass(frozen=True)
+class _StrategyCurves:
+    """Scores of all strategies on one robot against the data set length.
+
+    Attributes
+    ----------
+    metrics
+        Long table of metrics, of one noise level.
+    printed
+        The printed figures.
+    robot : str
+        Key of the robot.
+    order
+        Names of the strategies; their positions determine the line styles.
+    """
+
+    metrics: pd.DataFrame
+    printed: pd.DataFrame
+    robot: str
+    order: Sequence[str]
+
+    def draw_lines(self, axis: Axes, quantity: str, scale: float = 1.0) -> None:
+        """Draw a scaled column of the metrics for each different estimator, at the
+        lengths at which the mean of 1/c exists in practice."""
+        trusted = self.metrics[
+            (self.metrics.robot == self.robot) & self.metrics.trustworthy
+        ]
+        curves = trusted.pivot(index="length", columns="strategy", values=quantity)
+        for index in _find_distinct_curves(curves, self.order):
+            cell = trusted[trusted.strategy == self.order[index]]
+            style = choose_line_style(index)
+            value = scale * cell[quantity]
+            error = scale * cell[f"{quantity}_std_error"]
+            axis.plot(cell.length, value, label=self.order[index], **style)
+            _fill_band(axis, cell.length, value - error, value + error, style["color"])
+        axis.set_xlim(2, 1.02 * self.metrics.length.max())
+
+    def draw_printed_marks(self, axis: Axes, quantity: str) -> None:
+        """Draw the printed scores at a length, and the printed lengths at which scores
+        reach a limit."""
+        label = "the paper's Table 4"
+        printed = self.printed[
+            (self.printed.table == "4")
+            & (self.printed.robot == self.robot)
+            & self.printed.strategy.isin(self.order)
+        ]
+        for row in printed.itertuples():
+            position = _locate_printed_mark(quantity, str(row.quantity), row.value)
+            if position is None:
+                continue
+            style = choose_line_style(self.order.index(str(row.strategy)))
+            axis.plot(
+                *position, color=style["color"], zorder=4, label=label, **_DIAMOND
+            )
+            # A label with an underscore stays out of the legend.
+            label = "_same"
+
+
+def _find_distinct_curves(curves: pd.DataFrame, order: Sequence[str]) -> list[int]:
+    """Indices of the strategies whose curve equals no earlier one, up to rounding.
+
+    `curves` has a column for each strategy.
+    """
+    distinct: list[int] = []
+    for index, name in enumerate(order):
+        if name not in curves:
+            continue
+        earlier = (curves[order[other]] for other in distinct)
+        equal = (
+            np.allclose(curves[name], curve, rtol=1e-6, atol=0, equal_nan=True)
+            for curve in earlier
+        )
+        if not any(equal):
+            distinct.append(index)
+    return distinct
+
+
+def _locate_printed_mark(
+    quantity: str, printed: str, value: Any
+) -> tuple[float, float] | None:
+    """Length and score of a printed value of a quantity; None for other quantities."""
+    score = re.fullmatch(rf"{quantity}_(\d+)", printed)
+    if score:
+        return float(score[1]), value
+    reached = re.fullmatch(rf"n_{quantity}_([\d.]+)_\w+", printed)
+    if reached:
+        return value, float(reached[1])
+    return None
+
+
+def _fill_band(axis: Axes, x: Any, low: Any, high: Any, color: str) -> None:
+    axis.fill_between(x, low, high, color=color, alpha=0.12, linewidth=0)
+
+
+def _draw_limit(axis: Axes, value: float, unit: str) -> None:
+    """Draw a horizontal line with its value at the right."""
+    axis.axhline(value, color="black", linewidth=0.7)
+    axis.annotate(
+        f"{value:g} {unit}",
+        (1, value),
+        xycoords=("axes fraction", "data"),
+        xytext=(2, 0),
+        textcoords="offset points",
+        va="center",
+        fontsize=7.5,
+    )
 
 
 @styled
 def draw_noise_impact(
     metrics: pd.DataFrame, strategy: str, titles: Mapping[str, str]
 ) -> Figure:
-    """Figure 4: deviation of one strategy against the data set length, for each noise
-    level.
+    """Figure 4: draw the deviation of one strategy against the data set length, for
+    each noise level.
 
-    `metrics`: long. `titles`: name of each robot to draw, by its key.
+    Parameters
+    ----------
+    metrics
+        Long table of metrics.
+    strategy : str
+    titles
+        Name of each robot to draw, by its key.
     """
     figure, axes = create_panels(2, len(titles), 118, sharex=True, sharey="row")
     for column, (robot, title) in zip(axes.T, titles.items(), strict=True):
         cells = metrics[(metrics.robot == robot) & (metrics.strategy == strategy)]
         for axis in column:
-            for index, (noise, cell) in enumerate(cells.groupby("noise_um")):
-                trusted = cell[cell.trustworthy]
-                axis.plot(
-                    cell.length,
-                    MICRO * cell.deviation,
-                    color=PALETTE[index],
-                    linewidth=0.5,
-                    alpha=0.5,
-                )
-                axis.plot(
-                    trusted.length,
-                    MICRO * trusted.deviation,
-                    color=PALETTE[index],
-                    label=f"{noise:g}",
-                )
-                # By factors, which keeps a band on a logarithmic axis where the error
-                # is as large as the value.
-                spread = np.exp(trusted.deviation_std_error / trusted.deviation)
-                value = MICRO * trusted.deviation
-                axis.fill_between(
-                    trusted.length,
-                    value / spread,
-                    value * spread,
-                    color=PALETTE[index],
-                    alpha=0.12,
-                    linewidth=0,
-                )
-        column[0].set(title=title, yscale="log", ylim=(1e-4, 3000))
-        column[0].yaxis.set_major_formatter("{x:g}")
-        column[1].set(
-            xlabel=_LENGTH, xlim=(1, cells.length.max()), ylim=(0, _LINEAR_UM)
+            _draw_noise_levels(axis, cells)
+        logarithmic, linear = column
+        logarithmic.set(title=title, yscale="log", ylim=(1e-4, 3000))
+        logarithmic.yaxis.set_major_formatter("{x:g}")
+        linear.set(
+            xlabel=_LENGTH_LABEL,
+            xlim=(1, cells.length.max()),
+            ylim=(0, _LINEAR_RANGE_UM),
         )
     axes[0, 0].set_ylabel("dev, equation 15 (µm)")
     axes[1, 0].set_ylabel("the same, linear (µm)")
-    title = "noise (µm and µrad); bands: a standard error as a factor; thin: some ĉ ≤ 0, or ĉ scatters by over a quarter"
-    add_legend_below(figure, 5, title)
+    legend_title = (
+        "noise (µm and µrad); bands: a standard error as a factor; "
+        "thin: some ĉ ≤ 0, or ĉ scatters by over a quarter"
+    )
+    add_legend_below(figure, 5, legend_title)
     return figure
+
+
+def _draw_noise_levels(axis: Axes, cells: pd.DataFrame) -> None:
+    """Draw the deviation at each noise level, thick with a band where it is
+    trustworthy."""
+    levels = cells.groupby("noise_um")
+    for (noise, cell), color in zip(levels, cycle(PALETTE), strict=False):
+        trusted = cell[cell.trustworthy]
+        axis.plot(
+            cell.length, MICRO * cell.deviation, color=color, linewidth=0.5, alpha=0.5
+        )
+        value = MICRO * trusted.deviation
+        axis.plot(trusted.length, value, color=color, label=f"{noise:g}")
+        # A factor keeps the band on a logarithmic axis even if the error is as large as
+        # the value.
+        factor = np.exp(trusted.deviation_std_error / trusted.deviation)
+        _fill_band(axis, trusted.length, value / factor, value * factor, color)
 
 
 @styled
@@ -98,27 +228,36 @@ def draw_stiffness_errors(
     order: Sequence[str],
     limit_percent: float,
 ) -> Figure:
-    """Figures 5a and 5b: summed stiffness error of all strategies against the data set
-    length, under both counts of joints.
+    """Figures 5a and 5b: draw the summed stiffness error of all strategies against the
+    data set length, under both counts of joints.
 
-    `metrics`: long, of one noise level. `printed`: the printed figures; those of
-    k_sigma are taken to count the joints fixed in the last stage. `order`: strategies.
-    `limit_percent`: marked by a line.
+    Parameters
+    ----------
+    metrics, printed, robot, order
+        As in `_StrategyCurves`. The printed figures of k_sigma are taken to count the
+        joints fixed in the last stage.
+    title : str
+        Name of the robot.
+    limit_percent : float
+        Marked by a line.
     """
     figure, axes = create_panels(1, 2, 96, sharey=True)
-    counts = {
+    curves = _StrategyCurves(metrics, printed, robot, order)
+    panel_titles = {
         "k_sigma": "all joints (equation 14)",
         "k_sigma_fixed_joints": "joints fixed in the last stage",
     }
-    for axis, (quantity, count) in zip(axes[0], counts.items(), strict=True):
-        _strategy_lines(axis, metrics, robot, quantity, 1.0, order)
-        _limit(axis, limit_percent, "%")
-        axis.set(title=count, xlabel=_LENGTH)
-    _printed_marks(axes[0, 1], printed, robot, "k_sigma", order)
+    for axis, (quantity, panel_title) in zip(
+        axes[0], panel_titles.items(), strict=True
+    ):
+        curves.draw_lines(axis, quantity)
+        _draw_limit(axis, limit_percent, "%")
+        axis.set(title=panel_title, xlabel=_LENGTH_LABEL)
+    curves.draw_printed_marks(axes[0, 1], "k_sigma")
     figure.suptitle(title, fontsize=9)
     axes[0, 0].set(ylabel=r"$k_\Sigma$ (%)", yscale="log", ylim=(0.3, 40))
     label_decades(axes[0, 0].yaxis)
-    add_legend_below(figure, 4, _BANDS)
+    add_legend_below(figure, 4, _BANDS_TITLE)
     return figure
 
 
@@ -131,207 +270,122 @@ def draw_deviations(
     order: Sequence[str],
     limit_um: float,
 ) -> Figure:
-    """Figures 5c and 5d: deviation of all strategies against the data set length.
+    """Figures 5c and 5d: draw the deviation of all strategies against the data set
+    length.
 
-    `metrics`: long, of one noise level. `printed`: the printed figures. `order`:
-    strategies. `limit_um`: marked by a line.
+    Parameters are as in `draw_stiffness_errors`; `limit_um` is marked by a line.
     """
     figure, axes = create_panels(1, 1, 92)
     axis = axes[0, 0]
-    _strategy_lines(axis, metrics, robot, "deviation", MICRO, order)
-    _limit(axis, limit_um, "µm")
-    _printed_marks(axis, printed, robot, "dev", order)
+    curves = _StrategyCurves(metrics, printed, robot, order)
+    curves.draw_lines(axis, "deviation", MICRO)
+    _draw_limit(axis, limit_um, "µm")
+    curves.draw_printed_marks(axis, "dev")
     axis.set(
         title=title,
-        xlabel=_LENGTH,
+        xlabel=_LENGTH_LABEL,
         ylabel="dev, equation 15 (µm)",
         yscale="log",
         ylim=(0.5, 80),
     )
     label_decades(axis.yaxis)
-    add_legend_below(figure, 4, _BANDS)
+    add_legend_below(figure, 4, _BANDS_TITLE)
     return figure
-
-
-def _strategy_lines(
-    axis: Axes,
-    metrics: pd.DataFrame,
-    robot: str,
-    quantity: str,
-    scale: float,
-    order: Sequence[str],
-) -> None:
-    # Where the mean of 1/c exists in practice.
-    mine = metrics[(metrics.robot == robot) & metrics.trustworthy]
-    for index in _find_distinct(
-        mine.pivot(index="length", columns="strategy", values=quantity), order
-    ):
-        cell = mine[mine.strategy == order[index]]
-        style = choose_line_style(index)
-        value = scale * cell[quantity]
-        error = scale * cell[f"{quantity}_std_error"]
-        axis.plot(cell.length, value, label=order[index], **style)
-        axis.fill_between(
-            cell.length,
-            value - error,
-            value + error,
-            color=style["color"],
-            alpha=0.12,
-            linewidth=0,
-        )
-    axis.set_xlim(2, 1.02 * metrics.length.max())
-
-
-def _find_distinct(curves: pd.DataFrame, order: Sequence[str]) -> list[int]:
-    """Places of the strategies whose curve (a column each) no strategy before them has,
-    to rounding."""
-    found: list[int] = []
-    for index, name in enumerate(order):
-        same = (
-            np.allclose(
-                curves[name], curves[order[other]], rtol=1e-6, atol=0, equal_nan=True
-            )
-            for other in found
-        )
-        if name in curves and not any(same):
-            found.append(index)
-    return found
-
-
-def _printed_marks(
-    axis: Axes, printed: pd.DataFrame, robot: str, quantity: str, order: Sequence[str]
-) -> None:
-    """Scores that the paper prints at a length, and the lengths at which it has them
-    reach a limit."""
-    label = "the paper's Table 4"
-    for row in printed[
-        (printed.table == "4") & (printed.robot == robot) & printed.strategy.isin(order)
-    ].itertuples():
-        score = re.fullmatch(rf"{quantity}_(\d+)", str(row.quantity))
-        reached = re.fullmatch(rf"n_{quantity}_([\d.]+)_\w+", str(row.quantity))
-        if score or reached:
-            place = (
-                (float(score[1]), row.value)
-                if score
-                else (row.value, float(reached[1]) if reached else np.nan)
-            )
-            colour = choose_line_style(order.index(str(row.strategy)))["color"]
-            axis.plot(
-                *place,
-                "D",
-                color=colour,
-                markeredgecolor="black",
-                markersize=4,
-                zorder=4,
-                label=label,
-            )
-            label = "_same"
-
-
-def _limit(axis: Axes, value: float, unit: str) -> None:
-    axis.axhline(value, color="black", linewidth=0.7)
-    place: dict[str, Any] = {
-        "xycoords": ("axes fraction", "data"),
-        "xytext": (2, 0),
-        "textcoords": "offset points",
-    }
-    axis.annotate(f"{value:g} {unit}", (1, value), **place, va="center", fontsize=7.5)
 
 
 @styled
 def draw_scores(comparison: pd.DataFrame, titles: Mapping[str, str]) -> Figure:
-    """Table 4 among studies of the same size: the paper's figures, and how studies
-    scatter.
+    """Draw the printed figures of Table 4 among the scatter of studies of the same size.
 
-    `comparison`: the table of this name. `titles`: name of each robot to draw, by its
-    key.
+    Parameters
+    ----------
+    comparison
+        The table of this name.
+    titles
+        Name of each robot to draw, by its key.
     """
     shown = comparison[(comparison.table == "4") & comparison.studies_mean.notna()]
-    quantities = list(dict.fromkeys(shown.quantity))
-    strategies = list(dict.fromkeys(shown.strategy))
     if shown.empty:
         return draw_note("the paper prints nothing of the robots of this study")
-    figure, axes = create_panels(
-        len(titles), len(quantities), 24 + 38 * len(titles), sharey=True
-    )
-    for line, (robot, title) in zip(axes, titles.items(), strict=True):
-        for axis, quantity in zip(line, quantities, strict=True):
+    quantities = list(dict.fromkeys(shown.quantity))
+    strategies = list(dict.fromkeys(shown.strategy))
+    height_mm = 24 + 38 * len(titles)
+    figure, axes = create_panels(len(titles), len(quantities), height_mm, sharey=True)
+    for panels, (robot, title) in zip(axes, titles.items(), strict=True):
+        for axis, quantity in zip(panels, quantities, strict=True):
             cells = shown[(shown.robot == robot) & (shown.quantity == quantity)]
             rows = [strategies.index(strategy) for strategy in cells.strategy]
-            look: dict[str, Any] = {
-                "color": PALETTE[0],
-                "markersize": 3,
-                "elinewidth": 3,
-                "alpha": 0.6,
-            }
-            name = "further studies, mean ± 2 standard deviations"
-            axis.errorbar(
-                cells.studies_mean,
-                rows,
-                xerr=2 * cells.studies_std,
-                fmt="o",
-                label=name,
-                **look,
-            )
-            for differs, colour, name in (
-                (False, "white", "paper"),
-                (True, PALETTE[1], "paper, differs (Holm)"),
-            ):
-                some = ((cells.p_holm < SIGNIFICANCE_LEVEL) == differs).to_numpy()
-                at = np.array(rows)[some]
-                axis.plot(
-                    cells.paper[some],
-                    at,
-                    "D",
-                    color=colour,
-                    markeredgecolor="black",
-                    markersize=4,
-                    label=name,
-                )
+            _draw_scatter(axis, cells, np.array(rows))
             axis.set(
-                title=_HEADS.get(quantity, quantity.replace("_", " ")),
+                title=_QUANTITY_TITLES.get(quantity, quantity.replace("_", " ")),
                 xlim=(0, None),
                 ylim=(len(strategies) - 0.5, -0.5),
             )
             axis.grid(visible=False, axis="y")
-        line[0].set(yticks=range(len(strategies)), ylabel=title)
-        line[0].set_yticklabels(strategies)
+        panels[0].set(yticks=range(len(strategies)), ylabel=title)
+        panels[0].set_yticklabels(strategies)
     add_legend_below(figure, 2)
     return figure
 
 
+def _draw_scatter(axis: Axes, cells: pd.DataFrame, rows: np.ndarray) -> None:
+    """Draw the range of the studies and the printed value of each cell in its row."""
+    axis.errorbar(
+        cells.studies_mean,
+        rows,
+        xerr=2 * cells.studies_std,
+        fmt="o",
+        label="further studies, mean ± 2 standard deviations",
+        color=PALETTE[0],
+        markersize=3,
+        elinewidth=3,
+        alpha=0.6,
+    )
+    differs = (cells.p_holm < SIGNIFICANCE_LEVEL).to_numpy()
+    for selected, color, label in (
+        (~differs, "white", "paper"),
+        (differs, PALETTE[1], "paper, differs (Holm)"),
+    ):
+        axis.plot(
+            cells.paper[selected], rows[selected], color=color, label=label, **_DIAMOND
+        )
+
+
 @styled
 def draw_ladder(table: pd.DataFrame) -> Figure:
-    """Error of one data set by number of link springs, for each noise and length, of
-    the first robot with links.
+    """Draw the error of one data set by number of link springs, for each noise and
+    length, of the first robot with links.
 
-    `table`: from `ladder.ladder_table`.
+    Parameters
+    ----------
+    table
+        From `study.ladder.build_ladder_table`.
     """
     if table.empty:
         return draw_note("no robot of this study has elastic links")
-    table = table[table.robot == table.robot.iloc[0]]
-    steps = table[table.chosen_percent.notna()]
-    noises = list(dict.fromkeys(table.noise_um))
+    first_robot = table[table.robot == table.robot.iloc[0]]
+    steps = first_robot[first_robot.chosen_percent.notna()]
+    noises = list(dict.fromkeys(first_robot.noise_um))
     figure, axes = create_panels(1, len(noises), 72, sharey=True)
     for axis, noise in zip(axes[0], noises, strict=True):
-        for index, (length, cell) in enumerate(
-            steps[steps.noise_um == noise].groupby("length")
-        ):
+        by_length = steps[steps.noise_um == noise].groupby("length")
+        for (length, cell), color in zip(by_length, cycle(PALETTE), strict=False):
             springs = cell.link_springs.astype(int)
             axis.plot(
                 springs,
                 cell.rms_um,
-                color=PALETTE[index],
+                color=color,
                 label=f"{length}",
                 marker="o",
                 markersize=2.5,
             )
-            # Where cross-validation stops: the larger the more often.
+            # The size of a disc is the share of data sets in which cross-validation
+            # stops there.
             axis.scatter(
                 springs,
                 cell.rms_um,
                 s=0.9 * cell.chosen_percent,
-                color=PALETTE[index],
+                color=color,
                 alpha=0.35,
                 linewidths=0,
             )
@@ -343,8 +397,11 @@ def draw_ladder(table: pd.DataFrame) -> Figure:
         axis.set_xticks(range(int(steps.link_springs.astype(int).max()) + 1))
         label_decades(axis.yaxis)
     axes[0, 0].set_ylabel("RMS error of one data set (µm)")
-    title = "configurations in the data set; discs: share of data sets in which cross-validation stops there"
-    add_legend_below(figure, 6, title)
+    legend_title = (
+        "configurations in the data set; "
+        "discs: share of data sets in which cross-validation stops there"
+    )
+    add_legend_below(figure, 6, legend_title)
     return figure
 
 
@@ -352,35 +409,38 @@ def draw_ladder(table: pd.DataFrame) -> Figure:
 def draw_designs(
     table: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float
 ) -> Figure:
-    """Error that simulated data sets of random and optimal configurations leave, by
-    their number.
+    """Draw the error that random and optimal configurations leave in simulated data
+    sets, by their number.
 
-    `table`: from `designs.simulated_designs_table`, of which loads in random directions
-    are drawn. `titles`: name of each robot to draw, by its key. `accuracy_um`: marked
-    by a line.
+    Parameters
+    ----------
+    table
+        From `study.designs.build_designs_table`; only loads in random directions are
+        drawn.
+    titles
+        Name of each robot to draw, by its key.
+    accuracy_um : float
+        Marked by a line.
     """
     table = table[table.load == "random"]
+    sizes = sorted(set(table.configurations))
     figure, axes = create_panels(1, len(titles), 80, sharey=True)
     for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):
-        for index, (kind, name) in enumerate(_DESIGNS.items()):
-            cell = table[(table.robot == robot) & (table.design == kind)]
+        for index, (design, label) in enumerate(_DESIGN_LABELS.items()):
+            cell = table[(table.robot == robot) & (table.design == design)]
             axis.errorbar(
                 cell.configurations,
                 cell.rms_um,
                 cell.rms_um_std_error,
                 **choose_line_style(index),
-                label=name,
+                label=label,
             )
         axis.axhline(accuracy_um, color="black", linewidth=0.7)
         axis.set(title=title, xlabel="configurations", xscale="log", yscale="log")
-        axis.set_xticks(
-            sorted(set(table.configurations)),
-            labels=[f"{size}" for size in sorted(set(table.configurations))],
-        )
+        axis.set_xticks(sizes, labels=[f"{size}" for size in sizes])
         axis.xaxis.set_minor_locator(NullLocator())
         label_decades(axis.yaxis)
     axes[0, 0].set_ylabel("RMS error of one data set (µm)")
-    add_legend_below(
-        figure, 4, f"bars: ± one Monte Carlo standard error; line: {accuracy_um:g} µm"
-    )
+    legend_title = f"bars: ± one Monte Carlo standard error; line: {accuracy_um:g} µm"
+    add_legend_below(figure, 4, legend_title)
     return figure

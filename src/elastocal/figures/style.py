@@ -1,5 +1,5 @@
-"""One look for all figures: sizes, colours that colour-blind readers can distinguish,
-and a line style for each strategy."""
+"""The common look of all figures: sizes, colours that colour-blind readers can
+distinguish, and a line style for each strategy."""
 
 from __future__ import annotations
 
@@ -21,10 +21,11 @@ if TYPE_CHECKING:
     from elastocal.io.origin import Origin
 
 WIDTH_MM = 165
+_MM_PER_INCH = 25.4
 MICRO = 1e6
 MILLI = 1e3
-# Okabe and Ito's, without black and the yellow that is too pale for lines; then two
-# more.
+# The palette of Okabe and Ito, without black and without the yellow that is too pale for
+# lines, and two further colours.
 PALETTE = (
     "#0072B2",
     "#D55E00",
@@ -35,7 +36,7 @@ PALETTE = (
     "#7F3C8D",
     "#4D4D4D",
 )
-# Errors of a campaign, before and after.
+# Label and colour of the errors of a campaign, before and after correction.
 STAGES = {
     "before": ("declared model", PALETTE[1]),
     "after": ("with the effects found", PALETTE[0]),
@@ -66,8 +67,8 @@ SETTINGS: dict[RcKeyType, Any] = {
 }
 
 
-# Legends and titles take the look that is set while they are made: decorate each figure
-# function with it.
+# Decorator for functions that draw a figure: legends and titles take the settings that
+# are active when they are created.
 styled = rc_context(SETTINGS)
 
 
@@ -78,24 +79,36 @@ def create_panels(
     width_mm: float = WIDTH_MM,
     **options: Any,
 ) -> tuple[Figure, np.ndarray]:
-    """A figure with a grid of axes in the common look.
+    """Create a figure with a grid of axes in the common look.
 
-    `**options`: passed on to ``Figure.subplots``. Returns `axes` (rows, columns).
+    Parameters
+    ----------
+    rows, columns : int
+        Shape of the grid.
+    height_mm, width_mm : float
+        Size of the figure.
+    **options
+        Passed on to ``Figure.subplots``.
+
+    Returns
+    -------
+    figure : Figure
+    axes : (rows, columns) array of Axes
     """
-    figure = Figure(figsize=(width_mm / 25.4, height_mm / 25.4), layout="constrained")
+    size = (width_mm / _MM_PER_INCH, height_mm / _MM_PER_INCH)
+    figure = Figure(figsize=size, layout="constrained")
     return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
 
 def add_legend_below(figure: Figure, columns: int, title: str | None = None) -> None:
-    """One legend of all panels below them, each entry once."""
-    entries = {
-        label: one
-        for axis in figure.axes
-        for one, label in zip(*axis.get_legend_handles_labels(), strict=True)
-    }
+    """Add one legend below all panels, with each label once."""
+    handles_by_label = {}
+    for axis in figure.axes:
+        for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
+            handles_by_label[label] = handle
     figure.legend(
-        [*entries.values()],
-        [*entries],
+        [*handles_by_label.values()],
+        [*handles_by_label],
         title=title,
         loc="outside lower center",
         ncols=columns,
@@ -103,7 +116,7 @@ def add_legend_below(figure: Figure, columns: int, title: str | None = None) -> 
 
 
 def draw_note(text: str, height_mm: float = 25) -> Figure:
-    """A figure that says in words why there is nothing to draw."""
+    """Draw a figure that says in words why there is nothing to draw."""
     figure, axes = create_panels(1, 1, height_mm)
     axes[0, 0].set_axis_off()
     axes[0, 0].text(0.5, 0.5, text, ha="center", va="center")
@@ -111,8 +124,8 @@ def draw_note(text: str, height_mm: float = 25) -> Figure:
 
 
 def choose_line_style(index: int) -> dict[str, Any]:
-    """Colour and dashes of the strategy with this place in the list; lines that
-    coincide remain visible through the gaps."""
+    """Choose colour and dashes by a strategy's position in the list; coincident lines
+    remain visible through the gaps."""
     return {
         "color": PALETTE[index % len(PALETTE)],
         "linestyle": DASHES[index % len(DASHES)],
@@ -120,7 +133,7 @@ def choose_line_style(index: int) -> dict[str, Any]:
 
 
 def label_decades(*axes: Axis) -> None:
-    """Plain numbers on logarithmic axes, at 2 and 5 between the decades, too."""
+    """Put plain numbers on logarithmic axes, also at 2 and 5 between the decades."""
     for axis in axes:
         axis.set_major_locator(LogLocator(subs=[1.0, 2.0, 5.0]))
         axis.set_major_formatter("{x:g}")
@@ -128,11 +141,15 @@ def label_decades(*axes: Axis) -> None:
 
 
 def choose_ink(colour: tuple[float, ...]) -> str:
-    """Black or white, whichever has the higher contrast on a colour by its relative
-    luminance [1].
+    """Choose black or white, whichever has the higher contrast on a colour [1].
 
-    `colour`: red, green and blue of sRGB, 0 to 1; what follows is ignored.
+    Parameters
+    ----------
+    colour
+        Red, green and blue of sRGB, 0 to 1; further components are ignored.
 
+    References
+    ----------
     [1] World Wide Web Consortium, Web Content Accessibility Guidelines 2.2, "relative
     luminance" and "contrast ratio", 2023.
     """
@@ -149,36 +166,32 @@ def save(figure: Figure, pdf: str, png: str, origin: Origin | None = None) -> No
     """Write a figure as PDF and PNG without dates, so that the same data give the same
     bytes.
 
-    Each has a layout of its own: the widths of its letters differ by a few per cent,
-    and labels would be cut off.
+    Each format gets its own layout, because the widths of letters differ by a few per
+    cent and labels would be cut off.
 
-    `pdf`, `png`: paths; each file appears whole or not at all. `origin`: named in the
-    metadata of both: Subject and Keywords of the PDF, Description and Source of the
-    PNG.
+    Parameters
+    ----------
+    figure
+    pdf, png : str
+        Paths; each file appears complete or not at all.
+    origin
+        Written to the metadata of both files: Subject and Keywords of the PDF,
+        Description and Source of the PNG.
     """
-    subject = (
-        {}
-        if origin is None
-        else {
-            "Subject": origin.words,
-            "Keywords": " ".join(map(str, vars(origin).values())),
-        }
-    )
-    described = (
-        {} if origin is None else {"Description": origin.words, "Source": origin.commit}
-    )
-    of_pdf = {"CreationDate": None, **subject}
-    of_png = {"Software": None, **described}
-    for path, options in (
-        (pdf, {"metadata": of_pdf}),
-        (png, {"dpi": 150, "metadata": of_png}),
-    ):
-        with atomic_write(path) as partial:
-            figure.savefig(partial, format=path.rsplit(".", 1)[1], **options)
+    pdf_metadata: dict[str, str | None] = {"CreationDate": None}
+    png_metadata: dict[str, str | None] = {"Software": None}
+    if origin is not None:
+        keywords = " ".join(map(str, vars(origin).values()))
+        pdf_metadata |= {"Subject": origin.words, "Keywords": keywords}
+        png_metadata |= {"Description": origin.words, "Source": origin.commit}
+    with atomic_write(pdf) as partial:
+        figure.savefig(partial, format="pdf", metadata=pdf_metadata)
+    with atomic_write(png) as partial:
+        figure.savefig(partial, format="png", dpi=150, metadata=png_metadata)
 
 
 def save_all(figures: Mapping[str, Figure], folder: str) -> dict[str, str]:
-    """Write figures into a folder; returns the path of the PDF of each, by its name."""
+    """Write figures into a folder; returns the path of each PDF by the figure's name."""
     for name, figure in figures.items():
         save(figure, f"{folder}/{name}.pdf", f"{folder}/{name}.png")
     return {name: f"{folder}/{name}.pdf" for name in figures}
@@ -189,9 +202,8 @@ def save_svg(figure: Figure, path: str) -> None:
     """Write a figure for a page of the site, without a date and with names that are the
     same in every run.
 
-    Letters stay letters, which the reader's own sans serif draws.
-
-    `path`: the file appears whole or not at all.
+    Text stays text, which the reader's own sans serif draws. The file appears complete
+    or not at all.
     """
     with (
         rc_context({"svg.hashsalt": "elastocal", "svg.fonttype": "none"}),

@@ -1,5 +1,8 @@
-"""Robust generalized least squares on the composite model, by Gauss-Newton steps on
-exact predictions; and what it finds."""
+"""Robust generalized least squares by Gauss-Newton steps on exact predictions.
+
+`fit_model` fits a model to observations, `fit_robustly` is the iteration itself, and
+`register_placement` computes where it starts.
+"""
 
 from __future__ import annotations
 
@@ -25,6 +28,8 @@ from elastocal.fitting.model import (
 )
 from elastocal.fitting.normal_equations import (
     LeastSquaresProblem,
+    NormalSolution,
+    ParameterScales,
     compute_whitening,
     solve_normal_equations,
 )
@@ -41,57 +46,75 @@ if TYPE_CHECKING:
     from elastocal.fitting.normal_equations import Whitening
     from elastocal.fitting.observations import Observations, States
 
-    Solved = tuple[np.ndarray, np.ndarray, np.ndarray]
-
-# Rounds by which frames and targets are registered at most, and the move that ends
-# them.
-_ROUNDS = 200
-_SETTLED_M = 1e-9
-_STEPS = 30
-# A step that does not help is halved so often at most: one of a 64th that does not help
-# points the wrong way, or along a kink.
-_HALVINGS = 6
-# Largest step that remains, in standard errors: in a fit, and in one from which others
-# start.
+# Upper bound on the rounds of registration, and the move of a target below which the
+# registration has converged.
+_MAX_REGISTRATION_ROUNDS = 200
+_REGISTRATION_TOLERANCE_M = 1e-9
+# Upper bound on the Gauss-Newton steps of a fit.
+_MAX_STEPS = 30
+# Upper bound on the halvings of a step. If a 64th of it does not lower the objective,
+# the step points in a wrong direction or along a kink.
+_MAX_HALVINGS = 6
+# A fit has converged if its next step is below this many standard errors in every
+# parameter. Intermediate models, from which other fits start, need no tight
+# convergence.
 CONVERGENCE_TOLERANCE = 1e-3
 INTERMEDIATE_TOLERANCE = 0.1
-# A fit to more observations that does not come of a fit starts from the fit to so many
-# of them: they show the size of some fifty parameters as well as any number.
+# A fit to more observations than this starts from a fit to a sample of this size, which
+# shows the size of some fifty parameters as well as any larger number.
 START_SAMPLE_SIZE = 2_000
-# Standard errors: a step that moves no parameter farther, and no shape, leaves its Gram
-# matrix to the next one: standard errors by it are as sure as an estimate is within
-# `SETTLED`.
-_NEAR = 0.3
-# A step by all of so many observations takes seconds: the last of some that a fit to
-# all takes follow a fit to so many.
+# A step with more observations than this takes seconds. Such a fit first converges on a
+# sample of the second size, so that few steps use all observations.
 LARGE_FIT_SIZE = 100_000
-_STEPPING_STONE = 20_000
-# Loads are those of the step before: of a step so much is still to come, at most, by
-# deflection over reach.
-_LAGGING = 1e-2
-# Share of the slope by which a step must lower the objective (Armijo); a parabola gives
-# a half.
-_LEAST_FALL = 0.1
-# Of the objective. In a fit of a thousand rows a thousandth of a standard error in one
-# parameter makes half of that.
-_ROUNDING = 1e-9
+_INTERMEDIATE_SAMPLE_SIZE = 20_000
+# If a step moves every parameter by less than this many standard errors and no shape at
+# all, the next step uses the same Gram matrix. Standard errors computed with it are as
+# accurate as the estimate is within `CONVERGENCE_TOLERANCE`.
+_REUSE_THRESHOLD = 0.3
+# Loads lag one step behind. Of a step, at most this share is still to come: the ratio of
+# deflection to reach.
+_LAG_SHARE = 1e-2
+# Armijo's condition: share of the fall along the slope that a step must achieve. A
+# parabola achieves one half.
+_SUFFICIENT_DECREASE = 0.1
+# Rounding of the objective, relative to it. In a fit of a thousand rows, moving one
+# parameter by a thousandth of a standard error changes the objective by half of this.
+_OBJECTIVE_ROUNDING = 1e-9
 # Observations beyond this quantile of their distance lose weight.
 _HUBER_QUANTILE = 0.99
 
 
 @dataclass(frozen=True)
 class Fit:
-    """A model fitted to observations.
+    """A model fitted to M observations, with P parameters.
 
-    `unidentifiable` (P,) of bool: parameters that are not identifiable from the data.
-    `covariance` (P, P): of the parameters: inverse of the normal matrix of the last
-    step, which approximates the Hessian (Gauss-Newton); with priors as in Laplace's
-    approximation (Tierney and Kadane, J. Am. Stat. Assoc. 81, 1986). Zero where held.
-    `weights` (M,): robust weight of each observation. `residual` (M, rows): m and rad,
-    base axes. `joint_jacobian` (M, rows, n): of each target with respect to the joints;
-    None where there are too many to keep it. `conditions`: of the states fitted; None
-    where these are too many to keep it. `converged`: whether the last step was as small
-    as was asked for, in standard errors, in every parameter.
+    Attributes
+    ----------
+    model : Model
+    estimate : Estimate
+    noise : Noise
+    unidentifiable : (P,) bool array
+        Parameters that the data do not identify, which keep their values.
+    covariance : (P, P) array
+        Parameter covariance: inverse of the normal matrix of the last step, which
+        approximates the Hessian (Gauss-Newton); with priors as in Laplace's
+        approximation [1]_. Zero for unidentifiable parameters.
+    weights : (M,) array
+        Robust weight of each observation.
+    whitening : Whitening
+    residual : (M, rows) array
+        Measured minus predicted, m and rad, base axes.
+    joint_jacobian : (M, rows, n) array or None
+        Of each target with respect to the joints; None if there are too many states to
+        keep it in memory.
+    conditions : Conditions or None
+        Of the fitted states; None if there are too many to keep them in memory.
+    converged : bool
+        Whether the last step was within the tolerance in every parameter.
+
+    References
+    ----------
+    .. [1] Tierney and Kadane, J. Am. Stat. Assoc. 81, 1986.
     """
 
     model: Model
@@ -100,7 +123,7 @@ class Fit:
     unidentifiable: np.ndarray
     covariance: np.ndarray
     weights: np.ndarray
-    whitener: Whitening
+    whitening: Whitening
     residual: np.ndarray
     joint_jacobian: np.ndarray | None
     conditions: Conditions | None
@@ -108,13 +131,13 @@ class Fit:
 
     @property
     def parameters(self) -> list[tuple[str, Parameter]]:
-        """As `model.list_parameters`."""
+        """Owner and parameter, as `model.list_parameters` returns them."""
         return list_parameters(self.model, self.estimate)
 
     @property
     def prior_std(self) -> np.ndarray:
-        """Standard deviation of the prior of each of the parameters, infinite where it
-        has none, ndarray (P,)."""
+        """Standard deviation of the prior of each parameter, infinite without a prior,
+        (P,) array."""
         return np.array(
             [
                 np.inf if parameter.prior_std is None else parameter.prior_std
@@ -123,9 +146,8 @@ class Fit:
         )
 
     def parameter_indices(self, owner: str) -> np.ndarray:
-        """Places among the parameters of those that belong to one owner, such as the
-        key of an effect; ndarray of int."""
-        return np.flatnonzero([each == owner for each, _ in self.parameters])
+        """Indices of the parameters of one owner, such as the key of an effect."""
+        return np.flatnonzero([name == owner for name, _ in self.parameters])
 
     def effect_values(self, key: str) -> tuple[np.ndarray, np.ndarray]:
         """Linear parameters (D,) and shapes (F,) of one effect."""
@@ -133,43 +155,44 @@ class Fit:
         return self.estimate.coefficients[number], self.estimate.shapes[number]
 
     def whiten(self, values: np.ndarray) -> np.ndarray:
-        """Rows (M, rows, ...) weighted and whitened as in the fit."""
-        return self.whitener.apply(
-            values * np.sqrt(self.weights).reshape(-1, *[1] * (values.ndim - 1))
-        )
+        """Weight and whiten rows (M, rows, ...) as in the fit."""
+        root = np.sqrt(self.weights).reshape(-1, *[1] * (values.ndim - 1))
+        return self.whitening.apply(values * root)
 
     def iterate_sensitivities(
         self, observations: Observations
     ) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
-        """Sensitivities of the observations that were fitted, as they are and whitened,
-        in parts of whole poses.
+        """Compute the sensitivities of the fitted observations, by blocks of poses.
 
-        Yields `seen`: observations of the part; `plain`, `whitened` (M', rows, P).
+        Yields
+        ------
+        indices : slice of the observations
+        plain : (M', rows, P) array
+        whitened : (M', rows, P) array, weighted and whitened
         """
-        for states, seen, part in split_into_blocks(
-            observations, len(self.unidentifiable)
-        ):
-            around = self.get_conditions(
-                part.states, states if len(part) < len(observations) else None
+        for block in split_into_blocks(observations, len(self.unidentifiable)):
+            indices = block.indices
+            whole = len(block.observations) == len(observations)
+            conditions = self.get_conditions(
+                block.observations.states, None if whole else block.states
             )
-            line = linearize(self.model, self.estimate, part, around)
-            jacobian = (
-                line.joint_jacobian
-                if self.joint_jacobian is None
-                else self.joint_jacobian[seen]
+            linear_model = linearize(
+                self.model, self.estimate, block.observations, conditions
             )
-            white = compute_whitening(part, jacobian, self.noise)
-            yield (
-                seen,
-                line.sensitivities,
-                white.apply(
-                    line.sensitivities * np.sqrt(self.weights[seen])[:, None, None]
-                ),
-            )
+            if self.joint_jacobian is None:
+                jacobian = linear_model.joint_jacobian
+            else:
+                jacobian = self.joint_jacobian[indices]
+            whitening = compute_whitening(block.observations, jacobian, self.noise)
+            plain = linear_model.sensitivities
+            root = np.sqrt(self.weights[indices])[:, None, None]
+            yield indices, plain, whitening.apply(plain * root)
 
     def get_conditions(self, states: States, chosen: slice | None = None) -> Conditions:
-        """Conditions of the states, or of those chosen: as they were kept, or found
-        again where they were too many."""
+        """Conditions of the fitted states, or of a slice of them, which `states` are.
+
+        They are recomputed if there were too many to keep them in memory.
+        """
         if self.conditions is None:
             return evaluate_conditions(self.model, self.estimate, states)
         return self.conditions if chosen is None else at_states(self.conditions, chosen)
@@ -180,265 +203,514 @@ def fit_model(
     observations: Observations,
     noise: Noise,
     start: Estimate | None = None,
+    *,
     reweight_first_step: bool = False,
     tolerance: float = CONVERGENCE_TOLERANCE,
 ) -> Fit:
-    """Fit a model by robust generalized least squares and Gauss-Newton steps (Björck
-    1996), see `robustly`.
+    """Fit a model by robust generalized least squares (Björck 1996).
 
-    `start`: of this model; by `registered` without. `reweight_first_step`: whether the start
-    comes of a fit: outliers lose weight from the first step on. `tolerance`: largest step
-    that remains, in standard errors.
+    A fit to many observations starts from fits to samples of them.
+
+    Parameters
+    ----------
+    model, observations, noise
+    start : Estimate, optional
+        Estimate of this model; by default `register_placement` computes it.
+    reweight_first_step : bool
+        Whether outliers lose weight in the first step already, as they should if
+        `start` is the result of a fit.
+    tolerance : float
+        Largest remaining step, in standard errors.
     """
-    for most in ([] if reweight_first_step else [START_SAMPLE_SIZE]) + (
-        [_STEPPING_STONE] if len(observations) > LARGE_FIT_SIZE else []
-    ):
-        few = sample_observations(observations, most)
-        if len(few) < len(observations):
-            # Where all the measurements lead is close to where some of them do.
+    sample_sizes = [] if reweight_first_step else [START_SAMPLE_SIZE]
+    if len(observations) > LARGE_FIT_SIZE:
+        sample_sizes = [*sample_sizes, _INTERMEDIATE_SAMPLE_SIZE]
+    for size in sample_sizes:
+        sample = sample_observations(observations, size)
+        if len(sample) < len(observations):
             start = fit_model(
-                model, few, noise, start, reweight_first_step, INTERMEDIATE_TOLERANCE
+                model,
+                sample,
+                noise,
+                start,
+                reweight_first_step=reweight_first_step,
+                tolerance=INTERMEDIATE_TOLERANCE,
             ).estimate
             reweight_first_step = True
-    start = register_placement(model, observations) if start is None else start
-    return fit_robustly(
-        model,
-        observations,
-        noise,
-        start,
-        reweight_first_step=reweight_first_step,
-        tolerance=tolerance,
+    if start is None:
+        start = register_placement(model, observations)
+    options = IterationOptions(
+        reweight_first_step=reweight_first_step, tolerance=tolerance
     )
+    return fit_robustly(model, observations, noise, start, options)
 
 
 def evaluate_as_fit(
     model: Model, observations: Observations, noise: Noise, estimate: Estimate
 ) -> Fit:
-    """An estimate as a fit to observations that it need not come of; they have weight
-    one, whatever their distance."""
-    return replace(
-        fit_robustly(model, observations, noise, estimate, frozen=True),
-        weights=np.ones(len(observations)),
+    """Evaluate an estimate as if it were fitted to observations.
+
+    The estimate may come from elsewhere. All observations have weight one, whatever
+    their distance.
+    """
+    frozen = np.ones(len(list_parameters(model, estimate)), bool)
+    fitted = fit_robustly(
+        model, observations, noise, estimate, IterationOptions(frozen=frozen)
     )
+    return replace(fitted, weights=np.ones(len(observations)))
 
 
 def fit_placement(fitted: Fit, model: Model, observations: Observations) -> Estimate:
-    """Fit frames and targets of other observations; everything else stays as it was
-    found.
+    """Fit frames and targets of other observations and keep all effects of a fit.
 
-    `model`: the same effects with the targets of these observations.
+    `model` has the effects of the fit and the targets of these observations.
     """
-    found = fitted.estimate
     start = replace(
         register_placement(model, observations),
-        coefficients=found.coefficients,
-        shapes=found.shapes,
+        coefficients=fitted.estimate.coefficients,
+        shapes=fitted.estimate.shapes,
     )
-    frozen = ~find_placement_parameters(
-        owner for owner, _ in list_parameters(model, start)
-    )
-    return fit_robustly(model, observations, fitted.noise, start, frozen).estimate
+    owners = [owner for owner, _ in list_parameters(model, start)]
+    options = IterationOptions(frozen=~find_placement_parameters(owners))
+    return fit_robustly(model, observations, fitted.noise, start, options).estimate
+
+
+@dataclass(frozen=True)
+class IterationOptions:
+    """Options of `fit_robustly`.
+
+    Attributes
+    ----------
+    frozen : (P,) bool array, optional
+        Parameters that must not move; none by default.
+    reweight_first_step, tolerance
+        As in `fit_model`.
+    """
+
+    frozen: np.ndarray | None = None
+    reweight_first_step: bool = False
+    tolerance: float = CONVERGENCE_TOLERANCE
 
 
 def fit_robustly(
     model: Model,
     observations: Observations,
     noise: Noise,
-    estimate: Estimate,
-    frozen: bool | np.ndarray = False,
-    reweight_first_step: bool = False,
-    tolerance: float = CONVERGENCE_TOLERANCE,
+    start: Estimate,
+    options: IterationOptions,
 ) -> Fit:
-    """Iteratively reweighted least squares with Huber's weights [1] by Gauss-Newton
-    steps, each halved until it helps enough.
+    """Iterate reweighted least squares with Huber's weights and Gauss-Newton steps [1]_.
 
-    Where errors are independent, weighted squares are a bound of Huber's objective that
-    touches it at the present estimate (Huber and Ronchetti, Robust Statistics, 7.8), so
-    that it falls with them. Where measurements have errors in common there is none:
-    weights come before whitening, which would carry an outlier into the measurements
-    beside it, and the estimate solves the weighted equations (Preisser and Qaqish,
-    Biometrics 55, 1999). A whitening belongs to the axes in which a step begins:
-    residuals after the step are turned into these, or a fit would turn frame and robot
-    together on and on. Against curvature a step is backtracked until weighted squares
-    and priors fall by Armijo's condition (Nocedal and Wright, Numerical Optimization,
-    3.1). Where that hinders the first trial, what is linear given the laws that other
-    parameters load, and given their shapes, is solved for again there, as in variable
-    projection (Golub and Pereyra 1973): that is the acceleration by which a path
-    follows a bent valley (Transtrum and Sethna, arXiv 1201.5885), in which steps are
-    then halved. The first step gives all observations one weight, unless the start
-    comes of reweighted steps already.
+    If errors are independent, the weighted squares are an upper bound of Huber's
+    objective that touches it at the present estimate ([2]_, 7.8), so it falls with
+    them. If measurements have errors in common, there is no such bound: weights come
+    before whitening, because whitening would spread an outlier over the correlated
+    measurements, and the estimate solves the weighted equations [3]_. Each step is
+    backtracked, see `ArmijoLineSearch`. The first step gives all observations one
+    weight, unless the options say otherwise.
 
-    `estimate`: from which the first step is taken. `frozen` (P,) of bool: parameters
-    not to move. `reweight_first_step`, `tolerance`: as in `fit`.
-
-    [1] Holland, P. W. and Welsch, R. E., Robust regression using iteratively reweighted least-squares, Communications in
-        Statistics A6, 1977.
+    References
+    ----------
+    .. [1] Holland and Welsch, Robust regression using iteratively reweighted
+       least-squares, Communications in Statistics A6, 1977.
+    .. [2] Huber and Ronchetti, Robust Statistics.
+    .. [3] Preisser and Qaqish, Biometrics 55, 1999.
     """
-    rows = observations.rows
-    listed = [parameter for _, parameter in list_parameters(model, estimate)]
-    # Of chi-squared with as many degrees of freedom as a measurement has rows.
-    corner, typical = np.sqrt(2 * gammaincinv(rows / 2, [_HUBER_QUANTILE, 0.5]) / rows)
-    nonlinear = find_nonlinear_parameters(model, estimate)
-    bounds = get_parameter_bounds(model, estimate)
-    plausible = get_plausible_sizes(model, estimate)
-    penalty = np.array(
-        [0.0 if p.prior_std is None else p.prior_std**-2 for p in listed]
+    traits = ParameterTraits.of(model, start, options.frozen)
+    problem = LeastSquaresProblem(
+        model, observations, noise, start, traits.scales.plausible
     )
-    # Given what goes with the loads that other parameters make, and shapes, the
-    # residual is nearly linear in all others.
-    through = {
-        effect.key
-        for effect in model.effects
-        if effect.effect == "joint_compliance" or "load" in effect.needs
-    }
-    yielding = np.array(
-        [owner in through for owner, _ in list_parameters(model, estimate)], bool
-    )
-
-    def objective(estimate: Estimate, squares: float) -> float:
-        """Half the weighted squares of the residual and of what has a prior."""
-        return 0.5 * (squares + penalty @ get_parameter_values(model, estimate) ** 2)
-
-    def solved(
-        gram: np.ndarray,
-        along: np.ndarray,
-        present: np.ndarray,
-        frozen: bool | np.ndarray,
-    ) -> Solved:
-        """Gauss-Newton step, covariance and what is held, as of `solve_normal`, within
-        the ranges of the shapes."""
-        step, covariance, held = solve_normal_equations(
-            gram, along, plausible, frozen, penalty, present, nonlinear
-        )
-        # A shape that would leave its range goes to the end of it, and the others as
-        # they do then.
-        leaving = (present + step < bounds[:, 0]) | (present + step > bounds[:, 1])
-        if leaving.any():
-            ends = np.clip(present + step, *bounds.T)[leaving] - present[leaving]
-            rest = along - gram[:, leaving] @ (ends / plausible[leaving])
-            step = solve_normal_equations(
-                gram, rest, plausible, frozen | leaving, penalty, present, nonlinear
-            )[0]
-            step[leaving] = ends
-        return step, covariance, held
-
-    measurements = LeastSquaresProblem(model, observations, noise, estimate, plausible)
-    weights = np.ones(len(observations))
-    measurements.linearize(estimate)
-    scale = 1.0
-    last = np.zeros(len(plausible))
-    stuck = False
-    known = None
-    for number in range(_STEPS):
-        # Loads where the robot yielded to in the last step: a fixed point that the
-        # steps bring about.
-        measurements.whiten()
-        if number or reweight_first_step:
-            distance = measurements.distance()
-            scale = max(np.median(distance) / typical, 1.0)
-            weights = corner / np.maximum(distance / scale, corner)
-        gram, along = measurements.normal_equations(weights, known)
-        present = get_parameter_values(model, estimate)
-        if known is None:
-            step, covariance, held = solved(gram, along, present, frozen)
-            deviation = np.sqrt(np.diag(covariance))
-        else:
-            step = covariance @ (along / plausible - penalty * present)
-        # Standard errors of the errors that are there, which the noise may be less
-        # than.
-        small = tolerance * (scale * deviation) + (deviation == 0)
-        # A small step under the loads of before a large one says nothing of what these
-        # loads still bring about.
-        coming = np.maximum(
-            np.abs(step), _LAGGING * np.abs(last) * plausible * yielding
-        )
-        converged = bool(number or reweight_first_step) and bool(
-            (coming <= small).all()
-        )
+    problem.linearize(start)
+    iterate = Iterate(start, np.zeros(len(traits.bounds)))
+    huber = HuberWeights(np.ones(len(observations)), 1.0)
+    converged = False
+    for number in range(_MAX_STEPS):
+        # Loads are evaluated at the deflected pose of the previous step; they converge
+        # to their fixed point together with the parameters.
+        problem.whiten()
+        reweighted = number > 0 or options.reweight_first_step
+        if reweighted:
+            huber = HuberWeights.from_distance(problem.distance(), observations.rows)
+        step = GaussNewtonStep.compute(problem, traits, huber, iterate)
+        converged = reweighted and step.is_within(options.tolerance)
         if converged:
-            estimate = apply_step(model, estimate, step)
+            iterate = replace(
+                iterate, estimate=apply_step(model, iterate.estimate, step.step)
+            )
             break
-        # Weights and whitening follow the estimate. Where they throw it to and fro,
-        # half the way lies between (relaxation of a fixed-point iteration): a step that
-        # takes back more than half of the last one is halved.
-        with_priors = gram + np.diag(penalty * plausible**2)
-        first = int(with_priors @ (step / plausible + last / 2) @ last < 0)
-        last = step / plausible
-        # Twice the fall that a parabola promises.
-        slope = along @ (step / plausible) - penalty @ (present * step)
-        before = objective(estimate, measurements.squares(weights))
-        origin = estimate
-        acceleration = np.zeros(len(step))
-        for halving in range(first, _HALVINGS + 1):
-            share = 0.5**halving
-            estimate = apply_step(model, origin, share * step + share**2 * acceleration)
-            measurements.linearize(estimate)
-            after = objective(estimate, measurements.squares(weights))
-            least = _LEAST_FALL * share * slope - _ROUNDING * max(before, 1.0)
-            if after > before - least and halving == first:
-                # What it fell from was under the loads of the step before.
-                before = objective(origin, measurements.squares(weights, origin))
-                if (
-                    after > before - least
-                    and (nonlinear | yielding).any()
-                    and measurements.kept
-                ):
-                    there = measurements.normal_equations(weights)
-                    rest = solved(
-                        *there,
-                        get_parameter_values(model, estimate),
-                        frozen | nonlinear | yielding,
-                    )[0]
-                    acceleration = rest / share**2
-                    estimate = apply_step(
-                        model, origin, share * step + share**2 * acceleration
-                    )
-                    measurements.linearize(estimate)
-                    after = objective(estimate, measurements.squares(weights))
-            if after <= before - least:
-                near = np.abs(step) <= np.where(
-                    nonlinear & ~held, 0.0, _NEAR * scale * deviation + (deviation == 0)
-                )
-                known = (
-                    gram
-                    if (number or reweight_first_step) and not halving and near.all()
-                    else None
-                )
-                stuck = False
-                break
-        else:
-            estimate = origin
-            measurements.linearize(estimate)
-            # A step goes by the loads of the step before, and the first one by weights
-            # that are all alike: once more by those of now.
-            if stuck:
-                break
-            stuck = True
-            known = None
+        line_search = ArmijoLineSearch(problem, traits, huber.weights, step)
+        accepted = line_search.search()
+        if accepted is None and iterate.stalled:
+            break
+        iterate = iterate.advance(step, accepted, reweighted=reweighted)
+    final = problem.finish(iterate.estimate)
     return Fit(
         model,
-        estimate,
+        iterate.estimate,
         noise,
-        held,
-        covariance,
-        weights,
-        *measurements.ended(estimate),
+        step.solution.unidentifiable,
+        step.solution.covariance,
+        huber.weights,
+        final.whitening,
+        final.residual,
+        final.joint_jacobian,
+        final.conditions,
         converged,
     )
 
 
-def get_plausible_sizes(model: Model, estimate: Estimate) -> np.ndarray:
-    """Sizes of the parameters, ndarray (P,), beyond which a standard error means that
-    the data do not identify them.
+@dataclass(frozen=True)
+class ParameterTraits:
+    """What a step must respect in the P parameters of a model.
 
-    What has a prior need not be held: where the data do not identify it, the prior
-    does. Nor need what the start has found larger than it should be, or it would be
-    held there, without a standard error, once the noise turns out to be larger.
+    Attributes
+    ----------
+    scales : ParameterScales
+    bounds : (P, 2) array, lowest and highest values
+    load_coupled : (P,) bool array
+        Parameters of effects that load the robot or depend on its loads. Given these
+        and the shapes, the residual is nearly linear in all other parameters.
+    frozen : (P,) bool array, parameters that must not move
+    """
+
+    scales: ParameterScales
+    bounds: np.ndarray
+    load_coupled: np.ndarray
+    frozen: np.ndarray
+
+    @classmethod
+    def of(
+        cls, model: Model, estimate: Estimate, frozen: np.ndarray | None
+    ) -> ParameterTraits:
+        """Collect the traits of the parameters of a model; by default none is frozen."""
+        parameters = list_parameters(model, estimate)
+        penalty = [
+            0.0 if parameter.prior_std is None else parameter.prior_std**-2
+            for _, parameter in parameters
+        ]
+        coupled_effects = {
+            effect.key
+            for effect in model.effects
+            if effect.effect == "joint_compliance" or "load" in effect.needs
+        }
+        scales = ParameterScales(
+            get_plausible_sizes(model, estimate),
+            np.array(penalty),
+            find_nonlinear_parameters(model, estimate),
+        )
+        return cls(
+            scales,
+            get_parameter_bounds(model, estimate),
+            np.array([owner in coupled_effects for owner, _ in parameters], bool),
+            np.zeros(len(parameters), bool) if frozen is None else frozen,
+        )
+
+    def solve(
+        self,
+        gram: np.ndarray,
+        gradient: np.ndarray,
+        present: np.ndarray,
+        frozen: np.ndarray,
+    ) -> NormalSolution:
+        """Solve the normal equations within the bounds of the parameters.
+
+        A shape that would leave its range moves to the nearer bound, and the other
+        parameters move as they must given that.
+        """
+        solution = solve_normal_equations(gram, gradient, self.scales, present, frozen)
+        target = present + solution.step
+        out_of_range = (target < self.bounds[:, 0]) | (target > self.bounds[:, 1])
+        if not out_of_range.any():
+            return solution
+        step_to_bound = (
+            np.clip(target, *self.bounds.T)[out_of_range] - present[out_of_range]
+        )
+        scaled = step_to_bound / self.scales.plausible[out_of_range]
+        reduced_gradient = gradient - gram[:, out_of_range] @ scaled
+        step = solve_normal_equations(
+            gram, reduced_gradient, self.scales, present, frozen | out_of_range
+        ).step
+        step[out_of_range] = step_to_bound
+        return replace(solution, step=step)
+
+
+@dataclass(frozen=True)
+class HuberWeights:
+    """Huber's weights (M,) of observations, and the scale of their whitened residuals.
+
+    The scale is how many times larger the errors are than the noise says, at least 1.
+    """
+
+    weights: np.ndarray
+    scale: float
+
+    @classmethod
+    def from_distance(cls, distance: np.ndarray, rows: int) -> HuberWeights:
+        """Weight observations by their whitened distance (M,) from the prediction.
+
+        The squared distance, times `rows`, has a chi-squared distribution with as many
+        degrees of freedom.
+        """
+        huber_threshold, median_distance = np.sqrt(
+            2 * gammaincinv(rows / 2, [_HUBER_QUANTILE, 0.5]) / rows
+        )
+        scale = max(np.median(distance) / median_distance, 1.0)
+        return cls(
+            huber_threshold / np.maximum(distance / scale, huber_threshold), scale
+        )
+
+
+@dataclass(frozen=True)
+class Iterate:
+    """Where the iteration stands between two steps.
+
+    Attributes
+    ----------
+    estimate : Estimate
+    last_step : (P,) array, previous step, in plausible sizes
+    reused : GaussNewtonStep or None
+        The previous step if the next one is to use its Gram matrix and covariance.
+    stalled : bool
+        Whether the previous step did not lower the objective.
+    """
+
+    estimate: Estimate
+    last_step: np.ndarray
+    reused: GaussNewtonStep | None = None
+    stalled: bool = False
+
+    def advance(
+        self,
+        step: GaussNewtonStep,
+        accepted: AcceptedStep | None,
+        *,
+        reweighted: bool,
+    ) -> Iterate:
+        """Move to the estimate that the line search accepted.
+
+        Without one the estimate stays, and one more step is tried: the failed one used
+        the loads of the step before and perhaps equal weights, the next one uses the
+        current ones.
+        """
+        if accepted is None:
+            return Iterate(self.estimate, step.scaled, stalled=True)
+        reusable = reweighted and accepted.halvings == 0 and step.is_short()
+        return Iterate(
+            accepted.estimate, step.scaled, reused=step if reusable else None
+        )
+
+
+@dataclass(frozen=True)
+class GaussNewtonStep:
+    """A Gauss-Newton step from an iterate.
+
+    Attributes
+    ----------
+    traits : ParameterTraits
+    iterate : Iterate from which the step is taken
+    scale : float, see `HuberWeights`
+    gram : (P, P) array, in plausible sizes, without priors
+    gradient : (P,) array, in plausible sizes, without priors
+    present : (P,) array, values of the parameters
+    solution : NormalSolution
+    """
+
+    traits: ParameterTraits
+    iterate: Iterate
+    scale: float
+    gram: np.ndarray
+    gradient: np.ndarray
+    present: np.ndarray
+    solution: NormalSolution
+
+    @classmethod
+    def compute(
+        cls,
+        problem: LeastSquaresProblem,
+        traits: ParameterTraits,
+        huber: HuberWeights,
+        iterate: Iterate,
+    ) -> GaussNewtonStep:
+        """Solve the normal equations, with the Gram matrix of the last step if it is
+        reused."""
+        reused = iterate.reused
+        present = get_parameter_values(problem.model, iterate.estimate)
+        gram, gradient = problem.normal_equations(
+            huber.weights, None if reused is None else reused.gram
+        )
+        if reused is None:
+            solution = traits.solve(gram, gradient, present, traits.frozen)
+        else:
+            scales = traits.scales
+            gradient_with_prior = gradient / scales.plausible - scales.penalty * present
+            solution = replace(
+                reused.solution, step=reused.solution.covariance @ gradient_with_prior
+            )
+        return cls(traits, iterate, huber.scale, gram, gradient, present, solution)
+
+    @property
+    def step(self) -> np.ndarray:
+        """The step (P,) of the parameters."""
+        return self.solution.step
+
+    @property
+    def scaled(self) -> np.ndarray:
+        """The step (P,) in plausible sizes."""
+        return self.step / self.traits.scales.plausible
+
+    def is_within(self, tolerance: float) -> bool:
+        """Whether the step is below so many standard errors in every parameter.
+
+        Standard errors are those of the actual errors, which the noise may
+        underestimate. A small step under the loads before a large step says nothing
+        about what these loads still change, so a share of the last step counts too.
+        """
+        traits = self.traits
+        still_to_come = (
+            _LAG_SHARE
+            * np.abs(self.iterate.last_step)
+            * traits.scales.plausible
+            * traits.load_coupled
+        )
+        size = np.maximum(np.abs(self.step), still_to_come)
+        return bool((size <= self._standard_errors(tolerance)).all())
+
+    def is_short(self) -> bool:
+        """Whether the Gram matrix is still valid after the step: see
+        `_REUSE_THRESHOLD`."""
+        moving_shapes = self.traits.scales.nonlinear & ~self.solution.unidentifiable
+        limit = np.where(moving_shapes, 0.0, self._standard_errors(_REUSE_THRESHOLD))
+        return bool((np.abs(self.step) <= limit).all())
+
+    def _standard_errors(self, count: float) -> np.ndarray:
+        """So many standard errors (P,), no limit for parameters that do not move."""
+        deviation = np.sqrt(np.diag(self.solution.covariance))
+        return count * (self.scale * deviation) + (deviation == 0)
+
+    def takes_back_last(self) -> bool:
+        """Whether the step takes back more than half of the last one."""
+        scales = self.traits.scales
+        last = self.iterate.last_step
+        gram = self.gram + np.diag(scales.penalty * scales.plausible**2)
+        return bool(gram @ (self.scaled + last / 2) @ last < 0)
+
+    def slope(self) -> float:
+        """Twice the fall of the objective that a parabola predicts for the step."""
+        prior_slope = self.traits.scales.penalty @ (self.present * self.step)
+        return float(self.gradient @ self.scaled - prior_slope)
+
+
+@dataclass(frozen=True)
+class AcceptedStep:
+    """Estimate after a step that was halved so many times."""
+
+    estimate: Estimate
+    halvings: int
+
+
+@dataclass(frozen=True)
+class ArmijoLineSearch:
+    """Backtracking of a step until weighted squares and priors fall enough [1]_.
+
+    Against curvature, a step is halved until the objective meets Armijo's condition. If
+    the first trial does not, the parameters in which the residual is linear, given
+    shapes and loads, are solved for again there, as in variable projection [2]_. This
+    is the acceleration with which a path follows a curved valley [3]_; halved steps
+    follow it.
+
+    Attributes
+    ----------
+    problem : LeastSquaresProblem, linearized at the iterate
+    traits : ParameterTraits
+    weights : (M,) array
+    step : GaussNewtonStep
+
+    References
+    ----------
+    .. [1] Nocedal and Wright, Numerical Optimization, 3.1.
+    .. [2] Golub and Pereyra, 1973.
+    .. [3] Transtrum and Sethna, arXiv 1201.5885.
+    """
+
+    problem: LeastSquaresProblem
+    traits: ParameterTraits
+    weights: np.ndarray
+    step: GaussNewtonStep
+
+    def search(self) -> AcceptedStep | None:
+        """Find the longest step that lowers the objective enough; None without one.
+
+        The problem is linearized at the accepted estimate, or at the origin again.
+        """
+        origin = self.step.iterate.estimate
+        slope = self.step.slope()
+        objective = self._objective(origin, self.problem.squares(self.weights))
+        acceleration = np.zeros(len(self.step.step))
+        # Weights and whitening follow the estimate. If they throw it to and fro, half
+        # of the step is better: relaxation of a fixed-point iteration.
+        first = int(self.step.takes_back_last())
+        for halvings in range(first, _MAX_HALVINGS + 1):
+            share = 0.5**halvings
+            decrease = _SUFFICIENT_DECREASE * share * slope
+            decrease -= _OBJECTIVE_ROUNDING * max(objective, 1.0)
+            estimate, after = self._try_step(share, acceleration)
+            if after > objective - decrease and halvings == first:
+                # The previous objective used the loads of the previous step, so
+                # evaluate it again with the current loads.
+                squares = self.problem.squares(self.weights, origin)
+                objective = self._objective(origin, squares)
+                if after > objective - decrease and self._can_accelerate():
+                    correction = self._solve_linear_parameters(estimate)
+                    acceleration = correction / share**2
+                    estimate, after = self._try_step(share, acceleration)
+            if after <= objective - decrease:
+                return AcceptedStep(estimate, halvings)
+        self.problem.linearize(origin)
+        return None
+
+    def _try_step(
+        self, share: float, acceleration: np.ndarray
+    ) -> tuple[Estimate, float]:
+        """Linearize after a share of the step; return estimate and objective there."""
+        step = share * self.step.step + share**2 * acceleration
+        estimate = apply_step(self.problem.model, self.step.iterate.estimate, step)
+        self.problem.linearize(estimate)
+        squares = self.problem.squares(self.weights)
+        return estimate, self._objective(estimate, squares)
+
+    def _objective(self, estimate: Estimate, squares: float) -> float:
+        """Half the weighted squares of the residual and of parameters with a prior."""
+        values = get_parameter_values(self.problem.model, estimate)
+        return 0.5 * (squares + self.traits.scales.penalty @ values**2)
+
+    def _can_accelerate(self) -> bool:
+        """Whether some parameters bend the path, and conditions stay in memory."""
+        return self.problem.in_memory and bool(self._curving().any())
+
+    def _curving(self) -> np.ndarray:
+        """Parameters (P,) in which the residual is not linear."""
+        return self.traits.scales.nonlinear | self.traits.load_coupled
+
+    def _solve_linear_parameters(self, estimate: Estimate) -> np.ndarray:
+        """Step (P,) of the linear parameters at an estimate, given all others."""
+        gram, gradient = self.problem.normal_equations(self.weights)
+        present = get_parameter_values(self.problem.model, estimate)
+        frozen = self.traits.frozen | self._curving()
+        return self.traits.solve(gram, gradient, present, frozen).step
+
+
+def get_plausible_sizes(model: Model, estimate: Estimate) -> np.ndarray:
+    """Sizes (P,) of the parameters; a larger standard error means no identification.
+
+    A parameter with a prior is never unidentifiable: its prior identifies it if the
+    data do not. Nor is a parameter that the start has found larger than plausible.
+    Otherwise it would keep this value, without a standard error, once the noise turns
+    out to be larger.
     """
     plausible = np.array(
         [
-            max(p.plausible, p.prior_std or 0.0)
-            for _, p in list_parameters(model, estimate)
+            max(parameter.plausible, parameter.prior_std or 0.0)
+            for _, parameter in list_parameters(model, estimate)
         ]
     )
     linear = ~find_nonlinear_parameters(model, estimate)
@@ -446,16 +718,19 @@ def get_plausible_sizes(model: Model, estimate: Estimate) -> np.ndarray:
 
 
 def register_placement(model: Model, observations: Observations) -> Estimate:
-    """Frames and targets of a model that its nominal kinematics explain best, by
-    alternating closed-form steps.
+    """Compute the frames and targets that the nominal kinematics explain best.
 
-    Block coordinate descent: frames by the Kabsch algorithm (Acta Cryst. A32, 1976) for
+    Block coordinate descent in closed form: frames by the Kabsch algorithm [1]_ for
     Wahba's problem, given the targets; positions of targets as means, given the frames.
-    The turn of a target is the chordal mean of rotations (Markley et al., J. Guidance
-    30, 2007).
+    The rotation of a target is the chordal mean of rotations [2]_.
 
-    Returns with all effects at zero, except that joint compliances start at their
-    nominal values.
+    Returns an estimate with all effects at zero, except that joint compliances have
+    their nominal values.
+
+    References
+    ----------
+    .. [1] Kabsch, Acta Cryst. A32, 1976.
+    .. [2] Markley et al., J. Guidance 30, 2007.
     """
     observations = sample_observations(observations, START_SAMPLE_SIZE)
     return register_to_poses(
@@ -466,15 +741,17 @@ def register_placement(model: Model, observations: Observations) -> Estimate:
 def compute_nominal_poses(
     model: Model, observations: Observations
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (M, 3) and rotations (M, 3, 3) of measuring points on the nominal robot
-    without loads, base axes."""
+    """Compute poses of the measuring points on the nominal robot without loads.
+
+    Returns positions (M, 3) and rotations (M, 3, 3) in base axes.
+    """
     chain = model.sites.chain
     points = [chain.point(target.point) for target in model.targets]
     position, rotation = poses_of_points(
         chain, chain.at(observations.states.joint_angles), points
     )
-    seen = observations.target, observations.state
-    return position[seen], rotation[seen]
+    indices = (observations.target, observations.state)
+    return position[indices], rotation[indices]
 
 
 def register_to_poses(
@@ -483,61 +760,88 @@ def register_to_poses(
     nominal_position: np.ndarray,
     nominal_rotation: np.ndarray,
 ) -> Estimate:
-    """As `registered`, to nominal poses that are known, as by `nominal_poses`."""
-    states = observations.states
+    """Compute frames and targets as `register_placement`, for given nominal poses.
+
+    Nominal poses (M, 3), (M, 3, 3) are as `compute_nominal_poses` returns them.
+    """
+    sessions = np.unique(observations.states.session)
+    session = np.searchsorted(sessions, observations.states.session[observations.state])
+    members_of_session = [
+        np.flatnonzero(session == number) for number in range(len(sessions))
+    ]
     target = observations.target
-    measured = observations.position
-    sessions = np.unique(states.session)
-    session = np.searchsorted(sessions, states.session[observations.state])
-    of_session = [np.flatnonzero(session == number) for number in range(len(sessions))]
-    # A target may have all of its measurements among those held out.
-    seen = {
-        index: mine
-        for index in range(len(model.targets))
-        if len(mine := np.flatnonzero(target == index))
-    }
-    unknown = {
-        index: mine
-        for index, mine in seen.items()
-        if model.targets[index].offset_m is None
-    }
+    unknown_targets = [
+        index for index in np.unique(target) if model.targets[index].offset_m is None
+    ]
     offsets = np.array(
         [target.offset_m or (0.0, 0.0, 0.0) for target in model.targets], float
     )
-    turn = np.tile(np.eye(3), (len(sessions), 1, 1))
-    shift = np.zeros((len(sessions), 3))
-    for _ in range(_ROUNDS if model.fitted_frames and unknown else 1):
-        placed = nominal_position + np.einsum(
-            "mij,mj->mi", nominal_rotation, offsets[target]
-        )
-        for number, mine in enumerate(of_session if model.fitted_frames else ()):
-            centre = placed[mine].mean(axis=0)
-            middle = measured[mine].mean(axis=0)
-            left, _, right = np.linalg.svd(
-                (measured[mine] - middle).T @ (placed[mine] - centre)
+    rotation = np.tile(np.eye(3), (len(sessions), 1, 1))
+    position = np.zeros((len(sessions), 3))
+    alternating = model.fitted_frames and unknown_targets
+    for _ in range(_MAX_REGISTRATION_ROUNDS if alternating else 1):
+        if model.fitted_frames:
+            points = nominal_position + np.einsum(
+                "mij,mj->mi", nominal_rotation, offsets[target]
             )
-            left[:, -1] *= np.sign(np.linalg.det(left @ right))
-            turn[number] = left @ right
-            shift[number] = middle - turn[number] @ centre
-        in_base = np.einsum("mji,mj->mi", turn[session], measured - shift[session])
+            for number, members in enumerate(members_of_session):
+                rotation[number], position[number] = _align_points(
+                    points[members], observations.position[members]
+                )
+        in_base = np.einsum(
+            "mji,mj->mi", rotation[session], observations.position - position[session]
+        )
         local = np.einsum("mji,mj->mi", nominal_rotation, in_base - nominal_position)
-        before = offsets.copy()
-        for index, mine in unknown.items():
-            offsets[index] = local[mine].mean(axis=0)
-        if np.abs(offsets - before).max() < _SETTLED_M:
+        previous = offsets.copy()
+        for index in unknown_targets:
+            offsets[index] = local[target == index].mean(axis=0)
+        if np.abs(offsets - previous).max() < _REGISTRATION_TOLERANCE_M:
             break
-    turns = Rotation.from_rotvec(
+    placement = Estimate(
+        tuple(sessions.tolist()),
+        rotation,
+        position,
+        offsets,
+        _average_target_rotations(
+            model, observations, nominal_rotation, rotation[session]
+        ),
+    )
+    start = placement.with_effects(model.effects)
+    return replace(start, coefficients=model.nominal_coefficients)
+
+
+def _align_points(
+    points: np.ndarray, measured: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rotation (3, 3) and translation (3,) from points (N, 3) to measured ones, by the
+    Kabsch algorithm."""
+    centre = points.mean(axis=0)
+    measured_centre = measured.mean(axis=0)
+    left, _, right = np.linalg.svd((measured - measured_centre).T @ (points - centre))
+    left[:, -1] *= np.sign(np.linalg.det(left @ right))
+    rotation = left @ right
+    return rotation, measured_centre - rotation @ centre
+
+
+def _average_target_rotations(
+    model: Model,
+    observations: Observations,
+    nominal_rotation: np.ndarray,
+    frame_rotation: np.ndarray,
+) -> np.ndarray:
+    """Rotations (T, 3, 3) of the targets on their measuring points.
+
+    `nominal_rotation` and `frame_rotation` (M, 3, 3) are those of the measuring points
+    and of the base in the frame of the session.
+    """
+    rotations = Rotation.from_rotvec(
         [target.rotation or NO_ROTATION for target in model.targets]
     ).as_matrix()
     if observations.rotation is not None:
-        turned = (
-            nominal_rotation.transpose(0, 2, 1)
-            @ turn[session].transpose(0, 2, 1)
-            @ observations.rotation
-        )
-        for index in (index for index in seen if model.targets[index].rotation is None):
-            turns[index] = Rotation.from_matrix(turned[seen[index]]).mean().as_matrix()
-    nothing = Estimate(
-        tuple(sessions.tolist()), turn, shift, offsets, turns
-    ).with_effects(model.effects)
-    return replace(nothing, coefficients=model.nominal_coefficients)
+        into_base = frame_rotation.transpose(0, 2, 1)
+        local = nominal_rotation.transpose(0, 2, 1) @ into_base @ observations.rotation
+        for index in np.unique(observations.target):
+            if model.targets[index].rotation is None:
+                members = Rotation.from_matrix(local[observations.target == index])
+                rotations[index] = members.mean().as_matrix()
+    return rotations

@@ -1,25 +1,24 @@
-"""What is taken of errors before effects are sought: noise of the measurements, and
-tolerances of what a campaign declares.
+"""Noise of the measurements and scale of geometric errors, before effects are sought.
 
-Noise is a sensor part, alike in all directions, and the repeatability of the joints, by
-the Jacobian. Repeats of a state tell both: each repeat is a fresh approach, so that the
-joints come to rest a little differently and move all targets together, while the sensor
-errs for each target on its own.
+The noise has a sensor part, equal in all directions, and the repeatability of the
+joints, which acts through the Jacobian. Repeats of a state separate the two: each
+repeat is a fresh approach, so the joints come to rest a little differently and move all
+targets together, while the errors of the sensor are independent for each target.
 
-A robot is off its drawing by so many times what is plausible; one number for all
-declared geometry, by type II maximum likelihood (Good, The Estimation of Probabilities,
-1965), together with how many times the noise taken the measurements scatter. Both come
-of the declared model alone, so that all models of a campaign, with effects and without,
-have the same geometry beforehand.
+A robot deviates from its drawing by some multiple of what is plausible. This multiple,
+one number for all declared geometry, and the ratio of the scatter of the measurements
+to their assumed noise are estimated by type II maximum likelihood (Good, The Estimation
+of Probabilities, 1965). Both come from the declared model alone, so that all models of
+a campaign, with effects and without, have the same prior of geometry.
 """
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, fields, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import scipy  # Its optimizers load where a campaign has repeats enough for them.
+import scipy  # Import its optimizers lazily: only campaigns with enough repeats need them.
 from scipy.linalg import helmert
 from scipy.special import gammaincinv
 
@@ -40,54 +39,67 @@ from elastocal.fitting.observations import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
     from typing import Any
 
     from elastocal.campaigns.campaign import Campaign, Measurements
     from elastocal.effects.protocol import Candidate
     from elastocal.fitting.least_squares import Fit
+    from elastocal.fitting.linearization import LinearModel
     from elastocal.fitting.model import Case, Estimate, Model
     from elastocal.fitting.observations import Observations
 
-# Fewer contrasts of repeats than this do not separate the joints' part from the
-# sensor's; fewer than the second say nothing of their own; as many as the third tell
-# every deviation to a percent, and more only take time.
+# Fewer contrasts of repeats than the first number do not separate the joints' part from
+# the sensor's; fewer than the second are too few to estimate any noise. The third
+# number determines every standard deviation to a percent; more only take time.
 MIN_CONTRASTS_FOR_JOINTS = 60
 MIN_CONTRASTS = 9
 MAX_CONTRASTS = 20_000
-# No sensor repeats to less than this, m or rad: a sixtieth of the wavelength of a
-# laser.
+# No sensor repeats better than this, m or rad: a sixtieth of the wavelength of a laser.
 FINEST_RESOLUTION = 1e-8
 # Half width of the interval that holds 95 % of a normal distribution, in standard
 # deviations (JCGM 100:2008, section 6).
-_COVERAGE = 1.959964
-# How sure the joint part should be to be no smaller than taken: too small a value
-# raises false alarms, too large one costs power.
-_UPPER = 0.8
-_SMALLEST_RAD = 1e-8
-_LARGEST_RAD = 1e-2
-# Deviations of a joint that are tried between these: steps of two fifths.
-_DEVIATIONS = 40
-# Sizes of declared geometry, in plausible sizes: measured robots exceed data-sheet
-# tolerances tenfold, and none is ten times better than these.
+_COVERAGE_FACTOR = 1.959964
+# Confidence with which a joint's repeatability is no larger than its estimate: too
+# small an estimate raises false alarms, too large a one costs power.
+_JOINT_CONFIDENCE = 0.8
+# Range of the repeatability of a joint, and the number of values on a logarithmic grid
+# over it: steps of two fifths.
+_MIN_JOINT_RAD = 1e-8
+_MAX_JOINT_RAD = 1e-2
+_JOINT_GRID_SIZE = 40
+# Range of a sensor's standard deviation about that of all contrasts, as logarithms.
+_LOG_RANGE_BELOW = 7
+_LOG_RANGE_ABOVE = 1
+# Probability with which the ratio of estimated to declared noise is in the interval
+# outside which there is a warning.
+_RATIO_QUANTILES = (0.005, 0.995)
+# Scales of the prior of declared geometry, in plausible sizes: measured robots exceed
+# the tolerances of data sheets tenfold, and none is ten times better than these.
 PRIOR_SCALES = np.geomspace(0.1, 10.0, 9)
-# Noise that is there over the noise taken, in steps that change no verdict.
-_FACTORS = np.geomspace(1.0, 1e4, 185)
-# Shares of a prior's variance that measurements leave below this are rounding.
-_ROUNDING = 1e-14
-# Noise that is taken before anything is known of it, m and rad.
-_ASSUMED = 1e-4
+# Ratios of actual to assumed noise, in steps that change no verdict.
+_NOISE_FACTORS = np.geomspace(1.0, 1e4, 185)
+# A smaller remaining share of a prior's variance is rounding.
+_SHARE_ROUNDING = 1e-14
+# Noise that is assumed before anything is known about it, m and rad.
+_ASSUMED_NOISE = 1e-4
 
 
 @dataclass(frozen=True)
 class Noise:
     """Standard deviations of one measurement.
 
-    `source`: one of "repeats", "declared", "residual". `position_m`, `orientation_rad`:
-    sensor part, each component. `joint_rad` (n,): repeatability of each joint.
-    `degrees_of_freedom`: contrasts of repeats behind the figures; 0 where they are
-    declared. `pose_rad`: error of each joint that all measurements of a pose have in
-    common.
+    Attributes
+    ----------
+    source : "repeats", "declared" or "residual"
+    position_m, orientation_rad : float
+        Sensor part, of each component.
+    joint_rad : (n,) array
+        Repeatability of each joint.
+    degrees_of_freedom : int
+        Number of contrasts of repeats behind the figures; 0 if they are declared.
+    pose_rad : float
+        Error of each joint that all measurements of a pose have in common.
     """
 
     source: str
@@ -99,69 +111,66 @@ class Noise:
 
     @property
     def without_pose_error(self) -> Noise:
-        """The same without what the measurements of a pose have in common."""
+        """The same noise without the common error of the measurements of a pose."""
         return replace(self, pose_rad=0.0)
 
+    @property
+    def has_joint_error(self) -> bool:
+        """Whether errors of the joints are part of the noise."""
+        return bool(self.pose_rad or self.joint_rad.any())
+
     def scaled(self, factor: float) -> Noise:
-        """The same with the noise of single measurements multiplied."""
-        position = factor * self.position_m
-        orientation = factor * self.orientation_rad
-        joint = factor * self.joint_rad
+        """Multiply the noise of single measurements."""
         return replace(
-            self, position_m=position, orientation_rad=orientation, joint_rad=joint
+            self,
+            position_m=factor * self.position_m,
+            orientation_rad=factor * self.orientation_rad,
+            joint_rad=factor * self.joint_rad,
         )
 
     def sensor_std(self, rows: int) -> np.ndarray:
-        """The sensor's part of each component of a measurement, (rows,)."""
+        """Sensor part of each component of a measurement, (rows,) array."""
         return np.repeat([self.position_m, self.orientation_rad], 3)[:rows]
 
 
 def serialize_noise(noise: Noise) -> dict[str, Any]:
-    """Noise as a JSON document."""
+    """Write noise as a JSON document."""
     return asdict(noise) | {"joint_rad": noise.joint_rad.tolist()}
 
 
-def parse_noise(facts: Mapping[str, Any]) -> Noise:
-    """Noise from its JSON document, or from a verdict, which tells more of it."""
-    known = {entry.name: facts["noise"][entry.name] for entry in fields(Noise)}
-    return Noise(**known | {"joint_rad": np.array(known["joint_rad"])})
+def parse_noise(document: Mapping[str, Any]) -> Noise:
+    """Read noise from a JSON document with key "noise", such as a verdict.
+
+    A verdict has further keys under "noise".
+    """
+    values = {field.name: document["noise"][field.name] for field in fields(Noise)}
+    return Noise(**values | {"joint_rad": np.array(values["joint_rad"])})
 
 
 def choose_noise(
     campaign: Campaign, model: Model, estimate: Estimate
 ) -> tuple[Noise | None, list[str]]:
-    """Noise from repeats where there are enough, else as a campaign declares it, or by
-    what its measurements state.
+    """Choose noise from repeats if there are enough, otherwise the declared noise.
 
-    Of expanded uncertainties of the measurements, 95 % of one coordinate, the root mean
-    square counts. A ratio of the two outside the chi-squared interval of 99 % of a
-    variance is a warning. Returns `noise`: None where there are neither.
+    If the ratio of the two is outside the chi-squared interval of 99 % of a variance,
+    there is a warning.
+
+    Returns
+    -------
+    noise : Noise, or None if there are neither repeats nor declared noise
+    warnings : list of str
     """
     repeats = estimate_noise_from_repeats(model, estimate, campaign.measurements)
-    stated = campaign.noise or {}
-    u95 = campaign.measurements.u95_m
-    declared = None
-    if stated or u95 is not None:
-        position = (
-            stated["position_m"]
-            if u95 is None
-            else float(np.sqrt((u95**2).mean())) / _COVERAGE
-        )
-        joints = np.zeros(campaign.robot.joints) + stated.get("joint_rad", 0.0)
-        declared = Noise(
-            "declared", position, stated.get("orientation_rad", position), joints
-        )
-    if repeats is None:
-        return declared, [] if declared else [
+    declared = _read_declared_noise(campaign)
+    if repeats is None and declared is None:
+        return None, [
             "no repeats and no declared noise: nothing says how large the residual may be"
         ]
-    if declared is None:
-        return repeats, []
+    if repeats is None or declared is None:
+        return repeats or declared, []
     ratio = repeats.position_m / declared.position_m
-    of_positions = repeats.degrees_of_freedom * 3 // model.rows
-    low, high = np.sqrt(
-        2 * gammaincinv(of_positions / 2, [0.005, 0.995]) / of_positions
-    )
+    freedom = repeats.degrees_of_freedom * 3 // model.rows
+    low, high = np.sqrt(2 * gammaincinv(freedom / 2, _RATIO_QUANTILES) / freedom)
     if low < ratio < high:
         return repeats, []
     return repeats, [
@@ -169,268 +178,358 @@ def choose_noise(
     ]
 
 
+def _read_declared_noise(campaign: Campaign) -> Noise | None:
+    """Noise as a campaign declares it, or as its measurements state it.
+
+    Measurements state expanded uncertainties, 95 % of one coordinate, of which the root
+    mean square counts.
+    """
+    declared = campaign.noise or {}
+    u95_m = campaign.measurements.u95_m
+    if u95_m is not None:
+        position_m = float(np.sqrt((u95_m**2).mean())) / _COVERAGE_FACTOR
+    elif declared:
+        position_m = declared["position_m"]
+    else:
+        return None
+    return Noise(
+        "declared",
+        position_m,
+        declared.get("orientation_rad", position_m),
+        np.zeros(campaign.robot.joints) + declared.get("joint_rad", 0.0),
+    )
+
+
 def estimate_noise(case: Case) -> tuple[Noise, list[str]]:
-    """Noise from repeats or as declared, from the residual of the declared model where
-    there is neither; and warnings."""
+    """Estimate the noise of a campaign; return it with warnings.
+
+    It comes from repeats, or from the declaration, or otherwise from the residual of
+    the declared model.
+    """
     start = register_placement(case.model, case.observations)
     noise, warnings = choose_noise(case.campaign, case.model, start)
-    if noise is None:
-        assumed = Noise(
-            "residual", _ASSUMED, _ASSUMED, np.zeros(case.campaign.robot.joints)
-        )
-        # The widest prior leaves nearly what none would leave, without parameters that
-        # nothing determines.
-        model = set_prior_scale(case.model, PRIOR_SCALES[-1])
-        left = fit_model(model, case.observations, assumed, start).residual
-        typical = [
-            max(float(np.sqrt((part**2).mean())), FINEST_RESOLUTION)
-            for part in (left[:, :3], left[:, -3:])
-        ]
-        noise = replace(assumed, position_m=typical[0], orientation_rad=typical[1])
-        # What parameters have taken of it is given back.
-        noise = noise.scaled(
-            maximize_evidence(
-                fit_model(
-                    model,
-                    case.observations,
-                    noise,
-                    start,
-                    tolerance=INTERMEDIATE_TOLERANCE,
-                )
-            )[1]
-        )
-    return noise, warnings
+    if noise is not None:
+        return noise, warnings
+    joints = np.zeros(case.campaign.robot.joints)
+    assumed = Noise("residual", _ASSUMED_NOISE, _ASSUMED_NOISE, joints)
+    # The widest prior leaves nearly the same residual as no prior, without parameters
+    # that nothing determines.
+    model = set_prior_scale(case.model, PRIOR_SCALES[-1])
+    residual = fit_model(model, case.observations, assumed, start).residual
+    noise = replace(
+        assumed,
+        position_m=_limited_rms(residual[:, :3]),
+        orientation_rad=_limited_rms(residual[:, -3:]),
+    )
+    # Fitted parameters have absorbed a part of the noise, which makes the residual too
+    # small.
+    fitted = fit_model(
+        model, case.observations, noise, start, tolerance=INTERMEDIATE_TOLERANCE
+    )
+    return noise.scaled(maximize_evidence(fitted).noise_factor), warnings
+
+
+def _limited_rms(residual: np.ndarray) -> float:
+    """Root mean square of a residual, no less than any sensor resolves."""
+    return max(float(np.sqrt((residual**2).mean())), FINEST_RESOLUTION)
 
 
 def estimate_noise_from_repeats(
     model: Model, estimate: Estimate, measurements: Measurements
 ) -> Noise | None:
-    """Noise by restricted maximum likelihood from the differences between repeats.
+    """Estimate noise by restricted maximum likelihood from differences between repeats.
 
-    The likelihood is that of error contrasts (Patterson and Thompson, Biometrika 58,
-    1971), here of orthonormal Helmert contrasts of repeats; L-BFGS-B (Byrd et al. 1995)
-    finds its maximum. The joints' part is taken where it is worth its parameters by
-    Akaike's criterion (1974), at the upper limit of a one-sided chi-squared interval of
-    80 %; with fewer contrasts than show it, their mean square is the sensor's part.
+    The likelihood is that of error contrasts [1]_, here of orthonormal Helmert contrasts
+    of repeats; L-BFGS-B [2]_ finds its maximum. The joints' part is used if it is worth
+    its parameters by Akaike's criterion (1974), at the upper limit of a one-sided
+    chi-squared interval of 80 %. If contrasts are too few to show it, their mean square
+    is the sensor's part.
 
-    `estimate`: its frames turn measurements into base axes; nothing else of it matters.
-    Returns None where there are too few repeats, or where they do not differ at all.
+    Parameters
+    ----------
+    model : Model
+    estimate : Estimate
+        Its frames turn measurements into base axes; nothing else of it matters.
+    measurements : Measurements
+
+    Returns
+    -------
+    Noise, or None if there are too few repeats, or if they do not differ at all
+
+    References
+    ----------
+    .. [1] Patterson and Thompson, Biometrika 58, 1971.
+    .. [2] Byrd et al. 1995.
     """
-    contrasts = _contrasts(model, estimate, measurements)
-    sensors = model.rows // 3
-    joints = model.sites.joints
+    contrasts = _compute_contrasts(model, estimate, measurements)
     if contrasts is None:
         return None
+    sensors = len(contrasts.squares)
+    joints = model.sites.joints
     total = contrasts.count * sensors
-    start = np.sqrt(contrasts.squares / contrasts.count)
-    if start.min() < FINEST_RESOLUTION:
-        # The same number again and again is a sensor that stands still or digits that
-        # were cut off, not one without noise.
+    sensor_std = np.sqrt(contrasts.squares / contrasts.count)
+    if sensor_std.min() < FINEST_RESOLUTION:
+        # The same number again and again means a sensor that stands still or truncated
+        # digits, not a sensor without noise.
         return None
-    sensor = Noise(
-        "repeats", float(start[0]), float(start[-1]), np.zeros(joints), total
+    sensor_noise = Noise(
+        "repeats", float(sensor_std[0]), float(sensor_std[-1]), np.zeros(joints), total
     )
     if total < MIN_CONTRASTS_FOR_JOINTS:
-        return sensor
-    both = np.log(start)
-    free = np.concatenate([both, np.full(joints, np.log(0.3 * start[0]))])
-    bounds = [(value - 7, value + 1) for value in both] + [
-        (np.log(_SMALLEST_RAD), np.log(_LARGEST_RAD))
-    ] * joints
+        return sensor_noise
+    log_sensor = np.log(sensor_std)
+    log_joints = np.full(joints, np.log(0.3 * sensor_std[0]))
+    joint_bounds = (np.log(_MIN_JOINT_RAD), np.log(_MAX_JOINT_RAD))
     fitted = scipy.optimize.minimize(
         _negative_log_likelihood,
-        free,
+        np.concatenate([log_sensor, log_joints]),
         (contrasts,),
         "L-BFGS-B",
         jac=True,
-        bounds=bounds,
+        bounds=_sensor_bounds(log_sensor) + [joint_bounds] * joints,
     )
-    # Akaike: the joints' part must be worth its parameters.
-    nothing = np.concatenate([both, np.full(joints, np.log(_SMALLEST_RAD))])
-    if fitted.fun + joints > _negative_log_likelihood(nothing, contrasts)[0]:
-        return sensor
-    values = np.exp(fitted.x)
-    # Each approach draws a joint once, however many targets are read.
-    per_joint = max(min(total // (joints + 1), len(contrasts.along)), 1)
-    inflation = np.sqrt(per_joint / (2 * gammaincinv(per_joint / 2, 1 - _UPPER)))
-    position = float(values[0])
-    orientation = float(values[sensors - 1])
+    # Akaike's criterion compares with joints that repeat exactly.
+    without_joints = np.concatenate(
+        [log_sensor, np.full(joints, np.log(_MIN_JOINT_RAD))]
+    )
+    if fitted.fun + joints > _negative_log_likelihood(without_joints, contrasts)[0]:
+        return sensor_noise
+    std = np.exp(fitted.x)
     return replace(
-        sensor,
-        position_m=position,
-        orientation_rad=orientation,
-        joint_rad=values[sensors:] * inflation,
+        sensor_noise,
+        position_m=float(std[0]),
+        orientation_rad=float(std[sensors - 1]),
+        joint_rad=std[sensors:] * _joint_inflation(contrasts, joints),
     )
+
+
+def _joint_inflation(contrasts: _Contrasts, joints: int) -> float:
+    """Ratio of the upper limit of a joint's repeatability to its estimate.
+
+    Each approach draws the error of a joint once, however many targets are measured.
+    """
+    total = contrasts.count * len(contrasts.squares)
+    freedom = max(min(total // (joints + 1), len(contrasts.projections)), 1)
+    return float(
+        np.sqrt(freedom / (2 * gammaincinv(freedom / 2, 1 - _JOINT_CONFIDENCE)))
+    )
+
+
+def _sensor_bounds(log_std: np.ndarray) -> list[tuple[float, float]]:
+    """Bounds of the logarithms of the sensor's standard deviations."""
+    return [(value - _LOG_RANGE_BELOW, value + _LOG_RANGE_ABOVE) for value in log_std]
 
 
 def estimate_joint_repeatability(
     model: Model, estimate: Estimate, measurements: Measurements
 ) -> tuple[float, float]:
-    """How well joints repeat, rad, all alike, where the sensor hides each of them;
-    degrees of freedom that its square has.
+    """Estimate the repeatability of joints, all alike, that the sensor's noise hides.
 
-    The root mean square of what repeats leave possible, by the restricted likelihood of
-    `noise_from_repeats`, its maximum over the sensor's part, evenly over the deviation
-    of a joint. Zeros where there are too few repeats to say anything.
+    It is the root mean square of the values that repeats leave possible: an average
+    over the standard deviation of a joint, weighted by the restricted likelihood of
+    `estimate_noise_from_repeats`, of which the sensor's part is maximized.
+
+    Returns
+    -------
+    joint_rad : float
+    degrees_of_freedom : float
+        Of its square. Both are zero if repeats are too few.
     """
-    contrasts = _contrasts(model, estimate, measurements)
-    sensors = model.rows // 3
-    joints = model.sites.joints
+    contrasts = _compute_contrasts(model, estimate, measurements)
     if contrasts is None:
         return 0.0, 0.0
-    start = 0.5 * np.log(
-        np.maximum(contrasts.squares / contrasts.count, FINEST_RESOLUTION**2)
-    )
-    deviations = np.geomspace(_SMALLEST_RAD, _LARGEST_RAD, _DEVIATIONS)
+    sensors = len(contrasts.squares)
+    joints = model.sites.joints
+    variance = contrasts.squares / contrasts.count
+    log_sensor = 0.5 * np.log(np.maximum(variance, FINEST_RESOLUTION**2))
+    grid = np.geomspace(_MIN_JOINT_RAD, _MAX_JOINT_RAD, _JOINT_GRID_SIZE)
 
-    def value(free: np.ndarray, joint: float) -> tuple[float, np.ndarray]:
-        total, slope = _negative_log_likelihood(
-            np.concatenate([free, np.full(joints, np.log(joint))]), contrasts
+    def profile(log_sensor: np.ndarray, joint_rad: float) -> tuple[float, np.ndarray]:
+        """Negative log likelihood and its gradient for a given joint deviation."""
+        log_joints = np.full(joints, np.log(joint_rad))
+        value, gradient = _negative_log_likelihood(
+            np.concatenate([log_sensor, log_joints]), contrasts
         )
-        return total, slope[:sensors]
+        return value, gradient[:sensors]
 
-    minimize = scipy.optimize.minimize
-    bounds = [(at - 7, at + 1) for at in start]
-    likelihood = -np.array(
-        [
-            minimize(value, start, (d,), "L-BFGS-B", jac=True, bounds=bounds).fun
-            for d in deviations
-        ]
-    )
-    # Even steps of the logarithm: each stands for a range as wide as the deviation
-    # itself.
-    weights = np.exp(likelihood - likelihood.max()) * deviations
+    bounds = _sensor_bounds(log_sensor)
+    minima = [
+        scipy.optimize.minimize(
+            profile, log_sensor, (joint_rad,), "L-BFGS-B", jac=True, bounds=bounds
+        ).fun
+        for joint_rad in grid
+    ]
+    log_likelihood = -np.array(minima)
+    # The grid is even in the logarithm, so each value stands for a range as wide as the
+    # value itself.
+    weights = np.exp(log_likelihood - log_likelihood.max()) * grid
     weights /= weights.sum()
-    mean = float(weights @ deviations**2)
-    return float(np.sqrt(mean)), 2.0 * mean**2 / float(
-        weights @ (deviations**2 - mean) ** 2
-    )
+    mean_square = float(weights @ grid**2)
+    variance_of_square = float(weights @ (grid**2 - mean_square) ** 2)
+    return float(np.sqrt(mean_square)), 2.0 * mean_square**2 / variance_of_square
 
 
 @dataclass(frozen=True)
 class _Contrasts:
-    """What orthonormal contrasts v (k * rows,) of repeats with k targets, G of them,
-    say of the noise, Jacobians S beside them.
+    """Sums over G orthonormal contrasts v (k * rows,) of repeats with k targets.
 
-    `count`: numbers of one sensor's part, of positions or of orientations, in all v.
-    `squares` (s,): v'v of each sensor's part, of all. `along` (G, s, n): S'v of each.
-    `gram` (G, s, n, n): S'S of each.
+    A sensor part is positions or orientations, s of them; S is the Jacobian of the
+    targets with respect to the n joints.
+
+    Attributes
+    ----------
+    count : int, numbers of one sensor part in all contrasts
+    squares : (s,) array, v'v of each sensor part, summed over all contrasts
+    projections : (G, s, n) array, S'v
+    gram : (G, s, n, n) array, S'S
     """
 
     count: int
     squares: np.ndarray
-    along: np.ndarray
+    projections: np.ndarray
     gram: np.ndarray
 
 
-def _contrasts(
+def _compute_contrasts(
     model: Model, estimate: Estimate, measurements: Measurements
 ) -> _Contrasts | None:
-    """Contrasts between repeats; None where there are too few to say anything."""
+    """Compute contrasts between repeats; None if there are too few."""
     if not len(measurements) or not np.ptp(measurements.repeat):
         return None
-    observations, repeated = separate_approaches(remove_outlying_repeats(measurements))
-    first = np.flatnonzero(np.diff(repeated, prepend=-1))
-    # The targets that an approach saw, beside those of the first approach to its state.
-    seen = np.bincount(observations.state)
-    targets = np.full((len(seen), seen.max()), -1)
-    before = (np.cumsum(seen) - seen)[observations.state]
-    targets[observations.state, np.arange(len(observations)) - before] = (
-        observations.target
+    observations, averaged_state = separate_approaches(
+        remove_outlying_repeats(measurements)
     )
-    alike = (targets == targets[first[repeated]]).all(axis=1)
-    number = np.bincount(repeated, alike).astype(int)
-    # As many as tell, of states spread over the campaign.
-    wanted = np.flatnonzero(number > 1)
-    share = ((number - 1) * seen[first]).sum() * model.rows / MAX_CONTRASTS
-    wanted = (
-        wanted[np.linspace(0, len(wanted) - 1, int(len(wanted) / share)).astype(int)]
-        if share > 1
-        else wanted
-    )
-    chosen = alike & np.isin(repeated, wanted)
-    some = select_states(observations, chosen)
-    bare = replace(model, effects=())
-    if len(some) * model.rows < MIN_CONTRASTS:
+    chosen = _select_comparable_approaches(observations, averaged_state)
+    observations = select_states(observations, chosen)
+    averaged_state = averaged_state[chosen]
+    if len(observations) * model.rows < MIN_CONTRASTS:
         return None
-    at = replace(estimate, coefficients=(), shapes=())
-    line = linearize(bare, at, some, evaluate_conditions(bare, at, some.states))
-    sensors = model.rows // 3
-    squares = np.zeros(model.rows // 3)
-    found = []
-    targets_of = np.bincount(some.state)[some.state]
-    for members in batch_groups_by_size(
-        np.unique(repeated[chosen], return_inverse=True)[1][some.state]
-    ):
-        for count in np.unique(targets_of[members[:, 0]]):
-            mine = members[targets_of[members[:, 0]] == count].reshape(
-                -1, members.shape[1] // count, count
-            )
-            groups, repeats = mine.shape[:2]
-            vectors = helmert(repeats) @ line.residual[mine].reshape(
-                groups, repeats, -1
-            )
-            vectors = vectors.reshape(groups, repeats - 1, count, sensors, 3)
-            jacobian = line.joint_jacobian[mine[:, 0]].reshape(
-                groups, count, sensors, 3, -1
-            )
-            along = np.einsum("gtsxn,grtsx->grsn", jacobian, vectors)
-            gram = np.einsum("gtsxn,gtsxm->gsnm", jacobian, jacobian)
-            squares += (vectors**2).sum(axis=(0, 1, 2, 4))
-            found.append(
-                (
-                    along.reshape(-1, *along.shape[2:]),
-                    np.repeat(gram, repeats - 1, axis=0),
-                    vectors.size // sensors,
-                )
-            )
-    alongs, grams, counts = zip(*found, strict=True)
+    nominal_model = replace(model, effects=())
+    nominal = replace(estimate, coefficients=(), shapes=())
+    conditions = evaluate_conditions(nominal_model, nominal, observations.states)
+    linear_model = linearize(nominal_model, nominal, observations, conditions)
+    stacks = [
+        _contrast_repeats(linear_model, members)
+        for members in _stack_repeats(observations, averaged_state)
+    ]
     contrasts = _Contrasts(
-        sum(counts), squares, np.concatenate(alongs), np.concatenate(grams)
+        sum(stack.count for stack in stacks),
+        sum((stack.squares for stack in stacks), np.zeros(model.rows // 3)),
+        np.concatenate([stack.projections for stack in stacks]),
+        np.concatenate([stack.gram for stack in stacks]),
     )
-    return contrasts if contrasts.count * sensors >= MIN_CONTRASTS else None
+    total = contrasts.count * len(contrasts.squares)
+    return contrasts if total >= MIN_CONTRASTS else None
+
+
+def _select_comparable_approaches(
+    observations: Observations, averaged_state: np.ndarray
+) -> np.ndarray:
+    """Select approaches with the same targets as the first approach of their state.
+
+    If there are more contrasts than needed, only states spread over the campaign are
+    selected. `averaged_state` (S,) is the averaged state of each approach. Returns a
+    (S,) bool array.
+    """
+    first = np.flatnonzero(np.diff(averaged_state, prepend=-1))
+    target_count = np.bincount(observations.state)
+    start = (np.cumsum(target_count) - target_count)[observations.state]
+    targets = np.full((len(target_count), target_count.max()), -1)
+    column = np.arange(len(observations)) - start
+    targets[observations.state, column] = observations.target
+    comparable = (targets == targets[first[averaged_state]]).all(axis=1)
+    approaches = np.bincount(averaged_state, comparable).astype(int)
+    repeated = np.flatnonzero(approaches > 1)
+    contrasts = ((approaches - 1) * target_count[first]).sum() * observations.rows
+    excess = contrasts / MAX_CONTRASTS
+    if excess > 1:
+        count = int(len(repeated) / excess)
+        repeated = repeated[np.linspace(0, len(repeated) - 1, count).astype(int)]
+    return comparable & np.isin(averaged_state, repeated)
+
+
+def _stack_repeats(
+    observations: Observations, averaged_state: np.ndarray
+) -> Iterator[np.ndarray]:
+    """Indices (groups, repeats, targets) of the observations, for each number of
+    repeats and targets that states have."""
+    target_count = np.bincount(observations.state)[observations.state]
+    group = np.unique(averaged_state, return_inverse=True)[1]
+    for members in batch_groups_by_size(group[observations.state]):
+        counts = target_count[members[:, 0]]
+        for count in np.unique(counts):
+            repeats = members.shape[1] // count
+            yield members[counts == count].reshape(-1, repeats, count)
+
+
+def _contrast_repeats(linear_model: LinearModel, members: np.ndarray) -> _Contrasts:
+    """Contrasts of observations (groups, repeats, targets), given as indices."""
+    groups, repeats, targets = members.shape
+    residual = linear_model.residual[members].reshape(groups, repeats, -1)
+    vectors = helmert(repeats) @ residual
+    vectors = vectors.reshape(groups, repeats - 1, targets, -1, 3)
+    sensors = vectors.shape[3]
+    jacobian = linear_model.joint_jacobian[members[:, 0]].reshape(
+        groups, targets, sensors, 3, -1
+    )
+    projections = np.einsum("gtsxn,grtsx->grsn", jacobian, vectors)
+    gram = np.einsum("gtsxn,gtsxm->gsnm", jacobian, jacobian)
+    return _Contrasts(
+        vectors.size // sensors,
+        (vectors**2).sum(axis=(0, 1, 2, 4)),
+        projections.reshape(-1, *projections.shape[2:]),
+        np.repeat(gram, repeats - 1, axis=0),
+    )
 
 
 def _negative_log_likelihood(
-    logs: np.ndarray, contrasts: _Contrasts
+    log_std: np.ndarray, contrasts: _Contrasts
 ) -> tuple[float, np.ndarray]:
-    """Minus the logarithm of the restricted likelihood, and its derivatives by the
-    logarithms of the deviations.
+    """Negative log restricted likelihood, and its gradient with respect to `log_std`.
 
-    With D the variances of the sensors and L those of the joints, Sigma = D + S L S'
-    has the determinant |D| |I + L C| and the inverse D^-1 - D^-1 S A S' D^-1, C = S'
-    D^-1 S and A = (I + L C)^-1 L, by Woodbury's identity (Hager, SIAM Review 31, 1989).
+    `log_std` (s + n,) holds the logarithms of the standard deviations of the sensor
+    parts and of the joints. With D the variances of the sensors and L those of the
+    joints, Sigma = D + S L S' has the determinant |D| |I + L C| and the inverse
+    D^-1 - D^-1 S A S' D^-1, where C = S' D^-1 S and A = (I + L C)^-1 L, by Woodbury's
+    identity (Hager, SIAM Review 31, 1989).
     """
     sensors = len(contrasts.squares)
-    precision = np.exp(-2.0 * logs[:sensors])
-    deviation = np.exp(logs[sensors:])
-    along = precision @ contrasts.along
+    precision = np.exp(-2.0 * log_std[:sensors])
+    joint_std = np.exp(log_std[sensors:])
+    projection = precision @ contrasts.projections
     gram = (precision[:, None, None] * contrasts.gram).sum(axis=1)
-    inner = np.eye(len(deviation)) + deviation[:, None] * gram * deviation
-    left = deviation[:, None] * np.linalg.inv(inner) * deviation
-    solved = (left @ along[..., None])[..., 0]
-    total = contrasts.count * logs[:sensors].sum() + 0.5 * (
-        precision @ contrasts.squares - (along * solved).sum()
+    inner = np.eye(len(joint_std)) + joint_std[:, None] * gram * joint_std
+    # The matrix A, and A S' D^-1 v.
+    middle = joint_std[:, None] * np.linalg.inv(inner) * joint_std
+    solved = (middle @ projection[..., None])[..., 0]
+    value = contrasts.count * log_std[:sensors].sum() + 0.5 * (
+        precision @ contrasts.squares - (projection * solved).sum()
     )
-    total += 0.5 * np.linalg.slogdet(inner)[1].sum()
-    # S' times what the inverse makes of v; of each sensor's part, what the joints
-    # explain of its squares and its variance.
-    rest = along - (gram @ solved[..., None])[..., 0]
-    explained = 2.0 * (contrasts.along @ solved[..., None])[..., 0]
+    value += 0.5 * np.linalg.slogdet(inner)[1].sum()
+    # For each sensor part: the share of its squares and of its variance that the joints
+    # explain.
+    explained = 2.0 * (contrasts.projections @ solved[..., None])[..., 0]
     explained -= (
         (contrasts.gram @ solved[:, None, :, None])[..., 0] * solved[:, None]
     ).sum(axis=2)
-    explained -= (left[:, None] * contrasts.gram).sum(axis=(2, 3))
-    slopes = contrasts.count + precision * (explained.sum(axis=0) - contrasts.squares)
-    variance = np.diagonal(gram, axis1=1, axis2=2) - (gram * (gram @ left)).sum(axis=2)
-    return total, np.concatenate(
-        [slopes, deviation**2 * (variance - rest**2).sum(axis=0)]
+    explained -= (middle[:, None] * contrasts.gram).sum(axis=(2, 3))
+    sensor_gradient = contrasts.count + precision * (
+        explained.sum(axis=0) - contrasts.squares
     )
+    # S' Sigma^-1 v, and the diagonal of S' Sigma^-1 S.
+    reduced = projection - (gram @ solved[..., None])[..., 0]
+    diagonal = np.diagonal(gram, axis1=1, axis2=2) - (gram * (gram @ middle)).sum(
+        axis=2
+    )
+    joint_gradient = joint_std**2 * (diagonal - reduced**2).sum(axis=0)
+    return value, np.concatenate([sensor_gradient, joint_gradient])
 
 
 def fit_declared_model(model: Model, observations: Observations, noise: Noise) -> Fit:
-    """Fit a declared model, its geometry under priors of the most probable size;
-    without geometry as `least_squares.fit_model`."""
+    """Fit a declared model with the most probable prior scale of its geometry.
+
+    Without declared geometry this is `least_squares.fit_model`.
+    """
     if not find_declared_geometry(model):
         return fit_model(model, observations, noise)
     wide = fit_model(
@@ -440,7 +539,7 @@ def fit_declared_model(model: Model, observations: Observations, noise: Noise) -
         tolerance=INTERMEDIATE_TOLERANCE,
     )
     return fit_model(
-        set_prior_scale(model, maximize_evidence(wide)[0]),
+        set_prior_scale(model, maximize_evidence(wide).prior_scale),
         observations,
         noise,
         wide.estimate,
@@ -449,8 +548,10 @@ def fit_declared_model(model: Model, observations: Observations, noise: Noise) -
 
 
 def find_declared_geometry(model: Model) -> set[str]:
-    """Names of declared effects whose size is estimated: those whose parameters have no
-    prior of their own, but for springs."""
+    """Find the names of declared effects whose prior scale is estimated.
+
+    These are the effects whose parameters have no prior of their own, except springs.
+    """
     return {
         effect.effect
         for effect in model.effects
@@ -459,76 +560,116 @@ def find_declared_geometry(model: Model) -> set[str]:
     }
 
 
-def set_prior_scale(model: Model, size: float) -> Model:
-    """A declared model with priors of a size, in plausible sizes, on its geometry."""
-    sized = find_declared_geometry(model)
-    effects = [
-        set_prior_std(effect, [size * p.plausible for p in effect.parameters])
-        if effect.effect in sized
-        else effect
-        for effect in model.effects
-    ]
+def set_prior_scale(model: Model, scale: float) -> Model:
+    """Set priors on the declared geometry of a model, `scale` in plausible sizes."""
+    geometry = find_declared_geometry(model)
+    effects = []
+    for effect in model.effects:
+        if effect.effect in geometry:
+            deviations = [scale * p.plausible for p in effect.parameters]
+            effects.append(set_prior_std(effect, deviations))
+        else:
+            effects.append(effect)
     return replace(model, effects=tuple(effects))
 
 
 def set_prior_std(
     candidate: Candidate, deviations: Sequence[float] | np.ndarray
 ) -> Candidate:
-    """A candidate with normal priors about zero whose standard deviations were
-    estimated."""
-    pairs = zip(candidate.parameters, deviations, strict=True)
-    return replace(
-        candidate,
-        parameters=tuple(
-            replace(p, prior_std=float(std), sized=True) for p, std in pairs
-        ),
+    """Set normal priors about zero with estimated standard deviations (D,)."""
+    parameters = tuple(
+        replace(parameter, prior_std=float(deviation), sized=True)
+        for parameter, deviation in zip(candidate.parameters, deviations, strict=True)
     )
+    return replace(candidate, parameters=parameters)
 
 
-def maximize_evidence(wide: Fit) -> tuple[float, float]:
-    """Size of declared geometry, in plausible sizes, and noise over the noise taken
-    that make the measurements most probable.
+class PriorEvidence(NamedTuple):
+    """Hyperparameters that make the measurements most probable.
+
+    `prior_scale`: of declared geometry, in plausible sizes. `noise_factor`: actual over
+    assumed noise, at least 1.
+    """
+
+    prior_scale: float
+    noise_factor: float
+
+
+def maximize_evidence(wide: Fit) -> PriorEvidence:
+    """Find the prior scale of declared geometry and the noise factor by evidence.
 
     In closed form from a fit under the widest prior: given frames and targets the
-    geometry is linear, and the principal axes of its covariance in units of the prior
-    are independent. The noise is no less than the noise taken.
+    geometry is linear, and the principal axes of its covariance, in units of the prior,
+    are independent.
     """
-    mine = np.flatnonzero(
-        np.array([parameter.sized for _, parameter in wide.parameters], bool)
-        & ~wide.unidentifiable
+    is_sized = np.array([parameter.sized for _, parameter in wide.parameters], bool)
+    sized = np.flatnonzero(is_sized & ~wide.unidentifiable)
+    prior_std = wide.prior_std[sized]
+    remaining, axes = np.linalg.eigh(
+        wide.covariance[np.ix_(sized, sized)] / np.outer(prior_std, prior_std)
     )
-    prior = wide.prior_std[mine]
-    left, axes = np.linalg.eigh(
-        wide.covariance[np.ix_(mine, mine)] / np.outer(prior, prior)
+    remaining = np.clip(remaining, _SHARE_ROUNDING, 1.0)
+    values = get_parameter_values(wide.model, wide.estimate)[sized]
+    rows = wide.weights.sum() * wide.residual.shape[1]
+    fitted_count = (~wide.unidentifiable).sum()
+    log_evidence = _compute_log_evidence(
+        axes.T @ (values / prior_std),
+        remaining,
+        (wide.whiten(wide.residual) ** 2).sum(),
+        max(rows - fitted_count + len(sized), 1.0),
     )
-    left = np.clip(left, _ROUNDING, 1.0)
-    shift = axes.T @ (get_parameter_values(wide.model, wide.estimate)[mine] / prior)
-    seen = 1.0 / left - 1.0
-    # Squares of the whitened residual were all of it zero, beside frames and targets.
-    squares = (wide.whiten(wide.residual) ** 2).sum() + ((seen + 2.0) * shift**2).sum()
-    freedom = max(
-        wide.weights.sum() * wide.residual.shape[1]
-        - (~wide.unidentifiable).sum()
-        + len(mine),
-        1.0,
+    factor, scale = np.unravel_index(np.argmax(log_evidence), log_evidence.shape)
+    return PriorEvidence(float(PRIOR_SCALES[scale]), float(_NOISE_FACTORS[factor]))
+
+
+def _compute_log_evidence(
+    estimate: np.ndarray,
+    remaining: np.ndarray,
+    squares: float,
+    degrees_of_freedom: float,
+) -> np.ndarray:
+    """Log evidence of each noise factor and prior scale, up to a constant.
+
+    Parameters
+    ----------
+    estimate : (A,) array
+        Estimate along each principal axis of the covariance, in units of the prior.
+    remaining : (A,) array
+        Share of the prior variance that remains along each axis.
+    squares : float
+        Squares of the whitened residual of the fit.
+    degrees_of_freedom : float
+        Of the residual, given frames and targets.
+
+    Returns
+    -------
+    (noise factors, prior scales) array
+    """
+    information = 1.0 / remaining - 1.0
+    squares_without_geometry = squares + ((information + 2.0) * estimate**2).sum()
+    noise_variance = _NOISE_FACTORS[:, None, None] ** 2
+    prior_variance = ((PRIOR_SCALES / PRIOR_SCALES[-1]) ** 2)[:, None]
+    explained = (
+        (estimate / remaining) ** 2
+        * prior_variance
+        / (noise_variance + information * prior_variance)
+    ).sum(axis=2)
+    log_determinant = np.log1p(prior_variance * information / noise_variance).sum(
+        axis=2
     )
-    variance = _FACTORS[:, None, None] ** 2
-    wider = ((PRIOR_SCALES / PRIOR_SCALES[-1]) ** 2)[:, None]
-    explained = ((shift / left) ** 2 * wider / (variance + seen * wider)).sum(axis=2)
-    volume = np.log1p(wider * seen / variance).sum(axis=2)
-    variance = variance[..., 0]
-    evidence = -0.5 * (
-        freedom * np.log(variance) + (squares - explained) / variance + volume
+    noise_variance = noise_variance[..., 0]
+    return -0.5 * (
+        degrees_of_freedom * np.log(noise_variance)
+        + (squares_without_geometry - explained) / noise_variance
+        + log_determinant
     )
-    factor, size = np.unravel_index(np.argmax(evidence), evidence.shape)
-    return float(PRIOR_SCALES[size]), float(_FACTORS[factor])
 
 
 def count_effective_parameters(fitted: Fit) -> float:
-    """Free parameters, with a prior the share that it leaves open: trace of a ridge's
-    hat matrix (Hastie et al., 3.4.1)."""
+    """Count free parameters; one with a prior counts by the share that it leaves open.
+
+    This is the trace of a ridge's hat matrix (Hastie et al., 3.4.1).
+    """
     free = ~fitted.unidentifiable
-    return float(
-        free.sum()
-        - (np.diag(fitted.covariance)[free] / fitted.prior_std[free] ** 2).sum()
-    )
+    shrinkage = np.diag(fitted.covariance)[free] / fitted.prior_std[free] ** 2
+    return float(free.sum() - shrinkage.sum())

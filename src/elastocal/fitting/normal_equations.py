@@ -1,9 +1,9 @@
-"""Normal equations of a step of generalized least squares: whitened, added up over the
-measurements, and solved.
+"""Normal equations of generalized least squares: assembly and solution.
 
-Generalized least squares (Aitken, Proc. R. Soc. Edinburgh 55, 1935) divides residuals
-and sensitivities by the noise of the states in which they were taken; what the data do
-not identify is held at its value.
+Generalized least squares (Aitken, Proc. R. Soc. Edinburgh 55, 1935) whitens residuals
+and sensitivities: it multiplies them by the inverse Cholesky factor of the noise
+covariance of the states in which they were measured. Parameters that the data do not
+identify stay fixed.
 """
 
 from __future__ import annotations
@@ -30,73 +30,127 @@ if TYPE_CHECKING:
     from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import Observations
 
-# Correlation beyond which a parameter is not identifiable because of a shape.
-_BOUND_TO_SHAPE = 0.5
-# States beyond which conditions are not kept from step to step, and with a fit, but
-# found again: they take some ten kilobytes each, and there is one fit after another.
-_MOST_STATES = 20_000
-_MOST_STATES_OF_A_FIT = 2_000
-# Columns for each coordinate from which on products by factors cost less than those of
-# the columns written out.
-_COLUMNS_A_COORDINATE = 4
+# If a parameter is not identifiable and correlates more than this with a nonlinear
+# parameter, the nonlinear parameter is given up instead.
+_NONLINEAR_CORRELATION = 0.5
+# Upper bound on the states whose conditions stay in memory from step to step, and on
+# those whose conditions stay in memory with the finished fit. Conditions take some ten
+# kilobytes a state, and there is one fit after another. Above it they are recomputed.
+_MAX_STATES_IN_MEMORY = 20_000
+_MAX_STATES_OF_A_FIT = 2_000
+# Above this many columns per displaced coordinate, products of the factored
+# sensitivities are cheaper than those of the dense ones.
+_COLUMNS_PER_COORDINATE = 4
+# A pivot this close to the information of the prior alone, absolutely and relative to
+# the diagonal, is rounding.
+_PIVOT_ROUNDING = 1e-12
+_RELATIVE_PIVOT_ROUNDING = 1e-11
+
+
+@dataclass(frozen=True)
+class ParameterScales:
+    """What normal equations need to know about P parameters besides the measurements.
+
+    Attributes
+    ----------
+    plausible : (P,) array, plausible size of each parameter
+    penalty : (P,) array, inverse variance of the normal prior about zero; 0 if a
+        parameter has no prior
+    nonlinear : (P,) bool array, shape parameters
+    """
+
+    plausible: np.ndarray
+    penalty: np.ndarray
+    nonlinear: np.ndarray
+
+
+@dataclass(frozen=True)
+class NormalSolution:
+    """Solution of normal equations.
+
+    Attributes
+    ----------
+    step : (P,) array, zero for parameters that do not move
+    covariance : (P, P) array, zero for parameters that do not move
+    unidentifiable : (P,) bool array, parameters that do not move
+    """
+
+    step: np.ndarray
+    covariance: np.ndarray
+    unidentifiable: np.ndarray
 
 
 def solve_normal_equations(
     gram: np.ndarray,
-    along: np.ndarray,
-    plausible: np.ndarray,
-    frozen: bool | np.ndarray = False,
-    penalty: float | np.ndarray = 0.0,
-    present: float | np.ndarray = 0.0,
-    nonlinear: bool | np.ndarray = False,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Least squares over the parameters that the data identify, from the normal
-    equations.
+    gradient: np.ndarray,
+    scales: ParameterScales,
+    present: np.ndarray,
+    frozen: np.ndarray,
+) -> NormalSolution:
+    """Solve normal equations for the parameters that the data identify.
 
-    A parameter whose standard error would exceed its plausible size, first beside those
-    before it and then beside all, keeps its value. Nothing is regularised but what
-    carries a prior, as in generalized ridge regression (Hoerl and Kennard,
-    Technometrics 12, 1970).
+    A parameter whose standard error would exceed its plausible size, first given the
+    parameters before it and then given all, keeps its value. Only parameters with a
+    prior are regularised, as in generalized ridge regression.
 
-    `gram` (P, P): products of whitened sensitivities in plausible sizes with each
-    other. `along` (P,): with the whitened residual. `plausible` (P,): plausible size of
-    each parameter. `frozen` (P,) of bool: parameters not to move. `penalty` (P,): one
-    over the variance of the prior about zero; 0 for none. `present` (P,): values from
-    which the step is taken. `nonlinear` (P,) of bool: as in `identifiable`. Returns
-    `step` (P,): zero where held; `covariance` (P, P); `held` (P,) of bool.
+    Parameters
+    ----------
+    gram : (P, P) array
+        Products of whitened sensitivities, each in units of its plausible size.
+    gradient : (P,) array
+        Products of these sensitivities with the whitened residual.
+    scales : ParameterScales
+    present : (P,) array
+        Values from which the step is taken.
+    frozen : (P,) bool array
+        Parameters that must not move.
+
+    References
+    ----------
+    Hoerl and Kennard, Technometrics 12, 1970.
     """
-    gram = gram + np.diag(np.broadcast_to(penalty, len(plausible)) * plausible**2)
-    along = along - plausible * np.broadcast_to(penalty * present, len(plausible))
-    known, inverse = find_identifiable_parameters(
-        gram, *(np.broadcast_to(flags, len(plausible)) for flags in (frozen, nonlinear))
-    )
-    return (
-        plausible * (inverse @ along),
+    plausible = scales.plausible
+    gram = gram + np.diag(scales.penalty * plausible**2)
+    gradient = gradient - plausible * (scales.penalty * present)
+    identified, inverse = find_identifiable_parameters(gram, frozen, scales.nonlinear)
+    return NormalSolution(
+        plausible * (inverse @ gradient),
         inverse * np.outer(plausible, plausible),
-        ~known,
+        ~identified,
     )
 
 
 def find_identifiable_parameters(
     gram: np.ndarray, frozen: np.ndarray, nonlinear: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Which parameters the data distinguish from zero at their plausible size: first
-    given those before them, then given all.
+    """Find the parameters that the data distinguish from zero at their plausible size.
 
-    Forward selection in the order given, by the pivots of a Cholesky decomposition,
-    then backward elimination.
+    Forward selection in the given order by the pivots of a Cholesky decomposition, then
+    backward elimination, because later parameters may take the information that
+    identified earlier ones.
 
-    `gram` (P, P): information on the parameters, each in units of its plausible size.
-    `frozen` (P,) of bool: left out from the start. `nonlinear` (P,) of bool: shapes:
-    given up before a parameter that they are bound to, as that of their law is where it
-    is nearly a straight line. Returns (P,) of bool, and the covariance of these (P, P),
-    zero of all others.
+    Parameters
+    ----------
+    gram : (P, P) array
+        Information on the parameters, each in units of its plausible size.
+    frozen : (P,) bool array
+        Parameters that are excluded from the start.
+    nonlinear : (P,) bool array
+        Shape parameters. If a parameter of a basis function is not identifiable because
+        it correlates with the shape, as when that function is nearly a straight line,
+        the shape is given up first.
+
+    Returns
+    -------
+    identifiable : (P,) bool array
+    covariance : (P, P) array, zero for all other parameters
     """
     kept = np.flatnonzero(~frozen)
-    found = np.zeros_like(gram)
-    while (first := _first_without_information(gram[np.ix_(kept, kept)])) is not None:
+    inverse = np.zeros_like(gram)
+    first = _find_first_uninformed(gram[np.ix_(kept, kept)])
+    while first is not None:
         kept = np.delete(kept, first)
-    # Parameters that came later may have taken from what identified their predecessors.
+        first = _find_first_uninformed(gram[np.ix_(kept, kept)])
     while len(kept):
         covariance = invert_cholesky_factor(
             dpotrf(gram[np.ix_(kept, kept)], lower=1)[0]
@@ -104,62 +158,65 @@ def find_identifiable_parameters(
         deviation = np.sqrt(np.diag(covariance))
         worst = int(np.argmax(deviation))
         if deviation[worst] <= 1.0:
-            found[np.ix_(kept, kept)] = covariance
+            inverse[np.ix_(kept, kept)] = covariance
             break
-        correlation = np.where(
-            nonlinear[kept],
-            np.abs(covariance[worst]) / (deviation[worst] * deviation),
-            0.0,
-        )
+        correlation = np.abs(covariance[worst]) / (deviation[worst] * deviation)
+        correlation = np.where(nonlinear[kept], correlation, 0.0)
         shape = int(np.argmax(correlation))
-        kept = np.delete(kept, shape if correlation[shape] > _BOUND_TO_SHAPE else worst)
-    return np.isin(np.arange(len(gram)), kept), found
+        if correlation[shape] > _NONLINEAR_CORRELATION:
+            worst = shape
+        kept = np.delete(kept, worst)
+    return np.isin(np.arange(len(gram)), kept), inverse
 
 
 def invert_cholesky_factor(lower: np.ndarray) -> np.ndarray:
-    """Inverse of a symmetric positive matrix, of which this is Cholesky's factor."""
+    """Invert the symmetric positive definite matrix that has this Cholesky factor."""
     inverse = dpotri(lower, lower=1)[0]
-    # LAPACK leaves the other triangle as it was.
+    # LAPACK leaves the upper triangle as it was.
     return np.tril(inverse) + np.tril(inverse, -1).T
 
 
-def _first_without_information(gram: np.ndarray) -> int | None:
-    """The first of some parameters that those before it leave not enough information
-    on; None where there is none."""
+def _find_first_uninformed(gram: np.ndarray) -> int | None:
+    """Index of the first parameter that has too little information given its
+    predecessors; None if all have enough."""
     if not len(gram):
         return None
-    # Where a pivot is not positive, LAPACK says which (from 1), and has those before
-    # it.
-    factor, number = dpotrf(gram, lower=1)
-    known = number - 1 if number else len(gram)
-    left_over = np.diag(factor)[:known] ** 2
-    # Rounding of the squares counts as nothing, nor that of a prior which alone makes
-    # one.
-    lacking = left_over <= np.maximum(1.0 + 1e-12, 1e-11 * np.diag(gram)[:known])
-    if lacking.any():
-        return int(np.argmax(lacking))
-    return known if number else None
+    # If a pivot is not positive, LAPACK returns its number, counted from 1, and the
+    # pivots before it.
+    factor, failed = dpotrf(gram, lower=1)
+    count = failed - 1 if failed else len(gram)
+    pivots = np.diag(factor)[:count] ** 2
+    # A prior alone gives a pivot of one, so neither that nor rounding is information.
+    uninformed = pivots <= np.maximum(
+        1.0 + _PIVOT_ROUNDING, _RELATIVE_PIVOT_ROUNDING * np.diag(gram)[:count]
+    )
+    if uninformed.any():
+        return int(np.argmax(uninformed))
+    return count if failed else None
 
 
 @dataclass(frozen=True)
 class Whitening:
-    """What turns correlated rows into independent ones of unit variance.
+    """Linear map that turns correlated rows into independent rows of unit variance.
 
-    `blocks` (ndarray (G, k), ndarray (G, k * rows, k * rows)): for what errs together,
-    k observations each: their indices, and the inverse Cholesky factor of their
-    covariance.
+    Attributes
+    ----------
+    blocks : tuple of pairs
+        For each number k of observations with correlated errors: the indices (G, k) of
+        the observations, and the inverse Cholesky factors (G, k * rows, k * rows) of
+        their covariance.
     """
 
     blocks: tuple[tuple[np.ndarray, np.ndarray], ...]
 
     def apply(self, values: np.ndarray) -> np.ndarray:
-        """Whitened values (M, rows, ...)."""
-        (members, factor), *others = self.blocks
-        if not others and (members.ravel() == np.arange(len(values))).all():
-            # One after the other: nothing to gather.
-            return (factor @ values.reshape(*factor.shape[:2], -1)).reshape(
-                values.shape
-            )
+        """Whiten values (M, rows, ...)."""
+        members, factor = self.blocks[0]
+        single = len(self.blocks) == 1
+        if single and (members.ravel() == np.arange(len(values))).all():
+            # Observations are in the order of the blocks, so there is nothing to gather.
+            stacked = values.reshape(*factor.shape[:2], -1)
+            return (factor @ stacked).reshape(values.shape)
         whitened = np.empty(values.shape)
         for members, factor in self.blocks:
             stacked = values[members].reshape(*factor.shape[:2], -1)
@@ -170,110 +227,154 @@ class Whitening:
 
     @property
     def transposed(self) -> Whitening:
-        """What carries whitened values back, as products with whitened sensitivities
-        do."""
+        """Transpose of the map, as in products with whitened sensitivities."""
         return Whitening(
             tuple((members, factor.swapaxes(1, 2)) for members, factor in self.blocks)
         )
 
     def after(self, maps: np.ndarray) -> Whitening:
-        """What whitens values to each of whose observations a matrix is applied first,
-        ndarray (M, rows, rows)."""
+        """Compose with a matrix for each observation, (M, rows, rows), applied first."""
         blocks = []
         for members, factor in self.blocks:
             by_member = factor.reshape(
                 len(members), -1, members.shape[1], maps.shape[1]
             ).swapaxes(1, 2)
-            blocks.append(
-                (
-                    members,
-                    (by_member @ maps[members]).swapaxes(1, 2).reshape(factor.shape),
-                )
-            )
+            composed = (by_member @ maps[members]).swapaxes(1, 2)
+            blocks.append((members, composed.reshape(factor.shape)))
         return Whitening(tuple(blocks))
 
 
 def compute_measurement_covariances(
     noise: Noise, jacobians: np.ndarray, rows: int
 ) -> np.ndarray:
-    """Covariance of all measurements of one approach, ndarray (G, k * rows, k * rows).
+    """Compute the covariance of all measurements of one approach.
 
-    `jacobians` (G, k, rows, n): of the k targets, with respect to the joints. `rows`: 3
-    for positions, 6 for poses.
+    Parameters
+    ----------
+    noise : Noise
+    jacobians : (G, k, rows, n) array
+        Jacobians of k targets with respect to the joints.
+    rows : int
+        3 for positions, 6 for poses.
+
+    Returns
+    -------
+    (G, k * rows, k * rows) array
     """
     groups, targets = jacobians.shape[:2]
-    stacked = jacobians.reshape(groups, targets * rows, -1) * noise.joint_rad
+    size = targets * rows
+    stacked = jacobians.reshape(groups, size, -1) * noise.joint_rad
     covariance = stacked @ stacked.transpose(0, 2, 1)
-    covariance[:, np.arange(targets * rows), np.arange(targets * rows)] += np.tile(
-        noise.sensor_std(rows) ** 2, targets
-    )
+    diagonal = np.arange(size)
+    covariance[:, diagonal, diagonal] += np.tile(noise.sensor_std(rows) ** 2, targets)
     return covariance
 
 
 def compute_whitening(
     observations: Observations, jacobian: np.ndarray | None, noise: Noise
 ) -> Whitening:
-    """Whitening of averaged observations.
+    """Compute the whitening of averaged observations.
 
-    Those of a state share the approach; where poses have an error in common, those of
-    all states of a pose share it.
+    Observations of a state share the joints' error of one approach. If poses have an
+    error in common, the observations of all states of a pose share it.
 
-    `jacobian` (M, rows, n): with respect to the joints; where they do not err it is not
-    looked at. `noise`: of one measurement.
+    Parameters
+    ----------
+    observations : Observations
+    jacobian : (M, rows, n) array or None
+        With respect to the joints. It is not needed if the noise has no joint error.
+    noise : Noise
+        Of a single measurement.
     """
     rows = observations.rows
     repeats = observations.states.repeats[observations.state]
-    if not noise.pose_rad and not noise.joint_rad.any():
-        each = (np.sqrt(repeats)[:, None] / noise.sensor_std(rows))[..., None] * np.eye(
-            rows
-        )
-        return Whitening(((np.arange(len(each))[:, None], each),))
+    if not noise.has_joint_error:
+        factors = (np.sqrt(repeats)[:, None] / noise.sensor_std(rows))[
+            ..., None
+        ] * np.eye(rows)
+        return Whitening(((np.arange(len(factors))[:, None], factors),))
     assert jacobian is not None
+    group = observations.cluster if noise.pose_rad else observations.state
     blocks = []
-    for members in batch_groups_by_size(
-        observations.cluster if noise.pose_rad else observations.state
-    ):
-        stacked = jacobian[members].reshape(len(members), members.shape[1] * rows, -1)
+    for members in batch_groups_by_size(group):
+        of_members = jacobian[members]
+        stacked = of_members.reshape(len(members), members.shape[1] * rows, -1)
         state = np.repeat(observations.state[members], rows, axis=1)
-        alike = (state[:, :, None] == state[:, None, :]) / np.repeat(
-            repeats[members], rows, axis=1
-        )[:, None, :]
-        common = noise.pose_rad**2 * (stacked @ stacked.transpose(0, 2, 1))
+        repeats_of_row = np.repeat(repeats[members], rows, axis=1)
+        # The mean of k repeats has one k-th of their variance.
+        same_state = state[:, :, None] == state[:, None, :]
+        averaging = same_state / repeats_of_row[:, None, :]
+        pose_covariance = noise.pose_rad**2 * (stacked @ stacked.transpose(0, 2, 1))
         covariance = (
-            alike * compute_measurement_covariances(noise, jacobian[members], rows)
-            + common
+            averaging * compute_measurement_covariances(noise, of_members, rows)
+            + pose_covariance
         )
         blocks.append((members, np.linalg.inv(np.linalg.cholesky(covariance))))
     return Whitening(tuple(blocks))
 
 
 @dataclass
-class _Part:
-    """Some observations beside a model.
+class _ProblemBlock:
+    """State of the iteration for one block of observations.
 
-    `states`, `seen`: which. `around`: of their states, where conditions are kept: then
-    `line` is at the present estimate, and `jacobian` (M', rows, n), with respect to the
-    joints, is that by which `whitener` was found. Else `coordinates` (S, C): where the
-    robot has yielded to, by which loads are taken.
+    Attributes
+    ----------
+    indices : slice of all observations
+    observations : Observations
+    conditions : Conditions or None
+        Of the states of the block if conditions stay in memory.
+    linear_model : LinearModel or None
+        About the present estimate if conditions stay in memory.
+    joint_jacobian : (M', rows, n) array or None
+        Jacobian with which `whitening` was computed, if conditions stay in memory.
+    coordinates : (S, C) array or None
+        Otherwise, the displaced coordinates at which loads are evaluated.
+    whitening : Whitening, without blocks until it is computed
     """
 
-    states: slice
-    seen: slice
+    indices: slice
     observations: Observations
-    around: Conditions | None = None
-    line: LinearModel | None = None
-    jacobian: np.ndarray | None = None
+    conditions: Conditions | None = None
+    linear_model: LinearModel | None = None
+    joint_jacobian: np.ndarray | None = None
     coordinates: np.ndarray | None = None
-    whitener: Whitening = Whitening(())
+    whitening: Whitening = Whitening(())
+
+
+@dataclass(frozen=True)
+class FittedState:
+    """What stays in memory of a finished fit, for all M observations.
+
+    Attributes
+    ----------
+    whitening : Whitening
+    residual : (M, rows) array, m and rad, base axes
+    joint_jacobian : (M, rows, n) array with respect to the joints; None if there are
+        too many states to keep it
+    conditions : Conditions of the states; None if there are too many to keep them
+    """
+
+    whitening: Whitening
+    residual: np.ndarray
+    joint_jacobian: np.ndarray | None
+    conditions: Conditions | None
 
 
 class LeastSquaresProblem:
-    """Measurements beside a model, in parts of whole poses: what a step needs of them
-    adds up over the parts.
+    """Weighted, whitened least squares of a model, summed over blocks of whole poses.
 
-    Of very many states nothing is kept from step to step but the whitening of the last
-    step and where the robot yielded to. `estimate`: at which loads are first taken.
-    `plausible` (P,): plausible size of each parameter.
+    For very many states, nothing stays in memory from step to step except the whitening
+    of the last step and the displaced coordinates.
+
+    Parameters
+    ----------
+    model : Model
+    observations : Observations
+    noise : Noise
+    estimate : Estimate
+        Estimate at which loads are evaluated first.
+    plausible : (P,) array
+        Plausible size of each parameter.
     """
 
     def __init__(
@@ -288,197 +389,216 @@ class LeastSquaresProblem:
         self.observations = observations
         self.noise = noise
         self.plausible = plausible
-        self.parts = [
-            _Part(*edges) for edges in split_into_blocks(observations, len(plausible))
+        self.blocks = [
+            _ProblemBlock(block.indices, block.observations)
+            for block in split_into_blocks(observations, len(plausible))
         ]
-        self.kept = len(observations.states) <= _MOST_STATES
-        for part in self.parts if self.kept else ():
-            part.around = evaluate_conditions(model, estimate, part.observations.states)
-        # What is whitened over several states has no factors any more, one of which
-        # belongs to the state.
-        self.factors = not noise.pose_rad or observations.cluster.max() + 1 == len(
-            observations.states
-        )
+        self.in_memory = len(observations.states) <= _MAX_STATES_IN_MEMORY
+        if self.in_memory:
+            for block in self.blocks:
+                block.conditions = evaluate_conditions(
+                    model, estimate, block.observations.states
+                )
+        # The factored form needs each whitened row to belong to one state, so a pose
+        # error that correlates several states rules it out.
+        poses = observations.cluster.max() + 1
+        self.factored = not noise.pose_rad or poses == len(observations.states)
 
     def linearize(self, estimate: Estimate) -> None:
-        """Go to an estimate."""
+        """Linearize the model about an estimate."""
         self.estimate = estimate
-        found = []
-        for part in self.parts:
-            if part.around is not None:
-                part.line = linearize(
-                    self.model, estimate, part.observations, part.around
+        residuals = []
+        for block in self.blocks:
+            if block.conditions is None:
+                residuals.append(self._compute_block_residual(block, estimate))
+            else:
+                block.linear_model = linearize(
+                    self.model, estimate, block.observations, block.conditions
                 )
-            found.append(
-                part.line.residual if part.line else self._residual_of(part, estimate)
-            )
-        self.residual = np.concatenate(found)
+                residuals.append(block.linear_model.residual)
+        self.residual = np.concatenate(residuals)
 
     def whiten(self) -> None:
-        """Take loads and whitening at the present estimate."""
-        self.origin = self.estimate
-        for part in self.parts:
-            if part.line is not None:
-                part.around = part.line.conditions
-                part.jacobian = part.line.joint_jacobian
-                part.whitener = compute_whitening(
-                    part.observations, part.jacobian, self.noise
+        """Evaluate loads and whitening at the present estimate."""
+        self.whitened_at = self.estimate
+        for block in self.blocks:
+            if block.linear_model is not None:
+                block.conditions = block.linear_model.conditions
+                block.joint_jacobian = block.linear_model.joint_jacobian
+                block.whitening = compute_whitening(
+                    block.observations, block.joint_jacobian, self.noise
                 )
-            elif not part.whitener.blocks and (
-                self.noise.pose_rad or self.noise.joint_rad.any()
-            ):
-                self._linearized(part)
-            elif not part.whitener.blocks:
-                part.whitener = compute_whitening(part.observations, None, self.noise)
+            elif not block.whitening.blocks and self.noise.has_joint_error:
+                self._linearize_block(block)
+            elif not block.whitening.blocks:
+                block.whitening = compute_whitening(
+                    block.observations, None, self.noise
+                )
 
     def normal_equations(
-        self, weights: np.ndarray, known: np.ndarray | None = None
+        self, weights: np.ndarray, reused_gram: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Gram matrix of the weighted, whitened sensitivities in plausible sizes, and
-        their products with the residual.
+        """Assemble the normal equations of the weighted, whitened residual.
 
-        `known`: Gram matrix of a step before, if it is to be taken as it was.
+        Parameters
+        ----------
+        weights : (M,) array
+        reused_gram : (P, P) array, optional
+            Gram matrix of an earlier step, if it is to be used again.
+
+        Returns
+        -------
+        gram : (P, P) array
+            Products of the sensitivities, each in units of its plausible size.
+        gradient : (P,) array
+            Products of these sensitivities with the residual.
         """
         size = len(self.plausible)
         gram = np.zeros((size, size))
-        along = np.zeros(size)
+        gradient = np.zeros(size)
         root = np.sqrt(weights)
-        for part in self.parts if size else ():
-            line = part.line or self._linearized(part)
-            mine = root[part.seen]
-            turned = part.whitener.after(
-                _of_rotation_vectors(line.residual) * mine[:, None, None]
+        for block in self.blocks if size else ():
+            linear_model = block.linear_model or self._linearize_block(block)
+            whitening = block.whitening
+            residual = linear_model.residual
+            block_root = root[block.indices]
+            whitened_map = whitening.after(
+                _map_to_rotation_vectors(residual) * block_root[:, None, None]
             )
-            right = turned.transposed.apply(
-                part.whitener.apply(line.residual * mine[:, None])
-            )
-            along += line.columns.times(right[..., None])[:, 0]
-            if (
-                known is None
-                and self.factors
-                and size > _COLUMNS_A_COORDINATE * len(line.columns.spans)
-            ):
-                gram += replace(
-                    line.columns, jacobian=turned.apply(line.columns.jacobian)
-                ).gram()
-            elif known is None:
-                left = turned.apply(line.sensitivities).reshape(right.size, size)
-                gram += left.T @ left
-        return gram * np.outer(
-            self.plausible, self.plausible
-        ) if known is None else known, along * self.plausible
+            whitened = whitening.apply(residual * block_root[:, None])
+            adjoint = whitened_map.transposed.apply(whitened)
+            gradient += linear_model.columns.times(adjoint[..., None])[:, 0]
+            if reused_gram is None:
+                gram += self._compute_gram(linear_model, whitened_map)
+        if reused_gram is None:
+            reused_gram = gram * np.outer(self.plausible, self.plausible)
+        return reused_gram, gradient * self.plausible
+
+    def _compute_gram(
+        self, linear_model: LinearModel, whitened_map: Whitening
+    ) -> np.ndarray:
+        """Products (P, P) of the sensitivities of a block after a linear map."""
+        columns = linear_model.columns
+        size = len(self.plausible)
+        if self.factored and size > _COLUMNS_PER_COORDINATE * len(columns.spans):
+            jacobian = whitened_map.apply(columns.jacobian)
+            return replace(columns, jacobian=jacobian).gram()
+        dense = whitened_map.apply(linear_model.sensitivities)
+        dense = dense.reshape(linear_model.residual.size, size)
+        return dense.T @ dense
 
     def distance(self) -> np.ndarray:
-        """Whitened distance of each observation from the prediction, ndarray (M,)."""
-        return np.sqrt((self._whitened(self.residual) ** 2).mean(axis=1))
+        """Whitened distance (M,) of each observation from its prediction."""
+        return np.sqrt((self._whiten(self.residual) ** 2).mean(axis=1))
 
     def squares(self, weights: np.ndarray, estimate: Estimate | None = None) -> float:
-        """Sum of squares of the residual, weighted and whitened as in
-        `normal_equations`; of this or another estimate."""
-        residual = self.residual if estimate is None else self._residual(estimate)
-        # A residual in the base axes of an estimate in those of the one by which it is
-        # whitened.
-        estimate = estimate or self.estimate
-        turn = self.origin.frame_rotation.transpose(0, 2, 1) @ estimate.frame_rotation
+        """Compute the sum of squares of the weighted, whitened residual.
+
+        Parameters
+        ----------
+        weights : (M,) array
+        estimate : Estimate, optional
+            The present one by default.
+        """
+        if estimate is None:
+            estimate = self.estimate
+            residual = self.residual
+        else:
+            residual = self._compute_residual(estimate)
+        # The whitening belongs to the base axes of the estimate at which it was
+        # computed, so turn the residual into these axes.
+        turn = (
+            self.whitened_at.frame_rotation.transpose(0, 2, 1) @ estimate.frame_rotation
+        )
         if (turn != np.eye(3)).any():
+            states = self.observations.states
             session = np.searchsorted(
-                estimate.sessions,
-                self.observations.states.session[self.observations.state],
+                estimate.sessions, states.session[self.observations.state]
             )
             vectors = residual.reshape(len(residual), -1, 3)
-            residual = (vectors @ turn[session].transpose(0, 2, 1)).reshape(
-                residual.shape
-            )
-        return float((self._whitened(residual * np.sqrt(weights)[:, None]) ** 2).sum())
+            turned = vectors @ turn[session].transpose(0, 2, 1)
+            residual = turned.reshape(residual.shape)
+        return float((self._whiten(residual * np.sqrt(weights)[:, None]) ** 2).sum())
 
-    def ended(
-        self, estimate: Estimate
-    ) -> tuple[Whitening, np.ndarray, np.ndarray | None, Conditions | None]:
-        """What is kept of a fit at its last estimate, of all observations, under the
-        loads where its last step led.
-
-        Whitening; residual (M, rows); Jacobian with respect to the joints (M, rows, n),
-        None where there are too many to keep it; conditions, None where there are.
-        """
-        for part in self.parts:
-            if part.line is not None:
-                part.around = update_springs_and_masses(
-                    self.model, estimate, part.line.conditions
+    def finish(self, estimate: Estimate) -> FittedState:
+        """Evaluate at the last estimate, under the loads to which the last step led."""
+        for block in self.blocks:
+            if block.linear_model is not None:
+                block.conditions = update_springs_and_masses(
+                    self.model, estimate, block.linear_model.conditions
                 )
-        blocks = [
-            (members + part.seen.start, factor)
-            for part in self.parts
-            for members, factor in part.whitener.blocks
-        ]
-        kept = [part.jacobian for part in self.parts if part.jacobian is not None]
-        around = (
-            self.parts[0].around
-            if len(self.observations.states) <= _MOST_STATES_OF_A_FIT
-            and len(self.parts) == 1
-            else None
-        )
-        return (
-            Whitening(tuple(blocks)),
-            self._residual(estimate),
-            np.concatenate(kept) if kept else None,
-            around,
+        whitening_blocks = []
+        jacobians = []
+        for block in self.blocks:
+            for members, factor in block.whitening.blocks:
+                whitening_blocks.append((members + block.indices.start, factor))
+            if block.joint_jacobian is not None:
+                jacobians.append(block.joint_jacobian)
+        conditions = None
+        if (
+            len(self.observations.states) <= _MAX_STATES_OF_A_FIT
+            and len(self.blocks) == 1
+        ):
+            conditions = self.blocks[0].conditions
+        return FittedState(
+            Whitening(tuple(whitening_blocks)),
+            self._compute_residual(estimate),
+            np.concatenate(jacobians) if jacobians else None,
+            conditions,
         )
 
-    def _residual(self, estimate: Estimate) -> np.ndarray:
+    def _compute_residual(self, estimate: Estimate) -> np.ndarray:
         return np.concatenate(
-            [self._residual_of(part, estimate) for part in self.parts]
+            [self._compute_block_residual(block, estimate) for block in self.blocks]
         )
 
-    def _residual_of(self, part: _Part, estimate: Estimate) -> np.ndarray:
-        return compute_residuals(
-            self.model, estimate, part.observations, self._around(part, estimate)
-        )
+    def _compute_block_residual(
+        self, block: _ProblemBlock, estimate: Estimate
+    ) -> np.ndarray:
+        conditions = self._get_conditions(block, estimate)
+        return compute_residuals(self.model, estimate, block.observations, conditions)
 
-    def _whitened(self, residual: np.ndarray) -> np.ndarray:
+    def _whiten(self, residual: np.ndarray) -> np.ndarray:
         return np.concatenate(
-            [part.whitener.apply(residual[part.seen]) for part in self.parts]
+            [block.whitening.apply(residual[block.indices]) for block in self.blocks]
         )
 
-    def _around(self, part: _Part, estimate: Estimate) -> Conditions:
-        """Conditions as they are kept; else at the coordinates that are, which are
-        found at first."""
-        if part.around is not None:
-            return part.around
-        around = evaluate_conditions(
-            self.model, estimate, part.observations.states, part.coordinates
+    def _get_conditions(self, block: _ProblemBlock, estimate: Estimate) -> Conditions:
+        """Conditions in memory; otherwise evaluated at the block's coordinates, which
+        are computed the first time."""
+        if block.conditions is not None:
+            return block.conditions
+        conditions = evaluate_conditions(
+            self.model, estimate, block.observations.states, block.coordinates
         )
-        if part.coordinates is None:
-            part.coordinates = compute_displaced_coordinates(
-                self.model, estimate, around
+        if block.coordinates is None:
+            block.coordinates = compute_displaced_coordinates(
+                self.model, estimate, conditions
             )
-        return around
+        return conditions
 
-    def _linearized(self, part: _Part) -> LinearModel:
-        """At the present estimate, by which whitening and loads are then taken, where
-        lines are not kept."""
-        line = linearize(
-            self.model,
-            self.estimate,
-            part.observations,
-            self._around(part, self.estimate),
+    def _linearize_block(self, block: _ProblemBlock) -> LinearModel:
+        """Linearize a block that does not stay in memory, and update its loads and
+        whitening."""
+        conditions = self._get_conditions(block, self.estimate)
+        linear_model = linearize(
+            self.model, self.estimate, block.observations, conditions
         )
-        part.coordinates = line.coordinates
-        part.whitener = compute_whitening(
-            part.observations, line.joint_jacobian, self.noise
+        block.coordinates = linear_model.coordinates
+        block.whitening = compute_whitening(
+            block.observations, linear_model.joint_jacobian, self.noise
         )
-        return line
+        return linear_model
 
 
-def _of_rotation_vectors(residual: np.ndarray) -> np.ndarray:
-    """Matrices (M, rows, rows) that turn sensitivities of poses into those of the
-    residual itself.
+def _map_to_rotation_vectors(residual: np.ndarray) -> np.ndarray:
+    """Matrices (M, rows, rows) from sensitivities of poses to those of the residual.
 
-    Where a pose turns by -w, its rotation vector r grows by w + r x w / 2 + O(r^2):
+    If a pose turns by -w, its rotation vector r grows by w + r x w / 2 + O(r^2):
     Bortz's equation (IEEE Trans. Aerosp. Electron. Syst. 7, 1971).
     """
     maps = np.tile(np.eye(residual.shape[1]), (len(residual), 1, 1))
     if residual.shape[1] > 3:
-        maps[:, 3:, 3:] += 0.5 * np.cross(residual[:, None, 3:], np.eye(3)).transpose(
-            0, 2, 1
-        )
+        half_cross = 0.5 * np.cross(residual[:, None, 3:], np.eye(3))
+        maps[:, 3:, 3:] += half_cross.transpose(0, 2, 1)
     return maps

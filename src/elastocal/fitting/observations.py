@@ -1,11 +1,14 @@
-"""Measurements as the loop uses them: repeats averaged, grouped by the state of the
-robot in which they were taken."""
+"""Observations: measurements averaged over repeats and grouped by robot state.
+
+A state is one pose under one load, approached in one sense. Every fit uses observations
+instead of the rows of the measurements file.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -17,26 +20,31 @@ if TYPE_CHECKING:
 
     from elastocal.campaigns.campaign import Measurements
 
-# Measurements this many times as far from the middle of their repeats as half of all
-# are not noise: eight standard deviations.
-_WILD = 12.0
-# Values of sensitivities that are held at once, of which there are five copies:
-# observations beyond come in parts of so many, which stay in the processor's cache.
-# What a linearisation makes beside parameters is as 60 of them.
-_MOST_HELD = 2_000_000
-_MOST_AT_ONCE = 4000
-_BESIDE = 60
+# A repeat is an outlier if its distance from the median of its repeats exceeds this
+# many times the median distance: eight standard deviations of normal noise.
+_OUTLIER_RATIO = 12.0
+# Upper bound on the number of sensitivities that one block of observations has. There
+# are five copies of them, and larger blocks do not fit into the processor's cache.
+_MAX_SENSITIVITIES = 2_000_000
+_MAX_BLOCK_SIZE = 4000
+# Linearizing takes as much memory as this many parameters, even without parameters.
+_MIN_COLUMNS = 60
 
 
 @dataclass(frozen=True)
 class States:
-    """Each pose, load and sense of approach once; arrays of S.
+    """Robot states: each pose, load and sense of approach once.
 
-    `session`, `pose`, `load` (S,). `joint_angles` (S, n): rad. `wrench` (S, 6): N, N m,
-    at the origin of the last measuring point, base axes. `repeats` (S,): how many
-    approaches were averaged. `approach` (S, n): sense in which each joint was
-    approached, -1, 0, +1. `time_s`, `temperature_c` (S,). `row` (S,): first row of the
-    file that belongs to the state.
+    Attributes
+    ----------
+    session, pose, load : (S,) int arrays
+    joint_angles : (S, n) array, rad
+    wrench : (S, 6) array, N and N m, at the origin of the last measuring point, base
+        axes
+    repeats : (S,) int array, number of approaches that were averaged
+    approach : (S, n) array, sense in which each joint was approached, -1, 0 or +1
+    time_s, temperature_c : (S,) arrays
+    row : (S,) int array, first row of the measurements file that belongs to the state
     """
 
     session: np.ndarray
@@ -56,12 +64,14 @@ class States:
 
 @dataclass(frozen=True)
 class Observations:
-    """One averaged reading of one target in one state; M of them, in the order of the
-    states.
+    """M averaged measurements, each of one target in one state, in the order of states.
 
-    `state`, `target` (M,): index of the state and of the target. `position` (M, 3): m,
-    in the frame of the session. `rotation` (M, 3, 3): measured orientation, where poses
-    are measured.
+    Attributes
+    ----------
+    states : States
+    state, target : (M,) int arrays, indices of the state and of the target
+    position : (M, 3) array, m, in the frame of the session
+    rotation : (M, 3, 3) array, measured orientation; None if positions are measured
     """
 
     states: States
@@ -80,279 +90,322 @@ class Observations:
 
     @property
     def cluster(self) -> np.ndarray:
-        """ndarray (M,): number of the (session, pose) that each observation belongs to,
-        0 .. P-1."""
+        """Index 0 .. P-1 of the (session, pose) of each observation, (M,) array."""
         return index_poses(self.states)[self.state]
 
 
+class Block(NamedTuple):
+    """Consecutive observations of whole poses.
+
+    `states` and `indices` are the slices of the block in the states and the
+    observations that it was taken from; `observations` are its own.
+    """
+
+    states: slice
+    indices: slice
+    observations: Observations
+
+
 def index_poses(states: States | Measurements) -> np.ndarray:
-    """Number of the (session, pose) of each state, ndarray (S,): 0 .. P-1."""
+    """Number the (session, pose) of each state from 0 to P-1, (S,) array."""
     return group_equal_rows(np.column_stack([states.session, states.pose]))[1]
 
 
 def batch_groups_by_size(group: np.ndarray) -> list[np.ndarray]:
-    """Places of each group, for each number k of places in one, ndarray (G, k) of int.
+    """Find the members of each group, stacked over all groups of the same size.
 
-    `group` (M,) of int: such as the states or the poses of observations. Groups by
-    their numbers, the places of each rising.
+    `group` (M,) holds the group number of each member, such as the state or the pose of
+    an observation. For each size k that occurs, the result has a (G, k) array of member
+    indices. Groups are in the order of their numbers, indices in a group ascend.
     """
     order = np.argsort(group, kind="stable")
-    seen = np.bincount(group)
-    start = np.cumsum(seen) - seen
+    sizes = np.bincount(group)
+    start = np.cumsum(sizes) - sizes
     return [
-        order[start[seen == count][:, None] + np.arange(count)]
-        for count in np.unique(seen[seen > 0])
+        order[start[sizes == size][:, None] + np.arange(size)]
+        for size in np.unique(sizes[sizes > 0])
     ]
 
 
 def average_repeats(measurements: Measurements) -> Observations:
-    """Observations with the repeats averaged that were approached alike."""
-    return _observations(measurements, _approached_alike(measurements))
+    """Average the repeats of each state and target."""
+    return _average_equal_keys(measurements, _state_keys(measurements))
 
 
 def separate_approaches(measurements: Measurements) -> tuple[Observations, np.ndarray]:
-    """Observations of every single approach, and (S,) in which state it would be if
-    repeats were averaged."""
-    key = _approached_alike(measurements)
-    single = np.column_stack([key, measurements.repeat])
-    return _observations(measurements, single), group_equal_rows(
-        key[group_equal_rows(single)[0]]
+    """Make a state of every single approach.
+
+    Returns
+    -------
+    Observations
+    (S,) int array, index that each state would have if repeats were averaged
+    """
+    key = _state_keys(measurements)
+    approach_key = np.column_stack([key, measurements.repeat])
+    first = group_equal_rows(approach_key)[0]
+    return _average_equal_keys(measurements, approach_key), group_equal_rows(
+        key[first]
     )[1]
 
 
 def separate_measurements(measurements: Measurements) -> Observations:
-    """Every measurement as an observation in a state of its own, in the order of the
-    measurements."""
-    every = np.arange(len(measurements))
-    shared = [field.name for field in fields(States) if field.name != "repeats"]
+    """Make an observation and a state of every measurement, in their order."""
+    count = len(measurements)
+    names = [field.name for field in fields(States) if field.name != "repeats"]
     states = States(
-        **{name: getattr(measurements, name) for name in shared},
-        repeats=np.ones(len(measurements), int),
+        **{name: getattr(measurements, name) for name in names},
+        repeats=np.ones(count, int),
     )
-    turned = measurements.rotation_vector
-    rotation = None if turned is None else Rotation.from_rotvec(turned).as_matrix()
+    rotation = None
+    if measurements.rotation_vector is not None:
+        rotation = Rotation.from_rotvec(measurements.rotation_vector).as_matrix()
     return Observations(
-        states, every, measurements.target, measurements.position, rotation
+        states, np.arange(count), measurements.target, measurements.position, rotation
     )
 
 
 def remove_outlying_repeats(measurements: Measurements) -> Measurements:
-    """Measurements without those that are far from the other repeats of their state and
-    target.
+    """Remove measurements that are far from the other repeats of their state and target.
 
-    Hampel's identifier (Davies and Gather, J. Am. Stat. Assoc. 88, 1993): distances
-    from the median, here in units of the median absolute deviation of all repeats. An
-    outlier would be taken for noise, and would move the mean of its repeats. Of two
-    repeats nothing tells which is outlying.
+    Hampel's identifier: distances from the median, here in units of the median absolute
+    deviation of all repeats. An outlier would count as noise and would move the mean of
+    its repeats. Of only two repeats it is unknown which one is the outlier, so both
+    stay.
+
+    References
+    ----------
+    Davies and Gather, J. Am. Stat. Assoc. 88, 1993.
     """
-    group = group_equal_rows(_states_and_targets(measurements))[1]
+    group = group_equal_rows(_state_and_target_keys(measurements))[1]
     count = np.bincount(group)
     repeated = count[group] > 2
     if not repeated.any():
         return measurements
     start = np.cumsum(count) - count
-    rising = np.column_stack(
+    ascending = np.column_stack(
         [column[np.lexsort((column, group))] for column in measurements.position.T]
     )
-    medians = 0.5 * (rising[start + (count - 1) // 2] + rising[start + count // 2])
-    off = np.abs(measurements.position - medians[group])
-    apart = off[repeated]
-    # The middle one of an odd number is not off at all, and tells nothing of the
-    # others.
-    usual = np.median(apart[apart > 0]) if apart.any() else 0.0
-    return measurements.select(
-        np.flatnonzero(~(repeated & (off > _WILD * usual).any(axis=1)))
-    )
+    lower_middle = ascending[start + (count - 1) // 2]
+    upper_middle = ascending[start + count // 2]
+    medians = 0.5 * (lower_middle + upper_middle)
+    distance = np.abs(measurements.position - medians[group])
+    # The median of an odd number of repeats is one of them. Its distance of zero says
+    # nothing about the scatter of the others.
+    nonzero = distance[repeated[:, None] & (distance > 0)]
+    median_distance = np.median(nonzero) if nonzero.size else 0.0
+    outlier = repeated & (distance > _OUTLIER_RATIO * median_distance).any(axis=1)
+    return measurements.select(np.flatnonzero(~outlier))
 
 
 def match_states_and_targets(
-    some: Measurements | Observations,
-    others: Measurements | Observations,
+    measured: Measurements | Observations,
+    reference: Measurements | Observations,
     chosen: np.ndarray,
 ) -> np.ndarray:
-    """Which of some measurements, or averages of them, are of the same state and target
-    as those chosen of others, (N,)."""
-    mine = _states_and_targets(some)
-    theirs = _states_and_targets(others)
-    group = group_equal_rows(np.concatenate([mine, theirs]))[1]
-    return np.isin(group[: len(mine)], group[len(mine) :][chosen])
+    """Find measurements with the state and target of chosen reference measurements.
+
+    Parameters
+    ----------
+    measured : N measurements or observations
+    reference : R measurements or observations
+    chosen : indices or (R,) bool array, the reference measurements to look for
+
+    Returns
+    -------
+    (N,) bool array
+    """
+    keys = _state_and_target_keys(measured)
+    reference_keys = _state_and_target_keys(reference)
+    group = group_equal_rows(np.concatenate([keys, reference_keys]))[1]
+    return np.isin(group[: len(keys)], group[len(keys) :][chosen])
 
 
-def _states_and_targets(some: Measurements | Observations) -> np.ndarray:
-    states, each = (
-        (some.states, some.state)
-        if isinstance(some, Observations)
-        else (some, slice(None))
-    )
-    return np.column_stack([_approached_alike(states)[each], some.target])
+def _state_and_target_keys(measured: Measurements | Observations) -> np.ndarray:
+    """Rows (N, k) of integers, equal where state and target are equal."""
+    if isinstance(measured, Observations):
+        keys = _state_keys(measured.states)[measured.state]
+    else:
+        keys = _state_keys(measured)
+    return np.column_stack([keys, measured.target])
 
 
-def _approached_alike(measurements: Measurements | States) -> np.ndarray:
-    key = np.column_stack([measurements.session, measurements.pose, measurements.load])
-    return (
-        key
-        if measurements.approach is None
-        else np.column_stack([key, measurements.approach])
-    )
+def _state_keys(measured: Measurements | States) -> np.ndarray:
+    """Rows (N, k) of integers, equal where session, pose, load and approach are."""
+    columns = [measured.session, measured.pose, measured.load]
+    if measured.approach is not None:
+        columns.append(measured.approach)
+    return np.column_stack(columns)
 
 
-def _observations(measurements: Measurements, key: np.ndarray) -> Observations:
-    """Averages of the measurements of each target in each state, which measurements
-    (N,) share whose `key` (N, k) is equal."""
+def _average_equal_keys(measurements: Measurements, key: np.ndarray) -> Observations:
+    """Average the measurements of each target in each state.
+
+    Measurements are of the same state if their rows of `key` (N, k) are equal.
+    """
     first, state_of = group_equal_rows(key)
     pairs = np.column_stack([state_of, measurements.target])
-    first_pair, pair_of = group_equal_rows(pairs)
-    state, target = pairs[first_pair].T
+    first_of_pair, pair_of = group_equal_rows(pairs)
+    state, target = pairs[first_of_pair].T
     repeats = np.full(len(first), len(measurements))
-    row = measurements.row[first].copy()
     np.minimum.at(repeats, state, np.bincount(pair_of))
+    row = measurements.row[first].copy()
     np.minimum.at(row, state_of, measurements.row)
-    there = {
-        name: values
-        for name, values in vars(measurements).items()
-        if values is not None
-    }
-    shared: dict[str, Any] = {
-        name: there[name][first]
-        for name in ("session", "pose", "load", "approach")
-        if name in there
-    }
-    mean_of = ("joint_angles", "wrench", "time_s", "temperature_c")
-    shared |= {
-        name: average_by_group(there[name], state_of)
-        for name in mean_of
-        if name in there
-    }
-    states = States(**shared, repeats=repeats, row=row)
+    optional = {}
+    if measurements.approach is not None:
+        optional["approach"] = measurements.approach[first]
+    for name in ("time_s", "temperature_c"):
+        values = getattr(measurements, name)
+        if values is not None:
+            optional[name] = average_by_group(values, state_of)
+    states = States(
+        measurements.session[first],
+        measurements.pose[first],
+        measurements.load[first],
+        average_by_group(measurements.joint_angles, state_of),
+        average_by_group(measurements.wrench, state_of),
+        repeats,
+        row=row,
+        **optional,
+    )
     rotation = None
     if measurements.rotation_vector is not None:
-        each = Rotation.from_rotvec(measurements.rotation_vector)
-        mean = each[first_pair]
-        if len(first_pair) < len(measurements):
-            # Of rotations close to each other, the mean turn from the first: a step
-            # towards the Riemannian mean (Moakher 2002).
-            mean = (
-                Rotation.from_rotvec(
-                    average_by_group((each * mean[pair_of].inv()).as_rotvec(), pair_of)
-                )
-                * mean
-            )
-        rotation = mean.as_matrix()
-    return Observations(
-        states,
-        state,
-        target,
-        average_by_group(measurements.position, pair_of),
-        rotation,
-    )
+        rotation = _mean_rotations(
+            Rotation.from_rotvec(measurements.rotation_vector), first_of_pair, pair_of
+        )
+    position = average_by_group(measurements.position, pair_of)
+    return Observations(states, state, target, position, rotation)
+
+
+def _mean_rotations(
+    rotations: Rotation, first: np.ndarray, group: np.ndarray
+) -> np.ndarray:
+    """Mean rotation matrix (G, 3, 3) of each group, given its first member (G,).
+
+    The rotations of a group are close to each other. Their mean is the first one,
+    turned by the mean rotation vector from it: a step towards the Riemannian mean
+    (Moakher 2002).
+    """
+    mean = rotations[first]
+    if len(first) < len(group):
+        from_first = (rotations * mean[group].inv()).as_rotvec()
+        mean = Rotation.from_rotvec(average_by_group(from_first, group)) * mean
+    return mean.as_matrix()
 
 
 def select_states(observations: Observations, kept: np.ndarray) -> Observations:
-    """The part of some observations that was taken in some of their states, ndarray of
-    bool (S,)."""
-    return _some_of(observations, kept, kept[observations.state], np.cumsum(kept) - 1)
+    """Select the observations of some states, given as (S,) bool array."""
+    new_number = np.cumsum(kept) - 1
+    return _select(observations, kept, kept[observations.state], new_number)
 
 
-def split_into_blocks(
-    observations: Observations, columns: int
-) -> list[tuple[slice, slice, Observations]]:
-    """Some observations in parts of whole poses, in their order, one where their
-    sensitivities can be held at once.
+def split_into_blocks(observations: Observations, columns: int) -> list[Block]:
+    """Split observations into blocks of whole poses whose sensitivities fit in memory.
 
-    `observations`: those of a pose one after the other, as `averaged` gives them.
-    `columns`: how many sensitivities each has. Returns for each part which states and
-    which observations these are, and the part.
+    Parameters
+    ----------
+    observations : Observations
+        Those of a pose are consecutive, as `average_repeats` returns them.
+    columns : int
+        Number of sensitivities to each component of an observation.
+
+    Returns
+    -------
+    list of Block, in the order of the observations; one if all of them fit
     """
-    width = observations.rows * max(columns, _BESIDE)
-    most = max(min(_MOST_HELD // width, _MOST_AT_ONCE), 1)
-    if width * len(observations) <= _MOST_HELD:
-        return [
-            (
-                slice(0, len(observations.states)),
-                slice(0, len(observations)),
-                observations,
-            )
-        ]
-    first = np.flatnonzero(np.diff(index_poses(observations.states), prepend=-1))
-    place = np.searchsorted(observations.state, first)
-    chosen = np.unique(
-        np.searchsorted(place, np.arange(0, len(observations), most)).clip(
-            max=len(first) - 1
+    width = observations.rows * max(columns, _MIN_COLUMNS)
+    count = len(observations)
+    states = len(observations.states)
+    if width * count <= _MAX_SENSITIVITIES:
+        return [Block(slice(0, states), slice(0, count), observations)]
+    block_size = max(min(_MAX_SENSITIVITIES // width, _MAX_BLOCK_SIZE), 1)
+    pose_start = np.flatnonzero(np.diff(index_poses(observations.states), prepend=-1))
+    observation_start = np.searchsorted(observations.state, pose_start)
+    first_pose = np.unique(
+        np.searchsorted(observation_start, np.arange(0, count, block_size)).clip(
+            max=len(pose_start) - 1
         )
     )
-    ends = (
-        [*first[chosen].tolist(), len(observations.states)],
-        [*place[chosen].tolist(), len(observations)],
-    )
-    edges = ([slice(a, b) for a, b in pairwise(each)] for each in ends)
-    number = np.arange(len(observations.states))
-    return [
-        (mine, seen, _some_of(observations, mine, seen, number - mine.start))
-        for mine, seen in zip(*edges, strict=True)
-    ]
+    state_edges = [*pose_start[first_pose].tolist(), states]
+    edges = [*observation_start[first_pose].tolist(), count]
+    number = np.arange(states)
+    blocks = []
+    for (begin, end), (first, last) in zip(
+        pairwise(state_edges), pairwise(edges), strict=True
+    ):
+        states_of_block = slice(begin, end)
+        indices = slice(first, last)
+        part = _select(observations, states_of_block, indices, number - begin)
+        blocks.append(Block(states_of_block, indices, part))
+    return blocks
 
 
-def _some_of(
+def _select(
     observations: Observations,
     states: np.ndarray | slice,
-    seen: np.ndarray | slice,
-    number: np.ndarray,
+    indices: np.ndarray | slice,
+    new_number: np.ndarray,
 ) -> Observations:
-    """Those seen of some observations, all in some of their states, which are numbered
-    anew: `number` (S,)."""
-    values: dict[str, Any] = {
-        name: None if each is None else each[states]
-        for name, each in vars(observations.states).items()
-    }
-    own = {
-        name: None if each is None else each[seen]
-        for name, each in vars(observations).items()
-        if name != "states"
-    }
-    return Observations(States(**values), **own | {"state": number[own["state"]]})
+    """Select observations and the states that they belong to.
 
-
-def select_spread_poses(observations: Observations, most: int) -> np.ndarray:
-    """Which states belong to poses evenly spread over a campaign, so many that about
-    `most` observations are left.
-
-    Returns (S,) of bool: True throughout where there are no more.
+    `new_number` (S,) is the index of each old state among the selected ones.
     """
-    if len(observations) <= most:
+    rotation = observations.rotation
+    columns: dict[str, Any] = {
+        name: None if values is None else values[states]
+        for name, values in vars(observations.states).items()
+    }
+    return Observations(
+        States(**columns),
+        new_number[observations.state[indices]],
+        observations.target[indices],
+        observations.position[indices],
+        None if rotation is None else rotation[indices],
+    )
+
+
+def select_spread_poses(observations: Observations, size: int) -> np.ndarray:
+    """Select poses evenly spread over a campaign that have about `size` observations.
+
+    Returns a (S,) bool array of the states of these poses: all states if there are no
+    more observations than that.
+    """
+    if len(observations) <= size:
         return np.ones(len(observations.states), bool)
     pose = index_poses(observations.states)
     poses = pose.max() + 1
+    sample_size = max(int(poses * size / len(observations)), 2)
     chosen = np.zeros(poses, bool)
-    chosen[
-        np.linspace(0, poses - 1, max(int(poses * most / len(observations)), 2))
-        .round()
-        .astype(int)
-    ] = True
+    chosen[np.linspace(0, poses - 1, sample_size).round().astype(int)] = True
     return chosen[pose]
 
 
 def sample_observations(
-    observations: Observations, most: int, like: Observations | None = None
+    observations: Observations, size: int, like: Observations | None = None
 ) -> Observations:
-    """About so many observations at poses spread over a campaign, or all where the
-    sample would miss a session or a target.
+    """Sample about `size` observations at poses that are spread over the campaign.
 
-    `like`: a sample of the same campaign, of whose states they are to be.
+    Parameters
+    ----------
+    observations : Observations
+    size : int
+    like : Observations, optional
+        Sample of the same campaign whose states are to be sampled.
+
+    Returns
+    -------
+    Observations : all of them if the sample would miss a session or a target
     """
-    if len(observations) <= most:
+    if len(observations) <= size:
         return observations
-    chosen = select_spread_poses(observations, most)
-    if like is not None:
-        chosen = np.isin(
-            np.arange(len(chosen)),
-            observations.state[
-                match_states_and_targets(observations, like, np.ones(len(like), bool))
-            ],
+    if like is None:
+        chosen = select_spread_poses(observations, size)
+    else:
+        matching = match_states_and_targets(
+            observations, like, np.ones(len(like), bool)
         )
-    some = select_states(observations, chosen)
-    sessions = np.isin(observations.states.session, some.states.session).all()
-    return (
-        some
-        if sessions and np.isin(observations.target, some.target).all()
-        else observations
-    )
+        chosen = np.zeros(len(observations.states), bool)
+        chosen[observations.state[matching]] = True
+    sample = select_states(observations, chosen)
+    sessions = np.isin(observations.states.session, sample.states.session)
+    targets = np.isin(observations.target, sample.target)
+    return sample if sessions.all() and targets.all() else observations

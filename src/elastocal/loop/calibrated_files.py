@@ -15,16 +15,18 @@ import numpy as np
 from elastocal import __version__
 from elastocal.application.accuracy import (
     REGION,
-    build_residual_model,
-    calibrate_on_case,
     compute_uncorrected_rms_m,
     predict_errors,
     select_campaign_commands,
-    set_form_error,
-    tabulate_errors,
 )
 from elastocal.application.calibrated import compute_effect_contributions
 from elastocal.application.frames import root_mean_square
+from elastocal.application.scope import (
+    build_residual_model,
+    calibrate_on_case,
+    set_form_error,
+)
+from elastocal.application.statements import tabulate_errors
 from elastocal.campaigns.campaign_folder import CampaignFolder, read_campaign_folder
 from elastocal.diagnosis.misplaced import describe_reference_point
 from elastocal.errors import InputError
@@ -99,7 +101,7 @@ class Diagnosed:
             if contradicted
             else self.facts["document"].get("other_models_m") or 0.0
         )
-        return set_form_error(found, form_m, contradicted)
+        return set_form_error(found, form_m, contradicted=contradicted)
 
     def by_physics(self) -> Diagnosed:
         """The same without the regression on the remainder, as if there were none."""
@@ -203,7 +205,7 @@ def certificate(
     states = found.case.observations.states
     poses = select_campaign_commands(calibrated)
     prediction = predict_errors(calibrated, *poses)
-    accuracy = prediction.accuracy(REGION)
+    accuracy = prediction.summarize(REGION)
     worst = int(np.argmax(prediction.error_m))
     decision = decide_conformity(prediction.rms_m, tolerance_m, accepted_risk)
     missing = list_shortfalls(heldout["configurations"], states, robot)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -58,7 +58,7 @@ def diagnose_campaign(job: Any) -> None:
         job.params.states,
     )
     write_csv(job.output.experiment, pd.DataFrame(columns))
-    found = replace(found, document=found.document | {"next_experiment": facts})
+    found = replace(found, document=found.document | {"next_experiment": asdict(facts)})
     write_csv(job.output.candidates, pd.DataFrame(candidate_rows(found)))
     write_json(
         job.output.diagnosis,

@@ -114,8 +114,8 @@ def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
     attention = [fault.detail for fault in found]
     if diagnosable and not negative:
         attention += [
-            each["sentence"]
-            for each in find_misplaced_frames(_with_base(declared, case), campaign)
+            frame.sentence
+            for frame in find_misplaced_frames(_with_base(declared, case), campaign)
         ]
     attention += [*controller_warnings(campaign), *part.warnings]
     if negative:

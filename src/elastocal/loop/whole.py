@@ -7,15 +7,17 @@ from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 from elastocal.application.accuracy import (
-    build_residual_model,
-    calibrate_on_case,
     compute_uncorrected_rms_m,
     inflate_to_held_out_errors,
     predict_campaign_accuracy,
     select_campaign_commands,
-    set_form_error,
 )
 from elastocal.application.calibrated import compute_effect_contributions
+from elastocal.application.scope import (
+    build_residual_model,
+    calibrate_on_case,
+    set_form_error,
+)
 from elastocal.campaigns.campaign import tabulate_measurements
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.data_checks.protocol import data_at_fault
@@ -156,16 +158,21 @@ def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
     if not data_at_fault(verdict.document):
         found = calibrated_by(diagnosis, verdict.held_out, verdict.delivered)
         stated |= _accuracy(found) | {
-            "misplaced": find_misplaced_frames(diagnosis.final, diagnosis.case.campaign)
+            "misplaced": [
+                asdict(frame)
+                for frame in find_misplaced_frames(
+                    diagnosis.final, diagnosis.case.campaign
+                )
+            ]
         }
-        if found.remainder is not None:
+        if found.residual_model is not None:
             stated["physics"] = _accuracy(
                 calibrated_by(
                     diagnosis, verdict.held_out, verdict.delivered, physics_only=True
                 )
             )
         costs = compute_effect_contributions(
-            replace(found, remainder=None), *select_campaign_commands(found)
+            replace(found, residual_model=None), *select_campaign_commands(found)
         )
     effects = [
         effect | {"cost_m": costs.get(effect["name"])}

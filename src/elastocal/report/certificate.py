@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elastocal.application.accuracy import Accuracy, format_accuracy
+from elastocal.application.accuracy import Accuracy
+from elastocal.application.statements import format_accuracy
 from elastocal.counting import format_count
 from elastocal.report import words as say
 from elastocal.report.loop_facts import title_of

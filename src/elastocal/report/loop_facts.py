@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal import __version__
-from elastocal.application.accuracy import tabulate_errors
+from elastocal.application.statements import tabulate_errors
 from elastocal.counting import format_count, format_integer, pluralize
 from elastocal.data_checks.protocol import OF_DATA, data_at_fault
 from elastocal.diagnosis.hypotheses import OTHER

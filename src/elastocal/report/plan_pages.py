@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from elastocal.application.planning.plan import Plan, Survey
+    from elastocal.application.planning.plan import Plan
+    from elastocal.application.planning.survey import Survey
     from elastocal.campaigns.campaign import Target
 
 _UNITS = {"deg": "°", "mm": "mm"}

@@ -1,4 +1,4 @@
-"""What the reports of the study show: rows of tables and numbers of its text, by
+"""Facts that the reports of the study show: rows of tables and numbers of its text, by
 `study.txt`, from the tables of a run."""
 
 from __future__ import annotations
@@ -24,41 +24,66 @@ if TYPE_CHECKING:
 
     from elastocal.study.strategies import Strategy
 
-# The repeatability that the paper names for both robots, in µm.
+# Repeatability that the paper states for both robots.
 REPEATABILITY_UM = 60.0
 # Designs in the order of the tables.
 _DESIGNS = ("random", "D", "A", "I")
-# Beyond so many configurations nothing is known of a length.
-_LONGEST = 1000
-_CONTINUED = "†"
+# Extrapolated lengths above this one are not stated.
+_LONGEST_STATED = 1000
+# Mark of a length beyond a data set.
+_EXTRAPOLATED = "†"
 
 
 def shorten_titles(titles: Mapping[str, str]) -> dict[str, str]:
-    """Names for cells of tables: the first words of each title that distinguish it from
-    others.
+    """Shorten titles for cells of tables to the first words that distinguish them.
 
-    A title that continues another one, as that of a robot with elastic links, keeps
-    what it adds.
+    A title that continues another one, such as that of a robot with elastic links, keeps
+    its addition.
     """
-    found = {}
+    names = {}
     for robot, title in titles.items():
-        base = min(
-            (other for other in titles.values() if title.startswith(other)), key=len
-        )
-        words = base.split()
-        others = [
-            other.split() for other in titles.values() if not other.startswith(base)
-        ]
-        count = next(
-            (
-                n
-                for n in range(1, len(words))
-                if words[:n] not in [other[:n] for other in others]
-            ),
-            len(words),
-        )
-        found[robot] = " ".join(words[:count]) + title.removeprefix(base)
-    return found
+        base = min(filter(title.startswith, titles.values()), key=len)
+        others = [other for other in titles.values() if not other.startswith(base)]
+        names[robot] = _shorten_title(base, others) + title.removeprefix(base)
+    return names
+
+
+def _shorten_title(title: str, others: Sequence[str]) -> str:
+    """The fewest first words of a title with which no other title begins."""
+    words = title.split()
+    for count in range(1, len(words)):
+        beginning = words[:count]
+        if all(other.split()[:count] != beginning for other in others):
+            return " ".join(beginning)
+    return " ".join(words)
+
+
+class _Tables:
+    """The tables of a run, as the template of the report queries them.
+
+    Attributes
+    ----------
+    frames
+        Tables with the robots' names for cells.
+    records
+        The same as lists of rows.
+    """
+
+    def __init__(self, frames: Mapping[str, pd.DataFrame]) -> None:
+        self.frames = frames
+        self.records = {name: _list_records(frame) for name, frame in frames.items()}
+
+    def list_distinct(self, table: str, *columns: str) -> list[tuple[Any, ...]]:
+        """Distinct values of columns of a table, in its order."""
+        rows = self.frames[table][[*columns]].itertuples(index=False, name=None)
+        return list(dict.fromkeys(rows))
+
+    def find_row(self, table: str, **values: Any) -> dict[str, Any] | None:
+        """The first row of a table with these values."""
+        frame = self.frames[table]
+        matches = [frame[name] == value for name, value in values.items()]
+        selected = frame[np.logical_and.reduce(matches)]
+        return next(iter(_list_records(selected)), None)
 
 
 def collect_study_facts(
@@ -67,245 +92,243 @@ def collect_study_facts(
     robots: Sequence[str],
     settings: Mapping[str, Any],
 ) -> dict[str, Any]:
-    """Facts for the report of the study.
+    """Collect the facts for the report of the study.
 
-    `tables`: of the study, by the names that its rules give them. `names`: of all
-    robots in cells of tables, by their keys. `robots`: keys of those without links.
-    `settings`: ``noise_um``, ``length`` and ``configurations`` of the tables,
-    ``classical`` and ``best`` strategy, all ``strategies``, ``accuracy_um``, and
-    ``stated``, numbers of the configuration. Returns rows and paragraphs of `study.txt`
-    under its headings, strings ready to print.
+    Parameters
+    ----------
+    tables
+        Of the study, by the names that its rules give them.
+    names
+        Names of all robots for cells of tables, by their keys.
+    robots
+        Keys of the robots without links.
+    settings
+        ``noise_um``, ``length`` and ``configurations`` of the tables, ``classical`` and
+        ``best`` strategy, all ``strategies``, ``accuracy_um``, and ``stated``, numbers of
+        the configuration.
+
+    Returns
+    -------
+    dict
+        Rows and paragraphs of `study.txt` under its headings, and strings ready to
+        print.
     """
-    length = settings["length"]
+    queried = _Tables(_prepare_frames(tables, names, settings["accuracy_um"]))
+    frames = queried.frames
     titles = [names[robot] for robot in robots]
-    accuracy = settings["accuracy_um"]
-    of = {
-        name: frame.assign(robot=frame.robot.map(names)) if "robot" in frame else frame
-        for name, frame in tables.items()
-    }
-    judged = of["comparison"][of["comparison"].p_holm.notna()]
-    pairs = of["score_pairs"]
-    of |= {
-        "outside": judged[judged.p_value < SIGNIFICANCE_LEVEL],
-        "printed": of["comparison"][of["comparison"].table == "2"],
-        "turned": pairs[pairs.reversed & (pairs.metric != REFERENCE)].assign(
-            size=lambda frame: (frame.ratio / frame.rms_ratio).abs()
-        ),
-    }
-    of |= {
-        name: of[name][of[name].accuracy_um == accuracy]
-        for name in ("break_even", "needed")
-    }
-
-    def each(table: str, *columns: str) -> list[tuple[Any, ...]]:
-        """Distinct values of columns of a table, in its order."""
-        return list(
-            dict.fromkeys(of[table][[*columns]].itertuples(index=False, name=None))
-        )
-
-    def at(table: str, **keys: Any) -> dict[str, Any] | None:
-        """The first row of a table with these values."""
-        found = of[table][
-            np.logical_and.reduce(
-                [of[table][name] == value for name, value in keys.items()]
-            )
-        ]
-        return next(iter(_records(found)), None)
-
-    facts = {
+    judged = frames["judged"]
+    studies = frames["studies"]
+    stated = {name: f"{value:g}" for name, value in settings["stated"].items()}
+    extended = merge_errors(frames["extended"].drop(columns="robot"))
+    sentences = render_sentences(
+        "study.txt",
+        format_value=format_value,
+        format_column_head=format_column_head,
+        format_ratio=format_ratio,
+        list_distinct=queried.list_distinct,
+        find_row=queried.find_row,
+        tables=queried.records,
+        infinity=np.inf,
+        metrics=METRICS,
+        chosen=CHOSEN,
+        designs=_DESIGNS,
+        reference=REFERENCE,
+        titles=titles,
+        size=settings["length"],
+        accuracy=settings["accuracy_um"],
+        classical=settings["classical"],
+        favoured=settings["best"],
+        estimators=_list_estimators(studies, settings["configurations"]),
+        quantities=_find_table4_quantities(studies),
+    )
+    return {
+        **sentences,
         "titles": titles,
         "classical": settings["classical"],
         "metric_count": len(METRICS),
         "repeatability_um": f"{REPEATABILITY_UM:g}",
-        **{
-            name: f"{settings[name]:g}"
-            for name in ("noise_um", "length", "accuracy_um")
-        },
-        "stated": {name: f"{value:g}" for name, value in settings["stated"].items()},
+        "noise_um": f"{settings['noise_um']:g}",
+        "length": f"{settings['length']:g}",
+        "accuracy_um": f"{settings['accuracy_um']:g}",
+        "stated": stated,
         "cells": str(len(judged)),
         "differ": str(int((judged.p_holm < SIGNIFICANCE_LEVEL).sum())),
-        "studies": str(int(of["joint"].studies.max())),
-        "extended": merge_errors(of["extended"].drop(columns="robot"))
-        .to_numpy()
-        .tolist(),
-        "strategies": [_stages(strategy) for strategy in settings["strategies"]],
+        "studies": str(int(frames["joint"].studies.max())),
+        "extended": extended.to_numpy().tolist(),
+        "strategies": list(map(_describe_strategy, settings["strategies"])),
     }
-    helpers = {
-        "format_value": format_value,
-        "format_column_head": format_column_head,
-        "format_ratio": format_ratio,
-        "each": each,
-        "at": at,
+
+
+def _prepare_frames(
+    tables: Mapping[str, pd.DataFrame], names: Mapping[str, str], accuracy_um: float
+) -> dict[str, pd.DataFrame]:
+    """Name the robots in the tables, and add the selections that the report shows."""
+    frames = {name: _name_robots(frame, names) for name, frame in tables.items()}
+    comparison = frames["comparison"]
+    judged = comparison[comparison.p_holm.notna()]
+    pairs = frames["score_pairs"]
+    turned = pairs[pairs.reversed & (pairs.metric != REFERENCE)]
+    size = (turned.ratio / turned.rms_ratio).abs()
+    for name in ("break_even", "needed"):
+        frame = frames[name]
+        frames[name] = frame[frame.accuracy_um == accuracy_um]
+    return frames | {
+        "judged": judged,
+        "outside": judged[judged.p_value < SIGNIFICANCE_LEVEL],
+        "printed": comparison[comparison.table == "2"],
+        "turned": turned.assign(size=size),
     }
-    constants = {
-        "infinity": np.inf,
-        "metrics": METRICS,
-        "chosen": CHOSEN,
-        "designs": _DESIGNS,
-        "reference": REFERENCE,
-    }
-    chosen = {
-        "titles": titles,
-        "size": length,
-        "accuracy": accuracy,
-        "favoured": settings["best"],
-    }
-    more = {
-        "measured": _measured(of["studies"], settings["configurations"]),
-        "figures": _figures(of["studies"]),
-        "t": {name: _records(frame) for name, frame in of.items()},
-    }
-    return (
-        render_sentences(
-            "study.txt",
-            classical=settings["classical"],
-            **helpers,
-            **constants,
-            **chosen,
-            **more,
-        )
-        | facts
-    )
+
+
+def _name_robots(frame: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:
+    """Replace the keys of robots by their names, in a table with robots."""
+    if "robot" not in frame:
+        return frame
+    return frame.assign(robot=frame.robot.map(names))
 
 
 def format_paper_rows(
-    beside: pd.DataFrame, names: Mapping[str, str], configurations: int
+    compared: pd.DataFrame, names: Mapping[str, str], configurations: int
 ) -> list[dict[str, str]]:
-    """Each figure that the paper prints beside ours, in words.
+    """Format each figure that the paper prints next to ours, in words.
 
-    `beside`: by `comparison.beside_paper`. `names`: of the robots by their keys.
-    `configurations`: in a data set. Of ours stands the Monte Carlo standard deviation
-    of a study of this size behind ±.
-    """
-    return [
-        {
-            "table": row["table"],
-            "robot": names.get(row["robot"], ""),
-            "strategy": row["strategy"] if isinstance(row["strategy"], str) else "",
-            "quantity": format_column_head(row["quantity"]),
-            "paper": f"{row['paper']:g}",
-            "ours": "not studied"
-            if np.isnan(row["ours"])
-            else _continued(
-                row["quantity"], row["ours"], row["mc_std"], configurations
-            ),
-        }
-        for row in _records(beside)
-    ]
+    Parameters
+    ----------
+    compared
+        From `printed.compare_figures`.
+    names
+        Names of the robots by their keys.
+    configurations : int
+        In a data set.
 
-
-def format_paper_tables(
-    frames: Mapping[str, pd.DataFrame], names: Mapping[str, str], configurations: int
-) -> dict[str, Any]:
-    """The paper's tables of one study as rows of cells, heads first; lengths beyond a
-    data set are marked."""
-    found = {}
-    for name, frame in frames.items():
-        lengths = [
-            column
-            for column in map(str, frame)
-            if column.startswith("n_") and not column.endswith("_std_error")
-        ]
-        beyond = {
-            format_column_head(column): frame[column].between(
-                configurations, np.inf, "neither"
-            )
-            for column in lengths
-        }
-        heads, *rows = list_rows(
-            frame.assign(robot=frame.robot.map(names)) if "robot" in frame else frame
-        )
-        marks = [
-            [
-                _CONTINUED if head in beyond and beyond[head].iloc[row] else ""
-                for head in heads
-            ]
-            for row in range(len(rows))
-        ]
-        found[name] = [
-            heads,
-            *(
-                [f"{cell}{mark}" for cell, mark in zip(*each, strict=True)]
-                for each in zip(rows, marks, strict=True)
-            ),
-        ]
-    return found
-
-
-def _records(frame: pd.DataFrame) -> list[dict[str, Any]]:
-    rows: list[Any] = frame.to_dict("records")
-    return rows
-
-
-def format_ratio(row: Mapping[str, Any]) -> str:
-    """A ratio of a row with its interval."""
-    return f"{row['ratio']:.3f} ({row['ratio_low']:.3f} to {row['ratio_high']:.3f})"
-
-
-def _continued(
-    quantity: str,
-    value: float,
-    error: float,
-    configurations: int,
-    longest: float = np.inf,
-) -> str:
-    """A score with its error; a length beyond a data set, where the curve is continued
-    as 1/n, is marked."""
-    if not quantity.startswith("n_"):
-        return format_value(value, error)
-    if np.isfinite(longest) and value >= longest:
-        return f"over {longest:g}{_CONTINUED}"
-    text = (
-        f"{value:.0f} ± {error:.0f}"
-        if np.isfinite(longest)
-        else format_value(value, error)
-    )
-    return text + (_CONTINUED if np.isfinite(value) and value > configurations else "")
-
-
-def _measured(table: pd.DataFrame, configurations: int) -> list[dict[str, Any]]:
-    """Table 4 over studies, a row for each estimator on each robot.
-
-    Returns robot, strategy and the four figures of Table 4 by what is averaged, those
-    of k_sigma over the fixed joints under "fixed".
+    Returns
+    -------
+    list of dict
+        Our value is followed by ± and the Monte Carlo standard deviation of a study of
+        this size.
     """
     rows = []
-    seen = set()
-    figures = _figures(table)[:4]
-    fixed = [name.replace("k_sigma_", "k_sigma_fixed_joints_") for name in figures[:2]]
-    for (robot, strategy), cells in table.groupby(["robot", "strategy"], sort=False):
-        by = {row["average"]: row for row in _records(cells)}
-        usual = by["stiffness"]
-        # One estimator under another name; the fixed joints of its last stage are
-        # fewer, perhaps.
-        key = (robot, f"{usual[figures[2]]:.6g}")
-        if key in seen and usual[fixed[0]] == usual[figures[0]]:
-            continue
-        seen.add(key)
-
-        def cell(row: Mapping[str, Any], name: str) -> str:
-            return _continued(
-                name, row[name], row[f"{name}_std"], configurations, _LONGEST
+    for row in _list_records(compared):
+        ours = "not studied"
+        if not np.isnan(row["ours"]):
+            ours = _format_score(
+                row["quantity"], row["ours"], row["mc_std"], configurations
             )
-
-        found = {
-            average: [cell(row, name) for name in figures]
-            for average, row in by.items()
-        }
         rows.append(
             {
-                "robot": robot,
-                "strategy": strategy,
-                **found,
-                "fixed": [cell(usual, name) for name in fixed],
+                "table": row["table"],
+                "robot": names.get(row["robot"], ""),
+                "strategy": row["strategy"] if isinstance(row["strategy"], str) else "",
+                "quantity": format_column_head(row["quantity"]),
+                "paper": f"{row['paper']:g}",
+                "ours": ours,
             }
         )
     return rows
 
 
-def _figures(table: pd.DataFrame) -> list[str]:
-    """The four figures of Table 4 and the RMS error by their columns, whatever length
-    and limits they have."""
+def format_paper_tables(
+    frames: Mapping[str, pd.DataFrame], names: Mapping[str, str], configurations: int
+) -> dict[str, list[list[str]]]:
+    """Format the paper's tables of one study as rows of cells, heads first.
+
+    Lengths beyond a data set are marked.
+    """
+    tables = {}
+    for name, frame in frames.items():
+        rows = list_rows(_name_robots(frame, names))
+        heads = rows[0]
+        for column in map(str, frame):
+            if column.startswith("n_") and not column.endswith("_std_error"):
+                beyond = frame[column].between(configurations, np.inf, "neither")
+                index = heads.index(format_column_head(column))
+                for row in np.flatnonzero(beyond):
+                    rows[1 + row][index] += _EXTRAPOLATED
+        tables[name] = rows
+    return tables
+
+
+def _list_records(frame: pd.DataFrame) -> list[dict[str, Any]]:
+    rows: list[Any] = frame.to_dict("records")
+    return rows
+
+
+def format_ratio(row: Mapping[str, Any]) -> str:
+    """Format a row's ratio with its interval."""
+    return f"{row['ratio']:.3f} ({row['ratio_low']:.3f} to {row['ratio_high']:.3f})"
+
+
+def _format_score(
+    quantity: str, value: float, error: float, configurations: int
+) -> str:
+    """Format a score with its error; a length beyond a data set, where the curve is
+    extrapolated as 1/n, is marked."""
+    text = format_value(value, error)
+    is_extrapolated = np.isfinite(value) and value > configurations
+    if quantity.startswith("n_") and is_extrapolated:
+        return text + _EXTRAPOLATED
+    return text
+
+
+def _format_median(row: Mapping[str, Any], name: str, configurations: int) -> str:
+    """Format a median over studies with its robust deviation.
+
+    Lengths are whole numbers, marked beyond a data set; long ones are not stated.
+    """
+    value = row[name]
+    error = row[f"{name}_std"]
+    if not name.startswith("n_"):
+        return format_value(value, error)
+    if value >= _LONGEST_STATED:
+        return f"over {_LONGEST_STATED:g}{_EXTRAPOLATED}"
+    mark = _EXTRAPOLATED if value > configurations else ""
+    return f"{value:.0f} ± {error:.0f}{mark}"
+
+
+def _list_estimators(table: pd.DataFrame, configurations: int) -> list[dict[str, Any]]:
+    """Rows of Table 4 over studies, one for each estimator on each robot.
+
+    Returns
+    -------
+    list of dict
+        robot, strategy, and the four quantities of Table 4 by what is averaged; those of
+        k_sigma over the fixed joints under "fixed".
+    """
+    rows = []
+    listed = set()
+    quantities = _find_table4_quantities(table)[:4]
+    k_sigma, _, deviation, _ = quantities
+    fixed = [
+        name.replace("k_sigma_", "k_sigma_fixed_joints_") for name in quantities[:2]
+    ]
+    for (robot, strategy), cells in table.groupby(["robot", "strategy"], sort=False):
+        by_average = {row["average"]: row for row in _list_records(cells)}
+        usual = by_average["stiffness"]
+        # Leave out an estimator that is listed under another name, unless the joints
+        # fixed in its last stage are fewer.
+        key = (robot, f"{usual[deviation]:.6g}")
+        if key in listed and usual[fixed[0]] == usual[k_sigma]:
+            continue
+        listed.add(key)
+        cells_by_average = {
+            average: [_format_median(row, name, configurations) for name in quantities]
+            for average, row in by_average.items()
+        }
+        fixed_cells = [_format_median(usual, name, configurations) for name in fixed]
+        rows.append(
+            {
+                "robot": robot,
+                "strategy": strategy,
+                **cells_by_average,
+                "fixed": fixed_cells,
+            }
+        )
+    return rows
+
+
+def _find_table4_quantities(table: pd.DataFrame) -> list[str]:
+    """Columns of the four quantities of Table 4 and the RMS error, for any length and
+    limits."""
     names = [
         name
         for name in table.columns
@@ -315,21 +338,19 @@ def _figures(table: pd.DataFrame) -> list[str]:
     return [next(name for name in names if name.startswith(start)) for start in starts]
 
 
-def _stages(strategy: Strategy) -> list[str]:
-    """What a strategy does, stage by stage: its name, and points measured → compliances
-    identified."""
-
-    def springs(joints: Sequence[int]) -> str:
-        whole = len(joints) > 1 and [*joints] == [*range(joints[0], joints[-1] + 1)]
-        return (
-            f"c{joints[0] + 1}–c{joints[-1] + 1}"
-            if whole
-            else ", ".join(f"c{joint + 1}" for joint in joints)
-        )
-
-    stages = [
-        f"{' and '.join(stage.points)} → {springs(stage.identified)}"
-        + (f", {springs(stage.fixed)} fixed" if stage.fixed else "")
-        for stage in strategy.stages
-    ]
+def _describe_strategy(strategy: Strategy) -> list[str]:
+    """Name of a strategy, and its stages: points measured → compliances identified."""
+    stages = []
+    for stage in strategy.stages:
+        points = " and ".join(stage.points)
+        fixed = f", {_name_compliances(stage.fixed)} fixed" if stage.fixed else ""
+        stages.append(f"{points} → {_name_compliances(stage.identified)}{fixed}")
     return [strategy.name, "; then ".join(stages)]
+
+
+def _name_compliances(joints: Sequence[int]) -> str:
+    """Names of the compliances of joints, as a range if they are consecutive."""
+    names = [f"c{joint + 1}" for joint in joints]
+    if len(joints) > 1 and [*joints] == [*range(joints[0], joints[-1] + 1)]:
+        return f"{names[0]}–{names[-1]}"
+    return ", ".join(names)

@@ -23,25 +23,20 @@ if TYPE_CHECKING:
 
     from elastocal.io.origin import Origin
 
+# Tags of a template that fill a whole line.
+_LINE_OF_TAGS = re.compile(r"^[ \t]*((?:\{%(?:(?!%\}).)*%\})+)[ \t]*\n", re.MULTILINE)
+# A section of a template of sentences: marks, name and text.
+_SECTION = re.compile(r"^(##?) (\w+)\n(.*?)(?=^##? \w+\n|\Z)", re.DOTALL | re.MULTILINE)
+_EMPTY_LINES = r"\n[ \n]*\n"
+
 
 def load_template(name: str, filters: Mapping[str, Any] | None = None) -> Template:
-    """A template of this package with filters of its own, such as `words.FILTERS`;
-    pages (.html) escape what they show."""
+    """Load a template of this package with additional filters, such as `words.FILTERS`;
+    pages (.html) escape the facts that they show."""
     from jinja2 import Environment, FunctionLoader, StrictUndefined
 
-    def source(name: str) -> str:
-        # A line of tags alone leaves no line; one that has text, too, ends where it
-        # ends.
-        text = resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
-        return re.sub(
-            r"^[ \t]*((?:\{%(?:(?!%\}).)*%\})+)[ \t]*\n",
-            r"\1",
-            text,
-            flags=re.MULTILINE,
-        )
-
     environment = Environment(
-        loader=FunctionLoader(source),
+        loader=FunctionLoader(_read_template),
         autoescape=name.endswith(".html"),
         undefined=StrictUndefined,
     )
@@ -49,33 +44,41 @@ def load_template(name: str, filters: Mapping[str, Any] | None = None) -> Templa
     return environment.get_template(name)
 
 
+def _read_template(name: str) -> str:
+    """Read a template and join lines that hold only tags with the next one, so that they
+    leave no empty lines."""
+    text = resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
+    return _LINE_OF_TAGS.sub(r"\1", text)
+
+
 def render_sentences(
     name: str, filters: Mapping[str, Any] | None = None, /, **facts: Any
 ) -> dict[str, Any]:
-    """What a template of sentences (.txt) says.
+    """Render a template of sentences (.txt).
 
-    Returns under each heading ``# name`` its paragraphs, list of str: empty lines stand
-    between them, where other lines end does not matter; under each heading ``## name``
-    the rows of a table, list of lists of cells: a line each, ¦ between cells.
+    Returns
+    -------
+    dict
+        Under each heading ``# name`` its paragraphs, list of str: empty lines separate
+        them, other line ends do not matter. Under each heading ``## name`` the rows of a
+        table, list of lists of cells: one line each, ¦ between cells.
     """
-    found: dict[str, Any] = {}
-    for marks, head, text in re.findall(
-        r"^(##?) (\w+)\n(.*?)(?=^##? \w+\n|\Z)",
-        load_template(name, filters).render(facts),
-        re.DOTALL | re.MULTILINE,
-    ):
-        parts = re.split(r"\n" if len(marks) > 1 else r"\n[ \n]*\n", text)
-        stated = [
-            re.sub(r"[ \n]+", " ", part.strip(" \n"))
-            for part in parts
-            if part.strip(" \n")
-        ]
-        found[head] = (
-            [[cell.strip(" ") for cell in line.split("¦")] for line in stated]
-            if len(marks) > 1
-            else stated
-        )
-    return found
+    sections: dict[str, Any] = {}
+    rendered = load_template(name, filters).render(facts)
+    for marks, heading, text in _SECTION.findall(rendered):
+        is_table = marks == "##"
+        parts = re.split(r"\n" if is_table else _EMPTY_LINES, text)
+        stripped = [part.strip(" \n") for part in parts]
+        stated = [re.sub(r"[ \n]+", " ", part) for part in stripped if part]
+        if is_table:
+            sections[heading] = [_split_cells(line) for line in stated]
+        else:
+            sections[heading] = stated
+    return sections
+
+
+def _split_cells(line: str) -> list[str]:
+    return [cell.strip(" ") for cell in line.split("¦")]
 
 
 def compile_document(
@@ -86,42 +89,52 @@ def compile_document(
     origin: Origin | None = None,
     package: str = __package__,
 ) -> None:
-    """Compile a Typst document; the PDF appears whole or not at all.
+    """Compile a Typst document; the PDF appears complete or not at all.
 
-    `path`: the PDF. `document`: file name of the document. `data`: JSON-serialisable
-    contents of the files ``<name>.json`` that the document reads. `figures`: PDF files;
-    the document finds them by their names, which ``figures.json`` lists. `origin`: what
-    the document shows in its foot and has in its metadata: the contents of
-    ``origin.json``, empty without. `package`: has the document.
+    Parameters
+    ----------
+    path
+        Path of the PDF.
+    document : str
+        File name of the document.
+    data
+        JSON-serialisable contents of the files ``<name>.json`` that the document reads.
+    figures
+        Paths of PDF files; the document finds them by their names, which
+        ``figures.json`` lists.
+    origin
+        Shown in the document's foot and its metadata: the contents of ``origin.json``,
+        empty if None.
+    package : str
+        Package that has the document.
     """
     figures = [*figures]
-    words = "" if origin is None else origin.words
+    contents = {
+        **data,
+        "figures": [Path(figure).stem for figure in figures],
+        "origin": "" if origin is None else origin.words,
+    }
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder) / document
-        # A document imports what it shares with the others, which stands here.
-        beside = (
-            each
-            for name in {__package__, package}
-            for each in resources.files(name).iterdir()
-        )
-        for each in beside:
-            if each.name.endswith(".typ"):
-                Path(folder, each.name).write_text(
-                    each.read_text(encoding="utf-8"), encoding="utf-8"
-                )
+        # Documents import files of this package.
+        for name in {__package__, package}:
+            _copy_documents(name, folder)
         if not source.is_file():
             raise FileNotFoundError(document)
-        for name, contents in {
-            **data,
-            "figures": [Path(each).stem for each in figures],
-            "origin": words,
-        }.items():
-            (Path(folder) / f"{name}.json").write_text(
-                json.dumps(contents, allow_nan=False), encoding="utf-8"
-            )
+        for name, content in contents.items():
+            text = json.dumps(content, allow_nan=False)
+            Path(folder, f"{name}.json").write_text(text, encoding="utf-8")
         for figure in figures:
             shutil.copy(figure, folder)
         with atomic_write(path) as partial:
             typst.compile(
                 source, output=Path(partial), format="pdf", root=source.parent
             )
+
+
+def _copy_documents(package: str, folder: str) -> None:
+    """Copy the Typst documents of a package into a folder."""
+    for file in resources.files(package).iterdir():
+        if file.name.endswith(".typ"):
+            text = file.read_text(encoding="utf-8")
+            Path(folder, file.name).write_text(text, encoding="utf-8")

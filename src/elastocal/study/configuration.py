@@ -14,23 +14,33 @@ from elastocal.io.documents import (
     parse_yaml,
     read_named_document,
 )
+from elastocal.mechanics.chain import Chain
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.equation_11 import find_first_solvable_length
-from elastocal.study.strategies import check_strategy, strategy_from_document
+from elastocal.study.strategies import (
+    Strategy,
+    check_strategy,
+    strategy_from_document,
+)
 
 # A measuring point in chain notation.
 _POINT = re.compile(r"\[(\w*[A-Za-z]\w*)\]")
-# What a robot file may leave out and a simulation of the robot needs.
-_SIMULATED = ("joint_limits_deg", "compliance_urad_per_Nm")
+# Optional keys of a robot file that a simulation of the robot needs.
+_SIMULATION_KEYS = ("joint_limits_deg", "compliance_urad_per_Nm")
 
 
 @dataclass(frozen=True)
 class Study:
-    """A configuration that holds together.
+    """A configuration that passed all checks.
 
-    `robots`, `strategies`: documents by the names of their files. `points`: measuring
-    points that each strategy reads. `end_effectors`: last measuring point of each
-    robot.
+    Attributes
+    ----------
+    robots, strategies
+        Documents by the names of their files.
+    points
+        Measuring points that each strategy uses.
+    end_effectors
+        Last measuring point of each robot.
     """
 
     robots: dict[str, dict[str, Any]]
@@ -42,105 +52,149 @@ class Study:
 def check_study(
     config: Mapping[str, Any], folder: str | Path, source: str = "config.yaml"
 ) -> Study:
-    """Read the robots and strategies that a configuration names and check everything
-    against everything.
+    """Read the robots and strategies that a configuration names and check all of them
+    together.
 
-    `folder`: holds ``robots/`` and ``strategies/``. `source`: file of the
-    configuration, named in errors. Raises `InputError`: the first fault found.
+    Parameters
+    ----------
+    config
+    folder
+        Holds ``robots/`` and ``strategies/``.
+    source
+        File of the configuration, named in errors.
+
+    Raises
+    ------
+    InputError
+        The first fault that is found.
     """
     check_document(config, "config", source)
     robots = {
         name: read_named_document(folder, "robots", "robot", name, source)
         for name in config["robots"]
     }
-    for name, document in robots.items():
-        for key in (key for key in _SIMULATED if key not in document):
-            raise InputError(
-                document_path(folder, "robots", name),
-                key,
-                "nothing",
-                "values to simulate with, in a robot of the study",
-            )
-    strategies = {
+    for name, robot in robots.items():
+        _check_simulation_keys(robot, document_path(folder, "robots", name))
+    documents = {
         name: read_named_document(folder, "strategies", "strategy", name, source)
         for name in config["strategies"]
     }
-    named: dict[str, str] = {}
-    for name, document in strategies.items():
-        if (first := named.setdefault(document["name"], name)) != name:
-            place = document_path(folder, "strategies", name)
-            raise InputError(
-                place,
-                "name",
-                f"{document['name']!r}, as of {first}",
-                "a name of its own: tables go by it",
-            )
+    _check_distinct_names(documents, folder)
     chains = {
-        name: robot_from_document(document, document_path(folder, "robots", name)).chain
-        for name, document in robots.items()
+        name: robot_from_document(robot, document_path(folder, "robots", name)).chain
+        for name, robot in robots.items()
     }
-    points = {}
-    for name, document in strategies.items():
-        strategy = strategy_from_document(document)
-        points[name] = strategy.points
+    strategies = {
+        name: strategy_from_document(document) for name, document in documents.items()
+    }
+    for name, strategy in strategies.items():
         for chain in chains.values():
             check_strategy(strategy, chain, document_path(folder, "strategies", name))
-        needed = find_first_solvable_length(
-            strategy, count_components(config["interpretations"]["measured"])
-        )
-        if config["configurations"] < needed:
-            raise InputError(
-                source,
-                "configurations",
-                str(config["configurations"]),
-                f"{needed} or more: {strategy.name} is short",
-            )
-    if all("links" in document for document in robots.values()):
+        _check_length(strategy, config, source)
+    if all("links" in robot for robot in robots.values()):
         raise InputError(
             source,
             "robots",
             f"{config['robots']}, all with links",
             "at least one robot without links for Tables 3 and 4",
         )
-    own = {point.name for chain in chains.values() for point in chain.points}
-    for label, names in config["questions"]["point_sets"].items():
-        for name in (name for name in names if name not in own):
-            # A set may be there for robots that this study leaves out.
-            files = Path(folder, "robots").glob("*.yaml")
-            known = sorted(
-                {
-                    point
-                    for file in files
-                    for point in _POINT.findall(file.read_text("utf-8"))
-                }
-            )
-            if name not in known:
-                raise InputError(
-                    source,
-                    f"questions.point_sets.{label}",
-                    repr(name),
-                    ", ".join(known),
-                )
-    _check_cells(config, source)
+    _check_point_sets(config, chains, folder, source)
+    _check_noise_levels(config["noise_um"], source)
+    _check_tables(config, source)
     return Study(
         robots,
-        strategies,
-        points,
+        documents,
+        {name: strategy.points for name, strategy in strategies.items()},
         {name: chain.end_effector.name for name, chain in chains.items()},
     )
+
+
+def _check_simulation_keys(robot: Mapping[str, Any], source: str) -> None:
+    """Refuse a robot file without the values that a simulation needs."""
+    for key in _SIMULATION_KEYS:
+        if key not in robot:
+            raise InputError(
+                source,
+                key,
+                "nothing",
+                "values to simulate with, in a robot of the study",
+            )
+
+
+def _check_distinct_names(
+    documents: Mapping[str, Mapping[str, Any]], folder: str | Path
+) -> None:
+    """Refuse two strategies with the same name."""
+    files: dict[str, str] = {}
+    for file, document in documents.items():
+        first = files.setdefault(document["name"], file)
+        if first != file:
+            raise InputError(
+                document_path(folder, "strategies", file),
+                "name",
+                f"{document['name']!r}, as of {first}",
+                "a name of its own: tables go by it",
+            )
+
+
+def _check_length(strategy: Strategy, config: Mapping[str, Any], source: str) -> None:
+    """Refuse data sets that are too short for a strategy."""
+    components = count_components(config["interpretations"]["measured"])
+    needed = find_first_solvable_length(strategy, components)
+    if config["configurations"] < needed:
+        raise InputError(
+            source,
+            "configurations",
+            str(config["configurations"]),
+            f"{needed} or more: {strategy.name} is short",
+        )
+
+
+def _check_point_sets(
+    config: Mapping[str, Any],
+    chains: Mapping[str, Chain],
+    folder: str | Path,
+    source: str,
+) -> None:
+    """Refuse a set with a measuring point that no robot file has.
+
+    A set may belong to robots that this study leaves out.
+    """
+    studied = {point.name for chain in chains.values() for point in chain.points}
+    for label, names in config["questions"]["point_sets"].items():
+        for name in names:
+            if name in studied:
+                continue
+            texts = [
+                file.read_text("utf-8")
+                for file in Path(folder, "robots").glob("*.yaml")
+            ]
+            allowed = sorted(set(_POINT.findall("\n".join(texts))))
+            if name not in allowed:
+                key = f"questions.point_sets.{label}"
+                raise InputError(source, key, repr(name), ", ".join(allowed))
 
 
 def override_entries(
     config: Mapping[str, Any], entries: Iterable[str]
 ) -> dict[str, Any]:
-    """A configuration with keys changed on the command line, numbers read as in the
+    """Change keys of a configuration on the command line; values are read as in the
     file.
 
-    `entries`: ``key=value``; a value that is a mapping changes some keys of a mapping.
-    Raises `InputError`: a value that is no YAML.
+    Parameters
+    ----------
+    config
+    entries
+        ``key=value``; a value that is a mapping changes some keys of a mapping.
+
+    Raises
+    ------
+    InputError
+        A value is no YAML.
     """
     changed = dict(config)
-    for key, _, text in (entry.partition("=") for entry in entries):
+    for entry in entries:
+        key, _, text = entry.partition("=")
         changed[key] = _merge(changed.get(key), parse_yaml(text, f"--config {key}"))
     return changed
 
@@ -152,31 +206,33 @@ def _merge(old: Any, new: Any) -> Any:
 
 
 def count_components(measured: str) -> int:
-    """Measurements of one point in one configuration: 6 where poses are measured, 3
-    where positions are."""
+    """Number of components measured at one point in one configuration: 6 of a pose, 3
+    of a position."""
     return {"pose": 6, "position": 3}[measured]
 
 
-def _check_cells(config: Mapping[str, Any], source: str) -> None:
-    tables = config["tables"]
-    longest = config["configurations"]
-    levels: dict[str, float] = {}
-    for level in config["noise_um"]:
-        if levels.setdefault(f"{level:g}", level) != level:
+def _check_noise_levels(levels: Iterable[float], source: str) -> None:
+    """Refuse noise levels that agree to 6 digits, because files are named by these."""
+    levels_by_name: dict[str, float] = {}
+    for level in levels:
+        first = levels_by_name.setdefault(f"{level:g}", level)
+        if first != level:
             raise InputError(
                 source,
                 "noise_um",
-                f"{levels[f'{level:g}']} and {level}",
+                f"{first} and {level}",
                 "levels that differ in 6 digits",
             )
-    for key, name, allowed in (
-        ("classical_strategy", "strategies", config["strategies"]),
-        ("noise_um", "noise_um", config["noise_um"]),
-    ):
-        if tables[key] not in allowed:
-            raise InputError(
-                source, f"tables.{key}", repr(tables[key]), f"one of {name} {allowed}"
-            )
+
+
+def _check_tables(config: Mapping[str, Any], source: str) -> None:
+    """Refuse tables of strategies, noise levels or lengths that are not simulated."""
+    tables = config["tables"]
+    for key, name in (("classical_strategy", "strategies"), ("noise_um", "noise_um")):
+        if tables[key] not in config[name]:
+            allowed = f"one of {name} {config[name]}"
+            raise InputError(source, f"tables.{key}", repr(tables[key]), allowed)
+    longest = config["configurations"]
     if tables["length"] > longest:
         raise InputError(
             source,

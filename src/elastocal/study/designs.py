@@ -1,7 +1,7 @@
-"""Which configurations (RQ3): random against chosen ones.
+"""Which configurations to measure (RQ3): random ones against optimal designs.
 
-Candidates are random configurations with their loads; a design is some of them. Its
-worth is the error that simulated data sets of it leave.
+Candidates are random configurations with their loads; a design is a selection of them.
+Its worth is the error that it leaves in simulated data sets.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from elastocal.study.jobs import (
     make_real_column,
     make_schema,
 )
-from elastocal.study.metrics import evaluate_quadratic_form, make_validation_set
+from elastocal.study.metrics import evaluate_quadratic_form
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -67,27 +67,47 @@ SIMULATED_DESIGNS = make_schema(
     ),
     make_real_column("std_error", "m", "Monte Carlo standard error of the same"),
 )
-# Random designs of each size; each has as many noisy data sets as all have together
-# over this.
-_SIMULATED = 200
-# A joint whose columns are smaller than this share of the largest is not moved by the
-# loads.
-_MOVED = 1e-9
+# Number of random designs of each size. All of them together get the data sets of the
+# study.
+_RANDOM_DESIGNS = 200
+# A joint counts as not moved by the loads if its columns are smaller than this share of
+# the largest column.
+_SMALLEST_OBSERVABLE_SHARE = 1e-9
 
 
 @dataclass(frozen=True)
 class Candidates:
-    """Configurations under loads of one kind, among which is chosen.
+    """Configurations under loads of one kind, from which designs are chosen.
 
-    `rows` (N, rows, n): regressors, m per rad/(N m). `deflections` (N, rows): without
-    noise. `observable` (n,): joints that the loads move. `form`: mean squared error
-    over the test configurations as a quadratic form.
+    Attributes
+    ----------
+    regressors : (N, rows, n) array, m per rad/(N m)
+    deflections : (N, rows) array, m and rad
+        Without noise.
+    observable : (n,) array of bool
+        Joints that the loads move.
+    mean_form : (n + 1, n + 1) array
+        Mean squared error over the test configurations as a quadratic form, see
+        `metrics.ValidationSet`.
     """
 
-    rows: np.ndarray
+    regressors: np.ndarray
     deflections: np.ndarray
     observable: np.ndarray
-    form: np.ndarray
+    mean_form: np.ndarray
+
+
+@dataclass(frozen=True)
+class _Designs:
+    """Designs of one kind and size; `selections` (D, size) are indices of candidates."""
+
+    kind: str
+    selections: np.ndarray
+
+    @property
+    def size(self) -> int:
+        """Number of configurations of each design."""
+        return self.selections.shape[1]
 
 
 def evaluate_designs(
@@ -96,115 +116,168 @@ def evaluate_designs(
     sizes: Sequence[int],
     loads: Mapping[str, Sequence[float] | None],
 ) -> Iterator[dict[str, np.ndarray]]:
-    """Errors that designs leave in simulated data sets of their configurations, kind of
-    load by kind.
+    """Evaluate the errors that designs leave in simulated data sets, for each kind of
+    load.
 
-    `candidates`: how many. `loads`: direction of the force by the name of its kind,
-    base axes; None for one that is random in each configuration. Where the loads do not
-    move a joint, it is left out, and the test configurations have the loads of the
-    candidates.
+    Joints that the loads do not move are left out, and then the test configurations have
+    the loads of the candidates.
+
+    Parameters
+    ----------
+    study
+    candidates : int
+        Number of candidates.
+    sizes
+        Numbers of configurations of the designs.
+    loads
+        Direction of the force by the name of its kind, base axes; None if it is random
+        in each configuration.
+
+    Yields
+    ------
+    dict
+        Columns of the table of simulated designs.
     """
     for load, direction in loads.items():
-        made = _candidates(study, candidates, direction)
-        of = made.observable
-        scale = study.robot.compliance[of]
-        rows = made.rows[..., of] * scale / study.size.noise
-        # The form is of the squared error in all compliances and 1.
-        rules = {"I": Criterion(made.form[np.ix_(of, of)] * np.outer(scale, scale))}
-        rules |= {
-            kind: build_criterion(kind, rows[:, :3]) for kind in CRITERIA if kind != "I"
-        }
-        found: list[tuple[str, int, Sequence[np.ndarray] | np.ndarray | list[int]]] = []
-        for kind, rule in rules.items():
-            # A greedy choice of fewer is the beginning of that of more.
-            longest = choose_greedily(rows, max(sizes), rule)
-            found += [
-                (kind, size, exchange_candidates(rows, longest[:size], rule))
-                for size in sizes
-            ]
-        draws = open_stream(study.seed, study.key, f"random designs/{load}", 0)
-        found += [
-            (
-                RANDOM,
-                size,
-                [draws.choice(candidates, size, False) for _ in range(_SIMULATED)],
-            )
-            for size in sizes
+        pool = _draw_candidates(study, candidates, direction)
+        designs = [
+            *_choose_optimal_designs(study, pool, sizes),
+            *_draw_random_designs(study, candidates, sizes, load),
         ]
-        errors = np.array(
-            [_simulate(study, made, np.atleast_2d(chosen)) for _, _, chosen in found]
-        )
-        hidden = ", ".join(str(joint + 1) for joint in np.flatnonzero(~of))
+        errors = [
+            _simulate_errors(study, pool, design.selections) for design in designs
+        ]
+        unobservable = np.flatnonzero(~pool.observable)
+        hidden = ", ".join(str(joint + 1) for joint in unobservable)
         yield {
-            "load": np.full(len(found), load, object),
-            "design": np.array([kind for kind, _, _ in found], object),
-            "configurations": np.array([size for _, size, _ in found]),
-            "unobservable": np.full(len(found), hidden, object),
-            **dict(zip(("rms", "std_error"), errors.T, strict=True)),
+            "load": np.full(len(designs), load, object),
+            "design": np.array([design.kind for design in designs], object),
+            "configurations": np.array([design.size for design in designs]),
+            "unobservable": np.full(len(designs), hidden, object),
+            "rms": np.array([rms for rms, _ in errors]),
+            "std_error": np.array([std_error for _, std_error in errors]),
         }
 
 
-def _candidates(
+def _draw_candidates(
     study: StudyInMemory, count: int, direction: Sequence[float] | None
 ) -> Candidates:
-    read = study.interpretation
-    within = study if direction is None else study.under(direction=tuple(direction))
-    drawn = within.experiments([0], count, "candidates of designs")
-    rows = within.regressor(drawn)[0, :, : read.rows]
-    size = np.abs(rows).max(axis=(0, 1))
-    observable = size > _MOVED * size.max()
-    tests = study.tests() if observable.all() else within.tests()
-    form = make_validation_set(
-        study.robot, tests, within.deflections(tests), read.wrench_at
-    ).form
+    """Draw candidates under loads in one direction, or in random ones."""
+    loaded = study
+    if direction is not None:
+        loaded = study.with_loading(direction=tuple(direction))
+    rows = study.interpretation.rows
+    experiments = loaded.draw_experiments([0], count, "candidates of designs")
+    regressors = loaded.compute_regressor(experiments)[0, :, :rows]
+    size = np.abs(regressors).max(axis=(0, 1))
+    observable = size > _SMALLEST_OBSERVABLE_SHARE * size.max()
+    tests = study.draw_tests() if observable.all() else loaded.draw_tests()
     return Candidates(
-        rows, within.deflections(drawn)[0, :, : read.rows], observable, form
+        regressors,
+        loaded.compute_deflections(experiments)[0, :, :rows],
+        observable,
+        loaded.validate_on(tests).mean_form,
     )
 
 
-def _simulate(
-    study: StudyInMemory, candidates: Candidates, designs: np.ndarray
+def _choose_optimal_designs(
+    study: StudyInMemory, pool: Candidates, sizes: Sequence[int]
+) -> list[_Designs]:
+    """Choose one design of each size by each criterion."""
+    observable = pool.observable
+    scale = study.robot.compliance[observable]
+    regressors = pool.regressors[..., observable] * scale / study.size.noise
+    # Without its last row and column the form is that of the compliances alone.
+    form = pool.mean_form[np.ix_(observable, observable)]
+    criteria = {"I": Criterion(form * np.outer(scale, scale))}
+    for kind in CRITERIA:
+        if kind != "I":
+            criteria[kind] = build_criterion(kind, regressors[:, :3])
+    designs = []
+    for kind, rule in criteria.items():
+        # The beginning of a greedy selection is the greedy selection of fewer.
+        longest = choose_greedily(regressors, max(sizes), rule)
+        for size in sizes:
+            selection = exchange_candidates(regressors, longest[:size], rule)
+            designs.append(_Designs(kind, np.atleast_2d(selection)))
+    return designs
+
+
+def _draw_random_designs(
+    study: StudyInMemory, candidates: int, sizes: Sequence[int], load: str
+) -> list[_Designs]:
+    """Draw random designs of each size."""
+    draws = open_stream(study.seed, study.key, f"random designs/{load}", 0)
+    designs = []
+    for size in sizes:
+        selections = [
+            draws.choice(candidates, size, replace=False)
+            for _ in range(_RANDOM_DESIGNS)
+        ]
+        designs.append(_Designs(RANDOM, np.array(selections)))
+    return designs
+
+
+def _simulate_errors(
+    study: StudyInMemory, pool: Candidates, selections: np.ndarray
 ) -> tuple[float, float]:
-    """RMS error with its standard error of noisy data sets by designs (D, size)."""
-    repeats = -(-study.size.data_sets // len(designs))
-    draws = open_stream(
-        study.seed, study.key, f"noise of designs/{designs.shape[1]}", 0
-    )
-    of = candidates.observable
-    rows = candidates.rows[designs][..., of].reshape(len(designs), -1, of.sum())
-    ideal = candidates.deflections[designs].reshape(len(designs), -1, 1)
-    measured = ideal + study.size.noise * draws.standard_normal(
-        (*ideal.shape[:2], repeats)
-    )
-    across = rows.swapaxes(1, 2)
-    error = np.zeros((len(of), len(designs) * repeats))
-    estimates = np.linalg.solve(across @ rows, across @ measured)
-    error[of] = (
-        np.moveaxis(estimates, 1, 0).reshape(of.sum(), -1)
-        - study.robot.compliance[of][:, None]
-    )
-    squares = evaluate_quadratic_form(candidates.form, error)
+    """RMS error, with its standard error, of noisy data sets by designs (D, size)."""
+    count = len(selections)
+    repeats = -(-study.size.data_sets // count)
+    error = np.zeros((len(pool.observable), count * repeats))
+    estimates = _simulate_estimates(study, pool, selections, repeats)
+    true = study.robot.compliance[pool.observable]
+    error[pool.observable] = estimates - true[:, None]
+    squares = evaluate_quadratic_form(pool.mean_form, error)
     rms = np.sqrt(squares.mean())
-    # Data sets of one design go together.
-    each = squares.reshape(len(designs), repeats)
-    groups = each.mean(axis=1) if len(designs) > 1 else each[0]
-    return float(rms), float(groups.std(ddof=1) / np.sqrt(len(groups)) / (2 * rms))
+    # Data sets of one design are not independent of each other, so designs are the
+    # sample if there are several.
+    by_design = squares.reshape(count, repeats)
+    sample = by_design.mean(axis=1) if count > 1 else by_design[0]
+    std_error = sample.std(ddof=1) / np.sqrt(len(sample)) / (2 * rms)
+    return float(rms), float(std_error)
 
 
-def build_designs_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+def _simulate_estimates(
+    study: StudyInMemory, pool: Candidates, selections: np.ndarray, repeats: int
+) -> np.ndarray:
+    """Observable compliances (observable, D repeats) that least squares estimate from
+    noisy data sets of each design."""
+    count, size = selections.shape
+    joints = pool.observable.sum()
+    regressors = pool.regressors[selections][..., pool.observable]
+    matrix = regressors.reshape(count, -1, joints)
+    ideal = pool.deflections[selections].reshape(count, -1, 1)
+    draws = open_stream(study.seed, study.key, f"noise of designs/{size}", 0)
+    noise = draws.standard_normal((*ideal.shape[:2], repeats))
+    measured = ideal + study.size.noise * noise
+    transposed = matrix.swapaxes(1, 2)
+    estimates = np.linalg.solve(transposed @ matrix, transposed @ measured)
+    return np.moveaxis(estimates, 1, 0).reshape(joints, -1)
+
+
+def build_designs_table(designs: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """Simulated errors of random and chosen configurations by the kind of load.
 
-    gain: the error of random designs of the size over that of the design.
+    Parameters
+    ----------
+    designs
+        The table of simulated designs of each robot.
+
+    Returns
+    -------
+    DataFrame
+        ``gain`` is the error of random designs of the same size, over that of the
+        design.
     """
-    frame = concatenate_robots(found)
+    frame = concatenate_robots(designs)
     names = {"rms": "rms_um", "std_error": "rms_um_std_error"}
     errors = MICRO * frame[[*names]].rename(columns=names)
-    part = frame[["robot", "load", "design", "configurations", "unobservable"]].join(
-        errors
-    )
-    size = ["robot", "load", "configurations"]
-    random = part[part.design == RANDOM].set_index(size).rms_um.rename("random")
-    return part.assign(gain=part.join(random, on=size).random / part.rms_um)
+    heads = ["robot", "load", "design", "configurations", "unobservable"]
+    table = frame[heads].join(errors)
+    keys = ["robot", "load", "configurations"]
+    random = table[table.design == RANDOM].set_index(keys).rms_um.rename("random")
+    return table.assign(gain=table.join(random, on=keys).random / table.rms_um)
 
 
 simulate_designs = define_study_step(SIMULATED_DESIGNS, evaluate_designs)

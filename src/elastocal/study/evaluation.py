@@ -1,9 +1,9 @@
-"""Each strategy on each robot at each noise level: from measured data sets to the
-figures that judge it, in studies over again.
+"""Each strategy on each robot at each noise level: from measured data sets to the scores
+that judge it; and the same in further studies.
 
-As the paper does, which averages the stiffness over all data sets before it looks at
-the error (equations 12-15). All work goes block of data sets by block. Further studies
-have data sets that no other one has, and nothing of these is kept.
+As in the paper, the stiffness is averaged over all data sets before its error is
+computed (equations 12-15). All work goes block of data sets by block. Further studies
+have their own data sets, which are not kept.
 """
 
 from __future__ import annotations
@@ -67,15 +67,46 @@ from elastocal.study.strategies import drop_superseded_stages, strategy_from_doc
 if TYPE_CHECKING:
     import pandas as pd
 
+    from elastocal.mechanics.robot import Robot
     from elastocal.study.in_memory import StudyInMemory
     from elastocal.study.strategies import Strategy
 
+# Largest spread of an identified compliance, relative to its mean, at which the mean of
+# its inverse is trustworthy.
 MAX_TRUSTED_SPREAD = 0.25
-# Those of Table 4: name, column, factor, unit, key of the limit.
-_FIGURES = (
-    ("k_sigma", "k_sigma", 1.0, "percent", "k_sigma"),
-    ("k_sigma_fixed_joints", "k_sigma_fixed_joints", 1.0, "percent", "k_sigma"),
-    ("dev", "deviation", MICRO, "um", "deviation"),
+# Standard deviation of a normal distribution over its median absolute deviation.
+_STD_OVER_MAD = 1.4826
+
+
+@dataclass(frozen=True)
+class _Table4Quantity:
+    """A score of Table 4.
+
+    Attributes
+    ----------
+    name, unit : str
+        Parts of the names of the columns.
+    column : str
+        Column of the table of repeated studies.
+    factor : float
+        From the unit of that column to `unit`.
+    limit : str
+        Key of the limit that the score is to reach.
+    """
+
+    name: str
+    unit: str
+    column: str
+    factor: float
+    limit: str
+
+
+_TABLE4_QUANTITIES = (
+    _Table4Quantity("k_sigma", "percent", "k_sigma", 1.0, "k_sigma"),
+    _Table4Quantity(
+        "k_sigma_fixed_joints", "percent", "k_sigma_fixed_joints", 1.0, "k_sigma"
+    ),
+    _Table4Quantity("dev", "um", "deviation", MICRO, "deviation"),
 )
 
 SCORES = (
@@ -92,27 +123,45 @@ REPLICATES = make_schema(
     *SCORES,
     make_real_column("initial_deviation", "m", "as in the metrics"),
 )
+_NONPOSITIVE_SHARE = make_real_column(
+    "nonpositive_share",
+    "",
+    "share of data sets with a compliance that is not positive",
+)
+_RELATIVE_SPREAD = make_real_column(
+    "relative_spread",
+    "",
+    "largest standard deviation over mean of an identified compliance",
+    missing=True,
+)
+_TRUSTWORTHY = Column(
+    "trustworthy",
+    "bool",
+    "",
+    "whether the mean of 1/c exists in practice: none <= 0 and relative spread <= 0.25",
+)
 
 
 def make_metrics_schema(joints: int) -> TableSchema:
     """Equations 12-15, averaged over the data sets; one row for each length."""
-    of_stiffness = "the averaged stiffness of joint"
+    numbers = range(1, joints + 1)
+    stiffness = "the averaged stiffness of joint"
     quantities = [
         *(
             (
                 f"compliance_{j}",
                 "rad/(N m)",
-                f"inverse of {of_stiffness} {j} (equation 12)",
+                f"inverse of {stiffness} {j} (equation 12)",
             )
-            for j in range(1, joints + 1)
+            for j in numbers
         ),
         *(
             (
                 f"delta_k_{j}",
                 "percent",
-                f"relative error of {of_stiffness} {j} (equation 13)",
+                f"relative error of {stiffness} {j} (equation 13)",
             )
-            for j in range(1, joints + 1)
+            for j in numbers
         ),
         ("k_sigma", "percent", "sum of delta_k over all joints (equation 14)"),
         (
@@ -123,7 +172,8 @@ def make_metrics_schema(joints: int) -> TableSchema:
         (
             "deviation",
             "m",
-            "mean end-effector error of the averaged model on test configurations (equation 15)",
+            "mean end-effector error of the averaged model on test configurations "
+            "(equation 15)",
         ),
         (
             "initial_deviation",
@@ -131,56 +181,46 @@ def make_metrics_schema(joints: int) -> TableSchema:
             "mean deflection of the end-effector on the test configurations",
         ),
     ]
+    columns = []
+    for name, unit, meaning in quantities:
+        error = (
+            f"Monte Carlo error over data sets and test configurations of: {meaning}"
+        )
+        columns += [
+            make_real_column(name, unit, meaning, missing=True),
+            make_real_column(f"{name}_std_error", unit, error, missing=True),
+        ]
     return make_schema(
-        "metrics",
-        LENGTH,
-        *(
-            make_real_column(name + end, unit, words + meaning, missing=True)
-            for name, unit, meaning in quantities
-            for end, words in (
-                ("", ""),
-                (
-                    "_std_error",
-                    "Monte Carlo error over data sets and test configurations of: ",
-                ),
-            )
-        ),
-        make_real_column(
-            "nonpositive_share",
-            "",
-            "share of data sets with a compliance that is not positive",
-        ),
-        make_real_column(
-            "relative_spread",
-            "",
-            "largest standard deviation over mean of an identified compliance",
-            missing=True,
-        ),
-        Column(
-            "trustworthy",
-            "bool",
-            "",
-            "whether the mean of 1/c exists in practice: none <= 0 and relative spread <= 0.25",
-        ),
+        "metrics", LENGTH, *columns, _NONPOSITIVE_SHARE, _RELATIVE_SPREAD, _TRUSTWORTHY
     )
 
 
 def unpack_weights(columns: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Weights (1 + replicates, members) of a block of the weights table; replicate 0
-    counts each member once."""
+    """Unpack the weights (1 + replicates, members) of a block of the weights table.
+
+    Replicate 0 counts each member once.
+    """
     counts = columns["count"].reshape(-1, columns["replicate"].max())
     return np.vstack([np.ones(len(counts)), counts.T])
 
 
 @dataclass(frozen=True)
 class Averages:
-    """Averages over data sets, replicate 0 with every data set once, the others with
+    """Averages over data sets: replicate 0 with every data set once, the others with
     bootstrap weights.
 
-    `compliance` (1 + replicates, lengths, n): inverse of the averaged stiffness, rad/(N
-    m). `deviation` (1 + replicates, lengths): Equation 15, m. `initial_deviation` (1 +
-    replicates, lengths): the same without any model; it does not depend on the length.
-    `nonpositive_share`, `relative_spread` (lengths,).
+    Attributes
+    ----------
+    compliance : (1 + replicates, lengths, n) array, rad/(N m)
+        Inverse of the averaged stiffness.
+    deviation : (1 + replicates, lengths) array, m
+        Equation 15.
+    initial_deviation : (1 + replicates, lengths) array, m
+        The same without any model; it does not depend on the length.
+    nonpositive_share : (lengths,) array
+        Share of data sets with a compliance that is not positive.
+    relative_spread : (lengths,) array
+        Largest standard deviation over mean of a compliance.
     """
 
     compliance: np.ndarray
@@ -192,7 +232,7 @@ class Averages:
 
 def average_estimates(
     blocks: Iterable[tuple[np.ndarray, np.ndarray]],
-    judge: ValidationSet,
+    validation: ValidationSet,
     method: str,
     test_weights: np.ndarray,
 ) -> Averages:
@@ -202,35 +242,52 @@ def average_estimates(
     A replicate multiplies weights of data sets by independent weights of test
     configurations: the product-weight bootstrap of crossed factors [1].
 
-    `blocks` (compliance, weights): compliances (sets, lengths, n) and bootstrap weights
-    (1 + replicates, sets). `method`: what is averaged: stiffness 1/c or compliance c
-    (interpretation R7). `test_weights` (1 + replicates, tests).
+    Parameters
+    ----------
+    blocks
+        Compliances (sets, lengths, n) and bootstrap weights (1 + replicates, sets).
+    validation
+    method : str
+        What is averaged: stiffness 1/c or compliance c (interpretation R7).
+    test_weights : (1 + replicates, tests) array
 
+    References
+    ----------
     [1] Owen, A. B. and Eckles, D., Bootstrapping data arrays of arbitrary order, Annals
     of Applied Statistics 6, 2012.
     """
-    zero: np.ndarray = np.zeros(())
-    total = sums = moments = nonpositive = zero
+    total_weight: Any = 0.0
+    weighted_sum: Any = 0.0
+    moments: Any = 0.0
+    nonpositive: Any = 0.0
     sets = 0
     for compliance, weights in blocks:
         sets += len(compliance)
-        total = total + weights.sum(axis=1)
+        total_weight = total_weight + weights.sum(axis=1)
         nonpositive = nonpositive + (compliance <= 0).any(axis=-1).sum(axis=0)
-        scaled = compliance / judge.reference
+        scaled = compliance / validation.reference
         moments = moments + np.stack([scaled.sum(axis=0), (scaled**2).sum(axis=0)])
-        sums = sums + np.tensordot(
-            weights, compliance if method == "compliance" else 1.0 / compliance, axes=1
-        )
-    averaged = sums / total[:, None, None]
-    averaged = averaged if method == "compliance" else 1.0 / averaged
-    deviation = compute_mean_deviation(judge, averaged, test_weights)
-    initial = np.broadcast_to(
-        (test_weights @ judge.initial_errors / test_weights.sum(axis=1))[:, None],
-        deviation.shape,
+        averaged_quantity = _to_averaged_quantity(compliance, method)
+        weighted_sum = weighted_sum + np.tensordot(weights, averaged_quantity, axes=1)
+    mean_quantity = weighted_sum / total_weight[:, None, None]
+    averaged = _to_averaged_quantity(mean_quantity, method)
+    deviation = compute_mean_deviation(validation, averaged, test_weights)
+    initial = test_weights @ validation.initial_errors / test_weights.sum(axis=1)
+    mean, mean_square = moments / sets
+    std = np.sqrt(np.maximum(mean_square - mean**2, 0.0))
+    return Averages(
+        averaged,
+        deviation,
+        np.broadcast_to(initial[:, None], deviation.shape),
+        nonpositive / sets,
+        (std / np.abs(mean)).max(axis=-1),
     )
-    mean, square = moments / sets
-    spread = (np.sqrt(np.maximum(square - mean**2, 0.0)) / np.abs(mean)).max(axis=-1)
-    return Averages(averaged, deviation, initial, nonpositive / sets, spread)
+
+
+def _to_averaged_quantity(compliance: np.ndarray, method: str) -> np.ndarray:
+    """Convert compliances to the averaged quantity, stiffness or compliance; the
+    conversion is its own inverse."""
+    return compliance if method == "compliance" else 1.0 / compliance
 
 
 def compute_scores(
@@ -239,8 +296,16 @@ def compute_scores(
     true_compliance: np.ndarray,
     fixed_joints: Sequence[int],
 ) -> dict[str, np.ndarray]:
-    """Scores (..., lengths) of averaged models: `compliance` (..., lengths, n) and
-    `deviation` (..., lengths)."""
+    """Compute the scores (..., lengths) of averaged models.
+
+    Parameters
+    ----------
+    compliance : (..., lengths, n) array
+    deviation : (..., lengths) array
+    true_compliance : (n,) array
+    fixed_joints
+        Joints that are fixed in the last stage.
+    """
     return {
         "k_sigma": compute_k_sigma(compliance, true_compliance),
         "k_sigma_fixed_joints": compute_k_sigma(
@@ -253,33 +318,34 @@ def compute_scores(
 def build_metrics_table(
     averages: Averages, true_compliance: np.ndarray, fixed_joints: Sequence[int]
 ) -> dict[str, np.ndarray]:
-    """Columns of the metrics table, one row for each length, from `average`."""
-    replicated = {}
-    relative = compute_relative_stiffness_error(averages.compliance, true_compliance)
+    """Build the columns of the metrics table, one row for each length."""
+    quantities = {}
+    relative_error = compute_relative_stiffness_error(
+        averages.compliance, true_compliance
+    )
     for j in range(len(true_compliance)):
-        replicated[f"compliance_{j + 1}"] = averages.compliance[..., j]
-        replicated[f"delta_k_{j + 1}"] = relative[..., j]
-    replicated |= _replicated_scores(averages, true_compliance, fixed_joints)
+        quantities[f"compliance_{j + 1}"] = averages.compliance[..., j]
+        quantities[f"delta_k_{j + 1}"] = relative_error[..., j]
+    quantities |= _score_replicates(averages, true_compliance, fixed_joints)
     columns = {"length": np.arange(1, averages.deviation.shape[1] + 1)}
-    for name, values in replicated.items():
+    for name, values in quantities.items():
         columns[name] = values[0]
         columns[f"{name}_std_error"] = values[1:].std(axis=0, ddof=1)
     columns["nonpositive_share"] = averages.nonpositive_share
     columns["relative_spread"] = averages.relative_spread
     with np.errstate(invalid="ignore"):
-        columns["trustworthy"] = (averages.nonpositive_share == 0) & (
-            averages.relative_spread <= MAX_TRUSTED_SPREAD
-        )
+        small_spread = averages.relative_spread <= MAX_TRUSTED_SPREAD
+    columns["trustworthy"] = (averages.nonpositive_share == 0) & small_spread
     return columns
 
 
 def build_replicates_table(
     averages: Averages, true_compliance: np.ndarray, fixed_joints: Sequence[int]
 ) -> dict[str, np.ndarray]:
-    """Columns of the replicates table: the scores of every bootstrap replicate at every
-    length."""
+    """Build the columns of the replicates table: the scores of every bootstrap replicate
+    at every length."""
     replicates, lengths = averages.deviation[1:].shape
-    scores = _replicated_scores(averages, true_compliance, fixed_joints)
+    scores = _score_replicates(averages, true_compliance, fixed_joints)
     return {
         "replicate": np.repeat(np.arange(1, replicates + 1), lengths),
         "length": np.tile(np.arange(1, lengths + 1), replicates),
@@ -287,7 +353,7 @@ def build_replicates_table(
     }
 
 
-def _replicated_scores(
+def _score_replicates(
     averages: Averages, true_compliance: np.ndarray, fixed_joints: Sequence[int]
 ) -> dict[str, np.ndarray]:
     scores = compute_scores(
@@ -299,24 +365,43 @@ def _replicated_scores(
 def find_length_with_error(
     values: np.ndarray, replicate_values: np.ndarray, limit: float
 ) -> tuple[float, float]:
-    """First length at which a metric is at most `limit`, infinite where none is, with
-    its Monte Carlo standard error.
+    """Find the first length at which a metric is at most `limit`, with its Monte Carlo
+    standard error.
 
-    `values` (lengths,), `replicate_values` (replicates, lengths): those that do not
-    reach it are continued, see `metrics.length_to_reach`, since leaving them out would
-    make the error too small.
+    Parameters
+    ----------
+    values : (lengths,) array
+    replicate_values : (replicates, lengths) array
+        Replicates that do not reach the limit are extrapolated, see
+        `metrics.extrapolate_length`; leaving them out would make the error too small.
+    limit : float
+
+    Returns
+    -------
+    length : float
+        Infinite if no length reaches the limit.
+    std_error : float
     """
-    return float(find_first_length_below(values, limit)), float(
-        np.std(extrapolate_length(replicate_values, limit), ddof=1)
-    )
+    length = float(find_first_length_below(values, limit))
+    replicate_lengths = extrapolate_length(replicate_values, limit)
+    return length, float(np.std(replicate_lengths, ddof=1))
 
 
 def make_repeated_schema(joints: int) -> TableSchema:
     """Scores of further studies of the same size; one row for each study, strategy and
     length."""
-    other = (
+    by_compliance = (
         "by the mean of the compliances where the metrics have that of the stiffnesses"
     )
+    compliances = [
+        make_real_column(
+            f"compliance_{j}",
+            "rad/(N m)",
+            f"as in the metrics, of joint {j}",
+            missing=True,
+        )
+        for j in range(1, joints + 1)
+    ]
     return make_schema(
         "repeated",
         make_integer_column(
@@ -324,30 +409,22 @@ def make_repeated_schema(joints: int) -> TableSchema:
         ),
         STRATEGY,
         LENGTH,
-        *(
-            make_real_column(
-                f"compliance_{j}",
-                "rad/(N m)",
-                f"as in the metrics, of joint {j}",
-                missing=True,
-            )
-            for j in range(1, joints + 1)
-        ),
+        *compliances,
         *SCORES,
         make_real_column(
             "k_sigma_mean_compliance",
             "percent",
-            f"sum of delta_k over all joints, {other}",
+            f"sum of delta_k over all joints, {by_compliance}",
             missing=True,
         ),
         make_real_column(
             "k_sigma_fixed_joints_mean_compliance",
             "percent",
-            f"the same of the fixed joints, {other}",
+            f"the same of the fixed joints, {by_compliance}",
             missing=True,
         ),
         make_real_column(
-            "deviation_mean_compliance", "m", f"deviation {other}", missing=True
+            "deviation_mean_compliance", "m", f"deviation {by_compliance}", missing=True
         ),
         make_real_column(
             "mean_square",
@@ -359,185 +436,204 @@ def make_repeated_schema(joints: int) -> TableSchema:
 
 
 def evaluate_studies(
-    study: StudyInMemory, studies: Iterable[int], strategies: Sequence[Strategy]
+    study: StudyInMemory, numbers: Iterable[int], strategies: Sequence[Strategy]
 ) -> Iterator[dict[str, np.ndarray | str]]:
-    """Scores of studies of these numbers, block by block one strategy in one study."""
-    robot = study.robot
-    read = study.interpretation
-    tests = np.ones((1, study.size.tests))
-    for number in studies:
-        judge = study.judge(number)
-        found = study.estimates(strategies, number)
+    """Score strategies in the studies of these numbers; yields columns of the table of
+    repeated studies, for one strategy in one study after the other."""
+    for number in numbers:
+        validation = study.make_validation_set(number)
+        estimates = study.estimate_all(strategies, number)
         for strategy in strategies:
-            blocks = [
-                (compliance, np.ones((1, len(compliance))))
-                for compliance in found[strategy.name]
-            ]
-            averages = average_estimates(blocks, judge, read.average, tests)
-            plain = average_estimates(blocks, judge, "compliance", tests)
-            fixed = strategy.fixed_joints
-            others = compute_scores(
-                plain.compliance[0], plain.deviation[0], robot.compliance, fixed
-            )
-            squares = [
-                judge.mean_square(np.moveaxis(each, 0, -1)) for each, _ in blocks
-            ]
+            blocks = estimates[strategy.name]
+            columns = _score_study(study, strategy, blocks, validation)
+            lengths = len(columns["mean_square"])
             yield {
-                "length": np.arange(1, len(squares[0]) + 1),
-                **{
-                    f"compliance_{j + 1}": column
-                    for j, column in enumerate(averages.compliance[0].T)
-                },
-                **compute_scores(
-                    averages.compliance[0],
-                    averages.deviation[0],
-                    robot.compliance,
-                    fixed,
-                ),
-                **{
-                    f"{name}_mean_compliance": values for name, values in others.items()
-                },
-                "mean_square": np.concatenate(squares, axis=1).mean(axis=1),
-                "study": np.full(len(squares[0]), number),
+                "length": np.arange(1, lengths + 1),
+                "study": np.full(lengths, number),
                 "strategy": strategy.name,
+                **columns,
             }
+
+
+def _score_study(
+    study: StudyInMemory,
+    strategy: Strategy,
+    blocks: Sequence[np.ndarray],
+    validation: ValidationSet,
+) -> dict[str, np.ndarray]:
+    """Compliances and scores (lengths,) of one study.
+
+    `blocks` are compliances (sets, lengths, n) by one strategy.
+    """
+    tests = np.ones((1, study.size.tests))
+    weighted = [(block, np.ones((1, len(block)))) for block in blocks]
+
+    def average(method: str) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        averages = average_estimates(weighted, validation, method, tests)
+        compliance = averages.compliance[0]
+        scores = compute_scores(
+            compliance,
+            averages.deviation[0],
+            study.robot.compliance,
+            strategy.fixed_joints,
+        )
+        return compliance, scores
+
+    compliance, scores = average(study.interpretation.average)
+    _, compliance_scores = average("compliance")
+    squares = [
+        validation.compute_mean_square(np.moveaxis(block, 0, -1)) for block in blocks
+    ]
+    return {
+        **{f"compliance_{j}": column for j, column in enumerate(compliance.T, 1)},
+        **scores,
+        **{
+            f"{name}_mean_compliance": values
+            for name, values in compliance_scores.items()
+        },
+        "mean_square": np.concatenate(squares, axis=1).mean(axis=1),
+    }
 
 
 def build_over_studies_table(
     studies: pd.DataFrame, length: int, limits: Mapping[str, float]
 ) -> pd.DataFrame:
-    """Table 4 over studies, by what is averaged (stiffness or compliance).
+    """Build Table 4 over studies, by what is averaged (stiffness or compliance).
 
-    `studies`: robot and the columns of `repeated`. `limits`: k_sigma in percent and
-    deviation in µm whose lengths are given. Each figure is the median over studies with
-    a robust standard deviation between them (1.4826 times the median absolute
-    deviation); rms: of one data set.
+    Parameters
+    ----------
+    studies
+        Robot and the columns of the table of repeated studies.
+    length : int
+        Data set length of the scores.
+    limits
+        k_sigma in percent and deviation in µm for which the necessary lengths are given.
+
+    Returns
+    -------
+    DataFrame
+        Each score is the median over studies, with a robust standard deviation between
+        them (1.4826 times the median absolute deviation); rms is that of one data set.
     """
     rows = []
     for (robot, strategy), cell in studies.groupby(["robot", "strategy"], sort=False):
-        for averaged, end in (("stiffness", ""), ("compliance", "_mean_compliance")):
+        squares = cell.mean_square[cell.length == length]
+        rms = _summarize_robustly(f"rms_{length}_um", MICRO * np.sqrt(squares))
+        for averaged, suffix in (("stiffness", ""), ("compliance", "_mean_compliance")):
             row: dict[str, Any] = {
                 "robot": robot,
                 "strategy": strategy,
                 "average": averaged,
             }
-            for name, column, factor, unit, key in _FIGURES:
-                curves = (
-                    factor
-                    * cell.pivot(
-                        index="study", columns="length", values=f"{column}{end}"
-                    ).to_numpy()
-                )
-                row |= _middle(f"{name}_{length}_{unit}", curves[:, length - 1])
-                row |= _middle(
-                    f"n_{name}_{limits[key]:g}_{unit}",
-                    extrapolate_length(curves, limits[key]),
-                )
-            rows.append(
-                row
-                | _middle(
-                    f"rms_{length}_um",
-                    MICRO * np.sqrt(cell.mean_square[cell.length == length]),
-                )
-            )
+            for quantity in _TABLE4_QUANTITIES:
+                column = f"{quantity.column}{suffix}"
+                curves = cell.pivot(index="study", columns="length", values=column)
+                scores = quantity.factor * curves.to_numpy()
+                row |= _summarize_curves(quantity, scores, length, limits)
+            rows.append(row | rms)
     return make_frame(rows)
 
 
-def _middle(name: str, values: np.ndarray | pd.Series) -> dict[str, float]:
-    """Median, and a standard deviation that outlying studies do not move."""
-    middle = float(np.median(values))
-    return {
-        name: middle,
-        f"{name}_std": float(1.4826 * np.median(np.abs(values - middle))),
-    }
+def _summarize_curves(
+    quantity: _Table4Quantity,
+    scores: np.ndarray,
+    length: int,
+    limits: Mapping[str, float],
+) -> dict[str, float]:
+    """Summarize scores (studies, lengths): at a length, and the lengths at which they
+    reach their limit."""
+    limit = limits[quantity.limit]
+    name = f"{quantity.name}_{length}_{quantity.unit}"
+    length_name = f"n_{quantity.name}_{limit:g}_{quantity.unit}"
+    return _summarize_robustly(name, scores[:, length - 1]) | _summarize_robustly(
+        length_name, extrapolate_length(scores, limit)
+    )
+
+
+def _summarize_robustly(name: str, values: np.ndarray | pd.Series) -> dict[str, float]:
+    """Median, and a standard deviation that outlying studies do not influence."""
+    median = float(np.median(values))
+    spread = float(_STD_OVER_MAD * np.median(np.abs(values - median)))
+    return {name: median, f"{name}_std": spread}
 
 
 def identify(job: Job) -> None:
-    """One strategy for one robot at one noise level: compliances at every prefix
-    length, and what they are worth."""
-    asked = job.params
+    """Identify the compliances of one robot at one noise level by one strategy at every
+    prefix length, and score them."""
+    params = job.params
     robot = load_robot(job)
-    n = robot.joints
-    strategy = strategy_from_document(asked.strategy)
-    blocks = read_measured_blocks(job, n, strategy.points)
-    solved = identify_blocks(
-        blocks,
+    strategy = strategy_from_document(params.strategy)
+    blocks = identify_blocks(
+        read_measured_blocks(job, robot.joints, strategy.points),
         robot.chain,
-        drop_superseded_stages(strategy, n),
-        asked.rows,
-        asked.wrench_at,
+        drop_superseded_stages(strategy, robot.joints),
+        params.rows,
+        params.wrench_at,
     )
-    write_table(
-        job.output.identified,
-        make_identified_schema(n),
-        solved,
-        collect_provenance(job),
-    )
+    origin = collect_provenance(job)
+    schema = make_identified_schema(robot.joints)
+    write_table(job.output.identified, schema, blocks, origin)
 
-    tested = read_table(job.input.test_experiments, make_experiments_schema(n))
-    ideal = read_table(
-        job.input.test_ideal, DEFLECTIONS, point=robot.chain.end_effector.name
-    )
+    validation = _read_validation_set(job, robot)
     counts = ["replicate", "count"]
-    # Read again, so that any number of data sets is worked off in the same memory.
-    columns = [f"compliance_{j + 1}" for j in range(n)]
-    estimated = (
-        np.stack(
-            [block[name].reshape(len(list_data_sets(block)), -1) for name in columns],
-            axis=-1,
-        )
-        for block in read_blocks(
-            job.output.identified, make_identified_schema(n), ["data_set", *columns]
-        )
-    )
     weights = map(
         unpack_weights,
         read_blocks(job.input.weights, WEIGHTS, counts, members=DATA_SETS),
     )
-    of_tests = unpack_weights(
-        read_table(job.input.weights, WEIGHTS, counts, members=TESTS)
-    )
-    judge = make_validation_set(
-        robot, unpack_experiments(tested), unpack_deflections(ideal), asked.wrench_at
-    )
+    tests = read_table(job.input.weights, WEIGHTS, counts, members=TESTS)
+    # The estimates are read again, so that memory does not depend on the number of data
+    # sets.
     averages = average_estimates(
-        zip(estimated, weights, strict=True), judge, asked.average, of_tests
+        zip(_read_estimates(job, robot.joints), weights, strict=True),
+        validation,
+        params.average,
+        unpack_weights(tests),
     )
-    scored = averages, judge.reference, strategy.fixed_joints
-    write_table(
-        job.output.metrics,
-        make_metrics_schema(n),
-        [build_metrics_table(*scored)],
-        collect_provenance(job),
+    scored = averages, validation.reference, strategy.fixed_joints
+    schema = make_metrics_schema(robot.joints)
+    write_table(job.output.metrics, schema, [build_metrics_table(*scored)], origin)
+    replicates = build_replicates_table(*scored)
+    write_table(job.output.replicates, REPLICATES, [replicates], origin)
+
+
+def _read_validation_set(job: Job, robot: Robot) -> ValidationSet:
+    """Read the test configurations of a job with their true deflections."""
+    point = robot.chain.end_effector.name
+    schema = make_experiments_schema(robot.joints)
+    tests = read_table(job.input.test_experiments, schema)
+    ideal = read_table(job.input.test_ideal, DEFLECTIONS, point=point)
+    return make_validation_set(
+        robot,
+        unpack_experiments(tests),
+        unpack_deflections(ideal),
+        job.params.wrench_at,
     )
-    write_table(
-        job.output.replicates,
-        REPLICATES,
-        [build_replicates_table(*scored)],
-        collect_provenance(job),
-    )
+
+
+def _read_estimates(job: Job, joints: int) -> Iterator[np.ndarray]:
+    """Read the identified compliances (sets, lengths, n), block by block."""
+    names = [f"compliance_{j}" for j in range(1, joints + 1)]
+    schema = make_identified_schema(joints)
+    for block in read_blocks(job.output.identified, schema, ["data_set", *names]):
+        sets = len(list_data_sets(block))
+        yield np.stack([block[name].reshape(sets, -1) for name in names], axis=-1)
 
 
 def repeat_studies(job: Job) -> None:
-    """Further studies of one robot."""
+    """Evaluate further studies of one robot."""
     study = load_study(job)
     blocks = evaluate_studies(
         study, range(1, job.params.studies + 1), load_strategies(job)
     )
-    write_table(
-        job.output.repeated,
-        make_repeated_schema(study.robot.joints),
-        blocks,
-        collect_provenance(job),
-    )
+    schema = make_repeated_schema(study.robot.joints)
+    write_table(job.output.repeated, schema, blocks, collect_provenance(job))
 
 
 def tabulate_studies(job: Job) -> None:
-    """Table 4 over studies."""
+    """Write Table 4 over studies."""
     from elastocal.io.data_frames import read_long
 
-    asked = job.params
-    found = build_over_studies_table(
-        read_long(job.input.studies, make_repeated_schema), asked.length, asked.limits
-    )
-    write_csvs(job, table=add_slugs(found, asked.slugs))
+    params = job.params
+    studies = read_long(job.input.studies, make_repeated_schema)
+    table = build_over_studies_table(studies, params.length, params.limits)
+    write_csvs(job, table=add_slugs(table, params.slugs))

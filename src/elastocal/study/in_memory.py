@@ -1,7 +1,7 @@
-"""Data sets and test configurations of a study, drawn and measured in memory: nothing
-of them is kept.
+"""Data sets and test configurations of a study, drawn and measured in memory and not
+kept.
 
-They are the same as those of the pipeline's steps: random streams have names, see
+They equal those of the pipeline's steps, because random streams are named, see
 `random_streams`.
 """
 
@@ -29,6 +29,7 @@ from elastocal.study.metrics import ValidationSet, make_validation_set
 from elastocal.study.simulation import (
     Experiments,
     Loading,
+    RandomDesign,
     compute_true_deflections,
     draw_measurement_noise,
     draw_random_experiments,
@@ -48,8 +49,15 @@ if TYPE_CHECKING:
 class Interpretation:
     """How the paper is read; see `interpretations` in config.yaml.
 
-    `rows`: 6 where poses are measured, 3 where positions are. `wrench_at`: R6.
-    `average`: R7, see `evaluation.average`.
+    Attributes
+    ----------
+    loading : Loading
+    rows : int
+        Components measured at a point: 6 of a pose, 3 of a position.
+    wrench_at : str
+        R6.
+    average : str
+        R7, see `evaluation.average_estimates`.
     """
 
     loading: Loading
@@ -60,7 +68,7 @@ class Interpretation:
 
 @dataclass(frozen=True)
 class StudySize:
-    """How large a study is; `noise`: standard deviation, the same number in m and
+    """Size of a study, and the standard deviation of its noise: the same number in m and
     rad."""
 
     data_sets: int
@@ -71,12 +79,20 @@ class StudySize:
 
 @dataclass(frozen=True)
 class StudyInMemory:
-    """The study of one robot, and further ones of the same size.
+    """The study of one robot, and further studies of the same size.
 
-    Studies have numbers; that of the tables is 0. The data sets of one follow on those
-    of the one before, and each has test configurations of its own. `robot`: with the
-    offset of its targets. `key`: name of the robot's file; part of the name of the
-    random streams.
+    Studies have numbers; that of the tables is 0. The data sets of a study follow those
+    of the study before, and each study has its own test configurations.
+
+    Attributes
+    ----------
+    robot : Robot
+        With the offset of its targets.
+    key : str
+        Name of the robot's file; part of the names of the random streams.
+    seed : int
+    interpretation : Interpretation
+    size : StudySize
     """
 
     robot: Robot
@@ -85,172 +101,180 @@ class StudyInMemory:
     interpretation: Interpretation
     size: StudySize
 
-    def under(self, **loading: Any) -> StudyInMemory:
-        """The same study where the robot is moved and loaded otherwise, by attributes
-        of `Loading`."""
+    def with_loading(self, **loading: Any) -> StudyInMemory:
+        """The same study with other attributes of its `Loading`."""
         changed = replace(self.interpretation.loading, **loading)
-        return replace(
-            self, interpretation=replace(self.interpretation, loading=changed)
-        )
+        interpretation = replace(self.interpretation, loading=changed)
+        return replace(self, interpretation=interpretation)
 
-    def blocks(self, number: int = 0) -> Iterator[np.ndarray]:
-        """Numbers of the data sets of a study, block by block, ndarray of int each."""
+    def list_blocks(self, number: int = 0) -> Iterator[np.ndarray]:
+        """Yield the numbers of a study's data sets, block by block."""
         for sets in split_data_sets(self.size.data_sets):
             yield np.array(sets) + number * self.size.data_sets
 
-    def experiments(
+    def draw_experiments(
         self,
         sets: Sequence[int] | np.ndarray,
         configurations: int | None = None,
         purpose: str = "identification",
     ) -> Experiments:
-        """Configurations and loads of data sets, as many as in the study where nothing
-        else is said."""
+        """Draw configurations and loads of data sets; by default as many configurations
+        as the study has."""
         robot = self.robot
-        count = configurations or self.size.configurations
         loading = self.interpretation.loading
-        return draw_random_experiments(
-            robot.chain,
-            robot.joint_limits,
-            self.seed,
-            self.key,
-            loading,
-            purpose,
-            sets,
-            count,
-        )
+        design = RandomDesign(robot.chain, robot.joint_limits, loading, self.key)
+        count = configurations or self.size.configurations
+        return draw_random_experiments(design, self.seed, purpose, sets, count)
 
-    def tests(self, number: int = 0) -> Experiments:
-        """Test configurations of a study, as one data set."""
-        return self.experiments([number], self.size.tests, "test")
+    def draw_tests(self, number: int = 0) -> Experiments:
+        """Draw the test configurations of a study, as one data set."""
+        return self.draw_experiments([number], self.size.tests, "test")
 
-    def deflections(
+    def compute_deflections(
         self, experiments: Experiments, point: str | None = None
     ) -> np.ndarray:
-        """Deflections (sets, configurations, 6) of a measuring point, of the
-        end-effector where none is named."""
+        """Deflections (sets, configurations, 6) of a measuring point, by default of the
+        end-effector; m, rad."""
         chain = self.robot.chain
-        named = chain.point(point) if point else chain.end_effector
+        measured = chain.point(point) if point else chain.end_effector
         return compute_true_deflections(
-            self.robot, experiments, named, self.interpretation.wrench_at
+            self.robot, experiments, measured, self.interpretation.wrench_at
         )
 
-    def regressor(self, experiments: Experiments) -> np.ndarray:
+    def compute_regressor(self, experiments: Experiments) -> np.ndarray:
         """Regressors (sets, configurations, 6, n) of poses of the end-effector."""
         chain = self.robot.chain
+        point = chain.end_effector
         angles = experiments.joint_angles
-        at = loaded_point(chain, chain.end_effector, self.interpretation.wrench_at)
-        return regressor(
-            jacobians(chain, angles, chain.end_effector),
-            joint_torques(chain, angles, experiments.wrench, at),
-        )
+        loaded = loaded_point(chain, point, self.interpretation.wrench_at)
+        torques = joint_torques(chain, angles, experiments.wrench, loaded)
+        return regressor(jacobians(chain, angles, point), torques)
 
-    def judge(self, number: int = 0) -> ValidationSet:
-        """Score sheet of the test configurations of a study."""
-        tests = self.tests(number)
-        return make_validation_set(
-            self.robot, tests, self.deflections(tests), self.interpretation.wrench_at
-        )
+    def make_validation_set(self, number: int = 0) -> ValidationSet:
+        """Prepare the test configurations of a study for the errors of models."""
+        return self.validate_on(self.draw_tests(number))
+
+    def validate_on(self, experiments: Experiments) -> ValidationSet:
+        """Prepare any configurations for the errors of models."""
+        deflections = self.compute_deflections(experiments)
+        wrench_at = self.interpretation.wrench_at
+        return make_validation_set(self.robot, experiments, deflections, wrench_at)
 
     def measure(
         self, sets: np.ndarray, points: Sequence[str], repeat: str = ""
     ) -> dict[str, Measurements]:
-        """What each measuring point contributes to some data sets.
+        """Simulate what each measuring point contributes to some data sets.
 
-        `sets`: numbers of the data sets. `points`: names of measuring points. `repeat`:
-        part of the name of the noise's stream, by which measurements of the same
-        configurations differ.
+        Parameters
+        ----------
+        sets : array of int
+            Numbers of the data sets.
+        points
+            Names of measuring points.
+        repeat : str
+            Part of the name of the noise's stream; distinguishes repeated measurements
+            of the same configurations.
         """
-        drawn = self.experiments(sets)
-        read = self.interpretation
+        experiments = self.draw_experiments(sets)
+        interpretation = self.interpretation
         regressors = compute_regressors(
-            drawn, self.robot.chain, points, read.rows, read.wrench_at
+            experiments,
+            self.robot.chain,
+            points,
+            interpretation.rows,
+            interpretation.wrench_at,
         )
-        found = {}
+        measurements = {}
         for name in points:
             noise = draw_measurement_noise(
                 self.seed, self.key, name + repeat, sets, self.size.configurations
             )
-            found[name] = stack_measurements(
-                regressors[name],
-                self.deflections(drawn, name) + self.size.noise * noise,
+            ideal = self.compute_deflections(experiments, name)
+            measurements[name] = stack_measurements(
+                regressors[name], ideal + self.size.noise * noise
             )
-        return found
+        return measurements
 
     def estimate(
         self, strategy: Strategy, measurements: Mapping[str, Measurements]
     ) -> np.ndarray:
-        """Compliances (lengths, n, sets), rad/(N m), not a number where a length does
-        not determine them."""
-        compliance = estimate_compliance(strategy, measurements, self.robot.joints)[0]
-        compliance[
-            : find_first_solvable_length(strategy, self.interpretation.rows) - 1
-        ] = np.nan
+        """Estimate compliances (lengths, n, sets), rad/(N m); NaN if a length has too
+        few measurements."""
+        compliance, _ = estimate_compliance(strategy, measurements, self.robot.joints)
+        first = find_first_solvable_length(strategy, self.interpretation.rows)
+        compliance[: first - 1] = np.nan
         return compliance
 
-    def estimates(
+    def estimate_all(
         self, strategies: Sequence[Strategy], number: int = 0
     ) -> dict[str, list[np.ndarray]]:
-        """Compliances (sets, lengths, n) from all data sets of a study, block by block,
-        by the names of strategies.
+        """Estimate compliances from all data sets of a study by several strategies.
 
-        Strategies that are one estimator under equation 11 are worked out once and
-        share their arrays.
+        Strategies that are one estimator under equation 11 are computed once and share
+        their arrays.
+
+        Returns
+        -------
+        dict of lists of (sets, lengths, n) arrays, rad/(N m)
+            Blocks of data sets by the names of the strategies.
         """
         stages = {
             strategy.name: drop_superseded_stages(strategy, self.robot.joints).stages
             for strategy in strategies
         }
-        points = tuple(
-            dict.fromkeys(
-                name
-                for some in stages.values()
-                for stage in some
-                for name in stage.points
-            )
+        estimators = [
+            Strategy("", estimator) for estimator in dict.fromkeys(stages.values())
+        ]
+        points = dict.fromkeys(
+            name for estimator in estimators for name in estimator.points
         )
-        found: dict[tuple[Stage, ...], list[np.ndarray]] = {}
-        for sets in self.blocks(number):
-            measurements = self.measure(sets, points)
-            for estimator in dict.fromkeys(stages.values()):
-                compliance = self.estimate(Strategy("", estimator), measurements)
-                found.setdefault(estimator, []).append(np.moveaxis(compliance, -1, 0))
-        return {name: found[estimator] for name, estimator in stages.items()}
+        estimates: dict[tuple[Stage, ...], list[np.ndarray]] = {
+            estimator.stages: [] for estimator in estimators
+        }
+        for sets in self.list_blocks(number):
+            measurements = self.measure(sets, [*points])
+            for estimator in estimators:
+                compliance = self.estimate(estimator, measurements)
+                estimates[estimator.stages].append(np.moveaxis(compliance, -1, 0))
+        return {name: estimates[estimator] for name, estimator in stages.items()}
 
 
 def load_study(job: Job) -> StudyInMemory:
-    """The study of a rule's robot: its file, the seed, how the paper is read, the
-    study's size (`study` of its parameters)."""
-    read = job.params.study
+    """Load the study of a rule's robot from the parameter `study`: the robot's file, the
+    seed, the interpretation and the size."""
+    settings = job.params.study
     robot = with_target_offset(
-        robot_from_document(read["robot"]), read["tool_offset_m"]
+        robot_from_document(settings["robot"]), settings["tool_offset_m"]
     )
-    conventions = Interpretation(Loading(**read["loading"]), **read["interpretation"])
+    loading = Loading(**settings["loading"])
     return StudyInMemory(
-        robot, job.wildcards.robot, read["seed"], conventions, StudySize(**read["size"])
+        robot,
+        job.wildcards.robot,
+        settings["seed"],
+        Interpretation(loading, **settings["interpretation"]),
+        StudySize(**settings["size"]),
     )
 
 
 def define_study_step(
-    schema: TableSchema, question: Callable[..., Any]
+    schema: TableSchema, evaluate: Callable[..., Iterator[dict[str, Any]]]
 ) -> Callable[[Job], None]:
-    """A step of one robot, which fills one table: `question` has its study and, by
-    their names, the rule's parameters.
+    """Define a step that fills one table of one robot.
 
-    Strategies come as documents. The question returns the columns of the table, or
-    yields those of one block after the other.
+    Parameters
+    ----------
+    schema
+        Of the table.
+    evaluate
+        Called with the study and, by name, the rule's parameters; strategies are made
+        from their documents. Yields the columns of the table, block by block.
     """
 
     def step(job: Job) -> None:
         settings = collect_settings(job, "study")
         if "strategies" in settings:
             settings["strategies"] = load_strategies(job)
-        found = question(load_study(job), **settings)
-        write_table(
-            job.output[0],
-            schema,
-            [found] if isinstance(found, dict) else found,
-            collect_provenance(job),
-        )
+        blocks = evaluate(load_study(job), **settings)
+        write_table(job.output[0], schema, blocks, collect_provenance(job))
 
     return step

@@ -1,7 +1,7 @@
-"""What questions of the study share: how they declare tables, the robot of a rule,
-tables of every robot in frames.
+"""What the questions of the study share: declarations of tables, the robot and the
+strategies of a rule, and tables of every robot as data frames.
 
-Pandas is imported where a frame is made: most jobs make none.
+Functions that make a data frame import pandas themselves, because most jobs make none.
 """
 
 from __future__ import annotations
@@ -27,8 +27,7 @@ MILLI = 1e3
 
 
 def make_schema(name: str, *columns: Column) -> TableSchema:
-    """A table: its name and its columns with units and meanings, written down beside
-    the function that fills it."""
+    """Declare a table; the declaration belongs next to the function that fills it."""
     return TableSchema(name, columns)
 
 
@@ -36,20 +35,21 @@ def make_real_column(
     name: str,
     unit: str,
     meaning: str,
+    *,
     missing: bool = False,
     minimum: float | None = None,
 ) -> Column:
-    """Numbers; `missing`: some may be not a number or infinite."""
+    """Declare a column of real numbers; with `missing`, some may be NaN or infinite."""
     return Column(name, "float64", unit, meaning, missing, minimum)
 
 
 def make_integer_column(name: str, meaning: str, minimum: int | None = None) -> Column:
-    """Counts and numbers of things."""
+    """Declare a column of counts or numbers of objects."""
     return Column(name, "int32", "", meaning, minimum=minimum)
 
 
 def make_group_column(name: str, meaning: str) -> Column:
-    """A word that is the same in a whole row group."""
+    """Declare a column of text that is constant in each row group."""
     return Column(name, "string", "", meaning)
 
 
@@ -68,7 +68,7 @@ MEAN_SQUARE = make_real_column("mean_square", "m^2", MEAN_SQUARE_MEANING, missin
 
 
 class Job(Protocol):
-    """What Snakemake hands to a step; the names in each part are the rule's."""
+    """What Snakemake hands to a step; the rule names the members of each attribute."""
 
     input: Any
     output: Any
@@ -77,26 +77,26 @@ class Job(Protocol):
 
 
 def collect_provenance(job: Job) -> dict[str, Any]:
-    """Provenance of a file of one robot, noise or strategy, which its wildcards are."""
+    """Provenance of a file whose robot, noise or strategy the rule's wildcards name."""
     return describe_provenance(job.params, **dict(job.wildcards))
 
 
 def load_robot(job: Job) -> Robot:
-    """The robot of a rule with the offset of its targets (interpretation R5)."""
+    """Load the robot of a rule with the offset of its targets (interpretation R5)."""
     return with_target_offset(
         robot_from_document(job.params.robot), job.params.tool_offset_m
     )
 
 
 def load_strategies(job: Job) -> list[Strategy]:
-    """The strategies of a rule, in its order."""
+    """Load the strategies of a rule, in its order."""
     return [strategy_from_document(document) for document in job.params.strategies]
 
 
 def read_frames(
     job: Job, files: Iterable[str], schema: TableSchema
 ) -> dict[str, pd.DataFrame]:
-    """The table of each robot of a rule."""
+    """Read the table of each robot of a rule."""
     from elastocal.io.data_frames import read_frame
 
     return {
@@ -105,70 +105,72 @@ def read_frames(
     }
 
 
-def concatenate_robots(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
-    """The tables of all robots one below the other, with the name of the robot in
-    front."""
+def concatenate_robots(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """Join the tables of all robots, with the name of the robot as first column."""
     import pandas as pd
 
-    return pd.concat(found, names=["robot"]).reset_index("robot").reset_index(drop=True)
+    joined = pd.concat(frames, names=["robot"])
+    return joined.reset_index("robot").reset_index(drop=True)
 
 
 def make_frame(rows: Sequence[Any], columns: Sequence[str] = ()) -> pd.DataFrame:
-    """Rows as a data frame; `columns`: those of a table that may have no rows."""
+    """Make a data frame of rows; name the columns of a table that may have no rows."""
     import pandas as pd
 
     return pd.DataFrame(rows, columns=[*columns] or None)
 
 
 def add_slugs(frame: pd.DataFrame, slugs: Mapping[str, str]) -> pd.DataFrame:
-    """A table with the names of the strategies' files, `slugs` by the names of
-    strategies, behind these."""
-    found = frame.copy()
-    found.insert(
-        [*frame.columns].index("strategy") + 1,
-        "strategy_file",
-        frame.strategy.map(slugs),
-    )
-    return found
+    """Add a column with the file names of the strategies next to their names.
+
+    `slugs` are file names by the names of strategies.
+    """
+    extended = frame.copy()
+    position = [*frame.columns].index("strategy") + 1
+    extended.insert(position, "strategy_file", frame.strategy.map(slugs))
+    return extended
 
 
-def collect_settings(job: Job, *others: str) -> dict[str, Any]:
-    """Parameters of a rule but for those that are of every rule, and others."""
+def collect_settings(job: Job, *excluded: str) -> dict[str, Any]:
+    """Parameters of a rule, without those that every rule has and the excluded ones."""
     return {
         name: value
         for name, value in job.params.items()
-        if name not in (STEP, SOURCES_DIGEST, *others)
+        if name not in (STEP, SOURCES_DIGEST, *excluded)
     }
 
 
 def define_table_step(
-    schema: TableSchema, make: Callable[..., pd.DataFrame]
+    schema: TableSchema, make_table: Callable[..., pd.DataFrame]
 ) -> Callable[[Job], None]:
-    """A step of all robots: `make` has the table of each, of the rule's first input,
-    and by their names its parameters."""
+    """Define a step that makes one table of all robots.
+
+    Parameters
+    ----------
+    schema
+        Of the tables of single robots, the rule's first input.
+    make_table
+        Called with the table of each robot and, by name, the rule's parameters.
+    """
 
     def step(job: Job) -> None:
         files = job.input[next(iter(job.input.keys()))]
-        write_csvs(
-            job,
-            table=make(
-                read_frames(job, files, schema), **collect_settings(job, "robots")
-            ),
-        )
+        frames = read_frames(job, files, schema)
+        write_csvs(job, table=make_table(frames, **collect_settings(job, "robots")))
 
     return step
 
 
 def read_printed_figures(path: str) -> pd.DataFrame:
-    """The printed figures."""
+    """Read the figures that the paper prints."""
     import pandas as pd
 
     return pd.read_csv(path, dtype={"table": str}, keep_default_na=False)
 
 
-def write_csvs(job: Job, **found: pd.DataFrame) -> None:
-    """Tables for people, by the names of the rule's outputs."""
+def write_csvs(job: Job, **tables: pd.DataFrame) -> None:
+    """Write tables for people, by the names of the rule's outputs."""
     from elastocal.io.data_frames import write_csv
 
-    for name, frame in found.items():
-        write_csv(job.output[name], frame)
+    for name, table in tables.items():
+        write_csv(job.output[name], table)

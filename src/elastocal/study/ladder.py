@@ -1,21 +1,23 @@
-"""How many springs pay: from elastic joints alone, link spring by link spring, up to
-the extended model (RQ1).
+"""How many springs pay: from elastic joints alone, link spring by link spring, up to the
+extended model (RQ1).
 
 A link spring is the compliance of a beam about its own axes: six diagonal elements and
-the two by which bending and lateral deflection go together. All of them enter linearly.
-Which link comes next, and where to stop, is chosen by cross-validation [1] within each
-data set, by forward selection [2]; configurations that neither has seen judge the
-result.
+the two that couple bending and lateral deflection. All of them enter linearly. Within
+each data set, cross-validation [1] chooses which link comes next and where to stop, by
+forward selection [2]; configurations that neither uses judge the result.
 
-[1] Stone, M., Cross-validatory choice and assessment of statistical predictions, Journal of the Royal Statistical Society B 36,
-    1974.
-[2] Hastie, T., Tibshirani, R. and Friedman, J., The Elements of Statistical Learning, 2nd edition, sections 3.3 and 7.10,
-    Springer, 2009.
+References
+----------
+[1] Stone, M., Cross-validatory choice and assessment of statistical predictions, Journal
+of the Royal Statistical Society B 36, 1974.
+[2] Hastie, T., Tibshirani, R. and Friedman, J., The Elements of Statistical Learning,
+2nd edition, sections 3.3 and 7.10, Springer, 2009.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,7 +41,7 @@ from elastocal.study.jobs import (
     make_real_column,
     make_schema,
 )
-from elastocal.study.points import mean_of
+from elastocal.study.points import score_rms
 from elastocal.study.simulation import draw_measurement_noise
 
 if TYPE_CHECKING:
@@ -62,42 +64,127 @@ LADDER = make_schema(
 )
 CHOSEN = "by cross-validation"
 FOLDS = 5
-# Elements of the compliance of a beam along x: (row, column) of those that are not
-# zero, each with its mirror image.
+# Nonzero elements (row, column) of the compliance of a beam along x; those off the
+# diagonal stand for themselves and their mirror images.
 _ELEMENTS = ((0, 0), (1, 1), (2, 2), (3, 3), (4, 4), (5, 5), (1, 5), (2, 4))
-# Share of a column's squares that keeps normal equations well posed where springs do
-# the same, as the torsion of the first link and the first joint: what such springs
-# predict together does not depend on it.
+# Ridge, as a share of a column's squares, that keeps the normal equations well posed if
+# two springs have the same effect, such as the torsion of the first link and the first
+# joint. What such springs predict together does not depend on it.
 _RIDGE = 1e-10
 
 
 @dataclass(frozen=True)
 class NormalEquations:
-    """Normal equations of some measurements, K columns.
+    """Normal equations of least-squares problems with K columns.
 
-    `gram` (..., K, K), `along` (..., K), `squares` (...).
+    Attributes
+    ----------
+    gram : (..., K, K) array
+        Gram matrix of the columns.
+    right_side : (..., K) array
+        Products of the columns with the deflections.
+    squares : (...) array
+        Sum of squares of the deflections.
     """
 
     gram: np.ndarray
-    along: np.ndarray
+    right_side: np.ndarray
     squares: np.ndarray
 
-    def squared_error(self, coefficients: np.ndarray) -> np.ndarray:
-        """Sum of squares that coefficients (..., K) leave."""
-        quadratic = (coefficients * (self.gram @ coefficients[..., None])[..., 0]).sum(
-            axis=-1
+    def __add__(self, addend: NormalEquations) -> NormalEquations:
+        return NormalEquations(
+            self.gram + addend.gram,
+            self.right_side + addend.right_side,
+            self.squares + addend.squares,
         )
-        return self.squares - 2.0 * (coefficients * self.along).sum(axis=-1) + quadratic
+
+    def compute_squared_error(self, coefficients: np.ndarray) -> np.ndarray:
+        """Residual sum of squares (...) of coefficients (..., K)."""
+        products = (self.gram @ coefficients[..., None])[..., 0]
+        quadratic = (coefficients * products).sum(axis=-1)
+        linear = (coefficients * self.right_side).sum(axis=-1)
+        return self.squares - 2.0 * linear + quadratic
+
+
+@dataclass(frozen=True)
+class _ScaledEquations:
+    """Normal equations of columns scaled to length 1, with a ridge.
+
+    Attributes
+    ----------
+    gram : (sets, K, K) array
+    right_side, scale : (sets, K) arrays
+        `scale` holds the lengths of the original columns.
+    """
+
+    gram: np.ndarray
+    right_side: np.ndarray
+    scale: np.ndarray
+
+    @classmethod
+    def from_products(
+        cls, gram: np.ndarray, right_side: np.ndarray
+    ) -> _ScaledEquations:
+        """Scale the columns of normal equations."""
+        scale = np.sqrt(np.diagonal(gram, axis1=1, axis2=2))
+        scaled = gram / (scale[:, :, None] * scale[:, None, :])
+        ridge = _RIDGE * np.eye(gram.shape[-1])
+        return cls(scaled + ridge, right_side / scale, scale)
+
+    def fit(self, columns: np.ndarray) -> np.ndarray:
+        """Fit some columns (sets, k) of each data set by least squares.
+
+        Returns coefficients (sets, K), zero for all other columns.
+        """
+        sets = np.arange(len(columns))[:, None]
+        coefficients = np.zeros_like(self.right_side)
+        gram = self.gram[sets[..., None], columns[:, :, None], columns[:, None, :]]
+        right_side = self.right_side[sets, columns][..., None]
+        solution = np.linalg.solve(gram, right_side)[..., 0]
+        coefficients[sets, columns] = solution / self.scale[sets, columns]
+        return coefficients
+
+
+@dataclass(frozen=True)
+class _Folds:
+    """Normal equations of each fold, and of all other folds together."""
+
+    validation: list[NormalEquations]
+    training: list[_ScaledEquations]
+
+    @classmethod
+    def from_total(cls, folds: list[NormalEquations], total: NormalEquations) -> _Folds:
+        """Subtract each fold from the normal equations of the whole data set."""
+        training = [
+            _ScaledEquations.from_products(
+                total.gram - fold.gram, total.right_side - fold.right_side
+            )
+            for fold in folds
+        ]
+        return cls(folds, training)
+
+    def cross_validate(self, columns: np.ndarray) -> np.ndarray:
+        """Sum of squares (sets,) that fits of columns (sets, k) leave in the folds that
+        they do not use."""
+        errors = [
+            fold.compute_squared_error(others.fit(columns))
+            for fold, others in zip(self.validation, self.training, strict=True)
+        ]
+        return np.sum(errors, axis=0)
 
 
 @dataclass(frozen=True)
 class Ladder:
-    """Models of each data set, from no link spring to all.
+    """Models of each data set, from no link spring to all L.
 
-    `order` (sets, L) of int: links in the order in which they were added.
-    `cross_validated` (sets, L + 1): sum of squares left in the folds that were left
-    out. `coefficients` (sets, L + 1, K): of the model with so many links, fitted to the
-    whole data set.
+    Attributes
+    ----------
+    order : (sets, L) array of int
+        Links in the order in which they were added.
+    cross_validated : (sets, L + 1) array
+        Sum of squares left in the folds that were left out.
+    coefficients : (sets, L + 1, K) array
+        Of the model with each number of links, fitted to the whole data set.
     """
 
     order: np.ndarray
@@ -106,15 +193,17 @@ class Ladder:
 
     @property
     def chosen(self) -> np.ndarray:
-        """Number of links by cross-validation, ndarray of int (sets,)."""
+        """Number of links chosen by cross-validation, (sets,) array of int."""
         return np.argmin(self.cross_validated, axis=1)
 
 
 def compute_spring_columns(robot: Robot, experiments: Experiments) -> np.ndarray:
-    """Deflection of the end-effector per unit of each spring element: joints first,
-    then eight for each link.
+    """Compute the deflection of the end-effector per unit of each spring element.
 
-    `robot`: with links. Returns (sets, configurations, 6, n + 8 L).
+    Returns
+    -------
+    (sets, configurations, 6, n + 8 L) array
+        The n joints first, then eight elements for each of the robot's L links.
     """
     chain = extended_chain(robot)
     n = robot.joints
@@ -123,193 +212,183 @@ def compute_spring_columns(robot: Robot, experiments: Experiments) -> np.ndarray
     columns = [jacobian[..., :n] * torques[..., None, :n]]
     for number, link in enumerate(robot.links):
         axes = beam_axes(link)
-        mine = slice(n + 6 * number, n + 6 * number + 6)
-        moved = jacobian[..., mine] @ axes
-        forced = torques[..., mine] @ axes
+        coordinates = slice(n + 6 * number, n + 6 * number + 6)
+        motion = jacobian[..., coordinates] @ axes
+        force = torques[..., coordinates] @ axes
         for i, j in _ELEMENTS:
-            column = moved[..., i] * forced[..., None, j]
-            columns.append(
-                (column if i == j else column + moved[..., j] * forced[..., None, i])[
-                    ..., None
-                ]
-            )
+            column = motion[..., i] * force[..., None, j]
+            if i != j:
+                column = column + motion[..., j] * force[..., None, i]
+            columns.append(column[..., None])
     return np.concatenate(columns, axis=-1)
 
 
 def form_normal_equations(
     columns: np.ndarray, deflection: np.ndarray
 ) -> NormalEquations:
-    """Normal equations of each data set.
+    """Form the normal equations of each data set.
 
-    `columns` (sets, configurations, rows, K), `deflection` (sets, configurations,
-    rows). Returns of shape (sets,).
+    Parameters
+    ----------
+    columns : (sets, configurations, rows, K) array
+    deflection : (sets, configurations, rows) array
+
+    Returns
+    -------
+    NormalEquations
+        Of shape (sets,).
     """
-    left = columns.reshape(len(columns), -1, columns.shape[-1])
-    right = deflection.reshape(len(deflection), -1)
-    across = left.swapaxes(1, 2)
-    return NormalEquations(
-        across @ left, (across @ right[..., None])[..., 0], (right**2).sum(axis=1)
-    )
+    matrix = columns.reshape(len(columns), -1, columns.shape[-1])
+    values = deflection.reshape(len(deflection), -1)
+    transposed = matrix.swapaxes(1, 2)
+    right_side = (transposed @ values[..., None])[..., 0]
+    return NormalEquations(transposed @ matrix, right_side, (values**2).sum(axis=1))
 
 
-def build_ladder(parts: list[NormalEquations], joints: int, links: int) -> Ladder:
-    """Add link springs one by one, in each data set that which cross-validation likes
-    best.
+def build_ladder(folds: list[NormalEquations], joints: int, links: int) -> Ladder:
+    """Add link springs one by one; in each data set the one with the lowest
+    cross-validated error comes next.
 
-    `parts`: of each fold, of shape (sets,).
+    Parameters
+    ----------
+    folds
+        Of each fold, of shape (sets,).
+    joints, links : int
+        Numbers of joints and links.
     """
-    whole = NormalEquations(
-        *(
-            sum(getattr(part, name) for part in parts)
-            for name in ("gram", "along", "squares")
-        )
-    )
-    sets, size = whole.along.shape
-    each = np.arange(sets)
-    elements = (size - joints) // links
+    total = sum(folds[1:], start=folds[0])
+    sets, size = total.right_side.shape
+    elements = np.arange((size - joints) // links)
+    scaled = _ScaledEquations.from_products(total.gram, total.right_side)
+    validation = _Folds.from_total(folds, total)
+    rows = np.arange(sets)
     columns = np.broadcast_to(np.arange(joints), (sets, joints))
-    left = np.broadcast_to(np.arange(links), (sets, links))
-    order = np.zeros((sets, 0), int)
-    scaled = _scaled(whole.gram, whole.along)
-    others = [
-        _scaled(whole.gram - part.gram, whole.along - part.along) for part in parts
-    ]
-    scores = [_cross_validate(parts, others, columns)]
-    fits = [_fit(columns, *scaled)]
+    remaining = np.broadcast_to(np.arange(links), (sets, links))
+    order = []
+    scores = [validation.cross_validate(columns)]
+    fits = [scaled.fit(columns)]
     for _ in range(links):
-        added = [
-            joints + elements * left[:, [place]] + np.arange(elements)
-            for place in range(left.shape[1])
+        candidates = [
+            np.concatenate(
+                [columns, joints + len(elements) * link[:, None] + elements], axis=1
+            )
+            for link in remaining.T
         ]
-        tried = [np.concatenate([columns, of_link], axis=1) for of_link in added]
-        found = np.stack(
-            [_cross_validate(parts, others, some) for some in tried], axis=1
-        )
-        best = np.argmin(found, axis=1)
-        order = np.concatenate([order, left[each, best][:, None]], axis=1)
-        columns = np.stack(tried)[best, each]
-        left = left[np.arange(left.shape[1]) != best[:, None]].reshape(sets, -1)
-        scores.append(found[each, best])
-        fits.append(_fit(columns, *scaled))
-    return Ladder(order, np.stack(scores, axis=1), np.stack(fits, axis=1))
-
-
-def _cross_validate(
-    parts: list[NormalEquations],
-    others: list[tuple[np.ndarray, ...]],
-    columns: np.ndarray,
-) -> np.ndarray:
-    """Sum of squares left in each fold by the fit to the others, (sets,)."""
-    return np.sum(
-        [
-            part.squared_error(_fit(columns, *rest))
-            for part, rest in zip(parts, others, strict=True)
-        ],
-        axis=0,
+        errors = np.stack(list(map(validation.cross_validate, candidates)), axis=1)
+        best = np.argmin(errors, axis=1)
+        order.append(remaining[rows, best])
+        columns = np.stack(candidates)[best, rows]
+        remaining = _remove_columns(remaining, best)
+        scores.append(errors[rows, best])
+        fits.append(scaled.fit(columns))
+    return Ladder(
+        np.stack(order, axis=1), np.stack(scores, axis=1), np.stack(fits, axis=1)
     )
 
 
-def _scaled(gram: np.ndarray, along: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Normal equations with columns of length 1, and these lengths (sets, K)."""
-    scale = np.sqrt(np.diagonal(gram, axis1=1, axis2=2))
-    return (
-        gram / (scale[:, :, None] * scale[:, None, :])
-        + _RIDGE * np.eye(gram.shape[-1]),
-        along / scale,
-        scale,
-    )
-
-
-def _fit(
-    columns: np.ndarray, gram: np.ndarray, along: np.ndarray, scale: np.ndarray
-) -> np.ndarray:
-    """Least squares with some columns of each data set, zero for the others, (sets, K);
-    the rest from `_scaled`."""
-    each = np.arange(len(columns))[:, None]
-    found = np.zeros_like(along)
-    chosen = gram[each[..., None], columns[:, :, None], columns[:, None, :]]
-    found[each, columns] = (
-        np.linalg.solve(chosen, along[each, columns][..., None])[..., 0]
-        / scale[each, columns]
-    )
-    return found
+def _remove_columns(array: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Remove one column from each row of an array (N, K); returns (N, K - 1)."""
+    kept = np.arange(array.shape[1]) != columns[:, None]
+    return array[kept].reshape(len(array), -1)
 
 
 def evaluate_ladder(
     study: StudyInMemory, lengths: Sequence[int], noises: Sequence[float]
 ) -> Iterator[dict[str, np.ndarray]]:
-    """Models with more and more link springs, in each data set of the study of the
+    """Fit models with more and more link springs to each data set of the study of the
     tables.
 
-    `study`: of a robot with links; the noise of its size is not looked at. `lengths`:
-    configurations from which to identify. `noises`: standard deviations, the same
-    number in m and rad.
+    Parameters
+    ----------
+    study
+        Of a robot with links; the noise of its size is not used.
+    lengths
+        Numbers of configurations from which to identify.
+    noises
+        Standard deviations, the same number in m and rad.
+
+    Yields
+    ------
+    dict
+        Columns of the ladder table.
     """
     robot = study.robot
-    tests = study.tests()
-    judged = form_normal_equations(
+    tests = study.draw_tests()
+    test_equations = form_normal_equations(
         compute_spring_columns(robot, tests)[:, :, :3],
-        study.deflections(tests)[..., :3],
+        study.compute_deflections(tests)[..., :3],
     )
     longest = max(lengths)
-    count = len(robot.links)
-    for sets in study.blocks():
-        drawn = study.experiments(sets, longest)
-        columns = compute_spring_columns(robot, drawn)
-        ideal = study.deflections(drawn)
+    for sets in study.list_blocks():
+        experiments = study.draw_experiments(sets, longest)
+        columns = compute_spring_columns(robot, experiments)
+        ideal = study.compute_deflections(experiments)
         normal = draw_measurement_noise(
             study.seed, study.key, robot.chain.end_effector.name, sets, longest
         )
-        for noise, length in (
-            (noise, length) for noise in noises for length in lengths
-        ):
-            deflection = ideal + noise * normal
-            folds = [
-                form_normal_equations(
-                    columns[:, fold:length:FOLDS], deflection[:, fold:length:FOLDS]
-                )
-                for fold in range(FOLDS)
-            ]
-            found = build_ladder(folds, robot.joints, count)
-            errors = np.stack(
-                [
-                    judged.squared_error(some)
-                    for some in found.coefficients.swapaxes(0, 1)
-                ],
-                axis=1,
+        for noise, length in product(noises, lengths):
+            ladder = _fit_ladder(
+                robot, columns[:, :length], (ideal + noise * normal)[:, :length]
             )
+            errors = [
+                test_equations.compute_squared_error(model)
+                for model in ladder.coefficients.swapaxes(0, 1)
+            ]
+            mean_square = np.stack(errors, axis=1) / study.size.tests
+            springs = np.arange(len(robot.links) + 1)
             yield {
-                "noise": np.full(errors.size, noise),
-                "length": np.full(errors.size, length),
-                "data_set": np.repeat(sets, count + 1),
-                "link_springs": np.tile(np.arange(count + 1), len(sets)),
-                "chosen": (np.arange(count + 1) == found.chosen[:, None]).ravel(),
-                "mean_square": errors.ravel() / study.size.tests,
+                "noise": np.full(mean_square.size, noise),
+                "length": np.full(mean_square.size, length),
+                "data_set": np.repeat(sets, len(springs)),
+                "link_springs": np.tile(springs, len(sets)),
+                "chosen": (springs == ladder.chosen[:, None]).ravel(),
+                "mean_square": mean_square.ravel(),
             }
 
 
-def build_ladder_table(found: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
-    """Error of one data set on configurations that it has not seen, by number of link
-    springs, or `CHOSEN`.
+def _fit_ladder(robot: Robot, columns: np.ndarray, deflection: np.ndarray) -> Ladder:
+    """Build the ladder of some data sets; every `FOLDS`-th configuration is in one
+    fold."""
+    folds = [
+        form_normal_equations(columns[:, fold::FOLDS], deflection[:, fold::FOLDS])
+        for fold in range(FOLDS)
+    ]
+    return build_ladder(folds, robot.joints, len(robot.links))
 
-    `found`: the ladder table of each robot with links. chosen_percent: share of data
-    sets in which cross-validation stops there.
+
+def build_ladder_table(ladders: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """Error of one data set on test configurations, by number of link springs or
+    `CHOSEN`.
+
+    Parameters
+    ----------
+    ladders
+        The ladder table of each robot with links.
+
+    Returns
+    -------
+    DataFrame
+        ``chosen_percent`` is the share of data sets in which cross-validation stops
+        there.
     """
     rows = []
-    for robot, frame in found.items():
+    for robot, frame in ladders.items():
         for (noise, length), cell in frame.groupby(["noise", "length"]):
-            steps = [
-                (str(number), some) for number, some in cell.groupby("link_springs")
-            ]
-            for name, some in [*steps, (CHOSEN, cell[cell.chosen])]:
-                rms = mean_of(some.mean_square.to_numpy(), True, MICRO)
-                chosen = 100 * some.chosen.mean() if name != CHOSEN else np.nan
-                noise_um = round(MICRO * float(str(noise)), 6)
-                rows.append(
-                    (robot, noise_um, length, name, rms.value, rms.std_error(), chosen)
-                )
-    head = ("robot", "noise_um", "length", "link_springs")
-    return make_frame(rows, (*head, "rms_um", "rms_um_std_error", "chosen_percent"))
+            noise_um = round(MICRO * float(str(noise)), 6)
+            head = (robot, noise_um, length)
+            for springs, models in cell.groupby("link_springs"):
+                share = 100 * models.chosen.mean()
+                rows.append((*head, str(springs), *_score_models(models), share))
+            chosen = cell[cell.chosen]
+            rows.append((*head, CHOSEN, *_score_models(chosen), np.nan))
+    columns = ("robot", "noise_um", "length", "link_springs")
+    return make_frame(rows, (*columns, "rms_um", "rms_um_std_error", "chosen_percent"))
+
+
+def _score_models(models: pd.DataFrame) -> tuple[float, float]:
+    """RMS error in µm and its standard error."""
+    rms = score_rms(models.mean_square.to_numpy(), MICRO)
+    return rms.value, rms.compute_std_error()
 
 
 climb_ladder = define_study_step(LADDER, evaluate_ladder)

@@ -1,8 +1,8 @@
-"""Data sets as the paper makes them: random configurations and forces, exact
-deflections, noise; and their tables on disk.
+"""Simulated data sets as in the paper, and their tables on disk: random configurations
+and forces, exact deflections, noise.
 
-Arrays have the axes (data set, configuration, ...), and those from tables lie component
-first in memory.
+Arrays have the axes (data set, configuration, ...); arrays read from tables have the
+component as first axis in memory.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     from elastocal.mechanics.chain import Chain, MeasuringPoint
     from elastocal.mechanics.robot import Robot
 
-# What a step holds in memory at a time.
+# Block size: a step holds this many data sets in memory at a time.
 SETS_PER_BLOCK = 500
 
 DEFLECTIONS = make_schema(
@@ -65,7 +65,7 @@ DEFLECTIONS = make_schema(
         for name, unit, meaning in COMPONENTS
     ),
 )
-# All that `to_deflections` looks at.
+# The columns that `unpack_deflections` needs.
 DEFLECTION_COLUMNS = ("configuration", *COMPONENT_NAMES)
 
 INITIAL = make_schema(
@@ -119,8 +119,11 @@ def make_experiments_schema(joints: int) -> TableSchema:
 class Experiments:
     """Loaded configurations of a robot.
 
-    `joint_angles` (sets, configurations, n): rad. `wrench` (sets, configurations, 6):
-    N, N m at the end-effector, base axes.
+    Attributes
+    ----------
+    joint_angles : (sets, configurations, n) array, rad
+    wrench : (sets, configurations, 6) array, N and N m
+        At the end-effector, base axes.
     """
 
     joint_angles: np.ndarray
@@ -131,10 +134,19 @@ class Experiments:
 class Loading:
     """How the robot is moved and loaded.
 
-    `force_N`: magnitude. `direction`: of the force, base axes; without one it is
-    uniform on the sphere. `offset_m`: from the end-effector to where the force acts.
-    `offset_frame`: axes of the offset (interpretation R4). `joint_range`: joint angles
-    uniform in +-pi or within the robot's limits (interpretation R3).
+    Attributes
+    ----------
+    force_N : float
+        Magnitude of the force.
+    offset_m : (3,)
+        From the end-effector to the point where the force acts.
+    offset_frame : str
+        Axes of the offset (interpretation R4).
+    joint_range : str
+        Joint angles are uniform in +-pi, or within the robot's limits (interpretation
+        R3).
+    direction : (3,) or None
+        Direction of the force, base axes; uniform on the sphere if None.
     """
 
     force_N: float
@@ -144,83 +156,120 @@ class Loading:
     direction: tuple[float, ...] | None = None
 
 
+@dataclass(frozen=True)
+class RandomDesign:
+    """Distribution of random configurations and wrenches.
+
+    Attributes
+    ----------
+    chain : Chain
+    limits : (n, 2) array, rad
+        Joint limits.
+    loading : Loading
+    key : str
+        Name of the robot's file; part of the names of the random streams.
+    """
+
+    chain: Chain
+    limits: np.ndarray
+    loading: Loading
+    key: str
+
+    @property
+    def ranges(self) -> np.ndarray:
+        """Lower and upper ends (2, n) of the joint angles, rad."""
+        if self.loading.joint_range == "limits":
+            return self.limits.T
+        full_turn = np.full(self.chain.coordinates, np.pi)
+        return np.stack([-full_turn, full_turn])
+
+
 def draw_random_experiments(
-    chain: Chain,
-    limits: np.ndarray,
+    design: RandomDesign,
     seed: int,
-    key: str,
-    loading: Loading,
     purpose: str,
     data_sets: Sequence[int] | np.ndarray,
     configurations: int,
 ) -> Experiments:
-    """Random configurations and wrenches.
+    """Draw random configurations and wrenches.
 
-    Forces have the directions of normal vectors, which are uniform on the sphere [1].
+    Directions of normal vectors are uniform on the sphere [1].
 
-    `limits` (n, 2): joint limits in rad. `key`: name of the robot's file; part of the
-    name of the random streams. `purpose`: part of the name of the random streams: data
-    that identify and data that judge never share one. `configurations`: in each data
-    set; the first k of them do not depend on how many there are.
+    Parameters
+    ----------
+    design
+    seed : int
+    purpose : str
+        Part of the names of the random streams: data that identify and data that
+        validate never share one.
+    data_sets
+        Numbers of the data sets.
+    configurations : int
+        Configurations in each data set; the first k do not depend on their number.
 
-    [1] Muller, M. E., A note on a method for generating points uniformly on n-dimensional spheres, Communications of the ACM 2,
-        1959.
+    References
+    ----------
+    [1] Muller, M. E., A note on a method for generating points uniformly on
+    n-dimensional spheres, Communications of the ACM 2, 1959.
     """
-    n = chain.coordinates
-    turns = draw_data_sets(
+    chain = design.chain
+    loading = design.loading
+    shares = draw_data_sets(
         seed,
-        key,
+        design.key,
         f"{purpose}/joint angles",
         data_sets,
-        lambda stream: stream.random((configurations, n)),
+        lambda stream: stream.random((configurations, chain.coordinates)),
     )
-    low, high = (
-        limits.T
-        if loading.joint_range == "limits"
-        else (np.full(n, -np.pi), np.full(n, np.pi))
-    )
-    joint_angles = low + (high - low) * turns
+    low, high = design.ranges
+    joint_angles = low + (high - low) * shares
     if loading.direction is None:
         normal = draw_data_sets(
             seed,
-            key,
+            design.key,
             f"{purpose}/force",
             data_sets,
             lambda stream: stream.standard_normal((configurations, 3)),
         )
     else:
-        normal = np.broadcast_to(
-            np.array(loading.direction, float), (*joint_angles.shape[:-1], 3)
-        )
+        direction = np.array(loading.direction, float)
+        normal = np.broadcast_to(direction, (*joint_angles.shape[:-1], 3))
     force = loading.force_N * normal / np.linalg.norm(normal, axis=-1, keepdims=True)
-    rotation = (
-        poses(chain, joint_angles, chain.end_effector)[1]
-        if loading.offset_frame == "tool"
-        else None
-    )
-    return Experiments(
-        joint_angles, wrench_of_offset_force(force, loading.offset_m, rotation)
-    )
+    rotation = None
+    if loading.offset_frame == "tool":
+        _, rotation = poses(chain, joint_angles, chain.end_effector)
+    wrench = wrench_of_offset_force(force, loading.offset_m, rotation)
+    return Experiments(joint_angles, wrench)
 
 
 def compute_true_deflections(
     robot: Robot, experiments: Experiments, point: MeasuringPoint, wrench_at: str
 ) -> np.ndarray:
-    """Deflection of a measuring point: theta from equation 7, then the exact kinematics
-    of all springs.
+    """Compute the deflection of a measuring point by the virtual joint method: theta
+    from equation 7, then the exact kinematics of all springs.
 
-    The virtual joint method, see `mechanics.elastostatics`. `robot`: reduced or, where
-    it has links, extended. `point`: of the robot's chain. `wrench_at`: where the wrench
-    that deflects a partial point is taken to act (interpretation R6). Returns (sets,
-    configurations, 6): m, rad.
+    See `mechanics.elastostatics`.
+
+    Parameters
+    ----------
+    robot : Robot
+        The reduced model or, if the robot has links, the extended one.
+    experiments
+    point
+        A point of the robot's chain.
+    wrench_at : str
+        Where the wrench that deflects a partial point acts (interpretation R6).
+
+    Returns
+    -------
+    (sets, configurations, 6) array, m and rad
     """
     chain = extended_chain(robot)
     unloaded = chain.at(experiments.joint_angles)
     measured = replace(chain.point(point.name), offset_m=point.offset_m)
     jacobian = jacobians(chain, unloaded, loaded_point(chain, measured, wrench_at))
-    springs = generalized_forces(jacobian, experiments.wrench) @ spring_compliance(
-        robot
-    )
+    torques = generalized_forces(jacobian, experiments.wrench)
+    springs = torques @ spring_compliance(robot)
     return exact_deflections(chain, unloaded, springs, measured)
 
 
@@ -231,12 +280,13 @@ def draw_measurement_noise(
     data_sets: Sequence[int] | np.ndarray,
     configurations: int,
 ) -> np.ndarray:
-    """Standard normal noise (sets, configurations, 6) at one measuring point; times the
-    noise level it is the error.
+    """Draw standard normal noise (sets, configurations, 6) at one measuring point.
 
-    The same numbers serve every noise level, so that levels differ by scale alone:
-    common random numbers [1].
+    The error is this noise times the noise level. All levels use the same numbers, so
+    that they differ only in scale: common random numbers [1].
 
+    References
+    ----------
     [1] Glasserman, P. and Yao, D. D., Some guidelines and guarantees for common random
     numbers, Management Science 38, 1992.
     """
@@ -249,10 +299,10 @@ def draw_measurement_noise(
     )
 
 
-def split_data_sets(data_sets: int) -> Iterator[range]:
-    """Numbers of so many data sets, block by block."""
-    for first in range(0, data_sets, SETS_PER_BLOCK):
-        yield range(first, min(first + SETS_PER_BLOCK, data_sets))
+def split_data_sets(count: int) -> Iterator[range]:
+    """Yield the numbers of `count` data sets, block by block."""
+    for first in range(0, count, SETS_PER_BLOCK):
+        yield range(first, min(first + SETS_PER_BLOCK, count))
 
 
 def make_prefix_index(
@@ -267,7 +317,8 @@ def make_prefix_index(
 
 
 def list_data_sets(columns: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Numbers of the data sets of a block, (sets,), whose rows stand together."""
+    """List the numbers (sets,) of the data sets of a block; rows of a data set are
+    adjacent."""
     numbers = columns["data_set"]
     return numbers[np.flatnonzero(np.diff(numbers, prepend=-1))]
 
@@ -275,7 +326,7 @@ def list_data_sets(columns: Mapping[str, np.ndarray]) -> np.ndarray:
 def pack_experiments(
     sets: Sequence[int] | np.ndarray, experiments: Experiments
 ) -> dict[str, np.ndarray]:
-    """Block of the experiments table."""
+    """Pack experiments into a block of the experiments table."""
     columns = _index_columns(sets, experiments.joint_angles.shape[1])
     columns |= {
         f"q{j + 1}": angle.ravel()
@@ -285,14 +336,16 @@ def pack_experiments(
 
 
 def unpack_experiments(columns: Mapping[str, np.ndarray]) -> Experiments:
-    """Experiments of a block."""
+    """Unpack the experiments of a block."""
     angles = [f"q{j + 1}" for j in range(sum(name[0] == "q" for name in columns))]
-    return Experiments(_stacked(columns, angles), _stacked(columns, WRENCH_NAMES))
+    return Experiments(
+        _stack_components(columns, angles), _stack_components(columns, WRENCH_NAMES)
+    )
 
 
 def unpack_deflections(columns: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Deflections (sets, configurations, 6) of a block."""
-    return _stacked(columns, COMPONENT_NAMES)
+    """Unpack the deflections (sets, configurations, 6) of a block."""
+    return _stack_components(columns, COMPONENT_NAMES)
 
 
 def _index_columns(
@@ -310,18 +363,25 @@ def _component_columns(
     return {name: values[..., k].ravel() for k, name in enumerate(names)}
 
 
-def _stacked(columns: Mapping[str, np.ndarray], names: Sequence[str]) -> np.ndarray:
-    configurations = int(columns["configuration"].max()) + 1
-    return np.moveaxis(
-        np.stack([columns[name].reshape(-1, configurations) for name in names]), 0, -1
-    )
+def _count_configurations(columns: Mapping[str, np.ndarray]) -> int:
+    """Number of configurations in each data set of a block."""
+    return int(columns["configuration"].max()) + 1
+
+
+def _stack_components(
+    columns: Mapping[str, np.ndarray], names: Sequence[str]
+) -> np.ndarray:
+    """Stack columns of a block to an array (sets, configurations, components)."""
+    configurations = _count_configurations(columns)
+    components = [columns[name].reshape(-1, configurations) for name in names]
+    return np.moveaxis(np.stack(components), 0, -1)
 
 
 def simulate_blocks(
     experiments: Iterable[Mapping[str, np.ndarray]], robot: Robot, wrench_at: str
 ) -> Iterator[dict[str, np.ndarray | str]]:
-    """Deflections without noise: of each block of experiments one block for each
-    measuring point."""
+    """Simulate deflections without noise; yields one block for each block of experiments
+    and each measuring point."""
     for block in experiments:
         loaded = unpack_experiments(block)
         sets = list_data_sets(block)
@@ -338,19 +398,22 @@ def simulate_blocks(
 def add_noise_to_blocks(
     ideal_blocks: Iterable[dict[str, np.ndarray]], key: str, seed: int, noise: float
 ) -> Iterator[dict[str, np.ndarray | str]]:
-    """Deflections as measured: ideal plus independent normal noise on every component.
+    """Add independent normal noise to every component of ideal deflections.
 
-    `key`: name of the robot's file. `noise`: standard deviation, the same number in m
-    and rad.
+    Parameters
+    ----------
+    ideal_blocks
+        Blocks of the deflections table.
+    key : str
+        Name of the robot's file.
+    seed : int
+    noise : float
+        Standard deviation, the same number in m and rad.
     """
     for block in ideal_blocks:
         point = block["point"][0]
         normal = draw_measurement_noise(
-            seed,
-            key,
-            point,
-            list_data_sets(block),
-            int(block["configuration"].max()) + 1,
+            seed, key, point, list_data_sets(block), _count_configurations(block)
         )
         measured = {
             name: block[name] + noise * normal[..., k].ravel()
@@ -360,8 +423,11 @@ def add_noise_to_blocks(
 
 
 def summarize_displacements(displacement: np.ndarray) -> dict[str, np.ndarray]:
-    """How far each data set of displacements (sets, configurations, 3 or more) bends:
-    columns of sizes."""
+    """Mean, mean square and maximum size of the displacements of each data set.
+
+    `displacement` is (sets, configurations, 3 or more); only the first three components
+    count.
+    """
     size = np.linalg.norm(displacement[..., :3], axis=-1)
     return {
         "mean": size.mean(axis=1),
@@ -371,8 +437,8 @@ def summarize_displacements(displacement: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def compute_statistics(frame: pd.DataFrame) -> dict[str, pd.Series]:
-    """Mean, standard deviation and largest of the deflections of each data set, m, of
-    the initial table or that of tubes."""
+    """Mean, standard deviation and maximum of the deflections of each data set, m, from
+    the initial table or the table of tubes."""
     return {
         "mean": frame["mean"],
         "std": (frame.mean_square - frame["mean"] ** 2) ** 0.5,
@@ -383,17 +449,29 @@ def compute_statistics(frame: pd.DataFrame) -> dict[str, pd.Series]:
 def draw_bootstrap_weights(
     seed: int, key: str, data_sets: Sequence[int] | np.ndarray, replicates: int
 ) -> np.ndarray:
-    """How often each data set counts in each replicate: once in replicate 0, Poisson(1)
-    times in the others.
+    """Draw how often each data set counts in each replicate: once in replicate 0,
+    Poisson(1) times in the others.
 
-    The Poisson bootstrap [1], whose independent weights of mean one do not need to know
-    how many data sets there are. They are the same for every noise level and strategy,
-    so that replicates of two of them may be compared one by one.
+    The independent weights of the Poisson bootstrap [1] have mean one and do not depend
+    on the number of data sets. They are the same for every noise level and strategy, so
+    that replicates of two of them can be compared one by one.
 
-    `seed`, `key`: as in `random_streams.open_stream`. Returns (1 + replicates, sets).
+    Parameters
+    ----------
+    seed, key
+        As in `random_streams.open_stream`.
+    data_sets
+        Numbers of the data sets.
+    replicates : int
 
-    [1] Hanley, J. A. and MacGibbon, B., Creating non-parametric bootstrap samples using Poisson frequencies, Computer Methods
-        and Programs in Biomedicine 83, 2006.
+    Returns
+    -------
+    (1 + replicates, sets) array
+
+    References
+    ----------
+    [1] Hanley, J. A. and MacGibbon, B., Creating non-parametric bootstrap samples using
+    Poisson frequencies, Computer Methods and Programs in Biomedicine 83, 2006.
     """
     counts = draw_data_sets(
         seed,
@@ -408,24 +486,23 @@ def draw_bootstrap_weights(
 def draw_weight_blocks(
     key: str, seed: int, data_sets: int, tests: int, replicates: int
 ) -> Iterator[dict[str, np.ndarray | str]]:
-    """How often each data set and each test configuration counts in each bootstrap
+    """Draw how often each data set and each test configuration counts in each bootstrap
     replicate.
 
-    Yields columns of the weights table: data sets in the blocks of the experiments,
-    then all test configurations.
+    Yields columns of the weights table: data sets in the blocks of the experiments, then
+    all test configurations.
     """
     for sets in split_data_sets(data_sets):
-        yield _weight_columns(
-            DATA_SETS, sets, draw_bootstrap_weights(seed, key, sets, replicates)[1:].T
-        )
-    of_tests = draw_data_sets(
+        weights = draw_bootstrap_weights(seed, key, sets, replicates)
+        yield _weight_columns(DATA_SETS, sets, weights[1:].T)
+    test_counts = draw_data_sets(
         seed,
         key,
         "bootstrap of tests",
         [0],
         lambda stream: stream.poisson(1.0, (replicates, tests)),
     )[0]
-    yield _weight_columns(TESTS, range(tests), of_tests.T)
+    yield _weight_columns(TESTS, range(tests), test_counts.T)
 
 
 def _weight_columns(
@@ -440,82 +517,72 @@ def _weight_columns(
 
 
 def draw_experiments(job: Job) -> None:
-    """Random configurations and loads of one robot."""
-    asked = job.params
+    """Draw random configurations and loads of one robot."""
+    params = job.params
     robot = job.wildcards.robot
-    chain = parse_chain(asked.chain, asked.lengths_m, robot)
-    limits = joint_limits(asked.joint_limits_deg, chain, robot)
-    loading = Loading(**asked.loading)
+    chain = parse_chain(params.chain, params.lengths_m, robot)
+    limits = joint_limits(params.joint_limits_deg, chain, robot)
+    design = RandomDesign(chain, limits, Loading(**params.loading), robot)
     blocks = (
         pack_experiments(
             sets,
             draw_random_experiments(
-                chain,
-                limits,
-                asked.seed,
-                robot,
-                loading,
-                asked.purpose,
-                sets,
-                asked.configurations,
+                design, params.seed, params.purpose, sets, params.configurations
             ),
         )
-        for sets in split_data_sets(asked.data_sets)
+        for sets in split_data_sets(params.data_sets)
     )
-    write_table(
-        job.output.experiments,
-        make_experiments_schema(chain.coordinates),
-        blocks,
-        describe_provenance(asked),
-    )
+    schema = make_experiments_schema(chain.coordinates)
+    write_table(job.output.experiments, schema, blocks, describe_provenance(params))
 
 
 def draw_weights(job: Job) -> None:
-    """Bootstrap weights of one robot, drawn once for all strategies and noise
+    """Draw the bootstrap weights of one robot, once for all strategies and noise
     levels."""
-    asked = job.params
-    drawn = draw_weight_blocks(
-        job.wildcards.robot, asked.seed, asked.data_sets, asked.tests, asked.replicates
+    params = job.params
+    blocks = draw_weight_blocks(
+        job.wildcards.robot,
+        params.seed,
+        params.data_sets,
+        params.tests,
+        params.replicates,
     )
-    write_table(job.output.weights, WEIGHTS, drawn, collect_provenance(job))
+    write_table(job.output.weights, WEIGHTS, blocks, collect_provenance(job))
 
 
 def simulate(job: Job) -> None:
-    """Deflections of one robot without noise."""
+    """Simulate the deflections of one robot without noise."""
     robot = load_robot(job)
-    blocks = simulate_blocks(
-        read_blocks(job.input.experiments, make_experiments_schema(robot.joints)),
-        robot,
-        job.params.wrench_at,
-    )
+    schema = make_experiments_schema(robot.joints)
+    experiments = read_blocks(job.input.experiments, schema)
+    blocks = simulate_blocks(experiments, robot, job.params.wrench_at)
     write_table(job.output.ideal, DEFLECTIONS, blocks, describe_provenance(job.params))
 
 
 def measure(job: Job) -> None:
-    """Deflections of one robot as measured at one noise level."""
+    """Simulate the measured deflections of one robot at one noise level."""
     ideal = read_blocks(job.input.ideal, DEFLECTIONS)
+    noise_um = job.wildcards.noise
     blocks = add_noise_to_blocks(
-        ideal, job.wildcards.robot, job.params.seed, 1e-6 * float(job.wildcards.noise)
+        ideal, job.wildcards.robot, job.params.seed, 1e-6 * float(noise_um)
     )
-    write_table(
-        job.output.measured,
-        DEFLECTIONS,
-        blocks,
-        describe_provenance(job.params, noise_um=job.wildcards.noise),
-    )
+    origin = describe_provenance(job.params, noise_um=noise_um)
+    write_table(job.output.measured, DEFLECTIONS, blocks, origin)
 
 
 def summarize_initial(job: Job) -> None:
-    """How far a robot bends before any calibration (Table 2), data set by data set."""
+    """Summarize the deflections of a robot before any calibration (Table 2), data set by
+    data set."""
     ideal = read_blocks(job.input.ideal, DEFLECTIONS, point=job.params.end_effector)
-    blocks = (
-        {
-            "data_set": list_data_sets(block),
-            "configurations": np.full(
-                len(list_data_sets(block)), int(block["configuration"].max()) + 1
-            ),
-            **summarize_displacements(unpack_deflections(block)),
-        }
-        for block in ideal
-    )
+    blocks = map(_summarize_block, ideal)
     write_table(job.output.initial, INITIAL, blocks, describe_provenance(job.params))
+
+
+def _summarize_block(block: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Columns of the initial table from a block of deflections."""
+    sets = list_data_sets(block)
+    return {
+        "data_set": sets,
+        "configurations": np.full(len(sets), _count_configurations(block)),
+        **summarize_displacements(unpack_deflections(block)),
+    }

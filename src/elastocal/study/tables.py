@@ -1,14 +1,15 @@
-"""The paper's tables and those beside them, as data frames, from the metrics of all
-strategies; and how people read them.
+"""The paper's tables and the additional ones as data frames, from the metrics of all
+strategies; and their form for people.
 
-Long frames come in with the columns robot, noise_um and strategy in front of those of
-the files. Every quantity that was measured by simulation has a column of its Monte
-Carlo standard error, ``<quantity>_std_error``.
+Long frames have the columns robot, noise_um and strategy in front of those of the files.
+Every quantity measured by simulation has a column with its Monte Carlo standard error,
+``<quantity>_std_error``.
 """
 
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -30,118 +31,213 @@ from elastocal.study.simulation import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Mapping
 
     from elastocal.mechanics.robot import Robot
 
 
-# Compliance of a joint by its number, in tables that people read; in files it is
-# ``compliance_{}``, rad/(N m).
+# Name of a joint's compliance in tables for people, by the number of the joint; in files
+# it is ``compliance_{}``, rad/(N m).
 COMPLIANCE = "compliance_{}_urad_per_Nm"
 
 
-def build_table1(robots: Mapping[str, Robot]) -> pd.DataFrame:
-    """Joint compliances that the study takes as true, µrad/(N m)."""
-    found = {name: MICRO * robot.compliance for name, robot in robots.items()}
-    return pd.DataFrame(
-        [
-            {"robot": name} | {COMPLIANCE.format(j): c for j, c in enumerate(row, 1)}
-            for name, row in found.items()
+@dataclass(frozen=True)
+class Results:
+    """Metrics of all robots and strategies, and the cell that the tables show.
+
+    Attributes
+    ----------
+    metrics, replicates
+        Long tables.
+    noise_um : float
+        Noise level of the tables.
+    length : int
+        Data set length of the tables.
+    """
+
+    metrics: pd.DataFrame
+    replicates: pd.DataFrame
+    noise_um: float
+    length: int
+
+    def select_metrics(self, robot: str, strategy: str) -> pd.DataFrame:
+        """Metrics of a strategy on a robot by the length; empty if not studied."""
+        return self._select(self.metrics, robot, strategy).set_index("length")
+
+    def select_replicates(self, robot: str, strategy: str) -> pd.DataFrame:
+        """Bootstrap replicates of a strategy on a robot."""
+        return self._select(self.replicates, robot, strategy)
+
+    def _select(self, frame: pd.DataFrame, robot: str, strategy: str) -> pd.DataFrame:
+        return frame[
+            (frame.robot == robot)
+            & (frame.noise_um == self.noise_um)
+            & (frame.strategy == strategy)
         ]
-    )
+
+    def get_row(self, robot: str, strategy: str) -> pd.Series:
+        """Metrics of a strategy on a robot at the length of the tables."""
+        return _get_row(self.select_metrics(robot, strategy), self.length)
+
+    def compute_share_compensated(
+        self, robot: str, strategy: str
+    ) -> tuple[float, float]:
+        """Share of the initial deviation that calibration removes, in percent, with its
+        standard error; NaN if not studied."""
+        cell = self.select_metrics(robot, strategy)
+        if cell.empty:
+            return np.nan, np.nan
+        row = _get_row(cell, self.length)
+        replicates = self.select_replicates(robot, strategy)
+        replicates = replicates[replicates.length == self.length]
+        shares = 100 * (1 - replicates.deviation / replicates.initial_deviation)
+        share = 100 * (1 - row.deviation / row.initial_deviation)
+        return float(share), float(shares.std(ddof=1))
+
+    def compute_deviation_ratio(
+        self, robot: str, strategy: str, divisor: str
+    ) -> tuple[float, float]:
+        """Deviation of a strategy over that of the divisor, with its standard error; NaN
+        if not studied."""
+        values = []
+        drawn = []
+        for name in (strategy, divisor):
+            cell = self.select_metrics(robot, name)
+            if cell.empty:
+                return np.nan, np.nan
+            values.append(cell.deviation.loc[self.length])
+            replicates = self.select_replicates(robot, name)
+            at_length = replicates[replicates.length == self.length]
+            drawn.append(at_length.deviation.to_numpy())
+        std_error = np.std(drawn[0] / drawn[1], ddof=1)
+        return float(values[0] / values[1]), float(std_error)
+
+
+def _get_row(cell: pd.DataFrame, length: int) -> pd.Series:
+    """The row of a length, which occurs once."""
+    row = cell.loc[length]
+    assert isinstance(row, pd.Series)
+    return row
+
+
+def build_table1(robots: Mapping[str, Robot]) -> pd.DataFrame:
+    """Table 1: joint compliances that the study takes as true, µrad/(N m)."""
+    rows = []
+    for name, robot in robots.items():
+        row: dict[str, str | float] = {"robot": name}
+        for number, value in enumerate(MICRO * robot.compliance, 1):
+            row[COMPLIANCE.format(number)] = value
+        rows.append(row)
+    return pd.DataFrame(rows)
 
 
 def build_table2(
     initial: Mapping[str, pd.DataFrame], weights: Mapping[str, np.ndarray]
 ) -> pd.DataFrame:
-    """End-effector deviation before calibration, over all configurations of all data
-    sets.
+    """Table 2: end-effector deviation before calibration, over all configurations of all
+    data sets.
 
-    `initial`: the initial table of each robot. `weights` (1 + replicates, sets):
-    bootstrap weights of each robot's data sets. The bootstrap has no standard error for
-    a maximum. Beside them the average of the same figures of single data sets and its
-    spread, ``mean_mm_one_set`` and ``mean_mm_one_set_std``.
+    Parameters
+    ----------
+    initial
+        The initial table of each robot.
+    weights
+        Bootstrap weights (1 + replicates, sets) of each robot's data sets.
+
+    Returns
+    -------
+    DataFrame
+        Mean, standard deviation and maximum; the bootstrap has no standard error for a
+        maximum. ``mean_mm_one_set`` and ``mean_mm_one_set_std`` are the average and the
+        spread of the same quantity of single data sets.
     """
     rows = []
     for robot, frame in initial.items():
-        count = weights[robot] @ frame.configurations
-        mean = weights[robot] @ (frame.configurations * frame["mean"]) / count
-        std = np.sqrt(
-            weights[robot] @ (frame.configurations * frame.mean_square) / count
-            - mean**2
-        )
         row: dict[str, str | float] = {"robot": robot}
-        for name, values in (("mean_mm", MILLI * mean), ("std_mm", MILLI * std)):
-            row |= {
-                name: float(values[0]),
-                f"{name}_std_error": float(np.std(values[1:], ddof=1)),
-            }
+        weight = weights[robot]
+        count = weight @ frame.configurations
+        mean = weight @ (frame.configurations * frame["mean"]) / count
+        mean_square = weight @ (frame.configurations * frame.mean_square) / count
+        for name, values in (("mean", mean), ("std", np.sqrt(mean_square - mean**2))):
+            row[f"{name}_mm"] = float(MILLI * values[0])
+            spread = np.std(MILLI * values[1:], ddof=1)
+            row[f"{name}_mm_std_error"] = float(spread)
         row["max_mm"] = MILLI * frame.maximum.max()
-        for name, each in compute_statistics(frame).items():
-            row |= {
-                f"{name}_mm_one_set": MILLI * each.mean(),
-                f"{name}_mm_one_set_std": MILLI * each.std(ddof=1),
-            }
+        for name, statistic in compute_statistics(frame).items():
+            row[f"{name}_mm_one_set"] = MILLI * statistic.mean()
+            row[f"{name}_mm_one_set_std"] = MILLI * statistic.std(ddof=1)
         rows.append(row)
     return pd.DataFrame(rows)
 
 
 def build_table3(
-    metrics: pd.DataFrame,
-    robots: Iterable[str],
-    strategy: str,
-    noise_um: float,
-    length: int,
+    results: Results, robots: Iterable[str], strategy: str
 ) -> pd.DataFrame:
-    """Compliances from the averaged stiffness (equation 12) by one strategy, µrad/(N
-    m)."""
+    """Table 3: compliances from the averaged stiffness (equation 12) by one strategy,
+    µrad/(N m)."""
     rows = []
     for robot in robots:
-        cell = _row_of(_by_length(metrics, robot, noise_um, strategy), length)
+        cell = results.get_row(robot, strategy)
         row: dict[str, str | float] = {"robot": robot}
-        # A robot with fewer joints than another one of the same frame has empty columns
-        # for those that it lacks.
-        for j in range(
-            1, int(cell.filter(regex=r"^compliance_\d+$").notna().sum()) + 1
-        ):
-            row |= {
-                COMPLIANCE.format(j) + end: MICRO * cell[f"compliance_{j}{end}"]
-                for end in ("", "_std_error")
-            }
+        # If another robot has more joints, the columns of the joints that this one lacks
+        # are empty.
+        joints = cell.filter(regex=r"^compliance_\d+$").notna().sum()
+        for j in range(1, int(joints) + 1):
+            for suffix in ("", "_std_error"):
+                value = MICRO * cell[f"compliance_{j}{suffix}"]
+                row[COMPLIANCE.format(j) + suffix] = value
         rows.append(row)
     return pd.DataFrame(rows)
 
 
+@dataclass(frozen=True)
+class _Table4Score:
+    """A score of Table 4, and the length at which it reaches its limit.
+
+    Attributes
+    ----------
+    column : str
+        Column of the metrics.
+    factor : float
+        From the unit of the metrics to that of the table.
+    limit : float
+        In the unit of the table.
+    score_name, length_name : str
+        Columns of the table.
+    """
+
+    column: str
+    factor: float
+    limit: float
+    score_name: str
+    length_name: str
+
+
 def build_table4(
-    metrics: pd.DataFrame,
-    replicates: pd.DataFrame,
-    robots: Sequence[str],
+    results: Results,
+    robots: Iterable[str],
     strategies: Iterable[str],
-    noise_um: float,
-    length: int,
     k_sigma_limit_percent: float,
     deviation_limit_um: float,
 ) -> pd.DataFrame:
-    """Comparison of the strategies at one noise level: scores at a length, and lengths
-    at which scores reach a limit.
+    """Table 4: scores of the strategies at one noise level and length, and the lengths at
+    which they reach a limit.
 
     A length that no data set reaches is infinite.
     """
-    limit = f"{k_sigma_limit_percent:g}_percent"
-    # Column of the metrics, its factor, and the limit and names of its score and of the
-    # length at which that reaches the limit.
-    figures = [
-        (
-            f"k_sigma{end}",
+    length = results.length
+    scores = [
+        _Table4Score(
+            f"k_sigma{suffix}",
             1.0,
             k_sigma_limit_percent,
-            f"k_sigma_{length}_percent{end}",
-            f"n_k_sigma_{limit}{end}",
+            f"k_sigma_{length}_percent{suffix}",
+            f"n_k_sigma_{k_sigma_limit_percent:g}_percent{suffix}",
         )
-        for end in ("", "_fixed_joints")
+        for suffix in ("", "_fixed_joints")
     ]
-    figures.append(
-        (
+    scores.append(
+        _Table4Score(
             "deviation",
             MICRO,
             deviation_limit_um,
@@ -150,140 +246,113 @@ def build_table4(
         )
     )
     rows = []
-    for strategy, robot in product(strategies, robots):
-        cell = _by_length(metrics, robot, noise_um, strategy)
-        drawn = _cell(replicates, robot, noise_um, strategy)
-        at = _row_of(cell, length)
+    for strategy, robot in product(strategies, [*robots]):
+        cell = results.select_metrics(robot, strategy)
+        replicates = results.select_replicates(robot, strategy)
         row: dict[str, str | float] = {"strategy": strategy, "robot": robot}
-        for name, factor, least, score, reached in figures:
-            row |= {
-                score: factor * at[name],
-                f"{score}_std_error": factor * at[f"{name}_std_error"],
-            }
-            curves = drawn.pivot(
-                index="replicate", columns="length", values=name
-            ).to_numpy()
-            found = find_length_with_error(
-                cell[name].to_numpy(), curves, least / factor
-            )
-            row |= dict(zip((reached, f"{reached}_std_error"), found, strict=True))
+        for score in scores:
+            row |= _evaluate_score(score, cell, replicates, length)
         rows.append(row)
     return pd.DataFrame(rows)
 
 
-def build_extended_table(
-    metrics: pd.DataFrame,
-    replicates: pd.DataFrame,
-    robots: Iterable[str],
-    strategies: Sequence[str],
-    noise_um: float,
-    length: int,
-) -> pd.DataFrame:
-    """What the reduced model leaves of the deviation of robots with elastic links."""
-    rows = []
-    for robot, strategy in product(robots, strategies):
-        at = _row_of(_by_length(metrics, robot, noise_um, strategy), length)
-        initial = MILLI * at.initial_deviation, MILLI * at.initial_deviation_std_error
-        left = MICRO * at.deviation, MICRO * at.deviation_std_error
-        share = compute_share_compensated(
-            metrics, replicates, robot, strategy, noise_um, length
-        )
-        rows.append((strategy, *initial, *left, *share, robot))
-    quantities = ("initial_mean_mm", "residual_mean_um", "share_compensated_percent")
-    names = [
-        "strategy",
-        *(name + suffix for name in quantities for suffix in ("", "_std_error")),
-        "robot",
-    ]
-    return pd.DataFrame(rows, columns=names)
-
-
-def compute_share_compensated(
-    metrics: pd.DataFrame,
-    replicates: pd.DataFrame,
-    robot: str,
-    strategy: str,
-    noise_um: float,
-    length: int,
-) -> tuple[float, float]:
-    """Share of the initial deviation that calibration removes, in percent, with its
-    standard error; NaN where not studied."""
-    cell = _by_length(metrics, robot, noise_um, strategy)
-    if cell.empty:
-        return np.nan, np.nan
-    at = _row_of(cell, length)
-    drawn = _cell(replicates, robot, noise_um, strategy).query("length == @length")
-    shares = 100 * (1 - drawn.deviation / drawn.initial_deviation)
-    return float(100 * (1 - at.deviation / at.initial_deviation)), float(
-        shares.std(ddof=1)
+def _evaluate_score(
+    score: _Table4Score, cell: pd.DataFrame, replicates: pd.DataFrame, length: int
+) -> dict[str, float]:
+    """Value of one score and the length at which it reaches its limit, each with its
+    standard error."""
+    row = _get_row(cell, length)
+    curves = replicates.pivot(
+        index="replicate", columns="length", values=score.column
+    ).to_numpy()
+    needed, needed_error = find_length_with_error(
+        cell[score.column].to_numpy(), curves, score.limit / score.factor
     )
+    std_error = score.factor * row[f"{score.column}_std_error"]
+    return {
+        score.score_name: score.factor * row[score.column],
+        f"{score.score_name}_std_error": std_error,
+        score.length_name: needed,
+        f"{score.length_name}_std_error": needed_error,
+    }
 
 
-def compute_deviation_ratio(
-    metrics: pd.DataFrame,
-    replicates: pd.DataFrame,
-    robot: str,
-    strategy: str,
-    over: str,
-    noise_um: float,
-    length: int,
-) -> tuple[float, float]:
-    """How many times smaller the deviation of `over` is than that of `strategy`, with
-    its error; NaN where not studied."""
-    values = []
-    drawn = []
-    for name in (strategy, over):
-        cell = _by_length(metrics, robot, noise_um, name)
-        if cell.empty:
-            return np.nan, np.nan
-        values.append(cell.deviation.loc[length])
-        drawn.append(
-            _cell(replicates, robot, noise_um, name)
-            .query("length == @length")
-            .deviation.to_numpy()
+# Columns of a table that may have no rows.
+_EXTENDED_COLUMNS = [
+    "strategy",
+    "initial_mean_mm",
+    "initial_mean_mm_std_error",
+    "residual_mean_um",
+    "residual_mean_um_std_error",
+    "share_compensated_percent",
+    "share_compensated_percent_std_error",
+    "robot",
+]
+
+
+def build_extended_table(
+    results: Results, robots: Iterable[str], strategies: Iterable[str]
+) -> pd.DataFrame:
+    """Deviation of robots with elastic links that the reduced model leaves."""
+    rows = []
+    for robot, strategy in product(robots, [*strategies]):
+        cell = results.get_row(robot, strategy)
+        share, share_error = results.compute_share_compensated(robot, strategy)
+        rows.append(
+            {
+                "strategy": strategy,
+                "initial_mean_mm": MILLI * cell.initial_deviation,
+                "initial_mean_mm_std_error": MILLI * cell.initial_deviation_std_error,
+                "residual_mean_um": MICRO * cell.deviation,
+                "residual_mean_um_std_error": MICRO * cell.deviation_std_error,
+                "share_compensated_percent": share,
+                "share_compensated_percent_std_error": share_error,
+                "robot": robot,
+            }
         )
-    return float(values[0] / values[1]), float(np.std(drawn[0] / drawn[1], ddof=1))
+    return pd.DataFrame(rows, columns=_EXTENDED_COLUMNS)
 
 
 def merge_errors(frame: pd.DataFrame, digits: int = 3) -> pd.DataFrame:
-    """The same table for people: each value with its standard error behind a ± sign, an
-    infinite length as "not reached".
+    """Merge each value with its standard error, for people: value ± error.
 
-    `digits`: significant digits of a value without error.
+    An infinite length becomes "not reached". `digits` is the number of significant
+    digits of a value without error.
     """
-    shown = {}
+    merged = {}
     for column in frame.columns:
         if column.endswith("_std_error"):
             continue
         errors = frame.get(f"{column}_std_error", pd.Series(np.nan, frame.index))
-        shown[column] = [
+        merged[column] = [
             format_value(value, error, digits)
             for value, error in zip(frame[column], errors, strict=True)
         ]
-    return pd.DataFrame(shown)
+    return pd.DataFrame(merged)
 
 
 def list_rows(frame: pd.DataFrame) -> list[list[str]]:
-    """The table for people as rows of words, its header first, with names of columns
-    that break at blanks."""
-    shown = merge_errors(
-        frame.loc[:, ~frame.columns.str.contains("_one_set|strategy_file")]
-    )
-    return [
-        [format_column_head(name) for name in shown.columns],
-        *shown.to_numpy().tolist(),
-    ]
+    """List the rows of a table for people, its header first.
+
+    Columns about single data sets and file names are left out.
+    """
+    internal = frame.columns.str.contains("_one_set|strategy_file")
+    merged = merge_errors(frame.loc[:, ~internal])
+    header = [format_column_head(name) for name in merged.columns]
+    return [header, *merged.to_numpy().tolist()]
 
 
 def format_column_head(name: str) -> str:
-    """Name of a column or a quantity for people, with its unit.
+    """Format the name of a column or a quantity for people, with its unit.
 
-    Returns names that are not of the paper's quantities with blanks.
+    Names of other quantities than the paper's get blanks for underscores.
     """
-    stage = ", fixed joints" if name.endswith("_fixed_joints") else ""
+    quantity = name.removesuffix("_fixed_joints")
+    suffix = ", fixed joints" if quantity != name else ""
     for pattern, words in _HEADS:
-        if found := re.fullmatch(pattern, name.removesuffix("_fixed_joints")):
-            return words.format(*found.groups()) + stage
+        match = re.fullmatch(pattern, quantity)
+        if match:
+            return words.format(*match.groups()) + suffix
     return name.replace("_", " ")
 
 
@@ -299,10 +368,16 @@ _HEADS = (
 
 
 def format_value(value: float | str, error: float, digits: int = 3) -> str:
-    """A value for people, with two digits of its standard error.
+    """Format a value for people, with two digits of its standard error.
 
-    `error`: not a number or zero where there is none. `digits`: significant digits of a
-    value without error.
+    Parameters
+    ----------
+    value
+        Text stays as it is.
+    error : float
+        NaN or zero if there is none.
+    digits : int
+        Significant digits of a value without error.
     """
     if isinstance(value, str):
         return value
@@ -316,49 +391,30 @@ def format_value(value: float | str, error: float, digits: int = 3) -> str:
     return f"{value:.{decimals}f} ± {error:.{decimals}f}"
 
 
-def _cell(
-    frame: pd.DataFrame, robot: str, noise_um: float, strategy: str
-) -> pd.DataFrame:
-    return frame[
-        (frame.robot == robot)
-        & (frame.noise_um == noise_um)
-        & (frame.strategy == strategy)
-    ]
-
-
-def _by_length(
-    metrics: pd.DataFrame, robot: str, noise_um: float, strategy: str
-) -> pd.DataFrame:
-    return _cell(metrics, robot, noise_um, strategy).set_index("length")
-
-
-def _row_of(cell: pd.DataFrame, length: int) -> pd.Series:
-    """What `_by_length` has of one length, which stands there once."""
-    row = cell.loc[length]
-    assert isinstance(row, pd.Series)
-    return row
+def read_results(job: Job, noise_um: float, length: int) -> Results:
+    """Read the metrics and bootstrap replicates of all strategies for tables of a noise
+    level and a length."""
+    metrics = read_long(job.input.metrics, make_metrics_schema)
+    replicates = read_long(job.input.replicates, lambda joints: REPLICATES)
+    return Results(metrics, replicates, noise_um, length)
 
 
 def tabulate_compliances(job: Job) -> None:
-    """Table 1."""
-    write_csvs(
-        job,
-        table=build_table1(
-            {
-                name: robot_from_document(document, name)
-                for name, document in job.params.robots.items()
-            }
-        ),
-    )
+    """Write Table 1."""
+    robots = {
+        name: robot_from_document(document, name)
+        for name, document in job.params.robots.items()
+    }
+    write_csvs(job, table=build_table1(robots))
 
 
 def tabulate_initial(job: Job) -> None:
-    """Table 2."""
+    """Write Table 2."""
+    params = job.params
     initial = read_frames(job, job.input.initial, INITIAL)
-    drawn = job.params.seed, job.params.replicates
     weights = {
         name: draw_bootstrap_weights(
-            drawn[0], name, frame.data_set.to_numpy(), drawn[1]
+            params.seed, name, frame.data_set.to_numpy(), params.replicates
         )
         for name, frame in initial.items()
     }
@@ -366,42 +422,31 @@ def tabulate_initial(job: Job) -> None:
 
 
 def tabulate_identified(job: Job) -> None:
-    """Table 3."""
-    asked = job.params
-    frame = read_long(job.input.metrics, make_metrics_schema)
-    write_csvs(
-        job,
-        table=build_table3(
-            frame, asked.robots, asked.strategy, asked.noise_um, asked.length
-        ),
-    )
+    """Write Table 3, which needs no replicates."""
+    params = job.params
+    metrics = read_long(job.input.metrics, make_metrics_schema)
+    results = Results(metrics, pd.DataFrame(), params.noise_um, params.length)
+    write_csvs(job, table=build_table3(results, params.robots, params.strategy))
 
 
 def tabulate_strategies(job: Job) -> None:
-    """Table 4."""
-    asked = job.params
-    long = (read_long(job.input.metrics, make_metrics_schema), read_all_replicates(job))
-    write_csvs(
-        job,
-        table=add_slugs(
-            build_table4(*long, asked.robots, [*asked.strategies], **asked.cells),
-            asked.strategies,
-        ),
+    """Write Table 4."""
+    params = job.params
+    cells = params.cells
+    table = build_table4(
+        read_results(job, cells["noise_um"], cells["length"]),
+        params.robots,
+        params.strategies,
+        cells["k_sigma_limit_percent"],
+        cells["deviation_limit_um"],
     )
+    write_csvs(job, table=add_slugs(table, params.strategies))
 
 
 def tabulate_extended(job: Job) -> None:
-    """Robots with elastic links."""
-    asked = job.params
-    long = (read_long(job.input.metrics, make_metrics_schema), read_all_replicates(job))
+    """Write the table of robots with elastic links."""
+    params = job.params
+    results = read_results(job, params.noise_um, params.length)
     write_csvs(
-        job,
-        table=build_extended_table(
-            *long, asked.robots, asked.strategies, asked.noise_um, asked.length
-        ),
+        job, table=build_extended_table(results, params.robots, params.strategies)
     )
-
-
-def read_all_replicates(job: Job) -> pd.DataFrame:
-    """Bootstrap replicates of the scores of all strategies."""
-    return read_long(job.input.replicates, lambda joints: REPLICATES)

@@ -1,5 +1,4 @@
-"""Held-out poses: how they are parted, the error on them with its interval, and which
-lie outside the fitted range.
+"""Validation: errors on held-out poses with their intervals, and extrapolation.
 
 Imports `fitting` and `campaigns`.
 """

@@ -1,5 +1,7 @@
-"""Whether errors say enough of a robot's use, and whether it keeps a tolerance: guarded
-acceptance after JCGM 106."""
+"""Conformity of a robot with a tolerance, by guarded acceptance after JCGM 106.
+
+Also: whether the validation covers enough of the robot's workspace to decide.
+"""
 
 from __future__ import annotations
 
@@ -17,13 +19,13 @@ if TYPE_CHECKING:
     from elastocal.fitting.observations import States
     from elastocal.mechanics.robot import Robot
 
-# With so many configurations the largest error bounds 69 % of all others at 95 %
-# confidence; fewer show little more than half.
+# The largest error of so many configurations bounds 69 % of all others at 95 %
+# confidence; that of fewer bounds little more than half.
 MIN_CONFIGURATIONS = 8
-# Over this turn an error that goes with the sine of a joint's angle changes by half of
-# its amplitude: over less it is hardly distinguishable from a constant.
+# Over this rotation, an error that is a sine of a joint's angle changes by half of its
+# amplitude. Over a smaller one it is hardly distinguishable from a constant.
 MIN_ROTATION_RAD = 2.0 * np.arcsin(0.25)
-# The same of a rail, as a share of its travel.
+# The same for a rail, as a share of its travel.
 MIN_TRAVEL_SHARE = 0.1
 PASS = "pass"
 FAIL = "fail"
@@ -31,59 +33,76 @@ UNDECIDED = "undecided"
 
 
 def count_configurations(states: States | Measurements) -> int:
-    """How many configurations states or measurements are of."""
-    return (
-        int(number_configurations(states.joint_angles, index_poses(states)).max()) + 1
-    )
+    """Count the distinct configurations of states or measurements."""
+    numbers = number_configurations(states.joint_angles, index_poses(states))
+    return int(numbers.max()) + 1
 
 
 def find_joint_ranges(states: States, robot: Robot) -> list[dict[str, Any]]:
-    """Smallest and largest angle of each joint with its unit, degrees or of a rail m,
-    JSON-serialisable."""
-    ends = np.array(
-        [states.joint_angles.min(axis=0), states.joint_angles.max(axis=0)]
-    ).T
-    units = [
-        (pair, "m") if rail else (np.rad2deg(pair), "deg")
-        for pair, rail in zip(ends, robot.chain.prismatic, strict=True)
-    ]
-    return [
-        {"low": float(low), "high": float(high), "unit": unit}
-        for (low, high), unit in units
-    ]
+    """Find the smallest and largest angle of each joint, in degrees, or m for a rail.
 
-
-def list_shortfalls(judged: int, fitted: States, robot: Robot) -> list[str]:
-    """Why errors at some configurations say too little of a robot: they are too few, or
-    a joint hardly moved."""
-    found = []
-    if judged < MIN_CONFIGURATIONS:
-        found.append(
-            f"too few: {format_count(judged, 'configuration')}, where at least {MIN_CONFIGURATIONS} must judge"
+    Each joint has "low", "high" and "unit"; the result is JSON-serialisable.
+    """
+    low = states.joint_angles.min(axis=0)
+    high = states.joint_angles.max(axis=0)
+    ranges = []
+    for joint, is_rail in enumerate(robot.chain.prismatic):
+        limits = np.array([low[joint], high[joint]])
+        if not is_rail:
+            limits = np.rad2deg(limits)
+        ranges.append(
+            {
+                "low": float(limits[0]),
+                "high": float(limits[1]),
+                "unit": "m" if is_rail else "deg",
+            }
         )
-    moved = np.ptp(fitted.joint_angles, axis=0)
-    rails = np.array(robot.chain.prismatic)
-    least = np.where(
-        rails, MIN_TRAVEL_SHARE * np.ptp(robot.joint_limits, axis=1), MIN_ROTATION_RAD
+    return ranges
+
+
+def list_shortfalls(configurations: int, fitted: States, robot: Robot) -> list[str]:
+    """List why errors at some validation configurations say too little of a robot.
+
+    There are too few configurations, or a joint hardly moved in the fitted states.
+    """
+    shortfalls = []
+    if configurations < MIN_CONFIGURATIONS:
+        count = format_count(configurations, "configuration")
+        shortfalls.append(
+            f"too few: {count}, where at least {MIN_CONFIGURATIONS} must judge"
+        )
+    travel = np.ptp(fitted.joint_angles, axis=0)
+    is_rail = np.array(robot.chain.prismatic)
+    needed = np.where(
+        is_rail,
+        MIN_TRAVEL_SHARE * np.ptp(robot.joint_limits, axis=1),
+        MIN_ROTATION_RAD,
     )
-    for joint in np.flatnonzero(moved < least):
-        sizes = [
-            f"{size:.3g} m" if rails[joint] else f"{np.rad2deg(size):.0f}°"
-            for size in (moved[joint], least[joint])
-        ]
-        found.append(
-            f"too close: joint {joint + 1} moved by {sizes[0]}, and {sizes[1]} are needed"
+    for joint in np.flatnonzero(travel < needed):
+        moved, least = (
+            f"{size:.3g} m" if is_rail[joint] else f"{np.rad2deg(size):.0f}°"
+            for size in (travel[joint], needed[joint])
         )
-    return found
+        shortfalls.append(
+            f"too close: joint {joint + 1} moved by {moved}, and {least} are needed"
+        )
+    return shortfalls
 
 
 @dataclass(frozen=True)
 class Conformity:
-    """A robot against a tolerance on its root mean square position error.
+    """Decision on a tolerance of the root mean square position error of a robot.
 
-    `decision`: one of "pass", "fail", "undecided". `limit_m`: what is compared with the
-    tolerance to pass: the RMS is larger with the accepted risk. `risk_above`: risk that
-    the RMS over all poses like these lies above the tolerance."""
+    Attributes
+    ----------
+    decision : "pass", "fail" or "undecided"
+    tolerance_m : float
+    limit_m : float
+        Compared with the tolerance to pass: the RMS exceeds it with the accepted risk.
+    risk_above : float
+        Risk that the RMS over all poses like the measured ones exceeds the tolerance.
+    accepted_risk : float
+    """
 
     decision: str
     tolerance_m: float
@@ -95,25 +114,28 @@ class Conformity:
 def decide_conformity(
     rms_m: np.ndarray, tolerance_m: float, accepted_risk: float
 ) -> Conformity:
-    """Decide by the RMS over some poses of robots (draws,) that a fit leaves possible.
+    """Decide whether a robot keeps a tolerance.
 
-    The robot passes where the risk that its RMS lies above the tolerance is at most the
-    accepted one, fails where the risk that it lies below is, and is undecided between:
+    It passes if the risk that its RMS exceeds the tolerance is at most the accepted
+    one, fails if the risk that it does not is at most that, and is otherwise undecided:
     acceptance and rejection with guard bands (JCGM 106:2012, 8.3).
+
+    Parameters
+    ----------
+    rms_m : (draws,) array
+        RMS error over the same poses of robots drawn from those that a fit leaves
+        possible.
+    tolerance_m : float
+    accepted_risk : float
     """
-    # One more than were drawn, so that no finite number of draws gives certainty.
+    # Count one more draw on each side, so that no finite number of draws gives
+    # certainty.
     risk = float((1.0 + (rms_m > tolerance_m).sum()) / (2.0 + len(rms_m)))
-    decision = (
-        PASS
-        if risk <= accepted_risk
-        else FAIL
-        if risk >= 1.0 - accepted_risk
-        else UNDECIDED
-    )
-    return Conformity(
-        decision,
-        tolerance_m,
-        float(np.quantile(rms_m, 1.0 - accepted_risk)),
-        risk,
-        accepted_risk,
-    )
+    if risk <= accepted_risk:
+        decision = PASS
+    elif risk >= 1.0 - accepted_risk:
+        decision = FAIL
+    else:
+        decision = UNDECIDED
+    limit_m = float(np.quantile(rms_m, 1.0 - accepted_risk))
+    return Conformity(decision, tolerance_m, limit_m, risk, accepted_risk)

@@ -1,12 +1,10 @@
-"""Errors on poses that no step has seen: before and after, with intervals over poses;
-and those on poses left out of a fit.
+"""Errors on held-out poses, with intervals over poses, and on poses left out of a fit.
 
 One Gauss-Newton step from the fit to all observations leads to the fit without a part
-(Cook and Weisberg, Residuals and Influence in Regression, 2.2, 1982). Where the errors
-of a few poses decide, it is taken as it is, in closed form; where a refit is asked for,
-exact residuals after the step prove it, or lead on from there. What a parameter was is
-not carried over where only that part identifies it: it goes back to where a fit starts,
-to its prior.
+of them (Cook and Weisberg, Residuals and Influence in Regression, 2.2, 1982). If only
+the errors of a few poses matter, this step is used in closed form. For a refit, exact
+residuals after the step confirm it, or further steps follow. A parameter that only the
+omitted part identifies returns to where a fit starts, to its prior.
 """
 
 from __future__ import annotations
@@ -38,28 +36,32 @@ if TYPE_CHECKING:
 
 METRICS = ("mean_m", "rms_m", "p95_m", "max_m")
 _CONFIDENCE = 0.95
-_ENDS = np.array([0.5 * (1.0 - _CONFIDENCE), 0.5 * (1.0 + _CONFIDENCE)])
-# Student's t with the same standard error takes over where few poses make the
-# bootstrap-t erratic (3: it holds 80 %, t 94 %; 6: both hold the same), and where so
-# many make both alike (300: widths differ by 3 %) and drawing costly.
-_FEWEST_TO_DRAW = 6
-_MOST_TO_DRAW = 300
-# Standard errors that an interval reaches at most: those of Student's t with two
-# degrees of freedom. Where one pose makes most of the error, replicates without it
-# reach arbitrarily far; in the simulations this costs no coverage (3 degrees: 2 %).
-_DEGREES_AT_LEAST = 2
-# Standard errors of a logarithm below this are rounding.
-_ROUNDING = 1e-12
-# What a pose alone determines, such as the frame of a session of one pose, is no error
-# of it: shares below are rounding.
-_SHARE = 1e-9
+_QUANTILES = np.array([0.5 * (1.0 - _CONFIDENCE), 0.5 * (1.0 + _CONFIDENCE)])
+# Outside this range of poses, Student's t with the same standard error replaces the
+# bootstrap-t. With fewer poses the bootstrap-t is erratic (3 poses: it covers 80 %,
+# Student's t 94 %; 6 poses: both cover the same). With more, the two are alike (300
+# poses: widths differ by 3 %) and drawing is expensive.
+_MIN_BOOTSTRAP_POSES = 6
+_MAX_BOOTSTRAP_POSES = 300
+# Intervals extend at most as many standard errors as those of Student's t with this
+# many degrees of freedom. If one pose makes most of the error, replicates without it
+# extend arbitrarily far; in simulations the limit costs no coverage (3 degrees: 2 %).
+_MIN_DEGREES_OF_FREEDOM = 2
+# Smaller standard errors of a logarithm are rounding.
+_LOG_ROUNDING = 1e-12
+# A pose alone determines some parameters, such as the frame of a session of one pose.
+# They leave none of its error: smaller shares of it are rounding.
+_SHARE_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
 class PositionErrors:
-    """Position errors of observations.
+    """Position errors of M observations.
 
-    `distance` (M,): m. `cluster` (M,): pose of each, 0 .. P-1.
+    Attributes
+    ----------
+    distance : (M,) array, m
+    cluster : (M,) int array, pose of each observation, 0 .. P-1
     """
 
     distance: np.ndarray
@@ -74,47 +76,40 @@ class PositionErrors:
 def compute_position_errors(
     model: Model, estimate: Estimate, observations: Observations
 ) -> PositionErrors:
-    """Distances between measured and predicted positions."""
-    return PositionErrors(
-        np.linalg.norm(
-            compute_position_residuals(model, estimate, observations), axis=1
-        ),
-        observations.cluster,
-    )
+    """Compute distances between measured and predicted positions."""
+    residuals = compute_position_residuals(model, estimate, observations)
+    return PositionErrors(np.linalg.norm(residuals, axis=1), observations.cluster)
 
 
 def compute_position_residuals(
     model: Model, estimate: Estimate, observations: Observations
 ) -> np.ndarray:
-    """Measured less predicted positions, ndarray (M, 3): m, base axes; in parts that
-    fit into memory."""
-    parts = [part for _, _, part in split_into_blocks(observations, 0)]
-    return np.concatenate(
-        [
-            compute_residuals(
-                model, estimate, p, evaluate_conditions(model, estimate, p.states)
-            )[:, :3]
-            for p in parts
-        ]
-    )
+    """Compute measured minus predicted positions, (M, 3) array, m, base axes.
+
+    Blocks of observations that fit into memory are processed one after another.
+    """
+    residuals = []
+    for _, _, block in split_into_blocks(observations, 0):
+        conditions = evaluate_conditions(model, estimate, block.states)
+        residuals.append(compute_residuals(model, estimate, block, conditions)[:, :3])
+    return np.concatenate(residuals)
 
 
 def summarize_errors(distance: np.ndarray) -> dict[str, float]:
-    """Mean, RMS, 95th percentile and maximum of distances (M,)."""
-    found = (
-        distance.mean(),
-        np.sqrt((distance**2).mean()),
-        np.quantile(distance, 0.95),
-        distance.max(),
-    )
-    return dict(zip(METRICS, map(float, found), strict=True))
+    """Compute mean, RMS, 95th percentile and maximum of distances (M,)."""
+    return {
+        "mean_m": float(distance.mean()),
+        "rms_m": float(np.sqrt((distance**2).mean())),
+        "p95_m": float(np.quantile(distance, 0.95)),
+        "max_m": float(distance.max()),
+    }
 
 
 @dataclass(frozen=True)
 class Reduction:
     """Share by which the RMS falls from one model to another on the same poses.
 
-    `low`, `high`: 95 % interval.
+    `low` and `high` are its 95 % interval.
     """
 
     low: float
@@ -128,105 +123,127 @@ def compute_error_intervals(
     stream: np.random.Generator,
     reference: int = 0,
 ) -> tuple[list[dict[str, np.ndarray]], list[Reduction]]:
-    """95 % intervals of the summary, for as few poses as a campaign holds out.
+    """Compute 95 % intervals of the summary, for as few poses as a campaign holds out.
 
     Measurements of one pose share errors. Mean and RMS, and the ratio of two RMS, have
     bootstrap-t intervals over poses, studentized by the delete-one-pose jackknife on
-    the logarithmic scale (Efron and Tibshirani, An Introduction to the Bootstrap, 11.3
-    and 12.5; for clusters Cameron, Gelbach and Miller 2008), and those of Student's t
-    with the same standard error where poses are very few or many. Quantiles of so few
-    poses have none. What they cover: docs/held_out_intervals.md.
+    the logarithmic scale [1]_ [2]_, and those of Student's t with the same standard
+    error if poses are very few or many. Quantiles of so few poses have none. Their
+    coverage: docs/held_out_intervals.md.
 
-    `errors`: of several models for the same observations; every replicate draws the
-    same poses for all. `reference`: which of them the reductions count from. Returns
-    `intervals`, (2,) for each of `errors` and metric, m, not a number where there is
-    none, as with a single pose; `reductions`, from the reference to each.
+    Parameters
+    ----------
+    errors : sequence of PositionErrors
+        Of several models for the same observations. Every replicate draws the same
+        poses for all.
+    replicates : int
+    stream : numpy.random.Generator
+    reference : int
+        Index of the errors from which reductions count.
+
+    Returns
+    -------
+    intervals : for each of `errors`, a (2,) array for each metric, m
+        Not a number if there is no interval, as with a single pose.
+    reductions : list of Reduction, from the reference to each of `errors`
+
+    References
+    ----------
+    .. [1] Efron and Tibshirani, An Introduction to the Bootstrap, 11.3 and 12.5.
+    .. [2] Cameron, Gelbach and Miller 2008, for clusters.
     """
     cluster = errors[0].cluster
-    poses = errors[0].poses
-    weights = None
-    if _FEWEST_TO_DRAW <= poses <= _MOST_TO_DRAW:
-        weights = stream.multinomial(
-            poses, np.full(poses, 1.0 / poses), replicates
-        ).astype(float)
-        # A replicate of one pose alone has no standard error.
-        weights = weights[(weights > 0).sum(axis=1) > 1]
+    weights = _draw_pose_weights(errors[0].poses, replicates, stream)
     counts = np.bincount(cluster).astype(float)
-    none = np.full(2, np.nan)
-    squares = [np.bincount(cluster, one.distance**2) for one in errors]
-    found = []
-    for one, square in zip(errors, squares, strict=True):
-        mean = np.exp(
-            _log_ratio_interval(np.bincount(cluster, one.distance), counts, weights)[0]
+    no_interval = np.full(2, np.nan)
+    squares = [np.bincount(cluster, model.distance**2) for model in errors]
+    intervals = []
+    for model, square in zip(errors, squares, strict=True):
+        totals = np.bincount(cluster, model.distance)
+        log_mean, _ = _log_ratio_interval(totals, counts, weights)
+        log_mean_square, _ = _log_ratio_interval(square, counts, weights)
+        intervals.append(
+            {
+                "mean_m": np.exp(log_mean),
+                "rms_m": np.exp(0.5 * log_mean_square),
+                "p95_m": no_interval,
+                "max_m": no_interval,
+            }
         )
-        rms = np.exp(0.5 * _log_ratio_interval(square, counts, weights)[0])
-        found.append({"mean_m": mean, "rms_m": rms, "p95_m": none, "max_m": none})
-    reductions = []
     before = squares[reference]
-    for square in squares:
-        interval, error = _log_ratio_interval(square, before, weights)
-        high, low = 1.0 - np.exp(0.5 * interval)
-        reductions.append(
-            Reduction(
-                float(low),
-                float(high),
-                float(0.5 * np.sqrt(square.sum() / before.sum()) * error),
-            )
-        )
-    return found, reductions
+    return intervals, [_compute_reduction(before, after, weights) for after in squares]
+
+
+def _compute_reduction(
+    before: np.ndarray, after: np.ndarray, weights: np.ndarray | None
+) -> Reduction:
+    """Reduction of the RMS from squared errors (P,) of each pose before and after."""
+    log_ratio, error = _log_ratio_interval(after, before, weights)
+    high, low = 1.0 - np.exp(0.5 * log_ratio)
+    std_error = 0.5 * np.sqrt(after.sum() / before.sum()) * error
+    return Reduction(float(low), float(high), float(std_error))
+
+
+def _draw_pose_weights(
+    poses: int, replicates: int, stream: np.random.Generator
+) -> np.ndarray | None:
+    """How often each pose counts in each bootstrap replicate, (B, P) array.
+
+    None if Student's t is used instead.
+    """
+    if not _MIN_BOOTSTRAP_POSES <= poses <= _MAX_BOOTSTRAP_POSES:
+        return None
+    weights = stream.multinomial(poses, np.full(poses, 1.0 / poses), replicates)
+    # A replicate of one pose alone has no standard error.
+    return weights[(weights > 0).sum(axis=1) > 1].astype(float)
 
 
 def _log_ratio_interval(
-    over: np.ndarray, under: np.ndarray, weights: np.ndarray | None
+    numerator: np.ndarray, denominator: np.ndarray, weights: np.ndarray | None
 ) -> tuple[np.ndarray, float]:
-    """Interval (2,) of the logarithm of a ratio of totals over poses, and its standard
-    error.
+    """Interval (2,) of the log ratio of two totals over poses, and its standard error.
 
-    `over`, `under` (P,): of each pose. `weights` (B, P): how often each counts in each
-    replicate; Student's t without.
+    `numerator` and `denominator` (P,) are those of each pose, `weights` as
+    `_draw_pose_weights` returns them.
     """
-    poses = len(over)
+    poses = len(numerator)
     if poses < 2:
         return np.full(2, np.nan), np.nan
-    value, error = (found[0] for found in _log_ratios(np.ones((1, poses)), over, under))
-    if error <= _ROUNDING:
+    (value,), (error,) = _log_ratios(np.ones((1, poses)), numerator, denominator)
+    if error <= _LOG_ROUNDING:
         return np.full(2, value), 0.0
     if weights is None:
-        return value + error * stdtrit(poses - 1, _ENDS), error
-    drawn, errors = _log_ratios(weights, over, under)
-    scattered = errors > _ROUNDING
+        return value + error * stdtrit(poses - 1, _QUANTILES), error
+    drawn, errors = _log_ratios(weights, numerator, denominator)
+    scattered = errors > _LOG_ROUNDING
     pivots = (drawn - value)[scattered] / errors[scattered]
-    farthest = stdtrit(_DEGREES_AT_LEAST, _ENDS[1])
-    return value - error * np.quantile(pivots, _ENDS[::-1]).clip(
-        -farthest, farthest
-    ), error
+    limit = stdtrit(_MIN_DEGREES_OF_FREEDOM, _QUANTILES[1])
+    pivot_quantiles = np.quantile(pivots, _QUANTILES[::-1]).clip(-limit, limit)
+    return value - error * pivot_quantiles, error
 
 
 def _log_ratios(
-    weights: np.ndarray, over: np.ndarray, under: np.ndarray
+    weights: np.ndarray, numerator: np.ndarray, denominator: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Logarithms of the ratio of weighted totals, and their jackknife standard errors,
-    ndarray (B,) each."""
-    poses = len(over)
-    tops = weights @ over
-    bottoms = weights @ under
+    (B,) arrays."""
+    poses = len(numerator)
+    total = weights @ numerator
+    total_below = weights @ denominator
+    ratio_without = (total[:, None] - numerator) / (total_below[:, None] - denominator)
     # A pose that was not drawn cannot be left out.
-    left = np.log(
-        np.where(weights > 0, (tops[:, None] - over) / (bottoms[:, None] - under), 1.0)
-    )
-    middle = (weights * left).sum(axis=1) / poses
-    variance = (
-        (poses - 1) / poses * (weights * (left - middle[:, None]) ** 2).sum(axis=1)
-    )
-    return np.log(tops / bottoms), np.sqrt(variance)
+    log_without = np.log(np.where(weights > 0, ratio_without, 1.0))
+    mean = (weights * log_without).sum(axis=1) / poses
+    deviation = log_without - mean[:, None]
+    variance = (poses - 1) / poses * (weights * deviation**2).sum(axis=1)
+    return np.log(total / total_below), np.sqrt(variance)
 
 
 def bound_share_below_maximum(poses: int) -> float:
-    """Share of all poses whose errors stay below the largest of so many, at 95 %
-    confidence, whatever their distribution.
+    """Bound the share of all poses whose errors stay below the largest of a sample.
 
-    The one-sided tolerance limit of a sample's maximum (Wilks, Annals of Mathematical
-    Statistics 12, 1941).
+    The bound holds at 95 % confidence for any distribution: the one-sided tolerance
+    limit of a sample's maximum (Wilks, Annals of Mathematical Statistics 12, 1941).
     """
     return float((1.0 - _CONFIDENCE) ** (1.0 / poses))
 
@@ -234,53 +251,69 @@ def bound_share_below_maximum(poses: int) -> float:
 def compute_noise_floor(
     fitted: Fit, observations: Observations, model: Model, estimate: Estimate
 ) -> float:
-    """RMS position error that the noise of a fit alone leaves in observations, m; not a
-    number where it is not known."""
+    """Compute the RMS position error, m, that the noise of a fit alone causes.
+
+    Not a number if the noise is only known from the residual.
+    """
     noise = fitted.noise
-    total = 0.0
     if noise.source == "residual":
         return float("nan")
-    for _, _, part in split_into_blocks(observations, len(fitted.unidentifiable)):
-        variance = np.full((len(part), 3), noise.position_m**2)
+    total = 0.0
+    for _, _, block in split_into_blocks(observations, len(fitted.unidentifiable)):
+        variance = np.full((len(block), 3), noise.position_m**2)
         if noise.joint_rad.any():
-            line = linearize_coordinates(
-                model, estimate, part, evaluate_conditions(model, estimate, part.states)
-            )
-            variance += ((line.joint_jacobian[:, :3] * noise.joint_rad) ** 2).sum(
-                axis=2
-            )
-        total += (variance.sum(axis=1) / part.states.repeats[part.state]).sum()
+            conditions = evaluate_conditions(model, estimate, block.states)
+            linear_model = linearize_coordinates(model, estimate, block, conditions)
+            joint_errors = linear_model.joint_jacobian[:, :3] * noise.joint_rad
+            variance += (joint_errors**2).sum(axis=2)
+        total += (variance.sum(axis=1) / block.states.repeats[block.state]).sum()
     return float(np.sqrt(total / len(observations)))
 
 
 def summarize_errors_by_range(
     errors: Mapping[str, PositionErrors], outside: np.ndarray
 ) -> dict[str, Any]:
-    """Errors before and after, inside and outside the range of the fitted poses.
+    """Summarize errors inside and outside the range of the fitted poses.
 
-    `errors`: by stage, for the same observations. `outside` (P,) of bool: as of
-    `placing.outside_poses`. Returns ``poses`` outside, and summaries of every stage
-    ``inside`` and ``outside``, None where there is no such pose.
+    Parameters
+    ----------
+    errors : mapping from stage to PositionErrors of the same observations
+    outside : (P,) bool array, as `transfer.find_extrapolated_poses` returns it
+
+    Returns
+    -------
+    dict
+        ``poses``: number of poses outside. ``inside``, ``outside``: the summary of each
+        stage, or None if there is no such pose.
     """
-    found: dict[str, Any] = {"poses": int(outside.sum())}
+    summaries: dict[str, Any] = {"poses": int(outside.sum())}
     for name, poses in (("inside", ~outside), ("outside", outside)):
-        there = errors if poses.any() else {}
-        found[name] = {
-            stage: summarize_errors(one.distance[poses[one.cluster]])
-            for stage, one in there.items()
-        } or None
-    return found
+        summaries[name] = None
+        if poses.any():
+            summaries[name] = {
+                stage: summarize_errors(of_stage.distance[poses[of_stage.cluster]])
+                for stage, of_stage in errors.items()
+            } or None
+    return summaries
 
 
 def refit_without_folds(
-    fitted: Fit, observations: Observations, part: np.ndarray
+    fitted: Fit, observations: Observations, fold: np.ndarray
 ) -> Iterator[Estimate]:
-    """Fit a model without each part of the observations in turn, as a fit from the
-    nominal robot would with the same shapes.
+    """Refit a model without each fold of the observations in turn.
 
-    `observations`: which it was fitted to, or some of them. `part` (S,) of int: of each
-    state, by whole poses. Yields the fit to the rest, for all observations: a session
-    that was left out has its frame fitted to itself, see `placed_estimate`.
+    The result is that of a fit from the nominal robot with the same shapes.
+
+    Parameters
+    ----------
+    fitted : Fit
+    observations : Observations that it was fitted to, or some of them
+    fold : (S,) int array, fold of each state, whole poses in each
+
+    Yields
+    ------
+    Estimate of the fit to the other folds, for all observations: the frame of a session
+    that was left out is fitted to itself, see `place_unseen_sessions`
     """
     model = fitted.model
     noise = fitted.noise
@@ -293,47 +326,45 @@ def refit_without_folds(
             reweight_first_step=True,
             tolerance=INTERMEDIATE_TOLERANCE,
         )
-    for number in np.unique(part):
-        rest = select_states(observations, part != number)
-        refit = fit_model(model, rest, noise, fitted.estimate, reweight_first_step=True)
-        # What only that part identifies is where the nominal robot has it.
-        if (refit.unidentifiable & ~fitted.unidentifiable).any() or not refit.converged:
-            refit = fit_model(
-                model,
-                rest,
-                noise,
-                replace(register_placement(model, rest), shapes=fitted.estimate.shapes),
+    for number in np.unique(fold):
+        training = select_states(observations, fold != number)
+        refit = fit_model(
+            model, training, noise, fitted.estimate, reweight_first_step=True
+        )
+        # A parameter that only this fold identifies has its value on the nominal robot.
+        newly_unidentifiable = refit.unidentifiable & ~fitted.unidentifiable
+        if newly_unidentifiable.any() or not refit.converged:
+            start = replace(
+                register_placement(model, training), shapes=fitted.estimate.shapes
             )
+            refit = fit_model(model, training, noise, start)
         yield place_unseen_sessions(refit, observations)
 
 
 def predict_left_out_squares(fitted: Fit, observations: Observations) -> np.ndarray:
-    """Mean square position error of each configuration as all others predict it, m²,
-    ndarray (configurations,).
+    """Predict each configuration from all others; return mean square position errors.
 
-    By the step alone, in closed form, with what is held as in the fit.
+    By a single step in closed form; parameters that the fit does not identify stay
+    fixed. Returns a (configurations,) array, m².
     """
-    white = fitted.whiten(fitted.residual)
+    residual = fitted.whiten(fitted.residual)
     states = observations.states
-    found = []
     configuration = number_configurations(states.joint_angles, index_poses(states))[
         observations.cluster
     ]
-    plain, whitened = (
-        np.concatenate(parts)
-        for parts in list(
-            zip(*fitted.iterate_sensitivities(observations), strict=True)
-        )[1:]
-    )
+    blocks = list(fitted.iterate_sensitivities(observations))
+    plain = np.concatenate([block[1] for block in blocks])
+    whitened = np.concatenate([block[2] for block in blocks])
+    mean_squares = []
     for number in range(configuration.max() + 1):
-        mine = configuration == number
-        rows = whitened[mine].reshape(
-            mine.sum() * whitened.shape[1], len(fitted.unidentifiable)
-        )
+        members = configuration == number
+        count = members.sum() * whitened.shape[1]
+        rows = whitened[members].reshape(count, whitened.shape[2])
         gain = fitted.covariance @ rows.T
         inverse = np.linalg.pinv(
-            np.eye(len(rows)) - rows @ gain, rcond=_SHARE, hermitian=True
+            np.eye(len(rows)) - rows @ gain, rcond=_SHARE_ROUNDING, hermitian=True
         )
-        moved = plain[mine][:, :3] @ (gain @ (inverse @ white[mine].ravel()))
-        found.append(((fitted.residual[mine][:, :3] + moved) ** 2).sum(axis=1).mean())
-    return np.array(found)
+        step = gain @ (inverse @ residual[members].ravel())
+        errors = fitted.residual[members][:, :3] + plain[members][:, :3] @ step
+        mean_squares.append((errors**2).sum(axis=1).mean())
+    return np.array(mean_squares)

@@ -1,5 +1,8 @@
-"""A fit carried to other measurements: their frames and targets, the effects that can
-act there, and where it extrapolates."""
+"""Transfer of a fit to other measurements.
+
+Their frames and targets are fitted, effects that cannot act there are dropped, and
+poses at which the model extrapolates are found.
+"""
 
 from __future__ import annotations
 
@@ -30,173 +33,197 @@ if TYPE_CHECKING:
     from elastocal.fitting.model import Case, Estimate, Model
     from elastocal.fitting.observations import Observations, States
 
-# Of more observations a sample says how surely those that were fitted are predicted.
-_MOST_FITTED = 10_000
-# A share of forces and moments, and N or N m: forces of one cell are stated to a few
-# digits.
-_ROUNDING = 1e-3
+# Of more observations than this, a sample shows how certain the predictions of fitted
+# poses are.
+_MAX_FITTED = 10_000
+# Rounding of forces and moments: as a share, and in N or N m. Forces of one load cell
+# are given to a few digits.
+_LOAD_ROUNDING = 1e-3
 
 
-def transfer_fit(fitted: Fit, case: Case, part: Case) -> tuple[Model, Estimate]:
-    """Model and estimate for other measurements: as fitted, or with frames and targets
-    of another campaign.
+def transfer_fit(fitted: Fit, case: Case, test_case: Case) -> tuple[Model, Estimate]:
+    """Transfer a fit to other measurements.
 
-    `case`: which it was fitted to. `part`: measurements of the same campaign or of
-    another one.
+    Parameters
+    ----------
+    fitted : Fit
+    case : Case that it was fitted to
+    test_case : Case of the same campaign or of another one
+
+    Returns
+    -------
+    Model and estimate: as fitted, or with frames and targets of the other campaign
     """
-    if is_same_campaign(case, part):
-        return fitted.model, place_unseen_sessions(fitted, part.observations)
-    carried = keep_transferable_effects(fitted, part.model, part.observations.states)
-    model = replace(
-        part.model,
-        nominal_compliance=fitted.model.nominal_compliance,
-        effects=carried.model.effects,
+    observations = test_case.observations
+    if is_same_campaign(case, test_case):
+        return fitted.model, place_unseen_sessions(fitted, observations)
+    transferable = keep_transferable_effects(
+        fitted, test_case.model, observations.states
     )
-    return model, fit_placement(carried, model, part.observations)
+    model = replace(
+        test_case.model,
+        nominal_compliance=fitted.model.nominal_compliance,
+        effects=transferable.model.effects,
+    )
+    return model, fit_placement(transferable, model, observations)
 
 
-def is_same_campaign(case: Case, part: Case) -> bool:
-    """Whether two cases are parts of one campaign."""
-    return part is case or part.campaign.name == case.campaign.name
+def is_same_campaign(case: Case, test_case: Case) -> bool:
+    """Whether two cases belong to one campaign."""
+    return test_case is case or test_case.campaign.name == case.campaign.name
 
 
 def place_unseen_sessions(fitted: Fit, observations: Observations) -> Estimate:
-    """The estimate of a fit for other observations of its targets, whose sessions it
-    may not have seen.
+    """Add the frames of sessions that a fit has not seen to its estimate.
 
-    The frame of such a session is fitted to the very observations that test it, six
-    numbers of each session, and so its errors come out slightly too small. Everything
-    else stays.
+    The frame of such a session, six numbers, is fitted to the same observations that
+    test it, so their errors come out slightly too small. Everything else stays.
     """
-    found = fitted.estimate
-    unseen = ~np.isin(observations.states.session, found.sessions)
+    estimate = fitted.estimate
+    unseen = ~np.isin(observations.states.session, estimate.sessions)
     if not unseen.any():
-        return found
-    turns = Rotation.from_matrix(found.target_rotation).as_rotvec()
-    places = zip(fitted.model.targets, found.target_offset, turns, strict=True)
-    known = [
-        replace(target, offset_m=tuple(at), rotation=tuple(turn))
-        for target, at, turn in places
-    ]
-    there = fit_placement(
+        return estimate
+    rotations = Rotation.from_matrix(estimate.target_rotation).as_rotvec()
+    known_targets = tuple(
+        replace(target, offset_m=tuple(offset), rotation=tuple(rotation))
+        for target, offset, rotation in zip(
+            fitted.model.targets, estimate.target_offset, rotations, strict=True
+        )
+    )
+    placed = fit_placement(
         fitted,
-        replace(fitted.model, targets=tuple(known)),
+        replace(fitted.model, targets=known_targets),
         select_states(observations, unseen),
     )
-    sessions = np.array([*found.sessions, *there.sessions])
+    sessions = np.array([*estimate.sessions, *placed.sessions])
+    frame_rotation = np.concatenate([estimate.frame_rotation, placed.frame_rotation])
+    frame_position = np.concatenate([estimate.frame_position, placed.frame_position])
     order = np.argsort(sessions)
     return replace(
-        found,
+        estimate,
         sessions=tuple(sessions[order].tolist()),
-        frame_rotation=np.concatenate([found.frame_rotation, there.frame_rotation])[
-            order
-        ],
-        frame_position=np.concatenate([found.frame_position, there.frame_position])[
-            order
-        ],
+        frame_rotation=frame_rotation[order],
+        frame_position=frame_position[order],
     )
 
 
 def keep_transferable_effects(fitted: Fit, model: Model, states: States) -> Fit:
-    """A fit without the effects that another campaign cannot have, or does not record:
-    a wandering tracker, a temperature.
+    """Drop effects that another campaign cannot have or does not record.
 
-    `states`: of the other campaign.
+    Examples are a wandering tracker and a temperature. `model` and `states` are those
+    of the other campaign.
     """
-    there = model.available_inputs(states) | {*LOADED_JOINTS, "external load"}
+    inputs = model.available_inputs(states) | {*LOADED_JOINTS, "external load"}
     estimate = fitted.estimate
+    effects = fitted.model.effects
     kept = [
-        n
-        for n, effect in enumerate(fitted.model.effects)
-        if not effect.of_setup and effect.needs <= there
+        number
+        for number, effect in enumerate(effects)
+        if not effect.of_setup and effect.needs <= inputs
     ]
-    known = replace(fitted.model, effects=tuple(fitted.model.effects[n] for n in kept))
-    coefficients, shapes = (
-        tuple(values[n] for n in kept)
-        for values in (estimate.coefficients, estimate.shapes)
-    )
     return replace(
         fitted,
-        model=known,
-        estimate=replace(estimate, coefficients=coefficients, shapes=shapes),
+        model=replace(fitted.model, effects=tuple(effects[n] for n in kept)),
+        estimate=replace(
+            estimate,
+            coefficients=tuple(estimate.coefficients[n] for n in kept),
+            shapes=tuple(estimate.shapes[n] for n in kept),
+        ),
     )
 
 
 def find_extrapolated_poses(fitted: Fit, case: Case, held_out: Case) -> np.ndarray:
-    """Which poses lie outside the range of those that a model was fitted to, where it
-    has to extrapolate.
+    """Find poses outside the range of the fitted poses, where a model extrapolates.
 
     Either a joint stands beyond the fitted poses by more than chance explains, see
-    `holdout.find_poses_beyond_range`; or the model predicts the position less surely than it would
-    have predicted any pose it was fitted to, had that pose been left out. The second
-    finds what ranges joint by joint miss: corners between the poses, loads, times and
-    temperatures beyond those fitted. Poses drawn like the fitted ones pass that maximum
-    with probability 1 / (P + 1) at most, as all are exchangeable: the argument of
-    conformal prediction (Vovk, Gammerman and Shafer 2005).
+    `holdout.find_poses_beyond_range`; or the predicted position is less certain than at
+    any fitted pose, had that pose been left out. The second criterion finds what ranges
+    joint by joint miss: corners between the poses, and loads, times and temperatures
+    beyond the fitted ones. A pose drawn like the P fitted ones exceeds their maximum
+    with probability 1 / (P + 1) at most, because all are exchangeable: the argument of
+    conformal prediction [1]_.
 
-    `case`: which it was fitted to. Returns (P,) of bool: by `Observations.cluster`.
+    Parameters
+    ----------
+    fitted : Fit
+    case : Case that it was fitted to
+    held_out : Case
+
+    Returns
+    -------
+    (P,) bool array, in the order of `Observations.cluster`
+
+    References
+    ----------
+    .. [1] Vovk, Gammerman and Shafer 2005.
     """
     unseen = held_out.observations
     if not is_same_campaign(case, held_out):
         fitted = keep_transferable_effects(fitted, held_out.model, unseen.states)
-    own, other = compute_predictive_variances(
+    fitted_variances, variances = compute_predictive_variances(
         fitted, case.observations, *transfer_fit(fitted, case, held_out), unseen
     )
     outside = find_beyond_campaign(
         case.observations.states, unseen.states.joint_angles, None
-    ) | (other > own.max(initial=0.0))
+    )
+    outside |= variances > fitted_variances.max(initial=0.0)
     return np.bincount(index_poses(unseen.states), outside) > 0
 
 
 def warn_of_repeated_poses(
     fitted_states: States | Measurements, states: States | Measurements
 ) -> list[str]:
-    """What to say of poses for the test whose configurations were fitted as well, see
-    `holdout.find_repeated`, if any."""
-    again = find_repeated(_angles_of_poses(fitted_states), _angles_of_poses(states))
-    if not again.any():
+    """Warn of validation poses whose configurations were fitted as well.
+
+    See `holdout.find_repeated`.
+    """
+    repeated = find_repeated(_angles_of_poses(fitted_states), _angles_of_poses(states))
+    if not repeated.any():
         return []
-    many = format_count(len(again), "validation pose")
-    count = f"{again.sum()} of {many}" if not again.all() else f"all {many}"
+    poses = format_count(len(repeated), "validation pose")
+    count = f"all {poses}" if repeated.all() else f"{repeated.sum()} of {poses}"
     return [
         f"{count} repeat configurations that were fitted: these errors say nothing of other poses"
     ]
 
 
 def _angles_of_poses(states: States | Measurements) -> np.ndarray:
-    """Joint angles of each pose, (P, n): its loads and repeats share them."""
+    """Joint angles (P, n) of each pose, which its loads and repeats share."""
     return states.joint_angles[np.unique(index_poses(states), return_index=True)[1]]
 
 
 def find_beyond_campaign(
     fitted_states: States, joint_angles: np.ndarray, wrench: np.ndarray | None
 ) -> np.ndarray:
-    """Poses and loads beyond those that a campaign measured, before any fit is at hand.
+    """Find poses and loads beyond those that a campaign measured, without any fit.
 
-    `joint_angles` (N, n): of the chain, rad. `wrench` (N, 6): N, N m; none where
-    nothing loads the robot. Returns (N,) of bool: by the joint angles as in
-    `outside_poses`, or by its loads.
+    Parameters
+    ----------
+    fitted_states : States of the campaign
+    joint_angles : (N, n) array, of the chain, rad
+    wrench : (N, 6) array, N and N m, or None without loads
+
+    Returns
+    -------
+    (N,) bool array: joint angles as in `find_extrapolated_poses`, or loads
     """
     outside = find_poses_beyond_range(_angles_of_poses(fitted_states), joint_angles)
-    return (
-        outside
-        if wrench is None
-        else outside | find_larger_loads(fitted_states, wrench)
-    )
+    if wrench is None:
+        return outside
+    return outside | find_larger_loads(fitted_states, wrench)
 
 
 def find_larger_loads(
     fitted_states: States, wrench: np.ndarray, times: float = 1.0
 ) -> np.ndarray:
-    """Forces or moments, of wrenches (N, 6), that are larger than so many times any of
-    the campaign: bool (N,)."""
-    sizes, largest = (
-        np.linalg.norm(each.reshape(-1, 2, 3), axis=2)
-        for each in (wrench, fitted_states.wrench)
-    )
-    return (sizes > (1.0 + _ROUNDING) * times * largest.max(axis=0) + _ROUNDING).any(
-        axis=1
-    )
+    """Find wrenches (N, 6) with forces or moments above `times` the campaign's largest.
+
+    Returns a (N,) bool array.
+    """
+    sizes = np.linalg.norm(wrench.reshape(-1, 2, 3), axis=2)
+    fitted_sizes = np.linalg.norm(fitted_states.wrench.reshape(-1, 2, 3), axis=2)
+    limit = (1.0 + _LOAD_ROUNDING) * times * fitted_sizes.max(axis=0) + _LOAD_ROUNDING
+    return (sizes > limit).any(axis=1)
 
 
 def compute_predictive_variances(
@@ -206,87 +233,138 @@ def compute_predictive_variances(
     estimate: Estimate,
     unseen: Observations,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """How surely a fit predicts positions: its own poses (P,), of very many some, each
-    left out in turn, and other states (S,).
+    """Compute how uncertain the positions are that a fit predicts.
 
-    The variance of the least sure reading, m², comes from the parameters alone, each
-    with its normal prior or else one of its plausible size: what the measurements do
-    not identify is as uncertain as that, and a pose that alone identifies a parameter
-    does not make all others look sure. It is the leverage of a prediction; poses are
-    left out by case deletion (Cook and Weisberg 1982) with Woodbury's identity. Frames
-    and targets count only where they are those of the fit.
+    The variance comes from the parameters alone, each with its normal prior or
+    otherwise one of its plausible size: a parameter that the measurements do not
+    identify is as uncertain as that, and a pose that alone identifies a parameter does
+    not make all others look certain. It is the leverage of a prediction. Fitted poses
+    are left out in turn by case deletion [1]_ with Woodbury's identity. Frames and
+    targets count only if they are those of the fit.
 
-    `observations`: which it was fitted to. `estimate`: of the fit, for the other
-    observations.
+    Parameters
+    ----------
+    fitted : Fit
+    observations : Observations that it was fitted to
+    model, estimate : of the fit, for the other observations
+    unseen : Observations
+
+    Returns
+    -------
+    fitted_variances : (P,) array, m², of fitted poses; of very many a sample
+    variances : (S,) array, m², of the other states
+        Each is that of the least certain observation.
+
+    References
+    ----------
+    .. [1] Cook and Weisberg 1982.
     """
-    listed = fitted.parameters
-    own = np.zeros(len(observations))
-    other = np.zeros(len(unseen))
-    shared = model.targets == fitted.model.targets and set(
-        unseen.states.session
-    ) <= set(observations.states.session)
-    kept = shared | ~find_placement_parameters(owner for owner, _ in listed)
-    plausible = np.array(
-        [parameter.prior_std or parameter.plausible for _, parameter in listed]
+    parameters = fitted.parameters
+    count = len(parameters)
+    if not count:
+        return (
+            _largest_by_group(np.zeros(len(observations)), observations.cluster),
+            _largest_by_group(np.zeros(len(unseen)), unseen.state),
+        )
+    scale = np.array(
+        [parameter.prior_std or parameter.plausible for _, parameter in parameters]
     )
-    if not listed:
-        return _largest(own, observations.cluster), _largest(other, unseen.state)
-    some = sample_observations(observations, _MOST_FITTED)
-    gram = np.zeros((len(listed),) * 2)
-    if len(some) < len(observations):
-        fitted = evaluate_as_fit(fitted.model, some, fitted.noise, fitted.estimate)
-        own = np.zeros(len(some))
-    for _, _, white in fitted.iterate_sensitivities(some):
-        rows = (white * plausible).reshape(-1, len(listed))
+    placement = find_placement_parameters(owner for owner, _ in parameters)
+    counted = ~placement | _shares_placement(fitted, observations, model, unseen)
+    sample = sample_observations(observations, _MAX_FITTED)
+    if len(sample) < len(observations):
+        fitted = evaluate_as_fit(fitted.model, sample, fitted.noise, fitted.estimate)
+    gram = np.zeros((count, count))
+    for _, _, whitened in fitted.iterate_sensitivities(sample):
+        rows = (whitened * scale).reshape(-1, count)
         gram += rows.T @ rows
-    gram *= len(observations) / len(some)
-    root = np.linalg.inv(np.linalg.cholesky(gram + np.eye(len(listed))))
-    cluster = some.cluster
-    for seen, plain, white in fitted.iterate_sensitivities(some):
-        projected = _through(root, plain[:, :3] * (plausible * kept))
-        rows = _through(root, white * plausible)
-        own[seen] = _variances_left_out(projected, rows, cluster[seen])
-    for _, seen, part in split_into_blocks(unseen, len(listed)):
-        there = linearize(
-            model, estimate, part, evaluate_conditions(model, estimate, part.states)
-        ).sensitivities[:, :3]
+    gram *= len(observations) / len(sample)
+    root = np.linalg.inv(np.linalg.cholesky(gram + np.eye(count)))
+    cluster = sample.cluster
+    fitted_variances = np.zeros(len(sample))
+    for indices, plain, whitened in fitted.iterate_sensitivities(sample):
+        fitted_variances[indices] = _variances_left_out(
+            _apply_root(root, plain[:, :3] * (scale * counted)),
+            _apply_root(root, whitened * scale),
+            cluster[indices],
+        )
+    variances = _variances_of_unseen(
+        model, estimate, unseen, scale[counted], root[:, counted]
+    )
+    return (
+        _largest_by_group(fitted_variances, cluster),
+        _largest_by_group(variances, unseen.state),
+    )
+
+
+def _variances_of_unseen(
+    model: Model,
+    estimate: Estimate,
+    unseen: Observations,
+    scale: np.ndarray,
+    root: np.ndarray,
+) -> np.ndarray:
+    """Variances (M,) of predicted positions.
+
+    `scale` (C,) and `root` (P, C) are those of the C parameters that count.
+    """
+    count = len(scale)
+    variances = np.zeros(len(unseen))
+    for _, indices, block in split_into_blocks(unseen, len(root)):
+        conditions = evaluate_conditions(model, estimate, block.states)
+        linear_model = linearize(model, estimate, block, conditions)
+        sensitivities = linear_model.sensitivities[:, :3]
         # Effects come last in the order of the parameters, whatever frames and targets
-        # stand before them.
-        there = there[..., there.shape[-1] - kept.sum() :] * plausible[kept]
-        flat = there.reshape(-1, there.shape[2]) @ root[:, kept].T
-        other[seen] = (flat**2).sum(axis=1).reshape(len(part), 3).sum(axis=1)
-    return _largest(own, cluster), _largest(other, unseen.state)
+        # precede them.
+        sensitivities = sensitivities[..., sensitivities.shape[-1] - count :]
+        rows = (sensitivities * scale).reshape(-1, count)
+        squares = ((rows @ root.T) ** 2).sum(axis=1)
+        variances[indices] = squares.reshape(len(block), 3).sum(axis=1)
+    return variances
 
 
-def _through(root: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Rows (M, r, P) times the transpose of a lower triangular matrix (P, P), without
-    its zeros, laid out as BLAS wants it."""
-    return blas.dtrmm(
-        1.0, root.T, rows.reshape(-1, rows.shape[2]).T, lower=0, trans_a=1
-    ).T.reshape(rows.shape)
+def _shares_placement(
+    fitted: Fit, observations: Observations, model: Model, unseen: Observations
+) -> bool:
+    """Whether other observations have the frames and targets of a fit."""
+    sessions = set(unseen.states.session)
+    return model.targets == fitted.model.targets and sessions <= set(
+        observations.states.session
+    )
+
+
+def _apply_root(root: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Rows (M, r, P) times the transpose of a lower triangular matrix (P, P).
+
+    BLAS skips the zeros of the matrix and determines the order of the axes.
+    """
+    flat = rows.reshape(-1, rows.shape[2]).T
+    return blas.dtrmm(1.0, root.T, flat, lower=0, trans_a=1).T.reshape(rows.shape)
 
 
 def _variances_left_out(
-    projected: np.ndarray, rows: np.ndarray, cluster: np.ndarray
+    projected: np.ndarray, whitened: np.ndarray, cluster: np.ndarray
 ) -> np.ndarray:
-    """Variance (M,) of positions without their own poses, by sensitivities through a
-    root, plain (M, 3, P) and whitened."""
+    """Variances (M,) of positions, each predicted without its own pose.
+
+    `projected` and `whitened` are the sensitivities (M, 3, P) and (M, rows, P) after
+    `_apply_root`; `cluster` (M,) is the pose of each observation.
+    """
     variance = (projected**2).sum(axis=(1, 2))
     width = projected.shape[2]
     for members in batch_groups_by_size(cluster):
-        own, asked = (
-            each[members].reshape(len(members), -1, width) for each in (rows, projected)
-        )
-        across = asked @ own.transpose(0, 2, 1)
-        left = np.eye(own.shape[1]) - own @ own.transpose(0, 2, 1)
-        gained = (
-            across * np.linalg.solve(left, across.transpose(0, 2, 1)).transpose(0, 2, 1)
-        ).sum(axis=-1)
-        variance[members] += gained.reshape(*members.shape, -1).sum(axis=-1)
+        rows = whitened[members].reshape(len(members), -1, width)
+        targets = projected[members].reshape(len(members), -1, width)
+        cross = targets @ rows.transpose(0, 2, 1)
+        remaining = np.eye(rows.shape[1]) - rows @ rows.transpose(0, 2, 1)
+        solved = np.linalg.solve(remaining, cross.transpose(0, 2, 1))
+        increase = (cross * solved.transpose(0, 2, 1)).sum(axis=-1)
+        variance[members] += increase.reshape(*members.shape, -1).sum(axis=-1)
     return variance
 
 
-def _largest(values: np.ndarray, group: np.ndarray) -> np.ndarray:
-    found = np.zeros(group.max() + 1)
-    np.maximum.at(found, group, values)
-    return found
+def _largest_by_group(values: np.ndarray, group: np.ndarray) -> np.ndarray:
+    """Largest value of each group; values are not negative."""
+    largest = np.zeros(group.max() + 1)
+    np.maximum.at(largest, group, values)
+    return largest

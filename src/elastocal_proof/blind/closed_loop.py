@@ -414,7 +414,7 @@ def stated_accuracy(
         prediction = predict_errors(
             calibrated, targets.joint_angles[mine], wanted.wrench[mine]
         )
-        stated = prediction.accuracy(part)
+        stated = prediction.summarize(part)
         distance = np.linalg.norm(off[mine], axis=1)
         decided = decide_conformity(prediction.rms_m, tolerance, _RISK)
         rows.append(

@@ -1,15 +1,15 @@
-"""Boxes and lines of sight."""
+"""Boxes, floor, column and lines of sight."""
 
 import numpy as np
 import pytest
 from analysed_robots import analysed
 from made_surveys import made_survey
 
-from elastocal.application.inverse_kinematics import reach_m
+from elastocal.application.inverse_kinematics import compute_reach_m
 from elastocal.application.planning.cell import (
     COLUMN_SHARE,
     Cell,
-    find_allowed,
+    check_configurations,
     sample_links,
 )
 from elastocal.campaigns.campaign import Target
@@ -29,76 +29,65 @@ def angles(survey):
     return low + (high - low) * np.random.default_rng(1).random((300, 6))
 
 
+def check(cell, survey, angles):
+    return check_configurations(cell, survey.robot, survey.targets, angles)
+
+
 def test_nothing_is_allowed_in_a_box_around_everything_and_all_far_from_it(
     survey, angles
 ):
-    assert not find_allowed(
-        Cell((EVERYWHERE,), None, 0.05), survey.robot, survey.targets, angles
-    )["boxes"].any()
-    assert find_allowed(
-        Cell((EVERYWHERE + 20.0,), None, 0.05), survey.robot, survey.targets, angles
-    )["boxes"].all()
+    assert not check(Cell((EVERYWHERE,), None, 0.05), survey, angles)["boxes"].any()
+    far_away = EVERYWHERE + 20.0
+    assert check(Cell((far_away,), None, 0.05), survey, angles)["boxes"].all()
 
 
-def test_a_target_behind_the_arm_is_hidden_and_one_before_it_is_seen(survey, angles):
-    """A tracker at each end of the line from the middle of the arm through the
-    target."""
-    target, _ = poses(
-        survey.robot.chain,
-        survey.robot.model_angles(angles),
-        survey.robot.chain.end_effector,
-    )
-    elbow = sample_links(survey.robot, survey.robot.model_angles(angles))[8 * 2]
-    out = (target - elbow) / np.linalg.norm(target - elbow, axis=1, keepdims=True)
-    for number in np.flatnonzero(np.linalg.norm(target - elbow, axis=1) > 0.4)[::60]:
-        behind = Cell((), elbow[number] - 3.0 * out[number], 0.08)
-        assert not find_allowed(
-            behind, survey.robot, survey.targets, angles[number : number + 1]
-        )["sight"][0]
-    lone = Cell((), np.array([0.0, 0.0, 500.0]), 1e-6)
-    assert find_allowed(lone, survey.robot, survey.targets, angles)["sight"].all()
+def test_a_target_behind_the_arm_is_hidden(survey, angles):
+    """The tracker is on the line from the target through the elbow."""
+    robot = survey.robot
+    chain_angles = robot.model_angles(angles)
+    target, _ = poses(robot.chain, chain_angles, robot.chain.end_effector)
+    elbow = sample_links(robot, chain_angles)[8 * 2]
+    distance = np.linalg.norm(target - elbow, axis=1, keepdims=True)
+    direction = (target - elbow) / distance
+    for number in np.flatnonzero(distance > 0.4)[::60]:
+        cell = Cell((), elbow[number] - 3.0 * direction[number], 0.08)
+        assert not check(cell, survey, angles[number : number + 1])["sight"][0]
+
+
+def test_no_thin_link_hides_a_target_from_a_tracker_above(survey, angles):
+    cell = Cell((), np.array([0.0, 0.0, 500.0]), 1e-6)
+    assert check(cell, survey, angles)["sight"].all()
 
 
 @pytest.mark.parametrize("name", ["abb", "iiwa14"])
 def test_neither_forearm_nor_target_is_below_the_floor_or_in_the_column(name):
     robot = analysed(name)
-    draws = np.random.default_rng(1)
     low, high = robot.joint_limits.T
-    reported = robot.reported_angles(
-        low + (high - low) * draws.random((2000, robot.joints))
-    )
-    end = robot.chain.end_effector.name
-    column = COLUMN_SHARE * reach_m(robot)
-    targets = (Target("A", end, (0.0, 0.0, 0.2)),)
-    free = Cell((), None, 0.02)
+    shares = np.random.default_rng(1).random((2000, robot.joints))
+    reported = robot.reported_angles(low + (high - low) * shares)
     angles = robot.model_angles(reported)
-    at, turned = poses(robot.chain, angles, robot.chain.end_effector)
-    tip = at + turned @ [0.0, 0.0, 0.2]
+    offset_m = (0.0, 0.0, 0.2)
+    targets = (Target("A", robot.chain.end_effector.name, offset_m),)
+    position, rotation = poses(robot.chain, angles, robot.chain.end_effector)
+    height = (position + rotation @ offset_m)[:, 2]
     forearm = sample_links(robot, angles, 2)
-    low_ones = (tip[:, 2] < 0.0) | (forearm[..., 2] < 0.0).any(axis=0)
-    found = find_allowed(Cell((), None, 0.02, 0.0, column), robot, targets, reported)
-    assert (
-        low_ones.sum() > 50
-        and not (found["floor"] & low_ones).any()
-        and found["floor"].sum() > 200
+    is_below = (height < 0.0) | (forearm[..., 2] < 0.0).any(axis=0)
+    column_m = COLUMN_SHARE * compute_reach_m(robot)
+    cell = Cell((), None, 0.02, 0.0, column_m)
+    allowed = check_configurations(cell, robot, targets, reported)
+    assert is_below.sum() > 50
+    assert not (allowed["floor"] & is_below).any() and allowed["floor"].sum() > 200
+    # More configurations are allowed above a floor that is half a metre lower.
+    lower_floor = Cell((), None, 0.02, -0.5)
+    above = check_configurations(lower_floor, robot, targets, reported)["floor"]
+    assert above.sum() > allowed["floor"].sum()
+    in_an_empty_cell = check_configurations(
+        Cell((), None, 0.02), robot, targets, reported
     )
-    # Half a metre below, more is allowed.
-    assert (
-        find_allowed(Cell((), None, 0.02, -0.5), robot, targets, reported)[
-            "floor"
-        ].sum()
-        > found["floor"].sum()
-    )
-    assert all(
-        each.all() for each in find_allowed(free, robot, targets, reported).values()
-    )
-    shoulder = sample_links(robot, angles, 1)[0, :, 2]
-    inside = (
-        (np.linalg.norm(forearm[..., :2], axis=-1) < column)
-        & (forearm[..., 2] < shoulder)
-    ).any(axis=0)
-    assert (
-        inside.any()
-        and not (found["column"] & inside).any()
-        and found["column"].mean() > 0.5
-    )
+    assert all(constraint.all() for constraint in in_an_empty_cell.values())
+    shoulder_height = sample_links(robot, angles, 1)[0, :, 2]
+    distance = np.linalg.norm(forearm[..., :2], axis=-1)
+    is_inside = (distance < column_m) & (forearm[..., 2] < shoulder_height)
+    is_inside = is_inside.any(axis=0)
+    assert is_inside.any()
+    assert not (allowed["column"] & is_inside).any() and allowed["column"].mean() > 0.5

@@ -1,5 +1,2 @@
-"""Where to measure: configurations and loads that say most about a robot, among those
-that arm, cell and tracker allow.
-
-Imports what `application` imports.
-"""
+"""Where to measure: the configurations and loads that determine the parameters of a
+robot best, among those that arm, cell and tracker allow."""

@@ -1,9 +1,9 @@
-"""Which configurations a cell allows: a floor, boxes and the robot's own column to keep
-out of, and a tracker's line of sight.
+"""Which configurations a cell allows: keep-out boxes, a floor, the robot's own column,
+and a tracker's line of sight.
 
-Links are capsules of one radius about the line of the chain: coarse, on the safe side
-for slender arms. The column before joint 1 stands where it stands and is in no one's
-way but that of forearm and hand.
+Links are capsules of one radius about the line of the chain. This is coarse, and on the
+safe side for slender arms. The column before joint 1 does not move; only forearm and
+hand can hit it.
 """
 
 from __future__ import annotations
@@ -21,25 +21,30 @@ if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Target
     from elastocal.mechanics.robot import Robot
 
-# Points along each stretch of the chain that stand for it.
+# Sample points along each stretch of the chain.
 _SAMPLES = 8
-# Radii of the links and of the column over the length of the chain stretched out: 0.1
-# and 0.25 m on an arm of 2.5 m.
+# Radii of the links and of the column over the length of the stretched chain: 0.1 and
+# 0.25 m on an arm of 2.5 m.
 RADIUS_SHARE = 0.04
 COLUMN_SHARE = 0.1
-# Links this many radii around a target carry it, and do not hide it.
-_CARRIER = 2.5
+# Sample points within this many radii of a target belong to the link that carries it,
+# and do not hide it.
+_CARRIER_RADII = 2.5
 
 
 @dataclass(frozen=True)
 class Cell:
-    """What stands around the robot, base axes, m.
+    """What stands around the robot; lengths in m, base axes.
 
-    `boxes` (3, 2): lower and upper corner by axis. `tracker_m` (3,): where the tracker
-    stands; None where nothing hides its targets. `radius_m`: of the links. `floor_m`:
-    height below which neither target nor anything from the elbow on may be; None for no
-    floor. `column_m`: radius of a cylinder about the first axis that turns, up to the
-    second, if it is vertical.
+    Attributes
+    ----------
+    boxes : arrays (3, 2) with lower and upper corner by axis.
+    tracker_m : (3,) position of the tracker; None if nothing hides its targets.
+    radius_m : radius of the links.
+    floor_m : height that targets and all links from the elbow on stay above; None for no
+        floor.
+    column_m : radius of a cylinder about the first revolute axis, up to the next one, if
+        the axis is vertical; 0 for no column.
     """
 
     boxes: tuple[np.ndarray, ...]
@@ -49,105 +54,139 @@ class Cell:
     column_m: float = 0.0
 
 
-def find_allowed(
+def check_configurations(
     cell: Cell, robot: Robot, targets: tuple[Target, ...], reported_angles: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """Whether each configuration is allowed, by what might forbid it.
+    """Check configurations against each constraint of a cell.
 
-    `reported_angles` (N, n): rad. Returns (N,) of bool: "boxes", "floor", "column": all
-    is outside; "sight": the tracker sees every target.
+    Parameters
+    ----------
+    cell, robot : the cell and the robot in it.
+    targets : targets that the tracker must see.
+    reported_angles : (N, n) joint angles as the controller reports them, rad.
+
+    Returns
+    -------
+    (N,) bool by constraint, true if it is met: "boxes", "floor" and "column" if nothing
+    is inside, "sight" if the tracker sees every target.
     """
     angles = robot.model_angles(reported_angles)
-    radius = cell.radius_m
     links = sample_links(robot, angles)
-    found = {
-        name: np.ones(len(angles), bool)
-        for name in ("boxes", "floor", "column", "sight")
-    }
+    forearm_joint = min(_find_first_revolute(robot) + 2, robot.joints - 1)
+    forearm = sample_links(robot, angles, forearm_joint)
+    is_clear = np.ones(len(angles), bool)
+    is_above_floor = np.ones(len(angles), bool)
+    is_seen = np.ones(len(angles), bool)
     for box in cell.boxes:
-        inside = ((links > box[:, 0] - radius) & (links < box[:, 1] + radius)).all(
-            axis=-1
-        )
-        found["boxes"] &= ~inside.any(axis=0)
-    places = _joint_places(robot)
-    turning = next(
-        (joint for joint, slides in enumerate(robot.chain.prismatic) if not slides), 0
-    )
-    arm = sample_links(robot, angles, min(turning + 2, robot.joints - 1))
-    if (
-        cell.column_m
-        and turning + 2 < robot.joints
-        and robot.chain.transforms[places[turning]].axis == 2
-    ):
-        foot, shoulder = _points(robot, angles, places[turning : turning + 2])
-        aside = np.linalg.norm((arm - foot)[..., :2], axis=-1)
-        found["column"] &= (
-            (aside > cell.column_m + radius) | (arm[..., 2] > shoulder[:, 2] + radius)
-        ).all(axis=0)
+        is_clear &= _is_outside_box(links, box, cell.radius_m)
     if cell.floor_m is not None:
-        found["floor"] &= (arm[..., 2] > cell.floor_m + radius).all(axis=0)
+        is_above_floor &= (forearm[..., 2] > cell.floor_m + cell.radius_m).all(axis=0)
     for target in targets:
-        at, turned = poses_of_points(
-            robot.chain, angles, [robot.chain.point(target.point)]
-        )
-        seen = at[0] + (turned[0] @ np.array(target.offset_m or (0.0, 0.0, 0.0)))
+        position = _locate_target(robot, target, angles)
         if cell.floor_m is not None:
-            found["floor"] &= seen[:, 2] > cell.floor_m
+            is_above_floor &= position[:, 2] > cell.floor_m
         if cell.tracker_m is not None:
-            found["sight"] &= ~_find_hidden(links, seen, cell.tracker_m, radius)
-    return found
+            is_seen &= ~_is_hidden(links, position, cell.tracker_m, cell.radius_m)
+    return {
+        "boxes": is_clear,
+        "floor": is_above_floor,
+        "column": _is_outside_column(cell, robot, angles, forearm),
+        "sight": is_seen,
+    }
 
 
 def sample_links(robot: Robot, angles: np.ndarray, joint: int = 0) -> np.ndarray:
-    """Points along the links from a joint on, from 0. `angles` (N, n): of the chain,
-    rad. Returns (K, N, 3): m, base axes."""
+    """Sample points along the links from a joint on.
+
+    Parameters
+    ----------
+    robot : the robot, taken as rigid.
+    angles : (N, n) angles of the chain, rad.
+    joint : number of the joint, from 0.
+
+    Returns
+    -------
+    (K, N, 3) points, m, base axes.
+    """
     transforms = robot.chain.transforms
-    first = _joint_places(robot)[joint]
-    ends = [
-        first,
-        *(
-            place + 1
-            for place in range(first, len(transforms))
-            if transforms[place].kind == "T"
-        ),
-    ]
-    at = _points(robot, angles, ends)
+    first = _find_joint_indices(robot)[joint]
+    ends = [first]
+    for index in range(first, len(transforms)):
+        if transforms[index].kind == "T":
+            ends.append(index + 1)
+    corners = _locate_points(robot, angles, ends)
+    if len(corners) == 1:
+        # An arm without lengths behind the joint is a point.
+        return corners
     share = np.linspace(0.0, 1.0, _SAMPLES)[:, None, None]
-    # An arm without lengths behind that joint is a point.
-    return (
-        np.concatenate([one + share * (other - one) for one, other in pairwise(at)])
-        if len(at) > 1
-        else at
+    return np.concatenate(
+        [start + share * (end - start) for start, end in pairwise(corners)]
     )
 
 
-def _joint_places(robot: Robot) -> list[int]:
-    """Places of the joints among the transforms of the chain."""
+def _find_first_revolute(robot: Robot) -> int:
+    """Find the first joint that is not prismatic; 0 if all are."""
+    for joint, is_prismatic in enumerate(robot.chain.prismatic):
+        if not is_prismatic:
+            return joint
+    return 0
+
+
+def _find_joint_indices(robot: Robot) -> list[int]:
+    """Find the indices of the joints among the transforms of the chain."""
     return [
-        place
-        for place, transform in enumerate(robot.chain.transforms)
+        index
+        for index, transform in enumerate(robot.chain.transforms)
         if transform.coordinate is not None
     ]
 
 
-def _points(robot: Robot, angles: np.ndarray, places: list[int]) -> np.ndarray:
-    """Where the chain is before some of its transforms, (K, N, 3)."""
-    return poses_of_points(
-        robot.chain,
-        angles,
-        [MeasuringPoint("end of a link", place) for place in places],
-    )[0]
+def _locate_points(robot: Robot, angles: np.ndarray, indices: list[int]) -> np.ndarray:
+    """Locate the chain before transforms with the given indices, (K, N, 3), m."""
+    points = [MeasuringPoint("end of a link", index) for index in indices]
+    return poses_of_points(robot.chain, angles, points)[0]
 
 
-def _find_hidden(
+def _locate_target(robot: Robot, target: Target, angles: np.ndarray) -> np.ndarray:
+    """Locate a target, (N, 3), m; an unknown offset counts as zero."""
+    point = robot.chain.point(target.point)
+    position, rotation = poses_of_points(robot.chain, angles, [point])
+    return position[0] + rotation[0] @ np.array(target.offset_m or (0.0, 0.0, 0.0))
+
+
+def _is_outside_box(links: np.ndarray, box: np.ndarray, radius: float) -> np.ndarray:
+    """Whether all links are outside a box, (N,) bool."""
+    inside = (links > box[:, 0] - radius) & (links < box[:, 1] + radius)
+    return np.asarray(~inside.all(axis=-1).any(axis=0))
+
+
+def _is_outside_column(
+    cell: Cell, robot: Robot, angles: np.ndarray, forearm: np.ndarray
+) -> np.ndarray:
+    """Whether the forearm (K, N, 3) is outside the column below the shoulder, (N,)
+    bool."""
+    joint = _find_first_revolute(robot)
+    indices = _find_joint_indices(robot)
+    is_vertical = robot.chain.transforms[indices[joint]].axis == 2
+    if not cell.column_m or joint + 2 >= robot.joints or not is_vertical:
+        return np.ones(len(angles), bool)
+    foot, shoulder = _locate_points(robot, angles, indices[joint : joint + 2])
+    distance = np.linalg.norm((forearm - foot)[..., :2], axis=-1)
+    is_beside = distance > cell.column_m + cell.radius_m
+    is_above = forearm[..., 2] > shoulder[:, 2] + cell.radius_m
+    return (is_beside | is_above).all(axis=0)
+
+
+def _is_hidden(
     links: np.ndarray, target: np.ndarray, tracker: np.ndarray, radius: float
 ) -> np.ndarray:
-    """Whether any link lies in the line of sight, ndarray of bool (N,)."""
+    """Whether any link lies in the line of sight to a target (N, 3), (N,) bool."""
     sight = tracker - target
     length = np.linalg.norm(sight, axis=-1)
-    along = sight / np.maximum(length, np.finfo(float).tiny)[:, None]
+    direction = sight / np.maximum(length, np.finfo(float).tiny)[:, None]
     from_target = links - target
-    ahead = (from_target * along).sum(axis=-1).clip(0.0, length)
-    aside = np.linalg.norm(from_target - ahead[..., None] * along, axis=-1)
-    carriers = np.linalg.norm(from_target, axis=-1) < _CARRIER * radius
-    return ((aside < radius) & ~carriers).any(axis=0)
+    projection = (from_target * direction).sum(axis=-1).clip(0.0, length)
+    perpendicular = from_target - projection[..., None] * direction
+    in_the_way = np.linalg.norm(perpendicular, axis=-1) < radius
+    carries = np.linalg.norm(from_target, axis=-1) < _CARRIER_RADII * radius
+    return (in_the_way & ~carries).any(axis=0)

@@ -1,18 +1,19 @@
-"""Optimal designs: the best few of many candidates by a criterion.
+"""Optimal designs: the best subset of many candidates by a criterion.
 
-With M the information matrix in units of the plausible sizes, which a prior of one
-plausible size each makes I without any measurement (Bayesian designs [1], for which no
-parameter need be identifiable), a candidate with rows Z makes it M + Z' Z, and
+M is the information matrix in units of the plausible sizes of the parameters. A prior of
+one plausible size each makes it I without any measurement (a Bayesian design [1], which
+needs no identifiable parameters). A candidate with rows Z changes it to M + Z' Z, and
 
 - D: log det M grows by log det (I + Z M^-1 Z'), by the matrix determinant lemma;
-- A and I: tr C M^-1 falls by tr (I + Z M^-1 Z')^-1 Z M^-1 C M^-1 Z', by Woodbury's identity; C is the identity over the number
-  of parameters for A, and for I the mean of G' G over where the robot shall be accurate, G the sensitivities there.
+- A and I: tr C M^-1 falls by tr (I + Z M^-1 Z')^-1 Z M^-1 C M^-1 Z', by Woodbury's
+  identity. C is I over the number of parameters for A, and for I the mean of G' G over
+  the poses at which the robot shall be accurate, with the sensitivities G there.
 
-Chosen is greedily, then by Fedorov's exchange [2].
+The choice is greedy, followed by Fedorov's exchange [2].
 
 [1] Chaloner, K. and Verdinelli, I., Bayesian experimental design: a review, Statistical
-Science 10, 1995. [2] Fedorov, V. V., Theory of Optimal Experiments, Academic Press,
-1972.
+Science 10, 1995.
+[2] Fedorov, V. V., Theory of Optimal Experiments, Academic Press, 1972.
 """
 
 from __future__ import annotations
@@ -23,92 +24,120 @@ import numpy as np
 
 CRITERIA = ("D", "A", "I")
 # Candidates whose small matrices are in memory at a time.
-_AT_ONCE = 1000
-# Candidates for which the exchange looks: those that add most at the end of the greedy
-# choice; and its rounds: most designs settle in two or three. An exchange that gains
-# less than a share is rounding.
+_CHUNK = 1000
+# Candidates that the exchange considers: those with the largest gains at the end of the
+# greedy choice.
 _SHORT_LIST = 400
+# Upper bound on the rounds of the exchange; most designs settle in two or three.
 _ROUNDS = 4
-_LEAST_GAIN = 1e-6
-# What a sum of thousands of products in double precision is known to, over the sum.
+# Relative improvement below which an exchange is rounding.
+_SMALLEST_IMPROVEMENT = 1e-6
+# Relative rounding error of a sum of thousands of products in double precision.
 _ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
 class Criterion:
-    """What makes a design good. `weight` (P, P): C of A and I; None for D."""
+    """A criterion of optimality.
+
+    Attributes
+    ----------
+    weight : (P, P) matrix C of the criteria A and I; None for D.
+    """
 
     weight: np.ndarray | None
 
     def value(self, matrix: np.ndarray) -> float:
-        """log det M, or -tr C M^-1: the larger the better."""
+        """Value of an information matrix, log det M or -tr C M^-1; more is better."""
         if self.weight is None:
             return float(np.linalg.slogdet(matrix)[1])
         return -float(np.trace(np.linalg.solve(matrix, self.weight)))
 
     def gains(self, rows: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-        """By how much the value grows with each candidate. `rows` (N, k, P), `matrix`
-        (P, P). Returns (N,)."""
-        return np.concatenate(
-            [
-                self._gains(part, matrix)
-                for part in np.split(rows, range(_AT_ONCE, len(rows), _AT_ONCE))
-            ]
-        )
+        """Compute by how much the value grows with each candidate.
 
-    def _gains(self, rows: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-        inverse = np.linalg.inv(np.linalg.cholesky(matrix))
-        # Double precision, in which the matrix is I: single precision loses the 1 of I
-        # + Z Z' to an unknown base.
-        white = (rows.reshape(-1, rows.shape[2]) @ inverse.T).reshape(rows.shape)
-        inner = add_prior(white @ white.transpose(0, 2, 1))
+        Parameters
+        ----------
+        rows : (N, k, P) rows of the candidates.
+        matrix : (P, P) information matrix.
+
+        Returns
+        -------
+        (N,) gains.
+        """
+        chunks = np.split(rows, range(_CHUNK, len(rows), _CHUNK))
+        return np.concatenate([self._compute_gains(chunk, matrix) for chunk in chunks])
+
+    def _compute_gains(self, rows: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+        inverse_root = np.linalg.inv(np.linalg.cholesky(matrix))
+        # Whiten in double precision: in single precision an unknown base would swamp the
+        # 1 of I + Z Z'.
+        flat = rows.reshape(-1, rows.shape[2])
+        whitened = (flat @ inverse_root.T).reshape(rows.shape)
+        transposed = whitened.transpose(0, 2, 1)
+        inner = add_prior(whitened @ transposed)
         if self.weight is None:
             return np.linalg.slogdet(inner)[1]
-        across = white @ (inverse @ self.weight @ inverse.T) @ white.transpose(0, 2, 1)
-        return np.trace(np.linalg.solve(inner, across), axis1=1, axis2=2)
+        weight = inverse_root @ self.weight @ inverse_root.T
+        weighted = whitened @ weight @ transposed
+        return np.trace(np.linalg.solve(inner, weighted), axis1=1, axis2=2)
 
 
 def build_criterion(kind: str, accuracy_rows: np.ndarray) -> Criterion:
-    """One of `CRITERIA`, over sensitivities (N, 3, P) as by `plan.accuracy_rows`."""
+    """Build one of `CRITERIA`.
+
+    Parameters
+    ----------
+    kind : its letter.
+    accuracy_rows : (N, 3, P) sensitivities as by `survey.compute_accuracy_rows`.
+    """
     if kind == "D":
         return Criterion(None)
-    return Criterion(
-        np.eye(accuracy_rows.shape[2]) / accuracy_rows.shape[2]
-        if kind == "A"
-        else mean_squares(accuracy_rows)
-    )
+    if kind == "A":
+        count = accuracy_rows.shape[2]
+        return Criterion(np.eye(count) / count)
+    return Criterion(compute_mean_gram(accuracy_rows))
 
 
-def mean_squares(rows: np.ndarray) -> np.ndarray:
-    """Mean of G' G over N places, ndarray (P, P)."""
+def compute_mean_gram(rows: np.ndarray) -> np.ndarray:
+    """Compute the mean of G' G over N sensitivity matrices (N, k, P), (P, P)."""
     flat = rows.reshape(-1, rows.shape[2])
     return flat.T @ flat / len(rows)
 
 
-def add_prior(sums: np.ndarray) -> np.ndarray:
-    """Sums of products, ndarray (..., P, P), plus I: in place, and positive definite
-    whatever their size.
+def add_prior(gram: np.ndarray) -> np.ndarray:
+    """Add I to Gram matrices (..., P, P) in place, so that they are positive definite.
 
-    Where rounding has lost more than the 1, a diagonal element grows by what rounding
-    may have lost.
+    If rounding errors are larger than 1, the diagonal element grows by their bound
+    instead.
     """
-    here = np.arange(sums.shape[-1])
-    sums[..., here, here] += np.maximum(1.0, _ROUNDING * sums[..., here, here])
-    return sums
+    diagonal = np.arange(gram.shape[-1])
+    values = gram[..., diagonal, diagonal]
+    gram[..., diagonal, diagonal] += np.maximum(1.0, _ROUNDING * values)
+    return gram
 
 
-def matrix_of(rows: np.ndarray, chosen: np.ndarray | list[int]) -> np.ndarray:
-    """Information matrix of some candidates with the prior, ndarray (P, P), in double
-    precision."""
+def compute_information_matrix(
+    rows: np.ndarray, chosen: np.ndarray | list[int]
+) -> np.ndarray:
+    """Compute the information matrix (P, P) of chosen candidates and the prior, in
+    double precision."""
     flat = rows[chosen].reshape(-1, rows.shape[2]).astype(float)
     return add_prior(flat.T @ flat)
 
 
 def choose_greedily(rows: np.ndarray, count: int, criterion: Criterion) -> list[int]:
-    """Candidates, each that which adds most to those before it. `rows` (N, k, P)."""
+    """Choose candidates, each the one with the largest gain after those before it.
+
+    Parameters
+    ----------
+    rows : (N, k, P) rows of the candidates.
+    count : number of candidates to choose.
+    criterion : defines the gain.
+    """
     chosen: list[int] = []
     for _ in range(count):
-        gains = criterion.gains(rows, matrix_of(rows, chosen))
+        gains = criterion.gains(rows, compute_information_matrix(rows, chosen))
         gains[chosen] = -np.inf
         chosen.append(int(np.argmax(gains)))
     return chosen
@@ -117,23 +146,32 @@ def choose_greedily(rows: np.ndarray, count: int, criterion: Criterion) -> list[
 def exchange_candidates(
     rows: np.ndarray, chosen: list[int], criterion: Criterion
 ) -> list[int]:
-    """A design in which no single candidate of a short list would be better than one
-    that is in it.
+    """Exchange chosen candidates until no single one on a short list is better.
 
-    `rows` (N, k, P). Returns in the place of each the one that took it.
+    Parameters
+    ----------
+    rows : (N, k, P) rows of the candidates.
+    chosen : numbers of the chosen candidates.
+    criterion : defines what is better.
+
+    Returns
+    -------
+    The chosen candidates after the exchange, in their order.
     """
-    found = list(chosen)
-    gains = criterion.gains(rows, matrix_of(rows, found))
-    short = np.union1d(np.argsort(-gains)[:_SHORT_LIST], found)
+    design = list(chosen)
+    gains = criterion.gains(rows, compute_information_matrix(rows, design))
+    short_list = np.union1d(np.argsort(-gains)[:_SHORT_LIST], design)
     for _ in range(_ROUNDS):
-        before = list(found)
-        for place, old in enumerate(before):
-            rest = found[:place] + found[place + 1 :]
-            gains = criterion.gains(rows[short], matrix_of(rows, rest))
-            gains[np.isin(short, rest)] = -np.inf
+        previous = list(design)
+        for index, old in enumerate(previous):
+            remaining = design[:index] + design[index + 1 :]
+            matrix = compute_information_matrix(rows, remaining)
+            gains = criterion.gains(rows[short_list], matrix)
+            gains[np.isin(short_list, remaining)] = -np.inf
             best = int(np.argmax(gains))
-            if gains[best] > (1.0 + _LEAST_GAIN) * gains[np.searchsorted(short, old)]:
-                found[place] = int(short[best])
-        if found == before:
+            old_gain = gains[np.searchsorted(short_list, old)]
+            if gains[best] > (1.0 + _SMALLEST_IMPROVEMENT) * old_gain:
+                design[index] = int(short_list[best])
+        if design == previous:
             break
-    return found
+    return design

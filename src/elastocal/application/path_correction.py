@@ -1,0 +1,304 @@
+"""A corrected path: joint targets for a file of wanted poses, with the error and the
+status of each, as a table and in sentences."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from datetime import date
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elastocal.application.accuracy import (
+    ErrorPrediction,
+    compute_uncorrected_errors_m,
+    predict_errors,
+)
+from elastocal.application.calibrated import (
+    find_extrapolated,
+    predict_residual_displacements,
+)
+from elastocal.application.compensation import (
+    Correction,
+    LargeStep,
+    find_joint_targets,
+    find_large_steps,
+)
+from elastocal.application.frames import root_mean_square
+from elastocal.application.statements import format_accuracy, format_millimetres
+from elastocal.counting import format_count, format_integer, list_first
+from elastocal.errors import InputError
+from elastocal.exchange.target_path import NO_BOUND, OK, TargetPath
+from elastocal.mechanics.components import WRENCH_NAMES
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import pandas as pd
+
+    from elastocal.application.calibrated import CalibratedRobot
+    from elastocal.mechanics.robot import Robot
+
+# Loads above this multiple of the fitted ones get no error bound, because a stiffness
+# that was fitted as a constant need not be constant there.
+LOAD_FACTOR_WITH_BOUND = 2.0
+# Number of lines of a file that a message names.
+_LINES_NAMED = 5
+
+
+@dataclass(frozen=True)
+class CorrectedPath:
+    """Joint targets for N wanted poses, all of which are reached, and their errors.
+
+    Attributes
+    ----------
+    calibrated : the robot.
+    wanted : the poses.
+    wrench : (N, 6) loads, N and N m; zero if the file has none.
+    correction : joint targets.
+    uncorrected_error_m : (N,) predicted errors of uncorrected targets.
+    prediction : predicted errors of the corrected targets.
+    is_extrapolated : (N,) bool, joint angles or loads beyond those that were fitted.
+    status : (N,) of str, "ok" or why no error bound is stated.
+    large_steps : joints that move too far between targets, if the caller allowed them.
+    """
+
+    calibrated: CalibratedRobot
+    wanted: TargetPath
+    wrench: np.ndarray
+    correction: Correction
+    uncorrected_error_m: np.ndarray
+    prediction: ErrorPrediction
+    is_extrapolated: np.ndarray
+    status: np.ndarray
+    large_steps: list[LargeStep]
+
+    @property
+    def has_bound(self) -> np.ndarray:
+        """(N,) bool, targets with an error bound."""
+        return np.asarray(self.status == OK)
+
+    @property
+    def count(self) -> str:
+        """Number of targets in words."""
+        return format_count(len(self.wanted), "target")
+
+
+def correct_path(
+    calibrated: CalibratedRobot,
+    wanted: TargetPath,
+    source: str | Path,
+    *,
+    allow_large_steps: bool = False,
+) -> CorrectedPath:
+    """Correct the targets of a path and predict their errors.
+
+    Parameters
+    ----------
+    calibrated : the robot.
+    wanted : the poses.
+    source : file of the poses, for messages.
+    allow_large_steps : whether joints may move farther from target to target than
+        `compute_allowed_steps`.
+
+    Raises
+    ------
+    InputError
+        A pose is not reached, or not in the stated posture; or a step is too large.
+    """
+    wrench = np.zeros((len(wanted), 6)) if wanted.wrench is None else wanted.wrench
+    correction = find_joint_targets(
+        calibrated, wanted.position, wanted.rotation, wrench, wanted.start
+    )
+    _check_reached(wanted, correction, source)
+    commands = correction.joint_angles
+    large_steps = find_large_steps(
+        calibrated.robot, wanted.position, wanted.rotation, commands
+    )
+    if large_steps and not allow_large_steps:
+        raise InputError(
+            source,
+            "",
+            _describe_large_steps(calibrated.robot, wanted, large_steps, 1),
+            "targets between, another posture, or --allow-large-steps",
+        )
+    outside, overloaded = find_extrapolated(calibrated, commands, wrench)
+    _, without_bound = find_extrapolated(
+        calibrated, commands, wrench, LOAD_FACTOR_WITH_BOUND
+    )
+    status = correction.status.astype(object)
+    status[outside] = f"{NO_BOUND}joints outside the fitted range"
+    status[without_bound] = (
+        f"{NO_BOUND}loads beyond {LOAD_FACTOR_WITH_BOUND:g} times the measured ones"
+    )
+    return CorrectedPath(
+        calibrated,
+        wanted,
+        wrench,
+        correction,
+        compute_uncorrected_errors_m(
+            calibrated, wanted.position, wanted.rotation, correction.error_before
+        ),
+        predict_errors(calibrated, commands, wrench, draws=0),
+        outside | overloaded,
+        status,
+        large_steps,
+    )
+
+
+def _check_reached(
+    wanted: TargetPath, correction: Correction, source: str | Path
+) -> None:
+    """Refuse a path with targets that cannot be corrected."""
+    failures = [
+        f"line {wanted.lines[row]} is {correction.status[row]}"
+        for row in np.flatnonzero(correction.status != OK)
+    ]
+    if failures:
+        raise InputError(
+            source,
+            "",
+            list_first(failures, _LINES_NAMED),
+            "poses that the robot reaches within its limits,"
+            " in the posture that q1..qn state if any",
+        )
+
+
+def _describe_large_steps(
+    robot: Robot, wanted: TargetPath, steps: list[LargeStep], most: int
+) -> str:
+    """Name the first few steps with their lines in the file."""
+    sentences = []
+    for step in steps:
+        line = f"line {wanted.lines[step.row]}: joint {step.joint + 1}"
+        if robot.chain.prismatic[step.joint]:
+            sentences.append(
+                f"{line} shifts by {1e3 * step.size:.0f} mm,"
+                f" {1e3 * step.allowed:.0f} allowed"
+            )
+        else:
+            sentences.append(
+                f"{line} turns by {math.degrees(step.size):.1f} degrees,"
+                f" {math.degrees(step.allowed):.1f} allowed"
+            )
+    return list_first(sentences, most)
+
+
+def tabulate_targets(path: CorrectedPath) -> pd.DataFrame:
+    """Tabulate joint targets, their errors, and the wanted poses and loads.
+
+    Returns columns ``q1..qn`` (rad, as the controller reports them), predicted errors in
+    m, ``status``, ``x .. rz``, ``fx .. mz`` and ``q1_uncorrected ..``.
+    """
+    import pandas as pd
+    from scipy.spatial.transform import Rotation
+
+    correction = path.correction
+    prediction = path.prediction
+    commands = pd.DataFrame(correction.joint_angles).rename(
+        columns=lambda joint: f"q{joint + 1}"
+    )
+    uncorrected = pd.DataFrame(correction.uncorrected).rename(
+        columns=lambda joint: f"q{joint + 1}_uncorrected"
+    )
+    no_bound = [status.startswith(NO_BOUND) for status in path.status]
+    errors = {
+        "predicted_error_before_m": path.uncorrected_error_m,
+        "predicted_error_after_m": prediction.error_m,
+        "predicted_bound_m": np.where(no_bound, np.nan, prediction.bound_m),
+        "predicted_std_m": np.sqrt(
+            prediction.parameters_m**2
+            + prediction.repeated_m**2
+            + prediction.regression_m**2
+        ),
+        "repeatability_m": prediction.repeated_m,
+        "outside_range": path.is_extrapolated,
+        "status": path.status,
+    }
+    rotation = Rotation.from_matrix(path.wanted.rotation).as_rotvec()
+    wanted = pd.DataFrame(
+        np.hstack([path.wanted.position, rotation, path.wrench]),
+        columns=["x", "y", "z", "rx", "ry", "rz", *WRENCH_NAMES],
+    )
+    return pd.concat([commands, pd.DataFrame(errors), wanted, uncorrected], axis=1)
+
+
+def describe_path_accuracy(path: CorrectedPath) -> list[str]:
+    """State the accuracy over the targets with a bound, corrected and uncorrected; no
+    sentence if there are none."""
+    has_bound = path.has_bound
+    if not has_bound.any():
+        return []
+    prediction = predict_errors(
+        path.calibrated,
+        path.correction.joint_angles[has_bound],
+        path.wrench[has_bound],
+    )
+    region = "the targets" if has_bound.all() else "the targets with a bound"
+    rms = format_millimetres(root_mean_square(path.uncorrected_error_m[has_bound]))
+    return [
+        format_accuracy(prediction.summarize(region)),
+        f"uncorrected they would be missed by {rms} RMS",
+    ]
+
+
+def describe_regression(path: CorrectedPath, regression: str) -> str:
+    """Say how many targets the regression on the residuals corrects, and by how much.
+
+    `regression` is its name in words.
+    """
+    displacements = predict_residual_displacements(
+        path.calibrated, path.correction.joint_angles, path.wrench
+    )
+    lengths_m = np.linalg.norm(displacements, axis=1)
+    size = "nothing"
+    if lengths_m.any():
+        rms = root_mean_square(lengths_m[lengths_m > 0.0])
+        size = f"{format_millimetres(rms)} RMS"
+    return (
+        f"a {regression} on what the model leaves corrects"
+        f" {format_integer((lengths_m > 0.0).sum())} of {path.count} by {size}"
+    )
+
+
+def describe_path_warnings(path: CorrectedPath) -> list[str]:
+    """Describe large steps, targets without an error bound, and extrapolation."""
+    warnings = []
+    if path.large_steps:
+        robot = path.calibrated.robot
+        warnings.append(
+            _describe_large_steps(robot, path.wanted, path.large_steps, _LINES_NAMED)
+        )
+    if not path.has_bound.all():
+        warnings.append(
+            f"no bound is stated for {format_integer((~path.has_bound).sum())} of"
+            f" {path.count}: beyond {LOAD_FACTOR_WITH_BOUND:g} times the measured loads"
+            " or outside the fitted range of joints"
+        )
+    if path.is_extrapolated.any():
+        warnings.append(
+            f"{format_integer(path.is_extrapolated.sum())} of {path.count} lie beyond the poses"
+            " or loads of the campaign: their predicted errors are extrapolated"
+        )
+    return warnings
+
+
+def describe_program(path: CorrectedPath, campaign: str) -> list[str]:
+    """Return the remarks of a robot program with these targets: robot, campaign, day,
+    largest load, and tool."""
+    robot = path.calibrated.robot
+    end = robot.chain.end_effector
+    force = math.sqrt((path.wrench[:, :3] ** 2).sum(axis=1).max())
+    moment = math.sqrt((path.wrench[:, 3:] ** 2).sum(axis=1).max())
+    load = "none beside what the robot file states"
+    if force or moment:
+        load = f"force up to {force:.4g} N, moment up to {moment:.4g} N m"
+    offset = ", ".join(f"{1e3 * value:.4g}" for value in end.offset_m)
+    return [
+        f"robot: {robot.name}",
+        f"campaign: {campaign}",
+        f"date: {date.today().isoformat()}",
+        f"load: {load}",
+        f"tool: {end.name}, target offset {offset} mm",
+    ]

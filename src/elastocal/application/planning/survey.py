@@ -1,0 +1,289 @@
+"""What is measured in each configuration, how accurately, and what it says about the
+list_parameters of the robot.
+
+The model is the one that a campaign declares: offsets of the joints, lengths and angles
+of the links, joint compliances if loads are measured, errors of declared masses, and the
+placement of base and targets if they are unknown. Sensitivities are those of the fit
+itself, at the values of the robot file.
+
+Standard deviations of a sensor are half of the largest error that its maker permits,
+which a tracker's manual calls typical [1]; the angles of its probe are from [2].
+
+[1] Hexagon, Leica Absolute Tracker AT500 User Manual, section 2.8: transverse error at
+most 15 um + 6 um/m, typical results half of that.
+[2] Hexagon, data sheet of the Leica T-Mac: rotation angles to 0.01 deg, which is 18 um
+at 100 mm.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elastocal.application.calibrated import (
+    calibrate_by_model,
+    compute_nominal_poses,
+    compute_pose_sensitivities,
+    split_into_chunks,
+)
+from elastocal.application.frames import BASE, ROBOT, Scope, subtract_placement
+from elastocal.application.scope import is_offset_fitted
+from elastocal.effects.catalogue import declared_candidates
+from elastocal.effects.elastic import joint_compliance
+from elastocal.effects.gravity import declared_weight
+from elastocal.fitting.linearization import linearize
+from elastocal.fitting.model import (
+    Estimate,
+    Model,
+    evaluate_conditions,
+    list_parameters,
+)
+from elastocal.fitting.noise import Noise
+from elastocal.fitting.observations import Observations, States
+from elastocal.mechanics.sites import sites_of
+
+if TYPE_CHECKING:
+    from elastocal.campaigns.campaign import Target
+    from elastocal.mechanics.robot import Robot
+
+GEOMETRY = ("joint_offset", "link_geometry")
+# States that are linearized at once, so that their Jacobians stay in the processor's
+# cache.
+_CHUNK = 1000
+# Half of 15 um + 6 um/m at 7.5 m.
+_TRACKER_M = 30e-6
+_TRACKER = "half of MPE 15 µm + 6 µm/m"
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """A measuring instrument.
+
+    Attributes
+    ----------
+    description : the instrument, and where its noise is from.
+    position_m, orientation_rad : standard deviation of a coordinate and of an angle.
+    """
+
+    description: str
+    position_m: float
+    orientation_rad: float
+
+
+# The usual sensor for each kind of measurement.
+SENSORS = {
+    "position": Sensor(
+        f"laser tracker and reflector at 7.5 m, {_TRACKER} (Leica AT500)",
+        _TRACKER_M,
+        0.0,
+    ),
+    "pose": Sensor(
+        f"laser tracker and 6DoF probe, {_TRACKER} at 7.5 m and of 0.01° (Leica T-Mac)",
+        _TRACKER_M,
+        math.radians(0.005),
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What is measured in each configuration, and how accurately.
+
+    Attributes
+    ----------
+    robot : the robot.
+    targets : all of them are measured under each load.
+    unknown_base : whether the tracker's frame is fitted.
+    measured : "position" or "pose".
+    position_m, orientation_rad : standard deviation of each component of a measurement.
+    force_N : force of the load, 0 for none.
+    pulled : whether the load pulls in any direction; else it is a hanging weight.
+    """
+
+    robot: Robot
+    targets: tuple[Target, ...]
+    unknown_base: bool
+    measured: str
+    position_m: float
+    orientation_rad: float
+    force_N: float = 0.0
+    pulled: bool = False
+
+    @property
+    def rows(self) -> int:
+        """Numbers in a measurement of one target."""
+        return 6 if self.measured == "pose" else 3
+
+    @property
+    def shares(self) -> tuple[float, ...]:
+        """Shares of the force under which each configuration is measured."""
+        if not self.loaded:
+            return (0.0,)
+        return (0.0, 1.0, -1.0) if self.pulled else (0.0, 1.0)
+
+    @property
+    def numbers(self) -> int:
+        """Numbers that are measured in one configuration."""
+        return len(self.shares) * len(self.targets) * self.rows
+
+    @property
+    def loaded(self) -> bool:
+        """Whether any measurement is under a load."""
+        return self.force_N > 0.0
+
+    def draw_forces(self, count: int, stream: np.random.Generator) -> np.ndarray:
+        """Draw a force for each of N configurations, (N, 3), N, base axes."""
+        if self.pulled:
+            direction = stream.standard_normal((count, 3))
+        else:
+            direction = np.array([self.robot.gravity_m_s2] * count)
+        length = np.linalg.norm(direction, axis=1, keepdims=True)
+        return self.force_N * direction / length
+
+
+def declare_model(survey: Survey) -> tuple[Model, Estimate]:
+    """Build the model that a campaign of this survey declares, at the values of the robot
+    file."""
+    robot = survey.robot
+    sites = sites_of(robot)
+    effects = tuple(declared_candidates(GEOMETRY, sites))
+    if sites.masses:
+        effects = (declared_weight(sites), *effects)
+    if survey.loaded:
+        effects = (joint_compliance(sites), *effects)
+    model = Model(
+        sites,
+        survey.targets,
+        survey.unknown_base,
+        survey.rows,
+        robot.compliance,
+        effects,
+    )
+    coefficients = []
+    for effect in effects:
+        is_compliance = effect.effect == "joint_compliance"
+        zeros = np.zeros(len(effect.parameters))
+        coefficients.append(robot.compliance if is_compliance else zeros)
+    offsets = [target.offset_m or (0.0, 0.0, 0.0) for target in survey.targets]
+    estimate = Estimate(
+        (0,),
+        np.eye(3)[None],
+        np.zeros((1, 3)),
+        np.array(offsets),
+        np.broadcast_to(np.eye(3), (len(offsets), 3, 3)).copy(),
+        tuple(coefficients),
+        tuple(np.zeros(0) for _ in effects),
+    )
+    return model, estimate
+
+
+def compute_information_rows(
+    survey: Survey, reported_angles: np.ndarray, force: np.ndarray
+) -> np.ndarray:
+    """Compute the whitened sensitivities of the measurements in each configuration.
+
+    Parameters
+    ----------
+    survey : what is measured.
+    reported_angles : (N, n) joint angles as the controller reports them, rad.
+    force : (N, 3) full load at the last measuring point, N, base axes.
+
+    Returns
+    -------
+    (N, k, P) derivatives of the k numbers that are measured in each configuration, over
+    their standard deviations, by the `list_parameters` of the model in units of their
+    plausible sizes. The information matrix is ``rows.T @ rows``.
+    """
+    model, estimate = declare_model(survey)
+    plausible = [
+        parameter.plausible for _, parameter in list_parameters(model, estimate)
+    ]
+    std = np.repeat([survey.position_m, survey.orientation_rad], 3)[: survey.rows]
+    scale = np.array(plausible) / std[:, None]
+    count = len(reported_angles)
+    rows = np.empty((count, survey.numbers, len(plausible)))
+    for chunk in split_into_chunks(count, max(_CHUNK // len(survey.shares), 1)):
+        observations = build_observations(survey, reported_angles[chunk], force[chunk])
+        around = evaluate_conditions(model, estimate, observations.states)
+        linearization = linearize(model, estimate, observations, around)
+        scaled = linearization.sensitivities * scale
+        rows[chunk] = scaled.reshape(-1, survey.numbers, len(plausible))
+    return rows
+
+
+def compute_accuracy_rows(
+    survey: Survey, reported_angles: np.ndarray, force: np.ndarray
+) -> np.ndarray:
+    """Compute the sensitivities of the end effector's position, as `accuracy` counts it.
+
+    If the base is unknown, its best placement over these configurations is subtracted;
+    if the offset of the targets on the end effector is unknown, the best constant offset
+    there is. The placement of base and targets itself does not move the robot.
+
+    Parameters
+    ----------
+    survey : says what is unknown.
+    reported_angles : (N, n) configurations at which the robot shall be accurate, rad.
+    force : (N, 3) load under which it works there, N, base axes.
+
+    Returns
+    -------
+    (N, 3, P) derivatives by the list_parameters in units of their plausible sizes, m.
+    """
+    robot = survey.robot
+    model, estimate = declare_model(survey)
+    count = len(list_parameters(model, estimate))
+    noise = Noise(
+        "declared", survey.position_m, survey.orientation_rad, np.zeros(robot.joints)
+    )
+    calibrated = calibrate_by_model(
+        robot, model, estimate, np.zeros((count, count)), noise
+    )
+    wrench = np.hstack([force, np.zeros_like(force)])
+    sensitivities = compute_pose_sensitivities(calibrated, reported_angles, wrench)
+    position, rotation = compute_nominal_poses(robot, reported_angles)
+    scope = Scope(
+        ROBOT if survey.unknown_base else BASE,
+        position.mean(axis=0),
+        offset_removed=is_offset_fitted(survey.targets, robot.chain.end_effector.name),
+    )
+    commanded = list_parameters(calibrated.model, calibrated.estimate)
+    plausible = np.array([parameter.plausible for _, parameter in commanded])
+    residual = subtract_placement(scope, position, rotation, sensitivities * plausible)
+    rows = np.zeros((len(sensitivities), 3, count))
+    # The list_parameters of base and targets come first.
+    rows[..., -len(plausible) :] = residual[:, :3]
+    return rows
+
+
+def build_observations(
+    survey: Survey, reported_angles: np.ndarray, force: np.ndarray
+) -> Observations:
+    """Build observations without measured values: every target under every share of the
+    load of each configuration, in this order.
+
+    Arguments as in `compute_information_rows`.
+    """
+    loads = len(survey.shares)
+    targets = len(survey.targets)
+    angles = np.repeat(survey.robot.model_angles(reported_angles), loads, axis=0)
+    count = len(angles)
+    shares = np.array(survey.shares)[:, None]
+    wrench = np.zeros((count, 6))
+    wrench[:, :3] = (force[:, None] * shares).reshape(-1, 3)
+    zeros = np.zeros(count, int)
+    pose = np.arange(count) // loads
+    load = np.arange(count) % loads
+    states = States(zeros, pose, load, angles, wrench, zeros + 1)
+    state = np.repeat(np.arange(count), targets)
+    rotation = np.broadcast_to(np.eye(3), (len(state), 3, 3))
+    return Observations(
+        states,
+        state,
+        np.tile(np.arange(targets), count),
+        np.zeros((len(state), 3)),
+        rotation if survey.rows == 6 else None,
+    )

@@ -1,0 +1,254 @@
+"""Calibrated robots from fits to a campaign, with the meaning of their errors: which
+placement is free, and which effects of the fit are in no command."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elastocal.application.calibrated import (
+    ResidualModel,
+    build_observations,
+    calibrate_by_model,
+    compute_nominal_poses,
+    compute_pose_sensitivities,
+    factor_covariance,
+    move_to_end_effector,
+    predict_poses,
+    zero_coefficients,
+)
+from elastocal.application.frames import (
+    BASE,
+    ROBOT,
+    Scope,
+    compute_placement_columns,
+    fit_placement,
+    select_free_parameters,
+)
+from elastocal.fitting.linearization import linearize
+from elastocal.fitting.model import (
+    compute_displaced_coordinates,
+    evaluate_conditions,
+    list_parameters,
+)
+from elastocal.fitting.noise import estimate_joint_repeatability
+from elastocal.mechanics.kinematics import pose_differences, poses
+from elastocal.remainder.corrected import is_commanded
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from elastocal.application.calibrated import CalibratedRobot
+    from elastocal.campaigns.campaign import Target
+    from elastocal.fitting.model import Case, Estimate, Model
+    from elastocal.fitting.noise import Noise
+    from elastocal.fitting.observations import States
+    from elastocal.remainder.regressions import Predictor
+
+
+def calibrate_on_case(
+    case: Case,
+    model: Model,
+    estimate: Estimate,
+    covariance: np.ndarray,
+    noise: Noise,
+    residual_model: ResidualModel | None = None,
+) -> CalibratedRobot:
+    """Build a calibrated robot, with its scope, from a model that was fitted to a case.
+
+    If the tracker's noise hides how well each joint repeats, all joints get the same
+    repeatability, which is the one that the repeats do not rule out.
+
+    Parameters
+    ----------
+    case : the measurements that were fitted.
+    model, estimate : fitted model.
+    covariance : (P, P) covariance of all its `list_parameters`.
+    noise : of the campaign.
+    residual_model : result of `build_residual_model`.
+    """
+    robot = case.campaign.robot
+    states = case.observations.states
+    dof = 0.0
+    if noise.source == "repeats" and not noise.joint_rad.any():
+        repeatability_rad, dof = estimate_joint_repeatability(
+            model, estimate, case.campaign.measurements
+        )
+        noise = replace(noise, joint_rad=np.full(robot.joints, repeatability_rad))
+    calibrated = replace(
+        calibrate_by_model(robot, model, estimate, covariance, noise),
+        fitted=states,
+        residual_model=residual_model,
+    )
+    scope = determine_scope(calibrated, model, estimate, covariance, states)
+    return replace(calibrated, scope=replace(scope, repeatability_dof=dof))
+
+
+def build_residual_model(
+    case: Case, estimate: Estimate, predictor: Predictor, typical: float, noise_m: float
+) -> ResidualModel | None:
+    """Build the residual model of the end effector from a regression.
+
+    Parameters
+    ----------
+    case, estimate : fitted campaign.
+    predictor : regression on the residuals of the fit.
+    typical : as in `ResidualModel`.
+    noise_m : the tracker's noise as the campaign knows it. The fit is no source of it,
+        because it takes residuals that the regression explains for noise.
+
+    Returns
+    -------
+    None if no target is on the end effector.
+    """
+    end_effector = case.campaign.robot.chain.end_effector
+    targets = _find_targets_on(case.campaign.targets, end_effector.name)
+    if not targets:
+        return None
+    offset_m = min(
+        estimate.target_offset[targets],
+        key=lambda offset: float(np.linalg.norm(offset - end_effector.offset_m)),
+    )
+    repeats = case.observations.states.repeats
+    sensor_m = noise_m * float(np.sqrt((1.0 / repeats).mean()))
+    return ResidualModel(predictor, offset_m, sensor_m, typical)
+
+
+def _find_targets_on(targets: Sequence[Target], point: str) -> list[int]:
+    """Find the numbers of the targets on a measuring point."""
+    return [number for number, target in enumerate(targets) if target.point == point]
+
+
+def set_form_error(
+    calibrated: CalibratedRobot, form_m: float, *, contradicted: bool = False
+) -> CalibratedRobot:
+    """Return a robot with another model-form error; arguments as in `Scope`."""
+    scope = replace(calibrated.scope, form_m=form_m, contradicted=contradicted)
+    return replace(calibrated, scope=scope)
+
+
+def determine_scope(
+    calibrated: CalibratedRobot,
+    model: Model,
+    estimate: Estimate,
+    covariance: np.ndarray,
+    states: States,
+) -> Scope:
+    """Determine what the errors of a robot mean, from the fit behind it.
+
+    Errors are stated in the base frame if the campaign declares it, else after the best
+    placement of the base.
+
+    Parameters
+    ----------
+    calibrated : the robot as it is commanded.
+    model, estimate, covariance : fit with all its effects, also those in no command.
+    states : states of the campaign.
+    """
+    robot = calibrated.robot
+    end_effector = model.sites.chain.end_effector.name
+    numbers = _find_targets_on(model.targets, end_effector)
+    targets = [model.targets[number] for number in numbers]
+    offset_removed = is_offset_fitted(model.targets, end_effector)
+    rotation_fitted = bool(targets) and all(t.rotation is None for t in targets)
+    free = select_free_parameters(
+        base=model.fitted_frames,
+        offset=offset_removed,
+        rotation=rotation_fitted and model.rows == 6,
+    )
+    commands = robot.reported_angles(states.joint_angles)
+    position, rotation = predict_poses(calibrated, commands, states.wrench)
+    frame = ROBOT if model.fitted_frames else BASE
+    scope = Scope(frame, position.mean(axis=0), offset_removed=offset_removed)
+    columns = compute_placement_columns(scope, position, rotation)
+    sensitivities = compute_pose_sensitivities(calibrated, commands, states.wrench)
+    before = pose_differences(
+        *compute_nominal_poses(robot, commands), position, rotation
+    )
+    scope = replace(
+        scope,
+        absorbed=fit_placement(columns, sensitivities, free),
+        absorbed_before=fit_placement(columns, before[..., None], free)[:, 0],
+    )
+    left_out = tuple(effect.key for effect in model.effects if not is_commanded(effect))
+    if not left_out:
+        return scope
+    if model.row_span is None and states.row is not None:
+        # Drift counts from the first to the last row of the campaign, also if it is
+        # evaluated at other states.
+        model = replace(model, row_span=(int(states.row.min()), int(states.row.max())))
+    epochs = [states]
+    if not model.fitted_frames:
+        # A declared base is not placed again before use, so the drift by the end of the
+        # campaign counts in full.
+        epochs.append(_move_to_end_of_campaign(states))
+    rms_m = []
+    worst_m = []
+    for epoch in epochs:
+        fields = _compute_left_out_fields(model, estimate, covariance, epoch)
+        residual = fields - columns @ fit_placement(columns, fields, free)
+        squares = (residual[:, :3] ** 2).sum(axis=(1, 2))
+        rms_m.append(float(np.sqrt(squares.mean())))
+        worst_m.append(float(np.sqrt(squares.max())))
+    return replace(
+        scope,
+        left_out=left_out,
+        left_out_m=max(rms_m),
+        left_out_worst_m=max(worst_m),
+    )
+
+
+def is_offset_fitted(targets: Sequence[Target], end_effector: str) -> bool:
+    """Whether the offset of every target on the end effector is unknown, so that a
+    constant offset there is no error."""
+    numbers = _find_targets_on(targets, end_effector)
+    return bool(numbers) and all(targets[number].offset_m is None for number in numbers)
+
+
+def _move_to_end_of_campaign(states: States) -> States:
+    """Return the same states as if all had been measured at the end of the campaign."""
+    row = None if states.row is None else np.full_like(states.row, states.row.max())
+    time_s = states.time_s
+    if time_s is not None:
+        time_s = np.full_like(time_s, time_s.max())
+    return replace(states, row=row, time_s=time_s)
+
+
+def _compute_left_out_fields(
+    model: Model, estimate: Estimate, covariance: np.ndarray, states: States
+) -> np.ndarray:
+    """Compute the pose errors of the end effector by effects that are in no command.
+
+    Returns (S, 6, 1 + D): the displacement and rotation by all of them together, then
+    the columns of a factor of its covariance, m and rad, base axes.
+    """
+    end_model, end_estimate = move_to_end_effector(model, estimate)
+    states = replace(states, session=np.zeros_like(states.session))
+    left_out = {
+        number
+        for number, effect in enumerate(model.effects)
+        if not is_commanded(effect)
+    }
+    chain = model.sites.chain
+    end_poses = []
+    for values in (end_estimate, zero_coefficients(end_estimate, left_out)):
+        coordinates = compute_displaced_coordinates(
+            end_model, values, evaluate_conditions(end_model, values, states)
+        )
+        end_poses.append(poses(chain, coordinates, chain.end_effector))
+    displacement = pose_differences(*end_poses[0], *end_poses[1])
+    keys = {model.effects[number].key for number in left_out}
+    columns = np.array(
+        [owner in keys for owner, _ in list_parameters(end_model, end_estimate)]
+    )
+    rows = np.array([owner in keys for owner, _ in list_parameters(model, estimate)])
+    sensitivities = linearize(
+        end_model,
+        end_estimate,
+        build_observations(states),
+        evaluate_conditions(end_model, end_estimate, states),
+    ).sensitivities[..., columns]
+    spread = sensitivities @ factor_covariance(covariance[np.ix_(rows, rows)])
+    return np.concatenate([displacement[..., None], spread], axis=2)

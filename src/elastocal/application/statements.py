@@ -1,0 +1,99 @@
+"""Sentences and tables that state the accuracy of a robot, the same in the terminal, the
+report and the certificate."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from elastocal.application.accuracy import Accuracy
+from elastocal.application.frames import FRAMES, ROBOT
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+_OFFSET = "of a constant offset at the end effector"
+
+
+def format_millimetres(length_m: float) -> str:
+    """Format a length to the micrometre, so that one error looks the same everywhere."""
+    return f"{1e3 * length_m:.3f} mm"
+
+
+def format_accuracy(accuracy: Accuracy) -> str:
+    """Format an accuracy statement with all that belongs to it."""
+    frame = _format_frame(accuracy)
+    if not accuracy.fitted and not accuracy.form_m:
+        return (
+            f"No position error is predicted {frame}: nothing of the robot was fitted."
+        )
+    rms = _format_bounded(accuracy, accuracy.rms_m, accuracy.rms_bound_m)
+    worst = _format_bounded(accuracy, accuracy.worst_m, accuracy.worst_bound_m)
+    text = (
+        f"Predicted position error of the corrected robot {frame}: {rms} RMS over"
+        f" {accuracy.region} ({accuracy.poses}), {worst} at the worst of them;"
+        " the tracker's noise is not in it."
+    )
+    if accuracy.left_out:
+        names = ", ".join(accuracy.left_out)
+        size = format_millimetres(accuracy.left_out_m)
+        text += f" {size} of it stand for {names}, which no command contains."
+    # Do not mention a contribution that rounds to nothing.
+    if round(accuracy.form_m, 6):
+        size = format_millimetres(accuracy.form_m)
+        reason = "other models fit as well"
+        if accuracy.contradicted:
+            reason = "validation poses were missed by more than the fit says"
+        text += f" {size} of it stand for the form of the model: {reason}."
+    return text
+
+
+def _format_frame(accuracy: Accuracy) -> str:
+    """Say in which frame errors are stated, and which offset is subtracted."""
+    frame = FRAMES[accuracy.frame]
+    if not accuracy.offset_removed:
+        return frame
+    if accuracy.frame == ROBOT:
+        return f"{frame.removesuffix(')')} and {_OFFSET})"
+    return f"{frame} (after the best choice {_OFFSET})"
+
+
+def _format_bounded(accuracy: Accuracy, error_m: float, bound_m: float | None) -> str:
+    """Format an error, with its one-sided confidence bound if there is one."""
+    size = format_millimetres(error_m)
+    if bound_m is None:
+        return size
+    bound = format_millimetres(bound_m)
+    return f"{size} ({100 * accuracy.confidence:g} % sure: below {bound})"
+
+
+def tabulate_errors(verdict: Mapping[str, Any]) -> list[list[str]]:
+    """Tabulate the errors before and after the correction for report and certificate.
+
+    Measured and predicted errors, over different poses and in different frames, are
+    different quantities; each row says which one it states.
+
+    Parameters
+    ----------
+    verdict : contents of verdict.json.
+
+    Returns
+    -------
+    Rows of three cells: name of the RMS error, its value for the uncorrected robot, and
+    its value for the corrected one. No rows if the data are at fault.
+    """
+    if not verdict.get("accuracy"):
+        return []
+    heldout = verdict["heldout"]
+    accuracy = Accuracy(**verdict["accuracy"])
+    measured = [
+        "measured at validation poses, noise included,"
+        " after the best placement of the base",
+        format_millimetres(heldout["uncalibrated"]["rms_m"]),
+        format_millimetres(heldout["delivered"]["rms_m"]),
+    ]
+    predicted = [
+        f"predicted over {accuracy.region}, {FRAMES[accuracy.frame]}",
+        format_millimetres(verdict["uncorrected_m"]),
+        format_millimetres(accuracy.rms_m),
+    ]
+    return [measured, predicted]

@@ -1,0 +1,166 @@
+"""`elastocal export`: the calibrated robot as a robot file and as a URDF."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from typer import Argument, Option
+
+from elastocal.command.terminal import load_diagnosed_campaign, print_answer
+from elastocal.counting import format_count
+from elastocal.errors import InputError
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from elastocal.application.calibrated import CalibratedRobot
+    from elastocal.application.exported import FoldedRobot
+    from elastocal.exchange.urdf_writing import CorrectedUrdf
+    from elastocal.loop.calibrated_files import Diagnosed
+
+ROBOT = "robot.yaml"
+URDF = "robot.urdf"
+# Smaller deviations of the URDF are rounding and are not mentioned.
+_ROUNDING_MM = 1e-5
+
+
+def export(
+    folder: Annotated[Path, Argument(help="Folder of a diagnosed campaign.")],
+    *,
+    output: Annotated[Path, Option(help="Folder for the files.")],
+    urdf: Annotated[
+        Path | None,
+        Option(
+            help="The URDF that the robot was imported from. Its joint origins are"
+            " changed, nothing else."
+        ),
+    ] = None,
+) -> None:
+    """Write the calibrated robot: as a robot file, and as the URDF that it came from.
+
+    A robot file holds geometry, springs and weights, a URDF the geometry alone. Neither
+    holds other effects or the regression on the remainder: what is lost with them is
+    said, and the accuracy stated is without the regression.
+    """
+    from rich.console import Console
+
+    from elastocal.application.accuracy import predict_campaign_accuracy
+    from elastocal.application.exported import compute_urdf_deviation_m, fold_effects
+    from elastocal.application.statements import format_accuracy
+    from elastocal.exchange.urdf_writing import write_calibrated_origins
+    from elastocal.io.atomic_writes import check_places, write_together
+
+    check_places(output / ROBOT, output / URDF)
+    if urdf is not None and (output / URDF).resolve() == urdf.resolve():
+        raise InputError(
+            urdf, "", "the file that would be replaced", "a URDF outside of --output"
+        )
+    campaign = load_diagnosed_campaign(folder)
+    # No file can hold the regression, so the files are of the robot without it.
+    calibrated = campaign.by_physics().calibrated
+    nominal = calibrated.robot
+    folded = fold_effects(calibrated)
+    states = campaign.case.observations.states
+    commands = nominal.reported_angles(states.joint_angles)
+    details = _describe_losses(campaign, calibrated, folded, commands, states.wrench)
+    accuracy = predict_campaign_accuracy(calibrated)
+    details += [format_accuracy(accuracy), str(output / ROBOT)]
+    corrected = None
+    if urdf is not None:
+        corrected = write_calibrated_origins(urdf, nominal, folded.robot)
+    with write_together(output, (ROBOT, URDF)) as partial:
+        _write_robot(partial / ROBOT, folded, campaign.name)
+        if corrected is not None:
+            (partial / URDF).write_bytes(corrected.content)
+            deviation_m = compute_urdf_deviation_m(
+                corrected, partial / URDF, nominal, folded.robot, commands
+            )
+            details += [str(output / URDF), *_describe_urdf(corrected, deviation_m)]
+    print_answer(
+        f"{campaign.name}: calibrated robot in {output}",
+        details,
+        "",
+        Console(stderr=True),
+    )
+
+
+def _describe_losses(
+    campaign: Diagnosed,
+    exported: CalibratedRobot,
+    folded: FoldedRobot,
+    reported_angles: np.ndarray,
+    wrench: np.ndarray,
+) -> list[str]:
+    """Warn of the regression and of the effects that no file can hold.
+
+    Parameters
+    ----------
+    campaign : gives the regression.
+    exported : the robot without it.
+    folded : contents of the robot file.
+    reported_angles, wrench : (N, n) commands, rad, and (N, 6) loads, N and N m, at which
+        the losses are measured.
+    """
+    import numpy as np
+
+    from elastocal.application.calibrated import predict_residual_displacements
+    from elastocal.application.exported import compute_left_out_displacements_m
+
+    warnings = []
+    calibrated = campaign.calibrated
+    if calibrated.residual_model is not None:
+        name = campaign.verdict["remainder"]["words"]
+        displacements = predict_residual_displacements(
+            calibrated, reported_angles, wrench
+        )
+        size = _format_size(np.linalg.norm(displacements, axis=1))
+        warnings.append(
+            f"! no file holds the {name} on the remainder,"
+            f" which elastocal correct adds: {size}"
+        )
+    if folded.left_out:
+        effects = exported.model.effects
+        names = ", ".join(effects[number].key for number in folded.left_out)
+        size = _format_size(
+            compute_left_out_displacements_m(exported, reported_angles, wrench)
+        )
+        warnings.append(f"! no file holds {names}: {size}")
+    return warnings
+
+
+def _format_size(displacements_m: np.ndarray) -> str:
+    """Format the lengths (N,) of displacements of the end effector."""
+    rms_mm = 1e3 * float((displacements_m**2).mean()) ** 0.5
+    largest_mm = 1e3 * displacements_m.max()
+    return f"up to {largest_mm:.3f} mm at the measured poses ({rms_mm:.3f} mm RMS)"
+
+
+def _write_robot(path: Path, folded: FoldedRobot, campaign: str) -> None:
+    """Write the robot file."""
+    import yaml
+
+    from elastocal.io.atomic_writes import write_text
+    from elastocal.mechanics.robot_file import document_of
+
+    text = yaml.safe_dump(
+        document_of(folded.robot), sort_keys=False, default_flow_style=None, width=128
+    )
+    write_text(path, f"# Calibrated by elastocal from the campaign {campaign}.\n{text}")
+
+
+def _describe_urdf(corrected: CorrectedUrdf, deviation_m: float) -> list[str]:
+    """Say what was changed in the user's URDF, and how far it is from the robot file."""
+    changed = format_count(corrected.changed, "joint origin")
+    sentences = [
+        f"{URDF}: {changed} changed, nothing else;"
+        " put it where the old one is, beside its meshes"
+    ]
+    deviation_mm = 1e3 * deviation_m
+    if deviation_mm > _ROUNDING_MM:
+        sentences.append(
+            f"{URDF} cannot hold ratios of joints, and errors behind a last joint that"
+            " has no fixed one after it:"
+            f" up to {deviation_mm:.3f} mm at the measured poses"
+        )
+    return sentences

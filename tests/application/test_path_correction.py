@@ -1,0 +1,70 @@
+"""A corrected path as a library user has it: its status, table and warnings."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from analysed_robots import analysed
+from made_calibrated import made_calibrated
+from synthetic import made_states
+
+from elastocal.application.calibrated import compute_nominal_poses
+from elastocal.application.path_correction import (
+    correct_path,
+    describe_path_accuracy,
+    describe_path_warnings,
+    describe_program,
+    tabulate_targets,
+)
+from elastocal.errors import InputError
+from elastocal.exchange.target_path import TargetPath
+
+# Angles from the middle of the limits to a posture that is not singular.
+BENT = np.array([0.0, 0.2, 0.1, 0.3, 0.7, 0.0])
+
+
+@pytest.fixture(scope="module")
+def calibrated():
+    """A robot that was fitted in states all around the path."""
+    calibrated = made_calibrated(analysed("gp180"), "joint_offset@2")
+    middle = calibrated.robot.joint_limits.mean(axis=1) + BENT
+    states = made_states(6, 60)
+    angles = middle + np.linspace(-0.5, 0.5, 60)[:, None]
+    return replace(calibrated, fitted=replace(states, joint_angles=angles))
+
+
+def make_path(calibrated, steps):
+    robot = calibrated.robot
+    angles = robot.joint_limits.mean(axis=1) + BENT + np.array(steps)[:, None]
+    commands = robot.reported_angles(angles)
+    position, rotation = compute_nominal_poses(robot, commands)
+    lines = tuple(range(2, 2 + len(steps)))
+    return TargetPath(position, rotation, commands, None, lines)
+
+
+def test_targets_within_the_fitted_range_have_a_bound(calibrated):
+    path = correct_path(calibrated, make_path(calibrated, [0.0, 0.02]), "path.csv")
+    assert path.has_bound.all() and not path.is_extrapolated.any()
+    assert describe_path_warnings(path) == []
+    table = tabulate_targets(path)
+    assert table["status"].tolist() == ["ok", "ok"]
+    assert (table["predicted_error_after_m"] < table["predicted_bound_m"]).all()
+    assert "over the targets (2)" in describe_path_accuracy(path)[0]
+    assert "load: none beside what the robot file states" in describe_program(path, "c")
+
+
+def test_targets_beyond_the_fitted_range_have_no_bound(calibrated):
+    path = correct_path(calibrated, make_path(calibrated, [0.4, 0.7]), "path.csv")
+    assert path.has_bound.tolist() == [True, False]
+    assert np.isnan(tabulate_targets(path)["predicted_bound_m"][1])
+    no_bound, extrapolated = describe_path_warnings(path)
+    assert "no bound is stated for 1 of 2 targets" in no_bound
+    assert "1 of 2 targets lie beyond the poses or loads" in extrapolated
+    assert "the targets with a bound (1)" in describe_path_accuracy(path)[0]
+
+
+def test_an_unreachable_pose_is_refused_with_its_line(calibrated):
+    wanted = make_path(calibrated, [0.0, 0.02])
+    wanted.position[1] *= 5.0
+    with pytest.raises(InputError, match=r"path\.csv: found line 3 is unreachable"):
+        correct_path(calibrated, wanted, "path.csv")

@@ -1,0 +1,99 @@
+"""The scope of a fit: effects that no command contains count as errors, motions that
+nobody can know do not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_calibrated import made_calibrated, plain_model
+from made_folders import made_folder, made_table
+from scipy.linalg import block_diag
+from synthetic import made_states
+
+from elastocal.application.accuracy import predict_campaign_accuracy
+from elastocal.application.scope import calibrate_on_case, determine_scope
+from elastocal.effects.catalogue import candidates_on
+from elastocal.fitting.least_squares import fit_model
+from elastocal.fitting.noise import Noise
+from elastocal.loop.whole import cases_in
+from elastocal.mechanics.sites import sites_of
+from elastocal.remainder.corrected import is_commanded
+
+STATES = made_states(6, 60)
+
+
+def scope_with(robot, candidate, values, shapes, std=0.0):
+    """Scope of a fit that has one more effect than the robot is commanded by.
+
+    `std` is the standard deviation of its parameters in units of their plausible sizes.
+    """
+    calibrated = made_calibrated(robot, "joint_offset@2")
+    model = plain_model(robot, "joint_offset@2")
+    model = replace(model, effects=(*calibrated.model.effects, candidate))
+    estimate = replace(
+        calibrated.estimate,
+        coefficients=(*calibrated.estimate.coefficients, np.array(values)),
+        shapes=(*calibrated.estimate.shapes, np.array(shapes, float)),
+    )
+    deviations = [std * parameter.plausible for parameter in candidate.parameters]
+    deviations += [0.0 for _ in candidate.shapes]
+    covariance = block_diag(calibrated.covariance, np.diag(deviations) ** 2)
+    return determine_scope(calibrated, model, estimate, covariance, STATES)
+
+
+def test_every_effect_that_no_command_contains_counts_as_error(fanuc):
+    first_of_effect = {}
+    for key, candidate in candidates_on(sites_of(fanuc)).items():
+        if not is_commanded(candidate):
+            first_of_effect.setdefault(candidate.effect, (key, candidate))
+    instruments = {"frame_drift", "tracker_scale", "force_bias"}
+    conditions = {"hysteresis", "thermal_growth", "temperature_gradient"}
+    assert first_of_effect.keys() >= {"setup_step", *instruments, *conditions}
+    for key, candidate in first_of_effect.values():
+        values = [parameter.plausible for parameter in candidate.parameters]
+        shapes = [0.5 * (shape.lowest + shape.highest) for shape in candidate.shapes]
+        scope = scope_with(fanuc, candidate, values, shapes)
+        assert scope.left_out == (key,), key
+        assert scope.left_out_worst_m >= scope.left_out_m > 1e-7, key
+        # An effect that was fitted to zero still contributes its uncertainty.
+        zeros = np.zeros(len(values))
+        uncertain = scope_with(fanuc, candidate, zeros, shapes, std=1.0)
+        assert uncertain.left_out_m > 0.1 * scope.left_out_m, key
+
+
+def test_an_unknown_offset_of_the_target_at_the_end_effector_is_no_error(fanuc):
+    calibrated = made_calibrated(fanuc, "link_geometry@6")
+    target = calibrated.model.targets[0]
+    variances = [0.0] * (len(calibrated.covariance) - 6) + [1e-3] * 3 + [0.0] * 3
+    sizes = []
+    for offset_m in ((0.0, 0.0, 0.0), None):
+        model = replace(calibrated.model, targets=(replace(target, offset_m=offset_m),))
+        scope = determine_scope(
+            calibrated, model, calibrated.estimate, calibrated.covariance, STATES
+        )
+        assert scope.offset_removed == (offset_m is None)
+        uncertain = replace(
+            calibrated, scope=scope, covariance=np.diag(variances), fitted=STATES
+        )
+        sizes.append(predict_campaign_accuracy(uncertain).rms_m)
+    size_if_known, size_if_unknown = sizes
+    assert size_if_unknown < 1e-3 * size_if_known
+
+
+@pytest.fixture(scope="module")
+def case(kuka, tmp_path_factory, config_folder):
+    folder = tmp_path_factory.mktemp("repeated") / "made"
+    folder = made_folder(folder, kuka, table=made_table(kuka, "made"))
+    return cases_in(folder, config_folder / "robots")[0]
+
+
+def test_repeats_bound_the_repeatability_of_joints_that_the_sensor_hides(case):
+    noise = Noise("declared", 6e-5, 6e-5, np.zeros(6))
+    fit = fit_model(case.model, case.observations, noise)
+    calibrated = calibrate_on_case(
+        case, fit.model, fit.estimate, fit.covariance, replace(noise, source="repeats")
+    )
+    # No joint moves between these repeats, so the repeatability is what they do not rule
+    # out, and the same for all joints.
+    joint_rad = calibrated.noise.joint_rad
+    assert 0.0 < joint_rad[0] < 6e-5 and np.ptp(joint_rad) == 0.0

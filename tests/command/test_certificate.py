@@ -1,0 +1,112 @@
+"""`elastocal certificate`: the decision, what it is based on, and when there is none."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from analysed_robots import ROBOTS
+from certified import record_jobs
+
+from elastocal.application.statements import tabulate_errors
+from elastocal.campaigns.campaign_folder import read_campaign_folder
+
+REPORT = Path("reports/loop/made")
+CERTIFICATE = REPORT / "certificate.json"
+VERDICT = REPORT / "verdict.json"
+# Contributions to the error of the corrected robot, whose squares add up.
+CONTRIBUTIONS = (
+    "uncertainty of the parameters",
+    "repeatability",
+    "form of the model",
+    "not commanded",
+    "left by the regression",
+)
+
+
+def certify(elastocal, tolerance):
+    """Run the command; return its result and the document that it has written."""
+    result = elastocal("certificate", "made", "--tolerance", tolerance)
+    return result, json.loads(CERTIFICATE.read_text())
+
+
+def write_verdict(document):
+    """Change the verdict of a campaign as if its diagnosis had written it."""
+    VERDICT.write_text(json.dumps(document))
+    record_jobs("made", read_campaign_folder("made", ROBOTS).files())
+
+
+def test_a_tolerance_needs_its_unit_and_a_tight_one_fails(
+    elastocal, refusal, in_checkout
+):
+    assert "0.2mm" in refusal("certificate", "made", "--tolerance", "0.5")
+    result, _ = certify(elastocal, "1um")
+    assert result.exit_code == 1 and result.output.startswith("! fail")
+
+
+def test_a_certificate_states_the_errors_of_the_campaign(elastocal, in_checkout):
+    result, document = certify(elastocal, "0.5mm")
+    assert result.exit_code == 0, result.output
+    assert CERTIFICATE.with_suffix(".pdf").read_bytes().startswith(b"%PDF")
+    assert document["conformity"]["tolerance_m"] == 5e-4
+    decision, sentences, point, pages = result.output.splitlines()[:4]
+    assert document["conformity"]["decision"] in decision and "0.500 mm" in decision
+    assert "Nobody has measured" in sentences
+    assert document["point"] in point and pages.endswith(".pdf")
+    measured_and_predicted = tabulate_errors(json.loads(VERDICT.read_text()))
+    assert document["errors"] == measured_and_predicted
+    _, predicted = measured_and_predicted
+    uncorrected = document["budget"][0]
+    assert uncorrected["name"] == "uncorrected"
+    assert predicted[1] == f"{1e3 * uncorrected['rms_m']:.3f} mm"
+
+
+def test_correct_states_the_errors_of_its_targets(elastocal, correct_arguments, output):
+    answer = elastocal(*correct_arguments).stderr
+    targets = pd.read_csv(output)
+    before = 1e3 * np.sqrt((targets["predicted_error_before_m"] ** 2).mean())
+    after = 1e3 * np.sqrt((targets["predicted_error_after_m"] ** 2).mean())
+    assert f"uncorrected they would be missed by {before:.3f} mm RMS" in answer
+    assert f": {after:.3f} mm (" in answer
+
+
+def test_the_robot_is_judged_as_it_is_corrected(elastocal, copied_regressed_checkout):
+    """A tolerance that the physical model alone would fail is passed with the
+    regression on its residuals."""
+    report = Path("reports/loop/smooth")
+    verdict = json.loads((report / "verdict.json").read_text())
+    with_regression_m = verdict["accuracy"]["rms_bound_m"]
+    by_physics_m = verdict["physics"]["accuracy"]["rms_m"]
+    assert with_regression_m < by_physics_m
+    tolerance_mm = 1e3 * (with_regression_m + by_physics_m) / 2
+    elastocal("certificate", "smooth", "--tolerance", f"{tolerance_mm:.4f}mm")
+    document = json.loads((report / "certificate.json").read_text())
+    assert document["conformity"]["decision"] == "pass"
+    sum_of_squares = sum(
+        entry["rms_m"] ** 2
+        for entry in document["budget"]
+        if entry["name"] in CONTRIBUTIONS
+    )
+    rms_m = document["accuracy"]["rms_m"]
+    assert sum_of_squares == pytest.approx(rms_m**2, rel=1e-9)
+
+
+def test_certificate_and_correct_warn_of_a_misplaced_frame(
+    elastocal, copied_checkout, path
+):
+    sentence = "reflector or tool sits 5.0 mm from where it is declared"
+    misplaced = {"misplaced": [{"sentence": sentence}]}
+    write_verdict(json.loads(VERDICT.read_text()) | misplaced)
+    result, document = certify(elastocal, "0.5mm")
+    assert f"! {sentence}" in result.stderr
+    assert document["misplaced"] == misplaced["misplaced"]
+    result = elastocal("correct", "made", path, "--output", "targets.csv")
+    assert f"! {sentence}" in result.stderr
+
+
+def test_data_at_fault_get_no_certificate(refusal, copied_checkout):
+    fault = {"family": "data", "name": "wrong_sign"}
+    at_fault = {"effects": [fault], "accuracy": None}
+    write_verdict(json.loads(VERDICT.read_text()) | at_fault)
+    assert "data at fault" in refusal("certificate", "made", "--tolerance", "0.5mm")

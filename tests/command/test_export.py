@@ -1,0 +1,126 @@
+"""`elastocal export`: the calibrated robot as a robot file and as the user's URDF."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from analysed_robots import analysed
+from made_urdf import joint, link
+from made_urdf import robot as make_urdf
+
+from elastocal.campaigns.reading import read_robot
+from elastocal.exchange.urdf import robot_from_urdf
+from elastocal.mechanics.kinematics import poses
+
+ANGLES = 0.5 * np.linspace(-1, 1, 6)[None]
+
+
+def join_lines(text):
+    return " ".join(text.split())
+
+
+def test_the_robot_file_holds_the_identified_parameters(
+    in_checkout, elastocal, tmp_path
+):
+    result = elastocal("export", "made", "--output", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    robot = read_robot(tmp_path / "out" / "robot.yaml")
+    nominal = analysed("kuka")
+    offset = robot.reported_offset[2] - nominal.reported_offset[2]
+    assert abs(offset) == pytest.approx(3e-4, rel=0.2)
+    assert (robot.compliance != nominal.compliance).any()
+    assert not (tmp_path / "out" / "robot.urdf").exists()
+    assert "no file holds" not in result.stderr
+
+
+def test_an_export_says_how_much_is_lost_without_the_regression(
+    elastocal, copied_regressed_checkout, tmp_path
+):
+    verdict = json.loads(Path("reports/loop/smooth/verdict.json").read_text())
+    result = elastocal("export", "smooth", "--output", tmp_path / "out")
+    answer = join_lines(result.stderr)
+    loss = re.search(
+        r"no file holds the Gaussian process .*?up to (\S+) mm at the measured poses"
+        r" \((\S+) mm RMS",
+        answer,
+    )
+    assert loss and 0.1 < float(loss[2]) < float(loss[1]) < 1.0
+    by_physics_m = verdict["physics"]["accuracy"]["rms_m"]
+    assert f": {1e3 * by_physics_m:.3f} mm (" in answer
+
+
+def urdf_of(robot):
+    """Write a robot as URDF, with a joint for each of its transforms."""
+    end = robot.chain.end_effector
+    elements = [link("base")]
+    parent = "base"
+    for number, transform in enumerate(robot.chain.transforms[: end.after], 1):
+        child = end.name if number == end.after else f"l{number}"
+        axis = np.eye(3)[transform.axis]
+        kind = "revolute"
+        origin = {}
+        if transform.coordinate is None:
+            kind = "fixed"
+            key = "xyz" if transform.kind == "T" else "rpy"
+            origin[key] = transform.constant * axis
+        axis = (transform.sign or 1) * axis
+        elements.append(link(child))
+        elements.append(joint(f"j{number}", parent, child, kind, axis=axis, **origin))
+        parent = child
+    return make_urdf(*elements)
+
+
+@pytest.fixture
+def exported(in_checkout, elastocal, tmp_path):
+    """Export with a URDF of the user that has a comment; result and folder."""
+    urdf = tmp_path / "mine.urdf"
+    text = urdf_of(analysed("kuka")).replace("<link ", "<!-- mine --><link ", 1)
+    urdf.write_text(text)
+    result = elastocal("export", "made", "--urdf", urdf, "--output", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    return result, tmp_path / "out"
+
+
+def test_only_the_joint_origins_of_the_users_urdf_are_changed(exported, tmp_path):
+    result, folder = exported
+    answer = join_lines(result.stderr)
+    assert re.search(r"robot\.urdf: \d+ joint origins? changed, nothing else", answer)
+    assert "cannot hold" not in answer
+    text = (folder / "robot.urdf").read_text()
+    assert text.count('effort="1"') == 6 and "<!-- mine -->" in text
+    assert text != (tmp_path / "mine.urdf").read_text()
+
+
+def test_the_urdf_has_the_poses_of_the_robot_file(exported):
+    _, folder = exported
+    robot = read_robot(folder / "robot.yaml")
+    end = robot.chain.end_effector
+    from_urdf = robot_from_urdf(folder / "robot.urdf", "base", end.name).robot
+    wanted, _ = poses(robot.chain, robot.model_angles(ANGLES), end)
+    position, _ = poses(from_urdf.chain, ANGLES, from_urdf.chain.end_effector)
+    np.testing.assert_allclose(position, wanted, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [(urdf_of(analysed("gp180")), "imported"), ("<robot/>", "no <link>")],
+)
+def test_the_urdf_of_another_robot_is_refused(
+    in_checkout, refusal, tmp_path, text, message
+):
+    urdf = tmp_path / "other.urdf"
+    urdf.write_text(text)
+    arguments = ("export", "made", "--urdf", urdf, "--output", tmp_path / "out")
+    assert message in refusal(*arguments)
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_users_urdf_is_not_replaced(exported, refusal):
+    _, folder = exported
+    urdf = folder / "robot.urdf"
+    text = urdf.read_text()
+    message = refusal("export", "made", "--urdf", urdf, "--output", folder)
+    assert "would be replaced" in message
+    assert urdf.read_text() == text
