@@ -353,6 +353,7 @@ def warn_of_implausible_values(fitted: Fit, keys: Sequence[str]) -> list[str]:
                 warnings.append(f"{estimate}, and by its physics {sign}")
             if _is_oversized(value, std_error, parameter):
                 warnings.append(
-                    f"{estimate}, more than {_IMPLAUSIBLE_FACTOR:g} times what such an effect reaches"
+                    f"{estimate}, more than {_IMPLAUSIBLE_FACTOR:g} times "
+                    "what such an effect reaches"
                 )
     return warnings

@@ -230,14 +230,15 @@ def _warn_of_search(
     warnings = []
     if effects and not evidence.adopted:
         warnings.append(
-            "what was found is too uncertain to make predictions better: the model stays as declared"
+            "what was found is too uncertain to make predictions better: "
+            "the model stays as declared"
         )
     keys = [key for effect in effects for key in effect.members]
     warnings += warn_of_implausible_values(full_model, keys)
     if not evidence.settled:
         warnings.append(
-            f"the problem was linearised {settings.linearizations} times, and each time another model was found: "
-            "more may be missing"
+            f"the problem was linearised {settings.linearizations} times, "
+            "and each time another model was found: more may be missing"
         )
     return tuple(warnings)
 

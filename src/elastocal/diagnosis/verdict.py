@@ -167,7 +167,7 @@ def conclude(problem: SearchProblem, posterior: Posterior, alarm: Alarm) -> Conc
         return Conclusion(
             ADEQUATE, hypotheses, nothing, {}, mechanisms, nothing.probability
         )
-    missing = [h for h in hypotheses if h.mechanisms]
+    missing = [hypothesis for hypothesis in hypotheses if hypothesis.mechanisms]
     by_verdict: dict[str, list[Hypothesis]] = {UNEXPLAINED: [], CLASS: [], SEVERAL: []}
     for hypothesis in missing:
         by_verdict[_classify(hypothesis)].append(hypothesis)
@@ -177,25 +177,23 @@ def conclude(problem: SearchProblem, posterior: Posterior, alarm: Alarm) -> Conc
     state_alone, stated = _minimize_expected_loss(
         [best, *competitors], problem.settings
     )
+    alternatives: dict[str, tuple[str, ...]] = {}
     if verdict == UNEXPLAINED or not stated:
+        verdict = UNEXPLAINED
         probability = _sum_probabilities(by_verdict[UNEXPLAINED])
         if not stated:
             best = nothing
             probability += nothing.probability
-        return Conclusion(UNEXPLAINED, hypotheses, best, {}, mechanisms, probability)
-    if state_alone and verdict == CLASS and OTHER not in best.mechanisms:
-        no_alternatives: dict[str, tuple[str, ...]] = dict.fromkeys(best.named, ())
-        return Conclusion(
-            NAMED, hypotheses, best, no_alternatives, mechanisms, best.probability
-        )
-    return Conclusion(
-        verdict,
-        hypotheses,
-        best,
-        {name: _find_alternatives(name, best, stated) for name in best.named},
-        mechanisms,
-        min(_sum_probabilities(stated), 1.0),
-    )
+    elif state_alone and verdict == CLASS and OTHER not in best.mechanisms:
+        verdict = NAMED
+        probability = best.probability
+        alternatives = dict.fromkeys(best.named, ())
+    else:
+        probability = min(_sum_probabilities(stated), 1.0)
+        alternatives = {
+            name: _find_alternatives(name, best, stated) for name in best.named
+        }
+    return Conclusion(verdict, hypotheses, best, alternatives, mechanisms, probability)
 
 
 def _compute_inclusion_probabilities(
@@ -426,7 +424,8 @@ def find_contradictions(final: Fit, measured: Noise, settings: Settings) -> list
     for joint in np.flatnonzero(negative):
         multiple = -compliance[joint] / std_error[joint]
         contradictions.append(
-            f"the compliance of joint {joint + 1} is negative by {multiple:.1f} standard errors"
+            f"the compliance of joint {joint + 1} is negative by {multiple:.1f} "
+            "standard errors"
         )
     return contradictions
 
@@ -472,6 +471,7 @@ def warn_of_pose_error(residual_noise: Noise, least_rad: float) -> list[str]:
     if residual_noise.pose_rad < least_rad:
         return []
     return [
-        f"measurements of a pose err together as if every joint were {1e6 * residual_noise.pose_rad:.0f} µrad off, "
+        "measurements of a pose err together as if every joint were "
+        f"{1e6 * residual_noise.pose_rad:.0f} µrad off, "
         "which repeats of a pose do not show: new poses will err as much"
     ]

@@ -102,13 +102,22 @@ def calibrated_by(
     diagnosis: Diagnosis,
     held_out: Case,
     delivered: Corrected | None,
+    *,
     physics_only: bool = False,
 ) -> CalibratedRobot:
-    """The robot that a diagnosis found, with all that is known of its errors: held-out
-    rows without gross ones judge it.
+    """Return the robot of a diagnosis, with errors as large as validation poses show.
 
-    `delivered`: of `judge.apply_regression`. `physics_only`: corrected without its
-    regression; where there is one, what the final model leaves is known to be no noise.
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Result of the training poses.
+    held_out : Case
+        Validation poses without gross errors.
+    delivered : Corrected or None
+        Result of `judge.apply_regression`.
+    physics_only : bool
+        Whether to leave out the regression. The residual of the final model is then
+        still known not to be noise.
     """
     case = diagnosis.case
     final = diagnosis.final
@@ -116,23 +125,23 @@ def calibrated_by(
         *transfer_fit(final, case, held_out), held_out.observations
     )
     noise_m = final.noise.position_m
-    more = None
+    regression = None
     if delivered is not None and delivered.predictor is not None:
         noise_m = diagnosis.verdict.noise.position_m
         if not physics_only:
             residual = delivered.residual
-            more = build_residual_model(
+            regression = build_residual_model(
                 case,
                 final.estimate,
                 delivered.predictor,
                 delivered.chosen["spread"]["typical"],
                 noise_m,
             )
-    found = calibrate_on_case(
-        case, final.model, final.estimate, final.covariance, final.noise, more
+    robot = calibrate_on_case(
+        case, final.model, final.estimate, final.covariance, final.noise, regression
     )
-    found = set_form_error(found, diagnosis.verdict.other_models_m or 0.0)
-    return inflate_to_held_out_errors(found, held_out, residual, noise_m)
+    robot = set_form_error(robot, diagnosis.verdict.other_models_m or 0.0)
+    return inflate_to_held_out_errors(robot, held_out, residual, noise_m)
 
 
 def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
