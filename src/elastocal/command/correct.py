@@ -87,10 +87,9 @@ def correct(
         )
     _write_targets(output, corrected, campaign.name, program, axis_names)
     details = describe_path_accuracy(corrected)
-    if campaign.calibrated.residual_model is not None:
-        remainder = campaign.verdict.remainder
-        regression = remainder.words if remainder else ""
-        details.append(describe_regression(corrected, regression))
+    remainder = campaign.verdict.remainder
+    if remainder and campaign.calibrated.residual_model:
+        details.append(describe_regression(corrected, remainder.words))
     if program:
         details.append(program.describe(axis_names))
     warnings = [frame.sentence for frame in campaign.verdict.misplaced]
