@@ -107,30 +107,32 @@ def test_noise_levels_are_lines_in_micrometres_that_are_thick_only_where_they_ar
 
 def test_stiffness_errors_stand_under_both_counts_of_joints_with_their_limit():
     figure = draw_stiffness_errors(METRICS, PRINTED, "Kuka", "kuka", ORDER, 3.0)
-    whole, first = figure.axes
-    for axis, scale in ((whole, 1.0), (first, 0.5)):
-        one, other, limit = axis.lines[:3]
-        np.testing.assert_allclose(one.get_ydata(), 10 * scale / LENGTHS)
-        np.testing.assert_allclose(other.get_ydata(), 20 * scale / LENGTHS)
+    all_joints, fixed_joints = figure.axes
+    for axis, scale in ((all_joints, 1.0), (fixed_joints, 0.5)):
+        first_curve, second_curve, limit = axis.lines[:3]
+        np.testing.assert_allclose(first_curve.get_ydata(), 10 * scale / LENGTHS)
+        np.testing.assert_allclose(second_curve.get_ydata(), 20 * scale / LENGTHS)
         assert band(axis.collections[1])[2] == pytest.approx((9 * scale, 11 * scale))
         assert list(limit.get_ydata()) == [3.0, 3.0] and [
             text.get_text() for text in axis.texts
         ] == ["3 %"]
     assert (
-        "all joints" in whole.get_title()
-        and "fixed in the last stage" in first.get_title()
+        "all joints" in all_joints.get_title()
+        and "fixed in the last stage" in fixed_joints.get_title()
     )
-    assert whole.get_ylabel() == r"$k_\Sigma$ (%)"
+    assert all_joints.get_ylabel() == r"$k_\Sigma$ (%)"
     assert legend_entries(figure) == [*ORDER, PAPER]
     assert_nothing_cut_off(figure)
     # Both counts are those of the fixed joints in the paper: its score at 4
     # configurations, and where it reaches 3 %.
-    marks = [line for line in first.lines if line.get_marker() == "D"]
-    assert len(whole.lines) == 3 and [line.get_xydata().tolist() for line in marks] == [
+    marks = [line for line in fixed_joints.lines if line.get_marker() == "D"]
+    assert len(all_joints.lines) == 3 and [
+        line.get_xydata().tolist() for line in marks
+    ] == [
         [[4, 2.2]],
         [[5, 3]],
     ]
-    assert marks[0].get_color() == first.lines[1].get_color()
+    assert marks[0].get_color() == fixed_joints.lines[1].get_color()
 
 
 def find_points(axis, marker):

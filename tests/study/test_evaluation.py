@@ -70,7 +70,7 @@ def blocks_of(estimates, weights, *cuts):
 def test_averages_are_those_written_out_whatever_the_blocks(
     judge, estimates, weights, counts, method
 ):
-    found = average_estimates(
+    averages = average_estimates(
         iter(blocks_of(estimates, weights, 1, 20, 21)), judge, method, counts
     )
     for replicate in (0, 1, REPLICATES):
@@ -79,24 +79,24 @@ def test_averages_are_those_written_out_whatever_the_blocks(
             "stiffness": lambda drawn: 1 / (1 / drawn).mean(axis=0),
             "compliance": lambda drawn: drawn.mean(axis=0),
         }[method](drawn)
-        np.testing.assert_allclose(found.compliance[replicate], expected, rtol=1e-12)
+        np.testing.assert_allclose(averages.compliance[replicate], expected, rtol=1e-12)
         tests = counts[replicate].astype(int)
         deviation = np.repeat(
             compute_position_errors(judge, expected), tests, axis=1
         ).mean(axis=1)
         np.testing.assert_allclose(
-            found.initial_deviation[replicate],
+            averages.initial_deviation[replicate],
             np.repeat(judge.initial_errors, tests).mean(),
             rtol=1e-12,
         )
-        np.testing.assert_allclose(found.deviation[replicate], deviation, rtol=1e-9)
+        np.testing.assert_allclose(averages.deviation[replicate], deviation, rtol=1e-9)
     relative = estimates / judge.reference
     np.testing.assert_allclose(
-        found.relative_spread,
+        averages.relative_spread,
         (relative.std(axis=0) / relative.mean(axis=0)).max(axis=-1),
         rtol=1e-9,
     )
-    assert (found.nonpositive_share == 0).all()
+    assert (averages.nonpositive_share == 0).all()
 
 
 def test_share_of_nonpositive_compliances_counts_data_sets_and_takes_trust_away(
@@ -178,8 +178,10 @@ def test_a_length_comes_with_the_spread_of_replicates_that_go_on_beyond_their_cu
 ):
     """As one over the length: from 0.5, 0.75 and 1 at length 3 to 0.25."""
     replicates = np.column_stack([[3.0, 3.0, 2.0], [0.9, 2.6, 0.9], ends])
-    found, error = find_length_with_error(np.array([3.0, 0.9, 0.5]), replicates, limit)
-    assert found == length and error == pytest.approx(np.std(lengths, ddof=1))
+    first_length, error = find_length_with_error(
+        np.array([3.0, 0.9, 0.5]), replicates, limit
+    )
+    assert first_length == length and error == pytest.approx(np.std(lengths, ddof=1))
 
 
 def test_table_4_over_studies_is_their_median_with_a_spread_that_one_outlier_does_not_move():
