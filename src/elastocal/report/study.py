@@ -43,19 +43,25 @@ def shorten_titles(titles: Mapping[str, str]) -> dict[str, str]:
     names = {}
     for robot, title in titles.items():
         base = min(filter(title.startswith, titles.values()), key=len)
-        others = [other for other in titles.values() if not other.startswith(base)]
-        names[robot] = _shorten_title(base, others) + title.removeprefix(base)
+        alternatives = [
+            alternative
+            for alternative in titles.values()
+            if not alternative.startswith(base)
+        ]
+        names[robot] = _shorten_title(base, alternatives) + title.removeprefix(base)
     return names
 
 
-def _shorten_title(title: str, others: Sequence[str]) -> str:
-    """The fewest first words of a title with which no other title begins."""
-    words = title.split()
-    for count in range(1, len(words)):
-        beginning = words[:count]
-        if all(other.split()[:count] != beginning for other in others):
+def _shorten_title(title: str, alternatives: Sequence[str]) -> str:
+    """The fewest first words of a title with which no alternative begins."""
+    parts = title.split()
+    for count in range(1, len(parts)):
+        beginning = parts[:count]
+        if all(
+            alternative.split()[:count] != beginning for alternative in alternatives
+        ):
             return " ".join(beginning)
-    return " ".join(words)
+    return " ".join(parts)
 
 
 class _Tables:
