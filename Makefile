@@ -5,7 +5,7 @@ CORES ?= 2
 # The pins have every dependency, so none is looked for; compiled once, since an environment may forbid programs to do it as they run.
 INSTALL = $(BIN)/uv pip install -q --system-certs --compile-bytecode --python $(BIN)/python
 
-.PHONY: paper study proof audit test test-slow test-slurm fuzz soak mutants lint bench pictures site supply dist installed lock clean
+.PHONY: paper study proof audit test test-slow test-slurm fuzz soak mutants lint catalogue bench pictures site supply dist installed lock clean
 
 paper: .venv/ready
 	$(BIN)/snakemake -j$(CORES)
@@ -55,6 +55,10 @@ lint: .venv/ready-for-tests
 	$(BIN)/lint-imports
 	$(BIN)/mypy
 	$(BIN)/python workflow/lint.py
+
+# After a new or changed effect: the list of all candidates that a test compares, and the table of sizes in docs/method.md.
+catalogue: .venv/ready-for-tests
+	PYTHONPATH=tests/helpers $(BIN)/python tests/helpers/catalogue_lists.py
 
 bench: .venv/ready-for-tests
 	$(BIN)/python benchmarks/run.py

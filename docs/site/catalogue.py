@@ -6,10 +6,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import yaml
-
 from elastocal.campaigns.reading import read_robot
-from elastocal.effects.catalogue import list_effects
+from elastocal.effects.catalogue import list_bundled_effects
 from elastocal.figures.effect_signatures import compute_signature, list_candidates
 
 from extensions import with_plain_references
@@ -55,9 +53,6 @@ FAMILIES = {
 ROBOT = read_robot(
     Path(__file__).resolve().parents[2] / "config" / "robots" / "gp180.yaml"
 )
-FORMULAS = yaml.safe_load(
-    Path(__file__).with_name("effect_formulas.yaml").read_text(encoding="utf-8")
-)
 NEEDS = {
     "load": "a load, or the weight of the arm",
     "load on the joints": "a load on the joints, or declared masses",
@@ -71,16 +66,11 @@ NEEDS = {
 
 def page() -> str:
     """The page, in reStructuredText as the docstrings are."""
-    listed = list_effects()
-    unknown = {effect.family for effect in listed.values()} - set(FAMILIES)
-    if unknown or set(FORMULAS) != set(listed):
-        differ = sorted(unknown | (set(FORMULAS) ^ set(listed)))
-        raise KeyError(
-            f"docs/site: words of families in catalogue.py and effect_formulas.yaml differ from the catalogue in {differ}"
-        )
+    listed = list_bundled_effects()
     parts = [HEAD, _thumbnails(listed)]
-    for family, words in FAMILIES.items():
-        parts.append(_headed(words, "-"))
+    families = dict.fromkeys([*FAMILIES, *(e.family for e in listed.values())])
+    for family in families:
+        parts.append(_headed(FAMILIES.get(family, family.capitalize()), "-"))
         parts += [
             _section(effect) for effect in listed.values() if family == effect.family
         ]
@@ -117,7 +107,7 @@ def _section(effect: Effect) -> str:
     summary, _, rest = text.strip().partition("\n\n")
     # A heading of a docstring would be a heading of the page.
     rest, _, references = rest.partition("References\n----------\n")
-    formula = f".. math:: {FORMULAS[effect.name]}\n\n"
+    formula = f".. math:: {effect.formula}\n\n"
     head = f".. _{effect.name}:\n\n{_headed(title, '~')}"
     parts = (summary, formula + rest, moves, picture + _table(effect), references)
     return head + "\n\n".join(part.strip() for part in parts) + "\n\n"

@@ -1,4 +1,4 @@
-"""Counts with their nouns, as messages and reports write them."""
+"""Format counts with their nouns for messages and reports."""
 
 from __future__ import annotations
 
@@ -8,23 +8,25 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 
-def format_count(number: int, one: str, many: str | None = None) -> str:
-    """A number with its noun, with thin spaces in large numbers: 1 row, 2 rows."""
-    return f"{format_integer(number)} {pluralize(one, number, many)}"
+def format_count(number: int, singular: str, plural: str | None = None) -> str:
+    """Return a number with its noun, with thin spaces in large numbers: 1 row, 2 rows."""
+    return f"{format_integer(number)} {pluralize(singular, number, plural)}"
 
 
 def list_first(names: Sequence[str], most: int) -> str:
-    """The first of some names, and how many more there are: a, b and 3 more."""
-    return ", ".join(names[:most]) + (
-        f" and {len(names) - most} more" if len(names) > most else ""
-    )
+    """Return the first names, and the number of further ones: a, b and 3 more."""
+    listed = ", ".join(names[:most])
+    further = len(names) - most
+    return f"{listed} and {further} more" if further > 0 else listed
 
 
-def pluralize(one: str, number: int, many: str | None = None) -> str:
-    """A noun in the form of its number: row, rows."""
-    return one if number == 1 else many or one + "s"
+def pluralize(singular: str, number: int, plural: str | None = None) -> str:
+    """Return a noun in the form of its number: row, rows."""
+    if number == 1:
+        return singular
+    return plural or f"{singular}s"
 
 
 def format_integer(number: int) -> str:
-    """A whole number with a thin space between thousands."""
+    """Return a whole number with a thin space between thousands."""
     return f"{number:,}".replace(",", "\u2009")

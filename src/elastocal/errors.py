@@ -13,23 +13,35 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-# A terminal shows a message as a whole: files may hold values of any length.
+# Upper bound on a message, which a terminal shows as a whole: files may hold values of
+# any length.
 LONGEST_MESSAGE = 500
-# Tables hold names, and spreadsheets open tables; those of some countries take the wide
-# signs too.
-_FORMULA = tuple("=+-@＝＋－＠")
 _LONGEST_SOURCE = 160
 _LONGEST_KEY = 100
 _LONGEST_FOUND = 120
+# Tables hold names, and spreadsheets open tables and take a text that begins with one
+# of these for a formula, in some countries also with the wide characters.
+_FORMULA = tuple("=+-@＝＋－＠")
+# Name under which a file is being written, see `io.atomic_writes`.
+_PARTIAL = re.compile(r"\.[0-9a-f]{16}\.partial\b.*")
+# Messages of the loader of shared libraries if memory is used up.
+_NO_MEMORY = ("failed to map segment", "annot allocate memory")
+_USABLE = (
+    "a file or folder that is there, on a disk with space, where this user may read "
+    "and write"
+)
 
 
 class InputError(ValueError):
-    """Something that a user gave cannot be used; the message is one line of
-    `LONGEST_MESSAGE` characters at most.
+    """Something that a user gave cannot be used. The message is one line of at most
+    `LONGEST_MESSAGE` characters.
 
-    `source`: the file, or the name of the thing, that holds the fault. `key`: the key,
-    row or column inside it; empty where the whole file is meant. `found`: what stands
-    there. `allowed`: what may stand there.
+    Attributes
+    ----------
+    source : file, or name of the thing, that has the fault.
+    key : key, row or column inside the source; empty if the whole source is at fault.
+    found : what was found.
+    allowed : what is allowed there.
     """
 
     def __init__(self, source: str | Path, key: str, found: str, allowed: str) -> None:
@@ -37,123 +49,100 @@ class InputError(ValueError):
         self.key = key
         self.found = found
         self.allowed = allowed
-        name = format_printable(self.source)
-        where = (
-            name if len(name) <= _LONGEST_SOURCE else f"…{name[1 - _LONGEST_SOURCE :]}"
-        )
-        where += f": {_shortened(format_printable(key), _LONGEST_KEY)}" if key else ""
-        message = f"{where}: found {_shortened(format_printable(found), _LONGEST_FOUND)}; allowed: "
-        super().__init__(
-            message
-            + _shortened(format_printable(allowed), LONGEST_MESSAGE - len(message))
-        )
+        place = format_printable(self.source)
+        if len(place) > _LONGEST_SOURCE:
+            place = f"…{place[1 - _LONGEST_SOURCE :]}"
+        if key:
+            place += f": {_shorten(format_printable(key), _LONGEST_KEY)}"
+        found = _shorten(format_printable(found), _LONGEST_FOUND)
+        message = f"{place}: found {found}; allowed: "
+        message += _shorten(format_printable(allowed), LONGEST_MESSAGE - len(message))
+        super().__init__(message)
 
 
 def suggest_names(name: str, known: Collection[str]) -> str:
-    """What is allowed instead of a name: the closest first."""
-    listed = ", ".join(known)
-    return f"{hint} ({listed})" if (hint := suggest_name(name, known)) else listed
+    """Return the known names for a message, with the one closest to a wrong name as a
+    question first."""
+    names = ", ".join(known)
+    suggestion = suggest_name(name, known)
+    return f"{suggestion} ({names})" if suggestion else names
 
 
 def suggest_name(name: str, known: Collection[str]) -> str:
-    """The closest of some names as a question, whatever the case of its letters; empty
-    where none is close."""
-    lower = {other.lower(): other for other in known}
-    close = difflib.get_close_matches(str(name).lower(), lower, n=1)
-    return f"{lower[close[0]]!r}?" if close else ""
+    """Return the known name closest to a wrong one as a question, whatever the case of
+    its letters; empty if none is close."""
+    by_lower_case = {known_name.lower(): known_name for known_name in known}
+    close = difflib.get_close_matches(str(name).lower(), by_lower_case, n=1)
+    return f"{by_lower_case[close[0]]!r}?" if close else ""
 
 
 def format_printable(text: str) -> str:
-    """A text on one line, `escaped`."""
+    """Return a text on one line, with control characters as escapes."""
     return escape_control_characters(" ".join(text.split()))
 
 
 def escape_control_characters(text: str) -> str:
-    """A text with what `steering` finds as escapes: what a file holds must not steer a
-    terminal."""
-    return (
-        text
-        if text.isprintable()
-        else "".join(ascii(c)[1:-1] if find_control_character(c) else c for c in text)
+    """Return a text with what `find_control_character` finds as escapes, because a
+    file's contents must not control a terminal."""
+    if text.isprintable():
+        return text
+    return "".join(
+        ascii(character)[1:-1] if find_control_character(character) else character
+        for character in text
     )
 
 
 def find_control_character(text: str) -> str:
-    """The first control character of a text, or mark that turns the order of letters or
-    is not seen; empty where none is."""
-    return (
-        ""
-        if text.isprintable()
-        else next(
-            (
-                c
-                for c in text
-                if not (c.isprintable() or unicodedata.category(c) == "Zs")
-            ),
-            "",
-        )
-    )
+    """Return the first control character of a text, or the first mark that is invisible
+    or changes the direction of writing; empty if there is none."""
+    if text.isprintable():
+        return ""
+    for character in text:
+        is_space = unicodedata.category(character) == "Zs"
+        if not character.isprintable() and not is_space:
+            return character
+    return ""
 
 
 def find_text_fault(text: str) -> tuple[str, str] | None:
-    """What is wrong with a name or text that reports, tables and terminals show, and
-    what is allowed; None where nothing is."""
+    """Return what is wrong with a text that reports, tables and terminals show, and
+    what is allowed; None if nothing is wrong."""
     if character := find_control_character(text):
-        return (
-            f"the character {character!a} in {text!r}",
-            "printable characters on one line",
-        )
+        found = f"the character {character!a} in {text!r}"
+        return found, "printable characters on one line"
     if text.startswith(_FORMULA):
-        return (
-            repr(text),
-            f"a text that does not begin with {text[0]}, which a spreadsheet takes for a formula",
+        allowed = (
+            f"a text that does not begin with {text[0]}, which a spreadsheet takes for "
+            "a formula"
         )
+        return repr(text), allowed
     return None
-
-
-_PARTIAL = re.compile(r"\.[0-9a-f]{16}\.partial\b.*")
-# What the loader of libraries says of it.
-_NO_MEMORY = ("failed to map segment", "annot allocate memory")
-_USABLE = "a file or folder that is there, on a disk with space, where this user may read and write"
 
 
 def describe_system_fault(
     error: OSError | MemoryError | ImportError, place: str = "disk"
 ) -> InputError:
-    """A full disk, a folder that cannot be written to, memory that is used up and the
-    like; at `place` where it has no name."""
-    if isinstance(error, MemoryError) or any(
-        words in str(error) for words in _NO_MEMORY
-    ):
-        return InputError(
-            "memory",
-            "",
-            "none left",
-            "a smaller file, more memory, or fewer jobs at a time (-j1)",
-        )
+    """Return the InputError of a full disk, a folder that cannot be written to, used up
+    memory and the like; `place` is named if the error names no file."""
+    lacks_memory = any(message in str(error) for message in _NO_MEMORY)
+    if isinstance(error, MemoryError) or lacks_memory:
+        allowed = "a smaller file, more memory, or fewer jobs at a time (-j1)"
+        return InputError("memory", "", "none left", allowed)
     if isinstance(error, ImportError):
-        return InputError(
-            "Python",
-            "",
-            str(error),
-            "an environment with every package of this version",
-        )
-    # What was asked for, not the name beside it under which it is written.
-    return InputError(
-        _PARTIAL.sub("", str(error.filename or place)),
-        "",
-        describe_os_error(error),
-        _USABLE,
-    )
+        allowed = "an environment with every package of this version"
+        return InputError("Python", "", str(error), allowed)
+    # Name the file that was asked for, not the temporary name of an atomic write.
+    path = _PARTIAL.sub("", str(error.filename or place))
+    return InputError(path, "", describe_os_error(error), _USABLE)
 
 
 def describe_os_error(error: OSError) -> str:
-    """What was found where something could not be read or written, in words that fit a
+    """Return why something could not be read or written, in words that fit a
     sentence."""
-    return (
-        "no such file" if error.errno == errno.ENOENT else error.strerror or str(error)
-    )
+    if error.errno == errno.ENOENT:
+        return "no such file"
+    return error.strerror or str(error)
 
 
-def _shortened(text: str, longest: int) -> str:
+def _shorten(text: str, longest: int) -> str:
     return text if len(text) <= longest else f"{text[: longest - 1]}…"

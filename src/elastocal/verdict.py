@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-CONFIDENCE = 0.95
-
 
 @dataclass(frozen=True)
 class Location:
@@ -595,7 +593,7 @@ class Accuracy:
     contradicted: bool = False
     repeated_m: float = 0.0
     regression_m: float = 0.0
-    confidence: float = CONFIDENCE
+    confidence: float = 0.95
     fitted: bool = True
 
 

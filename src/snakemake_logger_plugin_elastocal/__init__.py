@@ -1,9 +1,8 @@
-"""What `snakemake` prints while it works: one line a job, and last of all why a job
-failed. The profile chooses it.
+"""Print what `snakemake` does: one line for each job, and at the end why a job failed.
 
-Snakemake finds the module by its name. A dry run prints what Snakemake prints by
-itself, without a list of all jobs unless `-p` asks for it; `--verbose` prints
-everything.
+The profile chooses this logger; Snakemake finds the module by its name. A dry run
+prints what Snakemake prints by itself, without the list of all jobs unless `-p` asks
+for it. `--verbose` prints everything.
 """
 
 from __future__ import annotations
@@ -20,34 +19,38 @@ from elastocal.counting import format_count
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-_OF_EACH_JOB = (LogEvent.JOB_INFO, LogEvent.SHELLCMD)
-# Events and beginnings of lines that are no news.
-_SILENT = (
+# Events that list jobs in a dry run.
+_JOB_EVENTS = (LogEvent.JOB_INFO, LogEvent.SHELLCMD)
+# Events and messages that this logger does not print.
+_SILENT_EVENTS = (
     LogEvent.JOB_STARTED,
     LogEvent.JOB_FINISHED,
     LogEvent.PROGRESS,
     LogEvent.WORKFLOW_STARTED,
 )
-_NO_NEWS = (
-    *(
-        "Building DAG of jobs",
-        "Config file ",
-        "Select jobs to execute",
-        "Execute ",
-        "Using shell",
-        "Provided cores",
-    ),
-    *("Assuming unrestricted shared filesystem", "Rules claiming more threads"),
+_SILENT_MESSAGES = (
+    "Building DAG of jobs",
+    "Config file ",
+    "Select jobs to execute",
+    "Execute ",
+    "Using shell",
+    "Provided cores",
+    "Assuming unrestricted shared filesystem",
+    "Rules claiming more threads",
 )
 _LOCKED = "Directory cannot be locked"
 _FAILED = "At least one job did not complete successfully."
-# Locks of runs that were killed are taken away before (workflow/rules/one_run.py).
-_TWICE = "snakemake: found another run at work on the same files; allowed: the same command once that one has ended"
+# Locks of killed runs are removed before (workflow/rules/one_run.py), so that a lock
+# belongs to a run at work.
+_LOCKED_BY_ANOTHER_RUN = (
+    "snakemake: found another run at work on the same files; allowed: the same command "
+    "once that one has ended"
+)
 
 
 class LogHandler(LogHandlerBase):
-    """One line for each job that starts; of a job that failed, the last line of its log
-    after all else."""
+    """Print one line for each job that starts, and at the end the last line of the log
+    of each job that failed."""
 
     def __post_init__(self) -> None:
         self._started = 0
@@ -61,56 +64,68 @@ class LogHandler(LogHandlerBase):
     needs_rulegraph = False
 
     def emit(self, record: Any) -> None:
-        """Write a record."""
-        for line in self._lines(record):
-            print(
-                line,
-                file=sys.stdout if self.common_settings.stdout else sys.stderr,
-                flush=True,
-            )
+        """Print what a record says, if anything."""
+        if self.common_settings.dryrun or self.common_settings.verbose:
+            lines = self._lines_of_snakemake(record)
+        else:
+            lines = self._lines_of_event(record)
+        stream = sys.stdout if self.common_settings.stdout else sys.stderr
+        for line in lines:
+            print(line, file=stream, flush=True)
 
-    def _lines(self, record: Any) -> list[str]:
+    def _lines_of_snakemake(self, record: Any) -> list[str]:
+        """Return what Snakemake prints by itself, without jobs that are not asked
+        for."""
+        settings = self.common_settings
+        lists_jobs = settings.verbose or settings.printshellcmds
+        if getattr(record, "event", None) in _JOB_EVENTS and not lists_jobs:
+            return []
+        return [self.format(record)]
+
+    def _lines_of_event(self, record: Any) -> list[str]:
+        """Return the lines of an event, and keep what later lines need: the number of
+        jobs, and those that failed."""
         event = getattr(record, "event", None)
-        message = record.getMessage()
-        asked = self.common_settings
-        if asked.dryrun or asked.verbose:
-            unasked = event in _OF_EACH_JOB and not (
-                asked.verbose or asked.printshellcmds
-            )
-            return [] if unasked else [self.format(record)]
         if event == LogEvent.RUN_INFO:
             self._total = record.stats.get("total", 0)
             return [format_count(self._total, "job")]
         if event == LogEvent.JOB_INFO:
             self._started += 1
-            return [
-                f"{self._started} of {self._total}: {' '.join([record.rule_name, *map(str, record.wildcards.values())])}"
-            ]
+            job = " ".join([record.rule_name, *map(str, record.wildcards.values())])
+            return [f"{self._started} of {self._total}: {job}"]
         if event == LogEvent.JOB_ERROR:
             self._failed.append((record.rule_name, record.log))
             return [f"failed: {record.rule_name}"]
-        if event == LogEvent.ERROR and self._failed and _FAILED in message:
-            return [_reason(rule, logs) for rule, logs in self._failed]
+        return self._lines_of_message(record, is_error=event == LogEvent.ERROR)
+
+    def _lines_of_message(self, record: Any, *, is_error: bool) -> list[str]:
+        """Return the lines of a message that is about no single job."""
+        message = record.getMessage()
+        if is_error and self._failed and _FAILED in message:
+            return [_describe_failure(rule, logs) for rule, logs in self._failed]
         if _LOCKED in message:
-            return [_TWICE]
-        # The output of the job itself stands above, and why it failed below.
-        known = event == LogEvent.ERROR and "CalledProcessError" in message
-        return (
-            []
-            if known or event in _SILENT or str(record.msg).startswith(_NO_NEWS)
-            else [self.format(record)]
-        )
+            return [_LOCKED_BY_ANOTHER_RUN]
+        # The job has printed its own output before, and why it failed follows.
+        is_known = is_error and "CalledProcessError" in message
+        is_silent = getattr(record, "event", None) in _SILENT_EVENTS
+        if is_known or is_silent or str(record.msg).startswith(_SILENT_MESSAGES):
+            return []
+        return [self.format(record)]
 
 
-def _reason(rule: str, logs: Sequence[str]) -> str:
-    """Last line of the logs of a job that failed; one that was killed as it began, or
-    for want of memory, has none."""
-    lines = [
-        line
-        for log in logs
-        if Path(log).is_file()
-        for line in Path(log).read_text(encoding="utf-8").splitlines()
-    ]
-    found = f"{rule}: found an end before its log began ({', '.join(logs)})"
-    otherwise = f"{found}; allowed: memory that a script needs to start and to end, and a sound one (if it said why, above)"
-    return next((line for line in reversed(lines) if line.strip()), otherwise)
+def _describe_failure(rule: str, logs: Sequence[str]) -> str:
+    """Return the last line of the logs of a failed job. A job that was killed before it
+    wrote a line probably lacked memory."""
+    last_line = ""
+    for log in logs:
+        if Path(log).is_file():
+            for line in Path(log).read_text(encoding="utf-8").splitlines():
+                if line.strip():
+                    last_line = line
+    if last_line:
+        return last_line
+    return (
+        f"{rule}: found that the job was killed before it wrote its log "
+        f"({', '.join(logs)}); allowed: enough memory for the job "
+        "(if the job said why it ended, its message is above)"
+    )

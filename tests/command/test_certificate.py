@@ -1,6 +1,7 @@
 """`elastocal certificate`: the decision, what it is based on, and when there is none."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,9 +9,12 @@ import pandas as pd
 import pytest
 from analysed_robots import ROBOTS
 from certified import record_jobs
+from made_loop_tables import CAMPAIGNS
 
 from elastocal.application.statements import tabulate_errors
 from elastocal.campaigns.campaign_folder import read_campaign_folder
+from elastocal.io.typed_json import to_document
+from elastocal.verdict import MisplacedFrame, read_verdict, write_verdict
 
 REPORT = Path("reports/loop/made")
 CERTIFICATE = REPORT / "certificate.json"
@@ -31,9 +35,9 @@ def certify(elastocal, tolerance):
     return result, json.loads(CERTIFICATE.read_text())
 
 
-def write_verdict(document):
+def change_verdict(**changes):
     """Change the verdict of a campaign as if its diagnosis had written it."""
-    VERDICT.write_text(json.dumps(document))
+    write_verdict(VERDICT, replace(read_verdict(VERDICT), **changes))
     record_jobs("made", read_campaign_folder("made", ROBOTS).files())
 
 
@@ -54,7 +58,7 @@ def test_a_certificate_states_the_errors_of_the_campaign(elastocal, in_checkout)
     assert document["conformity"]["decision"] in decision and "0.500 mm" in decision
     assert "Nobody has measured" in sentences
     assert document["point"] in point and pages.endswith(".pdf")
-    measured_and_predicted = tabulate_errors(json.loads(VERDICT.read_text()))
+    measured_and_predicted = tabulate_errors(read_verdict(VERDICT))
     assert document["errors"] == measured_and_predicted
     _, predicted = measured_and_predicted
     uncorrected = document["budget"][0]
@@ -96,17 +100,16 @@ def test_certificate_and_correct_warn_of_a_misplaced_frame(
     elastocal, copied_checkout, path
 ):
     sentence = "reflector or tool sits 5.0 mm from where it is declared"
-    misplaced = {"misplaced": [{"sentence": sentence}]}
-    write_verdict(json.loads(VERDICT.read_text()) | misplaced)
+    frame = MisplacedFrame("reflector or tool", (), (0.0, 0.0, 5e-3), 10.0, sentence)
+    change_verdict(misplaced=(frame,))
     result, document = certify(elastocal, "0.5mm")
     assert f"! {sentence}" in result.stderr
-    assert document["misplaced"] == misplaced["misplaced"]
+    assert document["misplaced"] == [to_document(frame)]
     result = elastocal("correct", "made", path, "--output", "targets.csv")
     assert f"! {sentence}" in result.stderr
 
 
 def test_data_at_fault_get_no_certificate(refusal, copied_checkout):
-    fault = {"family": "data", "name": "wrong_sign"}
-    at_fault = {"effects": [fault], "accuracy": None}
-    write_verdict(json.loads(VERDICT.read_text()) | at_fault)
+    faults = CAMPAIGNS["fault of the data"].effects
+    change_verdict(effects=faults, accuracy=None)
     assert "data at fault" in refusal("certificate", "made", "--tolerance", "0.5mm")

@@ -9,59 +9,64 @@ import pytest
 
 from elastocal.command import demo, main
 
-ORDER = ["plan", "check", "diagnose", "correct", "certificate"]
+STEPS = ["plan", "check", "diagnose", "correct", "certificate"]
+ERRORS = {
+    "uncorrected": np.full(3, 2e-3),
+    "corrected": np.full(3, 1e-4),
+    "noise alone": np.full(3, 9e-5),
+}
 
 
-@pytest.mark.parametrize(("fails", "code"), [("certificate", 0), ("diagnose", 3)])
-def test_what_is_printed_is_what_is_run_until_a_step_fails(
-    elastocal, monkeypatch, tmp_path, fails, code
-):
-    """With subcommands that only note what they were called with; a certificate may
-    fail."""
-    called = []
-    whole = main.InOrder.main
+@pytest.fixture
+def run_demo(elastocal, monkeypatch, tmp_path):
+    """Runs the demonstration with subcommands that only note their arguments.
 
-    def main_of_the_rest(self, args=None, **options):
-        if options.get("standalone_mode", True):
-            return whole(self, args, **options)
-        called.append(list(args))
-        return 3 if args[0] == fails else 0
-
-    monkeypatch.setattr(main.InOrder, "main", main_of_the_rest)
+    One of them fails with exit code 3. Returns the result and the noted arguments.
+    """
+    run_application = main.InOrder.main
+    rehearsal = "elastocal_proof.blind.rehearsal"
+    monkeypatch.setattr(f"{rehearsal}.fill_sheet", lambda *_: 12)
+    monkeypatch.setattr(f"{rehearsal}.write_milling_path", lambda *_: 50)
+    monkeypatch.setattr(f"{rehearsal}.measured_errors", lambda *_: ERRORS)
     monkeypatch.setattr(demo, "find_workplace", lambda: tmp_path)
-    missed = {
-        name: np.full(3, off)
-        for name, off in (
-            ("uncorrected", 2e-3),
-            ("corrected", 1e-4),
-            ("noise alone", 9e-5),
-        )
-    }
-    for name, result in (
-        ("fill_sheet", 12),
-        ("write_milling_path", 50),
-        ("measured_errors", missed),
-    ):
-        monkeypatch.setattr(
-            f"elastocal_proof.blind.rehearsal.{name}", lambda *_, result=result: result
-        )
     monkeypatch.setattr(
         "elastocal.campaigns.campaign_folder.read_campaign_folder",
         lambda *_: SimpleNamespace(document={}),
     )
-    result = elastocal("demo", tmp_path / "cell")
-    assert (
-        result.exit_code == code
-        and [words[0] for words in called] == ORDER[: ORDER.index(fails) + 1]
-    )
-    assert [
-        shlex.split(line[2:])[1:]
-        for line in result.stderr.splitlines()
-        if line.startswith("$ elastocal")
-    ] == called
-    if not code:
-        assert (
-            "✓" in result.stderr
-            and "2.00 mm RMS before, 0.100 mm after" in result.stderr
-        )
-        assert "hidden in it: gear transmission error of joint" in result.stderr
+
+    def run(failing_step):
+        noted = []
+
+        def note_subcommand(self, args=None, **options):
+            if options.get("standalone_mode", True):
+                return run_application(self, args, **options)
+            noted.append(list(args))
+            return 3 if args[0] == failing_step else 0
+
+        monkeypatch.setattr(main.InOrder, "main", note_subcommand)
+        return elastocal("demo", tmp_path / "cell"), noted
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("failing_step", "exit_code"), [("certificate", 0), ("diagnose", 3)]
+)
+def test_the_printed_commands_are_run_until_a_step_fails(
+    run_demo, failing_step, exit_code
+):
+    """The certificate may fail."""
+    result, noted = run_demo(failing_step)
+    assert result.exit_code == exit_code
+    steps = [arguments[0] for arguments in noted]
+    assert steps == STEPS[: STEPS.index(failing_step) + 1]
+    lines = result.stderr.splitlines()
+    commands = [line[2:] for line in lines if line.startswith("$ elastocal")]
+    assert [shlex.split(command)[1:] for command in commands] == noted
+
+
+def test_the_answer_compares_the_errors_and_tells_the_hidden_defects(run_demo):
+    result, _ = run_demo("certificate")
+    assert "✓" in result.stderr
+    assert "2.00 mm RMS before, 0.100 mm after" in result.stderr
+    assert "hidden in it: gear transmission error of joint" in result.stderr

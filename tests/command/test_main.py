@@ -1,5 +1,4 @@
-"""The application: one line for what is wrong, a help that fits, every subcommand
-registered."""
+"""The application: errors end in one line, and every subcommand is registered."""
 
 from pathlib import Path
 
@@ -8,7 +7,7 @@ import pytest
 from elastocal.command import main
 from elastocal.errors import InputError
 
-NO_SUBCOMMANDS = {"__init__", "main", "terminal"}
+WITHOUT_SUBCOMMAND = {"__init__", "main", "terminal"}
 
 
 @pytest.mark.parametrize(
@@ -31,28 +30,23 @@ def test_bad_input_and_faults_of_the_machine_end_in_one_line(monkeypatch, fault,
     monkeypatch.setattr(main, "app", fail)
     with pytest.raises(SystemExit) as stopped:
         main.main()
-    # Python writes a text to standard error and ends with 1.
-    assert (
-        stopped.value.code.startswith(line)
-        and len(stopped.value.code.splitlines()) == 1
-    )
+    # Python writes a text to standard error and ends with exit code 1.
+    message = stopped.value.code
+    assert message.startswith(line) and len(message.splitlines()) == 1
 
 
-def callbacks(app):
-    """Functions that an application and the applications inside of it run."""
-    found = [command.callback for command in app.registered_commands]
+def list_callbacks(app):
+    """List the functions that an application and its groups run."""
+    callbacks = [command.callback for command in app.registered_commands]
     for group in app.registered_groups:
-        found += [
-            group.typer_instance.registered_callback.callback,
-            *callbacks(group.typer_instance),
-        ]
-    return found
+        callbacks.append(group.typer_instance.registered_callback.callback)
+        callbacks += list_callbacks(group.typer_instance)
+    return callbacks
 
 
 def test_every_module_of_a_subcommand_is_registered():
-    modules = {
-        path.stem for path in Path(main.__file__).parent.glob("*.py")
-    } - NO_SUBCOMMANDS
-    assert modules == {
-        callback.__module__.rpartition(".")[2] for callback in callbacks(main.app)
-    }
+    files = Path(main.__file__).parent.glob("*.py")
+    modules = {path.stem for path in files} - WITHOUT_SUBCOMMAND
+    callbacks = list_callbacks(main.app)
+    registered = {callback.__module__.rpartition(".")[2] for callback in callbacks}
+    assert modules == registered

@@ -1,5 +1,5 @@
-"""Quantities need their unit; what is printed does not steer a terminal; where the
-pipeline and its results are."""
+"""Quantities need their unit, printed lines do not steer a terminal, and the folders of
+the pipeline and of its results are found."""
 
 import io
 from importlib import metadata
@@ -12,7 +12,7 @@ from rich.console import Console
 from support import refused
 
 from elastocal.campaigns.campaign_folder import read_campaign_folder
-from elastocal.command import terminal as module
+from elastocal.command import terminal
 from elastocal.command.terminal import (
     find_pipeline,
     find_robots_folder,
@@ -20,6 +20,7 @@ from elastocal.command.terminal import (
     load_diagnosed_campaign,
     parse_angle_rad,
     parse_length_m,
+    print_answer,
     print_lines,
 )
 from elastocal.errors import InputError
@@ -27,33 +28,24 @@ from elastocal.io.origin import environment
 
 
 @pytest.mark.parametrize(
-    ("read", "text", "value"),
+    ("parse", "text", "value"),
     [
-        *(
-            (parse_length_m, *pair)
-            for pair in (
-                ("0.2mm", 2e-4),
-                ("60um", 6e-5),
-                ("60 µm", 6e-5),
-                (".5mm", 5e-4),
-                ("0.01m", 0.01),
-            )
-        ),
-        *(
-            (parse_angle_rad, *pair)
-            for pair in (
-                ("0.01deg", 1.745329e-4),
-                ("0.1mrad", 1e-4),
-                ("60 µrad", 6e-5),
-                (".001rad", 1e-3),
-            )
-        ),
+        (parse_length_m, "0.2mm", 2e-4),
+        (parse_length_m, "60um", 6e-5),
+        (parse_length_m, "60 µm", 6e-5),
+        (parse_length_m, ".5mm", 5e-4),
+        (parse_length_m, "0.01m", 0.01),
+        (parse_angle_rad, "0.01deg", 1.745329e-4),
+        (parse_angle_rad, "0.1mrad", 1e-4),
+        (parse_angle_rad, "60 µrad", 6e-5),
+        (parse_angle_rad, ".001rad", 1e-3),
     ],
 )
-def test_a_quantity_is_read_with_its_unit(read, text, value):
-    assert read("--noise", text) == pytest.approx(value)
+def test_a_quantity_is_read_with_its_unit(parse, text, value):
+    assert parse("--noise", text) == pytest.approx(value)
 
 
+@pytest.mark.parametrize("parse", [parse_length_m, parse_angle_rad])
 @pytest.mark.parametrize(
     "text",
     [
@@ -69,35 +61,40 @@ def test_a_quantity_is_read_with_its_unit(read, text, value):
         "1",
     ],
 )
-def test_a_quantity_without_a_unit_or_of_no_sense_is_refused(text):
-    for read in (parse_length_m, parse_angle_rad):
-        with refused("--tolerance", "", "with its unit"):
-            read("--tolerance", text)
+def test_a_quantity_without_a_unit_or_of_an_impossible_size_is_refused(parse, text):
+    with refused("--tolerance", "", "with its unit"):
+        parse("--tolerance", text)
 
 
-def test_lines_are_printed_as_they_are_but_for_what_would_steer_a_terminal():
+def test_lines_are_printed_as_they_are_except_for_control_characters():
     console = Console(file=io.StringIO())
     print_lines(["    [bold] a\x1b[2Jb\u202ec 4.00\u00a0mm"], console)
     assert console.file.getvalue() == "    [bold] a\\x1b[2Jb\\u202ec 4.00\u00a0mm\n"
 
 
-def test_an_installed_package_has_its_pipeline_and_the_results_are_in_the_working_directory(
+def test_an_answer_has_its_mark_and_its_warnings_stand_out():
+    console = Console(file=io.StringIO())
+    print_answer("pass", ["detail", "! warning"], "", console)
+    print_answer("fail", [], "measure", console, passed=False)
+    lines = console.file.getvalue().splitlines()
+    assert lines == ["✓ pass", "  detail", "! warning", "! fail", "next: measure"]
+
+
+def test_an_installed_package_has_its_pipeline_and_results_in_the_working_directory(
     tmp_path, monkeypatch
 ):
-    """The package in a folder of no checkout, with the record of a wheel."""
-    monkeypatch.setattr(
-        module,
-        "__file__",
-        str(tmp_path / "lib" / "elastocal" / "command" / "terminal.py"),
-    )
+    """The package is in a folder without a checkout, with the record of a wheel."""
+    library = tmp_path / "lib"
+    module = library / "elastocal" / "command" / "terminal.py"
+    monkeypatch.setattr(terminal, "__file__", str(module))
     monkeypatch.setattr(
         metadata,
         "distribution",
-        lambda name: PathDistribution(tmp_path / "lib" / f"{name}-1.dist-info"),
+        lambda name: PathDistribution(library / f"{name}-1.dist-info"),
     )
-    (tmp_path / "lib" / "elastocal-1.dist-info").mkdir(parents=True)
+    (library / "elastocal-1.dist-info").mkdir(parents=True)
     record = "elastocal/__init__.py,,\n../share/elastocal/Snakefile,,\n"
-    (tmp_path / "lib" / "elastocal-1.dist-info" / "RECORD").write_text(record)
+    (library / "elastocal-1.dist-info" / "RECORD").write_text(record)
     installed = tmp_path / "share" / "elastocal"
     installed.mkdir(parents=True)
     (installed / "Snakefile").write_text("")
@@ -109,35 +106,28 @@ def test_an_installed_package_has_its_pipeline_and_the_results_are_in_the_workin
         find_pipeline()
 
 
-def test_a_checkout_above_the_working_directory_is_found_before_that_of_the_package(
+def test_a_checkout_above_the_working_directory_is_preferred_to_that_of_the_package(
     tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
-    assert (
-        find_pipeline() / "src" / "elastocal"
-    ).is_dir() and find_workplace() == find_pipeline()
+    assert (find_pipeline() / "src" / "elastocal").is_dir()
+    assert find_workplace() == find_pipeline()
     for folder in ("config/robots", "campaigns/cell7"):
         (tmp_path / folder).mkdir(parents=True)
     (tmp_path / "Snakefile").write_text("")
     monkeypatch.chdir(tmp_path / "campaigns" / "cell7")
-    assert (
-        find_pipeline() == find_workplace() == tmp_path
-        and find_robots_folder() == tmp_path / "config" / "robots"
-    )
+    assert find_pipeline() == find_workplace() == tmp_path
+    assert find_robots_folder() == tmp_path / "config" / "robots"
 
 
 def test_results_of_another_environment_come_with_a_warning(in_checkout, capsys):
-    assert (
-        load_diagnosed_campaign(in_checkout / "made").name == "made"
-        and not capsys.readouterr().err
-    )
-    record_jobs(
-        "made",
-        read_campaign_folder("made", ROBOTS).files(),
-        environment(".") | {"numpy": "1.0"},
-    )
-    assert load_diagnosed_campaign(in_checkout / "made").name == "made"
-    here = environment(".")["numpy"]
+    folder = in_checkout / "made"
+    assert load_diagnosed_campaign(folder).name == "made"
+    assert not capsys.readouterr().err
+    files = read_campaign_folder("made", ROBOTS).files()
+    record_jobs("made", files, environment(".") | {"numpy": "1.0"})
+    assert load_diagnosed_campaign(folder).name == "made"
+    version = environment(".")["numpy"]
     assert capsys.readouterr().err == (
-        f"warning: {in_checkout}/made was diagnosed with numpy 1.0; here are numpy {here}\n"
+        f"warning: {folder} was diagnosed with numpy 1.0; here are numpy {version}\n"
     )

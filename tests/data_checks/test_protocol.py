@@ -1,7 +1,11 @@
-"""What a fault makes of a verdict."""
+"""A fault of the data makes a verdict that says nothing of the robot."""
 
-from elastocal.data_checks.protocol import Fault, Value, data_at_fault
-from elastocal.diagnosis.verdict import fault_entry
+from dataclasses import replace
+
+from made_loop_tables import CAMPAIGNS
+
+from elastocal.data_checks.protocol import OF_DATA, Fault, Value
+from elastocal.diagnosis.effect_estimates import state_fault
 
 FAULT = Fault(
     "wrong_sign",
@@ -12,9 +16,10 @@ FAULT = Fault(
 )
 
 
-def test_a_verdict_with_a_fault_beside_effects_finds_the_data_at_fault_and_one_without_does_not():
-    effect = {"family": "gravity"}
-    assert data_at_fault({"effects": [effect, fault_entry(FAULT)]})
-    assert not data_at_fault({"effects": [effect]}) and not data_at_fault(
-        {"effects": []}
-    )
+def test_a_verdict_with_a_fault_finds_the_data_at_fault_and_one_without_does_not():
+    verdict = CAMPAIGNS["named"]
+    fault = state_fault(FAULT)
+    assert fault.family == OF_DATA
+    faulty = replace(verdict, effects=(*verdict.effects, fault))
+    assert faulty.faults == (fault,)
+    assert not verdict.faults and not replace(verdict, effects=()).faults

@@ -12,7 +12,7 @@ from elastocal.diagnosis.alarm import run_alarm_test
 from elastocal.diagnosis.evidence import evaluate_model, log_sum_exp
 from elastocal.diagnosis.hypotheses import OTHER
 
-ALARM_UNITS = (
+TERMS = (
     made_unit("offset", (1,), 0),
     made_unit("offset", (2,), 1),
     made_unit("tilt", (1,), [2, 3], signs=1),
@@ -20,112 +20,104 @@ ALARM_UNITS = (
 )
 
 
-def signalled(size):
+def problem_with_tilt(size):
+    """A problem whose tilt has both coefficients of a given size, and its products."""
     rows = made_rows(5, candidates=8)
-    return made_problem(
-        replace(
-            rows, residual=rows.residual + size * rows.candidates[:, 2:4] @ [1.0, 1.0]
-        ),
-        ALARM_UNITS,
-    )
+    signal = size * rows.candidates[:, 2:4] @ [1.0, 1.0]
+    return made_problem(replace(rows, residual=rows.residual + signal), TERMS)
 
 
-def test_statistic_rises_and_p_value_falls_with_the_size_of_what_is_missing():
+def test_statistic_rises_and_p_value_falls_with_the_size_of_the_missing_effect():
     sizes = [0.0, 0.3, 0.6, 1.2, 2.4]
-    found = [
-        run_alarm_test(*signalled(size), 0.0, np.random.default_rng(6))
+    alarms = [
+        run_alarm_test(*problem_with_tilt(size), 0.0, np.random.default_rng(6))
         for size in sizes
     ]
-    assert (np.diff([one.statistic for one in found[1:]]) > 0).all() and found[
-        -1
-    ].statistic > found[0].statistic
-    assert (np.diff([one.p_value for one in found[1:]]) <= 0).all()
-    assert found[-1].raised and found[-1].p_value == 1 / 500
-    assert not found[0].raised
+    statistics = [alarm.statistic for alarm in alarms]
+    assert (np.diff(statistics[1:]) > 0).all()
+    assert statistics[-1] > statistics[0]
+    assert (np.diff([alarm.p_value for alarm in alarms[1:]]) <= 0).all()
+    assert alarms[-1].raised
+    assert alarms[-1].p_value == 1 / 500
+    assert not alarms[0].raised
+
+
+def log_average_bayes_factor(problem, alternatives):
+    """Log of the sum of Bayes factors times prior odds, each evaluated on its own.
+
+    `alternatives`: terms, each with its log prior odds. The sizes of the pose error are
+    those that draws without a pose error can make likely: zero and the two next.
+    """
+    statistics = problem.statistics.at(np.arange(3))
+    log_pose = problem.log_pose[:3]
+
+    def log_evidence(terms):
+        scales = [0.1] * len(terms)
+        return evaluate_model(
+            statistics, terms, problem.grid, log_pose, scales
+        ).log_evidence
+
+    nothing = log_evidence([])
+    log_odds = [
+        log_evidence([term]) - nothing + log_prior for term, log_prior in alternatives
+    ]
+    return log_sum_exp(np.array(log_odds))
+
+
+def one_scale_below(term):
+    """A term whose scales begin one step earlier, as the alarm's do."""
+    return replace(term, smallest=max(term.smallest - 1, 0))
 
 
 @pytest.mark.parametrize("smallest", [0, 2])
 def test_statistic_is_the_log_of_the_prior_weighted_bayes_factors(smallest):
-    """Of all models of one unit, each averaged over its sizes and pose errors; signs of
-    physics do not count.
+    """Of all models of one term, each averaged over its scales and pose errors.
 
-    Sizes begin a step below the smallest.
+    Signs that physics gives do not count, and the scales begin one step below the
+    smallest one.
     """
-    problem, products = signalled(0.3)
-    problem = replace(
-        problem,
-        terms=(
-            *problem.terms[:2],
-            replace(problem.terms[2], smallest=smallest),
-            *problem.terms[3:],
-        ),
-    )
-    found = run_alarm_test(problem, products, 0.0, np.random.default_rng(7))
-    # The sizes of the pose error that draws at zero can make likely: zero and the two
-    # next.
-    some = problem.statistics.at(np.arange(3))
-    log_pose = problem.log_pose[:3]
-    unsigned = [
-        replace(
-            unit,
-            signs=np.zeros(len(unit.columns), int),
-            smallest=max(unit.smallest - 1, 0),
+    problem, products = problem_with_tilt(0.3)
+    terms = list(problem.terms)
+    terms[2] = replace(terms[2], smallest=smallest)
+    problem = replace(problem, terms=tuple(terms))
+    alarm = run_alarm_test(problem, products, 0.0, np.random.default_rng(7))
+    alternatives = [
+        (
+            replace(one_scale_below(term), signs=np.zeros(len(term.columns), int)),
+            problem.prior.compute_log_odds([term]),
         )
-        for unit in problem.terms
+        for term in problem.terms
     ]
-    nothing = evaluate_model(some, [], problem.grid, log_pose, []).log_evidence
-    total = [
-        evaluate_model(some, [unit], problem.grid, log_pose, [0.1]).log_evidence
-        - nothing
-        + problem.prior.compute_log_odds([unit])
-        for unit in unsigned
-    ]
-    assert found.statistic == pytest.approx(log_sum_exp(np.array(total)), abs=1e-6)
+    expected = log_average_bayes_factor(problem, alternatives)
+    assert alarm.statistic == pytest.approx(expected, abs=1e-6)
 
 
-def test_a_mechanism_counts_at_all_its_locations_at_once_too():
-    """With one law at each; of two laws each, and only of those that are at every
-    location once."""
-    candidates = {
-        detail: SimpleNamespace(detail=detail) for detail in ("", "two slopes")
-    }
-    units = (
-        made_unit(
-            "stiffening",
-            (1,),
-            0,
-            candidate=candidates[""],
-            smallest=1,
-            log_prior=np.log(0.5),
-        ),
-        made_unit(
-            "stiffening", (2,), [1, 2], candidate=candidates[""], log_prior=np.log(0.5)
-        ),
-        made_unit("stiffening", (1,), 3, candidate=candidates["two slopes"]),
-        made_unit("payload", (), 4, candidate=candidates[""]),
+def test_a_mechanism_also_counts_as_a_whole_with_one_variant_at_all_its_locations():
+    """Only variants that are at every location once form a whole mechanism."""
+    plain = SimpleNamespace(detail="")
+    two_slopes = SimpleNamespace(detail="two slopes")
+    half = np.log(0.5)
+    terms = (
+        made_unit("stiffening", (1,), 0, candidate=plain, smallest=1, log_prior=half),
+        made_unit("stiffening", (2,), [1, 2], candidate=plain, log_prior=half),
+        made_unit("stiffening", (1,), 3, candidate=two_slopes),
+        made_unit("payload", (), 4, candidate=plain),
     )
-    problem, products = made_problem(made_rows(5, candidates=8), units)
-    found = run_alarm_test(problem, products, 0.0, np.random.default_rng(7))
-    some = problem.statistics.at(np.arange(3))
-    log_pose = problem.log_pose[:3]
-    grid = problem.grid
+    problem, products = made_problem(made_rows(5, candidates=8), terms)
+    alarm = run_alarm_test(problem, products, 0.0, np.random.default_rng(7))
     whole = replace(
-        units[0],
+        terms[0],
         columns=np.arange(3),
         signs=np.zeros(3, int),
         sizes=np.ones(3),
         smallest=0,
     )
-    tested = [
-        (replace(unit, smallest=max(unit.smallest - 1, 0)), [unit]) for unit in units
-    ] + [(whole, list(units[:2]))]
-    nothing = evaluate_model(some, [], grid, log_pose, []).log_evidence
-    total = [
-        evaluate_model(some, [unit], grid, log_pose, [0.1]).log_evidence
-        - nothing
-        + problem.prior.compute_log_odds(members)
-        for unit, members in tested
+    alternatives = [
+        (one_scale_below(term), problem.prior.compute_log_odds([term]))
+        for term in terms
     ]
     # One choice among the variants, not one at each location.
-    total[-1] -= np.log(0.5)
-    assert found.statistic == pytest.approx(log_sum_exp(np.array(total)), abs=1e-6)
+    log_prior = problem.prior.compute_log_odds(terms[:2]) - half
+    alternatives.append((whole, log_prior))
+    expected = log_average_bayes_factor(problem, alternatives)
+    assert alarm.statistic == pytest.approx(expected, abs=1e-6)

@@ -27,9 +27,9 @@ TARGETS = (
 )
 
 
-def kept(robot, off=0.0, payload_kg=0.0):
-    """Two loads a pose of a robot whose moments are off by `off` standard deviations of
-    the wide prior."""
+def fitted_subset(robot, deviation=0.0, payload_kg=0.0):
+    """Measurements with two loads a pose of a robot whose first moments deviate by some
+    standard deviations of the wide prior, fitted with that prior."""
     model = made_model(
         robot,
         TARGETS,
@@ -38,47 +38,42 @@ def kept(robot, off=0.0, payload_kg=0.0):
         identified=True,
     )
     candidates = candidates_on(model.sites)
-    weight = model.effects[1]
-    true = made_estimate(model, size=0.0).with_effects([candidates["payload[mass]"]])
-    moved = [
-        off * p.prior_std * (-1) ** n * p.name.startswith("moment")
-        for n, p in enumerate(weight.parameters)
-    ]
-    true = replace(
-        true, coefficients=(robot.compliance, np.array(moved), np.array([payload_kg]))
+    payload = candidates["payload[mass]"]
+    moments = np.zeros(len(model.effects[1].parameters))
+    for index, parameter in enumerate(model.effects[1].parameters):
+        if parameter.name.startswith("moment"):
+            moments[index] = deviation * parameter.prior_std * (-1) ** index
+    truth = replace(
+        made_estimate(model, size=0.0).with_effects([payload]),
+        coefficients=(robot.compliance, moments, np.array([payload_kg])),
     )
     states = two_loads_a_pose(6, 30, 5)
-    seen = seen_exactly(model.with_effects([candidates["payload[mass]"]]), true, states)
-    seen = with_noise(seen, np.random.default_rng(6))
+    exact = seen_exactly(model.with_effects([payload]), truth, states)
+    observations = with_noise(exact, np.random.default_rng(6))
     noise = replace(NOISE, joint_rad=np.zeros(6))
-    declared = fit_model(model, seen, noise)
     return FittedSubset(
-        Case(None, seen, model, candidates),
-        np.ones(len(seen), bool),
+        Case(None, observations, model, candidates),
+        np.ones(len(observations), bool),
         noise,
         [],
-        declared,
-        seen,
+        fit_model(model, observations, noise),
+        observations,
     )
 
 
 @pytest.mark.parametrize(
-    ("off", "payload_kg", "stays_wide"),
+    ("deviation", "payload_kg", "stays_wide"),
     [(0.0, 0.0, False), (1.0, 0.0, True), (0.0, 20.0, False)],
 )
-def test_the_prior_is_that_which_the_measurements_make_more_probable(
-    fanuc, off, payload_kg, stays_wide
+def test_the_prior_is_the_one_that_the_measurements_make_more_probable(
+    fanuc, deviation, payload_kg, stays_wide
 ):
-    part = kept(replace(fanuc, masses=MASSES, payload_kg=165.0), off, payload_kg)
-    found = choose_centre_prior(part, Settings())
-    assert (found is part) == stays_wide
-    deviations = [
-        p.prior_std
-        for effect in found.declared.model.effects[1:2]
-        for p in effect.parameters
-    ]
-    assert (
-        deviations[1] == pytest.approx(28.0 * np.linalg.norm(MASSES[0].centre_m))
-        or stays_wide
-    )
-    assert found.case.model.effects[1] == found.declared.model.effects[1]
+    robot = replace(fanuc, masses=MASSES, payload_kg=165.0)
+    subset = fitted_subset(robot, deviation, payload_kg)
+    chosen = choose_centre_prior(subset, Settings())
+    assert (chosen is subset) == stays_wide
+    weight = chosen.declared.model.effects[1]
+    assert chosen.case.model.effects[1] == weight
+    if not stays_wide:
+        stated = 28.0 * np.linalg.norm(MASSES[0].centre_m)
+        assert weight.parameters[1].prior_std == pytest.approx(stated)

@@ -177,7 +177,7 @@ def test_frames_alone_are_kept_where_they_predict_left_out_poses_better(
         squares = np.full(25, 3.0), 3.0 + off + excess
         monkeypatch.setattr(
             module,
-            "left_out_squares",
+            "predict_left_out_squares",
             lambda each, _, squares=squares: squares[bool(each.model.effects)],
         )
         found = diagnose(case, settings, 1)

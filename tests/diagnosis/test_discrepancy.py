@@ -1,5 +1,5 @@
-"""Discrepancies depend on the inputs of one cause, and on nothing that the catalogue
-names."""
+"""Discrepancies depend on the inputs of one cause, and contain nothing that the
+catalogue names."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -23,126 +23,144 @@ from elastocal.diagnosis.discrepancy import (
 )
 
 FEATURES = 40
-OF_JOINTS = [
+BASE_FEATURES = 6
+JOINT_NAMES = [
     f"{cause}{load}" for cause in (OWN, NEIGHBOURS, TIME) for load in ("", UNDER_LOAD)
 ]
-AT_A_JOINT = [((4,), name) for name in OF_JOINTS]
-MOTIONS = {
-    FORCE: ("shift", "turn"),
-    TIME: ("shift", "turn"),
-    PLACE: ("shift x", "shift y", "shift z", "turn"),
-}
-AT_THE_BASE = [
-    ((), f"{cause} {motion}")
-    for cause, motions in MOTIONS.items()
-    for motion in motions
+BASE_NAMES = [
+    f"{FORCE} shift",
+    f"{FORCE} turn",
+    f"{TIME} shift",
+    f"{TIME} turn",
+    f"{PLACE} shift x",
+    f"{PLACE} shift y",
+    f"{PLACE} shift z",
+    f"{PLACE} turn",
 ]
-EVERY = pytest.mark.parametrize("law", [*AT_A_JOINT, *AT_THE_BASE], ids=str)
+# Joint and name of each discrepancy of joint 4 and of the base (joint 0).
+DISCREPANCIES = [(4, name) for name in JOINT_NAMES] + [(0, name) for name in BASE_NAMES]
+EVERY_DISCREPANCY = pytest.mark.parametrize(("joint", "name"), DISCREPANCIES)
 
 
-def around(count=60, force=500.0, **changes):
-    robot = robot_of(SEVEN_JOINTS)
-    return conditions_on(
-        robot, replace(made_states(7, count, seed=1, force=force), **changes)
+def conditions_of_seven_joints(count=60, force=500.0):
+    states = made_states(7, count, seed=1, force=force)
+    return conditions_on(robot_of(SEVEN_JOINTS), states)
+
+
+def displacements_by(joint, name, conditions, campaign=None):
+    """Displaced coordinates and displacements (features, S) of one discrepancy, drawn
+    for a campaign."""
+    location = (joint,) if joint else ()
+    (discrepancy,) = (
+        candidate
+        for candidate in build_discrepancies(campaign or conditions, FEATURES)
+        if (candidate.location, candidate.name) == (location, name)
     )
+    coordinates = []
+    values = []
+    for displacement in discrepancy.displacement(conditions):
+        ((coordinate, value),) = displacement.items()
+        coordinates.append(coordinate)
+        values.append(value)
+    return np.array(coordinates), np.array(values)
 
 
-def displacements(states, law, campaign=None):
-    """By the law of a location and name, drawn for a campaign."""
-    laws = build_discrepancies(states if campaign is None else campaign, FEATURES)
-    return next(
-        each for each in laws if (each.location, each.name) == law
-    ).displacement(states)
+def test_discrepancies_act_by_every_cause_at_every_joint_and_at_the_base():
+    discrepancies = build_discrepancies(conditions_of_seven_joints(), FEATURES)
+    at_joints = [((joint,), name) for joint in range(1, 8) for name in JOINT_NAMES]
+    at_base = [((), name) for name in BASE_NAMES]
+    assert [(d.location, d.name) for d in discrepancies] == at_joints + at_base
 
 
-def waves(found):
-    return np.array([next(iter(law.values())) for law in found])
+def test_a_joint_without_a_load_has_no_discrepancy_in_proportion_to_it():
+    unloaded = build_discrepancies(conditions_of_seven_joints(force=0.0), FEATURES)
+    names = [discrepancy.name for discrepancy in unloaded if discrepancy.location]
+    assert names == 7 * [OWN, NEIGHBOURS, TIME]
 
 
-def test_it_acts_by_each_law_at_every_joint_and_at_the_base():
-    expected = [((joint,), name) for joint in range(1, 8) for name in OF_JOINTS]
-    assert [
-        (law.location, law.name) for law in build_discrepancies(around(), FEATURES)
-    ] == [
-        *expected,
-        *AT_THE_BASE,
-    ]
-    # What does not bear a load cannot yield to it.
-    unloaded = [
-        law.name
-        for law in build_discrepancies(around(force=0.0), FEATURES)
-        if law.location
-    ]
-    assert unloaded == 7 * [OWN, NEIGHBOURS, TIME]
+def expected_coordinates(joint, name, base):
+    if joint:
+        return [joint - 1]
+    if name.startswith(f"{PLACE} shift"):
+        return [base["xyz".index(name[-1])]]
+    return list(base[:3] if "shift" in name else base[3:])
 
 
-@EVERY
-def test_it_displaces_its_coordinates_by_about_its_size_in_any_state_each_in_its_own_way(
-    law,
+def expected_size(joint, name):
+    if joint:
+        return JOINT_RAD
+    return BASE_M if "shift" in name else BASE_RAD
+
+
+@EVERY_DISCREPANCY
+def test_each_coordinate_is_displaced_by_about_the_size_and_differently_from_the_others(
+    joint, name
 ):
-    location, name = law
-    states = around(400)
-    size = JOINT_RAD if location else BASE_M if "shift" in name else BASE_RAD
-    mine = (
-        [3]
-        if location
-        else states.sites.base[:3]
-        if "shift" in name
-        else states.sites.base[3:]
-    )
-    mine = [states.sites.base["xyz".index(name[-1])]] if name[-2:-1] == " " else mine
-    by_coordinate = {coordinate: np.zeros((0, 400)) for coordinate in mine}
-    for made in displacements(states, law):
-        ((coordinate, values),) = made.items()
-        by_coordinate[coordinate] = np.vstack([by_coordinate[coordinate], values])
-    each = list(by_coordinate.values())
-    assert len(by_coordinate) == len(mine) and [len(found) for found in each] == [
-        FEATURES if location else 6
-    ] * len(mine)
-    for found in each:
-        squares = (found**2).sum(axis=0)
-        assert (
-            0.01 * size**2 < squares.mean() < 1.5 * size**2
-            and squares.max() < 8 * size**2
-        )
-    assert all(np.abs(one - other).max() > 0.1 * size for one, other in pairwise(each))
+    states = conditions_of_seven_joints(400)
+    coordinates, values = displacements_by(joint, name, states)
+    expected = expected_coordinates(joint, name, states.sites.base)
+    assert set(coordinates) == set(expected)
+    size = expected_size(joint, name)
+    by_coordinate = [values[coordinates == coordinate] for coordinate in expected]
+    for of_coordinate in by_coordinate:
+        assert len(of_coordinate) == (FEATURES if joint else BASE_FEATURES)
+        squares = (of_coordinate**2).sum(axis=0)
+        assert 0.01 * size**2 < squares.mean() < 1.5 * size**2
+        assert squares.max() < 8 * size**2
+    for first, second in pairwise(by_coordinate):
+        assert np.abs(first - second).max() > 0.1 * size
 
 
-@EVERY
-def test_no_law_has_a_part_that_the_catalogue_has_a_name_for(law):
-    """A zero offset, a compliance, a transmission ratio; what time brings a joint
-    begins at nothing, a place may shift all."""
-    location, name = law
-    states = around()
-    found = waves(displacements(states, law))
+@EVERY_DISCREPANCY
+def test_no_discrepancy_has_a_constant_part_that_the_catalogue_names(joint, name):
+    """A zero offset or a compliance has none; what time brings a joint begins at zero,
+    and a discrepancy with the position may shift all targets."""
+    states = conditions_of_seven_joints()
+    functions = plain_functions(joint, name, states)
+    size = np.abs(functions).max()
+    constant = functions.mean(axis=1)
+    if joint and name.startswith(TIME):
+        constant = functions[:, np.argmin(states.progress)]
+    largest = np.abs(constant).max()
+    if name.startswith(PLACE):
+        assert largest > 0.1 * size
+    else:
+        assert largest < 1e-9 * size
+
+
+@pytest.mark.parametrize("name", [n for n in JOINT_NAMES if not n.startswith(TIME)])
+def test_a_joint_has_no_linear_part_without_a_load_because_that_is_a_ratio(name):
+    """The compliance may change linearly with the angle: a cable that grows longer as
+    it winds is not in the catalogue."""
+    states = conditions_of_seven_joints()
+    functions = plain_functions(4, name, states)
+    size = np.abs(functions).max()
+    angle = states.joint_angles[:, 3]
+    linear = np.abs(functions @ (angle - angle.mean())).max()
     if UNDER_LOAD in name:
-        found = found / states.total[:, 3]
-    free = found if location else found[:3]
-    size = np.abs(free).max()
-    begins = location and name.startswith(TIME)
-    constant = np.abs(
-        free[:, np.argmin(states.progress)] if begins else free.mean(axis=1)
-    ).max()
-    assert constant > 0.1 * size if name.startswith(PLACE) else constant < 1e-9 * size
-    straight = np.abs(
-        free @ (states.joint_angles[:, 3] - states.joint_angles[:, 3].mean())
-    ).max()
-    if location and not name.startswith(TIME):
-        # The compliance may go straight with the angle: a cable that grows longer as it
-        # winds has no name.
-        assert straight > size if UNDER_LOAD in name else straight < 1e-7 * size
+        assert linear > size
+    else:
+        assert linear < 1e-7 * size
 
 
-# What each law may depend on beside the load: everything else may change and it stays
-# as it is.
-CHANGED = {
+def plain_functions(joint, name, states):
+    """Functions of one discrepancy, divided by the load if they are in proportion to
+    it; at the base those without the load, which come first."""
+    _, values = displacements_by(joint, name, states)
+    if UNDER_LOAD in name:
+        values = values / states.total[:, 3]
+    return values if joint else values[:3]
+
+
+# What a discrepancy may depend on besides the load, and states in which it differs.
+CHANGES = {
     "the joint's own angle": lambda states: replace(
         states, joint_angles=states.joint_angles + 0.3 * np.eye(7)[3]
     ),
-    "the angle beside": lambda states: replace(
+    "the neighbouring angle": lambda states: replace(
         states, joint_angles=states.joint_angles + 0.3 * np.eye(7)[4]
     ),
-    "an angle further off": lambda states: replace(
+    "a distant angle": lambda states: replace(
         states, joint_angles=states.joint_angles + 0.3 * np.eye(7)[6]
     ),
     "its approach": lambda states: replace(
@@ -154,26 +172,23 @@ CHANGED = {
     ),
     "the row": lambda states: replace(states, progress=states.progress[::-1].copy()),
 }
-DEPENDS = {
+DEPENDENCIES = {
     (4, OWN): {"the joint's own angle", "its approach"},
-    (4, NEIGHBOURS): {"the joint's own angle", "the angle beside"},
+    (4, NEIGHBOURS): {"the joint's own angle", "the neighbouring angle"},
     (4, TIME): {"the time", "the temperature", "the row"},
     (0, TIME): {"the time", "the temperature", "the row"},
     (0, FORCE): set(),
 }
 
 
-@pytest.mark.parametrize("what", CHANGED)
-@pytest.mark.parametrize(("joint", "law"), DEPENDS)
-def test_a_law_goes_by_its_own_cause_alone(joint, law, what):
-    """Unloaded, or the load of a joint would change with the angles; the force on the
-    base does not."""
-    states = around(force=500.0 if law == FORCE else 0.0)
-    moved = CHANGED[what](states)
-    chosen = ((joint,), law) if joint else ((), f"{law} shift")
-    one, other = (
-        waves(displacements(each, chosen, states)) for each in (states, moved)
-    )
-    assert (np.abs(one - other).max() > 0.02 * min(JOINT_RAD, BASE_M)) == (
-        what in DEPENDS[joint, law]
-    )
+@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize(("joint", "cause"), DEPENDENCIES)
+def test_a_discrepancy_depends_on_its_own_cause_alone(joint, cause, change):
+    """The robot is unloaded, because the load of a joint would change with the angles;
+    the force on the base does not."""
+    states = conditions_of_seven_joints(force=500.0 if cause == FORCE else 0.0)
+    name = cause if joint else f"{cause} shift"
+    _, before = displacements_by(joint, name, states, states)
+    _, after = displacements_by(joint, name, CHANGES[change](states), states)
+    differs = np.abs(before - after).max() > 0.02 * min(JOINT_RAD, BASE_M)
+    assert differs == (change in DEPENDENCIES[joint, cause])

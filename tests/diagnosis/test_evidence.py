@@ -1,5 +1,4 @@
-"""Bayes factors: marginal likelihoods of all measurements, integrated by brute
-force."""
+"""Bayes factors are ratios of marginal likelihoods, integrated by brute force."""
 
 from dataclasses import replace
 
@@ -25,17 +24,17 @@ TAU = np.array([0.0, 0.3, 0.9])
 SETTINGS = Settings()
 GRID = SizeGrid.from_settings(SETTINGS)
 LOG_POSE = compute_pose_error_log_prior(TAU, SETTINGS)
-# Residuals of a little less than the noise, so that its size is at its floor and
-# everything is normal.
+# Residuals of this share of the noise: its size is then at its lower bound, and all
+# densities are normal.
 QUIET = 0.5
-UNITS = (
+TERMS = (
     made_unit("a", (1,), [0, 1]),
     made_unit("b", (1,), 2),
     made_unit("c", (1,), [3, 4, 5]),
 )
 
 
-def quiet(seed, signal=()):
+def quiet_rows(seed, signal=()):
     """Rows with less noise than declared, and a signal of some candidates."""
     rows = made_rows(seed, poses=12)
     signal = np.array([*signal, *np.zeros(rows.candidates.shape[1] - len(signal))])
@@ -43,8 +42,12 @@ def quiet(seed, signal=()):
     return replace(rows, residual=rows.expected + noise + rows.candidates @ signal)
 
 
+def grid_of_one(scale):
+    return SizeGrid(np.array([scale]), np.zeros(1))
+
+
 def log_density(rows, tau, deviations):
-    """ln N(y; X mu, V(tau) + W D W'), scipy's, with nothing left out."""
+    """ln N(y; X mu, V(tau) + W D W') by scipy, with all constants."""
     covariance = (
         rows.marginal_covariance(tau)
         + (rows.candidates * deviations**2) @ rows.candidates.T
@@ -52,45 +55,35 @@ def log_density(rows, tau, deviations):
     return multivariate_normal(rows.expected, covariance).logpdf(rows.residual)
 
 
-def deviations_of(units, scales):
-    found = np.zeros(6)
-    for unit, scale in zip(units, scales, strict=True):
-        found[unit.columns] = scale
-    return found
-
-
-def brute_log_bayes_factor(rows, units, grid=GRID):
-    """Sum over all combinations of sizes and of the pose error."""
-    total = []
-    for numbers in np.ndindex(*[len(grid.scales)] * len(units)):
-        weight = grid.log_weights[list(numbers)].sum()
-        deviations = deviations_of(units, grid.scales[list(numbers)])
-        total += [
-            weight + pose + log_density(rows, tau, deviations)
-            for tau, pose in zip(TAU, LOG_POSE, strict=True)
-        ]
-    nothing = [
-        pose + log_density(rows, tau, np.zeros(6))
-        for tau, pose in zip(TAU, LOG_POSE, strict=True)
+def average_over_pose_errors(rows, deviations):
+    """Log density averaged over the pose error."""
+    by_pose_error = [
+        log_prior + log_density(rows, tau, deviations)
+        for tau, log_prior in zip(TAU, LOG_POSE, strict=True)
     ]
-    return logsumexp(total) - logsumexp(nothing)
+    return logsumexp(by_pose_error)
 
 
-def evaluated(rows, units, start=None):
+def brute_log_bayes_factor(rows, terms, grid=GRID):
+    """Sum over all combinations of scales and of the pose error."""
+    by_scales = []
+    for indices in np.ndindex(*[len(grid.scales)] * len(terms)):
+        deviations = np.zeros(6)
+        for index, term in zip(indices, terms, strict=True):
+            deviations[term.columns] = grid.scales[index]
+        log_weight = grid.log_weights[list(indices)].sum()
+        by_scales.append(log_weight + average_over_pose_errors(rows, deviations))
+    return logsumexp(by_scales) - average_over_pose_errors(rows, np.zeros(6))
+
+
+def evaluate(rows, terms, start=None):
     statistics = compute_statistics(rows.products, TAU)
-    start = [SETTINGS.scale_center] * len(units) if start is None else start
-    return evaluate_model(statistics, units, GRID, LOG_POSE, start)
+    start = [SETTINGS.scale_center] * len(terms) if start is None else start
+    return evaluate_model(statistics, terms, GRID, LOG_POSE, start)
 
 
-def part_of_grid(kept):
-    """A grid of some of the sizes alone."""
-    return SizeGrid(
-        GRID.scales[kept], GRID.log_weights[kept] - logsumexp(GRID.log_weights[kept])
-    )
-
-
-def log_bayes_factor(rows, units):
-    return evaluated(rows, units).log_evidence - evaluated(rows, ()).log_evidence
+def log_bayes_factor(rows, terms):
+    return evaluate(rows, terms).log_evidence - evaluate(rows, ()).log_evidence
 
 
 SIGNALS = {
@@ -103,28 +96,30 @@ SIGNALS = {
 
 @pytest.mark.parametrize("signal", SIGNALS)
 @pytest.mark.parametrize("chosen", [(0,), (1,), (2,), (0, 1), (0, 1, 2)])
-def test_evidence_is_that_of_all_combinations_of_sizes(signal, chosen):
-    """Exact of one unit; of several to 0.03 nats: their sizes are not quite independent
-    given the measurements."""
-    rows = quiet(3, SIGNALS[signal])
-    units = [UNITS[number] for number in chosen]
+def test_evidence_is_that_of_all_combinations_of_scales(signal, chosen):
+    """Exactly for one term; for several to 0.03 nats, because their scales are not
+    quite independent given the measurements."""
+    rows = quiet_rows(3, SIGNALS[signal])
+    terms = [TERMS[number] for number in chosen]
     statistics = compute_statistics(rows.products, TAU)
-    assert (statistics.residual_squares < statistics.degrees_of_freedom).all(), (
-        "the case must be quiet for the reference to be normal"
-    )
-    expected = brute_log_bayes_factor(rows, units)
-    assert log_bayes_factor(rows, units) == pytest.approx(
-        expected, abs=1e-8 if len(chosen) == 1 else 0.03
+    is_quiet = statistics.residual_squares < statistics.degrees_of_freedom
+    assert is_quiet.all(), "the case must be quiet for the reference to be normal"
+    tolerance = 1e-8 if len(chosen) == 1 else 0.03
+    assert log_bayes_factor(rows, terms) == pytest.approx(
+        brute_log_bayes_factor(rows, terms), abs=tolerance
     )
 
 
 @pytest.mark.parametrize("squares", [10.0, 49.9, 50.1, 80.0, 400.0])
 def test_the_size_of_the_noise_is_the_most_likely_one_of_at_least_one(squares):
-    def negative(log_variance):
+    def negative_log_likelihood(log_variance):
         return 25 * log_variance + 0.5 * squares / np.exp(log_variance)
 
     best = minimize_scalar(
-        negative, bounds=(0.0, 10.0), method="bounded", options={"xatol": 1e-10}
+        negative_log_likelihood,
+        bounds=(0.0, 10.0),
+        method="bounded",
+        options={"xatol": 1e-10},
     )
     assert log_likelihood(squares, 50) == pytest.approx(-best.fun, abs=1e-6)
 
@@ -132,12 +127,12 @@ def test_the_size_of_the_noise_is_the_most_likely_one_of_at_least_one(squares):
 def half_normal_evidence(rows, tau, columns, signs, scale):
     """Integral of the likelihood over half-normal coefficients, by quadrature, relative
     to that without them."""
-    nothing = multivariate_normal(rows.expected, rows.marginal_covariance(tau))
-    zero = nothing.logpdf(rows.residual)
+    without = multivariate_normal(rows.expected, rows.marginal_covariance(tau))
+    reference = without.logpdf(rows.residual)
 
     def density(*sizes):
-        moved = rows.candidates[:, columns] @ (np.array(sizes) * signs)
-        likelihood = np.exp(nothing.logpdf(rows.residual - moved) - zero)
+        contribution = rows.candidates[:, columns] @ (np.array(sizes) * signs)
+        likelihood = np.exp(without.logpdf(rows.residual - contribution) - reference)
         return likelihood * np.prod([2 * norm.pdf(size, scale=scale) for size in sizes])
 
     if len(columns) == 1:
@@ -148,7 +143,7 @@ def half_normal_evidence(rows, tau, columns, signs, scale):
 
 
 @pytest.mark.parametrize(
-    ("columns", "signs", "size", "within"),
+    ("columns", "signs", "size", "tolerance"),
     [
         ([2], [1], 0.3, 1e-5),
         ([2], [-1], 0.0, 1e-5),
@@ -156,61 +151,55 @@ def half_normal_evidence(rows, tau, columns, signs, scale):
         ([0, 1], [1, -1], 0.05, 0.05),
     ],
 )
-def test_half_normal_priors_are_exact_of_one_coefficient_and_taken_one_by_one_of_two(
-    columns, signs, size, within
+def test_half_normal_priors_are_exact_for_one_coefficient_and_independent_for_two(
+    columns, signs, size, tolerance
 ):
-    """The probability of an orthant as the product of its sides: of two coefficients,
-    correlated by 0.2, right to 0.05 nats."""
-    rows = quiet(12, size * np.bincount(columns, signs, 6))
+    """The probability of an orthant is taken as the product of its sides. For two
+    coefficients with a correlation of 0.2 that is right to 0.05 nats."""
+    rows = quiet_rows(12, size * np.bincount(columns, signs, 6))
     scale = 0.3 if len(columns) == 1 else 0.1
-    unit = replace(made_unit("b", (1,), columns), signs=np.array(signs))
-    one = compute_statistics(rows.products, [0.3])
-    grid = SizeGrid(np.array([scale]), np.zeros(1))
-    found = [
-        evaluate_model(one, units, grid, np.zeros(1), [scale] * len(units))
-        for units in ([unit], [])
-    ]
-    expected = half_normal_evidence(rows, 0.3, columns, signs, scale)
-    assert found[0].log_evidence - found[1].log_evidence == pytest.approx(
-        expected, abs=within
+    term = replace(made_unit("b", (1,), columns), signs=np.array(signs))
+    statistics = compute_statistics(rows.products, [0.3])
+    grid = grid_of_one(scale)
+    with_term = evaluate_model(statistics, [term], grid, np.zeros(1), [scale])
+    without = evaluate_model(statistics, [], grid, np.zeros(1), [])
+    assert with_term.log_evidence - without.log_evidence == pytest.approx(
+        half_normal_evidence(rows, 0.3, columns, signs, scale), abs=tolerance
     )
 
 
-def test_evidence_is_averaged_over_the_sizes_that_a_unit_may_have():
-    """Of a small signal, for which the sizes left out are the likely ones: wherever the
-    search for the sizes starts."""
-    rows = quiet(1, (0.02, -0.01))
-    unit = replace(UNITS[0], smallest=3)
-    expected = brute_log_bayes_factor(rows, [unit], part_of_grid(slice(3, None)))
+def test_evidence_is_averaged_over_the_scales_that_a_term_may_have():
+    """The signal is so small that the excluded scales are the likely ones; the result
+    does not depend on the scale at which the ascent starts."""
+    rows = quiet_rows(1, (0.02, -0.01))
+    term = replace(TERMS[0], smallest=3)
+    log_weights = GRID.log_weights[3:]
+    large_scales = SizeGrid(GRID.scales[3:], log_weights - logsumexp(log_weights))
+    expected = brute_log_bayes_factor(rows, [term], large_scales)
+    nothing = evaluate(rows, ()).log_evidence
     for start in SETTINGS.scales:
-        found = evaluated(rows, [unit], [start])
-        assert found.log_evidence - evaluated(rows, ()).log_evidence == pytest.approx(
-            expected, abs=1e-8
-        )
-        assert found.scales[0] >= GRID.scales[3]
-    assert expected < brute_log_bayes_factor(rows, [unit]) - 1.0
-    # Without it the model is the smaller one all the same.
-    assert found.without[0] == pytest.approx(evaluated(rows, ()).log_evidence, abs=1e-8)
+        evidence = evaluate(rows, [term], [start])
+        assert evidence.log_evidence - nothing == pytest.approx(expected, abs=1e-8)
+        assert evidence.scales[0] >= GRID.scales[3]
+        # Without the term the model is the smaller one, whatever scales are excluded.
+        assert evidence.without[0] == pytest.approx(nothing, abs=1e-8)
+    assert expected < brute_log_bayes_factor(rows, [term]) - 1.0
 
 
-def test_moments_have_the_noise_that_a_model_leaves_where_that_is_more_than_was_taken():
-    rows = quiet(1, SIGNALS["b"])
+def test_moments_have_the_noise_that_a_model_leaves_if_that_is_more_than_was_assumed():
+    rows = quiet_rows(1, SIGNALS["b"])
     rows = replace(rows, residual=rows.expected + 9.0 * (rows.residual - rows.expected))
-    one = compute_statistics(rows.products, [0.3])
+    statistics = compute_statistics(rows.products, [0.3])
     scale = 0.3
-    joint = ModelDensity(
-        one,
-        UNITS[:1],
-        SizeGrid(np.array([scale]), np.zeros(1)),
-        np.zeros(1),
-        np.zeros(1, int),
+    density = ModelDensity(
+        statistics, TERMS[:1], grid_of_one(scale), np.zeros(1), np.zeros(1, int)
     )
-    ((_, variance),) = joint.moments()
-    inner = one.gram_blocks(np.arange(2))[0] + np.eye(2) / scale**2
-    left = one.residual_squares[0] - one.score[0, :2] @ np.linalg.solve(
-        inner, one.score[0, :2]
-    )
-    assert left > 2.0 * one.degrees_of_freedom
+    ((_, variance),) = density.moments()
+    precision = statistics.gram_blocks(np.arange(2))[0] + np.eye(2) / scale**2
+    score = statistics.score[0, :2]
+    squares = statistics.residual_squares[0] - score @ np.linalg.solve(precision, score)
+    assert squares > 2.0 * statistics.degrees_of_freedom
+    noise_variance = squares / statistics.degrees_of_freedom
     np.testing.assert_allclose(
-        variance, left / one.degrees_of_freedom * np.diag(np.linalg.inv(inner))
+        variance, noise_variance * np.diag(np.linalg.inv(precision))
     )

@@ -1,12 +1,11 @@
-"""Rows that no model explains: their distances are those of a fit without them, and
-their number is that of chance."""
+"""Tests of the outlier test: good rows stand out as rarely as the settings say, and
+sentences state what a gross error reads."""
 
 import numpy as np
 import pytest
 from bad_rows import damaged
 from scipy.stats import binom, chi2
 
-from elastocal.diagnosis.fitted_subset import fit_subset
 from elastocal.diagnosis.gross_errors import (
     describe_gross_errors,
     find_gross_errors,
@@ -15,77 +14,52 @@ from elastocal.diagnosis.gross_errors import (
 from elastocal.diagnosis.settings import Settings
 
 SETTINGS = Settings()
-NOISE_M = 6e-5
-BAD = 11
 
 
-def test_the_distance_of_a_row_is_that_from_a_fit_without_it(cases):
-    case, _ = cases
-    measurements = case.campaign.measurements
-    every = np.ones(len(measurements), bool)
-    whole = fit_subset(case, every, SETTINGS)
-    without = fit_subset(case, np.arange(len(measurements)) != BAD, SETTINGS)
-    found = []
-    for part in (whole, without):
-        found.append(
-            find_gross_errors(
-                part.declared, whole.noise, measurements, part.kept, SETTINGS
-            ).distance
-        )
-    # Weights of the robust fit differ a little, since the model lacks something.
-    assert found[0][BAD] == pytest.approx(found[1][BAD], rel=0.1)
+def find_outliers(distance):
+    """Scaled distances and outliers of three-dimensional rows that are all kept."""
+    return flag_outliers(distance, 3, np.ones(len(distance), bool), SETTINGS)
 
 
-def test_rows_stand_out_by_chance_as_often_as_the_settings_say():
-    rows = 40
-    count = 3000
-    draws = np.random.default_rng(0)
-    distance = np.sqrt(draws.chisquare(3, (count, rows)))
-    alarms = sum(
-        flag_outliers(each, 3, np.ones(rows, bool), SETTINGS)[1].any()
-        for each in distance
-    )
+def test_good_rows_stand_out_as_rarely_as_the_settings_say():
+    campaigns = 3000
+    generator = np.random.default_rng(0)
+    distances = np.sqrt(generator.chisquare(3, (campaigns, 40)))
+    false_alarms = sum(find_outliers(distance)[1].any() for distance in distances)
     # A rate twice that of the settings would exceed this in all but 1e-6 of such tests.
-    assert alarms <= binom.ppf(0.999, count, SETTINGS.gross_error_level)
+    limit = binom.ppf(0.999, campaigns, SETTINGS.gross_error_level)
+    assert false_alarms <= limit
 
 
-def test_a_model_that_does_not_fit_makes_no_row_stand_out():
+def test_a_model_with_a_systematic_misfit_makes_no_row_stand_out():
     distance = 30.0 * np.sqrt(np.random.default_rng(1).chisquare(3, 60))
-    scaled, gross = flag_outliers(distance, 3, np.ones(60, bool), SETTINGS)
-    assert not gross.any() and np.median(scaled) == pytest.approx(
-        np.sqrt(chi2.median(3)), rel=0.2
-    )
+    scaled, outlier = find_outliers(distance)
+    assert not outlier.any()
+    assert np.median(scaled) == pytest.approx(np.sqrt(chi2.median(3)), rel=0.2)
     distance[:3] *= 20.0
-    assert np.flatnonzero(
-        flag_outliers(distance, 3, np.ones(60, bool), SETTINGS)[1]
-    ).tolist() == [0, 1, 2]
+    _, outlier = find_outliers(distance)
+    assert np.flatnonzero(outlier).tolist() == [0, 1, 2]
 
 
-def test_where_too_many_rows_stand_out_none_is_a_gross_error():
+def test_if_too_many_rows_stand_out_none_is_a_gross_error():
     distance = np.ones(40)
     distance[:9] = 1e3
-    assert not flag_outliers(distance, 3, np.ones(40, bool), SETTINGS)[1].any()
+    assert not find_outliers(distance)[1].any()
 
 
-def test_sentences_say_what_a_row_reads(cases, diagnosis):
-    case = damaged(cases[0], {})
-    position = case.campaign.measurements.position
-    position[4], position[8] = 0.0, position[7]
-    measurements = case.campaign.measurements
-    every = np.ones(len(position), bool)
-    errors = find_gross_errors(
-        diagnosis.final, diagnosis.declared.noise, measurements, every, SETTINGS
-    )
-    told = {
-        entry["rows"][0]: entry["detail"]
-        for entry in describe_gross_errors(errors, case.campaign, held_out=False)
+def test_sentences_state_a_lost_beam_and_a_repeated_position(cases, diagnosis):
+    campaign = damaged(cases[0], {}).campaign
+    measurements = campaign.measurements
+    position = measurements.position
+    position[4] = 0.0
+    position[8] = position[7]
+    kept = np.ones(len(position), bool)
+    noise = diagnosis.declared.noise
+    outcome = find_gross_errors(diagnosis.final, noise, measurements, kept, SETTINGS)
+    sentences = {
+        error.rows[0]: error.detail
+        for error in describe_gross_errors(outcome, campaign, held_out=False)
     }
-    assert "reads 0, 0, 0" in told[measurements.row[4]]
-    assert (
-        f"the same point as line {measurements.row[7] + 1} of"
-        in told[measurements.row[8]]
-    )
-
-
-SETTINGS = Settings()
-BAD = 11
+    assert "reads 0, 0, 0" in sentences[measurements.row[4]]
+    same_point = f"the same point as line {measurements.row[7] + 1} of"
+    assert same_point in sentences[measurements.row[8]]

@@ -1,4 +1,4 @@
-"""The prior is a probability, and spares what needs few numbers."""
+"""The prior is a probability, and the terms of the catalogue share it out."""
 
 from itertools import combinations
 
@@ -14,45 +14,59 @@ from elastocal.diagnosis.settings import Settings
 from elastocal.effects.catalogue import candidates_on
 
 SETTINGS = Settings()
-
-
 THIRD = float(np.log(1 / 3))
-# A mechanism at three locations, one of which has three laws.
-UNITS = (
+# A mechanism at three locations, one of which has three variants.
+TERMS = (
     made_unit("harmonic", (1,), 0),
     made_unit("harmonic", (2,), 1),
     *(made_unit("harmonic", (3,), column, log_prior=THIRD) for column in (2, 3, 4)),
 )
+DISCREPANCIES = (
+    made_unit(OTHER, (1,), 5),
+    made_unit(OTHER, (1,), 6, law=NEIGHBOURS),
+)
+PRIOR = build_model_prior([*TERMS, *DISCREPANCIES], SETTINGS)
 
 
-def test_the_number_of_locations_is_geometric_and_all_sets_of_so_many_are_equally_likely():
-    """Given that a mechanism is there; laws share a location. And what a unit adds is
-    the difference of both models."""
-    prior = build_model_prior(
-        [*UNITS, made_unit(OTHER, (1,), 5), made_unit(OTHER, (1,), 6, law=NEIGHBOURS)],
-        SETTINGS,
-    )
-    by_places = {}
+def models_of_one_term_a_location():
+    """All models of the mechanism, each with the set of its locations."""
     for size in range(1, 4):
-        for model in combinations(UNITS, size):
-            places = tuple(sorted({unit.location for unit in model}))
-            if len(places) == size:
-                odds = prior.compute_log_odds(model)
-                by_places[places] = by_places.get(places, 0.0) + np.exp(odds)
-                smaller = prior.compute_log_odds(model[:-1])
-                assert prior.log_odds_change(model[-1], size - 1) == pytest.approx(
-                    odds - smaller
-                )
-    there = SETTINGS.mechanism_probability / (1 - SETTINGS.mechanism_probability)
+        for model in combinations(TERMS, size):
+            locations = tuple(sorted({term.location for term in model}))
+            if len(locations) == size:
+                yield model, locations
+
+
+def odds_of(probability):
+    return probability / (1 - probability)
+
+
+def test_the_number_of_locations_is_geometric_and_equally_large_sets_are_equally_likely():
+    """Variants share the probability of their location."""
+    odds = {}
+    for model, locations in models_of_one_term_a_location():
+        model_odds = np.exp(PRIOR.compute_log_odds(model))
+        odds[locations] = odds.get(locations, 0.0) + model_odds
+    share_of_a_set = {1: 4 / 7 / 3, 2: 2 / 7 / 3, 3: 1 / 7}
+    presence = odds_of(SETTINGS.mechanism_probability)
     expected = {
-        places: there * {1: 4 / 7 / 3, 2: 2 / 7 / 3, 3: 1 / 7}[len(places)]
-        for places in by_places
+        locations: presence * share_of_a_set[len(locations)] for locations in odds
     }
-    assert len(by_places) == 7 and by_places == pytest.approx(expected)
-    # Laws of the competitor have places of their own, and its own probability.
-    other = [made_unit(OTHER, (1,), 5), made_unit(OTHER, (1,), 6, law=NEIGHBOURS)]
-    odds = SETTINGS.other_probability / (1 - SETTINGS.other_probability)
-    assert np.exp(prior.compute_log_odds(other)) == pytest.approx(odds / 3)
+    assert len(odds) == 7
+    assert odds == pytest.approx(expected)
+
+
+def test_a_term_changes_the_log_odds_by_the_difference_of_both_models():
+    for model, locations in models_of_one_term_a_location():
+        larger = PRIOR.compute_log_odds(model)
+        smaller = PRIOR.compute_log_odds(model[:-1])
+        change = PRIOR.log_odds_change(model[-1], len(locations) - 1)
+        assert change == pytest.approx(larger - smaller)
+
+
+def test_discrepancies_have_slots_and_a_probability_of_their_own():
+    odds = np.exp(PRIOR.compute_log_odds(DISCREPANCIES))
+    assert odds == pytest.approx(odds_of(SETTINGS.other_probability) / 3)
 
 
 @pytest.fixture(scope="module")
@@ -60,65 +74,79 @@ def catalogue():
     return list(candidates_on(equipped(robot_of(UR10))).values())
 
 
-def test_units_of_the_catalogue_have_columns_of_their_own_that_share_out_all(catalogue):
-    tried = [
-        (
-            c,
-            [(float(value),) for shape in c.shapes for value in shape.values(3)]
-            or [()],
-        )
-        for c in catalogue
-    ]
-    at_joints = [
-        Discrepancy((joint,), cause, 1.0, (), 40)
-        for joint, cause in ((1, OWN), (1, NEIGHBOURS), (2, OWN))
-    ]
-    laws = [
-        at_joints[0],
-        at_joints[1],
-        Discrepancy((), f"{FORCE} shift", 1.0, (), 24),
-        at_joints[2],
-    ]
-    units = build_terms(tried, laws, SETTINGS)
-    columns = np.concatenate([unit.columns for unit in units])
+JOINT_DISCREPANCIES = [
+    Discrepancy((joint,), cause, 1.0, (), 40)
+    for joint, cause in ((1, OWN), (1, NEIGHBOURS), (2, OWN))
+]
+BASE_DISCREPANCY = Discrepancy((), f"{FORCE} shift", 1.0, (), 24)
+ALL_DISCREPANCIES = [
+    *JOINT_DISCREPANCIES[:2],
+    BASE_DISCREPANCY,
+    JOINT_DISCREPANCIES[2],
+]
+
+
+@pytest.fixture(scope="module")
+def terms(catalogue):
+    """Terms of the catalogue with three values of each shape, and of discrepancies."""
+    shape_values = []
+    for candidate in catalogue:
+        values = [
+            (float(value),) for shape in candidate.shapes for value in shape.values(3)
+        ]
+        shape_values.append((candidate, values or [()]))
+    return build_terms(shape_values, ALL_DISCREPANCIES, SETTINGS)
+
+
+def test_terms_share_out_all_columns(terms):
+    columns = np.concatenate([term.columns for term in terms])
     np.testing.assert_array_equal(np.sort(columns), np.arange(len(columns)))
-    against = [unit for unit in units if unit.mechanism == OTHER]
-    assert [(unit.discrepancy, len(unit.columns)) for unit in against] == [
-        (law, law.features) for law in laws
-    ]
-    assert not any(unit.discrepancy for unit in units if unit.candidate)
-    # Laws and shapes at one location share its probability; laws of the competitor have
-    # places of their own.
-    for place in {unit.slot for unit in units if unit.candidate}:
-        assert np.exp(
-            [unit.log_prior for unit in units if unit.slot == place]
-        ).sum() == pytest.approx(1.0), place
-    assert len({unit.slot for unit in against}) == len(laws)
-    # Their kinds are equally likely, however many locations each has.
-    assert np.exp([unit.log_prior for unit in against]) == pytest.approx(
-        len(laws) / 3 / np.array([2, 1, 1, 2])
-    )
+
+
+def test_a_discrepancy_has_a_column_for_each_feature(terms):
+    competitors = [term for term in terms if term.mechanism == OTHER]
+    assert [term.discrepancy for term in competitors] == ALL_DISCREPANCIES
+    for term in competitors:
+        assert len(term.columns) == term.discrepancy.features
+    assert not any(term.discrepancy for term in terms if term.candidate)
+
+
+def test_variants_share_the_probability_of_their_location(terms):
+    probabilities = {}
+    for term in terms:
+        if term.candidate:
+            share = np.exp(term.log_prior)
+            probabilities[term.slot] = probabilities.get(term.slot, 0.0) + share
+    for slot, probability in probabilities.items():
+        assert probability == pytest.approx(1.0), slot
+
+
+def test_kinds_of_discrepancies_are_equally_likely_however_many_locations_they_have(
+    terms,
+):
+    competitors = [term for term in terms if term.mechanism == OTHER]
+    assert len({term.slot for term in competitors}) == len(ALL_DISCREPANCIES)
+    shares = np.exp([term.log_prior for term in competitors])
+    locations = np.array([2, 1, 1, 2])
+    kinds = 3
+    assert shares == pytest.approx(len(ALL_DISCREPANCIES) / kinds / locations)
 
 
 def test_plausible_sizes_fall_with_the_order_of_a_harmonic_and_signs_are_those_of_physics(
     catalogue,
 ):
-    chosen = [
-        c
-        for c in catalogue
-        if c.effect in ("transmission_harmonic", "stiffening", "base_compliance")
+    effects = ("transmission_harmonic", "stiffening", "base_compliance")
+    candidates = [candidate for candidate in catalogue if candidate.effect in effects]
+    shape_values = [
+        (candidate, [tuple(shape.start for shape in candidate.shapes)])
+        for candidate in candidates
     ]
-    units = build_terms(
-        [(c, [tuple(shape.start for shape in c.shapes)]) for c in chosen], [], SETTINGS
-    )
-    for unit, candidate in zip(units, chosen, strict=True):
+    terms = build_terms(shape_values, [], SETTINGS)
+    for term, candidate in zip(terms, candidates, strict=True):
         orders = np.array([parameter.order for parameter in candidate.parameters])
-        expected = [
-            parameter.plausible for parameter in candidate.parameters
-        ] * orders**-SETTINGS.harmonic_decay
-        np.testing.assert_allclose(unit.sizes, expected)
-        assert unit.signs.tolist() == [
-            parameter.sign for parameter in candidate.parameters
-        ]
-    assert max(unit.sizes.max() / unit.sizes.min() for unit in units) > 1.1
-    assert any(unit.signs.any() for unit in units)
+        plausible = np.array([p.plausible for p in candidate.parameters])
+        expected = plausible * orders**-SETTINGS.harmonic_decay
+        np.testing.assert_allclose(term.sizes, expected)
+        assert term.signs.tolist() == [p.sign for p in candidate.parameters]
+    assert max(term.sizes.max() / term.sizes.min() for term in terms) > 1.1
+    assert any(term.signs.any() for term in terms)

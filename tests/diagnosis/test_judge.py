@@ -1,43 +1,59 @@
 """Held-out poses: residuals by hand, errors before and after, and warnings where the
 figures do not bear the claim."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from made_loop_tables import CAMPAIGNS, effect_entry
 
 from elastocal.diagnosis.diagnose import Diagnosis, Step
 from elastocal.diagnosis.judge import generate_residual_blocks, judge
 from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.model import get_joint_compliances
-from elastocal.fitting.noise import Noise, serialize_noise
+from elastocal.fitting.noise import Noise
 from elastocal.mechanics.elastostatics import generalized_forces
 from elastocal.mechanics.kinematics import poses, poses_and_jacobians
 from elastocal.validation.held_out import METRICS
+from elastocal.verdict import TrainingVerdict
 
 NOISE = Noise("declared", 6e-5, 6e-5, np.zeros(6))
 
 
 def diagnosis_of(case, steps):
-    """A diagnosis whose document has what `judge` adds to and one thing that it must
-    leave alone."""
+    """A diagnosis whose verdict has the effects of the steps and one warning that
+    `judge` must leave alone."""
     names = [step.name.removeprefix("with ") for step in steps if step.kind == "effect"]
-    effects = [
-        {"name": name, "family": "geometry", "heldout_gain": None} for name in names
-    ]
-    document = {
-        "verdict": "named",
-        "effects": effects,
-        "heldout": None,
-        "warnings": ["as it was"],
-        "gross_errors": [],
+    made = CAMPAIGNS["named"]
+    inherited = {
+        entry.name: getattr(made, entry.name) for entry in fields(TrainingVerdict)
     }
-    document["noise"] = serialize_noise(NOISE)
+    noise = replace(
+        made.noise,
+        source=NOISE.source,
+        position_m=NOISE.position_m,
+        orientation_rad=NOISE.orientation_rad,
+        joint_rad=tuple(NOISE.joint_rad.tolist()),
+        degrees_of_freedom=0,
+        pose_rad=0.0,
+    )
+    verdict = TrainingVerdict(
+        **inherited
+        | {
+            "effects": tuple(
+                replace(effect_entry(name), family="geometry", heldout_gain=None)
+                for name in names
+            ),
+            "heldout": None,
+            "warnings": ("as it was",),
+            "noise": noise,
+        }
+    )
     return Diagnosis(
         case,
         tuple(steps),
         None,
-        document,
+        verdict,
         case.campaign.measurements.select(np.zeros(0, int)),
     )
 
@@ -233,10 +249,6 @@ def test_a_remainder_is_judged_where_the_campaign_asks_for_one_and_the_data_are_
     assert facts["physics"] + facts["regression_share"] + facts[
         "left"
     ] == pytest.approx(1.0)
-    faulty = asked.document | {
-        "effects": [asked.document["effects"][0] | {"family": "data"}]
-    }
-    assert (
-        judge(replace(asked, document=faulty), held_out, 1).document["remainder"]
-        is None
-    )
+    fault = CAMPAIGNS["fault of the data"].effects
+    faulty = replace(asked, verdict=replace(asked.verdict, effects=fault))
+    assert judge(faulty, held_out, 1).verdict.remainder is None

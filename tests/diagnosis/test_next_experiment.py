@@ -26,10 +26,10 @@ from elastocal.diagnosis.next_experiment import (
 )
 from elastocal.diagnosis.search import ScoredModel, search_models
 from elastocal.diagnosis.settings import Settings
-from elastocal.diagnosis.verdict import concluded
+from elastocal.diagnosis.verdict import conclude
 
 SETTINGS = Settings(pose_steps=(0.0, 2.0), other_features=6)
-RAISED = Alarm(0.002, 10.0, True)
+RAISED = Alarm(0.002, 10.0, raised=True)
 ELASTIC = ("link_elasticity", "base_compliance", "joint_tilt")
 
 
@@ -52,7 +52,7 @@ def diagnosed(campaign, robot, keys):
         linearized=design,
         posterior=posterior,
         alarm=RAISED,
-        conclusion=concluded(design.problem, posterior, RAISED),
+        conclusion=conclude(design.problem, posterior, RAISED),
     )
     case = SimpleNamespace(
         observations=campaign.observations, campaign=SimpleNamespace(robot=robot)

@@ -1,5 +1,5 @@
-"""The exact fit of a selected model, and averages over models: those of dense Bayesian
-regressions, pooled."""
+"""Tests of the exact fit of a selected model: the priors of the selection are those of
+the fit."""
 
 from dataclasses import replace
 
@@ -18,15 +18,15 @@ SETTINGS = Settings()
 
 
 @pytest.fixture(scope="module")
-def found(kuka):
-    """A robot with an offset of joint 3, offsets of joint 2 declared, and what the
-    search makes of it."""
+def search(kuka):
+    """Campaign of a robot with zero errors of joints 2 and 3, of which that of joint 2
+    is declared; the declared fit, the design of the candidates and the best model."""
     campaign = planted(
         kuka, {"joint_offset@3": [5e-4], "joint_offset@2": [3e-4]}, seed=1
     )
-    known = campaign.candidates["joint_offset@2"]
-    model = campaign.declared.model.with_effects([known])
-    start = campaign.declared.estimate.with_effects([known])
+    declared_effect = campaign.candidates["joint_offset@2"]
+    model = campaign.declared.model.with_effects([declared_effect])
+    start = campaign.declared.estimate.with_effects([declared_effect])
     declared = fit_model(model, campaign.observations, campaign.declared.noise, start)
     candidates = [
         candidate
@@ -34,61 +34,55 @@ def found(kuka):
         if candidate.effect != "joint_offset"
     ]
     candidates.append(replace(campaign.candidates["joint_offset@3"], effect="offset"))
-    problem = build_candidate_design(
+    design = build_candidate_design(
         declared, campaign.observations, candidates, SETTINGS
     )
-    models = search_models(problem.problem)
-    return campaign, declared, problem, models
+    best = search_models(design.problem).models[0]
+    return campaign, declared, design, best
 
 
-def test_priors_arrive_in_the_fit(found):
-    campaign, declared, line, models = found
-    best = models.models[0]
-    assert [line.problem.units[number].candidate.key for number in best.units] == [
-        "offset@3"
-    ]
-    chosen = select_effects(line, best)
-    (effect, shapes), *others = chosen
-    assert not others and shapes.size == 0
+def test_the_exact_fit_has_the_priors_of_the_selection(search):
+    campaign, declared, design, best = search
+    (index,) = best.term_indices
+    assert design.problem.terms[index].candidate.key == "offset@3"
+    effects = select_effects(design, best)
+    ((effect, shapes),) = effects
+    assert shapes.size == 0
     final = fit_selected_effects(
-        declared, campaign.observations, declared.noise, chosen
+        declared, campaign.observations, declared.noise, effects
     )
     priors = {
         owner: parameter.prior_std
         for owner, parameter in final.parameters
         if "offset@" in owner
     }
-    plausible = effect.parameters[0].plausible
-    assert priors["joint_offset@2"] is None and priors["offset@3"] == pytest.approx(
-        best.scales[0] * plausible, rel=1e-12
-    )
     assert best.scales[0] in SETTINGS.scales
-    # And do what a prior does: information of the measurements and of the prior add up.
-    about = linearize(
+    assert priors["joint_offset@2"] is None
+    assert priors["offset@3"] == pytest.approx(
+        best.scales[0] * effect.parameters[0].plausible, rel=1e-12
+    )
+    # The covariance shows that the prior counts: the information of the measurements
+    # and that of the prior add up.
+    linear_model = linearize(
         final.model, final.estimate, campaign.observations, final.conditions
     )
-    left = final.whiten(about.sensitivities).reshape(-1, len(final.parameters))
-    precision = np.array(
+    sensitivities = final.whiten(linear_model.sensitivities)
+    rows = sensitivities.reshape(-1, len(final.parameters))
+    prior_precision = np.array(
         [0.0 if p.prior_std is None else p.prior_std**-2 for _, p in final.parameters]
     )
-    expected = np.linalg.inv(left.T @ left + np.diag(precision))
+    expected = np.linalg.inv(rows.T @ rows + np.diag(prior_precision))
     np.testing.assert_allclose(np.diag(final.covariance), np.diag(expected), rtol=1e-2)
 
 
-def test_no_effect_is_fitted_under_a_wider_prior_than_it_had_before_the_measurements(
-    found,
-):
-    _, _, line, models = found
-    best = models.models[0]
-    unit = line.problem.terms[best.term_indices[0]]
-    before = line.problem.grid.root_mean_square(unit)
-    sizes = [0.5 * before, before, SETTINGS.scales[-1]]
+def test_no_prior_of_the_fit_is_wider_than_before_the_measurements(search):
+    _, _, design, best = search
+    term = design.problem.terms[best.term_indices[0]]
+    before = design.problem.grid.root_mean_square(term)
     assert before < SETTINGS.scales[-1]
-    chosen = [
-        select_effects(line, replace(best, scales=np.array([size])))[0][0]
-        for size in sizes
-    ]
-    deviations = [
-        candidate.parameters[0].prior_std / unit.sizes[0] for candidate in chosen
-    ]
-    np.testing.assert_allclose(deviations, [0.5 * before, before, before], rtol=1e-12)
+    prior_stds = []
+    for size in (0.5 * before, before, SETTINGS.scales[-1]):
+        model = replace(best, scales=np.array([size]))
+        ((effect, _),) = select_effects(design, model)
+        prior_stds.append(effect.parameters[0].prior_std / term.sizes[0])
+    np.testing.assert_allclose(prior_stds, [0.5 * before, before, before], rtol=1e-12)

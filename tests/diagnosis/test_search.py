@@ -1,5 +1,4 @@
-"""The search, on problems small enough for all models to be enumerated, and the alarm:
-its statistic and its power."""
+"""The search, on problems small enough for all models to be enumerated."""
 
 from dataclasses import replace
 from itertools import combinations
@@ -16,9 +15,9 @@ from elastocal.diagnosis.search import search_models
 from elastocal.diagnosis.settings import Settings
 
 TAU = [0.0, 0.3, 0.9]
-# Two laws at one location, two mechanisms at three and two locations, and the
-# competitor.
-UNITS = (
+# Two mechanisms at three and two locations, one of them with two variants at one
+# location, and a discrepancy.
+TERMS = (
     made_unit("offset", (1,), 0),
     made_unit("offset", (2,), 1),
     made_unit("offset", (3,), 2),
@@ -36,109 +35,97 @@ SIGNALS = {
 }
 
 
-def problem_of(signal, seed=0, settings=None):
+def problem_with_signal(name, seed=0):
     rows = made_rows(seed, poses=14, candidates=10)
-    moved = sum(
-        size * rows.candidates[:, column] for column, size in SIGNALS[signal].items()
+    signal = sum(
+        size * rows.candidates[:, column] for column, size in SIGNALS[name].items()
     )
-    return made_problem(
-        replace(rows, residual=rows.residual + moved), UNITS, settings, TAU
-    )[0]
+    rows = replace(rows, residual=rows.residual + signal)
+    problem, _ = made_problem(rows, TERMS, tau=TAU)
+    return problem
 
 
-def cancelling(size, units):
-    """The problem of a campaign with so much of three columns that nearly cancel: no
-    single one of them shows.
+def problem_with_cancelling_columns(size, terms):
+    """A problem with a signal in three columns that nearly cancel, so that no single
+    column shows it.
 
-    A search of it extends but the best model once.
+    Its search extends only the best model, and only once.
     """
     rows = made_rows(3, poses=14, candidates=6)
     common = 30 * np.random.default_rng(4).standard_normal(len(rows.pose))
     candidates = rows.candidates.copy()
     candidates[:, :3] += np.outer(common, [1, 1, -2])
-    rows = replace(
-        rows,
-        candidates=candidates,
-        residual=rows.residual + size * candidates[:, :3].sum(axis=1),
-    )
-    return made_problem(rows, units, replace(Settings(), beam=1, patience=1), TAU)[0]
+    signal = size * candidates[:, :3].sum(axis=1)
+    rows = replace(rows, candidates=candidates, residual=rows.residual + signal)
+    settings = replace(Settings(), beam=1, patience=1)
+    problem, _ = made_problem(rows, terms, settings, TAU)
+    return problem
 
 
-def enumerated(problem):
+def enumerate_models(problem):
     """Posterior probability of every model, each evaluated in full."""
-    odds = {}
+    log_odds = {}
     for size in range(len(problem.terms) + 1):
         for model in combinations(range(len(problem.terms)), size):
-            units = [problem.terms[number] for number in model]
-            if len({unit.slot for unit in units}) < size:
+            terms = [problem.terms[number] for number in model]
+            if len({term.slot for term in terms}) < size:
                 continue
-            found = evaluate_model(
+            evidence = evaluate_model(
                 problem.statistics,
-                units,
+                terms,
                 problem.grid,
                 problem.log_pose,
                 np.full(size, 0.1),
             )
-            odds[model] = found.log_evidence + problem.prior.compute_log_odds(units)
-    values = np.array(list(odds.values()))
-    return dict(zip(odds, np.exp(values - log_sum_exp(values)), strict=True))
+            log_prior = problem.prior.compute_log_odds(terms)
+            log_odds[model] = evidence.log_evidence + log_prior
+    values = np.array(list(log_odds.values()))
+    return dict(zip(log_odds, np.exp(values - log_sum_exp(values)), strict=True))
 
 
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("signal", SIGNALS)
 def test_posterior_is_that_of_all_models(signal, seed):
-    """To 0.02 in every probability, and models that were not met hold less than 2 %
+    """To 0.02 in every probability; models that were not met hold less than 2 %
     together."""
-    problem = problem_of(signal, seed)
-    expected = enumerated(problem)
-    found = search_models(problem)
-    assert found.probabilities.sum() == pytest.approx(1.0)
-    mine = dict(
-        zip(
-            (model.term_indices for model in found.models),
-            found.probabilities,
-            strict=True,
-        )
-    )
-    assert len(mine) == len(found.models)
-    assert all(
-        abs(mine.get(model, 0.0) - probability) < 0.02
-        for model, probability in expected.items()
-    )
-    assert (
-        sum(probability for model, probability in expected.items() if model not in mine)
-        < 0.02
-    )
-    assert set(mine) <= set(expected)
+    problem = problem_with_signal(signal, seed)
+    expected = enumerate_models(problem)
+    posterior = search_models(problem)
+    assert posterior.probabilities.sum() == pytest.approx(1.0)
+    models = [model.term_indices for model in posterior.models]
+    probabilities = dict(zip(models, posterior.probabilities, strict=True))
+    assert len(probabilities) == len(models)
+    assert set(probabilities) <= set(expected)
+    for model, probability in expected.items():
+        assert abs(probabilities.get(model, 0.0) - probability) < 0.02
+    not_met = sum(p for model, p in expected.items() if model not in probabilities)
+    assert not_met < 0.02
 
 
-def test_laws_of_the_competitor_at_one_location_join_in_one_model():
+def test_discrepancies_of_different_causes_at_one_location_join_in_one_model():
     rows = made_rows(poses=14)
-    laws = (
+    terms = (
         made_unit(OTHER, (1,), [0, 1]),
         made_unit(OTHER, (1,), [2, 3], law=NEIGHBOURS),
     )
-    rows = replace(
-        rows, residual=rows.residual + 0.8 * rows.candidates[:, :4].sum(axis=1)
-    )
-    assert search_models(made_problem(rows, laws, tau=TAU)[0]).models[
-        0
-    ].term_indices == (0, 1)
+    signal = 0.8 * rows.candidates[:, :4].sum(axis=1)
+    rows = replace(rows, residual=rows.residual + signal)
+    problem, _ = made_problem(rows, terms, tau=TAU)
+    assert search_models(problem).models[0].term_indices == (0, 1)
 
 
-def test_a_search_that_knows_a_good_model_finds_it_whatever_leads_there():
-    """Of mechanisms at one location each: no single one of them shows, nor any two."""
-    units = [
+def test_a_search_finds_a_good_model_that_it_is_told_even_if_no_step_leads_there():
+    """The model has three mechanisms, of which no single one shows, nor any two."""
+    terms = [
         made_unit(name, (1,), column, candidate=SimpleNamespace(key=name))
         for column, name in enumerate("abc")
     ]
-    problem = cancelling(
-        1.5, [*units, made_unit("d", (1,), 3), made_unit("e", (1,), 4)]
+    terms += [made_unit("d", (1,), 3), made_unit("e", (1,), 4)]
+    problem = problem_with_cancelling_columns(1.5, terms)
+    best_untold = max(
+        search_models(problem, keys).models[0].log_odds for keys in ((), ("a",))
     )
-    best = max(search_models(problem, keys).models[0].log_odds for keys in ((), ("a",)))
-    # What is known and not tested is no matter.
-    found = search_models(problem, {"a", "b", "c", "gone"})
-    assert (
-        found.models[0].term_indices == (0, 1, 2)
-        and found.models[0].log_odds > best + 5
-    )
+    # Keys that are not among the terms are ignored.
+    best = search_models(problem, {"a", "b", "c", "gone"}).models[0]
+    assert best.term_indices == (0, 1, 2)
+    assert best.log_odds > best_untold + 5

@@ -1,5 +1,5 @@
-"""Sufficient statistics: dense generalized least squares with the covariance written
-out, and measurements drawn one by one."""
+"""Sufficient statistics are those of dense generalized least squares with the
+covariance written out."""
 
 from dataclasses import replace
 
@@ -8,7 +8,10 @@ import pytest
 from made_problems import made_rows
 
 from elastocal.diagnosis import statistics
-from elastocal.diagnosis.statistics import compute_statistics
+from elastocal.diagnosis.statistics import (
+    assemble_normal_equations,
+    compute_statistics,
+)
 
 TAU = np.array([0.0, 0.1, 0.7, 5.0])
 CASES = {
@@ -19,18 +22,28 @@ CASES = {
 }
 
 
-def dense(rows, tau):
-    """W'MW, W'My, y'My and -1/2 ln |V|, with the declared parameters integrated over
-    their prior: V = Sigma + X P X'."""
-    marginal = rows.marginal_covariance(tau)
+def dense_statistics(rows):
+    """W'MW, W'My, y'My and -1/2 ln |V| at every tau, with the declared parameters
+    integrated over their prior: V = Sigma + X P X'."""
     y = rows.residual - rows.expected
-    inverse = np.linalg.inv(marginal)
-    return (
-        rows.candidates.T @ inverse @ rows.candidates,
-        rows.candidates.T @ inverse @ y,
-        y @ inverse @ y,
-        -0.5 * np.linalg.slogdet(marginal)[1],
-    )
+    grams = []
+    scores = []
+    squares = []
+    log_likelihoods = []
+    for tau in TAU:
+        marginal = rows.marginal_covariance(tau)
+        inverse = np.linalg.inv(marginal)
+        grams.append(rows.candidates.T @ inverse @ rows.candidates)
+        scores.append(rows.candidates.T @ inverse @ y)
+        squares.append(y @ inverse @ y)
+        log_likelihoods.append(-0.5 * np.linalg.slogdet(marginal)[1])
+    return tuple(map(np.array, (grams, scores, squares, log_likelihoods)))
+
+
+def assert_close(values, expected, rtol=1e-9):
+    """Equal to a relative tolerance of each value and of the largest one."""
+    atol = rtol * np.abs(expected).max()
+    np.testing.assert_allclose(values, expected, rtol=rtol, atol=atol)
 
 
 @pytest.mark.parametrize(
@@ -40,79 +53,89 @@ def dense(rows, tau):
 def test_statistics_are_those_of_dense_generalized_least_squares(
     case, at_once, columns_a_row, monkeypatch
 ):
-    """However many poses are looked at in one go, and whether what they take is kept
-    beside the products."""
+    """However many poses are in memory at once, and whether the correction for the pose
+    error is dense or in factors."""
     monkeypatch.setattr(statistics, "_AT_ONCE", at_once)
     monkeypatch.setattr(statistics, "_COLUMNS_A_ROW", columns_a_row)
     rows = made_rows(1, **CASES[case])
-    found = compute_statistics(rows.products, TAU)
-    gram, along, squares, logs = (
-        np.array(part) for part in zip(*(dense(rows, tau) for tau in TAU), strict=True)
-    )
-    every = np.arange(gram.shape[1])
-    assert len(found.gram) == (len(TAU) if columns_a_row else 1)
-    for between in (
-        found.gram_rows(every),
-        found.gram_blocks(every),
-        found.at([1, 3]).gram_rows(every[:2]),
+    computed = compute_statistics(rows.products, TAU)
+    gram, score, squares, log_likelihood = dense_statistics(rows)
+    columns = np.arange(gram.shape[1])
+    assert len(computed.gram) == (len(TAU) if columns_a_row else 1)
+    scale = 1e-9 * np.abs(gram).max()
+    for blocks, expected in (
+        (computed.gram_rows(columns), gram),
+        (computed.gram_blocks(columns), gram),
+        (computed.at([1, 3]).gram_rows(columns[:2]), gram[[1, 3], :2]),
     ):
-        expected = gram if len(between) == len(gram) else gram[[1, 3], :2]
-        np.testing.assert_allclose(
-            between, expected, rtol=1e-9, atol=1e-9 * np.abs(gram).max()
-        )
-    np.testing.assert_allclose(
-        found.score, along, rtol=1e-9, atol=1e-9 * np.abs(along).max()
-    )
-    np.testing.assert_allclose(found.residual_squares, squares, rtol=1e-9)
+        np.testing.assert_allclose(blocks, expected, rtol=1e-9, atol=scale)
+    assert_close(computed.score, score)
+    np.testing.assert_allclose(computed.residual_squares, squares, rtol=1e-9)
     # Up to a constant that does not depend on tau.
     np.testing.assert_allclose(
-        np.diff(found.log_likelihood), np.diff(logs), rtol=1e-9, atol=1e-9
+        np.diff(computed.log_likelihood), np.diff(log_likelihood), rtol=1e-9, atol=1e-9
     )
 
 
-def _orthonormal(columns):
+@pytest.mark.parametrize("columns_a_row", [4, 0])
+def test_normal_equations_need_no_rows_at_a_pose_error_that_was_met(
+    columns_a_row, monkeypatch
+):
+    """They are the same as those that are computed from the rows."""
+    monkeypatch.setattr(statistics, "_COLUMNS_A_ROW", columns_a_row)
+    rows = made_rows(1)
+    columns = np.array([0, 2, 3])
+    products = rows.products
+    compute_statistics(products, TAU)
+    from_cache = assemble_normal_equations(products.without_rows, TAU[2], columns)
+    from_rows = assemble_normal_equations(rows.products, TAU[2], columns)
+    assert_close(from_cache, from_rows)
+
+
+def orthonormalize(columns):
     """Gram-Schmidt, twice, in extended precision."""
     basis = []
     for column in columns.T.astype(np.longdouble):
         for _ in range(2):
-            for known in basis:
-                column = column - (known @ column) * known
+            for direction in basis:
+                column = column - (direction @ column) * direction
         basis.append(column / np.sqrt(column @ column))
     return np.array(basis).T
 
 
-def test_badly_scaled_and_nearly_collinear_columns_cost_no_precision():
-    """Declared columns of sizes from 1e-8 to 1e6, two of them alike to 1e-6, and
-    candidates that they nearly are."""
+def badly_scaled_rows():
+    """Declared columns of sizes from 1e-8 to 1e6, two of them equal to 1e-6, and
+    candidates that they nearly span."""
     rng = np.random.default_rng(4)
     rows = made_rows(4, declared=4, candidates=3)
     X = rows.declared.copy()
     X[:, 1] = X[:, 0] + 1e-6 * X[:, 1]
-    own = rng.standard_normal((len(X), 3))
-    rows = replace(
+    outside = rng.standard_normal((len(X), 3))
+    return replace(
         rows,
         declared=X * [1e-8, 1e-8, 1e6, 1.0],
         prior_std=np.array([1e12, 1e12, 1e-2, 1e4]),
-        candidates=X @ rng.standard_normal((4, 3)) + 1e-3 * own,
+        candidates=X @ rng.standard_normal((4, 3)) + 1e-3 * outside,
     )
-    found = compute_statistics(rows.products, [0.0])
-    augmented = np.concatenate([rows.declared, np.diag(1 / rows.prior_std)]).astype(
-        np.longdouble
-    )
-    basis = _orthonormal(augmented / np.linalg.norm(augmented.astype(float), axis=0))
-    rest = np.zeros((len(augmented), 4), np.longdouble)
-    rest[: len(X), :3] = rows.candidates
-    rest[: len(X), 3] = rows.residual
-    rest[len(X) :, 3] = -rows.present / rows.prior_std
+
+
+def test_badly_scaled_and_nearly_collinear_columns_cost_no_precision():
+    rows = badly_scaled_rows()
+    computed = compute_statistics(rows.products, [0.0])
+    priors = np.diag(1 / rows.prior_std)
+    augmented = np.concatenate([rows.declared, priors]).astype(np.longdouble)
+    norms = np.linalg.norm(augmented.astype(float), axis=0)
+    basis = orthonormalize(augmented / norms)
+    count = len(rows.residual)
+    others = np.zeros((len(augmented), 4), np.longdouble)
+    others[:count, :3] = rows.candidates
+    others[:count, 3] = rows.residual
+    others[count:, 3] = -rows.present / rows.prior_std
     for _ in range(2):
-        rest = rest - basis @ (basis.T @ rest)
-    exact = (rest.T @ rest).astype(float)
-    # Forming the normal equations would leave 1e-4 of it: the square of one over the
-    # collinearity times the rounding.
-    np.testing.assert_allclose(
-        found.gram[0], exact[:3, :3], rtol=1e-7, atol=1e-7 * np.abs(exact[:3, :3]).max()
-    )
-    np.testing.assert_allclose(
-        found.score[0], exact[:3, 3], rtol=1e-7, atol=1e-7 * np.abs(exact[:3, 3]).max()
-    )
-    np.testing.assert_allclose(found.residual_squares[0], exact[3, 3], rtol=1e-9)
+        others = others - basis @ (basis.T @ others)
+    exact = (others.T @ others).astype(float)
+    # Forming the normal equations would leave an error of 1e-4: the rounding times the
+    # square of one over the collinearity.
+    assert_close(computed.gram[0], exact[:3, :3], rtol=1e-7)
+    assert_close(computed.score[0], exact[:3, 3], rtol=1e-7)
+    np.testing.assert_allclose(computed.residual_squares[0], exact[3, 3], rtol=1e-9)

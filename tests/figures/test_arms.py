@@ -1,10 +1,13 @@
 """Pictures of arms: seen from the side and a little from above, with what the tables
 and the plan hold."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from analysed_robots import analysed
 from drawn_figures import legend_entries
+from made_loop_tables import CAMPAIGNS
 from made_surveys import OPEN, made_candidates, made_survey
 
 from elastocal.application.planning.cell import Cell
@@ -15,6 +18,7 @@ from elastocal.figures.arms import (
     draw_poses,
     project_view,
 )
+from elastocal.verdict import ErrorSummary
 
 
 @pytest.fixture
@@ -34,12 +38,13 @@ def table():
 
 
 def test_each_panel_has_its_errors_and_their_rms(table):
-    heldout = {
-        "before": {"rms_m": 1.23e-3},
-        "after": {"rms_m": 0.12e-3},
-        "poses": 4,
-        "noise_floor_rms_m": 0.105e-3,
-    }
+    heldout = replace(
+        CAMPAIGNS["named"].heldout,
+        before=ErrorSummary(1e-3, 1.23e-3, 2e-3, 3e-3),
+        after=ErrorSummary(1e-4, 0.12e-3, 2e-4, 3e-4),
+        poses=4,
+        noise_floor_rms_m=0.105e-3,
+    )
     figure = draw_arm_with_errors(analysed("kuka"), table, heldout)
     assert [axis.get_title(loc="left") for axis in figure.axes] == [
         "1.23 mm",

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import yaml
 
-from elastocal.application.accuracy import Accuracy
+from elastocal.verdict import Accuracy
 
 
 def made_document(decision="pass", misplaced=False, **conformity):

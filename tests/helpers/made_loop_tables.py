@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.verdict import (
     ADEQUATE,
@@ -17,7 +16,9 @@ from elastocal.diagnosis.verdict import (
     SEVERAL,
     UNEXPLAINED,
 )
+from elastocal.io.typed_json import from_document, to_document
 from elastocal.report.loop_facts import loop_facts
+from elastocal.verdict import DataFault, Effect, Probabilities, Verdict
 
 # What of verdict.json is always the same.
 DATA = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8"))
@@ -113,7 +114,8 @@ def probabilities(sets=None, alarm_p_value=0.002):
             mechanisms[name] = mechanisms.get(name, 0.0) + value
     nothing = sum(value for where, value in sets if not where)
     facts = {"nothing": nothing, "stated": sets[0][1], "alarm_p_value": alarm_p_value}
-    return facts | {"mechanisms": mechanisms, "sets": listed}
+    document = facts | {"mechanisms": mechanisms, "sets": listed}
+    return from_document(Probabilities, document, "made up")
 
 
 def step_rows(effects=("lost_motion",), largest_m=3e-4):
@@ -159,7 +161,7 @@ def effect_entry(
     adopted=True,
     cost_m=8.5e-5,
 ):
-    """An entry of the effects of verdict.json."""
+    """An effect of a verdict."""
     names = [f"{member} {parameter}" for member in members for parameter in parameters]
     locations = (
         locations or [(f"joint {joint}", 1.0) for joint in joints] or [("", 1.0)]
@@ -182,10 +184,12 @@ def effect_entry(
         ]
     }
     judged = {"adopted": True} if adopted else {"adopted": False, "heldout_gain": None}
-    return DATA["effect"] | given | judged | {"cost_m": cost_m if adopted else None}
+    document = DATA["effect"] | given | judged
+    document["cost_m"] = cost_m if adopted else None
+    return from_document(Effect, document, "made up")
 
 
-def verdict_document(
+def made_verdict(
     word,
     effects=(),
     warnings=(),
@@ -195,46 +199,44 @@ def verdict_document(
     reduction=(0.15, 0.32),
     remainder=None,
 ):
-    """Contents of verdict.json."""
-    faulty = data_at_fault({"effects": effects})
-    adopted = any(effect["adopted"] for effect in effects)
+    """A verdict with made-up errors."""
+    is_faulty = any(isinstance(effect, DataFault) for effect in effects)
+    is_adopted = any(effect.adopted for effect in effects)
     before = DATA["errors"]
-    after = {name: (0.7 if adopted else 1.0) * value for name, value in before.items()}
+    factor = 0.7 if is_adopted else 1.0
+    after = {name: factor * value for name, value in before.items()}
     both = {"before": before, "after": after}
-    found = deepcopy(DATA["verdict"]) | {
+    document = deepcopy(DATA["verdict"]) | {
         "campaign": "made_up",
         "verdict": word,
-        "effects": list(effects),
-    }
-    found |= {
+        "effects": to_document(list(effects)),
         "warnings": list(warnings),
         "held": [],
         "remainder": remainder,
-        "settings": Settings().document(),
+        "settings": to_document(Settings().document()),
+        "kept": "effect" if is_adopted else "declared",
+        "probabilities": None if is_faulty else to_document(probabilities(sets)),
     }
-    found |= {
-        "kept": "effect" if adopted else "declared",
-        "probabilities": None if faulty else probabilities(sets),
-    }
-    found |= {"misfit": None, "candidates_tested": 0} if faulty else {}
-    found["noise"] |= {
+    if is_faulty:
+        document |= {"misfit": None, "candidates_tested": 0}
+    document["noise"] |= {
         "source": noise,
         "degrees_of_freedom": 1008 if noise == "repeats" else 0,
     }
-    heldout = found["heldout"]
+    heldout = document["heldout"]
     heldout |= both | {"delivered": remainder["errors"] if remainder else after}
     heldout["uncalibrated"] |= {name: value / 0.7 for name, value in before.items()}
     heldout |= {
-        "reduction_ci95": list(reduction) if adopted else [0.0, 0.0],
-        "reduction_std_error": 0.04 if adopted else 0.0,
+        "reduction_ci95": list(reduction) if is_adopted else [0.0, 0.0],
+        "reduction_std_error": 0.04 if is_adopted else 0.0,
+        "noise_floor_rms_m": None if noise == "residual" else 5e-5,
+        "outside_range": {
+            "poses": outside,
+            "inside": both,
+            "outside": both if outside else None,
+        },
     }
-    heldout["noise_floor_rms_m"] = None if noise == "residual" else 5e-5
-    heldout["outside_range"] = {
-        "poses": outside,
-        "inside": both,
-        "outside": both if outside else None,
-    }
-    return found
+    return from_document(Verdict, document, "made up")
 
 
 HARMONICS = [
@@ -249,52 +251,52 @@ REMAINDER = DATA["remainder"] | {
 }
 TWO_PLACES = [("joint 3", 0.8), ("joint 5", 0.2)]
 CAMPAIGNS = {
-    "adequate": verdict_document(
+    "adequate": made_verdict(
         ADEQUATE, sets=[({}, 0.97), ({"lost_motion": ["joint 3"]}, 0.02)]
     ),
-    "named": verdict_document(NAMED, [effect_entry()]),
-    "named, location uncertain": verdict_document(
+    "named": made_verdict(NAMED, [effect_entry()]),
+    "named, location uncertain": made_verdict(
         NAMED, [effect_entry(locations=TWO_PLACES)]
     ),
-    "class": verdict_document(
+    "class": made_verdict(
         CLASS, [effect_entry(alternatives=["joint_tilt", "link_elasticity"])]
     ),
-    "class with a related mechanism": verdict_document(
+    "class with a related mechanism": made_verdict(
         CLASS, [effect_entry(alternatives=["other"])]
     ),
-    "several": verdict_document(
+    "several": made_verdict(
         SEVERAL, [effect_entry(), effect_entry("payload", ["payload"], (), ["mass"])]
     ),
-    "named, not adopted": verdict_document(NAMED, [effect_entry(adopted=False)]),
-    "class, not adopted": verdict_document(
+    "named, not adopted": made_verdict(NAMED, [effect_entry(adopted=False)]),
+    "class, not adopted": made_verdict(
         CLASS, [effect_entry(alternatives=["joint_tilt"], adopted=False)]
     ),
-    "unexplained": verdict_document(
+    "unexplained": made_verdict(
         UNEXPLAINED, sets=[({"other": ["joint 2"]}, 0.9), ({}, 0.1)]
     ),
-    "not_testable": verdict_document(NOT_TESTABLE, sets=[({}, 1.0)]),
-    "fault of the data": verdict_document(
+    "not_testable": made_verdict(NOT_TESTABLE, sets=[({}, 1.0)]),
+    "fault of the data": made_verdict(
         NAMED,
-        [effect_entry(adopted=False) | DATA["fault"]],
+        [from_document(DataFault, DATA["fault"], "made up")],
         ["the fit of the final model did not converge"],
     ),
-    "noise not known": verdict_document(
+    "noise not known": made_verdict(
         ADEQUATE, noise="residual", warnings=["no repeats and no declared noise"]
     ),
-    "hundreds of parameters": verdict_document(
+    "hundreds of parameters": made_verdict(
         SEVERAL, [effect_entry("transmission_harmonic", HARMONICS, range(1, 7), WAVES)]
     ),
-    "with a remainder": verdict_document(
+    "with a remainder": made_verdict(
         NAMED, [effect_entry()], outside=3, remainder=REMAINDER
     ),
-    "poses outside the range": verdict_document(NAMED, [effect_entry()], outside=3),
+    "poses outside the range": made_verdict(NAMED, [effect_entry()], outside=3),
 }
 
 
 def facts_of(verdict, **changed):
     """Facts of the report of a verdict, with tables that fit it where none are
     given."""
-    found = [effect["name"] for effect in verdict["effects"] if effect["adopted"]]
+    found = [effect.name for effect in verdict.effects if effect.adopted]
     given = {
         "steps": step_rows(effects=found),
         "experiment": [],

@@ -59,9 +59,9 @@ def test_the_robot_is_that_of_the_final_fit(checkout):
     assert found.calibrated.scope.frame == (
         "robot" if found.case.model.fitted_frames else "base"
     )
-    assert found.verdict["campaign"] == found.name == "made"
+    assert found.verdict.campaign == found.name == "made"
     assert found.calibrated.scope.form_m == pytest.approx(
-        found.verdict["accuracy"]["form_m"], rel=1e-9
+        found.verdict.accuracy.form_m, rel=1e-9
     )
 
 
@@ -71,34 +71,21 @@ def test_the_regression_comes_back_and_physics_alone_has_its_own_accuracy(
     whole = load_diagnosed(regressed_checkout / "smooth", ROBOTS, regressed_checkout)
     physics = whole.by_physics()
     stated = whole.verdict
-    heldout = whole.verdict["heldout"]
-    assert heldout["delivered"]["rms_m"] < 0.6 * heldout["after"]["rms_m"]
+    heldout = whole.verdict.heldout
+    assert heldout.delivered.rms_m < 0.6 * heldout.after.rms_m
     assert (
         physics.calibrated.residual_model is None
-        and physics.verdict["heldout"]["delivered"] == heldout["after"]
+        and physics.verdict.heldout.delivered == heldout.after
     )
-    assert (
-        physics.verdict["accuracy"]
-        == stated["physics"]["accuracy"]
-        != stated["accuracy"]
-    )
+    assert physics.verdict.accuracy == stated.physics.accuracy != stated.accuracy
     for found in (whole, physics):
         again = predict_campaign_accuracy(found.calibrated)
-        assert again.rms_m == pytest.approx(
-            found.verdict["accuracy"]["rms_m"], rel=1e-3
-        )
-        assert again.form_m == pytest.approx(
-            found.verdict["accuracy"]["form_m"], rel=1e-6
-        )
+        assert again.rms_m == pytest.approx(found.verdict.accuracy.rms_m, rel=1e-3)
+        assert again.form_m == pytest.approx(found.verdict.accuracy.form_m, rel=1e-6)
     # What it is predicted to miss is by folds with fewer poses, and no less than what
     # it missed.
-    missed = np.sqrt(heldout["delivered"]["rms_m"] ** 2 - 3 * NOISE_M**2)
-    assert (
-        missed
-        < stated["accuracy"]["rms_m"]
-        < 3.0 * missed
-        < stated["physics"]["accuracy"]["rms_m"]
-    )
+    missed = np.sqrt(heldout.delivered.rms_m**2 - 3 * NOISE_M**2)
+    assert missed < stated.accuracy.rms_m < 3.0 * missed < stated.physics.accuracy.rms_m
 
 
 def test_it_says_what_code_data_and_environment_made_it(checkout):
@@ -178,10 +165,12 @@ def test_a_certificate_passes_below_and_fails_above_what_is_predicted_if_enough_
     found = load_diagnosed(checkout / "made", ROBOTS, checkout)
     found = replace(
         found,
-        verdict=found.verdict
-        | {"heldout": found.verdict["heldout"] | {"configurations": judged}},
+        verdict=replace(
+            found.verdict,
+            heldout=replace(found.verdict.heldout, configurations=judged),
+        ),
     )
-    tolerance_m = share * found.verdict["accuracy"]["rms_m"]
+    tolerance_m = share * found.verdict.accuracy.rms_m
     conformity = certificate(found, tolerance_m, 0.05)["conformity"]
     assert conformity["decision"] == decision
     assert [

@@ -1,17 +1,20 @@
 """All campaigns on one page: rows, counted verdicts, and errors by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
+from made_loop_tables import effect_entry, made_verdict
 
 from elastocal.loop.summary import campaign_rows
 
 
 def verdict(word, *effects):
-    return {
-        "verdict": word,
-        "effects": [{"name": name, "joints": list(joints)} for name, joints in effects],
-    }
+    missing = [
+        replace(effect_entry(name), joints=tuple(joints)) for name, joints in effects
+    ]
+    return made_verdict(word, missing)
 
 
 def errors(before, after=None, pose=None, repeat=None, session=0):

@@ -2,7 +2,10 @@
 importer, language, one entry each."""
 
 import importlib.util
+import os
 import re
+import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -14,7 +17,6 @@ from synthetic import displacements, made_states
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.importers import find_importer
 from elastocal.campaigns.reading import read_campaign, read_robot
-from elastocal.effects import catalogue
 from elastocal.effects.conditions import conditions_of
 from elastocal.effects.protocol import Effect
 from elastocal.exchange.controllers import CONTROLLERS, axes_of, targets_of
@@ -26,27 +28,32 @@ ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 
 
+def examples(heading):
+    """The blocks of code below a heading."""
+    section = TEXT.split(f"\n## {heading}")[1].split("\n## ")[0]
+    return re.findall(r"^```\w+\n(.*?)^```$", section, re.MULTILINE | re.DOTALL)
+
+
 def example(heading):
     """The one block of code below a heading."""
-    section = TEXT.split(f"\n## {heading}")[1].split("\n## ")[0]
-    (block,) = re.findall(r"^```\w+\n(.*?)^```$", section, re.MULTILINE | re.DOTALL)
+    (block,) = examples(heading)
     return block
 
 
 @pytest.fixture
-def module(tmp_path, monkeypatch):
+def import_example(tmp_path, monkeypatch):
     """Import a block as a module of its own."""
 
-    def imported(heading):
+    def import_block(block):
         path = tmp_path / "shown.py"
-        path.write_text(example(heading), encoding="utf-8")
+        path.write_text(block, encoding="utf-8")
         spec = importlib.util.spec_from_file_location("shown", path)
-        found = importlib.util.module_from_spec(spec)
-        monkeypatch.setitem(sys.modules, "shown", found)
-        spec.loader.exec_module(found)
-        return found
+        module = importlib.util.module_from_spec(spec)
+        monkeypatch.setitem(sys.modules, "shown", module)
+        spec.loader.exec_module(module)
+        return module
 
-    return imported
+    return import_block
 
 
 def test_the_robot_is_the_file_that_it_is_said_to_be_without_what_its_comment_is_about(
@@ -77,23 +84,58 @@ def test_the_strategy_is_one_that_the_papers_robots_can_carry_out_and_none_of_th
     check_strategy(strategy, robot.chain, path)
 
 
-def test_the_effect_is_whole_and_displaces_what_its_formula_says(module, kuka):
-    effect = module("An effect").hoses
-    assert (
-        isinstance(effect, Effect)
-        and effect.name not in catalogue.list_effects()
-        and "k q^3" in effect.doc
-    )
+def test_the_effect_displaces_each_joint_as_its_formula_says(import_example, kuka):
+    effect = import_example(examples("An effect")[0]).hoses
+    assert isinstance(effect, Effect) and "k q^3" in effect.doc
     sites = sites_of(kuka)
     states = made_states(6, 5)
-    found = effect.candidates(sites)
-    assert [candidate.key for candidate in found] == [
-        f"hoses@{joint}" for joint in range(1, 7)
-    ]
+    candidates = effect.candidates(sites)
+    keys = [candidate.key for candidate in candidates]
+    assert keys == [f"hoses@{joint}" for joint in range(1, 7)]
     conditions = conditions_of(sites, kuka.compliance, states)
-    (moved,) = displacements(found[2], conditions)
-    np.testing.assert_array_equal(moved[:, 2], states.joint_angles[:, 2] ** 3)
-    assert not np.delete(moved, 2, axis=1).any()
+    (displacement,) = displacements(candidates[2], conditions)
+    np.testing.assert_array_equal(displacement[:, 2], states.joint_angles[:, 2] ** 3)
+    assert not np.delete(displacement, 2, axis=1).any()
+
+
+# Tests that go through the catalogue, and those that look for files.
+CATALOGUE_TESTS = [
+    *("tests/effects", "tests/plant/test_kinds.py", "tests/test_mirrors.py"),
+    *("tests/report/test_words.py", "tests/figures/test_effect_signatures.py"),
+    *("tests/diagnosis/test_hypotheses.py", "tests/project/test_written_names.py"),
+]
+
+
+@pytest.mark.slow
+def test_the_effect_and_its_test_copied_pass_lint_and_all_tests_of_the_catalogue(
+    tmp_path,
+):
+    """As a contributor copies them; nothing else changes."""
+    copied = ["src", "tests", "config", "docs", "workflow", "pyproject.toml"]
+    for name in [*copied, "CONTRIBUTING.md", "Snakefile", "config.yaml"]:
+        source = ROOT / name
+        copy = shutil.copytree if source.is_dir() else shutil.copy
+        copy(source, tmp_path / name)
+    module, test = examples("An effect")
+    new_files = ["src/elastocal/effects/hoses.py", "tests/effects/test_hoses.py"]
+    for name, text in zip(new_files, (module, test), strict=True):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    commands = [
+        ["ruff", "check", *new_files],
+        ["ruff", "format", "--check", *new_files],
+        ["mypy", new_files[0]],
+        ["pytest", "-q", "-p", "no:cacheprovider", *CATALOGUE_TESTS],
+    ]
+    environment = os.environ | {"PYTHONPATH": str(tmp_path / "src")}
+    for command in commands:
+        finished = subprocess.run(
+            [sys.executable, "-m", *command],
+            cwd=tmp_path,
+            env=environment,
+            capture_output=True,
+            text=True,
+        )
+        assert finished.returncode == 0, finished.stdout[-3000:] + finished.stderr
 
 
 def test_the_importer_makes_a_campaign_and_refuses_a_file_of_another_kind(
@@ -122,8 +164,8 @@ def test_the_importer_makes_a_campaign_and_refuses_a_file_of_another_kind(
         mine.write_campaign([path], tmp_path / "other", robots, "other")
 
 
-def test_the_language_is_whole_and_writes_targets(module):
-    language = module("A controller's language").LINES
+def test_the_language_writes_targets(import_example):
+    language = import_example(example("A controller's language")).LINES
     assert language.name not in CONTROLLERS
     shifts = (True, *6 * (False,))
     targets = targets_of(

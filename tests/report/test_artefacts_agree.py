@@ -2,7 +2,6 @@
 verdict.json and the terminal."""
 
 import html
-import json
 import re
 import shutil
 import subprocess
@@ -15,6 +14,7 @@ from made_loop_tables import CAMPAIGNS, facts_of, plainly, residual_table
 from elastocal.report.loop_page import loop_page, write_loop_page
 from elastocal.report.outcome import outcome
 from elastocal.report.typesetting import compile_document
+from elastocal.verdict import write_verdict
 
 PICTURES = ["arrows", "before_after", "candidates"]
 
@@ -38,7 +38,7 @@ def test_artefacts_of_every_verdict_agree(
     folder = Path("reports/loop/made")
     folder.mkdir(parents=True)
     facts = facts_of(verdict)
-    (folder / "verdict.json").write_text(json.dumps(verdict), encoding="utf-8")
+    write_verdict(folder / "verdict.json", verdict)
     compile_document(folder / "report.pdf", "loop.typ", {"facts": facts}, pictures)
     write_loop_page(folder / "report.html", *loop_page(facts, residual_table(), kuka))
     page = (
@@ -58,14 +58,14 @@ def test_artefacts_of_every_verdict_agree(
         texts["report"] = bare(
             subprocess.run(shown, capture_output=True, text=True, check=True).stdout
         )
-    faulty = verdict["probabilities"] is None
-    errors = verdict["heldout"]
+    faulty = bool(verdict.faults)
+    errors = verdict.heldout
     stages = [
         "uncalibrated",
-        *(["after"] if errors["delivered"] != errors["after"] else []),
+        *(["after"] if errors.delivered != errors.after else []),
         "delivered",
     ]
-    wanted = [] if faulty else [1e3 * errors[stage]["rms_m"] for stage in stages]
+    wanted = [] if faulty else [1e3 * getattr(errors, stage).rms_m for stage in stages]
     for name, text in (
         texts | {"terminal": bare(" ".join(outcome([f"{folder}/report.pdf"])))}
     ).items():
@@ -77,7 +77,7 @@ def test_artefacts_of_every_verdict_agree(
         assert [float(value) for value in stated] == pytest.approx(
             wanted, rel=5e-3, abs=5.1e-4
         ), name
-        known = None if faulty else errors["noise_floor_rms_m"]
+        known = None if faulty else errors.noise_floor_rms_m
         assert float(noise or 0) == pytest.approx(
             1e3 * (known or 0), rel=5e-3, abs=5.1e-4
         ), name
@@ -87,7 +87,7 @@ def test_artefacts_of_every_verdict_agree(
         for row in facts["causes"]
         if row["cost"]
     ]
-    assert len(causes) == (0 if faulty else len(verdict["effects"]))
+    assert len(causes) == (0 if faulty else len(verdict.effects))
     assert [
         (name, cause)
         for name, text in texts.items()

@@ -3,6 +3,7 @@ know, and compiles, whatever the verdict."""
 
 import json
 import re
+from dataclasses import replace
 
 import pytest
 from made_loop_tables import (
@@ -12,9 +13,9 @@ from made_loop_tables import (
     effect_entry,
     experiment_rows,
     facts_of,
+    made_verdict,
     plainly,
     step_rows,
-    verdict_document,
 )
 
 from elastocal.diagnosis.verdict import NAMED
@@ -27,6 +28,7 @@ from elastocal.report.loop_facts import (
     effect_facts,
 )
 from elastocal.report.loop_facts import step_rows as table_rows
+from elastocal.verdict import Compliances
 
 WORDS = {
     "adequate": "none of 30 candidate causes is needed",
@@ -62,8 +64,7 @@ def test_what_to_do_follows_from_the_verdict_and_from_the_gain():
 
     ends = ((0.15, 0.32), (-0.3, -0.1), (-0.1, 0.3))
     gained, lost, unsure = (
-        now(verdict_document(NAMED, [effect_entry()], reduction=each))[0]
-        for each in ends
+        now(made_verdict(NAMED, [effect_entry()], reduction=each))[0] for each in ends
     )
     assert (
         gained.startswith("Use the corrected model")
@@ -84,7 +85,7 @@ def test_what_to_do_follows_from_the_verdict_and_from_the_gain():
     assert not any("extrapolated" in advice for advice in now(CAMPAIGNS["named"]))
     assert "Use the declared model" in now(CAMPAIGNS["adequate"])[0]
     assert "loose target" in now(CAMPAIGNS["unexplained"])[0]
-    (advice,) = now(CAMPAIGNS["adequate"] | {"kept": "frames"})
+    (advice,) = now(replace(CAMPAIGNS["adequate"], kept="frames"))
     assert advice.startswith("Leave the robot as its file has it")
 
 
@@ -105,7 +106,10 @@ def test_what_to_do_follows_from_the_verdict_and_from_the_gain():
     ],
 )
 def test_each_cause_states_its_cost_and_small_ones_are_negligible(changed, words):
-    assert cost_words(effect_entry() | changed, CAMPAIGNS["named"]["heldout"]) == words
+    assert (
+        cost_words(replace(effect_entry(), **changed), CAMPAIGNS["named"].heldout)
+        == words
+    )
 
 
 def test_causes_are_those_found_and_what_else_is_probable_with_the_probabilities_of_the_verdict():
@@ -115,7 +119,7 @@ def test_causes_are_those_found_and_what_else_is_probable_with_the_probabilities
         ({}, 0.04),
     ]
     rows = cause_rows(
-        verdict_document(NAMED, [effect_entry() | {"probability": 0.6}], sets=sets)
+        made_verdict(NAMED, [replace(effect_entry(), probability=0.6)], sets=sets)
     )
     assert [(row["name"], plainly(row["words"]), row["cost"]) for row in rows] == [
         ("Lost motion (backlash) of joint 3", "60 %", "0.085 mm"),
@@ -154,12 +158,13 @@ def test_a_fault_of_the_data_is_no_effect():
 
 def test_parameters_stand_in_readable_units_with_what_determines_them_and_of_whom_they_are():
     effect = effect_entry()
-    heldout = CAMPAIGNS["named"]["heldout"]
+    heldout = CAMPAIGNS["named"].heldout
     assert effect_facts(effect, heldout)["parameters"] == [
         ["half play", "120.0 ± 3.0", "µrad", "measurements"]
     ]
     # What the measurements do not identify is counted, and no number of it is printed.
-    effect["parameters"][0] |= {"identifiable": False}
+    hidden = replace(effect.parameters[0], identifiable=False)
+    effect = replace(effect, parameters=(hidden, *effect.parameters[1:]))
     facts = effect_facts(effect, heldout)
     assert (facts["parameters"], facts["held"]) == ([], 1)
     # What belongs to an effect as a whole, such as its largest sag, stands without a
@@ -170,12 +175,11 @@ def test_parameters_stand_in_readable_units_with_what_determines_them_and_of_who
         (2, 3),
         ("compliance_times_mass",),
     )
-    effect["parameters"].insert(
-        0, effect["parameters"][0] | {"name": "link_weight largest_sag", "unit": "m"}
-    )
+    sag = replace(effect.parameters[0], name="link_weight largest_sag", unit="m")
+    effect = replace(effect, parameters=(sag, *effect.parameters))
     names = [row[0] for row in effect_facts(effect, heldout)["parameters"]]
     assert names[0] == "largest sag" and names[1].startswith("joint 2: ")
-    many = effect_facts(CAMPAIGNS["hundreds of parameters"]["effects"][0], heldout)
+    many = effect_facts(CAMPAIGNS["hundreds of parameters"].effects[0], heldout)
     assert (
         len(many["parameters"]) == 10
         and many["left_out"] == str(len(HARMONICS) * len(WAVES))
@@ -204,12 +208,12 @@ def test_before_and_after_have_intervals_and_multiples():
 
 def test_of_a_compliance_that_is_not_identifiable_no_number_is_stated_and_of_a_file_that_fits_none_all_are():
     rows = compliance_rows(
-        {"before": [0.5, 0.4], "after": [0.48, 0.4], "std_error": [0.01, 0.0]}
+        Compliances((0.5, 0.4), (0.48, 0.4), (0.01, 0.0), (True, False))
     )
     assert rows == [
         ["1", "0.500", "0.480 ± 0.010"],
         ["2", "not identifiable", "not identifiable"],
     ]
-    assert compliance_rows({"before": [0.5], "after": [0.5], "std_error": [0.0]}) == [
+    assert compliance_rows(Compliances((0.5,), (0.5,), (0.0,), (False,))) == [
         ["1", "0.5", "0.5"]
     ]

@@ -32,7 +32,7 @@ ALL_IN_SIGHT = """() => {
 
 
 def page_of(kuka, name="named", **changed):
-    verdict = CAMPAIGNS[name] | changed
+    verdict = replace(CAMPAIGNS[name], **changed)
     return loop_page(facts_of(verdict), residual_table(), kuka)
 
 

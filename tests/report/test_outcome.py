@@ -1,10 +1,9 @@
 """The terminal says of each report where it is and, of a campaign, the verdict."""
 
-import json
-
 from made_loop_tables import CAMPAIGNS
 
 from elastocal.report.outcome import outcome
+from elastocal.verdict import write_verdict
 
 
 def test_the_outcome_names_reports_and_verdicts(tmp_path):
@@ -17,9 +16,7 @@ def test_the_outcome_names_reports_and_verdicts(tmp_path):
     ]
     said = {}
     for name in ("not_testable", "named"):
-        (folder / "verdict.json").write_text(
-            json.dumps(CAMPAIGNS[name]), encoding="utf-8"
-        )
+        write_verdict(folder / "verdict.json", CAMPAIGNS[name])
         said[name] = outcome(made, tmp_path)
     first, errors, *rest = said["not_testable"]
     assert first.startswith(

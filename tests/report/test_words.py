@@ -18,6 +18,7 @@ from elastocal.report.words import (
     probability_words,
     scaled,
 )
+from elastocal.verdict import MechanismSet
 
 
 def test_every_effect_of_the_catalogue_brings_its_own_physical_name_and_a_kind():
@@ -90,7 +91,7 @@ def test_hypotheses_that_hold_the_first_are_stated_by_what_they_add_and_other_is
     ]
     assert hypotheses_words(
         [
-            {"mechanisms": names, "locations": {"link_weight": ["joint 2"]}}
+            MechanismSet(tuple(names), 0.1, {"link_weight": ("joint 2",)})
             for names in sets
         ]
     ) == [
@@ -104,7 +105,7 @@ def test_hypotheses_that_hold_the_first_are_stated_by_what_they_add_and_other_is
     # Beside "nothing" all are stated in full.
     assert (
         hypotheses_words(
-            [{"mechanisms": names, "locations": {}} for names in ([], ["joint_offset"])]
+            [MechanismSet(names, 0.5, {}) for names in ((), ("joint_offset",))]
         )[1]
         == "zero offset"
     )

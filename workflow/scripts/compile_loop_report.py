@@ -12,10 +12,11 @@ from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.report.loop_facts import loop_facts
 from elastocal.report.loop_page import loop_page, write_loop_page
 from elastocal.report.typesetting import compile_document
+from elastocal.verdict import read_verdict
 
 
 def compile_loop_report(job: Job) -> None:
-    verdict = read_json(job.input.verdict)
+    verdict = read_verdict(job.input.verdict)
     descriptions = read_json(job.input.descriptions)
     robot = robot_from_document(descriptions["robot"])
     rows = [

@@ -15,6 +15,7 @@ from elastocal.io.json_files import read_json
 from elastocal.loop.schemas import angles_of, read_residuals, worst_measurement
 from elastocal.mechanics.kinematics import corners
 from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.verdict import read_verdict
 
 
 def draw_campaign(job: Job) -> None:
@@ -22,15 +23,14 @@ def draw_campaign(job: Job) -> None:
     table = read_residuals(job.input.residuals, robot.joints)
     arm = corners(robot.chain, angles_of(table, robot.joints)[worst_measurement(table)])
     candidates = pd.read_csv(job.input.candidates).fillna({"note": ""})
-    stated = read_json(job.input.diagnosis)["document"]["probabilities"]
+    verdict = read_verdict(job.input.verdict)
     errors = pd.read_csv(job.input.before_after).to_dict("records")
     drawn = {
-        "before_after": draw_before_after(
-            errors, read_json(job.input.verdict)["heldout"]["noise_floor_rms_m"]
-        ),
+        "before_after": draw_before_after(errors, verdict.heldout.noise_floor_rms_m),
         "arrows": draw_residual_arrows(table, arm),
         "candidates": draw_probabilities(
-            stated, {name: column.to_numpy() for name, column in candidates.items()}
+            verdict.probabilities,
+            {name: column.to_numpy() for name, column in candidates.items()},
         ),
     }
     for name, pdf, png in zip(

@@ -7,6 +7,7 @@ from elastocal.figures.style import save
 from elastocal.io.json_files import read_json
 from elastocal.loop.schemas import read_residuals
 from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.verdict import read_verdict
 
 
 def draw_hero(job: Job) -> None:
@@ -14,7 +15,7 @@ def draw_hero(job: Job) -> None:
     figure = draw_arm_with_errors(
         robot,
         read_residuals(job.input.residuals, robot.joints),
-        read_json(job.input.verdict)["heldout"],
+        read_verdict(job.input.verdict).heldout,
     )
     save(figure, job.output.pdf, job.output.png, origin_of(job))
 

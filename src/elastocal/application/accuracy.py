@@ -18,7 +18,7 @@ unless held-out poses show more. The tracker's noise is in none of the parts.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,6 +39,7 @@ from elastocal.application.frames import (
 )
 from elastocal.application.scope import set_form_error
 from elastocal.mechanics.kinematics import jacobians, pose_differences
+from elastocal.verdict import Accuracy
 
 if TYPE_CHECKING:
     from elastocal.application.calibrated import CalibratedRobot
@@ -60,48 +61,6 @@ _CHUNK = 200
 # Upper bound on the states over which the accuracy of a campaign is stated; more states
 # do not change a printed digit.
 _MOST_STATES = 1000
-
-
-@dataclass(frozen=True)
-class Accuracy:
-    """Predicted errors over some poses, without the tracker's noise; `asdict` is its
-    JSON.
-
-    Attributes
-    ----------
-    frame : "robot" or "base", the frame in which errors are stated.
-    rms_m, worst_m : root mean square over the poses, and RMS at the worst pose.
-    rms_bound_m, worst_bound_m : one-sided confidence bounds on them; None if unknown.
-    poses : number of poses.
-    region : which poses these are, in words.
-    offset_removed, left_out, contradicted : as in `frames.Scope`.
-    left_out_m, form_m : contributions to `rms_m` of effects that no command contains
-        and of the uncertain form of the model.
-    repeated_m : contribution of the joints' repeatability and the random error of each
-        pose.
-    regression_m : error of a regression on the residuals beyond parameters and
-        repeatability.
-    confidence : of the bounds.
-    fitted : whether any parameter of the robot was fitted. If none was, an error of 0
-        is no prediction.
-    """
-
-    frame: str
-    rms_m: float
-    worst_m: float
-    rms_bound_m: float | None
-    worst_bound_m: float | None
-    poses: int
-    region: str
-    offset_removed: bool = False
-    left_out: list[str] = field(default_factory=list)
-    left_out_m: float = 0.0
-    form_m: float = 0.0
-    contradicted: bool = False
-    repeated_m: float = 0.0
-    regression_m: float = 0.0
-    confidence: float = CONFIDENCE
-    fitted: bool = True
 
 
 @dataclass(frozen=True)
@@ -143,7 +102,7 @@ class ErrorPrediction:
             poses=len(self.error_m),
             region=region,
             offset_removed=scope.offset_removed,
-            left_out=list(scope.left_out),
+            left_out=scope.left_out,
             left_out_m=scope.left_out_m,
             form_m=root_mean_square(self.form_m),
             contradicted=scope.contradicted,
@@ -182,37 +141,32 @@ def predict_errors(
         )
         for chunk in split_into_chunks(len(reported_angles), _CHUNK)
     ]
-    sum_of_squares = np.zeros(draws)
-    largest_square = np.zeros(draws)
-    for chunk in chunks:
-        sum_of_squares += chunk.sum_of_squares
-        largest_square = np.maximum(largest_square, chunk.largest_square)
-    by_parameters = np.concatenate([chunk.parameter_covariance for chunk in chunks])
-    by_repeats = np.concatenate([chunk.repeat_covariance for chunk in chunks])
-    additional = np.concatenate([chunk.additional for chunk in chunks], axis=1)
-    parameter_variance = np.diagonal(by_parameters, axis1=1, axis2=2)
-    repeat_variance = np.diagonal(by_repeats, axis1=1, axis2=2)
+    errors = _merge_chunks(chunks)
+    parameter_variance = np.diagonal(errors.parameter_covariance, axis1=1, axis2=2)
+    repeat_variance = np.diagonal(errors.repeat_covariance, axis1=1, axis2=2)
     variance = (parameter_variance + repeat_variance)[:, :3].sum(axis=1)
     left_out = scope.left_out_m**2
     covered = regression.active & (not scope.contradicted)
     form = np.where(covered, 0.0, scope.form_m**2)
-    isotropic = ((additional[1] + form) / 3.0)[:, None, None] * np.eye(3)
+    isotropic = ((errors.additional[1] + form) / 3.0)[:, None, None] * np.eye(3)
     quantile = compute_length_quantiles(
-        (by_parameters + by_repeats)[:, :3, :3] + isotropic
+        (errors.parameter_covariance + errors.repeat_covariance)[:, :3, :3] + isotropic
     )
     # A model-form error is one function over all poses; only its size is unknown.
     drawn_form = form.mean() * robots.stream.standard_normal(draws) ** 2
-    mean_square = sum_of_squares / len(reported_angles)
+    mean_square = errors.sum_of_squares / len(reported_angles)
     return ErrorPrediction(
         parameters_m=np.sqrt(parameter_variance[:, :3].sum(axis=1)),
         repeated_m=np.sqrt(repeat_variance[:, :3].sum(axis=1)),
-        regression_m=np.sqrt(additional[0]),
+        regression_m=np.sqrt(errors.additional[0]),
         form_m=np.sqrt(form),
-        error_m=np.sqrt(variance + additional[0] + left_out + form),
+        error_m=np.sqrt(variance + errors.additional[0] + left_out + form),
         bound_m=np.sqrt(quantile**2 + left_out),
         rms_m=np.sqrt(mean_square + left_out + drawn_form),
         worst_m=np.sqrt(
-            largest_square + scope.left_out_worst_m**2 + _WORST_OF_FORM * drawn_form
+            errors.largest_square
+            + scope.left_out_worst_m**2
+            + _WORST_OF_FORM * drawn_form
         ),
         scope=scope,
     )
@@ -271,6 +225,15 @@ class _RandomRobots:
     repeatability_scale: np.ndarray
     joint_std_rad: np.ndarray
 
+    def simulate_errors(
+        self, by_parameters: np.ndarray, by_repeats: np.ndarray
+    ) -> np.ndarray:
+        """Simulate position errors (K, 3, draws) from factors (K, 3, P) and (K, 3, n) of
+        their covariances."""
+        shape = (*by_repeats.shape[::2], len(self.repeatability_scale))
+        repeats = self.repeatability_scale * self.stream.standard_normal(shape)
+        return by_parameters @ self.standard_normal + by_repeats @ repeats
+
 
 def _draw_robots(calibrated: CalibratedRobot, draws: int) -> _RandomRobots:
     noise = calibrated.noise
@@ -305,6 +268,22 @@ class _ChunkErrors:
     largest_square: np.ndarray
 
 
+def _merge_chunks(chunks: list[_ChunkErrors]) -> _ChunkErrors:
+    """Join the errors at chunks of poses to those at all poses."""
+    sum_of_squares = np.zeros_like(chunks[0].sum_of_squares)
+    largest_square = np.zeros_like(chunks[0].largest_square)
+    for chunk in chunks:
+        sum_of_squares += chunk.sum_of_squares
+        largest_square = np.maximum(largest_square, chunk.largest_square)
+    return _ChunkErrors(
+        np.concatenate([chunk.parameter_covariance for chunk in chunks]),
+        np.concatenate([chunk.repeat_covariance for chunk in chunks]),
+        np.concatenate([chunk.additional for chunk in chunks], axis=1),
+        sum_of_squares,
+        largest_square,
+    )
+
+
 def _predict_chunk(
     calibrated: CalibratedRobot,
     reported_angles: np.ndarray,
@@ -313,32 +292,22 @@ def _predict_chunk(
     robots: _RandomRobots,
 ) -> _ChunkErrors:
     """Predict the errors at a chunk of poses, and simulate those of random robots."""
-    scope = calibrated.scope
+    placed = _compute_placed_sensitivities(calibrated, reported_angles, wrench)
+    by_parameters = placed @ robots.covariance_factor
     robot = calibrated.robot
-    placement = compute_placement_columns(
-        scope, *predict_poses(calibrated, reported_angles, wrench)
-    )
-    sensitivities = compute_pose_sensitivities(calibrated, reported_angles, wrench)
-    by_parameters = (
-        sensitivities - placement @ scope.absorbed
-    ) @ robots.covariance_factor
     angles = robot.model_angles(reported_angles)
-    by_repeats = (
-        jacobians(robot.chain, angles, robot.chain.end_effector) * robots.joint_std_rad
-    )
+    jacobian = jacobians(robot.chain, angles, robot.chain.end_effector)
+    by_repeats = jacobian * robots.joint_std_rad
     parameter_covariance = by_parameters @ by_parameters.transpose(0, 2, 1)
     repeat_covariance = by_repeats @ by_repeats.transpose(0, 2, 1)
     covariance = (parameter_covariance + repeat_covariance)[:, :3, :3]
     additional = np.maximum(
         regression.squares - np.trace(covariance, axis1=1, axis2=2), 0.0
     )
-    stream = robots.stream
-    shape = (len(angles), by_repeats.shape[2], len(robots.repeatability_scale))
-    repeats = robots.repeatability_scale * stream.standard_normal(shape)
-    errors = by_parameters[:, :3] @ robots.standard_normal + by_repeats[:, :3] @ repeats
+    errors = robots.simulate_errors(by_parameters[:, :3], by_repeats[:, :3])
     if regression.active.any():
         std = np.sqrt(additional[0] / 3.0)
-        errors += std[:, None, None] * stream.standard_normal(errors.shape)
+        errors += std[:, None, None] * robots.stream.standard_normal(errors.shape)
     squares = (errors**2).sum(axis=1)
     return _ChunkErrors(
         parameter_covariance,
@@ -347,6 +316,16 @@ def _predict_chunk(
         squares.sum(axis=0),
         squares.max(axis=0),
     )
+
+
+def _compute_placed_sensitivities(
+    calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray
+) -> np.ndarray:
+    """Compute sensitivities (K, 6, P) of the poses after the best placement."""
+    pose = predict_poses(calibrated, reported_angles, wrench)
+    columns = compute_placement_columns(calibrated.scope, *pose)
+    sensitivities = compute_pose_sensitivities(calibrated, reported_angles, wrench)
+    return np.asarray(sensitivities - columns @ calibrated.scope.absorbed)
 
 
 def compute_length_quantiles(covariance: np.ndarray) -> np.ndarray:
@@ -452,9 +431,8 @@ def inflate_to_held_out_errors(
     end_effector = calibrated.robot.chain.end_effector.name
     observations = held_out.observations
     states = observations.states
-    targets = held_out.campaign.targets
-    at_end = np.array([target.point == end_effector for target in targets])
-    tested = at_end[observations.target]
+    at_end = [target.point == end_effector for target in held_out.campaign.targets]
+    tested = np.array(at_end)[observations.target]
     if calibrated.noise.source == "residual" or not tested.any():
         return calibrated
     state = observations.state[tested]

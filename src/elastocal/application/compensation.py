@@ -104,7 +104,12 @@ class _NominalTargets:
     angles: np.ndarray
     residual_m: np.ndarray
 
-    def select(self, rows: slice) -> _NominalTargets:
+    @property
+    def is_reached(self) -> np.ndarray:
+        """(N,) bool, poses that the rigid robot reaches."""
+        return self.residual_m <= SOLVED_M
+
+    def select(self, rows: slice | np.ndarray) -> _NominalTargets:
         return _NominalTargets(
             self.position[rows],
             self.rotation[rows],
@@ -224,59 +229,89 @@ def find_large_steps(
     ]
 
 
+@dataclass(frozen=True)
+class _Equilibria:
+    """Where the robot comes to rest at K commands.
+
+    Attributes
+    ----------
+    coordinates : (K, C) coordinates of its sites.
+    displacement : (K, 3) displacement by the regression on the residuals, m.
+    error : (K, 6) wanted less predicted pose, m and rad.
+    """
+
+    coordinates: np.ndarray
+    displacement: np.ndarray
+    error: np.ndarray
+
+
 def _correct_chunk(calibrated: CalibratedRobot, targets: _NominalTargets) -> Correction:
     """Correct targets by Newton's method from the solution of the rigid robot."""
     robot = calibrated.robot
-    reached = targets.residual_m <= SOLVED_M
     uncorrected = robot.reported_angles(targets.angles)
-    coordinates, position, rotation = find_equilibrium(
-        calibrated, uncorrected, targets.wrench
+    current = _find_equilibria(calibrated, targets, uncorrected)
+    error_before = current.error.copy()
+    inverse = np.linalg.pinv(
+        jacobians(robot.chain, targets.angles, robot.chain.end_effector)
     )
-    displacement = predict_residual_displacements(
-        calibrated, uncorrected, targets.wrench
-    )
-    before = pose_differences(
-        targets.position, targets.rotation, position + displacement, rotation
-    )
-    jacobian = jacobians(robot.chain, targets.angles, robot.chain.end_effector)
-    inverse = np.linalg.pinv(jacobian)
     angles = targets.angles.copy()
-    error = before.copy()
     is_singular = np.zeros(len(angles), bool)
     # Rows that need another step: near singular postures more than elsewhere.
-    rows = np.flatnonzero(reached)
+    rows = np.flatnonzero(targets.is_reached)
     for iteration in range(_STEPS):
-        step = (inverse[rows] @ error[rows, :, None])[..., 0]
+        step = (inverse[rows] @ current.error[rows, :, None])[..., 0]
         change = np.abs(angles[rows] + step - targets.angles[rows]).max(axis=1)
-        too_far = change > _LARGEST_CORRECTION
-        is_singular[rows[too_far]] = True
-        rows = rows[~too_far]
-        angles[rows] += step[~too_far]
-        coordinates[rows, : robot.joints] += step[~too_far]
-        commands = robot.reported_angles(angles[rows])
-        wrench = targets.wrench[rows]
-        coordinates[rows], position, rotation = find_equilibrium(
-            calibrated, commands, wrench, coordinates[rows]
+        is_small = change <= _LARGEST_CORRECTION
+        is_singular[rows[~is_small]] = True
+        rows = rows[is_small]
+        angles[rows] += step[is_small]
+        current.coordinates[rows, : robot.joints] += step[is_small]
+        updated = _find_equilibria(
+            calibrated,
+            targets.select(rows),
+            robot.reported_angles(angles[rows]),
+            current.coordinates[rows],
+            None if iteration < _REGRESSION_STEPS else current.displacement[rows],
         )
-        if iteration < _REGRESSION_STEPS:
-            displacement[rows] = predict_residual_displacements(
-                calibrated, commands, wrench
-            )
-        error[rows] = pose_differences(
-            targets.position[rows],
-            targets.rotation[rows],
-            position + displacement[rows],
-            rotation,
-        )
-        rows = rows[_measure_length(robot, error[rows]) > _CONVERGED_M]
+        current.coordinates[rows] = updated.coordinates
+        current.displacement[rows] = updated.displacement
+        current.error[rows] = updated.error
+        rows = rows[_measure_length(robot, updated.error) > _CONVERGED_M]
         if not len(rows):
             break
     is_singular[rows] = True
     status = np.full(len(angles), OK, dtype=f"U{len(OTHER_POSTURE)}")
     status[is_singular] = SINGULAR
     status[find_beyond_limits(robot, angles).any(axis=1)] = OUTSIDE_LIMITS
-    status[~reached] = UNREACHABLE
-    return Correction(robot.reported_angles(angles), uncorrected, before, error, status)
+    status[~targets.is_reached] = UNREACHABLE
+    return Correction(
+        robot.reported_angles(angles), uncorrected, error_before, current.error, status
+    )
+
+
+def _find_equilibria(
+    calibrated: CalibratedRobot,
+    targets: _NominalTargets,
+    commands: np.ndarray,
+    nearby_coordinates: np.ndarray | None = None,
+    displacement: np.ndarray | None = None,
+) -> _Equilibria:
+    """Find where the robot comes to rest at commands (K, n), and its errors.
+
+    `nearby_coordinates` are as in `find_equilibrium`; a `displacement` by the regression
+    is taken as it is, instead of evaluated.
+    """
+    coordinates, position, rotation = find_equilibrium(
+        calibrated, commands, targets.wrench, nearby_coordinates
+    )
+    if displacement is None:
+        displacement = predict_residual_displacements(
+            calibrated, commands, targets.wrench
+        )
+    error = pose_differences(
+        targets.position, targets.rotation, position + displacement, rotation
+    )
+    return _Equilibria(coordinates, displacement, error)
 
 
 def _measure_length(robot: Robot, error: np.ndarray) -> np.ndarray:

@@ -88,39 +88,69 @@ def solve_poses(
     angles : (N, n) angles of the chain with the smallest error, rad.
     error_m : (N,) pose errors, rotations as lengths at the reach.
     """
-    count = len(start)
-    scale = np.repeat([1.0, compute_reach_m(robot)], 3)
     angles = start.copy()
-    trial = start.copy()
-    error_m = np.full(count, np.inf)
-    damping = np.full(count, _DAMPING)
-    pose_error = np.zeros((count, 6))
-    jacobian = np.zeros((count, 6, robot.joints))
-    rows = np.arange(count)
+    trial_angles = start.copy()
+    best = _PoseErrors.infinite(len(start), robot.joints)
+    damping = np.full(len(start), _DAMPING)
+    rows = np.arange(len(start))
     for _ in range(_ITERATIONS):
-        trial_position, trial_rotation, trial_jacobian = poses_and_jacobians(
-            robot.chain, trial[rows], robot.chain.end_effector
+        trial = _compute_pose_errors(
+            robot, position[rows], rotation[rows], trial_angles[rows]
         )
-        differences = pose_differences(
-            position[rows], rotation[rows], trial_position, trial_rotation
-        )
-        trial_pose_error = differences * scale
-        trial_error_m = np.sqrt((trial_pose_error**2).sum(axis=1))
-        better = trial_error_m < error_m[rows]
+        better = trial.length_m < best.length_m[rows]
         improved = rows[better]
-        angles[improved] = trial[improved]
-        error_m[improved] = trial_error_m[better]
-        pose_error[improved] = trial_pose_error[better]
-        jacobian[improved] = trial_jacobian[better] * scale[:, None]
+        angles[improved] = trial_angles[improved]
+        best.length_m[improved] = trial.length_m[better]
+        best.error[improved] = trial.error[better]
+        best.jacobian[improved] = trial.jacobian[better]
         factor = np.where(better, _DAMPING_AFTER_SUCCESS, _DAMPING_AFTER_FAILURE)
         damping[rows] = np.maximum(damping[rows] * factor, _SMALLEST_DAMPING)
-        rows = np.flatnonzero((error_m > _CONVERGED_M) & (damping < _LARGEST_DAMPING))
+        rows = np.flatnonzero(
+            (best.length_m > _CONVERGED_M) & (damping < _LARGEST_DAMPING)
+        )
         if not len(rows):
             break
-        trial[rows] = angles[rows] + _compute_damped_steps(
-            jacobian[rows], pose_error[rows], damping[rows]
+        trial_angles[rows] = angles[rows] + _compute_damped_steps(
+            best.jacobian[rows], best.error[rows], damping[rows]
         )
-    return angles, error_m
+    return angles, best.length_m
+
+
+@dataclass(frozen=True)
+class _PoseErrors:
+    """Pose errors of the rigid robot; rotations count as lengths at its reach.
+
+    Attributes
+    ----------
+    length_m : (N,) size of the errors.
+    error : (N, 6) wanted less reached pose, m.
+    jacobian : (N, 6, n) derivatives of the pose by the joint angles, m/rad.
+    """
+
+    length_m: np.ndarray
+    error: np.ndarray
+    jacobian: np.ndarray
+
+    @classmethod
+    def infinite(cls, count: int, joints: int) -> _PoseErrors:
+        """Errors that are larger than any other."""
+        error = np.zeros((count, 6))
+        return cls(np.full(count, np.inf), error, np.zeros((count, 6, joints)))
+
+
+def _compute_pose_errors(
+    robot: Robot, position: np.ndarray, rotation: np.ndarray, angles: np.ndarray
+) -> _PoseErrors:
+    scale = np.repeat([1.0, compute_reach_m(robot)], 3)
+    reached_position, reached_rotation, jacobian = poses_and_jacobians(
+        robot.chain, angles, robot.chain.end_effector
+    )
+    differences = pose_differences(
+        position, rotation, reached_position, reached_rotation
+    )
+    error = differences * scale
+    length_m = np.sqrt((error**2).sum(axis=1))
+    return _PoseErrors(length_m, error, jacobian * scale[:, None])
 
 
 def _compute_damped_steps(
@@ -259,9 +289,10 @@ def _choose_path(
     Rows without a solution within the limits are not part of the path and get the
     solution with the smallest error. Returns `angles` (N, n) and `error_m` (N,).
     """
-    period = np.where(robot.chain.prismatic, np.inf, 2 * np.pi)
-    limits = _narrow_limits(robot, period)
-    turns = np.floor((solutions.angles - limits[:, 0] + _ROUNDING) / period)
+    limits = _narrow_limits(robot)
+    turns = np.floor(
+        (solutions.angles - limits[:, 0] + _ROUNDING) / _find_periods(robot)
+    )
     shift = np.where(robot.chain.prismatic, 0.0, 2 * np.pi * turns)
     lowest = solutions.angles - shift
     error_m = solutions.error_m
@@ -273,14 +304,8 @@ def _choose_path(
     if len(rows):
         most = usable.sum(axis=0).max()
         order = np.argsort(~usable[:, rows], axis=0, kind="stable")[:most]
-        postures = lowest[order, rows]
-        width = limits[:, 1] - limits[:, 0]
-        counts = np.maximum(1, np.ceil(width / period - _ROUNDING)).astype(int)
         candidates = _PathCandidates(
-            copies=[
-                postures[..., joint, None] + 2 * np.pi * np.arange(count)
-                for joint, count in enumerate(counts)
-            ],
+            copies=_copy_postures(robot, lowest[order, rows], limits),
             limits=limits,
             exclusion=np.where(usable[order, rows], 0.0, np.inf),
             allowed=compute_allowed_steps(robot, position[rows], rotation[rows]),
@@ -290,11 +315,34 @@ def _choose_path(
     return path, np.where(is_solved, largest_error_m, error_m[best])
 
 
-def _narrow_limits(robot: Robot, period: np.ndarray) -> np.ndarray:
+def _find_periods(robot: Robot) -> np.ndarray:
+    """Return the change of each joint (n,) that does not change the pose: a turn, or
+    infinity for a prismatic joint."""
+    return np.where(robot.chain.prismatic, np.inf, 2 * np.pi)
+
+
+def _copy_postures(
+    robot: Robot, postures: np.ndarray, limits: np.ndarray
+) -> list[np.ndarray]:
+    """Copy postures (K, N, n) whole turns above, as many as fit into the limits.
+
+    Returns angles (K, N, turns) of each joint.
+    """
+    width = limits[:, 1] - limits[:, 0]
+    turns = np.ceil(width / _find_periods(robot) - _ROUNDING)
+    counts = np.maximum(1, turns).astype(int)
+    return [
+        postures[..., joint, None] + 2 * np.pi * np.arange(count)
+        for joint, count in enumerate(counts)
+    ]
+
+
+def _narrow_limits(robot: Robot) -> np.ndarray:
     """Narrow the joint limits to the largest number of turns, (n, 2), rad or m."""
     low, high = robot.joint_limits.T
-    low = np.maximum(low, 0.5 * (low + high - _MOST_TURNS * period))
-    high = np.minimum(high, low + _MOST_TURNS * period)
+    widest = _MOST_TURNS * _find_periods(robot)
+    low = np.maximum(low, 0.5 * (low + high - widest))
+    high = np.minimum(high, low + widest)
     return np.stack([low, high], axis=1)
 
 

@@ -3,7 +3,7 @@ placement is free, and which effects of the fit are in no command."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -148,30 +148,69 @@ def determine_scope(
     states : states of the campaign.
     """
     robot = calibrated.robot
-    end_effector = model.sites.chain.end_effector.name
-    numbers = _find_targets_on(model.targets, end_effector)
-    targets = [model.targets[number] for number in numbers]
-    offset_removed = is_offset_fitted(model.targets, end_effector)
-    rotation_fitted = bool(targets) and all(t.rotation is None for t in targets)
-    free = select_free_parameters(
-        base=model.fitted_frames,
-        offset=offset_removed,
-        rotation=rotation_fitted and model.rows == 6,
-    )
     commands = robot.reported_angles(states.joint_angles)
     position, rotation = predict_poses(calibrated, commands, states.wrench)
-    frame = ROBOT if model.fitted_frames else BASE
-    scope = Scope(frame, position.mean(axis=0), offset_removed=offset_removed)
-    columns = compute_placement_columns(scope, position, rotation)
+    end_effector = model.sites.chain.end_effector.name
+    scope = Scope(
+        ROBOT if model.fitted_frames else BASE,
+        position.mean(axis=0),
+        offset_removed=is_offset_fitted(model.targets, end_effector),
+    )
+    placement = _Placement(
+        compute_placement_columns(scope, position, rotation),
+        select_free_parameters(
+            base=model.fitted_frames,
+            offset=scope.offset_removed,
+            rotation=_is_rotation_fitted(model),
+        ),
+    )
     sensitivities = compute_pose_sensitivities(calibrated, commands, states.wrench)
     before = pose_differences(
         *compute_nominal_poses(robot, commands), position, rotation
     )
     scope = replace(
         scope,
-        absorbed=fit_placement(columns, sensitivities, free),
-        absorbed_before=fit_placement(columns, before[..., None], free)[:, 0],
+        absorbed=placement.fit(sensitivities),
+        absorbed_before=placement.fit(before[..., None])[:, 0],
     )
+    return _add_left_out_effects(scope, placement, model, estimate, covariance, states)
+
+
+@dataclass(frozen=True)
+class _Placement:
+    """A placement over the poses of a campaign.
+
+    Attributes
+    ----------
+    columns : (N, 6, 12) result of `compute_placement_columns`.
+    free : (12,) bool, parameters that are free.
+    """
+
+    columns: np.ndarray
+    free: np.ndarray
+
+    def fit(self, fields: np.ndarray) -> np.ndarray:
+        """Fit the placement to fields (N, 6, K), as `fit_placement`."""
+        return fit_placement(self.columns, fields, self.free)
+
+
+def _is_rotation_fitted(model: Model) -> bool:
+    """Whether poses are measured and the rotation of every target on the end effector is
+    unknown."""
+    numbers = _find_targets_on(model.targets, model.sites.chain.end_effector.name)
+    is_unknown = all(model.targets[number].rotation is None for number in numbers)
+    return bool(numbers) and is_unknown and model.rows == 6
+
+
+def _add_left_out_effects(
+    scope: Scope,
+    placement: _Placement,
+    model: Model,
+    estimate: Estimate,
+    covariance: np.ndarray,
+    states: States,
+) -> Scope:
+    """Add the errors by effects that are in no command to a scope."""
     left_out = tuple(effect.key for effect in model.effects if not is_commanded(effect))
     if not left_out:
         return scope
@@ -188,7 +227,7 @@ def determine_scope(
     worst_m = []
     for epoch in epochs:
         fields = _compute_left_out_fields(model, estimate, covariance, epoch)
-        residual = fields - columns @ fit_placement(columns, fields, free)
+        residual = fields - placement.columns @ placement.fit(fields)
         squares = (residual[:, :3] ** 2).sum(axis=(1, 2))
         rms_m.append(float(np.sqrt(squares.mean())))
         worst_m.append(float(np.sqrt(squares.max())))

@@ -3,13 +3,12 @@ report and the certificate."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from elastocal.application.accuracy import Accuracy
 from elastocal.application.frames import FRAMES, ROBOT
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from elastocal.verdict import Accuracy, Verdict
 
 _OFFSET = "of a constant offset at the end effector"
 
@@ -66,7 +65,7 @@ def _format_bounded(accuracy: Accuracy, error_m: float, bound_m: float | None) -
     return f"{size} ({100 * accuracy.confidence:g} % sure: below {bound})"
 
 
-def tabulate_errors(verdict: Mapping[str, Any]) -> list[list[str]]:
+def tabulate_errors(verdict: Verdict) -> list[list[str]]:
     """Tabulate the errors before and after the correction for report and certificate.
 
     Measured and predicted errors, over different poses and in different frames, are
@@ -74,26 +73,25 @@ def tabulate_errors(verdict: Mapping[str, Any]) -> list[list[str]]:
 
     Parameters
     ----------
-    verdict : contents of verdict.json.
+    verdict : the verdict on a campaign.
 
     Returns
     -------
     Rows of three cells: name of the RMS error, its value for the uncorrected robot, and
     its value for the corrected one. No rows if the data are at fault.
     """
-    if not verdict.get("accuracy"):
+    accuracy = verdict.accuracy
+    if accuracy is None or verdict.uncorrected_m is None:
         return []
-    heldout = verdict["heldout"]
-    accuracy = Accuracy(**verdict["accuracy"])
     measured = [
         "measured at validation poses, noise included,"
         " after the best placement of the base",
-        format_millimetres(heldout["uncalibrated"]["rms_m"]),
-        format_millimetres(heldout["delivered"]["rms_m"]),
+        format_millimetres(verdict.heldout.uncalibrated.rms_m),
+        format_millimetres(verdict.heldout.delivered.rms_m),
     ]
     predicted = [
         f"predicted over {accuracy.region}, {FRAMES[accuracy.frame]}",
-        format_millimetres(verdict["uncorrected_m"]),
+        format_millimetres(verdict.uncorrected_m),
         format_millimetres(accuracy.rms_m),
     ]
     return [measured, predicted]

@@ -1,5 +1,3 @@
 """A measured campaign: its files, checked as they are read; simulated ones; other
-people's data and their importers.
-
-Imports `mechanics` and `io`; fits nothing.
+people's data and their importers. Nothing is fitted.
 """

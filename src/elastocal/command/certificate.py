@@ -43,7 +43,6 @@ def certificate(
     """
     from rich.console import Console
 
-    from elastocal.data_checks.protocol import data_at_fault
     from elastocal.io.atomic_writes import check_places
     from elastocal.loop import calibrated_files
     from elastocal.report.certificate import certificate_facts
@@ -54,7 +53,7 @@ def certificate(
     reports = find_workplace() / "reports"
     report = reports / "loop" / campaign.name
     check_places(report / PAGES, report / DOCUMENT, top=reports)
-    if data_at_fault(campaign.verdict):
+    if campaign.verdict.faults:
         raise InputError(
             folder,
             "",

@@ -87,12 +87,12 @@ def correct(
         )
     _write_targets(output, corrected, campaign.name, program, axis_names)
     details = describe_path_accuracy(corrected)
-    if campaign.calibrated.residual_model is not None:
-        regression = campaign.verdict["remainder"]["words"]
-        details.append(describe_regression(corrected, regression))
+    remainder = campaign.verdict.remainder
+    if remainder and campaign.calibrated.residual_model:
+        details.append(describe_regression(corrected, remainder.words))
     if program:
         details.append(program.describe(axis_names))
-    warnings = [error["sentence"] for error in campaign.verdict["misplaced"]]
+    warnings = [frame.sentence for frame in campaign.verdict.misplaced]
     warnings += describe_path_warnings(corrected)
     details += [f"! {warning}" for warning in warnings]
     details.append(str(output))

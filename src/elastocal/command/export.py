@@ -110,7 +110,8 @@ def _describe_losses(
     warnings = []
     calibrated = campaign.calibrated
     if calibrated.residual_model is not None:
-        name = campaign.verdict["remainder"]["words"]
+        remainder = campaign.verdict.remainder
+        name = remainder.words if remainder else ""
         displacements = predict_residual_displacements(
             calibrated, reported_angles, wrench
         )

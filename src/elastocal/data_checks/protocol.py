@@ -4,10 +4,6 @@ much better they fit without it."""
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 # Family of faults of the data among the effects of a verdict.
 OF_DATA = "data"
@@ -39,9 +35,3 @@ class Fault:
     parameters: tuple[Value, ...]
     evidence: tuple[float, float]
     alternatives: tuple[str, ...] = ()
-
-
-def data_at_fault(verdict: Mapping[str, Any]) -> bool:
-    """Whether the document of a diagnosis or verdict finds a fault of the data, after
-    which it says nothing of the robot."""
-    return any(effect["family"] == OF_DATA for effect in verdict["effects"])

@@ -4,6 +4,7 @@ ones, once, at the end."""
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from elastocal.diagnosis import model_averaging, refit, verdict
 from elastocal.diagnosis.alarm import run_alarm_test
 from elastocal.diagnosis.candidate_design import build_candidate_design, refine_shapes
 from elastocal.diagnosis.centre_prior import choose_centre_prior
+from elastocal.diagnosis.effect_estimates import find_oversized_effects
 from elastocal.diagnosis.fitted_subset import (
     FittedSubset,
     fit_subset,
@@ -37,8 +39,9 @@ from elastocal.fitting.least_squares import (
 from elastocal.fitting.model import Case, get_parameter_values
 from elastocal.fitting.noise import count_effective_parameters, serialize_noise
 from elastocal.fitting.observations import Observations
+from elastocal.io.typed_json import to_document
 from elastocal.random_streams import open_stream
-from elastocal.remainder.repeatable import Repeatable, repeatable_part
+from elastocal.remainder.repeatable import repeatable_part
 from elastocal.validation.held_out import predict_left_out_squares
 
 if TYPE_CHECKING:
@@ -47,6 +50,7 @@ if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Measurements
     from elastocal.diagnosis.settings import Settings
     from elastocal.fitting.least_squares import Fit
+    from elastocal.verdict import RepeatableResidual, TrainingVerdict
 
 # Mechanisms that are added one at a time, each by a fit; of more, only the first.
 _MOST_STEPS = 4
@@ -73,15 +77,21 @@ class Step:
 class Diagnosis:
     """What training poses say of a campaign.
 
-    `steps`: the last is the final model. `document`: contents of verdict.json, but for
-    what held-out poses say. `left_out`: gross errors, which are no part of the case.
+    `steps`: the last is the final model. `verdict`: the part of the verdict that the
+    training poses decide. `left_out`: gross errors, which are no part of the case.
     """
 
     case: Case
     steps: tuple[Step, ...]
     evidence: Evidence | None
-    document: dict[str, Any] = field(repr=False)
+    verdict: TrainingVerdict = field(repr=False)
     left_out: Measurements
+
+    @cached_property
+    def document(self) -> dict[str, Any]:
+        """The verdict as a JSON document."""
+        document: dict[str, Any] = to_document(self.verdict)
+        return document
 
     @property
     def declared(self) -> Fit:
@@ -217,8 +227,8 @@ def diagnose(
         word = found.conclusion.verdict
         found = replace(
             found,
-            conclusion=verdict.with_related(
-                found.conclusion, verdict.oversized(final, named)
+            conclusion=verdict.allow_related_mechanisms(
+                found.conclusion, find_oversized_effects(final, named)
             ),
         )
         if not found.adopted:
@@ -260,10 +270,10 @@ def diagnose(
         kept, (asked, repeatable) = steps[-1].fitted, found.tested or (None, None)
         if asked is not kept:
             repeatable = repeatable_part(kept, case.observations, seed)
-        unnamed = verdict.remainder_sentences(repeatable)
+        unnamed = verdict.describe_repeatable_residual(repeatable)
         if word in (verdict.ADEQUATE, verdict.NOT_TESTABLE):
             contradicting = unnamed or (
-                verdict.contradictions(final, noise, settings)
+                verdict.find_contradictions(final, noise, settings)
                 if word == verdict.ADEQUATE
                 else []
             )
@@ -275,11 +285,11 @@ def diagnose(
         warnings += (
             []
             if unnamed
-            else verdict.pose_error_warnings(
+            else verdict.warn_of_pose_error(
                 kept.noise, found.linearized.pose_std_error_rad
             )
         )
-    document = state_training_verdict(
+    stated = state_training_verdict(
         TrainingResult(
             case=case,
             noise=noise,
@@ -295,7 +305,7 @@ def diagnose(
         settings,
     )
     return Diagnosis(
-        case, tuple(steps), found, document, whole.measurements.select(errors.gross)
+        case, tuple(steps), found, stated, whole.measurements.select(errors.gross)
     )
 
 
@@ -352,7 +362,7 @@ def _explained(
     searched = part.search_sample
     declared = part.declared
     about, before = start or (declared, None)
-    tested: tuple[Fit, Repeatable | None] | None = None
+    tested: tuple[Fit, RepeatableResidual | None] | None = None
     # The fit to all measurements starts where that to some ends.
     enough = (
         CONVERGENCE_TOLERANCE
@@ -387,7 +397,7 @@ def _explained(
         found = search_models(
             problem.problem, {effect.key for effect in about.model.effects}
         )
-        conclusion = verdict.concluded(problem.problem, found, alarm)
+        conclusion = verdict.conclude(problem.problem, found, alarm)
         # Rows of a long campaign make room for the fit, and for those of the next
         # linearisation.
         problem = problem.without_rows

@@ -217,10 +217,58 @@ def evaluate_extensions(
     -------
     (T,) of the model; (T, number of terms, S) of its extensions, not weighted by scale
     """
+    model = _condition_on_model(statistics, base, scaled_columns)
+    degrees_of_freedom = statistics.degrees_of_freedom
+    term_count = sum(len(block.numbers) for block in blocks)
+    log_evidence = np.empty((len(base), term_count, len(grid.scales)))
+    for block in blocks:
+        eigenvalues = block.eigenvalues
+        eigenvectors = block.eigenvectors
+        if model.cross.shape[1]:
+            shared = model.cross[:, :, block.columns].transpose(0, 2, 1, 3)
+            gram = block.gram - shared.swapaxes(-1, -2) @ shared
+            eigenvalues, eigenvectors = decompose_grams(gram)
+        score = model.score[:, block.columns, None]
+        by_axis = (eigenvectors.swapaxes(-1, -2) @ score)[..., 0]
+        gains, occam = _integrate_coefficients(eigenvalues, by_axis**2, grid.scales**2)
+        likelihood = log_likelihood(
+            model.squares[:, None, None] - gains, degrees_of_freedom
+        )
+        log_evidence[:, block.numbers] = (
+            model.log_occam[:, None, None] + occam + likelihood
+        )
+    likelihood = log_likelihood(model.squares, degrees_of_freedom)
+    return model.log_occam + likelihood, log_evidence
+
+
+@dataclass(frozen=True)
+class _ModelConditional:
+    """Statistics of all K columns, the D coefficients of a model integrated out.
+
+    Attributes
+    ----------
+    cross : (T, D, K), whose product with itself is subtracted from the Gram matrix
+    score : (T, K)
+    squares : (T,), residual sum of squares
+    log_occam : (T,), log Occam factor of the model, with what each tau contributes
+    """
+
+    cross: np.ndarray
+    score: np.ndarray
+    squares: np.ndarray
+    log_occam: np.ndarray
+
+
+def _condition_on_model(
+    statistics: SufficientStatistics,
+    base: np.ndarray,
+    scaled_columns: tuple[np.ndarray, np.ndarray],
+) -> _ModelConditional:
+    """Integrate out the coefficients of a model; arguments as of
+    `evaluate_extensions`."""
     columns, deviations = scaled_columns
     factor = np.linalg.cholesky(_scaled_precision(statistics, columns, deviations))
-    # Rows of the Gram matrix and of the score, divided by the factor: the share of all
-    # other columns that the model takes.
+    # Rows of the Gram matrix and of the score, divided by the factor.
     right = deviations[:, None] * np.concatenate(
         [statistics.gram_rows(columns), statistics.score[:, columns, None]], axis=2
     )
@@ -233,29 +281,13 @@ def evaluate_extensions(
         )
     cross = right[..., :-1]
     fitted = right[..., -1]
-    score = statistics.score - (fitted[:, None] @ cross)[:, 0]
-    squares = statistics.residual_squares - (fitted**2).sum(axis=1)
     log_diagonal = np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
-    log_occam = base - log_diagonal
-    term_count = sum(len(block.numbers) for block in blocks)
-    log_evidence = np.empty((len(base), term_count, len(grid.scales)))
-    for block in blocks:
-        eigenvalues, eigenvectors = block.eigenvalues, block.eigenvectors
-        if len(columns):
-            shared = cross[:, :, block.columns].transpose(0, 2, 1, 3)
-            eigenvalues, eigenvectors = decompose_grams(
-                block.gram - shared.swapaxes(-1, -2) @ shared
-            )
-        by_axis = eigenvectors.swapaxes(-1, -2) @ score[:, block.columns, None]
-        gains, occam = _integrate_coefficients(
-            eigenvalues, by_axis[..., 0] ** 2, grid.scales**2
-        )
-        likelihood = log_likelihood(
-            squares[:, None, None] - gains, statistics.degrees_of_freedom
-        )
-        log_evidence[:, block.numbers] = log_occam[:, None, None] + occam + likelihood
-    model_likelihood = log_likelihood(squares, statistics.degrees_of_freedom)
-    return log_occam + model_likelihood, log_evidence
+    return _ModelConditional(
+        cross,
+        statistics.score - (fitted[:, None] @ cross)[:, 0],
+        statistics.residual_squares - (fitted**2).sum(axis=1),
+        base - log_diagonal,
+    )
 
 
 def _integrate_coefficients(

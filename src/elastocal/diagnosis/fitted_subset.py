@@ -11,14 +11,14 @@ from elastocal.diagnosis.candidate_design import build_candidate_design
 from elastocal.diagnosis.gross_errors import find_gross_errors
 from elastocal.diagnosis.initial_outliers import find_unexplained_observations
 from elastocal.fitting.least_squares import (
+    CONVERGENCE_TOLERANCE,
     INTERMEDIATE_TOLERANCE,
     LARGE_FIT_SIZE,
     evaluate_as_fit,
     fit_model,
 )
-from elastocal.fitting.noise import Noise, estimate_noise, fit_declared_model
+from elastocal.fitting.noise import estimate_noise, fit_declared_model
 from elastocal.fitting.observations import (
-    Observations,
     match_states_and_targets,
     remove_outlying_repeats,
     sample_observations,
@@ -31,17 +31,33 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.settings import Settings
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Case
+    from elastocal.fitting.noise import Noise
+    from elastocal.fitting.observations import Observations
 
-# Standard errors of the last step by all measurements of a long campaign: what it
-# leaves is a tenth of it, or less.
-_LAST_STEP = 1.0
+# Tolerance of the last fit to a long campaign, in standard errors of its first step.
+# That step leaves a tenth of itself, or less.
+_LONG_FIT_TOLERANCE = 1.0
 
 
 @dataclass(frozen=True)
 class FittedSubset:
-    """The part of a case that is fitted, ``kept`` of all its measurements (N,), with
-    its noise, and its declared model fitted to what is `searched`: observations that a
-    search looks at, no more than so many."""
+    """The part of a case that is fitted, and the fit of its declared model.
+
+    Attributes
+    ----------
+    case
+        The case without the rows that are left out.
+    kept
+        (N,) of bool, which of all measurements it has.
+    noise
+        Noise of its measurements.
+    warnings
+        What is suspicious about the noise.
+    declared
+        Fit of the declared model to the search sample.
+    search_sample
+        Observations that a search uses: all, or a sample of a long campaign.
+    """
 
     case: Case
     kept: np.ndarray
@@ -50,129 +66,157 @@ class FittedSubset:
     declared: Fit
     search_sample: Observations
 
-    def fit_to_all(self, found: Fit) -> Fit:
-        """A model that is fitted to what is searched, fitted to all that is kept.
+    def fit_to_all(self, fitted: Fit) -> Fit:
+        """Fit a model that was fitted to the search sample to all observations.
 
-        From an estimate that some measurements lead to, a step or two by all of them
-        are as good as the fit's end (one-step M-estimators; Bickel, One-step Huber
-        estimates in the linear model, JASA 1975).
+        An estimate from a sample is so close that one or two steps by all observations
+        are as good as a converged fit: a one-step M-estimator [1]_.
+
+        References
+        ----------
+        .. [1] Bickel, One-step Huber estimates in the linear model, JASA 70, 1975.
         """
-        every = self.case.observations
-        if self.search_sample is not every:
-            settled = (
-                INTERMEDIATE_TOLERANCE if len(every) <= LARGE_FIT_SIZE else _LAST_STEP
-            )
-            return fit_model(
-                found.model,
-                every,
-                found.noise,
-                found.estimate,
-                reweight_first_step=True,
-                tolerance=settled,
-            )
-        return (
-            found
-            if found is self.declared
-            else fit_model(
-                found.model,
-                every,
-                found.noise,
-                found.estimate,
-                reweight_first_step=True,
-            )
+        observations = self.case.observations
+        tolerance = CONVERGENCE_TOLERANCE
+        if self.search_sample is not observations:
+            tolerance = INTERMEDIATE_TOLERANCE
+            if len(observations) > LARGE_FIT_SIZE:
+                tolerance = _LONG_FIT_TOLERANCE
+        elif fitted is self.declared:
+            return fitted
+        return fit_model(
+            fitted.model,
+            observations,
+            fitted.noise,
+            fitted.estimate,
+            reweight_first_step=True,
+            tolerance=tolerance,
         )
 
 
 def fit_subset(
-    case: Case, kept: np.ndarray, settings: Settings, last: FittedSubset | None = None
+    case: Case,
+    kept: np.ndarray,
+    settings: Settings,
+    previous: FittedSubset | None = None,
 ) -> FittedSubset:
-    """The part of a case that is kept, or the last one where that is the same."""
-    if last is not None and (kept == last.kept).all():
-        return last
-    part = case if kept.all() else case.select(kept)
-    noise, warnings = estimate_noise(part)
-    searched = sample_for_search(case, part, settings)
-    return FittedSubset(
-        part,
-        kept,
-        noise,
-        warnings,
-        fit_declared_model(part.model, searched, noise),
-        searched,
-    )
+    """Fit the declared model to some rows of a case.
+
+    Parameters
+    ----------
+    case
+        The whole case, of N measurements.
+    kept
+        (N,) of bool, rows to fit.
+    settings
+        Settings of the diagnosis.
+    previous
+        A subset that is returned if it has the same rows.
+    """
+    if previous is not None and (kept == previous.kept).all():
+        return previous
+    subset = case if kept.all() else case.select(kept)
+    noise, warnings = estimate_noise(subset)
+    sample = sample_for_search(case, subset, settings)
+    declared = fit_declared_model(subset.model, sample, noise)
+    return FittedSubset(subset, kept, noise, warnings, declared, sample)
 
 
-def sample_for_search(case: Case, part: Case, settings: Settings) -> Observations:
-    """What a search looks at of a part of a case: at the same poses whatever is kept,
-    so that only gross errors move a fit."""
-    most = settings.searched_observations
+def sample_for_search(case: Case, subset: Case, settings: Settings) -> Observations:
+    """Choose the observations of a subset that a search uses.
+
+    They are at the same poses whichever rows of the case the subset has, so that two
+    fits to subsets differ by nothing but the gross errors.
+    """
+    size = settings.searched_observations
     return sample_observations(
-        part.observations, most, sample_observations(case.observations, most)
+        subset.observations, size, sample_observations(case.observations, size)
     )
 
 
 def select_initial_subset(case: Case, settings: Settings) -> FittedSubset:
-    """The part of a case that its declared model, or all candidates together, might
+    """Leave out the rows that neither the declared model nor all candidates together
     explain.
 
-    Rows under far larger loads than most are judged by the others alone: they would
-    pull any fit to themselves (bad leverage points; Rousseeuw and Leroy, Robust
-    Regression and Outlier Detection, 1987).
+    Rows under extreme loads are bad leverage points [1]_: they would pull any fit
+    towards themselves. They are left out at first and judged by fits to the other rows.
+
+    References
+    ----------
+    .. [1] Rousseeuw and Leroy, Robust Regression and Outlier Detection, 1987.
     """
     measurements = case.campaign.measurements
+    extreme = find_extreme_loads(measurements, settings)
+    start = fit_subset(case, ~extreme, settings)
+    subset = _leave_out_unpredicted(case, start, settings)
+    limit = settings.gross_start_numbers // case.model.rows
+    examined = select_spread_poses(case.observations, limit)
+    if subset is start and not examined.all():
+        # No row stands out against the declared model, and the campaign is too long to
+        # test every observation against all candidates.
+        return start
+    left_out = _find_states(case, ~subset.kept)
+    count = min(len(left_out), limit)
+    examined[left_out[np.linspace(0, len(left_out) - 1, count).astype(int)]] = True
+    examined[_find_states(case, extreme)] = False
+    sample = select_states(case.observations, examined)
+    reference = evaluate_as_fit(
+        subset.declared.model, sample, subset.noise, subset.declared.estimate
+    )
     candidates = list(case.candidates.values())
-    pulling = find_extreme_loads(measurements, settings)
-    whole = part = fit_subset(case, ~pulling, settings)
-    for _ in range(settings.gross_error_rounds):
-        errors = find_gross_errors(
-            part.declared, part.noise, measurements, part.kept, settings
-        )
-        last = part
-        part = fit_subset(case, ~errors.gross, settings, part)
-        if part is last:
-            break
+    unexplained = find_unexplained_observations(
+        build_candidate_design(reference, sample, candidates, settings)
+    )
+    # A repeat far from the others is in no average. The declared model alone has judged
+    # it.
+    in_sample = match_states_and_targets(
+        measurements, sample, np.ones(len(sample), bool)
+    )
+    inliers = remove_outlying_repeats(measurements)
+    tested = in_sample & np.isin(measurements.row, inliers.row)
+    gross = np.where(
+        tested,
+        match_states_and_targets(measurements, sample, unexplained),
+        ~subset.kept,
+    )
+    return fit_subset(case, ~gross, settings, start)
+
+
+def _find_states(case: Case, rows: np.ndarray) -> np.ndarray:
+    """States in which some rows, (N,) of bool, were measured, rising, (k,) of int."""
     observations = case.observations
-    most = settings.gross_start_numbers // case.model.rows
-    few = select_spread_poses(observations, most)
-    if part is whole and not few.all():
-        # Nothing stands apart, and there are too many to look more closely.
-        return whole
-    apart = np.unique(
-        observations.state[
-            match_states_and_targets(observations, measurements, ~part.kept)
-        ]
-    )
-    few[apart[np.linspace(0, len(apart) - 1, min(len(apart), most)).astype(int)]] = True
-    few[
-        observations.state[
-            match_states_and_targets(observations, measurements, pulling)
-        ]
-    ] = False
-    some = select_states(observations, few)
-    about = evaluate_as_fit(
-        part.declared.model, some, part.noise, part.declared.estimate
-    )
-    taken = find_unexplained_observations(
-        build_candidate_design(about, some, candidates, settings)
-    )
-    # A repeat far from its others is in no average, and stays what the declared model
-    # says of it.
-    looked_at = match_states_and_targets(measurements, some, np.ones(len(some), bool))
-    looked_at &= np.isin(measurements.row, remove_outlying_repeats(measurements).row)
-    return fit_subset(
-        case,
-        ~np.where(
-            looked_at, match_states_and_targets(measurements, some, taken), ~part.kept
-        ),
-        settings,
-        whole,
-    )
+    measured = match_states_and_targets(observations, case.campaign.measurements, rows)
+    return np.unique(observations.state[measured])
+
+
+def _leave_out_unpredicted(
+    case: Case, subset: FittedSubset, settings: Settings
+) -> FittedSubset:
+    """Leave out the gross errors of the declared model's fit, and fit it again, until
+    they stay the same."""
+    measurements = case.campaign.measurements
+    for _ in range(settings.gross_error_rounds):
+        outcome = find_gross_errors(
+            subset.declared, subset.noise, measurements, subset.kept, settings
+        )
+        previous = subset
+        subset = fit_subset(case, ~outcome.gross, settings, previous)
+        if subset is previous:
+            break
+    return subset
 
 
 def find_extreme_loads(measurements: Measurements, settings: Settings) -> np.ndarray:
-    """Which rows are under a force far beyond that of most loaded ones, if these are
-    few, ndarray of bool (N,)."""
+    """Find the rows under forces far beyond those of most loaded rows.
+
+    Returns
+    -------
+    ndarray
+        (N,) of bool; none if there are too many to be exceptions.
+    """
     force = np.linalg.norm(measurements.wrench[:, :3], axis=1)
-    usual = np.quantile(force[force > 0], 0.75) if force.any() else np.inf
-    far = force > settings.extreme_load * usual
-    return far & (far.mean() <= settings.gross_error_share)
+    loaded = force > 0
+    if not loaded.any():
+        return loaded
+    extreme = force > settings.extreme_load * np.quantile(force[loaded], 0.75)
+    return extreme & (extreme.mean() <= settings.gross_error_share)

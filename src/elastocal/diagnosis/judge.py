@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -10,15 +11,14 @@ import numpy as np
 
 from elastocal.campaigns.campaign import NO_REMAINDER, Measurements, tabulate_residuals
 from elastocal.counting import format_count
-from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.gross_errors import (
     OutlierTest,
     describe_gross_errors,
-    estimate_prediction_uncertainty,
     find_held_out_gross_errors,
     format_gross_error_warnings,
 )
 from elastocal.diagnosis.settings import Settings
+from elastocal.diagnosis.studentized_residuals import estimate_prediction_uncertainty
 from elastocal.fitting.model import (
     Case,
     compute_residuals,
@@ -27,6 +27,7 @@ from elastocal.fitting.model import (
 )
 from elastocal.fitting.noise import parse_noise
 from elastocal.fitting.observations import index_poses, separate_measurements
+from elastocal.io.typed_json import from_document, to_document
 from elastocal.random_streams import open_stream
 from elastocal.remainder.corrected import Corrected, corrected, remainder_facts
 from elastocal.validation import held_out as figures
@@ -35,6 +36,18 @@ from elastocal.validation.transfer import (
     find_extrapolated_poses,
     transfer_fit,
     warn_of_repeated_poses,
+)
+from elastocal.verdict import (
+    BeforeAfter,
+    Effect,
+    ErrorsByRange,
+    ErrorSummary,
+    HeldOut,
+    JointRange,
+    Remainder,
+    TrainingVerdict,
+    UncalibratedErrors,
+    Verdict,
 )
 
 if TYPE_CHECKING:
@@ -58,18 +71,24 @@ _ERRORS = {
 class Judgement:
     """A diagnosis with what held-out poses say of it.
 
-    `document`: contents of verdict.json. `rows`: of before_after.csv. `held_out`: what
+    `verdict`: the whole verdict. `rows`: of before_after.csv. `held_out`: what
     was held out, without its gross errors. `left_out`: these. `outside` (P,) of bool:
     poses held out that lie outside the range of the fitted ones. `delivered`: what the
     final model and a regression leave of the held-out poses; None where there is none.
     """
 
-    document: dict[str, Any]
+    verdict: Verdict
     rows: list[dict[str, Any]]
     held_out: Case
     left_out: Measurements
     outside: np.ndarray
     delivered: Corrected | None
+
+    @cached_property
+    def document(self) -> dict[str, Any]:
+        """The verdict as a JSON document."""
+        document: dict[str, Any] = to_document(self.verdict)
+        return document
 
 
 def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
@@ -85,25 +104,22 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
     rows, heldout, warnings = compare_held_out_errors(steps, case, part, outside, seed)
     whole = (
         [
-            figures.summarize_errors(error.distance)
+            ErrorSummary(**figures.summarize_errors(error.distance))
             for error in _errors(steps, case, held_out)[1]
         ]
         if left_out
         else []
     )
-    of_all = [error["rms_m"] for error in whole] or [
-        row["heldout_rms_m"] for row in rows
-    ]
+    of_all = [error.rms_m for error in whole] or [row["heldout_rms_m"] for row in rows]
     rows = [
         row | {"heldout_rms_all_rows_m": rms}
         for row, rms in zip(rows, of_all, strict=True)
     ]
-    heldout["with_gross_errors"] = (
-        {"before": whole[_declared(steps)], "after": whole[-1]} if left_out else None
-    )
     if left_out:
+        both = BeforeAfter(before=whole[_declared(steps)], after=whole[-1])
+        heldout = replace(heldout, with_gross_errors=both)
         gross = format_count(len(left_out), "gross error")
-        sizes = [1e3 * each["rms_m"] for each in (whole[-1], heldout["after"])]
+        sizes = [1e3 * each.rms_m for each in (whole[-1], heldout.after)]
         words = "with all rows the RMS is {:.3g} mm instead of {:.3g} mm".format(*sizes)
         warnings.append(f"held-out errors are without {gross}: {words}")
     # By what share each step lowers the held-out RMS.
@@ -114,31 +130,40 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
         )
         for last, row in pairs
     }
-    found = diagnosis.document
+    found = diagnosis.verdict
     remainder = None
     delivered = apply_regression(diagnosis, part, seed)
     if delivered is not None:
         draws = open_stream(seed, case.campaign.name, "remainder", 0)
-        remainder = remainder_facts(
+        facts = remainder_facts(
             delivered, diagnosis.declared, diagnosis.final, case, part, draws
         )
-    heldout["delivered"] = remainder["errors"] if remainder else heldout["after"]
-    document = found | {
-        "effects": [
-            entry | {"heldout_gain": gains.get(entry["name"])}
-            for entry in found["effects"]
-        ],
-        "heldout": heldout,
-        "remainder": remainder,
-        "gross_errors": [*found["gross_errors"], *left_out],
-        "warnings": [
-            *found["warnings"],
-            *format_gross_error_warnings(left_out),
-            *warnings,
-        ],
+        remainder = from_document(Remainder, facts, "regression on the remainder")
+        heldout = replace(heldout, delivered=remainder.errors)
+    inherited = {
+        entry.name: getattr(found, entry.name) for entry in fields(TrainingVerdict)
     }
+    verdict = Verdict(
+        **inherited
+        | {
+            "effects": tuple(
+                replace(effect, heldout_gain=gains.get(effect.name))
+                if isinstance(effect, Effect)
+                else effect
+                for effect in found.effects
+            ),
+            "heldout": heldout,
+            "remainder": remainder,
+            "gross_errors": (*found.gross_errors, *left_out),
+            "warnings": (
+                *found.warnings,
+                *format_gross_error_warnings(left_out),
+                *warnings,
+            ),
+        }
+    )
     return Judgement(
-        document,
+        verdict,
         rows,
         part,
         held_out.campaign.measurements.select(errors.gross),
@@ -153,7 +178,7 @@ def apply_regression(
     """The final model with the regression that a campaign asks for, on held-out poses
     without gross errors; None for none."""
     campaign = diagnosis.case.campaign
-    if campaign.remainder == NO_REMAINDER or data_at_fault(diagnosis.document):
+    if campaign.remainder == NO_REMAINDER or diagnosis.verdict.faults:
         return None
     # Poses held out at random have neighbours among those fitted; others have none, nor
     # may those that set the intervals.
@@ -182,20 +207,23 @@ def remove_gross_errors(
     poses = find_extrapolated_poses(final, diagnosis.case, held_out)
     part = held_out
     errors = OutlierTest.none(len(measurements), held_out.model.rows)
-    if data_at_fault(diagnosis.document):
+    if diagnosis.verdict.faults:
         return errors, part, poses
     settings = Settings()
     noise = parse_noise(diagnosis.document).without_pose_error
-    yardstick = estimate_prediction_uncertainty(
+    fitted_uncertainty = estimate_prediction_uncertainty(
         final, noise, diagnosis.case.campaign.measurements
     )
     outside = poses[index_poses(measurements)]
     for _ in range(settings.gross_error_rounds):
         # Frames of another campaign are fitted to what is kept of it.
-        there = transfer_fit(final, diagnosis.case, part)
+        model, estimate = transfer_fit(final, diagnosis.case, part)
+        uncertainty = fitted_uncertainty
+        if model is not final.model or estimate is not final.estimate:
+            uncertainty = replace(fitted_uncertainty, parameter_covariance=None)
         last = errors.gross
         errors = find_held_out_gross_errors(
-            final, there, yardstick, held_out, outside, settings
+            model, estimate, uncertainty, held_out, outside, settings
         )
         part = held_out.select(~errors.gross) if errors.gross.any() else held_out
         if (errors.gross == last).all():
@@ -210,7 +238,7 @@ def remove_gross_errors(
 
 def compare_held_out_errors(
     steps: Sequence[Step], case: Case, held_out: Case, outside: np.ndarray, seed: int
-) -> tuple[list[dict[str, Any]], dict[str, Any], list[str]]:
+) -> tuple[list[dict[str, Any]], HeldOut, list[str]]:
     """Errors of every step on training and held-out poses.
 
     `held_out`, `seed`: as in `judge`. `outside` (P,): as of `Verdict`. Returns `rows`:
@@ -267,22 +295,30 @@ def compare_held_out_errors(
     by_range = figures.summarize_errors_by_range(
         {"before": errors[before], "after": errors[after]}, outside
     )
-    heldout = {
-        "uncalibrated": figures.summarize_errors(errors[0].distance)
-        | {"reduction_ci95": [of_calibration.low, of_calibration.high]},
-        "before": figures.summarize_errors(errors[before].distance),
-        "after": figures.summarize_errors(errors[after].distance),
-        "noise_floor_rms_m": None if np.isnan(floor) else floor,
-        "reduction_ci95": [reductions[after].low, reductions[after].high],
-        "reduction_std_error": reductions[after].std_error,
-        "poses": errors[0].poses,
-        "configurations": count_configurations(held_out.observations.states),
-        "joint_ranges": find_joint_ranges(
-            held_out.observations.states, held_out.campaign.robot
+    summary_after = ErrorSummary(**figures.summarize_errors(errors[after].distance))
+    heldout = HeldOut(
+        uncalibrated=UncalibratedErrors(
+            **figures.summarize_errors(errors[0].distance),
+            reduction_ci95=(of_calibration.low, of_calibration.high),
         ),
-        "share_below_max": figures.bound_share_below_maximum(errors[0].poses),
-        "outside_range": by_range,
-    }
+        before=ErrorSummary(**figures.summarize_errors(errors[before].distance)),
+        after=summary_after,
+        noise_floor_rms_m=None if np.isnan(floor) else floor,
+        reduction_ci95=(reductions[after].low, reductions[after].high),
+        reduction_std_error=reductions[after].std_error,
+        poses=errors[0].poses,
+        configurations=count_configurations(held_out.observations.states),
+        joint_ranges=tuple(
+            JointRange(**entry)
+            for entry in find_joint_ranges(
+                held_out.observations.states, held_out.campaign.robot
+            )
+        ),
+        share_below_max=figures.bound_share_below_maximum(errors[0].poses),
+        outside_range=from_document(ErrorsByRange, by_range, "errors by range"),
+        with_gross_errors=None,
+        delivered=summary_after,
+    )
     if count := by_range["poses"]:
         lie = f"{count} of {format_count(len(outside), 'validation pose')} {'lies' if count == 1 else 'lie'}"
         warnings.append(

@@ -204,10 +204,48 @@ def find_misplaced_frames(fitted: Fit, campaign: Campaign) -> list[MisplacedFram
     parameters = _FreeParameters.of_fit(fitted, campaign)
     if not parameters.shifts or parameters.is_plausible or not parameters.is_linear:
         return []
-    equations = _NormalEquations.of_fit(fitted, parameters)
-    places = parameters.places
+    wrong = _find_wrong_shifts(_NormalEquations.of_fit(fitted, parameters))
+    frames = []
+    for place, alternatives in wrong.alternatives.items():
+        indices = [n for n in wrong.indices if parameters.places[n] == place]
+        shift_m = np.zeros(3)
+        axes = ["xyz".index(parameters.axes[n]) for n in indices]
+        shift_m[axes] = wrong.values[indices]
+        usual_m = parameters.usual_sizes[indices].max()
+        sizes = float(np.linalg.norm(shift_m) / usual_m)
+        if sizes > _MOST_SIZES:
+            sentence = _describe_frame(place, alternatives, shift_m, sizes, campaign)
+            frames.append(
+                MisplacedFrame(
+                    place, alternatives, tuple(shift_m.tolist()), sizes, sentence
+                )
+            )
+    return frames
+
+
+@dataclass(frozen=True)
+class _WrongShifts:
+    """Shifts that were declared wrongly.
+
+    Attributes
+    ----------
+    indices : of their parameters
+    values : (N,), most probable parameters with these shifts
+    alternatives : by place, the other places whose shift explains the measurements as
+        well
+    """
+
+    indices: list[int]
+    values: np.ndarray
+    alternatives: dict[str, tuple[str, ...]]
+
+
+def _find_wrong_shifts(equations: _NormalEquations) -> _WrongShifts:
+    """Declare shifts as wrong, one after the other, as long as each makes the
+    measurements more probable."""
+    places = equations.parameters.places
     wrong: list[int] = []
-    alternatives: dict[str, set[str]] = {}
+    equivalent_places: dict[str, set[str]] = {}
     explanation = equations.explain(wrong)
     while len(wrong) < _MOST_AXES:
         tried = {
@@ -226,23 +264,14 @@ def find_misplaced_frames(fitted: Fit, campaign: Campaign) -> list[MisplacedFram
         shift = _choose_shift(equivalent, places)
         explanation = tried[shift]
         wrong += shift
-        place = places[shift[0]]
-        alternatives.setdefault(place, set()).update(places[s[0]] for s in equivalent)
-    frames = []
-    for place, as_good in alternatives.items():
-        indices = [index for index in wrong if places[index] == place]
-        shift_m = np.zeros(3)
-        axes = ["xyz".index(parameters.axes[index]) for index in indices]
-        shift_m[axes] = explanation.values[indices]
-        usual_m = parameters.usual_sizes[indices].max()
-        sizes = float(np.linalg.norm(shift_m) / usual_m)
-        if sizes > _MOST_SIZES:
-            frames.append(
-                _describe_frame(
-                    place, sorted(as_good - {place}), shift_m, sizes, campaign
-                )
-            )
-    return frames
+        equivalent_places.setdefault(places[shift[0]], set()).update(
+            places[indices[0]] for indices in equivalent
+        )
+    alternatives = {
+        place: tuple(sorted(equivalent - {place}))
+        for place, equivalent in equivalent_places.items()
+    }
+    return _WrongShifts(wrong, explanation.values, alternatives)
 
 
 def _list_shifts(places: dict[int, str]) -> list[tuple[int, ...]]:
@@ -284,7 +313,10 @@ def describe_reference_point(campaign: Campaign) -> str:
             f"{target.name} on {target.point}" for target in campaign.targets
         )
         between = "what lies between is the robot file's."
-        return f"All errors are those of {end}, on which no target was measured ({names}): {between}"
+        return (
+            f"All errors are those of {end}, on which no target was measured ({names}): "
+            f"{between}"
+        )
     descriptions = []
     for target in targets:
         if target.offset_m is None:
@@ -307,12 +339,12 @@ def _format_millimetres(vector_m: Sequence[float] | np.ndarray) -> str:
 
 def _describe_frame(
     place: str,
-    alternatives: list[str],
+    alternatives: tuple[str, ...],
     shift_m: np.ndarray,
     sizes: float,
     campaign: Campaign,
-) -> MisplacedFrame:
-    """A misplaced frame with its sentence."""
+) -> str:
+    """What a report says of a misplaced frame; arguments as of `MisplacedFrame`."""
     length_m = np.linalg.norm(shift_m)
     length = f"{1e3 * length_m:.1f} mm"
     direction = f"by {_format_millimetres(shift_m)}"
@@ -335,8 +367,6 @@ def _describe_frame(
         if place == "link 1":
             text += ", or a wrong height of base or pedestal"
     if alternatives:
-        text += f" (or it is {' or '.join(alternatives)}: these measurements do not distinguish them)"
-    sentence = f"{text}. It is {sizes:.0f} times what such a length is usually off"
-    return MisplacedFrame(
-        place, tuple(alternatives), tuple(shift_m.tolist()), sizes, sentence
-    )
+        names = " or ".join(alternatives)
+        text += f" (or it is {names}: these measurements do not distinguish them)"
+    return f"{text}. It is {sizes:.0f} times what such a length is usually off"

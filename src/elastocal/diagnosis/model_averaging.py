@@ -1,287 +1,361 @@
-"""Averages over the models of a posterior."""
+"""Parameters and predictions averaged over the models of a posterior, so that intervals
+are honest after selection.
+
+What other models say differently is taken from the linearised problem by Bayesian model
+averaging [1]_: the mean over models shifts the estimate, and their spread widens its
+standard error (law of total variance). Parameters of an effect are averaged over its
+sizes and over the models that have it: they state how large it is if it is present.
+
+References
+----------
+.. [1] Hoeting, Madigan, Raftery and Volinsky, Statistical Science 14, 1999.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from elastocal.diagnosis.evidence import ModelDensity
 from elastocal.diagnosis.refit import predict_reduced_chi_square
-from elastocal.diagnosis.search import (
-    NEGLIGIBLE_LOG_WEIGHT,
-    Posterior,
-    ScoredModel,
-    SearchProblem,
-    solve_positive_definite,
-)
-from elastocal.diagnosis.statistics import (
-    SufficientStatistics,
-    assemble_normal_equations,
-)
+from elastocal.diagnosis.search import NEGLIGIBLE_LOG_WEIGHT, solve_positive_definite
+from elastocal.diagnosis.statistics import assemble_normal_equations
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
     from elastocal.diagnosis.candidate_design import CandidateDesign
-    from elastocal.effects.protocol import Candidate
+    from elastocal.diagnosis.search import Posterior, ScoredModel, SearchProblem
+    from elastocal.diagnosis.statistics import SufficientStatistics
 
-    # Effects with normal priors on their parameters, and values of their shapes.
-    SelectedEffects = tuple[tuple[Candidate, np.ndarray], ...]
+    # Owner and name of a parameter.
+    ParameterKey = tuple[str, str]
+    # Mean and variance of each parameter.
+    Moments = dict[ParameterKey, tuple[float, float]]
 
-# Models that hold less than this move no digit that is reported.
-_LEAST_PROBABILITY = 0.002
+# Models that are less probable change no reported digit of an average.
+_MIN_PROBABILITY = 0.002
 
 
 @dataclass(frozen=True)
 class ModelAverage:
-    """Corrections to the exact fit of the most probable model.
+    """Corrections to the exact fit of the most probable model, by owner and name of
+    each parameter.
 
-    `shift` (str, str): by owner and name of a parameter: what the other models add to
-    its estimate. `std_error` (str, str). `of_prior`: parameters of effects of which the
-    prior says more than the measurements do.
+    Attributes
+    ----------
+    shift
+        What the other models add to its estimate.
+    std_error
+        Standard error over all models.
+    prior_dominated
+        Parameters of effects about which the prior says more than the measurements.
     """
 
-    shift: dict[tuple[str, str], float]
-    std_error: dict[tuple[str, str], float]
-    prior_dominated: frozenset[tuple[str, str]] = frozenset()
+    shift: dict[ParameterKey, float]
+    std_error: dict[ParameterKey, float]
+    prior_dominated: frozenset[ParameterKey] = frozenset()
+
+
+class SumOfSquares(NamedTuple):
+    """Sum of squares of the whitened displacements that some terms of a model make.
+
+    Attributes
+    ----------
+    total
+        The whole sum.
+    extra
+        The part that the other terms of the model cannot make.
+    """
+
+    total: float
+    extra: float
 
 
 def average_models(
-    linearized: CandidateDesign,
+    design: CandidateDesign,
     posterior: Posterior,
     best: ScoredModel,
-    owners: Sequence[tuple[str, str]],
+    declared_parameters: Sequence[ParameterKey],
 ) -> ModelAverage:
-    """Average over the models of a posterior.
+    """Average the parameters over the models of a posterior.
 
-    `best`: of which there is an exact fit. `owners` (str, str): owner and name of each
-    parameter of the declared block.
+    Parameters
+    ----------
+    design
+        The linearised problem.
+    posterior
+        Models and their probabilities.
+    best
+        The model of which there is an exact fit.
+    declared_parameters
+        Owner and name of each parameter of the declared model, in its order.
     """
-    likely = _likely(posterior, best)
-    problem = linearized.problem
-    sizes = {model.pose_error_rad for model, _ in likely}
-    # Sizes of the pose error that the best model makes likely, and those of the models
-    # that count.
-    some = problem.statistics
-    base = problem.statistics.log_likelihood + problem.log_pose
-    if best.term_indices:
-        density = _joint(problem, best, some, base).by_pose_error
-        of_models = np.isin(some.pose_error_rad, list(sizes))
-        kept = np.flatnonzero(
-            (density > density.max() + NEGLIGIBLE_LOG_WEIGHT) | of_models
-        )
-        some = some.at(kept)
-        base = base[kept]
-    each = [
-        (p, _moments(linearized, model, owners, _joint(problem, model, some, base)))
-        for model, p in likely
-    ]
-    exact = next(
-        found
-        for (model, _), (_, found) in zip(likely, each, strict=True)
-        if model is best
-    )
-    shift: dict[tuple[str, str], float] = {}
-    std_error: dict[tuple[str, str], float] = {}
-    for name, (estimate, _) in exact.items():
+    problem = design.problem
+    models = _select_likely_models(posterior, best)
+    statistics, log_weights = _select_pose_errors(problem, best, models)
+    weighted_moments = []
+    best_moments: Moments = {}
+    for model, probability in models:
+        density = _build_density(problem, model, statistics, log_weights)
+        moments = _compute_moments(design, model, declared_parameters, density)
+        weighted_moments.append((probability, moments))
+        if model is best:
+            best_moments = moments
+    shift = {}
+    std_error = {}
+    for key, (estimate, _) in best_moments.items():
         weight, mean, variance = np.array(
             [
-                (probability, *found[name])
-                for probability, found in each
-                if name in found
+                (probability, *moments[key])
+                for probability, moments in weighted_moments
+                if key in moments
             ]
         ).T
         weight = weight / weight.sum()
-        center = weight @ mean
-        shift[name] = float(center - estimate)
-        std_error[name] = float(np.sqrt(weight @ (variance + (mean - center) ** 2)))
-    least = np.sqrt(problem.settings.prior_share)
-    of_prior = frozenset(
-        (unit.candidate.key, parameter.name)
-        for unit in (problem.terms[number] for number in best.term_indices)
-        if unit.candidate
-        for parameter, size in zip(
-            unit.candidate.parameters,
-            unit.sizes * problem.grid.root_mean_square(unit),
-            strict=True,
-        )
-        if std_error[unit.candidate.key, parameter.name] > least * size
-    )
-    return ModelAverage(shift, std_error, of_prior)
+        average = weight @ mean
+        shift[key] = float(average - estimate)
+        std_error[key] = float(np.sqrt(weight @ (variance + (mean - average) ** 2)))
+    prior_dominated = _find_prior_dominated(problem, best, std_error)
+    return ModelAverage(shift, std_error, prior_dominated)
+
+
+def _find_prior_dominated(
+    problem: SearchProblem, model: ScoredModel, std_error: dict[ParameterKey, float]
+) -> frozenset[ParameterKey]:
+    """Parameters of a model's effects of whose prior variance more than `prior_share`
+    is left after the measurements."""
+    max_ratio = np.sqrt(problem.settings.prior_share)
+    keys = set()
+    for index in model.term_indices:
+        term = problem.terms[index]
+        if term.candidate is None:
+            continue
+        prior_std = term.sizes * problem.grid.root_mean_square(term)
+        for parameter, deviation in zip(
+            term.candidate.parameters, prior_std, strict=True
+        ):
+            key = (term.candidate.key, parameter.name)
+            if std_error[key] > max_ratio * deviation:
+                keys.add(key)
+    return frozenset(keys)
 
 
 def is_expected_to_help(
     problem: SearchProblem, posterior: Posterior, model: ScoredModel
 ) -> bool:
-    """Whether predictions are expected to be better with a model of the posterior than
-    without it, at poses like the measured.
+    """Decide whether a model is expected to predict better than the declared one, at
+    poses like those measured.
 
-    With d the displacement that it predicts and E d its mean over all models, the
-    expected square of the error falls by 2 d'E d - d'd where d is added. Under the
-    model alone that has at most the variance 4 d'd of a least-squares estimate; the
-    interval of the gain has to exclude nothing.
+    With d the displacement that the model predicts and E d its mean over all models,
+    adding d lowers the expected squared error by 2 d'E d - d'd. Under the model alone
+    that gain has at most the variance 4 d'd of a least-squares estimate. The interval
+    of the gain has to exclude zero.
     """
     gram = problem.statistics.gram[0]
+    coefficients = _compute_coefficients(problem, model)
     mean = np.zeros(len(gram))
-    mine = _predicted(problem, model)
-    for other, probability in _likely(posterior, model):
-        mean += probability * _predicted(problem, other)
-    error = 2.0 * np.sqrt(
-        mine @ gram @ mine * max(predict_reduced_chi_square(problem, model), 1.0)
-    )
-    return bool(mine @ gram @ (2.0 * mean - mine) > problem.settings.useful * error)
+    for likely_model, probability in _select_likely_models(posterior, model):
+        mean += probability * _compute_coefficients(problem, likely_model)
+    variance_factor = max(predict_reduced_chi_square(problem, model), 1.0)
+    std_error = 2.0 * np.sqrt(coefficients @ gram @ coefficients * variance_factor)
+    gain = coefficients @ gram @ (2.0 * mean - coefficients)
+    return bool(gain > problem.settings.useful * std_error)
 
 
 def compute_between_model_squares(
     problem: SearchProblem, posterior: Posterior, model: ScoredModel
 ) -> float:
-    """How otherwise the models of a posterior predict than one of them: expected sum of
-    squares of whitened numbers.
+    """Compute how differently the models of a posterior predict from one of them.
 
-    The smooth error of unknown cause is in no model that is kept, but the robot has it
-    all the same.
+    The discrepancy term, a smooth error of unknown cause, is in no model that is kept,
+    but the robot has that error all the same: it counts as a difference.
+
+    Returns
+    -------
+    float
+        Expected sum of squares of the differences of the whitened predictions.
     """
     gram = problem.statistics.gram[0]
-    mine = _predicted(problem, model)
-    for number in model.term_indices:
-        if problem.terms[number].candidate is None:
-            mine[problem.terms[number].columns] = 0.0
-    off = [
-        (probability, _predicted(problem, other) - mine)
-        for other, probability in _likely(posterior, model)
-    ]
-    return float(
-        sum(probability * (apart @ gram @ apart) for probability, apart in off)
-    )
-
-
-def _likely(posterior: Posterior, best: ScoredModel) -> list[tuple[ScoredModel, float]]:
-    """Models that count, and the best, with their probabilities."""
-    pairs = zip(posterior.models, posterior.probabilities, strict=True)
-    return [
-        (model, probability)
-        for model, probability in pairs
-        if probability >= _LEAST_PROBABILITY or model is best
-    ]
+    coefficients = _compute_coefficients(problem, model)
+    for index in model.term_indices:
+        term = problem.terms[index]
+        if term.candidate is None:
+            coefficients[term.columns] = 0.0
+    squares = 0.0
+    for likely_model, probability in _select_likely_models(posterior, model):
+        difference = _compute_coefficients(problem, likely_model) - coefficients
+        squares += probability * (difference @ gram @ difference)
+    return float(squares)
 
 
 def compute_explained_squares(
     problem: SearchProblem, model: ScoredModel
 ) -> dict[str, float]:
-    """Sum of squares of the whitened displacements that each mechanism of a model
-    makes, dict of str to float."""
+    """Compute the sum of squares of the whitened displacements that each mechanism of a
+    model makes, by mechanism."""
     mechanisms = dict.fromkeys(
-        problem.terms[number].mechanism for number in model.term_indices
+        problem.terms[index].mechanism for index in model.term_indices
     )
     return {
-        mechanism: compute_extra_squares(problem, model, {mechanism})[0][0]
+        mechanism: compute_extra_squares(problem, model, {mechanism})[0].total
         for mechanism in mechanisms
     }
 
 
 def compute_extra_squares(
     problem: SearchProblem, model: ScoredModel, mechanisms: Collection[str]
-) -> list[tuple[float, float]]:
-    """Sum of squares of the displacements that some mechanisms of a model make, and how
-    much of it the others cannot make.
+) -> tuple[SumOfSquares, SumOfSquares]:
+    """Compute the sums of squares of some mechanisms of a model and of the others, each
+    with its extra part, which the other group cannot make.
 
-    The others may take any size that their priors allow: a Schur complement of the Gram
-    matrix with the priors of the others. Returns both numbers of these mechanisms, and
-    then of the others.
+    The other group may take any sizes that its priors allow: the extra sum of squares
+    [1]_ is a Schur complement of the Gram matrix with the priors of the other group.
+
+    Parameters
+    ----------
+    problem
+        The linearised problem.
+    model
+        One of its models.
+    mechanisms
+        Names of mechanisms of the model.
+
+    Returns
+    -------
+    SumOfSquares, SumOfSquares
+        Of these mechanisms, and of all others.
+
+    References
+    ----------
+    .. [1] Draper and Smith, Applied Regression Analysis, 1998, section 6.1.
     """
-    coefficients = _predicted(problem, model)
+    coefficients = _compute_coefficients(problem, model)
     gram = problem.statistics.gram[0]
-    columns, deviations = problem.scaled_columns(model.term_indices, model.scales)
-    units = [problem.terms[number] for number in model.term_indices]
-    _, mine = problem.scaled_columns(
-        model.term_indices, [unit.mechanism in mechanisms for unit in units]
+    columns, prior_std = problem.scaled_columns(model.term_indices, model.scales)
+    _, in_group = problem.scaled_columns(
+        model.term_indices,
+        [problem.terms[index].mechanism in mechanisms for index in model.term_indices],
     )
-    found = []
-    for inside in (mine, ~mine):
-        ours = columns[inside]
-        rest = columns[~inside]
-        made = gram[:, ours] @ coefficients[ours]
-        whole = float(coefficients[ours] @ made[ours])
-        inner = gram[np.ix_(rest, rest)] + np.diag(deviations[~inside] ** -2.0)
-        found.append(
-            (
-                whole,
-                whole - float(made[rest] @ solve_positive_definite(inner, made[rest])),
-            )
+
+    def split(inside: np.ndarray) -> SumOfSquares:
+        group = columns[inside]
+        complement = columns[~inside]
+        products = gram[:, group] @ coefficients[group]
+        total = float(coefficients[group] @ products[group])
+        penalized = gram[np.ix_(complement, complement)] + np.diag(
+            prior_std[~inside] ** -2.0
         )
-    return found
+        solution = solve_positive_definite(penalized, products[complement])
+        return SumOfSquares(total, total - float(products[complement] @ solution))
+
+    return split(in_group), split(~in_group)
 
 
-def _predicted(problem: SearchProblem, model: ScoredModel) -> np.ndarray:
-    """Coefficients of all columns in a model at its most probable sizes, in plausible
-    sizes, ndarray (K,)."""
+def _select_likely_models(
+    posterior: Posterior, best: ScoredModel
+) -> list[tuple[ScoredModel, float]]:
+    """The probable models of a posterior, and the best one, with their
+    probabilities."""
+    pairs = zip(posterior.models, posterior.probabilities, strict=True)
+    return [
+        (model, probability)
+        for model, probability in pairs
+        if probability >= _MIN_PROBABILITY or model is best
+    ]
+
+
+def _compute_coefficients(problem: SearchProblem, model: ScoredModel) -> np.ndarray:
+    """Coefficients of all columns in a model at its most probable sizes, (K,), in
+    plausible sizes."""
     coefficients = np.zeros(problem.statistics.gram.shape[1])
     columns, mode, _ = problem.find_mode(model)
     coefficients[columns] = mode
     return coefficients
 
 
-def _moments(
-    linearized: CandidateDesign,
+def _select_pose_errors(
+    problem: SearchProblem,
+    best: ScoredModel,
+    models: list[tuple[ScoredModel, float]],
+) -> tuple[SufficientStatistics, np.ndarray]:
+    """Statistics at the pose errors that the best model makes likely and at those of
+    the other models, and the log weight of each, (T,)."""
+    statistics = problem.statistics
+    log_weights = statistics.log_likelihood + problem.log_pose
+    if not best.term_indices:
+        return statistics, log_weights
+    density = _build_density(problem, best, statistics, log_weights).by_pose_error
+    likely = density > density.max() + NEGLIGIBLE_LOG_WEIGHT
+    sizes = list({model.pose_error_rad for model, _ in models})
+    chosen = np.flatnonzero(likely | np.isin(statistics.pose_error_rad, sizes))
+    return statistics.at(chosen), log_weights[chosen]
+
+
+def _compute_moments(
+    design: CandidateDesign,
     model: ScoredModel,
-    owners: Sequence[tuple[str, str]],
-    joint: ModelDensity,
-) -> dict[tuple[str, str], tuple[float, float]]:
-    """Mean and variance of every parameter of one model, by owner and name; declared
-    ones up to a constant in the mean."""
-    products = linearized.products
-    problem = linearized.problem
-    declared, (columns, deviations) = (
-        products.declared_count,
-        problem.scaled_columns(model.term_indices, model.scales),
-    )
+    declared_parameters: Sequence[ParameterKey],
+    density: ModelDensity,
+) -> Moments:
+    """Mean and variance of every parameter of one model; means of the declared
+    parameters up to a constant."""
+    problem = design.problem
+    moments = _compute_declared_moments(design, model, declared_parameters)
+    for index, (mean, variance) in zip(
+        model.term_indices, density.moments(), strict=True
+    ):
+        term = problem.terms[index]
+        if term.candidate is None:
+            continue
+        for parameter, size, parameter_mean, parameter_variance in zip(
+            term.candidate.parameters, term.sizes, mean, variance, strict=True
+        ):
+            moments[term.candidate.key, parameter.name] = (
+                size * parameter_mean,
+                size**2 * parameter_variance,
+            )
+    return moments
+
+
+def _compute_declared_moments(
+    design: CandidateDesign,
+    model: ScoredModel,
+    declared_parameters: Sequence[ParameterKey],
+) -> Moments:
+    """Mean, up to a constant, and variance of every declared parameter in one model."""
+    problem = design.problem
+    products = design.products
+    count = products.declared_count
+    columns, prior_std = problem.scaled_columns(model.term_indices, model.scales)
     equations = assemble_normal_equations(products, model.pose_error_rad, columns)
     information = equations[:-1, :-1]
-    places = np.arange(declared, len(equations) - 1)
-    information[places, places] += deviations**-2.0
-    # Declared parameters from the orthonormal basis, less what the candidates' columns
-    # have in it.
-    back = products.basis_transform @ np.concatenate(
-        [np.eye(declared), -products.projections[:, columns]], axis=1
+    candidates = np.arange(count, len(equations) - 1)
+    information[candidates, candidates] += prior_std**-2.0
+    # Transform from the orthonormal basis back to the declared parameters, without the
+    # part of the candidates' columns that lies in the basis.
+    transform = products.basis_transform @ np.concatenate(
+        [np.eye(count), -products.projections[:, columns]], axis=1
     )
-    solved = solve_positive_definite(
-        information, np.column_stack([back.T, equations[:-1, -1]])
+    solution = solve_positive_definite(
+        information, np.column_stack([transform.T, equations[:-1, -1]])
     )
-    variance = max(predict_reduced_chi_square(problem, model), 1.0) * (
-        back * solved[:, :-1].T
-    ).sum(axis=1)
-    found = dict(
-        zip(owners, zip(back @ solved[:, -1], variance, strict=True), strict=True)
-    )
-    for number, (value, spread) in zip(
-        model.term_indices, joint.moments(), strict=True
-    ):
-        unit = problem.terms[number]
-        if unit.candidate:
-            names = [
-                (unit.candidate.key, parameter.name)
-                for parameter in unit.candidate.parameters
-            ]
-            found |= dict(
-                zip(
-                    names,
-                    zip(unit.sizes * value, unit.sizes**2 * spread, strict=True),
-                    strict=True,
-                )
-            )
-    return found
+    mean = transform @ solution[:, -1]
+    variance_factor = max(predict_reduced_chi_square(problem, model), 1.0)
+    variance = variance_factor * (transform * solution[:, :-1].T).sum(axis=1)
+    return dict(zip(declared_parameters, zip(mean, variance, strict=True), strict=True))
 
 
-def _joint(
+def _build_density(
     problem: SearchProblem,
     model: ScoredModel,
     statistics: SufficientStatistics,
-    base: np.ndarray,
+    log_weights: np.ndarray,
 ) -> ModelDensity:
-    """Density under a model, at some sizes of the pose error with what each contributes
-    alone."""
-    places = np.searchsorted(problem.grid.scales, model.scales)
-    units = [problem.terms[number] for number in model.term_indices]
-    return ModelDensity(statistics, units, problem.grid, base, places)
+    """Density of the measurements under a model, at pose errors with log weights
+    (T,)."""
+    sizes = np.searchsorted(problem.grid.scales, model.scales)
+    terms = [problem.terms[index] for index in model.term_indices]
+    return ModelDensity(statistics, terms, problem.grid, log_weights, sizes)

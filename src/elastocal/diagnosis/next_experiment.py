@@ -357,45 +357,95 @@ def propose_experiment(
     if reason:
         return _explain_no_experiment(robot, best, reason)
     hypotheses = _select_hypotheses(evidence)
-    alternatives = hypotheses[1:]
+    model = diagnosis.final.model
     states = diagnosis.case.observations.states
     angles, wrench = draw_candidate_experiments(
         states, robot, _CANDIDATE_EXPERIMENTS, stream
     )
-    planned = build_planned_observations(diagnosis.final.model, states, angles, wrench)
+    planned = build_planned_observations(model, states, angles, wrench)
     pairs, rows = _predict_experiments(evidence, hypotheses, planned)
-    probabilities = np.array([h.probability for h in alternatives])
-    leading = hypotheses[0].probability
-    weights = np.sqrt(leading * probabilities)
-    chosen, separations = select_experiments(pairs, weights, rows, poses)
-    within_reach = _find_resolvable(pairs, rows[chosen])
-    unreachable = tuple(
-        hypothesis.mechanisms
-        for hypothesis, resolvable in zip(alternatives, within_reach, strict=True)
-        if not resolvable
-    )
-    # Nothing counts as ambiguous if the alternatives that can be resolved hold no more
-    # probability than an unambiguous diagnosis may leave open.
-    certainty = leading / (leading + probabilities[within_reach].sum())
-    if unreachable and certainty >= evidence.linearized.settings.credible:
-        return _explain_no_experiment(robot, best, NOT_DISTINGUISHABLE, unreachable)
-    nearest = int(np.argmin(np.where(within_reach, separations[-1], np.inf)))
-    points = dict.fromkeys(target.point for target in diagnosis.final.model.targets)
+    plan = _Plan.choose(hypotheses, pairs, rows, poses)
+    if plan.unreachable and plan.certainty >= evidence.linearized.settings.credible:
+        return _explain_no_experiment(
+            robot, best, NOT_DISTINGUISHABLE, plan.unreachable
+        )
     table = _build_table(
-        robot, angles[chosen], wrench[chosen], separations[:, within_reach].min(axis=1)
+        robot, angles[plan.chosen], wrench[plan.chosen], plan.least_separations
     )
-    names = best, alternatives[nearest].mechanisms
-    table["effect"] = np.full(poses, " or ".join(map(" + ".join, names)))
+    points = dict.fromkeys(target.point for target in model.targets)
+    table["effect"] = np.full(
+        poses, f"{' + '.join(best)} or {' + '.join(plan.nearest)}"
+    )
     table["point"] = np.full(poses, " ".join(points))
     return table, NextExperiment(
         poses,
         reason="",
-        best=names[0],
-        nearest=names[1],
-        indistinguishable=unreachable,
+        best=best,
+        nearest=plan.nearest,
+        indistinguishable=plan.unreachable,
         separation=float(table["separation"][-1]),
         resolved=float(table["resolved"][-1]),
     )
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """Chosen experiments, and what they promise.
+
+    Attributes
+    ----------
+    hypotheses : the best one and its alternatives
+    chosen : indices of the experiments
+    separations : (experiments, alternatives), after each experiment
+    within_reach : (alternatives,) bool, alternatives that some experiment can resolve
+    """
+
+    hypotheses: list[Hypothesis]
+    chosen: list[int]
+    separations: np.ndarray
+    within_reach: np.ndarray
+
+    @classmethod
+    def choose(
+        cls,
+        hypotheses: list[Hypothesis],
+        pairs: Sequence[HypothesisPair],
+        rows: np.ndarray,
+        poses: int,
+    ) -> _Plan:
+        """Choose experiments from some rows (E, R, U)."""
+        probabilities = np.array([h.probability for h in hypotheses])
+        weights = np.sqrt(probabilities[0] * probabilities[1:])
+        chosen, separations = select_experiments(pairs, weights, rows, poses)
+        within_reach = _find_resolvable(pairs, rows[chosen])
+        return cls(hypotheses, chosen, separations, within_reach)
+
+    @property
+    def unreachable(self) -> tuple[tuple[str, ...], ...]:
+        """Mechanisms of the alternatives that no experiment within reach resolves."""
+        pairs = zip(self.hypotheses[1:], self.within_reach, strict=True)
+        return tuple(h.mechanisms for h, is_within in pairs if not is_within)
+
+    @property
+    def certainty(self) -> float:
+        """Probability of the best hypothesis against the alternatives within reach.
+
+        If it is as large as an unambiguous diagnosis asks for, nothing that can be
+        resolved is ambiguous.
+        """
+        leading, *others = (h.probability for h in self.hypotheses)
+        return leading / (leading + np.array(others)[self.within_reach].sum())
+
+    @property
+    def nearest(self) -> tuple[str, ...]:
+        """Mechanisms of the alternative within reach that is separated least."""
+        separations = np.where(self.within_reach, self.separations[-1], np.inf)
+        return self.hypotheses[1 + int(np.argmin(separations))].mechanisms
+
+    @property
+    def least_separations(self) -> np.ndarray:
+        """Separation (experiments,) of the alternatives within reach."""
+        return self.separations[:, self.within_reach].min(axis=1)
 
 
 def _predict_experiments(

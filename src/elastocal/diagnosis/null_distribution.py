@@ -36,43 +36,91 @@ def simulate_null_statistics(
     score : (T, K, N), as in `SufficientStatistics`
     residual_squares : (T, N)
     """
-    declared = products.declared_count
-    sizes = np.asarray(pose_error_rad)
     white = stream.standard_normal((*products.rows.residual.shape, count))
-    score = _project_on_columns(products, white)
-    residual_squares = (white**2).sum(axis=(0, 1))
-    declared_rows = np.tile(products.gram[:declared, :-1], (len(sizes), 1, 1))
-    score_corrections = np.zeros((len(sizes), *score.shape))
-    square_corrections = np.zeros((len(sizes), count))
+    equations = _SimulatedEquations(products, white, np.asarray(pose_error_rad))
+    joints = products.rows.jacobian.shape[2]
     for block in products.iterate_poses():
-        columns = block.products.reshape(-1, block.products.shape[2])[:, :-1]
-        eigenvalues = block.eigenvalues.reshape(-1, 1)
-        by_axis = _project_on_axes(block, white[block.selected])
+        noise = _project_on_axes(block, white[block.selected])
         if tau:
             # The joint errors of a pose are as independent along its principal axes as
             # they are joint by joint.
-            joints = products.rows.jacobian.shape[2]
-            errors = stream.standard_normal((len(block.products), joints, count))
-            axes = block.products.shape[1]
-            common = tau * errors[:, -axes:].reshape(by_axis.shape)
-            residual_squares += (common * (2 * by_axis + eigenvalues * common)).sum(
-                axis=0
-            )
-            score += columns.T @ common
-            by_axis += eigenvalues * common
-        for number in np.flatnonzero(sizes).tolist():
-            size = sizes[number]
+            poses, axes = block.eigenvalues.shape
+            errors = stream.standard_normal((poses, joints, count))
+            common = tau * errors[:, -axes:].reshape(noise.shape)
+            equations.add_common_error(block, noise, common)
+        equations.subtract_correction(block, noise)
+    return equations.eliminate_declared()
+
+
+class _SimulatedEquations:
+    """Normal equations of N simulated data sets at T sizes of the pose error.
+
+    Attributes
+    ----------
+    sizes : (T,), sizes of the pose error
+    score : (P + K, N), products of all columns with the data, without a pose error
+    residual_squares : (N,)
+    declared_rows : (T, P, P + K), rows of the declared parameters
+    score_corrections, square_corrections : (T, P + K, N), (T, N), to be subtracted for
+        each size of the pose error
+    """
+
+    def __init__(
+        self, products: CrossProducts, white: np.ndarray, sizes: np.ndarray
+    ) -> None:
+        self.sizes = sizes
+        self.score = _project_on_columns(products, white)
+        self.residual_squares = (white**2).sum(axis=(0, 1))
+        self.declared_rows = np.tile(
+            products.gram[: products.declared_count, :-1], (len(sizes), 1, 1)
+        )
+        self.score_corrections = np.zeros((len(sizes), *self.score.shape))
+        self.square_corrections = np.zeros((len(sizes), white.shape[2]))
+
+    def add_common_error(
+        self, block: PoseBlock, noise: np.ndarray, common: np.ndarray
+    ) -> None:
+        """Add errors (G a, N) that the measurements of a pose have in common to the
+        data, and to their products with the axes of the poses, `noise` (G a, N)."""
+        eigenvalues = block.eigenvalues.reshape(-1, 1)
+        squares = common * (2 * noise + eigenvalues * common)
+        self.residual_squares += squares.sum(axis=0)
+        self.score += _columns_by_axis(block).T @ common
+        noise += eigenvalues * common
+
+    def subtract_correction(self, block: PoseBlock, noise: np.ndarray) -> None:
+        """Subtract the correction for the pose error of some poses, whose axes have the
+        products `noise` (G a, N) with the data."""
+        declared = self.declared_rows.shape[1]
+        columns = _columns_by_axis(block)
+        eigenvalues = block.eigenvalues.reshape(-1, 1)
+        for number in np.flatnonzero(self.sizes).tolist():
+            size = self.sizes[number]
             share = size**2 / (1.0 + size**2 * eigenvalues)
-            solved = share * by_axis
-            score_corrections[number] += columns.T @ solved
-            square_corrections[number] += (by_axis * solved).sum(axis=0)
-            declared_rows[number] -= columns[:, :declared].T @ (share * columns)
-    return _eliminate_declared(
-        declared_rows,
-        score,
-        score_corrections,
-        residual_squares - square_corrections,
-    )
+            solved = share * noise
+            self.score_corrections[number] += columns.T @ solved
+            self.square_corrections[number] += (noise * solved).sum(axis=0)
+            self.declared_rows[number] -= columns[:, :declared].T @ (share * columns)
+
+    def eliminate_declared(self) -> tuple[np.ndarray, np.ndarray]:
+        """Marginalise the declared parameters: score (T, K, N), squares (T, N)."""
+        declared = self.declared_rows.shape[1]
+        sizes, columns, count = self.score_corrections.shape
+        score = np.empty((sizes, columns - declared, count))
+        squares = self.residual_squares - self.square_corrections
+        for number, rows in enumerate(self.declared_rows):
+            corrected = self.score - self.score_corrections[number]
+            factor = np.linalg.cholesky(rows[:, :declared])
+            fitted = solve_triangular(factor, corrected[:declared], lower=True)
+            cross = solve_triangular(factor, rows[:, declared:], lower=True)
+            np.subtract(corrected[declared:], cross.T @ fitted, out=score[number])
+            squares[number] -= (fitted**2).sum(axis=0)
+        return score, squares
+
+
+def _columns_by_axis(block: PoseBlock) -> np.ndarray:
+    """Products (G a, P + K) of the axes of the poses with all columns."""
+    return block.products.reshape(-1, block.products.shape[2])[:, :-1]
 
 
 def _project_on_columns(products: CrossProducts, white: np.ndarray) -> np.ndarray:
@@ -95,36 +143,3 @@ def _project_on_axes(block: PoseBlock, white: np.ndarray) -> np.ndarray:
         noise = white[members].reshape(len(members), -1, count)
         by_pose[block.rows.pose[members[:, 0]]] = jacobian.transpose(0, 2, 1) @ noise
     return by_pose.reshape(-1, count)
-
-
-def _eliminate_declared(
-    declared_rows: np.ndarray,
-    score: np.ndarray,
-    score_corrections: np.ndarray,
-    residual_squares: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Marginalise the declared parameters at each size of the pose error.
-
-    Parameters
-    ----------
-    declared_rows : (T, P, P + K), rows of the Gram matrix of the declared parameters
-    score : (P + K, N), without a pose error
-    score_corrections : (T, P + K, N), to be subtracted for each size of it
-    residual_squares : (T, N)
-
-    Returns
-    -------
-    (T, K, N) and (T, N), as of `simulate_null_statistics`
-    """
-    declared = declared_rows.shape[1]
-    sizes, columns, count = score_corrections.shape
-    marginal_score = np.empty((sizes, columns - declared, count))
-    marginal_squares = residual_squares.copy()
-    for number, rows in enumerate(declared_rows):
-        corrected = score - score_corrections[number]
-        factor = np.linalg.cholesky(rows[:, :declared])
-        fitted = solve_triangular(factor, corrected[:declared], lower=True)
-        cross = solve_triangular(factor, rows[:, declared:], lower=True)
-        np.subtract(corrected[declared:], cross.T @ fitted, out=marginal_score[number])
-        marginal_squares[number] -= (fitted**2).sum(axis=0)
-    return marginal_score, marginal_squares

@@ -1,17 +1,14 @@
-"""The exact fit of a selected model, and parameters averaged over models, so that
-intervals are honest after selection.
+"""The exact fit of a selected model, and the noise that a model leaves.
 
-The fit is maximum a posteriori, a generalized ridge regression (Hoerl and Kennard,
-Technometrics 1970): coefficients keep the priors under which they were selected,
-half-normal ones as normal, none wider than all sizes of the effect together made it
-before the measurements: what asks for more is often something beside the law, which
-fits where poses are and not between them.
+The fit is maximum a posteriori, a generalized ridge regression [1]_. Coefficients keep
+the priors under which they were selected; half-normal priors become normal ones. No
+prior is wider than all sizes of the effect together made it before the measurements: a
+larger coefficient is often an error that does not follow the modelled effect, and such
+a coefficient fits at the measured poses and not between them.
 
-What other models say differently is taken from the linearised problem (Bayesian model
-averaging; Hoeting et al., Statistical Science 1999): the mean over models moves the
-estimate, and their spread widens its standard error (law of total variance). Those of
-an effect are averaged over its sizes and the models that have it: how large it is if it
-is there.
+References
+----------
+.. [1] Hoerl and Kennard, Ridge regression, Technometrics 12, 1970.
 """
 
 from __future__ import annotations
@@ -21,17 +18,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.diagnosis.search import (
-    ScoredModel,
-    SearchProblem,
-)
-from elastocal.fitting.least_squares import fit_model
+from elastocal.fitting.least_squares import CONVERGENCE_TOLERANCE, fit_model
 from elastocal.fitting.model import get_parameter_values
 from elastocal.fitting.noise import set_prior_std
 from elastocal.fitting.normal_equations import compute_whitening
 
 if TYPE_CHECKING:
     from elastocal.diagnosis.candidate_design import CandidateDesign
+    from elastocal.diagnosis.search import ScoredModel, SearchProblem
     from elastocal.effects.protocol import Candidate
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.noise import Noise
@@ -40,27 +34,25 @@ if TYPE_CHECKING:
     # Effects with normal priors on their parameters, and values of their shapes.
     SelectedEffects = tuple[tuple[Candidate, np.ndarray], ...]
 
-# Of the mean square; each step leaves what the error common to a pose makes of it,
-# which does not grow.
-_NOISE_STEPS = 20
-_NOISE_SETTLED = 0.02
+# Limits of the iteration for the noise beside a smaller pose error. Each step removes
+# the excess that does not come from the pose error, and the remaining part of the mean
+# square does not grow.
+_MAX_NOISE_STEPS = 20
+_NOISE_TOLERANCE = 0.02
 
 
-def select_effects(linearized: CandidateDesign, model: ScoredModel) -> SelectedEffects:
-    """What a model of the posterior is for the exact fit: without the competitor, which
-    predicts nothing."""
-    problem = linearized.problem
+def select_effects(design: CandidateDesign, model: ScoredModel) -> SelectedEffects:
+    """Select the effects of a model for the exact fit, with their priors; without the
+    discrepancy term, which predicts nothing elsewhere."""
+    problem = design.problem
     effects = []
-    for number, scale in zip(model.term_indices, model.scales, strict=True):
-        unit = problem.terms[number]
-        if unit.candidate:
-            size = min(scale, problem.grid.root_mean_square(unit))
-            effects.append(
-                (
-                    set_prior_std(unit.candidate, size * unit.sizes),
-                    np.array(unit.shapes, float),
-                )
-            )
+    for index, scale in zip(model.term_indices, model.scales, strict=True):
+        term = problem.terms[index]
+        if term.candidate is None:
+            continue
+        size = min(scale, problem.grid.root_mean_square(term))
+        effect = set_prior_std(term.candidate, size * term.sizes)
+        effects.append((effect, np.array(term.shapes, float)))
     return tuple(effects)
 
 
@@ -68,97 +60,123 @@ def fit_selected_effects(
     declared: Fit,
     observations: Observations,
     noise: Noise,
-    chosen: SelectedEffects,
+    effects: SelectedEffects,
     near: Fit | None = None,
-    **options: float,
+    tolerance: float = CONVERGENCE_TOLERANCE,
 ) -> Fit:
-    """Fit the declared model with the effects of a selected one.
+    """Fit the declared model with selected effects.
 
-    `declared`: where the search starts. `noise`: of measurements and poses, as the
-    selected model leaves it. `near`: with other effects: the search then starts from
-    its values of those that are the same. `**options`: of `fitting.fit`.
+    Parameters
+    ----------
+    declared
+        Fit of the declared model, from whose estimate the iteration starts.
+    observations
+        Measurements to fit.
+    noise
+        Noise of measurements and poses, as the selected model leaves it.
+    effects
+        Effects with their priors and values of their shapes.
+    near
+        A fit with other effects, if there is one. The iteration starts from its
+        estimate, with its values of the effects that both models have.
+    tolerance
+        Convergence tolerance, in standard errors.
     """
-    model = declared.model
-    effects = [candidate for candidate, _ in chosen]
-    start = declared.estimate.with_effects(effects)
-    start = replace(
-        start, shapes=(*declared.estimate.shapes, *(shapes for _, shapes in chosen))
-    )
+    candidates = [candidate for candidate, _ in effects]
+    model = declared.model.with_effects(candidates)
+    estimate = declared.estimate
+    shapes = (*estimate.shapes, *(values for _, values in effects))
+    start = replace(estimate.with_effects(candidates), shapes=shapes)
     if near is not None:
-        met = {effect.key for effect in near.model.effects}
-        values = zip((*model.effects, *effects), start.coefficients, strict=True)
+        keys_near = {effect.key for effect in near.model.effects}
         coefficients = tuple(
-            near.effect_values(effect.key)[0] if effect.key in met else value
-            for effect, value in values
+            near.effect_values(effect.key)[0] if effect.key in keys_near else values
+            for effect, values in zip(model.effects, start.coefficients, strict=True)
         )
-        start = replace(near.estimate, coefficients=coefficients, shapes=start.shapes)
+        start = replace(near.estimate, coefficients=coefficients, shapes=shapes)
     return fit_model(
-        model.with_effects(effects),
+        model,
         observations,
         noise,
         start,
         reweight_first_step=near is not None,
-        **options,
+        tolerance=tolerance,
     )
 
 
 def predict_reduced_chi_square(problem: SearchProblem, model: ScoredModel) -> float:
-    """Mean square of the whitened residual that a model leaves, by the linearised
-    problem: 1 where noise accounts for it."""
+    """Predict the mean square of the whitened residual of a model by the linearised
+    problem; it is 1 if the noise accounts for the residual."""
     statistics = problem.statistics
-    columns, coefficients, place = problem.find_mode(model)
-    return float(
-        (
-            statistics.residual_squares[place]
-            - statistics.score[place, columns] @ coefficients
-        )
-        / statistics.degrees_of_freedom
+    columns, coefficients, index = problem.find_mode(model)
+    squares = (
+        statistics.residual_squares[index]
+        - statistics.score[index, columns] @ coefficients
     )
+    return float(squares / statistics.degrees_of_freedom)
 
 
 def compute_reduced_chi_square(fitted: Fit) -> float:
-    """The same of an exact fit, over all that is left free, its priors included: 1
-    where it left the noise that it has."""
+    """Compute the mean square of the whitened residual of an exact fit and of its
+    priors, per degree of freedom; it is 1 if the noise of the fit accounts for it."""
     white = fitted.whiten(fitted.residual)
-    squares = (white**2).sum() + (
-        (get_parameter_values(fitted.model, fitted.estimate) / fitted.prior_std) ** 2
-    ).sum()
-    return float(
-        squares
-        / (white.size - (np.isinf(fitted.prior_std) & ~fitted.unidentifiable).sum())
-    )
+    values = get_parameter_values(fitted.model, fitted.estimate)
+    squares = (white**2).sum() + ((values / fitted.prior_std) ** 2).sum()
+    free_without_prior = np.isinf(fitted.prior_std) & ~fitted.unidentifiable
+    return float(squares / (white.size - free_without_prior.sum()))
 
 
 def limit_pose_error(fitted: Fit, observations: Observations, pose_rad: float) -> Noise:
-    """Noise of measurements that a fit leaves if those of a pose have no more in
-    common: by it the mean square stays."""
+    """Estimate the noise of measurements if a pose error is no larger than a limit.
+
+    Parameters
+    ----------
+    fitted
+        A fit, whose pose error may exceed the limit.
+    observations
+        Measurements that it was fitted to.
+    pose_rad
+        The limit.
+
+    Returns
+    -------
+    Noise
+        Noise by which the residual has the same mean square as by the noise of the fit.
+    """
     noise = replace(fitted.noise, pose_rad=min(fitted.noise.pose_rad, pose_rad))
-    usual = (fitted.whiten(fitted.residual) ** 2).mean()
+    jacobian = fitted.joint_jacobian
+    if jacobian is None:
+        return noise
+    mean_square = (fitted.whiten(fitted.residual) ** 2).mean()
     residual = fitted.residual * np.sqrt(fitted.weights)[:, None]
-    for _ in range(_NOISE_STEPS if fitted.joint_jacobian is not None else 0):
-        over = (
-            compute_whitening(observations, fitted.joint_jacobian, noise).apply(
-                residual
-            )
-            ** 2
-        ).mean() / usual
-        noise = noise.scaled(float(np.sqrt(over)))
-        if over < 1.0 + _NOISE_SETTLED:
+    for _ in range(_MAX_NOISE_STEPS):
+        white = compute_whitening(observations, jacobian, noise).apply(residual)
+        excess = (white**2).mean() / mean_square
+        noise = noise.scaled(float(np.sqrt(excess)))
+        if excess < 1.0 + _NOISE_TOLERANCE:
             break
     return noise
 
 
 def estimate_residual_noise(
-    problem: SearchProblem, model: ScoredModel, taken: Noise, least: Noise
+    problem: SearchProblem, model: ScoredModel, whitening_noise: Noise, lowest: Noise
 ) -> Noise:
-    """Noise as a model leaves it.
+    """Estimate the noise that a model leaves, by the linearised problem.
 
-    `taken`: by which the problem was whitened. `least`: that repeats or the campaign
-    say, below which it does not fall.
+    Parameters
+    ----------
+    problem
+        The linearised problem.
+    model
+        One of its models.
+    whitening_noise
+        Noise by which the problem was whitened.
+    lowest
+        Noise that repeats show or the campaign declares, below which the estimate does
+        not fall.
     """
-    left = predict_reduced_chi_square(problem, model)
-    factor = float(np.sqrt(max(left * (taken.position_m / least.position_m) ** 2, 1.0)))
-    return replace(
-        least.scaled(factor),
-        pose_rad=float(np.sqrt(max(left, 1.0))) * model.pose_error_rad,
-    )
+    chi_square = predict_reduced_chi_square(problem, model)
+    ratio = whitening_noise.position_m / lowest.position_m
+    factor = float(np.sqrt(max(chi_square * ratio**2, 1.0)))
+    pose_rad = float(np.sqrt(max(chi_square, 1.0))) * model.pose_error_rad
+    return replace(lowest.scaled(factor), pose_rad=pose_rad)

@@ -267,8 +267,8 @@ def compute_cross_products(
         priors keep the problem well posed
     present : (P,), present value of each declared parameter less its prior mean
     """
-    observations, components, declared_count = rows.declared.shape
-    declared = rows.declared.reshape(observations * components, declared_count)
+    declared_count = rows.declared.shape[2]
+    declared = rows.declared.reshape(-1, declared_count)
     augmented = np.concatenate([declared, np.diag(1.0 / prior_std)])
     norms = np.linalg.norm(augmented, axis=0)
     basis, triangle = np.linalg.qr(augmented / norms)
@@ -276,14 +276,11 @@ def compute_cross_products(
     residual = np.concatenate([rows.residual.ravel(), -present / prior_std])
     basis_and_residual = np.concatenate(
         [measured_basis, rows.residual.reshape(-1, 1)], axis=1
-    ).reshape(observations, components, declared_count + 1)
+    ).reshape(*rows.residual.shape, declared_count + 1)
     products = rows.candidates.times(basis_and_residual)
     projections = np.concatenate(
         [products[:, :-1].T, (basis.T @ residual)[:, None]], axis=1
     )
-    orthogonal_residual = residual - basis @ projections[:, -1]
-    # A second projection removes the rounding of the first.
-    orthogonal_residual -= basis @ (basis.T @ orthogonal_residual)
     gram = np.eye(projections.shape[1] + declared_count)
     spanned = _fill_candidate_products(
         gram[declared_count:, declared_count:],
@@ -291,7 +288,10 @@ def compute_cross_products(
         products[:, -1],
         projections,
     )
-    gram[-1, -1] = orthogonal_residual @ orthogonal_residual
+    residual -= basis @ projections[:, -1]
+    # A second projection removes the rounding of the first.
+    residual -= basis @ (basis.T @ residual)
+    gram[-1, -1] = residual @ residual
     return CrossProducts(
         rows,
         basis_and_residual,
@@ -385,65 +385,98 @@ class SufficientStatistics:
         return gram - low_rank @ low_rank.swapaxes(-1, -2)
 
 
+class _PoseErrorEquations:
+    """Normal equations at T sizes of the pose error, from which the correction for the
+    pose error is subtracted one block of poses after the other.
+
+    The rows of the declared parameters are dense. The block of the K candidates and the
+    residual is dense for each size, or shared by all with the correction in factors.
+    """
+
+    def __init__(self, products: CrossProducts, sizes: np.ndarray) -> None:
+        declared = products.declared_count
+        columns = len(products.gram) - declared
+        correction_rows = (int(products.rows.pose.max()) + 1) * products.axes + declared
+        self.sizes = sizes
+        self.declared_count = declared
+        self.is_factored = correction_rows * _COLUMNS_A_ROW < columns
+        # Without a pose error the declared columns are orthonormal, and orthogonal to
+        # all others.
+        self.declared_rows = np.tile(products.gram[:declared], (len(sizes), 1, 1))
+        self.gram = products.gram[None, declared:, declared:]
+        if not self.is_factored:
+            self.gram = np.tile(self.gram, (len(sizes), 1, 1))
+        rank = correction_rows if self.is_factored else 0
+        self.low_rank = np.zeros((len(sizes), columns, rank))
+        self.log_dets = np.zeros(len(sizes))
+        self._first_row = 0
+
+    def _subtract_square(self, number: int, rows: np.ndarray) -> None:
+        """Subtract the product of some rows (r, K + 1) with themselves."""
+        if self.is_factored:
+            chosen = slice(self._first_row, self._first_row + len(rows))
+            self.low_rank[number, :, chosen] = rows.T
+        else:
+            self.gram[number] -= rows.T @ rows
+
+    def subtract_correction(self, block: PoseBlock) -> None:
+        """Subtract the correction for the pose error of some poses."""
+        declared = self.declared_count
+        for number in np.flatnonzero(self.sizes).tolist():
+            tau = self.sizes[number]
+            widened = 1.0 + tau**2 * block.eigenvalues
+            scaled = block.products * (tau / np.sqrt(widened))[..., None]
+            rows = scaled.reshape(-1, scaled.shape[2])
+            self.declared_rows[number] -= rows[:, :declared].T @ rows
+            self._subtract_square(number, np.ascontiguousarray(rows[:, declared:]))
+            self.log_dets[number] += np.log1p(tau**2 * block.eigenvalues).sum()
+        self._first_row += block.eigenvalues.size
+
+    def eliminate_declared(self) -> list[Elimination]:
+        """Eliminate the declared parameters at each size of the pose error."""
+        declared = self.declared_count
+        factors = np.linalg.cholesky(self.declared_rows[:, :, :declared])
+        eliminations = []
+        for number, tau in enumerate(self.sizes):
+            coupling = self.declared_rows[number, :, declared:]
+            if tau:
+                coupling = solve_triangular(factors[number], coupling, lower=True)
+                self._subtract_square(number, coupling)
+            eliminations.append(
+                Elimination(
+                    factors[number],
+                    coupling,
+                    self.gram[0 if self.is_factored else number],
+                    self.low_rank[number],
+                )
+            )
+        return eliminations
+
+
 def compute_statistics(
     products: CrossProducts, pose_error_rad: np.ndarray
 ) -> SufficientStatistics:
     """Compute the sufficient statistics at some sizes of the pose error (T,)."""
-    declared = products.declared_count
     sizes = np.asarray(pose_error_rad)
-    columns = len(products.gram) - declared
-    # Without a pose error the declared columns are orthonormal, and orthogonal to all
-    # others.
-    declared_rows = np.tile(products.gram[:declared], (len(sizes), 1, 1))
-    gram = products.gram[None, declared:, declared:]
-    correction_rows = (int(products.rows.pose.max()) + 1) * products.axes + declared
-    in_factors = correction_rows * _COLUMNS_A_ROW < columns
-    if not in_factors:
-        gram = np.tile(gram, (len(sizes), 1, 1))
-    rank = correction_rows if in_factors else 0
-    low_rank = np.zeros((len(sizes), columns, rank))
-
-    def subtract_square(number: int, rows: np.ndarray, first: int) -> None:
-        """Subtract the product of some rows (r, K + 1) with themselves."""
-        if in_factors:
-            low_rank[number, :, first : first + len(rows)] = rows.T
-        else:
-            gram[number] -= rows.T @ rows
-
-    first_row = 0
-    log_dets = np.zeros(len(sizes))
-    for block in products.iterate_poses() if sizes.any() else ():
-        for number in np.flatnonzero(sizes).tolist():
-            tau = sizes[number]
-            widened = 1.0 + tau**2 * block.eigenvalues
-            scaled = block.products * (tau / np.sqrt(widened))[..., None]
-            rows = scaled.reshape(-1, declared + columns)
-            declared_rows[number] -= rows[:, :declared].T @ rows
-            subtract_square(number, np.ascontiguousarray(rows[:, declared:]), first_row)
-            log_dets[number] += np.log1p(tau**2 * block.eigenvalues).sum()
-        first_row += block.eigenvalues.size
-    factors = np.linalg.cholesky(declared_rows[:, :, :declared])
-    for number, tau in enumerate(sizes):
-        coupling = declared_rows[number, :, declared:]
-        if tau:
-            coupling = solve_triangular(factors[number], coupling, lower=True)
-            subtract_square(number, coupling, first_row)
-        elimination = Elimination(
-            factors[number],
-            coupling,
-            gram[0 if in_factors else number],
-            low_rank[number],
-        )
+    equations = _PoseErrorEquations(products, sizes)
+    if sizes.any():
+        for block in products.iterate_poses():
+            equations.subtract_correction(block)
+    eliminations = equations.eliminate_declared()
+    for tau, elimination in zip(sizes, eliminations, strict=True):
         products.eliminations.store(float(tau), elimination)
-    last_row = gram[:, -1] - (low_rank @ low_rank[:, -1, :, None])[..., 0]
+    factors = np.array([elimination.factor for elimination in eliminations])
     log_factors = np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
+    gram = equations.gram
+    low_rank = equations.low_rank
+    last_row = gram[:, -1] - (low_rank @ low_rank[:, -1, :, None])[..., 0]
     return SufficientStatistics(
         sizes,
         gram[:, :-1, :-1],
         low_rank[:, :-1],
         score=last_row[:, :-1],
         residual_squares=last_row[:, -1],
-        log_likelihood=-0.5 * log_dets - log_factors,
+        log_likelihood=-0.5 * equations.log_dets - log_factors,
         degrees_of_freedom=products.degrees_of_freedom,
     )
 

@@ -2,16 +2,45 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.data_checks.faults import compliance_warnings
-from elastocal.diagnosis import model_averaging, refit, verdict
+from elastocal.diagnosis import refit
+from elastocal.diagnosis.effect_estimates import (
+    format_location,
+    state_effects,
+    state_fault,
+    warn_of_implausible_values,
+)
 from elastocal.diagnosis.gross_errors import format_gross_error_warnings
+from elastocal.diagnosis.model_averaging import (
+    ModelAverage,
+    average_models,
+    compute_between_model_squares,
+)
+from elastocal.diagnosis.verdict import (
+    MIN_REPORTED_PROBABILITY,
+    NAMED,
+    SEVERAL,
+    list_locations,
+    warn_of_scatter,
+)
 from elastocal.fitting.model import get_joint_compliances
-from elastocal.fitting.noise import serialize_noise
+from elastocal.verdict import (
+    Compliances,
+    Convergence,
+    DataFault,
+    Effect,
+    MechanismSet,
+    Misfit,
+    NoiseEstimate,
+    Probabilities,
+    Setting,
+    TrainingVerdict,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,11 +48,11 @@ if TYPE_CHECKING:
     from elastocal.data_checks.protocol import Fault
     from elastocal.diagnosis.diagnose import Step
     from elastocal.diagnosis.settings import Settings
-    from elastocal.diagnosis.verdict import Evidence
+    from elastocal.diagnosis.verdict import Evidence, Hypothesis
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Case
     from elastocal.fitting.noise import Noise
-    from elastocal.remainder.repeatable import Repeatable
+    from elastocal.verdict import GrossError, RepeatableResidual
 
 
 @dataclass(frozen=True)
@@ -48,10 +77,10 @@ class TrainingResult:
         Warnings that come before those of this module.
     contradictions : tuple of str
         Reasons why the declared model is not called adequate.
-    repeatable : Repeatable or None
-        What the kept model leaves that is a function of the joints.
-    gross_errors : tuple of dict
-        Entries of the rows that were left out.
+    repeatable : RepeatableResidual or None
+        Part of the residual of the kept model that is a function of the joints.
+    gross_errors : tuple of GrossError
+        Rows that were left out.
     """
 
     case: Case
@@ -62,171 +91,262 @@ class TrainingResult:
     faults: Sequence[Fault]
     warnings: tuple[str, ...]
     contradictions: tuple[str, ...]
-    repeatable: Repeatable | None
-    gross_errors: tuple[dict[str, Any], ...]
+    repeatable: RepeatableResidual | None
+    gross_errors: tuple[GrossError, ...]
 
 
 def state_training_verdict(
     result: TrainingResult, settings: Settings
-) -> dict[str, Any]:
-    """Return the contents of verdict.json, without what validation poses add."""
-    document = _document(
-        result.case,
-        result.noise,
-        result.steps,
-        result.full_model,
-        result.evidence,
-        result.faults,
-        settings,
-        result.warnings,
-    )
-    document |= {
-        "contradictions": list(result.contradictions),
-        "gross_errors": list(result.gross_errors),
-        "repeatable": result.repeatable and asdict(result.repeatable),
+) -> TrainingVerdict:
+    """State the part of a verdict that the training poses decide."""
+    statement = _state_faults(result.faults)
+    if result.evidence:
+        statement = _state_evidence(result, result.evidence, settings)
+    declared = result.steps[1].fitted
+    final = result.steps[-1].fitted
+    warnings = [
+        *result.warnings,
+        *statement.warnings,
+        *compliance_warnings(final),
+        *warn_of_scatter(final.noise, result.noise, settings.relinearize_noise),
+        *_warn_of_convergence(declared, final),
+    ]
+    held = {
+        f"{owner} {parameter.name}"
+        for (owner, parameter), is_held in zip(
+            final.parameters, final.unidentifiable, strict=True
+        )
+        if is_held
     }
-    document["warnings"] += format_gross_error_warnings(list(result.gross_errors))
-    return document
-
-
-def _document(
-    case: Case,
-    noise: Noise,
-    steps: Sequence[Step],
-    with_effects: Fit,
-    found: Evidence | None,
-    known: Sequence[Fault],
-    settings: Settings,
-    warnings: Sequence[str],
-) -> dict[str, Any]:
-    declared = steps[1].fitted
-    final = steps[-1].fitted
-    springs = model_averaging.ModelAverage({}, {})
-    tested = set[str]()
-    stated: dict[str, Any] = {
-        "verdict": verdict.NAMED if len(known) == 1 else verdict.SEVERAL,
-        "effects": [verdict.fault_entry(fault) for fault in known],
-    } | dict.fromkeys(("probabilities", "misfit", "other_models_m"))
-    untestable: dict[str, str] = {}
-    remarks = [*warnings]
-    if found:
-        problem = found.linearized.problem
-        conclusion = found.conclusion
-        models = found.posterior.models
-        nothing = found.posterior.empty_model
-        best = models[conclusion.best.model] if conclusion.best.mechanisms else nothing
-        chosen = best if conclusion.best.named else nothing
-        kept = chosen if found.adopted else nothing
-        owners = [(owner, parameter.name) for owner, parameter in declared.parameters]
-        averages = model_averaging.average_models(
-            found.linearized, found.posterior, chosen, owners
-        )
-        springs = (
-            averages
-            if kept is chosen
-            else model_averaging.average_models(
-                found.linearized, found.posterior, nothing, owners
-            )
-        )
-        entries = verdict.effect_entries(
-            found, with_effects, averages, case.observations
-        )
-        untestable = found.linearized.untestable
-        other = model_averaging.compute_between_model_squares(
-            problem, found.posterior, kept
-        )
-        tested = {unit.candidate.key for unit in problem.terms if unit.candidate}
-        stated = {
-            "verdict": conclusion.verdict,
-            "effects": entries,
-            "probabilities": verdict.probability_facts(found),
-            "misfit": {
-                "before": refit.predict_reduced_chi_square(problem, nothing),
-                "after": refit.predict_reduced_chi_square(problem, best),
-            },
-            # Root mean square by which positions may be elsewhere by other models than
-            # the one that is kept.
-            "other_models_m": float(
-                np.sqrt(3.0 * other / found.linearized.products.degrees_of_freedom)
-            )
-            * noise.position_m,
-        }
-        if entries and not found.adopted:
-            remarks.append(
-                "what was found is too uncertain to make predictions better: the model stays as declared"
-            )
-        remarks += verdict.implausible(with_effects, entries)
-        if not found.settled:
-            words = f"the problem was linearised {settings.linearizations} times, and each time another model was found"
-            remarks.append(f"{words}: more may be missing")
-    remarks += compliance_warnings(final) + verdict.scatter_warnings(
-        final.noise, noise, settings.relinearize_noise
-    )
-    for name, fitted in (("declared", declared), ("final", final)):
-        if not fitted.converged:
-            remarks.append(
-                f"the fit of the {name} model did not converge: its parameters are not to be relied on"
-            )
-    return stated | {
-        "campaign": case.campaign.name,
-        "noise": serialize_noise(noise)
-        | {
-            "pose_rad": final.noise.pose_rad,
-            "factor": final.noise.position_m / noise.position_m,
+    return TrainingVerdict(
+        verdict=statement.verdict,
+        effects=statement.effects,
+        probabilities=statement.probabilities,
+        misfit=statement.misfit,
+        other_models_m=statement.other_models_m,
+        campaign=result.case.campaign.name,
+        noise=_state_noise(result.noise, final.noise),
+        heldout=None,
+        kept=result.steps[-1].kind.replace("kept", "frames"),
+        compliance_urad_per_Nm=_state_compliances(
+            declared, final, statement.compliance_average, settings.prior_share
+        ),
+        held=tuple(sorted(held)),
+        candidates_tested=statement.candidates_tested,
+        untestable=statement.untestable,
+        converged=Convergence(declared.converged, final.converged),
+        warnings=(
+            *dict.fromkeys(warnings),
+            *format_gross_error_warnings(list(result.gross_errors)),
+        ),
+        settings={
+            name: Setting(**entry) for name, entry in settings.document().items()
         },
-        "heldout": None,
-        "kept": steps[-1].kind.replace("kept", "frames"),
-        "compliance_urad_per_Nm": _compliances(
-            declared, final, springs, settings.prior_share
-        ),
-        "held": sorted(
-            {
-                f"{o} {p.name}"
-                for (o, p), held in zip(
-                    final.parameters, final.unidentifiable, strict=True
-                )
-                if held
-            }
-        ),
-        "candidates_tested": len(tested),
-        "untestable": untestable,
-        "converged": {"declared": declared.converged, "final": final.converged},
-        "warnings": list(dict.fromkeys(remarks)),
-        "settings": settings.document(),
-    }
+        contradictions=result.contradictions,
+        gross_errors=result.gross_errors,
+        repeatable=result.repeatable,
+    )
 
 
-def _compliances(
-    declared: Fit, final: Fit, springs: model_averaging.ModelAverage, prior_share: float
-) -> dict[str, list[float]]:
+@dataclass(frozen=True)
+class _Statement:
+    """Result of the search, or faults of the data, as verdict.json has them.
+
+    `compliance_average` corrects the compliances of the final model by those of other
+    probable models; `warnings` concern the search alone.
+    """
+
+    verdict: str
+    effects: tuple[Effect | DataFault, ...]
+    probabilities: Probabilities | None = None
+    misfit: Misfit | None = None
+    other_models_m: float | None = None
+    candidates_tested: int = 0
+    untestable: dict[str, str] = field(default_factory=dict)
+    compliance_average: ModelAverage = field(
+        default_factory=lambda: ModelAverage({}, {})
+    )
+    warnings: tuple[str, ...] = ()
+
+
+def _state_faults(faults: Sequence[Fault]) -> _Statement:
+    verdict = NAMED if len(faults) == 1 else SEVERAL
+    return _Statement(verdict, tuple(state_fault(fault) for fault in faults))
+
+
+def _state_evidence(
+    result: TrainingResult, evidence: Evidence, settings: Settings
+) -> _Statement:
+    """State the result of the search."""
+    design = evidence.linearized
+    posterior = evidence.posterior
+    best = evidence.conclusion.best
+    declared = result.steps[1].fitted
+    best_model = posterior.empty_model
+    if best.mechanisms:
+        best_model = posterior.models[best.model]
+    # The competitor alone predicts nothing that could be kept.
+    named_model = best_model if best.named else posterior.empty_model
+    kept_model = named_model if evidence.adopted else posterior.empty_model
+    owners = [(owner, parameter.name) for owner, parameter in declared.parameters]
+    average = average_models(design, posterior, named_model, owners)
+    kept_average = average
+    if kept_model is not named_model:
+        kept_average = average_models(design, posterior, kept_model, owners)
+    effects = state_effects(
+        evidence, result.full_model, average, result.case.observations
+    )
+    between_models = compute_between_model_squares(
+        design.problem, posterior, kept_model
+    )
+    tested = {term.candidate.key for term in design.problem.terms if term.candidate}
+    return _Statement(
+        verdict=evidence.conclusion.verdict,
+        effects=effects,
+        probabilities=_state_probabilities(evidence),
+        misfit=Misfit(
+            refit.predict_reduced_chi_square(design.problem, posterior.empty_model),
+            refit.predict_reduced_chi_square(design.problem, best_model),
+        ),
+        other_models_m=float(
+            np.sqrt(3.0 * between_models / design.products.degrees_of_freedom)
+        )
+        * result.noise.position_m,
+        candidates_tested=len(tested),
+        untestable=design.untestable,
+        compliance_average=kept_average,
+        warnings=_warn_of_search(evidence, result.full_model, effects, settings),
+    )
+
+
+def _warn_of_search(
+    evidence: Evidence,
+    full_model: Fit,
+    effects: tuple[Effect, ...],
+    settings: Settings,
+) -> tuple[str, ...]:
+    """Return warnings of effects that were not adopted or are implausible, and of a
+    search that did not settle."""
+    warnings = []
+    if effects and not evidence.adopted:
+        warnings.append(
+            "what was found is too uncertain to make predictions better: "
+            "the model stays as declared"
+        )
+    keys = [key for effect in effects for key in effect.members]
+    warnings += warn_of_implausible_values(full_model, keys)
+    if not evidence.settled:
+        warnings.append(
+            f"the problem was linearised {settings.linearizations} times, "
+            "and each time another model was found: more may be missing"
+        )
+    return tuple(warnings)
+
+
+def _warn_of_convergence(declared: Fit, final: Fit) -> list[str]:
+    return [
+        f"the fit of the {name} model did not converge: its parameters are not to be relied on"
+        for name, fitted in (("declared", declared), ("final", final))
+        if not fitted.converged
+    ]
+
+
+def _state_probabilities(evidence: Evidence) -> Probabilities:
+    """State the probabilities that are worth reporting; each set of mechanisms has the
+    locations of its most probable model."""
+    conclusion = evidence.conclusion
+    sets = []
+    for hypothesis in conclusion.hypotheses:
+        if hypothesis.probability < MIN_REPORTED_PROBABILITY:
+            continue
+        sets.append(
+            MechanismSet(
+                hypothesis.mechanisms,
+                hypothesis.probability,
+                {
+                    name: _list_location_words(evidence, hypothesis, name)
+                    for name in hypothesis.mechanisms
+                },
+            )
+        )
+    return Probabilities(
+        nothing=next(
+            hypothesis.probability
+            for hypothesis in conclusion.hypotheses
+            if not hypothesis.mechanisms
+        ),
+        stated=conclusion.probability,
+        alarm_p_value=evidence.alarm.p_value,
+        mechanisms={
+            name: probability
+            for name, probability in conclusion.mechanisms.items()
+            if probability >= MIN_REPORTED_PROBABILITY
+        },
+        sets=tuple(sets),
+    )
+
+
+def _list_location_words(
+    evidence: Evidence, hypothesis: Hypothesis, mechanism: str
+) -> tuple[str, ...]:
+    model = evidence.posterior.models[hypothesis.model]
+    locations = list_locations(evidence.linearized.problem, model, mechanism)
+    return tuple(format_location(mechanism, location) for location in locations)
+
+
+def _state_noise(measured: Noise, final: Noise) -> NoiseEstimate:
+    """State the noise of the measurements, with the pose error and the scatter of the
+    final model."""
+    return NoiseEstimate(
+        source=measured.source,
+        position_m=measured.position_m,
+        orientation_rad=measured.orientation_rad,
+        joint_rad=tuple(measured.joint_rad.tolist()),
+        degrees_of_freedom=measured.degrees_of_freedom,
+        pose_rad=final.pose_rad,
+        factor=final.position_m / measured.position_m,
+    )
+
+
+def _state_compliances(
+    declared: Fit, final: Fit, average: ModelAverage, prior_share: float
+) -> Compliances:
+    """State the joint compliances, averaged over models where they are identified.
+
+    Parameters
+    ----------
+    declared, final : Fit
+        Fits of the declared and of the final model.
+    average : ModelAverage
+        Corrections by the other models.
+    prior_share : float
+        Largest share of the prior variance that an identifiable compliance keeps.
+    """
     joints = final.model.sites.joints
     after = get_joint_compliances(final.model, final.estimate).copy()
-    deviations = np.zeros(joints)
-    identified = np.zeros(joints, bool)
+    std_error = np.zeros(joints)
+    identifiable = np.zeros(joints, bool)
     if final.model.identifies_compliance:
-        mine = final.parameter_indices("joint_compliance")
-        names = [
-            ("joint_compliance", final.parameters[index][1].name) for index in mine
-        ]
-        alone = np.sqrt(np.diag(final.covariance))[mine]
-        after += [springs.shift.get(name, 0.0) for name in names]
-        deviations = np.array(
+        indices = final.parameter_indices("joint_compliance")
+        parameters = [final.parameters[index][1] for index in indices]
+        keys = [("joint_compliance", parameter.name) for parameter in parameters]
+        after += [average.shift.get(key, 0.0) for key in keys]
+        fit_errors = np.sqrt(np.diag(final.covariance))[indices]
+        std_error = np.array(
             [
-                springs.std_error.get(name, error)
-                for name, error in zip(names, alone, strict=True)
+                average.std_error.get(key, fit_error)
+                for key, fit_error in zip(keys, fit_errors, strict=True)
             ]
         )
-        # With a prior of the size that such a spring reaches, of which that share would
-        # be left.
-        plausible = np.array([final.parameters[index][1].plausible for index in mine])
-        identified = ~final.unidentifiable[mine] & (
-            deviations**2 < prior_share * (deviations**2 + plausible**2)
+        # The prior is taken to be as wide as the largest plausible compliance.
+        plausible = np.array([parameter.plausible for parameter in parameters])
+        identifiable = ~final.unidentifiable[indices] & (
+            std_error**2 < prior_share * (std_error**2 + plausible**2)
         )
-    found = {
-        "before": get_joint_compliances(declared.model, declared.estimate),
-        "after": after,
-        "std_error": deviations,
-    }
-    return {name: (1e6 * values).tolist() for name, values in found.items()} | {
-        "identifiable": identified.tolist()
-    }
+    before = get_joint_compliances(declared.model, declared.estimate)
+    return Compliances(
+        before=tuple((1e6 * before).tolist()),
+        after=tuple((1e6 * after).tolist()),
+        std_error=tuple((1e6 * std_error).tolist()),
+        identifiable=tuple(identifiable.tolist()),
+    )

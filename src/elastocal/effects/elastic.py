@@ -94,9 +94,14 @@ def _bending(sites: Sites) -> list[tuple[tuple[int, ...], str]]:
     at=_bending,
     part="link",
     detail_words={_ONE_SECTION: "all of one cross-section"},
+    formula=(
+        r"y = \frac{F_y l^3 a}{E I} + \frac{M_z l^2 b}{E I}, \quad r_z = "
+        r"\frac{F_y l^2 b}{E I} + \frac{M_z l c}{E I}, \quad r_x = \frac{M_x l "
+        r"c}{G J}"
+    ),
 )
 def link_elasticity(
-    own: Effect, sites: Sites, links: tuple[int, ...], detail: str
+    entry: Effect, sites: Sites, links: tuple[int, ...], detail: str
 ) -> Candidates:
     """A link that bends and twists: a cantilever between two joints.
 
@@ -131,10 +136,12 @@ def link_elasticity(
     length = float(np.linalg.norm(sites.link_vectors_m[longest]))
     before = max(longest - 1, 0)
     names = ("bending_1_over_EI", "torsion_1_over_GJ")
-    parameters = own.parameters("1/EI", names, "1/(N m^2)", sites, before, over=length)
+    parameters = entry.parameters(
+        "1/EI", names, "1/(N m^2)", sites, before, over=length
+    )
     joints = tuple(k for k in links if k)
     needs = load_behind(sites, max(links))
-    yield own.candidate(
+    yield entry.candidate(
         joints,
         parameters,
         law,
@@ -179,8 +186,9 @@ def _end_compliance(
         sign=1,
     ),
     at=every_joint,
+    formula=r"\theta_e = c_e\, (e \cdot M_i)",
 )
-def joint_tilt(own: Effect, sites: Sites, joint: int) -> Candidates:
+def joint_tilt(entry: Effect, sites: Sites, joint: int) -> Candidates:
     """A bearing that tilts across its axis under the moment that it carries.
 
     theta_e = c_e (e . M_i) at joint i, with theta_e the tilt (rad) about each of the
@@ -194,7 +202,7 @@ def joint_tilt(own: Effect, sites: Sites, joint: int) -> Candidates:
         for axis in range(3)
         if sites.prismatic[joint] or axis != sites.joint_axes[joint]
     ]
-    tilts = own.parameters(
+    tilts = entry.parameters(
         "tilt",
         [f"tilt_about_{'xyz'[axis]}" for axis in across],
         "rad/(N m)",
@@ -202,15 +210,19 @@ def joint_tilt(own: Effect, sites: Sites, joint: int) -> Candidates:
         joint,
     )
     law = _springs([sites.tilt[joint][axis]] for axis in across)
-    yield own.candidate((joint + 1,), tilts, law, load_behind(sites, joint))
+    yield entry.candidate((joint + 1,), tilts, law, load_behind(sites, joint))
 
 
 @_effect(
     "elasticity of the foundation",
     Size("tilt", 0.3, "a foundation is stiffer than what it bears", STIFFEST, sign=1),
     Size("shift", 0.01, "the same at a fifth of the reach", SHIFT, sign=1),
+    formula=(
+        r"u = C \begin{pmatrix} F \\ M + p \times F \end{pmatrix}, \quad C = "
+        r"\mathrm{diag}(c_h, c_h, c_v, c_t, c_t, 0)"
+    ),
 )
-def base_compliance(own: Effect, sites: Sites) -> Candidates:
+def base_compliance(entry: Effect, sites: Sites) -> Candidates:
     """A foundation that yields elastically: floor, anchors or pedestal let the foot of
     the robot shift and tilt under the load.
 
@@ -221,9 +233,9 @@ def base_compliance(own: Effect, sites: Sites) -> Candidates:
     of a joint 1 that turns about it, and is not counted again.
     """
     tx, ty, tz, rx, ry, _ = sites.base
-    shifts = own.parameters("shift", ["horizontal", "vertical"], "m/N", sites)
-    tilt = own.parameters("tilt", ["tilt"], "rad/(N m)", sites)
-    every = own.candidate(
+    shifts = entry.parameters("shift", ["horizontal", "vertical"], "m/N", sites)
+    tilt = entry.parameters("tilt", ["tilt"], "rad/(N m)", sites)
+    every = entry.candidate(
         (), (*shifts, *tilt), _springs([(tx, ty), (tz,), (rx, ry)]), {"load"}
     )
     # Rocking alone is what most foundations do.
@@ -239,8 +251,9 @@ def base_compliance(own: Effect, sites: Sites) -> Candidates:
         JOINT,
     ),
     at=lambda sites: combinations([joint for (joint,) in turning_joints(sites)], 2),
+    formula=r"\theta_i = c_{ij} \tau_j, \quad \theta_j = c_{ij} \tau_i",
 )
-def cross_compliance(own: Effect, sites: Sites, one: int, other: int) -> Candidates:
+def cross_compliance(entry: Effect, sites: Sites, one: int, other: int) -> Candidates:
     """Elastic coupling of two joints: each turns under the torque of the other, as
     where one flexible casting holds both gears.
 
@@ -251,10 +264,10 @@ def cross_compliance(own: Effect, sites: Sites, one: int, other: int) -> Candida
     the link between them.
     """
     both = (one + 1, other + 1)
-    coupling = own.parameters(
+    coupling = entry.parameters(
         "coupling", ["compliance"], "rad/(N m)", sites, one, other
     )
-    yield own.candidate(
+    yield entry.candidate(
         both,
         coupling,
         lambda around: [{one: around.total[:, other], other: around.total[:, one]}],
@@ -266,8 +279,9 @@ def cross_compliance(own: Effect, sites: Sites, one: int, other: int) -> Candida
     "angle-dependent stiffness",
     Size("variation", 0.3, "teeth and rollers in mesh vary by a third", JOINT),
     at=turning_joints,
+    formula=r"\theta_i = \tau_i (u \cos q_i + v \sin q_i)",
 )
-def joint_dependent_stiffness(own: Effect, sites: Sites, joint: int) -> Candidates:
+def joint_dependent_stiffness(entry: Effect, sites: Sites, joint: int) -> Candidates:
     """A joint compliance that changes with the angle of the joint: teeth, rollers and
     housing are not equally stiff all round.
 
@@ -277,10 +291,10 @@ def joint_dependent_stiffness(own: Effect, sites: Sites, joint: int) -> Candidat
     beside the mean, which is the compliance of the model.
     """
 
-    variation = own.parameters(
+    variation = entry.parameters(
         "variation", ["cos_q", "sin_q"], "rad/(N m)", sites, joint
     )
-    yield own.of_joint(
+    yield entry.of_joint(
         joint, variation, lambda around: _softer(around, joint, 1), LOADED_JOINTS
     )
 
@@ -297,8 +311,12 @@ def _softer(around: Conditions, joint: int, *orders: int) -> list[np.ndarray]:
     "stiffness of the gravity compensator",
     Size("variation", 0.3, "a compensator is an order softer than its gear", JOINT),
     at=compensated_joint,
+    formula=(
+        r"k = -\frac{dT}{dq} = K a L \left[ \frac{s_0}{s} \left( \cos p + \frac{a "
+        r"L \sin^2 p}{s^2} \right) - \cos p \right], \quad p = \alpha + q"
+    ),
 )
-def compensator_stiffness(own: Effect, sites: Sites, joint: int) -> Candidates:
+def compensator_stiffness(entry: Effect, sites: Sites, joint: int) -> Candidates:
     """Stiffness that a gravity compensator adds to the shoulder: its spring resists a
     turn more in some poses than in others.
 
@@ -311,8 +329,8 @@ def compensator_stiffness(own: Effect, sites: Sites, joint: int) -> Candidates:
     v in rad/(N m).
     """
 
-    variation = wave_parameters(own, "variation", "rad/(N m)", sites, joint)
-    yield own.of_joint(
+    variation = wave_parameters(entry, "variation", "rad/(N m)", sites, joint)
+    yield entry.of_joint(
         joint, variation, lambda around: _softer(around, joint, 1, 2), LOADED_JOINTS
     )
 
@@ -327,8 +345,9 @@ def compensator_stiffness(own: Effect, sites: Sites, joint: int) -> Candidates:
         sign=1,
     ),
     Size("shift", 1e-2, "the same at a tenth of the reach", SHIFT, sign=1),
+    formula=r"u = C w, \quad C \text{ diagonal}",
 )
-def flange_flexibility(own: Effect, sites: Sites) -> Candidates:
+def flange_flexibility(entry: Effect, sites: Sites) -> Candidates:
     """A flange, its bearing or a tool changer that yields elastically: what holds the
     tool is a spring behind the last joint.
 
@@ -337,11 +356,13 @@ def flange_flexibility(own: Effect, sites: Sites) -> Candidates:
     (Klimchik et al. 2014). The turn about the axis of the last joint is held by the fit
     where its compliance is identified.
     """
-    shifts = own.parameters("shift", [f"shift_{axis}" for axis in "xyz"], "m/N", sites)
-    turns = own.parameters(
+    shifts = entry.parameters(
+        "shift", [f"shift_{axis}" for axis in "xyz"], "m/N", sites
+    )
+    turns = entry.parameters(
         "turn", [f"turn_{axis}" for axis in "xyz"], "rad/(N m)", sites, sites.joints - 1
     )
-    every = own.candidate(
+    every = entry.candidate(
         (), (*shifts, *turns), _springs([c] for c in sites.link_end[-1]), LOADED_JOINTS
     )
     # Turns alone are most of what a flange does.

@@ -50,8 +50,9 @@ CAUSES = {"temperature": (), "time": (Shape("lag", "s", 3600.0, 900.0, 36000.0),
     Size("turn", 1e-3, "mastering by marks; measured robots have up to 10 mrad"),
     Size("shift", 4e-4, "as links", REACH),
     at=every_joint,
+    formula=r"\theta_i = \delta_i",
 )
-def joint_offset(own: Effect, sites: Sites, joint: int) -> Candidates:
+def joint_offset(entry: Effect, sites: Sites, joint: int) -> Candidates:
     """Zero offset of a joint: its encoder was mastered a little off the mark.
 
     theta_i = delta_i at every pose, with and without load, in rad (m for a prismatic
@@ -59,8 +60,8 @@ def joint_offset(own: Effect, sites: Sites, joint: int) -> Candidates:
     last one of the tool: identifiable only where frame and target are known.
     """
     quantity, unit = ("shift", "m") if sites.prismatic[joint] else ("turn", "rad")
-    offset = own.parameters(quantity, ["offset"], unit, sites)
-    yield own.of_joint(joint, offset, lambda around: [around.always], fixed=True)
+    offset = entry.parameters(quantity, ["offset"], unit, sites)
+    yield entry.of_joint(joint, offset, lambda around: [around.always], fixed=True)
 
 
 @_effect(
@@ -69,8 +70,9 @@ def joint_offset(own: Effect, sites: Sites, joint: int) -> Candidates:
     Size("turn", 1e-3, "a millimetre a metre"),
     at=every_joint,
     part="link",
+    formula=r"u = \begin{pmatrix} d \\ r \end{pmatrix}",
 )
-def link_geometry(own: Effect, sites: Sites, joint: int) -> Candidates:
+def link_geometry(entry: Effect, sites: Sites, joint: int) -> Candidates:
     """Wrong dimensions of a link: machining and assembly leave its far end shifted and
     turned from where the drawing has it.
 
@@ -80,9 +82,9 @@ def link_geometry(own: Effect, sites: Sites, joint: int) -> Candidates:
     that other links, the base or the tool make as well are not identifiable and are
     held by the fit.
     """
-    six = moved_and_turned(own.size("length", sites), own.size("turn", sites))
+    six = moved_and_turned(entry.size("length", sites), entry.size("turn", sites))
     end = sites.link_end[joint + 1]
-    yield own.candidate(
+    yield entry.candidate(
         (joint + 1,), six, lambda around: [{c: around.always} for c in end], fixed=True
     )
 
@@ -94,8 +96,9 @@ def link_geometry(own: Effect, sites: Sites, joint: int) -> Candidates:
         "shift", 5e-4, "a tracker registers to 0.05 to 0.3 mm, unless a step goes wrong"
     ),
     Size("turn", 3e-4, "the same over the reflectors' distance"),
+    formula=r"u = \begin{pmatrix} d \\ r \end{pmatrix}",
 )
-def base_placement(own: Effect, sites: Sites) -> Candidates:
+def base_placement(entry: Effect, sites: Sites) -> Candidates:
     """A robot whose foot does not stand where the campaign declares it: a constant
     shift and turn.
 
@@ -103,8 +106,8 @@ def base_placement(own: Effect, sites: Sites) -> Candidates:
     r x p. Where the placement of the base is unknown it is fitted, and there is nothing
     to misplace. A turn about a vertical first axis is the zero offset of joint 1.
     """
-    six = moved_and_turned(own.size("shift", sites), own.size("turn", sites))
-    yield own.candidate(
+    six = moved_and_turned(entry.size("shift", sites), entry.size("turn", sites))
+    yield entry.candidate(
         (),
         six,
         lambda around: [{c: around.always} for c in sites.base],
@@ -117,8 +120,9 @@ def base_placement(own: Effect, sites: Sites) -> Candidates:
     "eccentric nest of the reflector",
     Size("shift", 5e-5, "a worn nest of a reflector"),
     moves_robot=False,
+    formula=r"d = \sum_e e\, (a_e \cos 2 q + b_e \sin 2 q)",
 )
-def nest_eccentricity(own: Effect, sites: Sites) -> Candidates:
+def nest_eccentricity(entry: Effect, sites: Sites) -> Candidates:
     """A reflector whose centre is off the axis of its nest at the flange: it circles as
     the last joint turns.
 
@@ -133,7 +137,7 @@ def nest_eccentricity(own: Effect, sites: Sites) -> Candidates:
     if sites.prismatic[last]:
         return
     across = [axis for axis in range(3) if axis != sites.joint_axes[last]]
-    size = own.size("shift", sites)
+    size = entry.size("shift", sites)
     parameters = [
         Parameter(f"{wave}_{'xyz'[axis]}_{_NEST_ORDER}q", "m", size, size)
         for axis in across
@@ -149,7 +153,7 @@ def nest_eccentricity(own: Effect, sites: Sites) -> Candidates:
             for shift in shifts
         ]
 
-    yield own.candidate(
+    yield entry.candidate(
         (),
         parameters,
         law,
@@ -163,8 +167,9 @@ def nest_eccentricity(own: Effect, sites: Sites) -> Candidates:
     "scale error of the tracker",
     Size("scale", 2e-5, "20 K or 70 hPa of air that were not entered"),
     moves_robot=False,
+    formula=r"p' = (1 + s)\, p",
 )
-def tracker_scale(own: Effect, sites: Sites) -> Candidates:
+def tracker_scale(entry: Effect, sites: Sites) -> Candidates:
     """A tracker that measures all lengths too long or too short, by its wavelength in
     warm air or by a bad absolute distance.
 
@@ -184,7 +189,7 @@ def tracker_scale(own: Effect, sites: Sites) -> Candidates:
         return [times(around.always, every) | travels]
 
     every = longer(sites, np.ones(sites.joints + 1))
-    yield own.candidate((), own.parameters("scale", ["scale"], "m/m", sites), law)
+    yield entry.candidate((), entry.parameters("scale", ["scale"], "m/m", sites), law)
 
 
 def longer(sites: Sites, shares: np.ndarray) -> dict[int, float]:
@@ -210,8 +215,9 @@ def times(amount: np.ndarray, moved: dict[int, float]) -> dict[int, np.ndarray]:
     Size("shift an hour", 2e-4, "a tripod on a warming floor"),
     Size("turn an hour", 1e-4, "the same over its height"),
     moves_robot=False,
+    formula=r"u = t \begin{pmatrix} d \\ r \end{pmatrix}",
 )
-def frame_drift(own: Effect, sites: Sites) -> Candidates:
+def frame_drift(entry: Effect, sites: Sites) -> Candidates:
     """A tracker or a robot's foot that drifts: stand, floor or bolts settle, and all
     measurements move as one rigid body.
 
@@ -219,9 +225,9 @@ def frame_drift(own: Effect, sites: Sites) -> Candidates:
     (h), d in m/h and r in rad/h; a point p (m) moves by t (d + r x p).
     """
     six = moved_and_turned(
-        own.size("shift an hour", sites), own.size("turn an hour", sites), "/h"
+        entry.size("shift an hour", sites), entry.size("turn an hour", sites), "/h"
     )
-    yield own.candidate(
+    yield entry.candidate(
         (),
         six,
         lambda around: [{c: around.time_s / _HOUR_S} for c in sites.base],
@@ -237,8 +243,12 @@ def frame_drift(own: Effect, sites: Sites) -> Candidates:
     Size("turn", 2e-4, "the same over its height"),
     moves_robot=False,
     parameter_words={"when": "share of the measurements before it"},
+    formula=(
+        r"u = \begin{pmatrix} d \\ r \end{pmatrix} \text{ from the share } w "
+        r"\text{ of the campaign on, } 0 \text{ before}"
+    ),
 )
-def setup_step(own: Effect, sites: Sites) -> Candidates:
+def setup_step(entry: Effect, sites: Sites) -> Candidates:
     """A tracker, a nest or a foot that was moved between two rows: a rigid motion of
     all measurements from there on.
 
@@ -247,7 +257,7 @@ def setup_step(own: Effect, sites: Sites) -> Candidates:
     a shape: w = 0 is the first row of the campaign, 1 its last. A step needs no clock;
     where the rows are not known the poses count by their numbers.
     """
-    six = moved_and_turned(own.size("shift", sites), own.size("turn", sites))
+    six = moved_and_turned(entry.size("shift", sites), entry.size("turn", sites))
 
     def law(around: Conditions, when: float) -> Displacements:
         return [
@@ -255,7 +265,7 @@ def setup_step(own: Effect, sites: Sites) -> Candidates:
             for coordinate in sites.base
         ]
 
-    yield own.candidate((), six, law, shapes=(_WHEN,), of_setup=True)
+    yield entry.candidate((), six, law, shapes=(_WHEN,), of_setup=True)
 
 
 def warmer(around: Conditions, *lag: float) -> np.ndarray:
@@ -274,9 +284,13 @@ def warmer(around: Conditions, *lag: float) -> np.ndarray:
         ("temperature", "expansion", "1/K"),
         ("time", "final growth", "m/m"),
     ],
+    formula=(
+        r"\delta l = \alpha\, \Delta T\, l \quad \text{or} \quad \delta l = g "
+        r"\left( 1 - e^{-t / t_0} \right) l"
+    ),
 )
 def thermal_growth(
-    own: Effect, sites: Sites, cause: str, quantity: str, unit: str
+    entry: Effect, sites: Sites, cause: str, quantity: str, unit: str
 ) -> Candidates:
     """Column and links that grow as they warm up: motors, gears and the air warm the
     castings, which expand.
@@ -287,13 +301,13 @@ def thermal_growth(
     growth (m/m) and t_0 (s) the lag of a body that has one temperature throughout
     (Incropera and DeWitt 2002).
     """
-    growth = own.parameters(quantity, [quantity.replace(" ", "_")], unit, sites)
+    growth = entry.parameters(quantity, [quantity.replace(" ", "_")], unit, sites)
     every = longer(sites, np.ones(sites.joints + 1))
 
     def law(around: Conditions, *lag: float) -> Displacements:
         return [times(warmer(around, *lag), every)]
 
-    yield own.candidate((), growth, law, {cause}, shapes=CAUSES[cause], detail=cause)
+    yield entry.candidate((), growth, law, {cause}, shapes=CAUSES[cause], detail=cause)
 
 
 def _warmed(sites: Sites) -> list[tuple[int | None, str]]:
@@ -319,9 +333,13 @@ def _warmed(sites: Sites) -> list[tuple[int | None, str]]:
         for where, words in _WARMED_WORDS.items()
         for cause in CAUSES
     },
+    formula=(
+        r"\delta y = \tfrac{1}{2} \alpha g\, \Delta T\, l^2, \quad \delta r = "
+        r"\alpha g\, \Delta T\, l, \quad \delta l = b (x - x_0)\, \Delta T\, l"
+    ),
 )
 def temperature_gradient(
-    own: Effect, sites: Sites, link: int | None, cause: str
+    entry: Effect, sites: Sites, link: int | None, cause: str
 ) -> Candidates:
     """An arm that is warmer on one side or at one end than at the other: motors, sun or
     a draught warm it unevenly.
@@ -362,11 +380,11 @@ def temperature_gradient(
         rise = warmer(around, *lag)
         return [times(rise, each) for each in moved.values()]
 
-    parameters = [Parameter(name, unit, own.size(quantity, sites)) for name in moved]
+    parameters = [Parameter(name, unit, entry.size(quantity, sites)) for name in moved]
     where = {None: "along", 0: "column"}.get(link, "")
     detail = f"{where} {cause}".strip()
     joints = (link,) if link else ()
-    yield own.candidate(
+    yield entry.candidate(
         joints,
         parameters,
         law,

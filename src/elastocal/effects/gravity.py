@@ -125,8 +125,9 @@ def _sagging(
     ),
     Size("mass of one joint", 1.5, "the same, by the joint's turn", SAG),
     detail_words={_OFF_THE_LINE: "centres of mass off the links' axes"},
+    formula=r"\theta_i = c_i \sum_k m_k \tau_{ik}(q)",
 )
-def link_weight(own: Effect, sites: Sites) -> Candidates:
+def link_weight(entry: Effect, sites: Sites) -> Candidates:
     """Sag of the arm, or of one joint, under the weight of the links that it carries.
 
     theta_i = c_i sum_k m_k tau_ik(q), with theta_i in rad, c_i the compliance (rad/(N
@@ -160,9 +161,9 @@ def link_weight(own: Effect, sites: Sites) -> Candidates:
             ("", "{}") if joint is None else ("compliance_times_", "rad {}/(N m)")
         )
         size = (
-            own.size("mass", sites)
+            entry.size("mass", sites)
             if joint is None
-            else own.size("mass of one joint", sites, joint)
+            else entry.size("mass of one joint", sites, joint)
         )
         parameters = [
             Parameter(f"{of}mass_at_end_of_link_{k}", unit.format("kg"), size)
@@ -182,10 +183,10 @@ def link_weight(own: Effect, sites: Sites) -> Candidates:
             # far off.
             law = partial(_sagging, places=places)
             needs = {"external load"}
-            return own.candidate(
+            return entry.candidate(
                 (), parameters, law, needs, detail=detail, location_name="arm"
             )
-        return own.of_joint(
+        return entry.of_joint(
             joint,
             parameters,
             lambda at: [at.weight(*place)[:, joint] for place in places],
@@ -216,14 +217,15 @@ def link_weight(own: Effect, sites: Sites) -> Candidates:
         0.3,
         "files made of drawings lack motors, cables and dress, a third of an arm's weight",
     ),
+    formula=r"\theta_i = c_i \sum_k s_k m_k \tau_{ik}(q)",
 )
-def declared_masses(own: Effect, sites: Sites) -> Candidates:
+def declared_masses(entry: Effect, sites: Sites) -> Candidates:
     """Declared masses that are farther off than the robot file says: all by one factor,
-    or each by its own.
+    or each by its entry.
 
     theta_i = c_i sum_k s_k m_k tau_ik(q), with theta_i in rad, c_i the compliance
     (rad/(N m)), m_k the declared mass of link k (kg), tau_ik its torque on joint i (N
-    m/kg) and s_k the share by which it is heavier, one for all links or each its own. A
+    m/kg) and s_k the share by which it is heavier, one for all links or each its entry. A
     mass takes its declared centre with it. Without a load the compliances are free, and
     no factor of all masses is distinguishable from them.
     """
@@ -249,9 +251,9 @@ def declared_masses(own: Effect, sites: Sites) -> Candidates:
         ("each", names, np.eye(len(bodies))),
     )
     for detail, named, shares in ways:
-        parameters = own.parameters("share", named, "1", sites)
+        parameters = entry.parameters("share", named, "1", sites)
         turns = partial(law, shares=shares)
-        yield own.candidate(
+        yield entry.candidate(
             (), parameters, turns, {"external load"}, detail=detail, location_name="arm"
         )
 
@@ -261,8 +263,12 @@ def declared_masses(own: Effect, sites: Sites) -> Candidates:
 @_gravity(
     "weight of an undeclared payload",
     Size("mass", 0.15, "a cable package or a forgotten gripper", RATED),
+    formula=(
+        r"\theta = \mathrm{diag}(c)\, J^{T} \begin{pmatrix} m g \\ m r \times g "
+        r"\end{pmatrix}"
+    ),
 )
-def payload(own: Effect, sites: Sites) -> Candidates:
+def payload(entry: Effect, sites: Sites) -> Candidates:
     """Weight at the flange that the model does not know: a tool, a cable package or an
     adapter that nobody declared.
 
@@ -272,12 +278,12 @@ def payload(own: Effect, sites: Sites) -> Candidates:
     is linear in m and in the first moments m r along the axes of the end-effector (kg
     m) (Atkeson et al. 1986).
     """
-    mass = own.size("mass", sites)
+    mass = entry.size("mass", sites)
     law = partial(_sagging, places=[(sites.joints, axis) for axis in (None, 0, 1, 2)])
     moments = [Parameter(f"moment_{axis}", "kg m", _LEVER_M * mass) for axis in "xyz"]
     # Where neither a load nor what the links weigh is known, what hangs on the flange
     # is not distinguishable from that.
-    tool = own.candidate(
+    tool = entry.candidate(
         (), [Parameter("mass", "kg", mass), *moments], law, LOADED_JOINTS - {"load"}
     )
     # A mass alone is most of what a tool does.
@@ -292,12 +298,14 @@ def compensated_joint(sites: Sites) -> list[tuple[int]]:
 
 
 def wave_parameters(
-    own: Effect, quantity: str, unit: str, sites: Sites, joint: int
+    entry: Effect, quantity: str, unit: str, sites: Sites, joint: int
 ) -> list[Parameter]:
     """Parameters of `waves` of orders 1 and 2, of which the latter are half as
     large."""
     each = [
-        own.parameters(quantity, [f"cos_{k}q", f"sin_{k}q"], unit, sites, joint, over=k)
+        entry.parameters(
+            quantity, [f"cos_{k}q", f"sin_{k}q"], unit, sites, joint, over=k
+        )
         for k in (1, 2)
     ]
     return [parameter for order in each for parameter in order]
@@ -307,8 +315,12 @@ def wave_parameters(
     "torque of the gravity compensator",
     Size("turn", 0.3, "a compensator bears a third of the weight", TORQUE),
     at=compensated_joint,
+    formula=(
+        r"T = -\frac{dU}{dq} = K a L \left( 1 - \frac{s_0}{s} \right) \sin(\alpha "
+        r"+ q), \quad s^2 = a^2 + L^2 + 2 a L \cos(\alpha + q)"
+    ),
 )
-def compensator_torque(own: Effect, sites: Sites, joint: int) -> Candidates:
+def compensator_torque(entry: Effect, sites: Sites, joint: int) -> Candidates:
     """Torque of a spring or gas gravity compensator on the shoulder: it bears part of
     the arm's weight, more in some poses.
 
@@ -321,8 +333,8 @@ def compensator_torque(own: Effect, sites: Sites, joint: int) -> Candidates:
     gas cylinder too; the compliance of the joint turns it into theta = sum_k u_k cos(k
     q) + v_k sin(k q), k = 1, 2, in rad.
     """
-    parameters = wave_parameters(own, "turn", "rad", sites, joint)
-    whole = own.of_joint(
+    parameters = wave_parameters(entry, "turn", "rad", sites, joint)
+    whole = entry.of_joint(
         joint, parameters, lambda around: waves(around.joint_angles[:, joint], 1, 2)
     )
     yield from (whole, small_form(whole, "first order", slice(2)))
@@ -341,7 +353,7 @@ def _turned(
 
 
 def _wrong(
-    own: Effect, parameters: tuple[Parameter, ...], frame: str, change: Change
+    entry: Effect, parameters: tuple[Parameter, ...], frame: str, change: Change
 ) -> Candidate:
     """Candidate of a wrench that is wrong by ``change(direction, wrench)`` for each of
     the axes of a frame."""
@@ -361,7 +373,7 @@ def _wrong(
             changed = [(force, np.cross(lever, force)) for force, _ in changed]
         return _turned(around, changed)
 
-    return own.candidate((), parameters, law, LOADED_JOINTS, detail=frame)
+    return entry.candidate((), parameters, law, LOADED_JOINTS, detail=frame)
 
 
 def lever_of_pull(wrench: np.ndarray, rotation: np.ndarray) -> np.ndarray:
@@ -391,8 +403,14 @@ def lever_of_pull(wrench: np.ndarray, rotation: np.ndarray) -> np.ndarray:
     "misalignment of the force sensor",
     Size("turn", 0.02, "a sensor mounted by eye: a degree"),
     at=lambda sites: _AND_IN_PULL,
+    formula=(
+        r"\theta = \mathrm{diag}(c)\, J^{T} \begin{pmatrix} \varphi \times F \\ 0 "
+        r"\end{pmatrix} \quad \text{or} \quad \mathrm{diag}(c)\, J^{T} "
+        r"\begin{pmatrix} \varphi \times F \\ r \times (\varphi \times F) "
+        r"\end{pmatrix}"
+    ),
 )
-def force_misalignment(own: Effect, sites: Sites, frame: str) -> Candidates:
+def force_misalignment(entry: Effect, sites: Sites, frame: str) -> Candidates:
     """A force sensor that is mounted askew: it shows the right force in a wrong
     direction.
 
@@ -406,11 +424,11 @@ def force_misalignment(own: Effect, sites: Sites, frame: str) -> Candidates:
     recorded. Derived here: a small turn adds phi x F, and an error dw of the wrench
     loads by J^T dw.
     """
-    parameters = own.parameters(
+    parameters = entry.parameters(
         "turn", [f"about_{axis}" for axis in "xyz"], "rad", sites
     )
     yield _wrong(
-        own,
+        entry,
         parameters,
         frame,
         lambda axis, wrench: (np.cross(axis, wrench[:, :3]), np.zeros_like(axis)),
@@ -421,8 +439,13 @@ def force_misalignment(own: Effect, sites: Sites, frame: str) -> Candidates:
     "zero error of the force sensor",
     Size("force", 0.01, "accuracy class of load cells that suit the arm", LOAD),
     at=lambda sites: _AND_IN_PULL,
+    formula=(
+        r"\theta = \mathrm{diag}(c)\, J^{T} \begin{pmatrix} b \\ 0 \end{pmatrix} "
+        r"\quad \text{or} \quad \mathrm{diag}(c)\, J^{T} \begin{pmatrix} b \\ r "
+        r"\times b \end{pmatrix}"
+    ),
 )
-def force_bias(own: Effect, sites: Sites, frame: str) -> Candidates:
+def force_bias(entry: Effect, sites: Sites, frame: str) -> Candidates:
     """A force sensor that shows a force where there is none: its zero was not set
     before the pull, or has moved since.
 
@@ -432,11 +455,11 @@ def force_bias(own: Effect, sites: Sites, frame: str) -> Candidates:
     the recorded one (N), which is minus what the sensor shows at zero. It is fixed in
     base axes, or in the flange where the sensor turns with the tool.
     """
-    parameters = own.parameters(
+    parameters = entry.parameters(
         "force", [f"along_{axis}" for axis in "xyz"], "N", sites
     )
     yield _wrong(
-        own,
+        entry,
         parameters,
         frame,
         lambda axis, wrench: (
@@ -450,8 +473,12 @@ def force_bias(own: Effect, sites: Sites, frame: str) -> Candidates:
     "wrong load application point",
     Size("shift", 0.01, "a hook or a screw beside the point that was meant", REACH),
     at=lambda sites: _FRAMES,
+    formula=(
+        r"\theta = \mathrm{diag}(c)\, J^{T} \begin{pmatrix} 0 \\ \delta r \times "
+        r"F \end{pmatrix}"
+    ),
 )
-def application_point(own: Effect, sites: Sites, frame: str) -> Candidates:
+def application_point(entry: Effect, sites: Sites, frame: str) -> Candidates:
     """A force that acts elsewhere than was recorded: the pull or the weight is fixed to
     the tool at another place.
 
@@ -461,11 +488,11 @@ def application_point(own: Effect, sites: Sites, frame: str) -> Candidates:
     where the load hangs on the tool. Derived here: a force that is moved by dr has the
     further moment dr x F.
     """
-    parameters = own.parameters(
+    parameters = entry.parameters(
         "shift", [f"shift_{axis}" for axis in "xyz"], "m", sites
     )
     yield _wrong(
-        own,
+        entry,
         parameters,
         frame,
         lambda axis, wrench: (np.zeros_like(axis), np.cross(axis, wrench[:, :3])),
@@ -475,8 +502,9 @@ def application_point(own: Effect, sites: Sites, frame: str) -> Candidates:
 @_sensor(
     "scale error of the force sensor",
     Size("scale", 0.02, "a load cell that was calibrated long ago"),
+    formula=r"\theta = \mathrm{diag}(c)\, J^{T} (s\, w)",
 )
-def force_scale(own: Effect, sites: Sites) -> Candidates:
+def force_scale(entry: Effect, sites: Sites) -> Candidates:
     """A force sensor that shows too much or too little: its sensitivity differs from
     the one of its calibration.
 
@@ -486,8 +514,8 @@ def force_scale(own: Effect, sites: Sites) -> Candidates:
     are identified and no declared masses load the joints it is exactly an alias of
     them, so that only a reference weight can find it.
     """
-    scale = own.parameters("scale", ["scale"], "1", sites)
-    yield own.candidate(
+    scale = entry.parameters("scale", ["scale"], "1", sites)
+    yield entry.candidate(
         (),
         scale,
         lambda around: _turned(around, [np.split(around.wrench, 2, axis=1)]),

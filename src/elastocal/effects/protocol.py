@@ -1,9 +1,9 @@
-"""What an effect of the catalogue is: candidates, each with named parameters and the
-displacements that they make.
+"""The parts of an effect of the catalogue: candidates, each with named parameters and
+the displacements that they cause.
 
-An effect is a function of a module of this package that `effect` decorates. Nothing
-else knows the effects by name: a new one, in a module of its own, is found by the
-catalogue.
+An effect is a function that `effect` decorates. The catalogue finds it in any module of
+this package, and by an entry point in other installed packages; no other code knows the
+effects by name.
 """
 
 from __future__ import annotations
@@ -31,45 +31,54 @@ if TYPE_CHECKING:
     from elastocal.effects.sizes import Size
     from elastocal.mechanics.sites import Sites
 
-    # For each parameter, by coordinate of the sites, the displacement per unit of the
+    # For each parameter: by coordinate of the sites, the displacement per unit of the
     # parameter, ndarray (S,).
     Displacements = list[dict[int, np.ndarray]]
-    # From the conditions and a value of each of the shapes.
+    # From the conditions and one value of each shape.
     Law = Callable[..., Displacements]
-    # What tells each place on a robot where an effect acts; and its candidates, from
-    # the effect, the sites and that of a place.
+    # The locations on a robot at which an effect can act, each as the arguments that
+    # the effect's function takes for it.
     Places = Callable[[Sites], Iterable[tuple[Any, ...]]]
     Candidates = Iterator["Candidate"]
+    # From the effect, the sites and the arguments of one location.
     Listing = Callable[..., Candidates]
+    # From the conditions and one value of each shape: one deviation of a joint, ndarray
+    # (S,), for each parameter.
     Turns = Callable[..., Iterable[np.ndarray]]
 
 
-# Needs of laws that go with the load on the joints.
+# Needs of laws that depend on the load on the joints.
 LOADED_JOINTS = frozenset({"load", "load on the joints"})
 WAVES = {"cos": np.cos, "sin": np.sin}
 
 
 def load_behind(sites: Sites, joints: int) -> frozenset[str]:
-    """Needs of the law of what yields to the load, behind so many joints.
+    """List the needs of a structure that yields to the load behind so many joints.
 
-    A weight that is only usual, not declared, loads columns and rails: behind a joint
-    that turns `link_weight` has it.
+    The usual weight of an arm whose masses are not declared loads columns and rails.
+    Behind a joint that turns, the effect `link_weight` models that weight instead.
     """
-    return frozenset({"load"}) if all(sites.prismatic[:joints]) else LOADED_JOINTS
+    if all(sites.prismatic[:joints]):
+        return frozenset({"load"})
+    return LOADED_JOINTS
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One unknown of an effect.
+    """One linear unknown of an effect.
 
-    `plausible`: magnitude that such an effect can reach on a real robot; one that the
-    data cannot distinguish from zero even at this size is not estimated. `prior_std`:
-    standard deviation of a normal prior about zero, for series whose terms the data
-    distinguish only in part, as in ridge regression (Hoerl and Kennard 1970), reported
-    with the estimate; None, as nearly everywhere, for no prior. `sign`: that such an
-    effect has by its physics; 0 where it may have either. `order`: of a harmonic, whose
-    plausible size falls with it; 1 elsewhere. `sized`: whether the prior was estimated
-    from the measurements. `most`: times its plausible size that a search allows for.
+    Attributes
+    ----------
+    name, unit : as tables and reports have them; SI units.
+    plausible : magnitude that such an effect can reach on a real robot. A parameter
+        that the data cannot distinguish from zero even at this size is not estimated.
+    prior_std : standard deviation of a normal prior about zero, for series whose terms
+        the data distinguish only in part, as in ridge regression (Hoerl and Kennard
+        1970); reported with the estimate. None, as nearly everywhere, for no prior.
+    sign : sign that physics gives such an effect, 0 for either.
+    order : order of a harmonic, with which its plausible size falls; 1 elsewhere.
+    sized : whether the prior was estimated from the measurements.
+    most : multiple of the plausible size that a search allows for.
     """
 
     name: str
@@ -84,11 +93,15 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Shape:
-    """An unknown in which the effect is not linear.
+    """One unknown in which an effect is not linear.
 
-    `start`: where the search starts. `lowest`, `highest`: range in which the law keeps
-    its meaning. `tried`: how many evenly spaced values a search must try lest it step
-    over the law, one for the start alone; 0 where a few growing values will do.
+    Attributes
+    ----------
+    name, unit : as tables and reports have them.
+    start : value at which a search starts.
+    lowest, highest : range in which the law keeps its meaning.
+    tried : how many evenly spaced values a search must try lest it step over the law; 1
+        for the start alone; 0 if a few values in geometric series suffice.
     """
 
     name: str
@@ -99,8 +112,11 @@ class Shape:
     tried: int = 0
 
     def values(self, few: int) -> np.ndarray:
-        """Values for a search to start from, ndarray: those that must be tried, or a
-        few in geometric series in the range."""
+        """Values from which a search starts, ndarray.
+
+        These are the values that must be tried, or else `few` inner values of a
+        geometric series over the range.
+        """
         if self.tried == 1:
             return np.array([self.start])
         if self.tried:
@@ -108,46 +124,55 @@ class Shape:
         return np.geomspace(self.lowest, self.highest, few + 2)[1:-1]
 
     def between(self, below: float, above: float, count: int) -> np.ndarray:
-        """Values inside of an interval, evenly spaced as those that a search tries,
-        ndarray (count,)."""
-        return (np.linspace if self.tried else np.geomspace)(below, above, count + 2)[
-            1:-1
-        ]
+        """Values inside an interval, spaced as those that a search tries, ndarray
+        (count,)."""
+        spaced = np.linspace if self.tried else np.geomspace
+        return spaced(below, above, count + 2)[1:-1]
 
     def shares(self, values: Sequence[float] | np.ndarray) -> np.ndarray:
-        """How much of the range each of some values stands for: the part nearest to it
-        (Voronoi cell), ndarray of sum one."""
+        """Share of the range that each value represents, ndarray of sum one: the part
+        of the range that is closest to it (its Voronoi cell)."""
         scale = (lambda value: value) if self.tried else np.log
-        places = scale(np.asarray(values, float))
+        points = scale(np.asarray(values, float))
         low = scale(self.lowest)
         high = scale(self.highest)
-        order = np.argsort(places)
-        inner = 0.5 * (places[order][1:] + places[order][:-1])
-        edges = np.concatenate([[low], np.clip(inner, low, high), [high]])
-        found = np.empty(len(places))
-        found[order] = np.diff(edges) / (edges[-1] - edges[0])
-        return found
+        order = np.argsort(points)
+        midpoints = 0.5 * (points[order][1:] + points[order][:-1])
+        edges = np.concatenate([[low], np.clip(midpoints, low, high), [high]])
+        shares = np.empty(len(points))
+        shares[order] = np.diff(edges) / (edges[-1] - edges[0])
+        return shares
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """One way in which one effect can act on this robot.
+    """One way in which one effect can act on a robot.
 
-    `joints`: concerned, from 1; empty where the effect belongs to no joint. `detail`:
-    which variant, where an effect has more than one for these joints. `parameters`: in
-    which the displacement is linear. `displacement`: ``displacement(conditions,
-    *shapes)`` gives for each parameter a dict from a coordinate of the sites to its
-    displacement per unit, ndarray (S,). It may go with the total loads of the
-    coordinates that it displaces, of no others. `needs`: what must be there, see
-    `conditions.offered`. `distinct_angles`: how many different angles of its joints the
-    law needs to be distinguishable from a smooth one. `location_name`: names the
-    location beside the joints where these do not: a column, a band of orders.
     Candidates of one effect at one location are variants of its law, of which only one
-    can hold. `of_setup`: whether it belongs to where tracker and robot stood in one
-    campaign, and is not carried over to another. `turning`: joints with whose angles
-    the law goes, from 1, where it belongs to no joint. `fixed`: whether the
-    displacement per unit goes with the joint angles alone, not with loads, springs or
-    where the robot yielded to, so that no step changes it.
+    can be true.
+
+    Attributes
+    ----------
+    effect, family : names of the effect and of the kind of its physics.
+    joints : joints that are concerned, from 1; empty if the effect belongs to none.
+    detail : name of the variant, if an effect has several for these joints.
+    parameters : unknowns in which the displacement is linear.
+    displacement : ``displacement(conditions, *shapes)`` gives for each parameter a
+        dictionary from a coordinate of the sites to its displacement per unit, ndarray
+        (S,). It may depend on the total loads of the coordinates that it displaces, of
+        no others.
+    needs : what the data must have, see `conditions.offered`.
+    shapes : unknowns in which the displacement is not linear.
+    distinct_angles : how many different angles of its joints the law needs to be
+        distinguishable from a smooth one.
+    location_name : name of the location if the joints do not determine it: a column, a
+        band of orders.
+    of_setup : whether the effect belongs to where tracker and robot stood in one
+        campaign, and is not carried over to another one.
+    turning : joints, from 1, on whose angles the law depends if it belongs to no joint.
+    fixed : whether the displacement per unit depends on the joint angles alone, neither
+        on loads or compliances nor on the deflected pose, so that no step of a fit
+        changes it.
     """
 
     effect: str
@@ -166,41 +191,59 @@ class Candidate:
 
     @property
     def location(self) -> tuple[int | str, ...]:
-        """Where the effect acts: its joints, with the name of the location where they
-        do not determine it."""
-        return (*self.joints, self.location_name) if self.location_name else self.joints
+        """Where the effect acts: its joints, and the name of the location if they do
+        not determine it."""
+        if self.location_name:
+            return (*self.joints, self.location_name)
+        return self.joints
 
     @cached_property
     def key(self) -> str:
         """Unique name, such as ``link_weight@2`` or ``transmission_harmonic@1[orders
         3-12]``."""
-        where = "@" + "+".join(map(str, self.joints)) if self.joints else ""
-        return f"{self.effect}{where}" + (f"[{self.detail}]" if self.detail else "")
+        joints = f"@{'+'.join(map(str, self.joints))}" if self.joints else ""
+        detail = f"[{self.detail}]" if self.detail else ""
+        return f"{self.effect}{joints}{detail}"
 
 
 def moved_and_turned(shift: float, turn: float, per: str = "") -> tuple[Parameter, ...]:
-    """Parameters of a shift along and a turn about each axis, of plausible sizes in m
-    and rad; `per` follows their units."""
-    sizes = (("d", "m", shift), ("r", "rad", turn))
+    """Make the parameters of a shift along and a rotation about each axis.
+
+    Parameters
+    ----------
+    shift, turn : plausible sizes, m and rad.
+    per : end of the units, such as ``/h``.
+    """
+    quantities = (("d", "m", shift), ("r", "rad", turn))
     return tuple(
         Parameter(f"{letter}{axis}", unit + per, size)
-        for letter, unit, size in sizes
+        for letter, unit, size in quantities
         for axis in "xyz"
     )
 
 
 def require_unique(names: Sequence[str]) -> None:
-    """Refuse two candidates of one name, a ValueError: in tables nothing would
-    distinguish them."""
-    twice = [name for name, count in Counter(names).items() if count > 1]
-    if twice:
-        raise ValueError(f"candidates of one name: {', '.join(twice)}")
+    """Refuse two candidates of one name: tables could not distinguish them.
+
+    Raises ValueError.
+    """
+    duplicates = [name for name, count in Counter(names).items() if count > 1]
+    if duplicates:
+        raise ValueError(f"candidates of one name: {', '.join(duplicates)}")
 
 
 @dataclass(frozen=True)
 class Effect:
-    """One effect of the catalogue, as `effect` makes it of the function `listed`; `doc`
-    is the docstring of that."""
+    """One effect of the catalogue.
+
+    Attributes
+    ----------
+    name, doc : name and docstring of the function `listed`.
+    family, words, formula, moves_robot, part, detail_words, parameter_words, at : as
+        `effect` has them.
+    sizes : sizes by quantity.
+    listed : the decorated function, which yields the candidates at one location.
+    """
 
     name: str
     family: str
@@ -211,15 +254,16 @@ class Effect:
     at: Places
     moves_robot: bool = True
     part: str = "joint"
+    formula: str = ""
     detail_words: Mapping[str, str] = field(default_factory=dict)
     parameter_words: Mapping[str, str] = field(default_factory=dict)
 
     def candidates(self, sites: Sites) -> list[Candidate]:
-        """Where on this robot the effect can act."""
+        """List every way in which the effect can act on this robot."""
         return [
             candidate
-            for place in self.at(sites)
-            for candidate in self.listed(self, sites, *place)
+            for arguments in self.at(sites)
+            for candidate in self.listed(self, sites, *arguments)
         ]
 
     def candidate(
@@ -228,10 +272,10 @@ class Effect:
         parameters: Iterable[Parameter],
         law: Law,
         needs: Collection[str] = (),
-        **more: Any,
+        **options: Any,
     ) -> Candidate:
-        """A `Candidate` of this effect; `more` as there."""
-        detail = more.pop("detail", "")
+        """Make a `Candidate` of this effect; `options` are further fields of it."""
+        detail = options.pop("detail", "")
         return Candidate(
             self.name,
             self.family,
@@ -240,7 +284,7 @@ class Effect:
             tuple(parameters),
             law,
             frozenset(needs),
-            **more,
+            **options,
         )
 
     def of_joint(
@@ -249,16 +293,23 @@ class Effect:
         parameters: Iterable[Parameter],
         turns: Turns,
         *needs: Any,
-        **more: Any,
+        **options: Any,
     ) -> Candidate:
-        """A candidate that moves one joint alone, from 0, by ``turns(conditions,
-        *shapes)``, one for each parameter."""
+        """Make a candidate that moves one joint alone.
+
+        Parameters
+        ----------
+        joint : from 0.
+        turns : ``turns(conditions, *shapes)`` gives the deviation of the joint per unit
+            of each parameter, ndarrays (S,).
+        needs, options : as in `candidate`.
+        """
         return self.candidate(
             (joint + 1,),
             parameters,
-            lambda *at: [{joint: turn} for turn in turns(*at)],
+            lambda *arguments: [{joint: turn} for turn in turns(*arguments)],
             *needs,
-            **more,
+            **options,
         )
 
     def size(self, quantity: str, sites: Sites, *joints: int) -> float:
@@ -274,67 +325,83 @@ class Effect:
         *joints: int,
         over: float = 1.0,
     ) -> tuple[Parameter, ...]:
-        """Parameters of one quantity with its size, divided by `over`, and its sign;
-        `joints` as of `Size.on`."""
+        """Make parameters of one quantity, with its size and sign.
+
+        Parameters
+        ----------
+        quantity : key of `sizes`.
+        names, unit : of the parameters.
+        joints : as of `Size.on`.
+        over : by which the size is divided.
+        """
         size = self.size(quantity, sites, *joints) / over
-        line = self.sizes[quantity]
+        stated = self.sizes[quantity]
         return tuple(
-            Parameter(name, unit, size, sign=line.sign, most=line.most)
+            Parameter(name, unit, size, sign=stated.sign, most=stated.most)
             for name in names
         )
 
 
-def effect(
-    family: str, words: str, *sizes: Size, at: Places = lambda sites: [()], **more: Any
-) -> Callable[[Listing], Effect]:
-    """Make an effect of a function that yields its candidates, ``name(own, sites,
-    *place)``, for each place on a robot.
+def _act_once(sites: Sites) -> list[tuple[()]]:
+    return [()]
 
-    Keys and tables call it by the name of the function; its docstring has the physics,
-    the formula with units and the source. `family`: kind of its physics, such as
-    elastic or gearbox. `words`: its physical name in words that precede "of joint 2",
-    or stand alone. `sizes`: of its quantities. `at`: ``at(sites)`` lists the places.
-    `more`: `moves_robot`, False where it moves only what was measured of the robot, so
-    that its tasks do not feel it; `part`, "link" if its joints stand for the links
-    behind them; `detail_words` and `parameter_words`, if the detail of a candidate or
-    the name of a parameter says too little.
+
+def effect(
+    family: str, words: str, *sizes: Size, at: Places = _act_once, **options: Any
+) -> Callable[[Listing], Effect]:
+    """Make an effect of a function that yields its candidates at one location.
+
+    The function is called ``name(entry, sites, *arguments)``, with the effect itself,
+    the robot's sites and the arguments of one location. Keys and tables call the effect
+    by the name of the function. Its docstring has the physics, the formula with units
+    and the source.
+
+    Parameters
+    ----------
+    family : kind of its physics, such as elastic or gearbox.
+    words : its physical name, which precedes "of joint 2" or stands alone.
+    sizes : sizes of its quantities.
+    at : ``at(sites)`` lists the locations; without it there is one without arguments.
+    options : ``formula``, the formula for print, in TeX; ``moves_robot``, False if the
+        effect changes only the measurements, so that the robot's tasks do not feel it;
+        ``part``, "link" if its joints stand for the links behind them; ``detail_words``
+        and ``parameter_words``, if the detail of a candidate or the name of a parameter
+        says too little.
     """
 
-    def made(listed: Listing) -> Effect:
-        by_quantity = {size.quantity: size for size in sizes}
+    def make_effect(listed: Listing) -> Effect:
         return Effect(
             listed.__name__,
             family,
             words,
             cleandoc(listed.__doc__ or ""),
-            by_quantity,
+            {size.quantity: size for size in sizes},
             listed,
             at,
-            **more,
+            **options,
         )
 
-    return made
+    return make_effect
 
 
 def waves(angle: np.ndarray, *orders: float) -> list[np.ndarray]:
-    """Cosine and sine of so many times an angle (S,), order by order; list of ndarray
+    """Cosine and sine of multiples of an angle (S,), order by order, as ndarrays
     (S,)."""
     return [wave(order * angle) for order in orders for wave in WAVES.values()]
 
 
 def every_joint(sites: Sites) -> list[tuple[int]]:
-    """Joints from 0, one a place."""
+    """List all joints, from 0, one a location."""
     return [(joint,) for joint in range(sites.joints)]
 
 
 def turning_joints(sites: Sites) -> list[tuple[int]]:
-    """The same of those that turn, for effects that have no meaning for prismatic
-    ones."""
+    """List the revolute joints, from 0, one a location."""
     return [(joint,) for joint in range(sites.joints) if not sites.prismatic[joint]]
 
 
 def small_form(whole: Candidate, detail: str, kept: slice) -> Candidate:
-    """Variant of a candidate that has some of its parameters."""
+    """Make the variant of a candidate that has only some of its parameters."""
 
     def law(conditions: Conditions, *shapes: float) -> Displacements:
         return whole.displacement(conditions, *shapes)[kept]

@@ -1,7 +1,4 @@
-"""Transmission: effects that are there without a load, by the angle of the joint.
-
-Gearboxes: effects by the load or the approach, but not in proportion.
-"""
+"""Transmission: effects that are present without a load, by the angle of the joint."""
 
 from __future__ import annotations
 
@@ -12,26 +9,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.effects.protocol import (
-    LOADED_JOINTS,
     WAVES,
     Parameter,
     Shape,
     effect,
-    every_joint,
     turning_joints,
     waves,
 )
-from elastocal.effects.sizes import JOINT, Size, full_torque_Nm
+from elastocal.effects.sizes import Size
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
     from elastocal.effects.conditions import Conditions
     from elastocal.effects.protocol import Candidates, Displacements, Effect
     from elastocal.mechanics.sites import Sites
 
 _effect = partial(effect, "transmission")
-_gearbox = partial(effect, "gearbox")
 _SAMPLES_PER_PERIOD = 4
 _BANDS = ((1, 2), (3, 6), (7, 12), (13, 18), (19, 24), (25, 30), (31, 36))
 # Nearer to an integer than the margin an order is not distinguishable from it.
@@ -54,9 +48,10 @@ _ANGLES_OF_MOTOR = 12
     at=lambda sites: [
         (joint, *band) for (joint,) in turning_joints(sites) for band in _BANDS
     ],
+    formula=r"\theta_i = \sum_k a_k \cos k q_i + b_k \sin k q_i",
 )
 def transmission_harmonic(
-    own: Effect, sites: Sites, joint: int, low: int, high: int
+    entry: Effect, sites: Sites, joint: int, low: int, high: int
 ) -> Candidates:
     """Transmission error of a gear, periodic in the angle of its joint: eccentric and
     uneven parts let it run ahead and behind.
@@ -72,7 +67,7 @@ def transmission_harmonic(
     parameters = [
         replace(wave, prior_std=wave.plausible, order=order)
         for order in range(low, high + 1)
-        for wave in own.parameters(
+        for wave in entry.parameters(
             "amplitude", (f"cos_{order}q", f"sin_{order}q"), "rad", sites
         )
     ]
@@ -89,7 +84,7 @@ def transmission_harmonic(
 
     band = f"orders {low}-{high}"
     angles = _SAMPLES_PER_PERIOD * high
-    yield own.of_joint(
+    yield entry.of_joint(
         joint,
         parameters,
         turns,
@@ -117,8 +112,14 @@ def transmission_harmonic(
         f"order {above}-{above + 1}": f"order between {above} and {above + 1}"
         for above in range(1, _HIGHEST)
     },
+    formula=(
+        r"\theta_i = \sum_{m=1}^{2} a_m \cos m k q_i + b_m \sin m k q_i, \quad k "
+        r"\notin \mathbb{N}"
+    ),
 )
-def transmission_order(own: Effect, sites: Sites, joint: int, above: int) -> Candidates:
+def transmission_order(
+    entry: Effect, sites: Sites, joint: int, above: int
+) -> Candidates:
     """Transmission error of an order that is no integer: parts of a gear that do not
     come round with the joint.
 
@@ -133,7 +134,7 @@ def transmission_order(own: Effect, sites: Sites, joint: int, above: int) -> Can
     shape = Shape(
         "order", "1", above + 0.5, above + _MARGIN, above + 1 - _MARGIN, tried=1
     )
-    four = own.parameters(
+    four = entry.parameters(
         "amplitude", ("cos_kq", "sin_kq", "cos_2kq", "sin_2kq"), "rad", sites
     )
     parameters = [
@@ -148,7 +149,7 @@ def transmission_order(own: Effect, sites: Sites, joint: int, above: int) -> Can
         "distinct_angles": angles,
         "location_name": band,
     }
-    yield own.of_joint(
+    yield entry.of_joint(
         joint,
         parameters,
         lambda at, order: waves(order * at.joint_angles[:, joint], 1, 2),
@@ -174,9 +175,10 @@ def _driven(sites: Sites) -> list[tuple[int, list[int], str]]:
         f"from {number}": f"coupling from joint {number} alone"
         for number in range(1, 10)
     },
+    formula=r"\theta_i = e_i q_i + e_{ih} q_h, \quad h = i - 1",
 )
 def transmission_ratio(
-    own: Effect, sites: Sites, joint: int, sources: list[int], detail: str
+    entry: Effect, sites: Sites, joint: int, sources: list[int], detail: str
 ) -> Candidates:
     """Wrong ratio of a gear, or coupling from a joint before it: the controller divides
     the motor's angle by a wrong number.
@@ -195,10 +197,10 @@ def transmission_ratio(
         if sites.prismatic[source] == sites.prismatic[joint]
     ]
     unit = "m/m" if sites.prismatic[joint] else "rad/rad"
-    per = own.parameters(
+    per = entry.parameters(
         "per turn", [f"per_q{source + 1}" for source in alike], unit, sites
     )
-    yield own.of_joint(
+    yield entry.of_joint(
         joint,
         per,
         lambda around: [around.joint_angles[:, q] for q in alike],
@@ -211,8 +213,9 @@ def transmission_ratio(
     "motor eccentricity",
     Size("amplitude", 5e-5, "milliradians at the motor, over a ratio of a hundred"),
     at=turning_joints,
+    formula=r"\theta_i = \sum_{k=1}^{2} a_k \cos k N q_i + b_k \sin k N q_i",
 )
-def motor_eccentricity(own: Effect, sites: Sites, joint: int) -> Candidates:
+def motor_eccentricity(entry: Effect, sites: Sites, joint: int) -> Candidates:
     """An eccentric motor, resolver or input pinion: transmission error once and twice
     per turn of the motor.
 
@@ -225,14 +228,14 @@ def motor_eccentricity(own: Effect, sites: Sites, joint: int) -> Candidates:
     ratio = sites.gear_ratio[joint] if sites.gear_ratio else None
     if ratio is None:
         return
-    size = own.size("amplitude", sites)
+    size = entry.size("amplitude", sites)
     options = {"distinct_angles": _ANGLES_OF_MOTOR, "fixed": True}
     parameters = [
         Parameter(f"{wave}_{order}_motor", "rad", size)
         for order in (1, 2)
         for wave in WAVES
     ]
-    yield own.of_joint(
+    yield entry.of_joint(
         joint,
         parameters,
         lambda around: waves(ratio * around.joint_angles[:, joint], 1, 2),
@@ -249,8 +252,9 @@ def motor_eccentricity(own: Effect, sites: Sites, joint: int) -> Candidates:
         for motion in ("radial", "axial", "wobble")
         for (joint,) in turning_joints(sites)
     ],
+    formula=r"e = \sum_{k=1}^{2} a_k \cos k q + b_k \sin k q",
 )
-def bearing_runout(own: Effect, sites: Sites, joint: int, motion: str) -> Candidates:
+def bearing_runout(entry: Effect, sites: Sites, joint: int, motion: str) -> Candidates:
     """A bearing that runs out: races or seats that are out of round or askew move the
     axis of a joint once and twice per turn.
 
@@ -265,7 +269,7 @@ def bearing_runout(own: Effect, sites: Sites, joint: int, motion: str) -> Candid
     # Over the part of a turn that a joint uses the two orders are nearly one function,
     # and like a link of other dimensions: a prior of that size keeps them from
     # cancelling each other.
-    size = own.size("wobble" if wobbles else "shift", sites)
+    size = entry.size("wobble" if wobbles else "shift", sites)
     unit = "rad" if wobbles else "m"
     names = [
         f"{motion}_{'xyz'[axis]}_{wave}_{order}q"
@@ -288,7 +292,7 @@ def bearing_runout(own: Effect, sites: Sites, joint: int, motion: str) -> Candid
     parameters = [Parameter(name, unit, size, size) for name in names]
     at = (joint + 1,)
     angles = _SAMPLES_PER_PERIOD * 2
-    yield own.candidate(
+    yield entry.candidate(
         at,
         parameters,
         law,
@@ -310,104 +314,3 @@ def _seen_behind(sites: Sites, joint: int, axis: int, angle: np.ndarray) -> np.n
         np.cross(about, along), np.sin(turned)
     )
     return lengthwise[:, None] + across
-
-
-# Start, least and most of the torque of a law, of the full torque. Slopes that meet at
-# less are those of play; where both laws reach, either may be meant.
-_PLAY = np.array([0.03, 0.003, 0.1])
-_MEETING = np.array([0.3, 0.05, 0.8])
-_AS_AT_REST: dict[str, Callable[[np.ndarray, float], np.ndarray]] = {
-    "": lambda load, torque: torque * np.tanh(load / torque),
-    "two slopes": lambda load, torque: np.clip(load, -torque, torque),
-}
-
-
-# Small gears carry less torque and may bend more by it.
-@_gearbox(
-    "gear stiffening",
-    Size(
-        "lost beyond",
-        0.5,
-        "of gears' compliance half goes once all teeth bear",
-        JOINT,
-        sign=-1,
-    ),
-    at=lambda sites: [
-        (joint, law) for law in _AS_AT_REST for (joint,) in turning_joints(sites)
-    ],
-)
-def stiffening(own: Effect, sites: Sites, joint: int, detail: str) -> Candidates:
-    """A gear that gets stiffer with torque: more of its teeth, pins or rollers share a
-    larger load.
-
-    theta_i = d_i (tau_i - s(tau_i)), with s(tau) = clip(tau, -tau_1, tau_1) or tau_1
-    tanh(tau / tau_1),
-
-    theta_i in rad, tau_i the torque of load and declared masses (N m), d_i < 0 in
-    rad/(N m), and s the part that bends the gear as at rest: either two slopes that
-    meet at the torque tau_1 (N m); or a slope that falls smoothly, as several kinks do
-    together, and which below tau_1 is the cubic law tau^3 / (3 tau_1^2). Neither is
-    linear in tau_1. A stiffness that depends on the torque was measured on strain wave
-    gears (Tuttle 1992).
-    """
-    beyond = own.parameters("lost beyond", ["beyond"], "rad/(N m)", sites, joint)
-    meeting = Shape(
-        "torque", "N m", *(_MEETING * full_torque_Nm(sites, joint)).tolist()
-    )
-
-    def turns(around: Conditions, torque: float) -> list[np.ndarray]:
-        load = around.total[:, joint]
-        return [load - _AS_AT_REST[detail](load, torque)]
-
-    yield own.of_joint(
-        joint, beyond, turns, LOADED_JOINTS, shapes=(meeting,), detail=detail
-    )
-
-
-@_gearbox(
-    "lost motion (backlash)",
-    Size("play", 1e-4, "a third of an arc minute", sign=1),
-    at=turning_joints,
-)
-def lost_motion(own: Effect, sites: Sites, joint: int) -> Candidates:
-    """Play that the gear crosses where the torque changes its sign: teeth leave one
-    flank and touch the other.
-
-    theta_i = D_i tanh(tau_i / tau_0), with theta_i in rad, tau_i the torque of load and
-    declared masses (N m), D_i half the play (rad) and tau_0 the torque at which it is
-    taken up (N m). Makers of gears measure it at 3 % of the rated torque (Nabtesco,
-    Precision Reduction Gear RV, glossary). Derived here: tanh is a smooth step from one
-    flank, -D_i, to the other, +D_i.
-    """
-    play = own.parameters("play", ["half_play"], "rad", sites)
-    taken_up = Shape("torque", "N m", *(_PLAY * full_torque_Nm(sites, joint)).tolist())
-    yield own.of_joint(
-        joint,
-        play,
-        lambda around, at: [np.tanh(around.total[:, joint] / at)],
-        LOADED_JOINTS,
-        shapes=(taken_up,),
-    )
-
-
-@_gearbox(
-    "hysteresis",
-    Size("turn", 1e-4, "a third of an arc minute"),
-    Size("shift", 2e-5, "the nut of a spindle"),
-    at=every_joint,
-)
-def hysteresis(own: Effect, sites: Sites, joint: int) -> Candidates:
-    """Friction and backlash that hold a joint back on the side from which it came: the
-    gear stays wound up after a stop.
-
-    theta_i = h_i s_i, with s_i = -1 or +1 the sense in which the joint was approached,
-    0 where it is not known, and h_i half the width of the loop (rad; m for a prismatic
-    joint), negative where the joint stays short: friction F sgn(dq/dt)
-    (Armstrong-Hélouvry 1991) that is left at rest winds up a gear of compliance c by c
-    F. Where the approach is not recorded this is part of the repeatability.
-    """
-    quantity, unit = ("shift", "m") if sites.prismatic[joint] else ("turn", "rad")
-    width = own.parameters(quantity, ["half_width"], unit, sites)
-    yield own.of_joint(
-        joint, width, lambda around: [around.approach[:, joint]], {"approach"}
-    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.patches import Rectangle
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from elastocal.application.planning.cell import Cell
     from elastocal.application.planning.plan import Plan
     from elastocal.mechanics.robot import Robot
+    from elastocal.verdict import HeldOut
 
 # Direction of view.
 _AZIMUTH = np.radians(-60.0)
@@ -95,7 +96,7 @@ def draw_arm(axis: Axes, links: np.ndarray, width: float) -> None:
 
 @styled
 def draw_arm_with_errors(
-    robot: Robot, table: Mapping[str, np.ndarray], heldout: Mapping[str, Any]
+    robot: Robot, table: Mapping[str, np.ndarray], heldout: HeldOut
 ) -> Figure:
     """Draw an arm and its held-out errors as arrows, before and after correction.
 
@@ -107,7 +108,7 @@ def draw_arm_with_errors(
     table
         Columns of the residuals table.
     heldout
-        ``heldout`` of verdict.json; the titles state its RMS errors.
+        Errors of the validation poses; the titles state its RMS errors.
     """
     held_out = table["held_out"].astype(bool)
     angles = np.column_stack(
@@ -125,7 +126,7 @@ def draw_arm_with_errors(
         errors = np.column_stack([table[f"{stage}_d{xyz}"][held_out] for xyz in "xyz"])
         _draw_errors(axis, positions, errors, stage)
         axis.set_title(
-            f"{MILLI * heldout[stage]['rms_m']:.2f} mm",
+            f"{MILLI * getattr(heldout, stage).rms_m:.2f} mm",
             fontsize=17,
             fontweight="bold",
             color=color,
@@ -136,9 +137,9 @@ def draw_arm_with_errors(
         axis.set_aspect("equal")
         axis.set_axis_off()
         axis.margins(0.03)
-    noise_mm = MILLI * heldout["noise_floor_rms_m"]
+    noise_mm = MILLI * (heldout.noise_floor_rms_m or np.nan)
     figure.supxlabel(
-        f"RMS position error at {heldout['poses']} held-out poses; "
+        f"RMS position error at {heldout.poses} held-out poses; "
         f"arrows: {_MAGNIFICATION} times the error; "
         f"the tracker's noise alone: {noise_mm:.2f} mm",
         fontsize=7.5,

@@ -34,6 +34,7 @@ from elastocal.report.words import (
     probability_words,
     unit_of,
 )
+from elastocal.verdict import MechanismSet, Probabilities
 
 # Above this number of states, only one state is drawn in each cell of a square grid
 # with this number of columns.
@@ -473,7 +474,7 @@ def _name_campaigns(table: pd.DataFrame) -> pd.Series:
 
 @styled
 def draw_probabilities(
-    posterior: Mapping[str, Any] | None, table: Mapping[str, np.ndarray]
+    posterior: Probabilities | None, table: Mapping[str, np.ndarray]
 ) -> Figure:
     """Draw the posterior probabilities of the leading hypotheses, and the Bayes factors
     of the leading candidates alone.
@@ -497,7 +498,7 @@ def draw_probabilities(
             "measurements."
         )
     shown = ranked[:_SHOWN_CANDIDATES]
-    hypotheses = _list_hypotheses(posterior["sets"][:_SHOWN_HYPOTHESES])
+    hypotheses = _list_hypotheses(posterior.sets[:_SHOWN_HYPOTHESES])
     names = [shorten_candidate_name(table["candidate"][index]) for index in shown]
     upper_heights = _compute_row_heights([label for label, _ in hypotheses])
     lower_heights = _compute_row_heights(names)
@@ -522,13 +523,13 @@ def draw_probabilities(
     return figure
 
 
-def _list_hypotheses(sets: Sequence[Mapping[str, Any]]) -> list[tuple[str, float]]:
+def _list_hypotheses(sets: Sequence[MechanismSet]) -> list[tuple[str, float]]:
     """Label and probability of each hypothesis, then of all others together."""
     labels = [
         textwrap.fill(capital(hypothesis), _HYPOTHESIS_LABEL_WIDTH)
         for hypothesis in hypotheses_words(sets)
     ]
-    values = [entry["probability"] for entry in sets]
+    values = [hypothesis.probability for hypothesis in sets]
     hypotheses = [*zip(labels, values, strict=True)]
     remaining = 1.0 - sum(values)
     if remaining > _SMALLEST_SHOWN_PROBABILITY:

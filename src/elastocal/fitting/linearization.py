@@ -1,12 +1,11 @@
-"""Sensitivities of the measurements: the Jacobian of the chain times the displacement
-of its coordinates per parameter.
+"""Sensitivities: Jacobian of the chain times coordinate displacement per parameter.
 
-An effect displaces coordinates of the sites, by an amount that belongs to the state;
-how a coordinate moves what is measured belongs to the measurement. In row r of state s
-a column of sensitivities is the sum over coordinates c of J[r, c] f_c(s), so that
-products of two columns are sums over states of f_c(s) g_d(s) H_cd(s), with H = J'J of
-the rows of one state: as many terms as states, where the columns themselves have a term
-for each component of each target in it.
+An effect displaces coordinates of the sites by an amount that depends on the state. How
+far a coordinate moves a target depends on the observation. In row r of state s, a
+column of sensitivities is the sum over coordinates c of J[r, c] f_c(s). Products of two
+columns are therefore sums over states of f_c(s) g_d(s) H_cd(s), where H = J'J of the
+rows of one state. They have one term a state; products of the dense columns have one
+for each component of each target of the state.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -47,26 +46,35 @@ if TYPE_CHECKING:
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.observations import Observations
 
-    Laws = Sequence[Mapping[int, np.ndarray]]
+    # For each parameter, the displacement (S,) of each coordinate that it displaces.
+    Basis = Sequence[Mapping[int, np.ndarray]]
 
-# Numbers of products by state that are in memory at once.
+# Upper bound on the products by state that are in memory at once.
 _AT_ONCE = 1_500_000
-# Relative step of the central difference in a shape parameter; of the forward
-# difference in what loads the springs, in plausible sizes: laws of gears bend little
-# over that.
+# Relative step of the central difference in a shape parameter, and step of the forward
+# difference in a compliance or mass, in plausible sizes. Basis functions of gears are
+# nearly linear over such a step.
 _SHAPE_STEP = 1e-4
-_SPRING_STEP = 1e-4
+_LOAD_STEP = 1e-4
+# The step in a shape is no smaller than that of this share of its highest value.
+_SHAPE_STEP_FLOOR = 0.1
 
 
 @dataclass(frozen=True)
 class FactoredSensitivities:
-    """Rows of K columns that displace coordinates, in two factors.
+    """K columns of sensitivities in two factors: displacements and a Jacobian.
 
-    Entries tell what a column does to a coordinate; those of one coordinate lie side by
-    side, those of many first. `columns`: K. `values` (E, S): displacement of one
-    coordinate by one column, in each state. `coordinate`, `column` (E,) of int.
-    `jacobian` (M, rows, C): of each observation with respect to the coordinates,
-    whitened or not. `state` (M,) of int: its state.
+    An entry is the displacement of one coordinate by one column. Entries of a
+    coordinate are consecutive; coordinates with the most entries come first.
+
+    Attributes
+    ----------
+    columns : int, K
+    values : (E, S) array, displacement of each entry in each state
+    coordinate, column : (E,) int arrays, of each entry
+    jacobian : (M, rows, C) array
+        Of each observation with respect to the coordinates, whitened or not.
+    state : (M,) int array, state of each observation
     """
 
     columns: int
@@ -79,171 +87,176 @@ class FactoredSensitivities:
     @classmethod
     def of(
         cls,
-        laws: Laws,
+        basis: Basis,
         jacobian: np.ndarray,
         state: np.ndarray,
         states: int,
         sizes: np.ndarray | None = None,
     ) -> FactoredSensitivities:
-        """Gather laws, one for each column, each a displacement of some coordinates in
-        S `states`, times `sizes` (K,)."""
-        count = Counter(coordinate for law in laws for coordinate in law)
+        """Gather the basis functions of each column, (S,) arrays by coordinate.
+
+        Parameters
+        ----------
+        basis : sequence of mappings, one for each column
+        jacobian, state : as attributes
+        states : int, S
+        sizes : (K,) array, optional
+            Factor of each column.
+        """
+        count = Counter(coordinate for functions in basis for coordinate in functions)
         entries = sorted(
             (-count[coordinate], coordinate, column)
-            for column, law in enumerate(laws)
-            for coordinate in law
+            for column, functions in enumerate(basis)
+            for coordinate in functions
         )
         values = np.empty((len(entries), states))
-        sizes = np.ones(len(laws)) if sizes is None else sizes
-        for place, (_, coordinate, column) in zip(values, entries, strict=True):
-            np.multiply(laws[column][coordinate], sizes[column], out=place)
+        sizes = np.ones(len(basis)) if sizes is None else sizes
+        for row, (_, coordinate, column) in zip(values, entries, strict=True):
+            np.multiply(basis[column][coordinate], sizes[column], out=row)
         _, coordinates, columns = np.array(entries, int).reshape(-1, 3).T
-        return cls(len(laws), values, coordinates, columns, jacobian, state)
+        return cls(len(basis), values, coordinates, columns, jacobian, state)
 
     def select_columns(self, kept: np.ndarray) -> FactoredSensitivities:
-        """The same of some of the columns, ndarray of bool (K,), which are numbered
-        anew."""
-        mine = kept[self.column]
-        number = np.cumsum(kept) - 1
-        entries = self.values[mine], self.coordinate[mine], number[self.column[mine]]
-        return FactoredSensitivities(
-            int(kept.sum()), *entries, self.jacobian, self.state
+        """Select columns, given as (K,) bool array, and renumber them."""
+        kept_entries = kept[self.column]
+        new_number = np.cumsum(kept) - 1
+        return replace(
+            self,
+            columns=int(kept.sum()),
+            values=self.values[kept_entries],
+            coordinate=self.coordinate[kept_entries],
+            column=new_number[self.column[kept_entries]],
         )
 
-    def at(self, seen: np.ndarray) -> FactoredSensitivities:
-        """The same of some of the observations, ndarray of bool (M,), whose states are
-        numbered anew."""
-        states, state = np.unique(self.state[seen], return_inverse=True)
+    def at(self, chosen: np.ndarray) -> FactoredSensitivities:
+        """Select observations, given as (M,) bool array, and renumber their states."""
+        states, state = np.unique(self.state[chosen], return_inverse=True)
         return replace(
             self,
             values=self.values[:, states],
-            jacobian=self.jacobian[seen],
+            jacobian=self.jacobian[chosen],
             state=state,
         )
 
     @cached_property
     def spans(self) -> list[tuple[int, slice]]:
-        """Coordinates that are displaced, and the entries of each."""
+        """Each displaced coordinate with the slice of its entries."""
         first = np.flatnonzero(np.diff(self.coordinate, prepend=-1)).tolist()
         return [
-            (int(self.coordinate[a]), slice(a, b))
-            for a, b in pairwise([*first, len(self.coordinate)])
+            (int(self.coordinate[start]), slice(start, stop))
+            for start, stop in pairwise([*first, len(self.coordinate)])
         ]
 
     @cached_property
     def _fold(self) -> csr_array:
-        """Ones where an entry is of a column, sparse (K, E)."""
+        """Sparse (K, E) matrix that sums the entries of each column."""
         entries = len(self.column)
         return csr_array(
             (np.ones(entries), (self.column, np.arange(entries))),
             (self.columns, entries),
         )
 
-    def _products(
+    def _iterate_products(
         self, right: np.ndarray | None = None
     ) -> Iterator[tuple[slice, np.ndarray]]:
-        """J' times some rows (M, rows, q), or times J itself, summed over each state,
-        of some states at a time.
+        """Compute J' times rows (M, rows, q), or times J itself, summed over each state.
 
-        Yields the states, and ndarray (S', C', q) for the coordinates that are
-        displaced.
+        Yields a slice of states, and the products (S', C', q) for the displaced
+        coordinates.
         """
         left = self.jacobian[..., [coordinate for coordinate, _ in self.spans]]
         right = left if right is None else right
-        shape, states = (left.shape[2], right.shape[2]), self.values.shape[1]
+        shape = (left.shape[2], right.shape[2])
+        states = self.values.shape[1]
         step = max(_AT_ONCE // max(shape[0] * shape[1], 1), 1)
         groups = batch_groups_by_size(self.state)
         for start in range(0, states, step):
-            found = np.zeros((min(step, states - start), *shape))
-            for each in groups:
-                state = self.state[each[:, 0]] - start
+            products = np.zeros((min(step, states - start), *shape))
+            for group in groups:
+                state = self.state[group[:, 0]] - start
                 inside = (state >= 0) & (state < step)
-                mine = each if inside.all() else each[inside]
-                height = each.shape[1] * left.shape[1]
-                rows, others = (
-                    part[mine].reshape(len(mine), height, part.shape[2])
-                    for part in (left, right)
-                )
-                found[state[inside]] = rows.transpose(0, 2, 1) @ others
-            yield slice(start, start + step), found
+                members = group if inside.all() else group[inside]
+                stacked = (len(members), group.shape[1] * left.shape[1])
+                left_rows = left[members].reshape(*stacked, shape[0])
+                right_rows = right[members].reshape(*stacked, shape[1])
+                products[state[inside]] = left_rows.transpose(0, 2, 1) @ right_rows
+            yield slice(start, start + step), products
 
     def gram(self) -> np.ndarray:
-        """Products of the columns with each other, ndarray (K, K)."""
-        place = np.repeat(
-            np.arange(len(self.spans)),
-            [span.stop - span.start for _, span in self.spans],
-        )
+        """Products of the columns with each other, (K, K) array."""
+        sizes = [span.stop - span.start for _, span in self.spans]
+        position = np.repeat(np.arange(len(self.spans)), sizes)
         entries = np.zeros((len(self.values),) * 2)
-        for states, products in self._products():
+        for states, products in self._iterate_products():
             values = self.values[:, states]
             pairs = np.ascontiguousarray(products.transpose(1, 2, 0))
             for number, (_, span) in enumerate(self.spans):
-                # With coordinates from this one on, for the others are alike.
-                rest = slice(span.start, None)
-                entries[span, rest] += (
-                    values[span] @ (values[rest] * pairs[number][place[rest]]).T
-                )
+                # The matrix is symmetric, so compute it from this coordinate on.
+                upper = slice(span.start, None)
+                weighted = values[upper] * pairs[number][position[upper]]
+                entries[span, upper] += values[span] @ weighted.T
         for _, span in self.spans:
             entries[span.stop :, span] = entries[span, span.stop :].T
         return self._fold @ (self._fold @ entries).T
 
     def times(self, right: np.ndarray) -> np.ndarray:
-        """Products of the columns with other rows (M, rows, q), ndarray (K, q)."""
-        found = np.zeros((len(self.values), right.shape[2]))
-        for states, products in self._products(right):
+        """Products of the columns with rows (M, rows, q), (K, q) array."""
+        entries = np.zeros((len(self.values), right.shape[2]))
+        for states, products in self._iterate_products(right):
             for number, (_, span) in enumerate(self.spans):
-                found[span] += self.values[span, states] @ products[:, number]
-        return self._fold @ found
+                entries[span] += self.values[span, states] @ products[:, number]
+        return self._fold @ entries
 
     def multiply_by_pose(self, right: np.ndarray, pose: np.ndarray) -> np.ndarray:
-        """Products of the columns with other rows (M, rows, n), of the measurements of
-        each pose, ndarray (G, n, K).
+        """Products of the columns with rows (M, rows, n), summed over each pose.
 
-        `pose` (M,) of int: 0 .. G-1; all measurements of a state are of one pose.
+        `pose` (M,) holds numbers 0 .. G-1; all observations of a state belong to one
+        pose. Returns a (G, n, K) array.
         """
-        shape = int(pose.max()) + 1, right.shape[2]
-        of_state = np.zeros(self.values.shape[1], int)
-        of_state[self.state] = pose
-        found = np.zeros((len(self.values), *shape))
-        for states, products in self._products(right):
-            for members in batch_groups_by_size(of_state[states]):
-                at = of_state[states][members[:, 0]]
+        shape = (int(pose.max()) + 1, right.shape[2])
+        pose_of_state = np.zeros(self.values.shape[1], int)
+        pose_of_state[self.state] = pose
+        entries = np.zeros((len(self.values), *shape))
+        for states, products in self._iterate_products(right):
+            for members in batch_groups_by_size(pose_of_state[states]):
+                poses = pose_of_state[states][members[:, 0]]
                 for number, (_, span) in enumerate(self.spans):
-                    some = self.values[span, states][:, members].transpose(1, 0, 2)
-                    found[span, at] += (some @ products[members, number]).transpose(
-                        1, 0, 2
-                    )
-        folded = self._fold @ found.reshape(len(found), shape[0] * shape[1])
+                    values = self.values[span, states][:, members].transpose(1, 0, 2)
+                    by_pose = values @ products[members, number]
+                    entries[span, poses] += by_pose.transpose(1, 0, 2)
+        folded = self._fold @ entries.reshape(len(entries), shape[0] * shape[1])
         return np.ascontiguousarray(folded.T).reshape(*shape, self.columns)
 
     def dense(self) -> np.ndarray:
-        """The columns themselves, ndarray (M, rows, K); the observations of each lie
-        side by side."""
+        """The columns as an (M, rows, K) array, contiguous along the observations."""
         jacobian = self.jacobian.transpose(2, 1, 0)
-        found, made = (
-            np.zeros((columns, jacobian.shape[1], len(self.state)))
-            for columns in (self.columns, 1)
-        )
+        shape = (jacobian.shape[1], len(self.state))
+        columns = np.zeros((self.columns, *shape))
+        product = np.zeros(shape)
         single = np.array_equal(self.state, np.arange(self.values.shape[1]))
         for coordinate, column, values in zip(
             self.coordinate, self.column, self.values, strict=True
         ):
-            found[column] += np.multiply(
-                jacobian[coordinate],
-                values if single else values[self.state],
-                out=made[0],
+            by_observation = values if single else values[self.state]
+            columns[column] += np.multiply(
+                jacobian[coordinate], by_observation, out=product
             )
-        return found.transpose(2, 1, 0)
+        return columns.transpose(2, 1, 0)
 
 
 @dataclass(frozen=True)
 class LinearModel:
-    """A model about an estimate, for M observations.
+    """A model linearized about an estimate, for M observations.
 
-    `residual` (M, rows): measured less predicted, base axes, m and rad. `columns`:
-    sensitivities to the P `parameters`; to them the place of a target that is fitted is
-    another few coordinates, which move no other target. `coordinates` (S, C) of the
-    sites, `conditions`: where the robot has yielded to, by this estimate.
+    Attributes
+    ----------
+    residual : (M, rows) array
+        Measured minus predicted, base axes, m and rad.
+    columns : FactoredSensitivities
+        With respect to the P parameters. The components of fitted targets are
+        additional coordinates, each of which moves one target.
+    coordinates : (S, C) array, displaced coordinates of the sites
+    conditions : Conditions, at the displaced pose of this estimate
     """
 
     residual: np.ndarray
@@ -253,220 +266,253 @@ class LinearModel:
 
     @property
     def coordinate_jacobian(self) -> np.ndarray:
-        """Of each target with respect to the coordinates of the sites, ndarray (M,
-        rows, C)."""
+        """Of each target with respect to the coordinates of the sites, (M, rows, C)."""
         return self.columns.jacobian[..., : self.conditions.sites.chain.coordinates]
 
     @property
     def joint_jacobian(self) -> np.ndarray:
-        """Of each target with respect to the joints, ndarray (M, rows, n)."""
+        """Of each target with respect to the joints, (M, rows, n)."""
         return self.columns.jacobian[..., : self.conditions.sites.joints]
 
     @cached_property
     def sensitivities(self) -> np.ndarray:
-        """With respect to `parameters`, ndarray (M, rows, P)."""
+        """With respect to the parameters, (M, rows, P)."""
         return self.columns.dense()
 
 
 def linearize(
     model: Model, estimate: Estimate, observations: Observations, conditions: Conditions
 ) -> LinearModel:
-    """Residuals of a model and their sensitivities; arguments as of `predict`.
+    """Linearize a model about an estimate; arguments are those of `model.predict`.
 
-    Sensitivities are analytic, but for shapes (central differences) and for what
-    springs do by way of other effects (forward differences).
+    Sensitivities are analytic, except for shapes (central differences) and for the
+    influence of compliances and masses on other effects (forward differences).
     """
-    around = update_springs_and_masses(model, estimate, conditions)
+    conditions = update_springs_and_masses(model, estimate, conditions)
+    by_coordinates = linearize_coordinates(model, estimate, observations, conditions)
+    jacobian = by_coordinates.columns.jacobian
     states = observations.states
-    found = linearize_coordinates(model, estimate, observations, around)
-    laws = []
-    for session in estimate.sessions if model.fitted_frames else ():
-        in_session = (states.session == session).astype(float)
-        laws += [{coordinate: in_session} for coordinate in model.sites.base]
-    placed = range(model.sites.chain.coordinates, found.columns.jacobian.shape[2])
-    laws += [{coordinate: np.ones(len(states))} for coordinate in placed]
+    basis: list[Mapping[int, np.ndarray]] = []
+    if model.fitted_frames:
+        for session in estimate.sessions:
+            in_session = (states.session == session).astype(float)
+            basis += [{coordinate: in_session} for coordinate in model.sites.base]
+    target_coordinates = range(model.sites.chain.coordinates, jacobian.shape[2])
+    basis += [{coordinate: np.ones(len(states))} for coordinate in target_coordinates]
     for effect, values, shapes in zip(
         model.effects, estimate.coefficients, estimate.shapes, strict=True
     ):
-        laws += (
-            _spring_laws(effect, model, estimate, around)
-            if effect.effect in LOAD_EFFECTS
-            else evaluate_basis_functions(effect, shapes, around)
-        )
-        laws += _shape_laws(effect, values, shapes, around)
-    return replace(
-        found,
-        columns=FactoredSensitivities.of(
-            laws, found.columns.jacobian, observations.state, len(states)
-        ),
-    )
+        if effect.effect in LOAD_EFFECTS:
+            basis += _load_effect_basis(effect, model, estimate, conditions)
+        else:
+            basis += evaluate_basis_functions(effect, shapes, conditions)
+        basis += _shape_derivatives(effect, values, shapes, conditions)
+    columns = FactoredSensitivities.of(basis, jacobian, observations.state, len(states))
+    return replace(by_coordinates, columns=columns)
 
 
 def linearize_coordinates(
     model: Model, estimate: Estimate, observations: Observations, conditions: Conditions
 ) -> LinearModel:
-    """The same without sensitivities to parameters: no columns beside the Jacobian."""
-    around = update_springs_and_masses(model, estimate, conditions)
-    coordinates = compute_displaced_coordinates(model, estimate, around)
-    count = len(observations)
-    rows = model.rows
-    chain = model.sites.chain
+    """Linearize with respect to the coordinates alone, without parameters.
+
+    The result has a Jacobian and no columns. Arguments are those of `model.predict`.
+    """
+    conditions = update_springs_and_masses(model, estimate, conditions)
+    coordinates = compute_displaced_coordinates(model, estimate, conditions)
+    sites = model.sites
     points = locate_targets(model, estimate)
-    placed = [
-        (index, part)
-        for index, parts in model.fitted_target_components
-        for part in range(parts.start, parts.stop, 3)
-    ]
-    moved = motion(chain, coordinates, (*model.sites.followed, *points))
+    moved = motion(sites.chain, coordinates, (*sites.followed, *points))
+    # Each fitted component of a target is an additional coordinate.
+    target_coordinates = sum(
+        components.stop - components.start
+        for _, components in model.fitted_target_components
+    )
+    count = len(observations)
     position = np.empty((count, 3))
     rotation = np.empty((count, 3, 3))
-    # Component first, so that every effect's arithmetic runs along the observations.
-    jacobian = np.zeros((rows, chain.coordinates + 3 * len(placed), count))
+    # The component comes first, so that the arithmetic of effects is contiguous along
+    # the observations.
+    jacobian = np.zeros(
+        (model.rows, sites.chain.coordinates + target_coordinates, count)
+    )
     for index, point in enumerate(points):
-        seen = np.flatnonzero(observations.target == index)
-        # Where each state is seen once there is nothing to gather.
-        once = np.array_equal(seen, observations.state) and len(seen) == len(
-            coordinates
+        members = np.flatnonzero(observations.target == index)
+        state = observations.state[members]
+        if len(members) == len(coordinates) and np.array_equal(members, state):
+            # Each state has one observation, so there is nothing to gather.
+            state = slice(None)  # type: ignore[assignment]
+        followed = len(sites.followed) + index
+        point_position = moved.position[followed][:, state]
+        position[members] = point_position.T
+        rotation[members] = np.moveaxis(moved.rotation[followed][..., state], -1, 0)
+        jacobian[:, : sites.chain.coordinates, members] = moved.jacobian(
+            point.after, point_position, model.rows, state
         )
-        state = slice(None) if once else observations.state[seen]
-        number = len(model.sites.followed) + index
-        at = moved.position[number][:, state]
-        position[seen] = at.T
-        rotation[seen] = np.moveaxis(moved.rotation[number][..., state], -1, 0)
-        jacobian[:, : chain.coordinates, seen] = moved.jacobian(
-            point.after, at, rows, state
-        )
-    residual = subtract_prediction(
-        estimate,
-        observations,
-        position,
-        rotation @ estimate.target_rotation[observations.target],
+    _fill_target_jacobian(
+        jacobian[:, sites.chain.coordinates :], model, observations, rotation
     )
-    # A target's shift along the axes of its measuring point and, for poses, its turn
-    # about them, where it is seen.
-    for first, (index, part) in zip(
-        range(chain.coordinates, jacobian.shape[1], 3), placed, strict=True
-    ):
-        seen = np.flatnonzero(observations.target == index)
-        jacobian[part : part + 3, first : first + 3, seen] = rotation[seen].transpose(
-            1, 2, 0
-        )
+    rotation = rotation @ estimate.target_rotation[observations.target]
     columns = FactoredSensitivities.of(
-        [], np.moveaxis(jacobian, -1, 0), observations.state, len(observations.states)
+        [], np.moveaxis(jacobian, -1, 0), observations.state, len(coordinates)
     )
-    return LinearModel(residual, columns, coordinates, replace(around, motion=moved))
+    return LinearModel(
+        subtract_prediction(estimate, observations, position, rotation),
+        columns,
+        coordinates,
+        replace(conditions, motion=moved),
+    )
+
+
+def _fill_target_jacobian(
+    jacobian: np.ndarray,
+    model: Model,
+    observations: Observations,
+    rotation: np.ndarray,
+) -> None:
+    """Fill a Jacobian (rows, coordinates, M) with respect to the fitted targets.
+
+    A fitted target moves along and about the axes (M, 3, 3) of its measuring point.
+    """
+    start = 0
+    for index, components in model.fitted_target_components:
+        members = np.flatnonzero(observations.target == index)
+        axes = rotation[members].transpose(1, 2, 0)
+        for first in range(components.start, components.stop, 3):
+            jacobian[first : first + 3, start : start + 3, members] = axes
+            start += 3
 
 
 def compute_effect_sensitivities(
     effects: Iterable[tuple[Law, Iterable[float]]],
-    around: Conditions,
+    conditions: Conditions,
     jacobian: np.ndarray,
     state: np.ndarray,
     sizes: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Sensitivities (M, rows, D) to the parameters of what displaces linearly, with its
-    shapes, by a `coordinate_jacobian`, times some sizes (D,)."""
-    laws = [
-        law for displacement, shapes in effects for law in displacement(around, *shapes)
-    ]
-    return FactoredSensitivities.of(
-        laws, jacobian, state, len(around.joint_angles), sizes
-    ).dense()
+    """Compute the sensitivities to the linear parameters of effects, (M, rows, D).
+
+    Parameters
+    ----------
+    effects : iterable of pairs of a displacement function and its shapes
+    conditions : Conditions of the states
+    jacobian : (M, rows, C) array, see `LinearModel.coordinate_jacobian`
+    state : (M,) int array
+    sizes : (D,) array, optional
+        Factor of each column.
+    """
+    basis: list[dict[int, np.ndarray]] = []
+    for displacement, shapes in effects:
+        basis += displacement(conditions, *shapes)
+    states = len(conditions.joint_angles)
+    return FactoredSensitivities.of(basis, jacobian, state, states, sizes).dense()
 
 
-def _shape_laws(
+def _shape_derivatives(
     effect: Candidate, values: np.ndarray, shapes: np.ndarray, conditions: Conditions
 ) -> Iterator[dict[int, np.ndarray]]:
+    """Derivatives of the displacements with respect to each shape of an effect."""
     for number, shape in enumerate(effect.shapes):
         if shape.tried > 1:
-            # A law that changes in jumps has no slope: a search finds its place, and a
-            # fit that took the jump of a row within a step for one would go to and fro.
+            # A basis function with jumps has no slope. A search finds its shape; a fit
+            # would take the jump of a row within a step for a slope and oscillate.
             yield {}
             continue
-        step = _SHAPE_STEP * max(abs(shapes[number]), shape.lowest, 0.1 * shape.highest)
-        off = step * (np.arange(len(shapes)) == number)
-        above, below = (
-            sum_displacements([(effect, values, at)], conditions)
-            for at in (shapes + off, shapes - off)
+        step = _SHAPE_STEP * max(
+            abs(shapes[number]), shape.lowest, _SHAPE_STEP_FLOOR * shape.highest
         )
+        offset = step * (np.arange(len(shapes)) == number)
+        above = sum_displacements([(effect, values, shapes + offset)], conditions)
+        below = sum_displacements([(effect, values, shapes - offset)], conditions)
         yield {
-            c: (above.get(c, 0.0) - below.get(c, 0.0)) / (2 * step)
-            for c in {*above, *below}
+            coordinate: (above.get(coordinate, 0.0) - below.get(coordinate, 0.0))
+            / (2 * step)
+            for coordinate in {*above, *below}
         }
 
 
-def _spring_laws(
-    spring: Candidate, model: Model, estimate: Estimate, around: Conditions
+def _load_effect_basis(
+    load_effect: Candidate, model: Model, estimate: Estimate, conditions: Conditions
 ) -> list[dict[int, np.ndarray]]:
-    """Displacements per unit of compliances or of errors of masses, with all that they
-    do by way of other effects.
+    """Displacements per unit of compliances or of errors of masses, including their
+    influence on other effects.
 
-    Compliances turn other loads into angles; errors of masses are part of the load that
-    other effects go with.
+    Compliances turn the loads of other effects into angles. Errors of masses are part
+    of the load on which other effects depend.
     """
-    laws = spring.displacement(around)
-    springs = spring.effect == "joint_compliance"
-    others = [
-        found
-        for found in zip(
+    basis = load_effect.displacement(conditions)
+    is_compliance = load_effect.effect == "joint_compliance"
+    influenced = [
+        (effect, values, shapes)
+        for effect, values, shapes in zip(
             model.effects, estimate.coefficients, estimate.shapes, strict=True
         )
-        if (
-            found[0].family in ("gravity", "load")
-            if springs
-            else "load" in found[0].needs and found[0].effect not in LOAD_EFFECTS
-        )
+        if _depends_on(effect, is_compliance=is_compliance)
     ]
-    if not others:
-        return laws
-    present = [sum_displacements([other], around) for other in others]
-    place = around.motion.place
+    if not influenced:
+        return basis
+    present = [sum_displacements([effect], conditions) for effect in influenced]
     coordinates = sorted(
-        {coordinate for each in present for coordinate in each},
-        key=lambda coordinate: place[coordinate],
+        {coordinate for displacements in present for coordinate in displacements},
+        key=conditions.motion.place.__getitem__,
     )
     steps = np.array(
-        [_SPRING_STEP * parameter.plausible for parameter in spring.parameters]
+        [_LOAD_STEP * parameter.plausible for parameter in load_effect.parameters]
     )
-    if springs:
-        every = {*coordinates}
-        values = get_joint_compliances(model, estimate)
-        corrections = get_mass_corrections(model, estimate)
-        sprung: Iterable[Any] = (
-            (every, with_springs(around, values + row, corrections))
-            for row in np.diag(steps)
-        )
+    if is_compliance:
+        changes = _step_each_compliance(model, estimate, conditions, steps)
     else:
-        sprung = _with_each_correction(around, coordinates, steps)
-    for law, step, (loaded, changed) in zip(laws, steps, sprung, strict=True):
-        for other, before in zip(others, present, strict=True):
-            moved = (
-                {} if loaded.isdisjoint(before) else sum_displacements([other], changed)
-            )
-            for coordinate, by in moved.items():
-                by -= before[coordinate]
-                if by.any():
-                    by /= step
-                    law[coordinate] = (
-                        np.add(law[coordinate], by, out=by) if coordinate in law else by
-                    )
-    return laws
+        changes = _step_each_mass_correction(conditions, coordinates, steps)
+    for functions, step, (loaded, changed) in zip(basis, steps, changes, strict=True):
+        for effect, before in zip(influenced, present, strict=True):
+            if loaded is not None and loaded.isdisjoint(before):
+                continue
+            for coordinate, change in sum_displacements([effect], changed).items():
+                change -= before[coordinate]
+                if change.any():
+                    change /= step
+                    if coordinate in functions:
+                        change += functions[coordinate]
+                    functions[coordinate] = change
+    return basis
 
 
-def _with_each_correction(
-    around: Conditions, coordinates: list[int], steps: np.ndarray
-) -> Iterator[Any]:
-    """Conditions with one error of a mass after the other changed by a step, behind the
-    set of coordinates that this loads."""
-    present = around.total.T
-    total = around.total.T.copy()
-    for sizes, forces in zip(
+def _depends_on(effect: Candidate, *, is_compliance: bool) -> bool:
+    """Whether an effect acts through the compliances, or through the masses."""
+    if is_compliance:
+        return effect.family in ("gravity", "load")
+    return "load" in effect.needs and effect.effect not in LOAD_EFFECTS
+
+
+def _step_each_compliance(
+    model: Model, estimate: Estimate, conditions: Conditions, steps: np.ndarray
+) -> Iterator[tuple[set[int] | None, Conditions]]:
+    """Conditions with one compliance after the other changed by a step.
+
+    They come with None, because a compliance may act on any coordinate.
+    """
+    compliances = get_joint_compliances(model, estimate)
+    corrections = get_mass_corrections(model, estimate)
+    for step in np.diag(steps):
+        yield None, with_springs(conditions, compliances + step, corrections)
+
+
+def _step_each_mass_correction(
+    conditions: Conditions, coordinates: list[int], steps: np.ndarray
+) -> Iterator[tuple[set[int] | None, Conditions]]:
+    """Conditions with one error of a mass after the other changed by a step.
+
+    They come with the coordinates that this loads.
+    """
+    present = conditions.total.T
+    total = conditions.total.T.copy()
+    for mass_steps, forces in zip(
         steps.reshape(-1, MASS_PARAMETERS),
-        around.gravity_of_corrections(coordinates),
+        conditions.gravity_of_corrections(coordinates),
         strict=True,
     ):
         loaded = coordinates[: forces.shape[1]]
-        for step, per_unit in zip(sizes, forces, strict=True):
+        for step, per_unit in zip(mass_steps, forces, strict=True):
             total[loaded] = present[loaded] + step * per_unit
-            yield {*loaded}, with_total(around, total.T)
+            yield {*loaded}, with_total(conditions, total.T)
         total[loaded] = present[loaded]

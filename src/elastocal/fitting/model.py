@@ -1,5 +1,4 @@
-"""What the measurements are modelled by, all that this leaves open as one vector of
-parameters, and what it predicts."""
+"""The model of the measurements, its parameters as one vector, and its predictions."""
 
 from __future__ import annotations
 
@@ -38,33 +37,43 @@ if TYPE_CHECKING:
     from elastocal.fitting.observations import States
     from elastocal.mechanics.chain import MeasuringPoint
 
-# Frames and targets may be anywhere in a workshop.
-_ANYWHERE_M = 1.0
-_ANYWHERE_RAD = 1.0
-# Fixed-point iterations of the load at the displaced pose. Each shrinks what is left by
-# deflection over reach, some 1 / 500 at 3 kN, from ten micrometres at the commanded
-# pose.
-_PASSES = 2
-# Effects on which the laws of others depend: they turn a wrench into angles, or are
-# part of the load.
+# Plausible sizes of frames and targets, which may be anywhere in a workshop.
+_PLACEMENT_M = 1.0
+_PLACEMENT_RAD = 1.0
+# Fixed-point iterations of the load at the displaced pose. Each reduces the error by
+# the ratio of deflection to reach, some 1 / 500 at 3 kN; the first error, that of the
+# commanded pose, is ten micrometres.
+_LOAD_ITERATIONS = 2
+# Effects that determine how other effects act: compliances turn a wrench into angles,
+# masses are part of the load.
 LOAD_EFFECTS = ("joint_compliance", DECLARED_WEIGHT)
 
 
 @dataclass(frozen=True)
 class Model:
-    """What is taken to make the measurements: nominal robot, frames, targets and any
-    set of effects.
+    """Model of the measurements: nominal robot, frames, targets and any set of effects.
 
-    `targets`: as in the campaign; offsets and rotations that they do not have are
-    fitted. `fitted_frames`: whether the placement of the base is unknown, one for each
-    session. `rows`: 3 where positions are measured, 6 where poses are.
-    `nominal_compliance` (n,): rad/(N m). `effects`: joint compliances, where they are
-    identified, and errors of declared masses, where there are any, among them.
-    `time_zero_s`: from which effects count the time: the first measurement to be
-    fitted. `row_span` (int, int): first and last row of the measurements to be fitted,
-    between which the campaign made its progress. `compliance_known`: whether the
-    nominal compliances are those of the robot file; else they are usual ones, or 0 of
-    joints taken as rigid.
+    Attributes
+    ----------
+    sites : Sites
+    targets : tuple of Target
+        As in the campaign; offsets and rotations that they do not have are fitted.
+    fitted_frames : bool
+        Whether the placement of the base is unknown, one for each session.
+    rows : int
+        3 if positions are measured, 6 if poses are.
+    nominal_compliance : (n,) array, rad/(N m)
+    effects : tuple of Candidate
+        Including joint compliances, if they are identified, and errors of declared
+        masses, if there are any.
+    time_zero_s : float
+        From which effects count the time: the first measurement to be fitted.
+    row_span : (int, int) or None
+        First and last row of the measurements to be fitted, between which the campaign
+        made its progress.
+    compliance_known : bool
+        Whether the nominal compliances are those of the robot file; otherwise they are
+        usual ones, or 0 for joints that are taken as rigid.
     """
 
     sites: Sites
@@ -84,51 +93,50 @@ class Model:
 
     @property
     def nominal_coefficients(self) -> tuple[np.ndarray, ...]:
-        """Where a fit starts: joint compliances at their nominal values, all else at
-        zero."""
-        nominal = self.nominal_compliance
-        effects = self.effects
+        """Linear parameters at which a fit starts: nominal compliances, zero for all
+        other effects."""
         return tuple(
-            nominal.copy()
-            if e.effect == "joint_compliance"
-            else np.zeros(len(e.parameters))
-            for e in effects
+            self.nominal_compliance.copy()
+            if effect.effect == "joint_compliance"
+            else np.zeros(len(effect.parameters))
+            for effect in self.effects
         )
 
     @property
     def fitted_target_components(self) -> list[tuple[int, slice]]:
-        """Targets that are fitted, and which of shift and turn (x, y, z, rx, ry, rz)
-        are."""
-        ends = [
-            (0 if t.offset_m is None else 3, self.rows if t.rotation is None else 3)
-            for t in self.targets
-        ]
-        return [
-            (number, slice(first, last))
-            for number, (first, last) in enumerate(ends)
-            if first < last
-        ]
+        """Indices of the targets that are fitted, each with its slice of the fitted
+        components x, y, z, rx, ry, rz."""
+        components = []
+        for index, target in enumerate(self.targets):
+            first = 0 if target.offset_m is None else 3
+            last = self.rows if target.rotation is None else 3
+            if first < last:
+                components.append((index, slice(first, last)))
+        return components
 
     def available_inputs(self, states: States) -> frozenset[str]:
-        """What effects may need that some states and the campaign have: see
-        `Candidate.needs`."""
-        return offered(self.sites, states) | (
-            frozenset() if self.fitted_frames else {"declared base"}
-        )
+        """Inputs of effects that states and campaign provide: see `Candidate.needs`."""
+        inputs = offered(self.sites, states)
+        return inputs if self.fitted_frames else inputs | {"declared base"}
 
     def with_effects(self, effects: Iterable[Candidate]) -> Model:
-        """The same model with more effects."""
+        """Add effects."""
         return replace(self, effects=(*self.effects, *effects))
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Values of everything that a model leaves open.
+    """Values of all parameters of a model.
 
-    `frame_rotation`, `frame_position` (K, 3, 3), (K, 3): placement of the base in the
-    frame of each session. `target_offset`, `target_rotation` (T, 3), (T, 3, 3): each
-    target in the frame of its measuring point, m. `coefficients`: linear parameters of
-    each effect. `shapes`: shape parameters of each effect.
+    Attributes
+    ----------
+    sessions : tuple of int, K of them
+    frame_rotation, frame_position : (K, 3, 3) and (K, 3) arrays
+        Placement of the base in the frame of each session.
+    target_offset, target_rotation : (T, 3) and (T, 3, 3) arrays
+        Each target in the frame of its measuring point, m.
+    coefficients : tuple of arrays, linear parameters of each effect
+    shapes : tuple of arrays, shape parameters of each effect
     """
 
     sessions: tuple[int, ...]
@@ -140,169 +148,172 @@ class Estimate:
     shapes: tuple[np.ndarray, ...] = ()
 
     def with_effects(self, effects: Sequence[Candidate]) -> Estimate:
-        """The same estimate with more effects, all of them at zero."""
+        """Add effects, all of them at zero."""
+        coefficients = [np.zeros(len(effect.parameters)) for effect in effects]
+        shapes = [_start_of_shapes(effect) for effect in effects]
         return replace(
             self,
-            coefficients=(
-                *self.coefficients,
-                *(np.zeros(len(effect.parameters)) for effect in effects),
-            ),
-            shapes=(
-                *self.shapes,
-                *(
-                    np.array([shape.start for shape in effect.shapes])
-                    for effect in effects
-                ),
-            ),
+            coefficients=(*self.coefficients, *coefficients),
+            shapes=(*self.shapes, *shapes),
         )
+
+
+def _start_of_shapes(effect: Candidate) -> np.ndarray:
+    return np.array([shape.start for shape in effect.shapes])
 
 
 def build_declared_model(
     campaign: Campaign, effects: Iterable[Candidate] = ()
 ) -> Model:
-    """The model that a campaign declares, with its declared effects."""
+    """Build the model that a campaign declares, with its declared effects."""
     sites = sites_of(campaign.robot)
     measurements = campaign.measurements
-    # Under an arm whose first joint turns, a base that yields and the sag of that arm
-    # are one thing until weights are known.
-    unknown = not sites.masses and not measurements.wrench.any()
-    sites = replace(sites, usual_weight=sites.prismatic[0] and unknown)
-    springs = (joint_compliance(sites),) if campaign.compliance == "identify" else ()
-    weight = (declared_weight(sites),) if sites.masses else ()
+    # Without known weights, a compliant base under an arm that slides on its first
+    # joint is indistinguishable from the sag of that arm.
+    unknown_load = not sites.masses and not measurements.wrench.any()
+    sites = replace(sites, usual_weight=sites.prismatic[0] and unknown_load)
+    load_effects = []
+    if campaign.compliance == "identify":
+        load_effects.append(joint_compliance(sites))
+    if sites.masses:
+        load_effects.append(declared_weight(sites))
+    row_span = None
+    if len(measurements):
+        row_span = (int(measurements.row.min()), int(measurements.row.max()))
+    time_s = measurements.time_s
     return Model(
         sites,
         campaign.targets,
         campaign.frame == "tracker",
         6 if campaign.measured == "pose" else 3,
         campaign.robot.compliance,
-        (*springs, *weight, *effects),
-        0.0 if measurements.time_s is None else float(measurements.time_s.min()),
-        (int(measurements.row.min()), int(measurements.row.max()))
-        if len(measurements)
-        else None,
+        (*load_effects, *effects),
+        0.0 if time_s is None else float(time_s.min()),
+        row_span,
         campaign.robot.compliance_known,
     )
 
 
 def list_parameters(model: Model, estimate: Estimate) -> list[tuple[str, Parameter]]:
-    """Everything that is fitted, in the order of the sensitivities.
+    """List all fitted parameters in the order of the sensitivities.
 
-    Returns (str, Parameter): what it belongs to ("frame 0", "target A", the key of an
-    effect) and the parameter.
+    Returns
+    -------
+    list of (owner, parameter)
+        The owner is "frame 0", "target A" or the key of an effect.
     """
-    found = []
-    placed = moved_and_turned(_ANYWHERE_M, _ANYWHERE_RAD)
+    parameters = []
+    components = moved_and_turned(_PLACEMENT_M, _PLACEMENT_RAD)
     if model.fitted_frames:
-        found += [
-            (f"frame {session}", parameter)
-            for session in estimate.sessions
-            for parameter in placed
-        ]
-    for number, parts in model.fitted_target_components:
-        found += [
-            (f"target {model.targets[number].name}", parameter)
-            for parameter in placed[parts]
-        ]
+        for session in estimate.sessions:
+            owner = f"frame {session}"
+            parameters += [(owner, component) for component in components]
+    for index, fitted in model.fitted_target_components:
+        owner = f"target {model.targets[index].name}"
+        parameters += [(owner, component) for component in components[fitted]]
     for effect in model.effects:
-        found += [(effect.key, parameter) for parameter in effect.parameters]
-        found += [
-            (effect.key, Parameter(s.name, s.unit, s.highest - s.lowest))
-            for s in effect.shapes
-        ]
-    return found
+        parameters += [(effect.key, parameter) for parameter in effect.parameters]
+        for shape in effect.shapes:
+            width = shape.highest - shape.lowest
+            parameters.append((effect.key, Parameter(shape.name, shape.unit, width)))
+    return parameters
 
 
 def find_placement_parameters(owners: Iterable[str]) -> np.ndarray:
-    """Which of some owners of parameters are frames and targets, ndarray of bool."""
+    """Find the owners that are frames and targets, bool array."""
     return np.array([owner.startswith(("frame ", "target ")) for owner in owners], bool)
 
 
 def get_parameter_bounds(model: Model, estimate: Estimate) -> np.ndarray:
-    """Lowest and highest value of each of the `parameters`, ndarray (P, 2): the ranges
-    of shapes, infinite for all others."""
+    """Lowest and highest value of each parameter, (P, 2) array.
+
+    Shapes have ranges; all other parameters are unbounded.
+    """
     ranges = {
         (effect.key, shape.name): (shape.lowest, shape.highest)
         for effect in model.effects
         for shape in effect.shapes
     }
-    return np.array(
-        [
-            ranges.get((o, p.name), (-np.inf, np.inf))
-            for o, p in list_parameters(model, estimate)
-        ]
-    ).reshape(-1, 2)
+    unbounded = (-np.inf, np.inf)
+    bounds = [
+        ranges.get((owner, parameter.name), unbounded)
+        for owner, parameter in list_parameters(model, estimate)
+    ]
+    return np.array(bounds).reshape(-1, 2)
 
 
 def find_nonlinear_parameters(model: Model, estimate: Estimate) -> np.ndarray:
-    """Which of the `parameters` are shapes, which alone have limits, ndarray of bool
-    (P,)."""
-    shapes = [
-        shape
-        for effect in model.effects
-        for shape in (False,) * len(effect.parameters) + (True,) * len(effect.shapes)
-    ]
-    return np.array(
-        [False] * (len(list_parameters(model, estimate)) - len(shapes)) + shapes, bool
-    )
+    """Find the parameters that are shapes, (P,) bool array."""
+    of_effects: list[bool] = []
+    for effect in model.effects:
+        of_effects += [False] * len(effect.parameters) + [True] * len(effect.shapes)
+    placement = len(list_parameters(model, estimate)) - len(of_effects)
+    return np.array([False] * placement + of_effects, bool)
 
 
 def get_parameter_values(model: Model, estimate: Estimate) -> np.ndarray:
-    """Present values of the `parameters`, ndarray (P,); frames and targets are fitted
-    by steps and count as zero."""
-    effects = [
-        part
-        for pair in zip(estimate.coefficients, estimate.shapes, strict=True)
-        for part in pair
-    ]
-    return np.concatenate(
-        [
-            np.zeros(len(list_parameters(model, estimate)) - sum(map(len, effects))),
-            *effects,
-        ]
-    )
+    """Present values of the parameters, (P,) array.
+
+    Frames and targets are fitted by steps and count as zero.
+    """
+    values = []
+    for coefficients, shapes in zip(
+        estimate.coefficients, estimate.shapes, strict=True
+    ):
+        values += [coefficients, shapes]
+    placement = len(list_parameters(model, estimate)) - sum(map(len, values))
+    return np.concatenate([np.zeros(placement), *values])
 
 
 def apply_step(model: Model, estimate: Estimate, step: np.ndarray) -> Estimate:
-    """An estimate after a step (P,) of all `parameters`; shapes stay in their
-    ranges."""
-
-    def take(count: int) -> np.ndarray:
-        nonlocal step
-        taken = step[:count]
-        step = step[count:]
-        return taken
-
+    """Apply a step (P,) of all parameters; shapes stay in their ranges."""
+    components = iter(np.split(step, np.cumsum(_group_sizes(model, estimate))))
     frame_rotation = estimate.frame_rotation.copy()
     frame_position = estimate.frame_position.copy()
     if model.fitted_frames:
         for number in range(len(estimate.sessions)):
-            shift = take(3)
-            turn = take(3)
+            shift, turn = np.split(next(components), 2)
             frame_position[number] += frame_rotation[number] @ shift
             frame_rotation[number] = (
                 frame_rotation[number] @ Rotation.from_rotvec(turn).as_matrix()
             )
     target_offset = estimate.target_offset.copy()
     target_rotation = estimate.target_rotation.copy()
-    for number, parts in model.fitted_target_components:
-        moved = np.zeros(6)
-        moved[parts] = take(parts.stop - parts.start)
-        target_offset[number] += moved[:3]
-        target_rotation[number] = (
-            Rotation.from_rotvec(moved[3:]).as_matrix() @ target_rotation[number]
-        )
+    for index, fitted in model.fitted_target_components:
+        motion_of_target = np.zeros(6)
+        motion_of_target[fitted] = next(components)
+        target_offset[index] += motion_of_target[:3]
+        rotation = Rotation.from_rotvec(motion_of_target[3:]).as_matrix()
+        target_rotation[index] = rotation @ target_rotation[index]
     coefficients = []
     shapes = []
-    for effect, values, shape in zip(
+    for effect, values, shape_values in zip(
         model.effects, estimate.coefficients, estimate.shapes, strict=True
     ):
-        coefficients.append(values + take(len(values)))
-        ends = np.array(
-            [(each.lowest, each.highest) for each in effect.shapes]
-        ).reshape(-1, 2)
-        shapes.append(np.clip(shape + take(len(shape)), *ends.T))
-    placed = frame_rotation, frame_position, target_offset, target_rotation
-    return Estimate(estimate.sessions, *placed, tuple(coefficients), tuple(shapes))
+        coefficients.append(values + next(components))
+        lowest = [shape.lowest for shape in effect.shapes]
+        highest = [shape.highest for shape in effect.shapes]
+        shapes.append(np.clip(shape_values + next(components), lowest, highest))
+    return Estimate(
+        estimate.sessions,
+        frame_rotation,
+        frame_position,
+        target_offset,
+        target_rotation,
+        tuple(coefficients),
+        tuple(shapes),
+    )
+
+
+def _group_sizes(model: Model, estimate: Estimate) -> list[int]:
+    """Numbers of parameters of each frame and target, and of the coefficients and the
+    shapes of each effect."""
+    sizes = [6] * len(estimate.sessions) if model.fitted_frames else []
+    for _, fitted in model.fitted_target_components:
+        sizes.append(fitted.stop - fitted.start)
+    for effect in model.effects:
+        sizes += [len(effect.parameters), len(effect.shapes)]
+    return sizes
 
 
 def evaluate_conditions(
@@ -311,156 +322,171 @@ def evaluate_conditions(
     states: States,
     coordinates: np.ndarray | None = None,
 ) -> Conditions:
-    """What the effects of a model may depend on, in some states: loads at the displaced
-    pose, by fixed-point iteration.
+    """Evaluate the conditions of states on which the effects of a model depend.
 
-    `coordinates` (S, C): where the robot has yielded to; found without.
+    Loads act at the displaced pose, which is found by fixed-point iteration unless
+    displaced `coordinates` (S, C) are given.
     """
-    springs = (
-        get_joint_compliances(model, estimate),
-        get_mass_corrections(model, estimate),
-    )
-    around = conditions_of(
+    conditions = conditions_of(
         model.sites,
-        springs[0],
+        get_joint_compliances(model, estimate),
         states,
         model.time_zero_s,
-        springs[1],
+        get_mass_corrections(model, estimate),
         model.row_span,
         coordinates,
     )
-    for _ in range(_PASSES if coordinates is None else 0):
-        displaced = compute_displaced_coordinates(model, estimate, around)
-        around = replace(
-            around, motion=motion(model.sites.chain, displaced, model.sites.followed)
+    if coordinates is not None:
+        return conditions
+    for _ in range(_LOAD_ITERATIONS):
+        displaced = compute_displaced_coordinates(model, estimate, conditions)
+        conditions = replace(
+            conditions,
+            motion=motion(model.sites.chain, displaced, model.sites.followed),
         )
-    return around
+    return conditions
 
 
 def get_joint_compliances(model: Model, estimate: Estimate) -> np.ndarray:
-    """Joint compliances of an estimate, ndarray (n,), rad/(N m): the identified ones
-    where they are parameters."""
-    return _values_of("joint_compliance", model, estimate, model.nominal_compliance)
+    """Joint compliances of an estimate, (n,) array, rad/(N m).
 
-
-def get_mass_corrections(model: Model, estimate: Estimate) -> np.ndarray:
-    """By how much the declared masses of an estimate are off the robot file, ndarray (4
-    m,): see `Conditions`."""
-    return _values_of(
-        DECLARED_WEIGHT,
-        model,
-        estimate,
-        np.zeros(MASS_PARAMETERS * len(model.sites.masses)),
+    These are the identified ones if they are parameters, otherwise the nominal ones.
+    """
+    return _get_coefficients(
+        "joint_compliance", model, estimate, model.nominal_compliance
     )
 
 
+def get_mass_corrections(model: Model, estimate: Estimate) -> np.ndarray:
+    """Errors of the declared masses in the robot file, (4 m,) array: see
+    `Conditions`."""
+    zero = np.zeros(MASS_PARAMETERS * len(model.sites.masses))
+    return _get_coefficients(DECLARED_WEIGHT, model, estimate, zero)
+
+
 def update_springs_and_masses(
-    model: Model, estimate: Estimate, around: Conditions
+    model: Model, estimate: Estimate, conditions: Conditions
 ) -> Conditions:
-    """Conditions with the springs and the masses of an estimate."""
+    """Update conditions to the compliances and masses of an estimate."""
     return with_springs(
-        around,
+        conditions,
         get_joint_compliances(model, estimate),
         get_mass_corrections(model, estimate),
     )
 
 
-def _values_of(
-    name: str, model: Model, estimate: Estimate, otherwise: np.ndarray
+def _get_coefficients(
+    name: str, model: Model, estimate: Estimate, default: np.ndarray
 ) -> np.ndarray:
+    """Linear parameters of the effect with this name."""
     for effect, values in zip(model.effects, estimate.coefficients, strict=True):
         if effect.effect == name:
             return values
-    return otherwise
+    return default
 
 
 def compute_displaced_coordinates(
     model: Model, estimate: Estimate, conditions: Conditions
 ) -> np.ndarray:
-    """Coordinates of the sites in each state, ndarray (S, C): joint angles, springs
-    under load and effects.
+    """Compute the coordinates of the sites in each state, (S, C) array.
 
-    Springs yield to the total load, the external one and the weight that the robot file
-    declares.
+    They are the joint angles, displaced by springs and effects. Springs yield to the
+    total load: the external one and the weight that the robot file declares.
     """
-    around = update_springs_and_masses(model, estimate, conditions)
-    # Component first, as kinematics look at them.
-    displaced = np.zeros((model.sites.chain.coordinates, len(around.joint_angles))).T
-    displaced[:, : model.sites.joints] = (
-        around.joint_angles + around.total[:, : model.sites.joints] * around.compliance
+    conditions = update_springs_and_masses(model, estimate, conditions)
+    joints = model.sites.joints
+    # Coordinates are contiguous along the states, as kinematics reads them.
+    shape = (model.sites.chain.coordinates, len(conditions.joint_angles))
+    displaced = np.zeros(shape).T
+    displaced[:, :joints] = (
+        conditions.joint_angles + conditions.total[:, :joints] * conditions.compliance
     )
-    effects = zip(model.effects, estimate.coefficients, estimate.shapes, strict=True)
-    for coordinate, by in sum_displacements(
-        (each for each in effects if each[0].effect not in LOAD_EFFECTS), around
+    other_effects = [
+        (effect, values, shapes)
+        for effect, values, shapes in zip(
+            model.effects, estimate.coefficients, estimate.shapes, strict=True
+        )
+        if effect.effect not in LOAD_EFFECTS
+    ]
+    for coordinate, displacement in sum_displacements(
+        other_effects, conditions
     ).items():
-        displaced[:, coordinate] += by
+        displaced[:, coordinate] += displacement
     return displaced
 
 
 def sum_displacements(
-    effects: Iterable[tuple[Candidate, np.ndarray, Iterable[float]]], around: Conditions
+    effects: Iterable[tuple[Candidate, np.ndarray, Iterable[float]]],
+    conditions: Conditions,
 ) -> dict[int, np.ndarray]:
-    """What effects, with their linear parameters (D,) and their shapes (F,), do
-    together to each coordinate, (S,)."""
-    displaced: dict[int, np.ndarray] = {}
+    """Sum the displacements of each coordinate by effects, (S,) arrays.
+
+    `effects` come with their linear parameters (D,) and their shapes (F,).
+    """
+    displacements: dict[int, np.ndarray] = {}
     for effect, values, shapes in effects:
-        for value, law in zip(
-            values, evaluate_basis_functions(effect, shapes, around), strict=True
-        ):
-            for coordinate, per_unit in law.items():
-                by = value * per_unit
-                displaced[coordinate] = (
-                    np.add(displaced[coordinate], by, out=by)
-                    if coordinate in displaced
-                    else by
-                )
-    return displaced
+        basis = evaluate_basis_functions(effect, shapes, conditions)
+        for value, functions in zip(values, basis, strict=True):
+            for coordinate, per_unit in functions.items():
+                displacement = value * per_unit
+                if coordinate in displacements:
+                    displacements[coordinate] += displacement
+                else:
+                    displacements[coordinate] = displacement
+    return displacements
 
 
 def evaluate_basis_functions(
-    effect: Candidate, shapes: Iterable[float], around: Conditions
+    effect: Candidate, shapes: Iterable[float], conditions: Conditions
 ) -> list[dict[int, np.ndarray]]:
-    """Displacements per unit of each linear parameter of an effect, those that no step
-    changes as they were found before."""
+    """Evaluate the displacements per unit of each linear parameter of an effect.
+
+    Basis functions of the joint angles alone do not change from step to step; the
+    conditions keep them.
+    """
     if not effect.fixed:
-        return effect.displacement(around, *shapes)
-    if effect.key not in around.of_angles:
-        around.of_angles[effect.key] = effect.displacement(around)
-    return around.of_angles[effect.key]
+        return effect.displacement(conditions, *shapes)
+    if effect.key not in conditions.of_angles:
+        conditions.of_angles[effect.key] = effect.displacement(conditions)
+    return conditions.of_angles[effect.key]
 
 
 def predict(
-    model: Model, estimate: Estimate, observations: Observations, around: Conditions
+    model: Model, estimate: Estimate, observations: Observations, conditions: Conditions
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Exact poses of the targets, in base axes: positions (M, 3) and rotations (M, 3,
-    3); `around`: of their states."""
-    coordinates = compute_displaced_coordinates(model, estimate, around)
+    """Predict the exact poses of the targets in base axes.
+
+    `conditions` are those of the states. Returns positions (M, 3) and rotations
+    (M, 3, 3).
+    """
+    coordinates = compute_displaced_coordinates(model, estimate, conditions)
     position, rotation = poses_of_points(
         model.sites.chain, coordinates, locate_targets(model, estimate)
     )
-    seen = observations.target, observations.state
-    return position[seen], rotation[seen] @ estimate.target_rotation[
-        observations.target
-    ]
+    indices = (observations.target, observations.state)
+    target_rotation = estimate.target_rotation[observations.target]
+    return position[indices], rotation[indices] @ target_rotation
 
 
 def locate_targets(model: Model, estimate: Estimate) -> list[MeasuringPoint]:
-    """The targets as points of the kinematic chain, where an estimate has them."""
+    """Points of the kinematic chain at which an estimate has the targets."""
     points = [model.sites.chain.point(target.point) for target in model.targets]
     return [
-        replace(point, offset_m=tuple(at))
-        for point, at in zip(points, estimate.target_offset, strict=True)
+        replace(point, offset_m=tuple(offset))
+        for point, offset in zip(points, estimate.target_offset, strict=True)
     ]
 
 
 def compute_residuals(
     model: Model, estimate: Estimate, observations: Observations, conditions: Conditions
 ) -> np.ndarray:
-    """Measured less predicted, ndarray (M, rows): base axes, m and, where poses are
-    measured, rad; arguments of `predict`."""
-    return subtract_prediction(
-        estimate, observations, *predict(model, estimate, observations, conditions)
-    )
+    """Compute measured minus predicted values, (M, rows) array, base axes.
+
+    Positions in m and, if poses are measured, rotation vectors in rad. Arguments are
+    those of `predict`.
+    """
+    position, rotation = predict(model, estimate, observations, conditions)
+    return subtract_prediction(estimate, observations, position, rotation)
 
 
 def subtract_prediction(
@@ -469,42 +495,42 @@ def subtract_prediction(
     position: np.ndarray,
     rotation: np.ndarray,
 ) -> np.ndarray:
-    """Measured less predicted, as `residuals`, of poses (M, 3), (M, 3, 3) as by
-    `predict`."""
-    measured, turned = transform_to_base(estimate, observations)
-    return (
-        measured - position
-        if turned is None
-        else pose_differences(measured, turned, position, rotation)
-    )
+    """Subtract predicted poses (M, 3), (M, 3, 3) from measured ones; see
+    `compute_residuals`."""
+    measured, measured_rotation = transform_to_base(estimate, observations)
+    if measured_rotation is None:
+        return measured - position
+    return pose_differences(measured, measured_rotation, position, rotation)
 
 
 def transform_to_base(
     estimate: Estimate, observations: Observations
 ) -> tuple[np.ndarray, np.ndarray | None]:
-    """Measured positions (M, 3) and rotations (M, 3, 3), taken from the frames of the
-    sessions into base axes."""
+    """Transform measurements from the frames of their sessions into base axes.
+
+    Returns positions (M, 3), and rotations (M, 3, 3) or None.
+    """
     session = np.searchsorted(
         estimate.sessions, observations.states.session[observations.state]
     )
     into_base = estimate.frame_rotation[session].transpose(0, 2, 1)
-    position = (
-        into_base
-        @ (observations.position - estimate.frame_position[session])[..., None]
-    )[..., 0]
-    return (
-        position,
-        None if observations.rotation is None else into_base @ observations.rotation,
-    )
+    relative = observations.position - estimate.frame_position[session]
+    position = (into_base @ relative[..., None])[..., 0]
+    if observations.rotation is None:
+        return position, None
+    return position, into_base @ observations.rotation
 
 
 @dataclass(frozen=True)
 class Case:
     """A campaign ready to be fitted.
 
-    `campaign`: its measurements are those to fit. `observations`: their repeats
-    averaged, without the outlying ones. `model`: as declared. `candidates`: everything
-    that the model might lack.
+    Attributes
+    ----------
+    campaign : Campaign, with the measurements to fit
+    observations : Observations, averages of its repeats without outlying ones
+    model : Model, as declared
+    candidates : dict from key to effect that the model may lack
     """
 
     campaign: Campaign
@@ -513,22 +539,23 @@ class Case:
     candidates: dict[str, Candidate]
 
     def select(self, kept: np.ndarray) -> Case:
-        """The same without some of the measurements; ndarray of bool (N,)."""
-        some = replace(
-            self.campaign, measurements=self.campaign.measurements.select(kept)
-        )
+        """Keep only some measurements, given as (N,) bool array."""
+        measurements = self.campaign.measurements.select(kept)
         return replace(
             self,
-            campaign=some,
-            observations=average_repeats(remove_outlying_repeats(some.measurements)),
+            campaign=replace(self.campaign, measurements=measurements),
+            observations=average_repeats(remove_outlying_repeats(measurements)),
         )
 
 
 def build_case(
     descriptions: Mapping[str, Any], columns: Mapping[str, np.ndarray]
 ) -> Case:
-    """Put a campaign together from its description, as step 1 writes it, and the
-    columns of its measurements table."""
+    """Build a case from the description of a campaign and its measurements table.
+
+    `descriptions` is as step 1 of the pipeline writes it, `columns` are those of the
+    table.
+    """
     source = descriptions["source"]
     robot = robot_from_document(descriptions["robot"], source)
     campaign = assemble_campaign(
@@ -539,9 +566,9 @@ def build_case(
         campaign, declared_candidates(campaign.declared, sites, source)
     )
     candidates = {
-        key: c
-        for key, c in candidates_on(sites).items()
-        if c.effect not in campaign.declared
+        key: candidate
+        for key, candidate in candidates_on(sites).items()
+        if candidate.effect not in campaign.declared
     }
     return Case(
         campaign,

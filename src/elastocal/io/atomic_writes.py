@@ -1,5 +1,5 @@
-"""The one way to write: files that appear whole or not at all, and never where a link,
-a pipe or a device stands."""
+"""Write files atomically: a file appears complete or not at all, and never replaces a
+link, a pipe or a device."""
 
 import os
 import re
@@ -17,10 +17,10 @@ _PARTIAL = re.compile(r"\.[0-9a-f]{16}\.partial$")
 
 
 def check_places(*paths: str | Path, top: Path | None = None) -> None:
-    """Refuse a file to be written whose name something else has, which is never
-    replaced or written through.
+    """Refuse to write a file in the place of a link, a pipe or anything else that is no
+    regular file.
 
-    Nor is a folder between the file and `top`, which the user named, a link.
+    A folder between the file and `top`, which the user named, must not be a link.
     """
     folders = dict.fromkeys(
         folder
@@ -28,8 +28,9 @@ def check_places(*paths: str | Path, top: Path | None = None) -> None:
         for folder in Path(path).parents
         if top in folder.parents
     )
-    if link := next((folder for folder in folders if folder.is_symlink()), None):
-        raise InputError(link, "", "a link", "a folder")
+    for folder in folders:
+        if folder.is_symlink():
+            raise InputError(folder, "", "a link", "a folder")
     for path in paths:
         try:
             mode = os.lstat(path).st_mode
@@ -47,9 +48,9 @@ def check_places(*paths: str | Path, top: Path | None = None) -> None:
 
 
 def check_folder(folder: str | Path) -> None:
-    """Refuse a folder that holds links, pipes or devices, however deep: what is written
-    there would go elsewhere."""
-    # Another run may take away what it has just listed.
+    """Refuse a folder that contains links, pipes or devices at any depth, because what
+    is written there would go elsewhere."""
+    # Another run may remove an entry that was just listed.
     with suppress(FileNotFoundError), os.scandir(folder) as entries:
         for entry in entries:
             if entry.is_dir(follow_symlinks=False):
@@ -59,22 +60,26 @@ def check_folder(folder: str | Path) -> None:
 
 
 def remove_partials(folder: str | Path) -> None:
-    """Take away what was being written below a folder by runs that were killed; none
-    may be at work."""
+    """Remove the partial files that killed runs have left below a folder. No run may be
+    at work."""
     for path in Path(folder).rglob("*.partial"):
-        if _PARTIAL.search(path.name):
-            shutil.rmtree(path) if path.is_dir() else path.unlink()
+        if not _PARTIAL.search(path.name):
+            continue
+        if path.is_dir():
+            shutil.rmtree(path)
+        else:
+            path.unlink()
 
 
 @contextmanager
-def atomic_write(path: str | Path, empty: bool = False) -> Iterator[str]:
-    """Write to a name beside a file that nobody can foresee, then rename; if the block
-    raises, nothing is left behind.
+def atomic_write(path: str | Path, *, empty: bool = False) -> Iterator[str]:
+    """Give the block an unpredictable name in the same folder to write to, and rename
+    the file afterwards. If the block raises, nothing is left behind.
 
-    That it wrote nothing is an OSError, unless the file may be `empty`.
+    A block that writes nothing is an OSError, unless the file may be `empty`.
     """
     check_places(path)
-    partial = _beside(path)
+    partial = _partial_name(path)
     os.close(
         os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o666)
     )
@@ -90,12 +95,12 @@ def atomic_write(path: str | Path, empty: bool = False) -> Iterator[str]:
 
 @contextmanager
 def write_together(folder: str | Path, names: Iterable[str]) -> Iterator[Path]:
-    """Write files that belong together to the folder that is given to the block, each
-    with one of these names.
+    """Write files that belong together: the block writes them, under these names, to
+    the folder that it is given.
 
-    A new folder appears with all of them. In one that is there they replace those of
-    these names, in this order, after all of the old ones are gone: a run that is killed
-    leaves no old file beside a new one.
+    A new folder appears with all files. In an existing folder the files of these names
+    are replaced, in this order, after all old ones were removed, so that a killed run
+    leaves no old file next to a new one.
     """
     folder = Path(os.path.abspath(folder))
     names = [*names]
@@ -107,13 +112,13 @@ def write_together(folder: str | Path, names: Iterable[str]) -> Iterator[Path]:
             describe_file_kind(os.lstat(folder).st_mode),
             "a folder, or a new name",
         )
-    new = not folder.exists()
+    is_new = not folder.exists()
     folder.parent.mkdir(parents=True, exist_ok=True)
-    partial = Path(_beside(folder if new else folder / names[0]))
+    partial = Path(_partial_name(folder if is_new else folder / names[0]))
     partial.mkdir()
     try:
         yield partial
-        if new:
+        if is_new:
             partial.rename(folder)
             return
         check_places(*(folder / name for name in names))
@@ -127,7 +132,7 @@ def write_together(folder: str | Path, names: Iterable[str]) -> Iterator[Path]:
 
 
 def write_text(path: str | Path, text: str) -> None:
-    """Write a text in UTF-8; the file appears whole or not at all."""
+    """Write a text in UTF-8, atomically."""
     with (
         atomic_write(path, empty=not text) as partial,
         open(partial, "w", encoding="utf-8") as file,
@@ -135,5 +140,5 @@ def write_text(path: str | Path, text: str) -> None:
         file.write(text)
 
 
-def _beside(path: str | Path) -> str:
+def _partial_name(path: str | Path) -> str:
     return f"{path}.{secrets.token_hex(8)}.partial"

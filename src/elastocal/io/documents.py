@@ -1,4 +1,4 @@
-"""YAML documents that users write: read, and checked against a JSON schema that knows
+"""Read YAML documents that users write, and check them against a JSON schema that knows
 every key."""
 
 import json
@@ -16,36 +16,43 @@ import yaml
 from elastocal.errors import InputError, find_text_fault, suggest_name, suggest_names
 from elastocal.io.texts import read_text
 
-# Far above what people write by hand (no schema goes deeper than 7), and read in
-# seconds whatever it holds.
+# Upper bounds on a document. They are far above what people write by hand (no schema is
+# deeper than 7), and a document within them is read in seconds whatever it holds.
 LARGEST_BYTES = 300_000
 MOST_VALUES = 100_000
 DEEPEST = 20
-# More digits are no number that anything here counts, and beyond 308 no floating-point
-# number.
+# Upper bound on the digits of an integer. No document counts that far, and an integer of
+# more than 308 digits cannot be converted to a floating-point number.
 _MOST_DIGITS = 18
 _DECIMAL = re.compile(
-    rf"[-+]?(0|[1-9]\d{{0,{_MOST_DIGITS - 1}}})|[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)|[-+]?(\d+\.\d*|\.\d+)|[-+]?\.(inf|nan)",
+    rf"[-+]?(0|[1-9]\d{{0,{_MOST_DIGITS - 1}}})"
+    r"|[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)"
+    r"|[-+]?(\d+\.\d*|\.\d+)"
+    r"|[-+]?\.(inf|nan)",
     re.ASCII | re.IGNORECASE,
 )
-# Faults of one document that are looked at: it may hold a fault in each of its entries.
+# Upper bound on the faults of a document that are compared to find the first one.
 _MOST_FAULTS = 1000
-_NOT_XML = "YAML; a URDF becomes a robot file by `elastocal import urdf FILE --base LINK --tip LINK --output robot.yaml`"
+_NOT_XML = (
+    "YAML; a URDF becomes a robot file by `elastocal import urdf FILE --base LINK "
+    "--tip LINK --output robot.yaml`"
+)
 
 
 class _UnclearError(yaml.MarkedYAMLError):
-    """What people and YAML 1.1 read differently; `allowed` is what may stand there."""
+    """A text that people and YAML 1.1 read differently; `allowed` is allowed instead."""
 
     def __init__(self, mark: Any, found: str, allowed: str) -> None:
         super().__init__(problem=found, problem_mark=mark)
+        self.line = mark.line + 1
         self.allowed = allowed
 
 
-# The safe loader, in C where libyaml is there: the study is read at every call of
-# snakemake.
+# Use the safe loader in C if libyaml is installed, because every start of Snakemake reads
+# the configuration of the study.
 class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
-    """Safe; a date stays the text that it is in the file, each key stands once, and
-    numbers are decimal."""
+    """Safe loader for which a date is a text, each key occurs once, and numbers are
+    decimal."""
 
     yaml_implicit_resolvers: ClassVar = {
         first: [
@@ -57,28 +64,25 @@ class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[mi
     }
 
     def construct_mapping(
-        self, node: yaml.MappingNode, deep: bool = False
+        self, node: yaml.MappingNode, *, deep: bool = False
     ) -> dict[Any, Any]:
-        """A mapping; of keys that stand there twice the last would win."""
-        first: dict[str, yaml.Node] = {}
+        """Return a mapping; refuse a repeated key, of which YAML takes the last."""
+        first_nodes: dict[str, yaml.Node] = {}
         for key, _ in node.value:
-            if (
-                isinstance(key, yaml.ScalarNode)
-                and first.setdefault(key.value, key) is not key
-            ):
-                line = first[key.value].start_mark.line + 1
-                raise _UnclearError(
-                    key.start_mark,
-                    f"the key {key.value!r} again",
-                    f"each key once (first in line {line})",
-                )
+            if not isinstance(key, yaml.ScalarNode):
+                continue
+            first = first_nodes.setdefault(key.value, key)
+            if first is not key:
+                found = f"the key {key.value!r} again"
+                allowed = f"each key once (first in line {first.start_mark.line + 1})"
+                raise _UnclearError(key.start_mark, found, allowed)
         mapping: dict[Any, Any] = super().construct_mapping(node, deep)
         return mapping
 
     def construct_number(self, node: yaml.ScalarNode) -> int | float:
-        """A decimal number; YAML 1.1 would read 1_0 as 10, 010 as 8 and 1:30 as 90."""
+        """Return a decimal number; YAML 1.1 reads 1_0 as 10, 010 as 8 and 1:30 as 90."""
         if not _DECIMAL.fullmatch(node.value):
-            allowed = f"a decimal number of at most {_MOST_DIGITS} digits, or in quotes what is a text"
+            allowed = f"a decimal number of at most {_MOST_DIGITS} digits, or a text in quotes"
             raise _UnclearError(node.start_mark, node.value, allowed)
         number: int | float = (
             self.construct_yaml_float(node)
@@ -90,7 +94,8 @@ class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[mi
 
 for _kind in ("int", "float"):
     _Loader.add_constructor(f"tag:yaml.org,2002:{_kind}", _Loader.construct_number)
-# A number without a point or a sign in its exponent, which YAML 1.1 takes for a text.
+# Read 1e5, which has neither a point nor a sign in its exponent, as a number. YAML 1.1
+# reads it as a text.
 _Loader.add_implicit_resolver(
     "tag:yaml.org,2002:float",
     re.compile(r"[-+]?\d+(\.\d*)?[eE][-+]?\d+$", re.ASCII),
@@ -100,12 +105,14 @@ _Loader.add_implicit_resolver(
 
 @cache
 def _validator(schema: str) -> Any:
-    """Stricter than JSON, which has no NaN and no infinity and takes 10.0 for an
+    """Return the validator of a schema. It refuses NaN and infinity, and 10.0 for an
     integer."""
     import jsonschema
 
-    def each_once(_: Any, wanted: bool, instance: Any, __: Any) -> Iterator[Exception]:
-        """The rule uniqueItems in linear time: jsonschema compares each pair where
+    def find_repeated_entry(
+        _: Any, wanted: Any, instance: Any, __: Any
+    ) -> Iterator[Exception]:
+        """Check uniqueItems in linear time: jsonschema compares each pair of entries if
         numbers and lists are mixed."""
         if wanted and isinstance(instance, list):
             entries = [json.dumps(entry, default=str) for entry in instance]
@@ -125,7 +132,7 @@ def _validator(schema: str) -> Any:
     base = jsonschema.Draft202012Validator
     checked = base.TYPE_CHECKER.redefine_many(types)
     validator = jsonschema.validators.extend(
-        base, {"uniqueItems": each_once}, type_checker=checked
+        base, {"uniqueItems": find_repeated_entry}, type_checker=checked
     )
     return validator(
         read_schema(schema), format_checker=jsonschema.FormatChecker(["date"])
@@ -133,14 +140,23 @@ def _validator(schema: str) -> Any:
 
 
 def read_document(path: str | Path) -> Any:
-    """Contents of a YAML file; one that is missing or `parse_yaml` refuses is an
-    InputError."""
+    """Read a YAML file; an InputError refuses a missing file, or as `parse_yaml`."""
     return parse_yaml(read_text(path, LARGEST_BYTES), path)
 
 
 def parse_yaml(text: str, source: str | Path) -> Any:
-    """Contents of a YAML text; an InputError names the line of what is no YAML, unclear
-    or out of bounds, such as a URDF."""
+    """Return the contents of a YAML text.
+
+    Parameters
+    ----------
+    text : YAML.
+    source : file, for messages.
+
+    Raises
+    ------
+    InputError
+        If the text is not YAML, unclear, or out of bounds; with its line.
+    """
     if text.lstrip("\ufeff \r\n\t").startswith("<"):
         raise InputError(source, "", "XML", _NOT_XML)
     try:
@@ -150,66 +166,63 @@ def parse_yaml(text: str, source: str | Path) -> Any:
         line = text.count("\n", 0, error.position) + 1
         found = f"the control character {chr(error.character)!r}"
         raise InputError(source, f"line {line}", found, "YAML") from None
+    except _UnclearError as error:
+        found = str(error.problem)
+        raise InputError(source, f"line {error.line}", found, error.allowed) from None
     except yaml.MarkedYAMLError as error:
         mark: Any = error.problem_mark or error.context_mark
-        found = str(error.problem)
-        if not isinstance(error, _UnclearError):
-            here = "".join(text.splitlines()[mark.line :][:1])[mark.column :][
-                :40
-            ].strip()
-            problem, _, wanted = found.partition("did not find expected ")
-            found = f"{f'no {wanted}' if wanted else problem.removeprefix('found ')}: {here!r}"
-        raise InputError(
-            source, f"line {mark.line + 1}", found, getattr(error, "allowed", "YAML")
-        ) from None
+        found = _describe_yaml_error(str(error.problem), text, mark)
+        raise InputError(source, f"line {mark.line + 1}", found, "YAML") from None
+
+
+def _describe_yaml_error(problem: str, text: str, mark: Any) -> str:
+    """Return an error of PyYAML for a message, with the text at its place."""
+    rest_of_line = "".join(text.splitlines()[mark.line :][:1])[mark.column :]
+    excerpt = rest_of_line[:40].strip()
+    summary, _, expected = problem.partition("did not find expected ")
+    if expected:
+        return f"no {expected}: {excerpt!r}"
+    return f"{summary.removeprefix('found ')}: {excerpt!r}"
 
 
 def _check_events(text: str) -> None:
-    """Refuse what lets a small file grow beyond bounds or makes other objects than
-    values, before anything is made of it.
+    """Refuse a small file that would grow out of bounds or make objects other than
+    values, before it is loaded.
 
-    An alias counts as all values before it, more than its anchor has; none may stand
-    within an anchor, and so for others.
+    An alias counts as all values before it, which are more than its anchor has. An
+    alias within an anchor is refused, so that this holds.
     """
-    plain = 0
-    total = 0
-    opened = list[str | None]()
+    value_count = 0
+    # Also counts the values of aliases.
+    expanded_count = 0
+    anchors = list[str | None]()
     for event in yaml.parse(text, Loader=_Loader):
         if isinstance(event, yaml.ScalarEvent | yaml.CollectionStartEvent):
             if event.tag is not None:
-                raise _UnclearError(
-                    event.start_mark, f"the tag {event.tag}", "values without tags"
-                )
-            plain = plain + 1
-            total = total + 1
+                found = f"the tag {event.tag}"
+                raise _UnclearError(event.start_mark, found, "values without tags")
+            value_count += 1
+            expanded_count += 1
         if isinstance(event, yaml.AliasEvent):
-            if any(opened):
-                raise _UnclearError(
-                    event.start_mark,
-                    f"the alias *{event.anchor}",
-                    "one in no other anchor",
-                )
-            total += plain
+            if any(anchors):
+                found = f"the alias *{event.anchor}"
+                raise _UnclearError(event.start_mark, found, "one in no other anchor")
+            expanded_count += value_count
         if isinstance(event, yaml.CollectionStartEvent):
-            opened.append(event.anchor)
+            anchors.append(event.anchor)
         elif isinstance(event, yaml.CollectionEndEvent):
-            opened.pop()
-        if len(opened) >= DEEPEST:
-            raise _UnclearError(
-                event.start_mark,
-                "lists or keys in each other",
-                f"at most {DEEPEST} deep",
-            )
-        if total > MOST_VALUES:
-            raise _UnclearError(
-                event.start_mark,
-                "more values than a document has",
-                f"at most {MOST_VALUES} with aliases",
-            )
+            anchors.pop()
+        if len(anchors) >= DEEPEST:
+            found = "lists or keys in each other"
+            raise _UnclearError(event.start_mark, found, f"at most {DEEPEST} deep")
+        if expanded_count > MOST_VALUES:
+            found = "more values than a document has"
+            allowed = f"at most {MOST_VALUES} with aliases"
+            raise _UnclearError(event.start_mark, found, allowed)
 
 
 def format_one_line(value: Any) -> str:
-    """A value as YAML on one line."""
+    """Return a value as YAML on one line."""
     text: str = yaml.safe_dump(
         value,
         default_flow_style=True,
@@ -222,7 +235,7 @@ def format_one_line(value: Any) -> str:
 
 @cache
 def read_schema(name: str) -> dict[str, Any]:
-    """One of the package's schemas: ``config``, ``robot`` or ``strategy``."""
+    """Read a schema of the package, such as ``config``, ``robot`` or ``strategy``."""
     text = (
         resources.files("elastocal")
         .joinpath("schemas", f"{name}.yaml")
@@ -232,102 +245,103 @@ def read_schema(name: str) -> dict[str, Any]:
 
 
 def check_document(document: Any, schema: str, source: str) -> None:
-    """Check a document of the file `source` against a schema, as `read_schema` names
-    it; the first key at fault is refused."""
+    """Check a document against a schema; the first key at fault is refused.
+
+    Parameters
+    ----------
+    document : contents of the document.
+    schema : name of the schema, as in `read_schema`.
+    source : file of the document, for messages.
+    """
     errors = islice(_validator(schema).iter_errors(document), _MOST_FAULTS)
-    if error := min(
+    error = min(
         errors,
-        key=lambda error: [str(part) for part in error.absolute_path],
+        key=lambda error: [str(key) for key in error.absolute_path],
         default=None,
-    ):
-        raise _refusal(source, *_explained(error))
-    for place, text in _texts(document):
-        # White space between the transforms of a chain is free.
-        if fault := find_text_fault(
-            " ".join(text.split()) if place == ("chain",) else text
-        ):
-            raise _refusal(source, place, *fault)
+    )
+    if error is not None:
+        raise _refusal(source, *_explain(error))
+    for path, text in _iterate_texts(document):
+        if path == ("chain",):
+            # White space between the transforms of a chain may be a line break.
+            text = " ".join(text.split())
+        if fault := find_text_fault(text):
+            raise _refusal(source, path, *fault)
 
 
 def _refusal(
     source: str, path: Sequence[str | int], found: str, allowed: str
 ) -> InputError:
-    """An error at a key, with its line where the file has it."""
+    """Return an error at a key, with its line if the file has it."""
     key = "".join(
         f"[{part}]" if isinstance(part, int) else f".{part}" for part in path
     ).lstrip(".")
-    return InputError(
-        source, ", ".join(filter(None, (_line_of(source, path), key))), found, allowed
-    )
+    place = ", ".join(filter(None, (_line_of(source, path), key)))
+    return InputError(source, place, found, allowed)
 
 
-def _texts(
+def _iterate_texts(
     value: Any, path: tuple[str | int, ...] = ()
 ) -> Iterator[tuple[tuple[str | int, ...], str]]:
-    """All texts of a document, keys among them, and where each stands."""
+    """Iterate over all texts of a document, including keys, with their paths."""
     if isinstance(value, str):
         yield path, value
-    for key, each in (
-        value.items()
-        if isinstance(value, dict)
-        else enumerate(value)
-        if isinstance(value, list)
-        else ()
-    ):
-        if isinstance(key, str):
-            yield (*path, key), key
-        yield from _texts(each, (*path, key))
+    elif isinstance(value, dict):
+        for key, entry in value.items():
+            if isinstance(key, str):
+                yield (*path, key), key
+            yield from _iterate_texts(entry, (*path, key))
+    elif isinstance(value, list):
+        for index, entry in enumerate(value):
+            yield from _iterate_texts(entry, (*path, index))
 
 
 def _line_of(source: str, path: Sequence[str | int]) -> str:
-    """Line of the file at which a key stands, or what it should stand in; empty where
-    the file has neither."""
+    """Return the line of the file at which a key is, or else the entry that should
+    contain it; empty if the file has neither."""
     try:
         node = yaml.compose(read_text(source, LARGEST_BYTES), Loader=_Loader)
     except (InputError, yaml.YAMLError):
         return ""
     line = ""
     for part in path:
-        if (
-            isinstance(node, yaml.SequenceNode)
-            and isinstance(part, int)
-            and part < len(node.value)
-        ):
-            place = node = node.value[part]
-        else:
-            entries = node.value if isinstance(node, yaml.MappingNode) else []
-            place, node = next(
-                ((key, value) for key, value in entries if key.value == str(part)),
-                (None, None),
-            )
-        if place is None:
+        marked_node, node = _find_entry(node, part)
+        if marked_node is None:
             break
-        line = f"line {place.start_mark.line + 1}"
+        line = f"line {marked_node.start_mark.line + 1}"
     return line
 
 
-def _explained(error: Any) -> tuple[list[str | int], str, str]:
-    """Where one violation is, what was found there and what is allowed."""
+def _find_entry(node: Any, part: str | int) -> tuple[Any, Any]:
+    """Return the node at which an entry begins, and the node of its value; None if there
+    is none."""
+    if isinstance(node, yaml.SequenceNode) and isinstance(part, int):
+        if part < len(node.value):
+            return node.value[part], node.value[part]
+    elif isinstance(node, yaml.MappingNode):
+        for key, value in node.value:
+            if key.value == str(part):
+                return key, value
+    return None, None
+
+
+def _explain(error: Any) -> tuple[list[str | int], str, str]:
+    """Return the path of a violation, what was found there, and what is allowed."""
     path = [*error.absolute_path]
     schema = error.schema
     if error.validator == "additionalProperties":
         known = sorted(schema.get("properties", {}))
         unknown = next(name for name in error.instance if name not in known)
-        return (
-            [*path, unknown],
-            "an unknown key",
-            f"{suggest_name(unknown, known)} ({', '.join(known)})".strip(),
-        )
+        allowed = f"{suggest_name(unknown, known)} ({', '.join(known)})".strip()
+        return [*path, unknown], "an unknown key", allowed
     if error.validator == "required":
         missing = next(
             name for name in error.validator_value if name not in error.instance
         )
-        return [*path, missing], "nothing", _admitted(schema["properties"][missing])
-    return (
-        path,
-        "nothing" if error.instance is None else repr(error.instance),
-        _admitted(schema) or error.message,
-    )
+        allowed = _describe_schema(schema["properties"][missing])
+        return [*path, missing], "nothing", allowed
+    found = "nothing" if error.instance is None else repr(error.instance)
+    return path, found, _describe_schema(schema) or error.message
 
 
 _KINDS = {
@@ -340,7 +354,7 @@ _RANGES = (
     ("minLength", "maxLength", " characters"),
     ("minItems", "maxItems", " entries"),
 )
-_OTHERS = {
+_RULES = {
     "exclusiveMinimum": "more than {}",
     "exclusiveMaximum": "less than {}",
     "minProperties": "{} or more keys",
@@ -350,60 +364,70 @@ _OTHERS = {
 }
 
 
-def _admitted(schema: Mapping[str, Any]) -> str:
-    """What a schema admits, in words, with what it means in brackets."""
-    kinds = (
-        [schema["type"]]
-        if isinstance(schema.get("type"), str)
-        else schema.get("type", [])
-    )
-    kind = " or ".join(_KINDS.get(each, each) for each in kinds)
-    parts = [
-        " | ".join(map(str, schema["enum"]))
-        if "enum" in schema
-        else ""
-        if "minItems" in schema
-        else kind
-    ]
-    for low, high, unit in _RANGES:
-        least = schema.get(low)
-        most = schema.get(high)
-        if least is not None and most is not None:
-            parts.append(
-                f"{least}{unit}" if least == most else f"{least} to {most}{unit}"
-            )
-        elif least is not None or most is not None:
-            parts.append(
-                f"{least} or more{unit}" if most is None else f"{most} or fewer{unit}"
-            )
+def _describe_schema(schema: Mapping[str, Any]) -> str:
+    """Return in words what a schema allows, with its description in brackets."""
+    parts = [_describe_type(schema)]
+    parts += [_describe_range(schema, *names) for names in _RANGES]
     parts += [
-        words.format(schema[rule]) for rule, words in _OTHERS.items() if rule in schema
+        words.format(schema[rule]) for rule, words in _RULES.items() if rule in schema
     ]
-    return ", ".join(filter(None, parts)) + (
-        f" ({schema['description']})" if "description" in schema else ""
-    )
+    text = ", ".join(filter(None, parts))
+    if "description" in schema:
+        text += f" ({schema['description']})"
+    return text
+
+
+def _describe_type(schema: Mapping[str, Any]) -> str:
+    if "enum" in schema:
+        return " | ".join(map(str, schema["enum"]))
+    if "minItems" in schema:
+        return ""
+    kinds = schema.get("type", [])
+    if isinstance(kinds, str):
+        kinds = [kinds]
+    return " or ".join(_KINDS.get(kind, kind) for kind in kinds)
+
+
+def _describe_range(
+    schema: Mapping[str, Any], lower_name: str, upper_name: str, unit: str
+) -> str:
+    lower = schema.get(lower_name)
+    upper = schema.get(upper_name)
+    if lower is None and upper is None:
+        return ""
+    if upper is None:
+        return f"{lower} or more{unit}"
+    if lower is None:
+        return f"{upper} or fewer{unit}"
+    return f"{lower}{unit}" if lower == upper else f"{lower} to {upper}{unit}"
 
 
 def document_path(folder: str | Path, kind: str, name: str) -> str:
-    """Where a document stands that a configuration names: ``folder/kind/name.yaml``."""
+    """Return the path of a document that a configuration names:
+    ``folder/kind/name.yaml``."""
     return (Path(folder) / kind / f"{name}.yaml").as_posix()
 
 
 def read_named_document(
     folder: str | Path, kind: str, schema: str, name: str, source: str
 ) -> dict[str, Any]:
-    """Read and check a document that a configuration, `source`, names: that of `name`
-    without its ending in ``folder/kind``."""
-    known = sorted(
-        file.stem for file in Path(folder, kind).glob("*.yaml") if file.is_file()
-    )
-    # By its name alone: a path would lead out of the folder.
+    """Read and check a document that a configuration names.
+
+    Parameters
+    ----------
+    folder, kind : the document is in ``folder/kind``.
+    schema : name of its schema.
+    name : name of the file without its ending.
+    source : file of the configuration, for messages.
+    """
+    files = Path(folder, kind).glob("*.yaml")
+    known = sorted(file.stem for file in files if file.is_file())
+    # Accept a name only, because a path might lead out of the folder.
     if name not in known:
-        allowed = (
-            f"a file of {Path(folder, kind).as_posix()}: {suggest_names(name, known)}"
-        )
+        listed = suggest_names(name, known)
+        allowed = f"a file of {Path(folder, kind).as_posix()}: {listed}"
         raise InputError(source, kind, repr(name), allowed)
     path = document_path(folder, kind, name)
-    document = read_document(path)
+    document: dict[str, Any] = read_document(path)
     check_document(document, schema, path)
     return document

@@ -1,5 +1,4 @@
-"""Which commit, configuration, seed and environment a file comes from, as it stands in
-the file or beside it."""
+"""State from which commit, configuration, seed and environment a file was made."""
 
 import hashlib
 import json
@@ -11,13 +10,13 @@ from typing import Any
 from elastocal import __version__
 from elastocal.io.plugins import plugin_versions
 
-# Parameters of rules that tell Snakemake of edited sources, and a job what to call:
-# nothing of what was configured.
+# Parameters of rules that are no configuration: with one Snakemake notices edited
+# sources, the other is the function that a job calls.
 SOURCES_DIGEST = "sources_sha256"
 STEP = "step"
-# Of what a run on one machine has installed; a wheel comes without.
+# Pins of the packages that a run installs; a wheel has none.
 _LOCK = "requirements/run.lock"
-# What numbers may depend on wherever there is no such list.
+# Libraries on which numbers may depend; their versions are recorded also without pins.
 _LIBRARIES = ("numpy", "pandas", "pyarrow", "scipy")
 
 
@@ -25,8 +24,12 @@ _LIBRARIES = ("numpy", "pandas", "pyarrow", "scipy")
 class Origin:
     """What a file was made from.
 
-    `commit`: of the repository, with ``-dirty`` behind it where sources were edited
-    since; ``unknown`` outside of a checkout.
+    Attributes
+    ----------
+    commit : commit of the repository, followed by ``-dirty`` if sources were edited;
+        ``unknown`` outside a checkout.
+    configuration_sha256 : digest of the configuration.
+    seed : seed of the configuration.
     """
 
     commit: str
@@ -36,12 +39,15 @@ class Origin:
     @property
     def words(self) -> str:
         """One line that people and programs can read."""
-        return f"commit {self.commit}, configuration SHA-256 {self.configuration_sha256}, seed {self.seed}"
+        return (
+            f"commit {self.commit}, configuration SHA-256 {self.configuration_sha256}, "
+            f"seed {self.seed}"
+        )
 
 
 def format_canonical_json(value: Any) -> str:
-    """The one JSON text of a value: keys sorted, no spaces, so that equal values have
-    equal digests."""
+    """Return the JSON text of a value with sorted keys and no spaces, so that equal
+    values have equal digests."""
     return json.dumps(
         value,
         sort_keys=True,
@@ -52,36 +58,39 @@ def format_canonical_json(value: Any) -> str:
 
 
 def configuration_sha256(configuration: Any) -> str:
-    """SHA-256 of the canonical JSON of a configuration with everything that it refers
-    to, such as the documents of robots."""
+    """Return the SHA-256 of the canonical JSON of a configuration, which must include
+    everything that it refers to, such as the documents of robots."""
     return hashlib.sha256(format_canonical_json(configuration).encode()).hexdigest()
 
 
 def environment(folder: str | Path) -> dict[str, str]:
-    """Versions of the installed libraries and of packages with plug-ins, and the
-    SHA-256 of the pins in the folder of the Snakefile if it has some."""
+    """Return the versions of the installed libraries and of packages with plug-ins, and
+    the SHA-256 of the pins in the folder of the Snakefile if it has some."""
     lock = Path(folder, _LOCK)
-    pinned = (
-        {_LOCK: hashlib.sha256(lock.read_bytes()).hexdigest()} if lock.is_file() else {}
-    )
-    return {name: version(name) for name in _LIBRARIES} | plugin_versions() | pinned
+    versions = {name: version(name) for name in _LIBRARIES} | plugin_versions()
+    if lock.is_file():
+        versions[_LOCK] = hashlib.sha256(lock.read_bytes()).hexdigest()
+    return versions
 
 
-def describe_provenance(settings: Any, **more: Any) -> dict[str, Any]:
-    """What a table was made from, as JSON has it: `settings`, a mapping or parameters
-    of a rule, and further facts."""
-    kept = {
+def describe_provenance(settings: Any, **facts: Any) -> dict[str, Any]:
+    """Return what a table was made from, JSON-serialisable.
+
+    Parameters
+    ----------
+    settings : configuration, a mapping or the parameters of a rule.
+    facts : further entries.
+    """
+    named = {
         name: value
         for name, value in settings.items()
         if name not in (SOURCES_DIGEST, STEP)
     }
-    leaves = json.loads(json.dumps(kept, sort_keys=True, default=list))
-    digest = hashlib.sha256(json.dumps(leaves, sort_keys=True).encode()).hexdigest()[
-        :16
-    ]
+    configuration = json.loads(json.dumps(named, sort_keys=True, default=list))
+    text = json.dumps(configuration, sort_keys=True)
     return {
         "elastocal_version": __version__,
-        "configuration": leaves,
-        "configuration_sha256": digest,
-        **more,
+        "configuration": configuration,
+        "configuration_sha256": hashlib.sha256(text.encode()).hexdigest()[:16],
+        **facts,
     }

@@ -1,9 +1,9 @@
-"""What each job read and wrote, when, and from which commit, configuration, seed and
-environment: a record beside every output.
+"""Record for each output what its job read and wrote, when, and from which commit,
+configuration, seed and environment.
 
-A record has the SHA-256 of its output and of all that the job read: whoever reads a
-file next finds a byte that was altered, in it or in anything behind it. `python -m
-elastocal.io.records | sha256sum --check` judges all files.
+A record has the SHA-256 of the output and of everything that the job read, so that the
+next reader notices an altered byte in the file or in any file that it was made from.
+`python -m elastocal.io.records | sha256sum --check` checks all files.
 """
 
 import hashlib
@@ -18,22 +18,28 @@ from elastocal.io.origin import Origin, configuration_sha256
 from elastocal.io.texts import check_file
 
 RECORDS = Path("results/records")
-# What the pipeline makes, the rest is the user's.
-_MADE = ("data", "results", "reports")
+# Folders in which the pipeline makes files. All other files are the user's.
+_PIPELINE_FOLDERS = ("data", "results", "reports")
 _AS_WRITTEN = "the file as the pipeline wrote it (delete {} and run the pipeline again)"
-# Of one output, and of all else that its record says.
+# Keys of a record: digests of its output, and the digest of the record itself.
 _FILES = "files"
 _DIGEST = "sha256"
 
 
 @dataclass(frozen=True)
 class JobRecord:
-    """One job that has ended well.
+    """One job that was successful.
 
-    `started`, `ended`: UTC, ISO 8601. `inputs`: digests of files by their names in the
-    working directory, scripts and modules among them. `own`: inputs of the user, which
-    no job made and which may lie elsewhere by now. `environment`: from
-    `origin.environment`.
+    Attributes
+    ----------
+    rule, wildcards : the job.
+    started, ended : UTC, ISO 8601.
+    inputs : digests of files by their paths in the working directory, including scripts
+        and modules.
+    own : inputs of the user, which no job made and which may have moved since.
+    outputs : paths of what the job made.
+    origin : commit, configuration and seed.
+    environment : as of `origin.environment`.
     """
 
     rule: str
@@ -48,7 +54,7 @@ class JobRecord:
 
     @property
     def name(self) -> str:
-        """The rule and its wildcards."""
+        """Rule and wildcards."""
         return " ".join([self.rule, *self.wildcards.values()])
 
     @property
@@ -57,7 +63,7 @@ class JobRecord:
         return {
             file: digest
             for file, digest in self.inputs.items()
-            if _made(file) and file not in self.own
+            if _is_made(file) and file not in self.own
         }
 
     @property
@@ -67,42 +73,51 @@ class JobRecord:
         return {
             file: digest
             for file, digest in self.inputs.items()
-            if not _made(file) and file not in self.own
+            if not _is_made(file) and file not in self.own
         }
 
 
 def write_records(job: JobRecord) -> None:
-    """Keep the record of each output that lies where the pipeline makes files; a
-    folder's has all of these."""
-    for output in filter(_made, job.outputs):
-        place = locate_record(output)
-        place.parent.mkdir(parents=True, exist_ok=True)
-        written = asdict(job) | {_FILES: _digests(output)}
-        write_json(place, written | {_DIGEST: configuration_sha256(written)})
+    """Write the record of each output in the pipeline's folders; that of an output
+    folder has all of its files."""
+    for output in filter(_is_made, job.outputs):
+        path = locate_record(output)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        record = asdict(job) | {_FILES: _file_digests(output)}
+        write_json(path, record | {_DIGEST: configuration_sha256(record)})
 
 
 def read_record(path: str, within: str | Path = "") -> tuple[JobRecord, dict[str, str]]:
-    """The job that made a file or folder, and the SHA-256 of each file that it wrote
+    """Read which job made a file or folder, and the SHA-256 of each file that it wrote
     there.
 
-    `within` is the folder that `path` and the records are in, here and below; the
-    working directory without. An InputError refuses a missing record and one that is
-    not as it was written.
+    Parameters
+    ----------
+    path : output of the job.
+    within : folder that `path` and the records are relative to, in all functions of
+        this module; the working directory if empty.
+
+    Raises
+    ------
+    InputError
+        If there is no record, or if it is not as it was written.
     """
-    place = locate_record(path, within)
-    if not place.is_file():
-        found = f"no record of the job that made it, {place}"
+    record_path = locate_record(path, within)
+    if not record_path.is_file():
+        found = f"no record of the job that made it, {record_path}"
         raise InputError(Path(within, path), "", found, _AS_WRITTEN.format("it"))
     try:
-        kept = read_json(place)
-        if kept.pop(_DIGEST) != configuration_sha256(kept):
+        record = read_json(record_path)
+        if record.pop(_DIGEST) != configuration_sha256(record):
             raise ValueError("other contents than were written")
-        files: dict[str, str] = kept.pop(_FILES)
-        names = {key: tuple(kept[key]) for key in ("own", "outputs")}
-        return JobRecord(**kept | names | {"origin": Origin(**kept["origin"])}), files
+        files: dict[str, str] = record.pop(_FILES)
+        record["own"] = tuple(record["own"])
+        record["outputs"] = tuple(record["outputs"])
+        record["origin"] = Origin(**record["origin"])
+        return JobRecord(**record), files
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(
-            place,
+            record_path,
             "",
             f"no record of a job ({error})",
             f"of {path} {_AS_WRITTEN.format('it')}",
@@ -110,11 +125,11 @@ def read_record(path: str, within: str | Path = "") -> tuple[JobRecord, dict[str
 
 
 def list_recorded_files(within: str | Path = "") -> dict[str, str]:
-    """SHA-256 of every file that has a record, as `read_record`."""
+    """Return the SHA-256 of every file that has a record, by its path."""
     top = Path(within, RECORDS)
     names = sorted(
-        place.relative_to(top).as_posix().removesuffix(".json")
-        for place in top.rglob("*.json")
+        file.relative_to(top).as_posix().removesuffix(".json")
+        for file in top.rglob("*.json")
     )
     return {
         file: digest
@@ -124,48 +139,57 @@ def list_recorded_files(within: str | Path = "") -> dict[str, str]:
 
 
 def locate_record(path: str, within: str | Path = "") -> Path:
-    """Where the record of a file or folder is."""
+    """Return the path of the record of a file or folder."""
     return Path(within, RECORDS, f"{path}.json")
 
 
 def digest_inputs(
     paths: Iterable[str], checked: Collection[str] | None = None
 ) -> tuple[dict[str, str], tuple[str, ...]]:
-    """SHA-256 of what a job reads, and which of it is the user's own: what need not be
-    checked and has no record.
+    """Return the SHA-256 of the inputs of a job, and which inputs are the user's own:
+    those that are not checked and have no record.
 
-    Of what is `checked`, all without, an InputError refuses a file in data, results or
-    reports that has no record or is no longer what the job wrote that made it.
+    Parameters
+    ----------
+    paths : inputs.
+    checked : inputs to check; all if None.
+
+    Raises
+    ------
+    InputError
+        If a checked file in data, results or reports has no record, or is not as its
+        job wrote it.
     """
     digests = {}
     own = []
     for path in map(str, paths):
-        judged = checked is None or path in checked
-        digests[path] = (
-            _intact(path)[1] if judged and _made(path) else _joint(_digests(path))
-        )
-        if not judged and not locate_record(path).is_file():
+        is_checked = checked is None or path in checked
+        if is_checked and _is_made(path):
+            digests[path] = _check_output(path)[1]
+        else:
+            digests[path] = _joint_digest(_file_digests(path))
+        if not is_checked and not locate_record(path).is_file():
             own.append(path)
     return digests, tuple(own)
 
 
 def trace_jobs(targets: Iterable[str], within: str | Path = "") -> list[JobRecord]:
-    """The jobs that made some files, and those that made what these read, to the first;
-    in the order in which they began.
+    """Return the jobs that made some files, and all jobs behind them, in the order in
+    which they began.
 
     An InputError refuses a missing record or file, and any file of these jobs that is
-    not as it was written or not the one that the next job read.
+    not as it was written or not as the next job read it.
     """
-    found: dict[tuple[str, str], JobRecord] = {}
+    jobs: dict[tuple[str, str], JobRecord] = {}
     digests: dict[str, str] = {}
-    left = list(targets)
-    while left:
-        path = left.pop()
+    pending = list(targets)
+    while pending:
+        path = pending.pop()
         if path not in digests:
-            job, digests[path] = _intact(path, within)
-            found[job.started, job.name] = job
-            left += [*filter(_made, job.outputs), *job.made_inputs]
-    for job in found.values():
+            job, digests[path] = _check_output(path, within)
+            jobs[job.started, job.name] = job
+            pending += [*filter(_is_made, job.outputs), *job.made_inputs]
+    for job in jobs.values():
         for path, digest in job.made_inputs.items():
             if digests[path] != digest:
                 raise InputError(
@@ -174,16 +198,15 @@ def trace_jobs(targets: Iterable[str], within: str | Path = "") -> list[JobRecor
                     f"not what {job.name} read",
                     _AS_WRITTEN.format("it"),
                 )
-    return [job for _, job in sorted(found.items())]
+    return [job for _, job in sorted(jobs.items())]
 
 
 def check_sources(jobs: Iterable[JobRecord], within: str | Path, allowed: str) -> None:
-    """Refuse results that other modules, scripts or robots made than those that are
-    here now: an InputError with `allowed`."""
+    """Refuse results that were made with other modules, scripts or robots than the
+    present ones: an InputError with `allowed`."""
     for job in jobs:
-        for path, digest in (
-            (Path(within, file), digest) for file, digest in job.sources.items()
-        ):
+        for file, digest in job.sources.items():
+            path = Path(within, file)
             if not path.is_file() or compute_sha256(path) != digest:
                 raise InputError(
                     path, "", f"not what {job.name} was made with", allowed
@@ -191,15 +214,15 @@ def check_sources(jobs: Iterable[JobRecord], within: str | Path, allowed: str) -
 
 
 def compute_sha256(path: str | Path) -> str:
-    """SHA-256 of a file."""
+    """Return the SHA-256 of a file."""
     check_file(path)
     with open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _digests(path: str, within: str | Path = "") -> dict[str, str]:
-    """SHA-256 of the file, or of all files below the folder but for hidden ones:
-    Snakemake notes the time in one."""
+def _file_digests(path: str, within: str | Path = "") -> dict[str, str]:
+    """Return the SHA-256 of a file, or of all files below a folder. Hidden files are
+    left out, because Snakemake writes the time to one."""
     folder = Path(within, path)
     files = [
         file
@@ -214,46 +237,45 @@ def _digests(path: str, within: str | Path = "") -> dict[str, str]:
     return {name: compute_sha256(Path(within, name)) for name in names}
 
 
-def _intact(path: str, within: str | Path = "") -> tuple[JobRecord, str]:
-    """The job that made a file or folder, and what it holds, which is what the job
-    wrote."""
+def _check_output(path: str, within: str | Path = "") -> tuple[JobRecord, str]:
+    """Return the job that made a file or folder, and the digest; refuse a file that is
+    not as the job wrote it."""
     job, written = read_record(path, within)
-    found = _digests(path, within) if Path(within, path).exists() else {}
-    for file in sorted(written.keys() | found.keys()):
-        if written.get(file) != found.get(file):
-            what = "other contents than were written" if file in found else "nothing"
+    present = _file_digests(path, within) if Path(within, path).exists() else {}
+    for file in sorted(written.keys() | present.keys()):
+        if written.get(file) != present.get(file):
+            what = "other contents than were written" if file in present else "nothing"
             raise InputError(
                 Path(within, file),
                 "",
                 what,
                 _AS_WRITTEN.format("it" if file == path else path),
             )
-    return job, _joint(written)
+    return job, _joint_digest(written)
 
 
-def _joint(files: Mapping[str, str]) -> str:
-    """Of a file its own SHA-256, of a folder that of its list."""
-    return (
-        next(iter(files.values()))
-        if len(files) == 1
-        else hashlib.sha256("".join(_lines(files)).encode()).hexdigest()
-    )
+def _joint_digest(files: Mapping[str, str]) -> str:
+    """Return the SHA-256 of a single file, or that of the list of several files."""
+    if len(files) == 1:
+        return next(iter(files.values()))
+    return hashlib.sha256("".join(_format_list(files)).encode()).hexdigest()
 
 
-def _lines(files: Mapping[str, str]) -> list[str]:
-    """As `sha256sum` has them."""
+def _format_list(files: Mapping[str, str]) -> list[str]:
+    """Return lines as `sha256sum` prints them."""
     return [f"{digest}  {file}\n" for file, digest in files.items()]
 
 
-def _made(path: str) -> bool:
+def _is_made(path: str) -> bool:
+    """Return whether the pipeline makes the file."""
     return (
-        Path(path).parts[:1] in [(name,) for name in _MADE]
+        Path(path).parts[:1] in [(name,) for name in _PIPELINE_FOLDERS]
         and ".." not in Path(path).parts
     )
 
 
 if __name__ == "__main__":
     try:
-        sys.stdout.writelines(_lines(list_recorded_files()))
+        sys.stdout.writelines(_format_list(list_recorded_files()))
     except InputError as error:
         sys.exit(str(error))

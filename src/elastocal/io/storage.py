@@ -1,9 +1,9 @@
-"""Tables on disk: Parquet files that carry their units and their provenance.
+"""Write and read tables as Parquet files that carry their units and their provenance.
 
-A file is one tidy table. Each column's unit and meaning stand in its field metadata;
-the file's own metadata hold the name of the schema and the provenance. Row groups are
-blocks of data sets, so that any number of them is worked off in the same memory. That a
-file is as it was written says its record, see `io.records`.
+A file is one tidy table. The metadata of a column have its unit and meaning; those of
+the file have the name of the schema and the provenance. Row groups are blocks of data
+sets, so that a table of any length is processed in the same memory. `io.records` checks
+that a file is as it was written.
 """
 
 import json
@@ -20,12 +20,12 @@ from elastocal.errors import InputError
 from elastocal.io.atomic_writes import atomic_write
 from elastocal.io.texts import check_file
 
-# Of each column one value or an array.
+# One value or an array for each column.
 Block = Mapping[str, np.ndarray | Sequence[str] | Sequence[float]]
 _TABLE = "elastocal.table"
 _PROVENANCE = "elastocal.provenance"
-# One value for each row group, and one for each row.
-_TEXTS = ("string", "text")
+# Column types of text: one value for each row group, and one for each row.
+_TEXT_TYPES = ("string", "text")
 _AS_WRITTEN = "the file as the pipeline wrote it (delete it and it is made again)"
 
 
@@ -33,9 +33,15 @@ _AS_WRITTEN = "the file as the pipeline wrote it (delete it and it is made again
 class Column:
     """One column of a table.
 
-    `type`: a string column has one value for each row group, a text column one for each
-    row. `unit`: empty for counts, names and shares. `missing`: whether a floating-point
-    column may hold not-a-number or infinity.
+    Attributes
+    ----------
+    name : name of the column.
+    type : numpy type; a "string" column has one value for each row group, a "text"
+        column one for each row.
+    unit : unit; empty for counts, names and shares.
+    meaning : what the values are.
+    missing : whether a floating-point column may hold NaN or infinity.
+    minimum : smallest allowed value, if any.
     """
 
     name: str
@@ -44,6 +50,11 @@ class Column:
     meaning: str
     missing: bool = False
     minimum: float | None = None
+
+    @property
+    def is_text(self) -> bool:
+        """Whether the values are texts."""
+        return self.type in _TEXT_TYPES
 
 
 @dataclass(frozen=True)
@@ -60,42 +71,42 @@ def write_table(
     blocks: Iterable[Block],
     provenance: Mapping[str, Any],
 ) -> None:
-    """Write a table block by block, each a row group; the file appears whole or not at
-    all.
+    """Write a table block by block, each as a row group. The write is atomic.
 
-    `blocks`: one value or array for each column; all arrays of a block have the same
-    length. `provenance`: JSON-serialisable; says from what the table was made. Raises
-    `InputError`: a column that is missing, too many, not finite or out of range.
+    Parameters
+    ----------
+    path : file.
+    schema : schema of the table.
+    blocks : one value or array for each column; all arrays of a block have one length.
+    provenance : what the table was made from; JSON-serialisable.
+
+    Raises
+    ------
+    InputError
+        If a column is missing or unknown, or a value is not finite or out of range.
     """
-    fields = pa.schema(
-        [
-            pa.field(
-                c.name, _arrow_type(c), False, {"unit": c.unit, "meaning": c.meaning}
-            )
-            for c in schema.columns
-        ]
-    )
-    floats = [c.name for c in schema.columns if c.type.startswith("float")]
-    coded = [c.name for c in schema.columns if c.name not in floats]
-    kind = {
+    fields = pa.schema([_arrow_field(column) for column in schema.columns])
+    is_float = {
+        column.name: column.type.startswith("float") for column in schema.columns
+    }
+    options = {
         "compression": "zstd",
         "compression_level": 1,
-        "use_dictionary": coded,
-        "use_byte_stream_split": floats,
+        "use_dictionary": [name for name in is_float if not is_float[name]],
+        "use_byte_stream_split": [name for name in is_float if is_float[name]],
     }
     with (
         atomic_write(path) as partial,
-        pq.ParquetWriter(partial, fields, **kind) as writer,
+        pq.ParquetWriter(partial, fields, **options) as writer,
     ):
         for block in blocks:
             arrays = [
-                _array(values, fields.field(name).type)
-                for name, values in _checked(path, schema, block).items()
+                _to_arrow(values, fields.field(name).type)
+                for name, values in _check_block(path, schema, block).items()
             ]
             if len(arrays[0]):
-                writer.write_table(
-                    pa.Table.from_arrays(arrays, schema=fields), row_group_size=2**30
-                )
+                table = pa.Table.from_arrays(arrays, schema=fields)
+                writer.write_table(table, row_group_size=2**30)
         metadata = {_TABLE: schema.name, _PROVENANCE: provenance}
         writer.add_key_value_metadata(
             {key: json.dumps(value, sort_keys=True) for key, value in metadata.items()}
@@ -108,51 +119,62 @@ def read_blocks(
     columns: Sequence[str] | None = None,
     **where: str | float,
 ) -> Iterator[dict[str, np.ndarray]]:
-    """Read a table block by block, checked against its schema.
+    """Read a table block by block and check it against its schema.
 
-    `columns`: only these; all without. `**where`: column = value: only row groups with
-    this value throughout. Raises `InputError`: a file that cannot be read or is another
-    table.
+    Parameters
+    ----------
+    path : file.
+    schema : schema of the table.
+    columns : columns to read; all if None.
+    where : value by column: only row groups that have this value throughout are read.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or is another table.
     """
-    wanted = [c.name for c in schema.columns] if columns is None else [*columns]
-    with _parquet_file(path) as file:
-        name = _metadata(path, file, _TABLE, schema.name)
-        if name != schema.name:
-            raise InputError(path, f"metadata {_TABLE}", name, schema.name)
-        types = {field.name: field.type for field in file.schema_arrow}
-        for column in schema.columns:
-            if types.get(column.name) != _arrow_type(column):
-                found = (
-                    f"type {types[column.name]}" if column.name in types else "nothing"
-                )
-                raise InputError(
-                    path, f"column {column.name}", found, f"type {_arrow_type(column)}"
-                )
+    wanted = [column.name for column in schema.columns]
+    if columns is not None:
+        wanted = [*columns]
+    with _open_parquet(path) as file:
+        _check_schema(path, file, schema)
+        layout = file.metadata.schema
         positions = {
-            file.metadata.schema.column(i).path: i
-            for i in range(file.metadata.num_columns)
+            layout.column(position).path: position
+            for position in range(file.metadata.num_columns)
         }
         for group in range(file.num_row_groups):
-            if any(
-                _constant(file, group, positions[name]) != value
+            is_selected = all(
+                _constant_value(file, group, positions[name]) == value
                 for name, value in where.items()
-            ):
-                continue
-            try:
-                table = file.read_row_group(group, wanted, use_threads=False)
-            except (OSError, pa.ArrowException) as error:
-                raise InputError(
-                    path,
-                    f"row group {group}",
-                    f"unreadable data ({error})",
-                    _AS_WRITTEN,
-                ) from None
-            yield {
-                name: np.concatenate(
-                    [_values(chunk) for chunk in table.column(name).chunks]
-                )
-                for name in wanted
-            }
+            )
+            if is_selected:
+                yield _read_row_group(path, file, group, wanted)
+
+
+def _check_schema(path: str | Path, file: pq.ParquetFile, schema: TableSchema) -> None:
+    """Refuse a file that is another table."""
+    name = _read_metadata(path, file, _TABLE, schema.name)
+    if name != schema.name:
+        raise InputError(path, f"metadata {_TABLE}", name, schema.name)
+    types = {field.name: field.type for field in file.schema_arrow}
+    for column in schema.columns:
+        expected = _arrow_type(column)
+        if types.get(column.name) != expected:
+            found = f"type {types[column.name]}" if column.name in types else "nothing"
+            key = f"column {column.name}"
+            raise InputError(path, key, found, f"type {expected}")
+
+
+def _read_row_group(
+    path: str | Path, file: pq.ParquetFile, group: int, names: Sequence[str]
+) -> dict[str, np.ndarray]:
+    try:
+        table = file.read_row_group(group, names, use_threads=False)
+    except (OSError, pa.ArrowException) as error:
+        found = f"unreadable data ({error})"
+        raise InputError(path, f"row group {group}", found, _AS_WRITTEN) from None
+    return {name: _to_numpy(table.column(name)) for name in names}
 
 
 def read_table(
@@ -161,66 +183,80 @@ def read_table(
     columns: Sequence[str] | None = None,
     **where: str | float,
 ) -> dict[str, np.ndarray]:
-    """Read a whole table; as `read_blocks`, with the blocks joined."""
+    """Read a whole table: as `read_blocks`, with the blocks joined."""
     blocks = list(read_blocks(path, schema, columns, **where))
     if where and not blocks:
-        raise InputError(
-            path,
-            ", ".join(where),
-            ", ".join(map(repr, where.values())),
-            "values in the file",
-        )
-    wanted = [c for c in schema.columns if columns is None or c.name in columns]
-    none = {c.name: np.zeros(0, object if c.type in _TEXTS else c.type) for c in wanted}
-    return {
-        name: np.concatenate([block[name] for block in blocks or [none]])
-        for name in none
-    }
+        key = ", ".join(where)
+        found = ", ".join(map(repr, where.values()))
+        raise InputError(path, key, found, "values in the file")
+    wanted = [
+        column for column in schema.columns if columns is None or column.name in columns
+    ]
+    if not blocks:
+        return {
+            column.name: np.zeros(0, object if column.is_text else column.type)
+            for column in wanted
+        }
+    names = [column.name for column in wanted]
+    return {name: np.concatenate([block[name] for block in blocks]) for name in names}
 
 
 def read_provenance(path: str | Path) -> dict[str, Any]:
-    """Provenance of a table, as it was given to `write_table`."""
-    with _parquet_file(path) as file:
-        return _metadata(path, file, _PROVENANCE)
+    """Read the provenance of a table, as it was given to `write_table`."""
+    with _open_parquet(path) as file:
+        provenance: dict[str, Any] = _read_metadata(path, file, _PROVENANCE)
+        return provenance
 
 
-def _parquet_file(path: str | Path) -> pq.ParquetFile:
+def _open_parquet(path: str | Path) -> pq.ParquetFile:
     try:
         check_file(path)
         return pq.ParquetFile(path)
     except (OSError, pa.ArrowException) as error:
-        raise InputError(
-            path, "", f"no readable Parquet file ({error})", _AS_WRITTEN
-        ) from None
+        found = f"no readable Parquet file ({error})"
+        raise InputError(path, "", found, _AS_WRITTEN) from None
 
 
-def _metadata(
+def _read_metadata(
     path: str | Path, file: pq.ParquetFile, key: str, allowed: str = _AS_WRITTEN
 ) -> Any:
-    text = (file.metadata.metadata or {}).get(key.encode())
+    metadata = file.metadata.metadata or {}
+    text = metadata.get(key.encode())
     if text is None:
         raise InputError(path, f"metadata {key}", "nothing", allowed)
     return json.loads(text)
 
 
-def _constant(file: pq.ParquetFile, group: int, column: int) -> str | float | None:
+def _constant_value(
+    file: pq.ParquetFile, group: int, column: int
+) -> str | float | None:
+    """Return the value that a column has throughout a row group, or None."""
     statistics = file.metadata.row_group(group).column(column).statistics
-    return statistics.min if statistics and statistics.min == statistics.max else None
+    if statistics and statistics.min == statistics.max:
+        value: str | float = statistics.min
+        return value
+    return None
+
+
+def _arrow_field(column: Column) -> pa.Field:
+    metadata = {"unit": column.unit, "meaning": column.meaning}
+    return pa.field(column.name, _arrow_type(column), nullable=False, metadata=metadata)
 
 
 def _arrow_type(column: Column) -> pa.DataType:
     if column.type == "text":
         return pa.string()
-    return (
-        pa.dictionary(pa.int32(), pa.string())
-        if column.type == "string"
-        else pa.type_for_alias(column.type)
-    )
+    if column.type == "string":
+        return pa.dictionary(pa.int32(), pa.string())
+    return pa.type_for_alias(column.type)
 
 
-def _array(values: np.ndarray, kind: pa.DataType) -> pa.Array:
-    """Values of one column; `pyarrow.array` and ``to_numpy`` would import pandas, half
-    of the time of a job of the study."""
+def _to_arrow(values: np.ndarray, kind: pa.DataType) -> pa.Array:
+    """Convert the values of a column.
+
+    `pyarrow.array` and ``to_numpy`` would import pandas, which takes half of the time
+    of a job of the study.
+    """
     if pa.types.is_dictionary(kind):
         codes = {text: code for code, text in enumerate(dict.fromkeys(values))}
         texts = [text.encode() for text in codes]
@@ -229,77 +265,77 @@ def _array(values: np.ndarray, kind: pa.DataType) -> pa.Array:
             len(texts), ends, pa.py_buffer(b"".join(texts))
         )
         coded = np.fromiter(map(codes.__getitem__, values), np.int32, len(values))
-        return pa.DictionaryArray.from_arrays(_array(coded, kind.index_type), names)
+        return pa.DictionaryArray.from_arrays(_to_arrow(coded, kind.index_type), names)
     if pa.types.is_string(kind):
         return pa.array(values, kind)
-    bits = (
-        np.packbits(values, bitorder="little")
-        if values.dtype == bool
-        else np.ascontiguousarray(values)
-    )
+    if values.dtype == bool:
+        bits = np.packbits(values, bitorder="little")
+    else:
+        bits = np.ascontiguousarray(values)
     return pa.Array.from_buffers(kind, len(values), [None, pa.py_buffer(bits)])
 
 
-def _values(chunk: pa.Array) -> np.ndarray:
+def _to_numpy(column: pa.ChunkedArray) -> np.ndarray:
+    return np.concatenate([_chunk_to_numpy(chunk) for chunk in column.chunks])
+
+
+def _chunk_to_numpy(chunk: pa.Array) -> np.ndarray:
     if pa.types.is_dictionary(chunk.type):
-        return np.array(chunk.dictionary.to_pylist(), dtype=object)[
-            np.from_dlpack(chunk.indices)
-        ]
+        texts = np.array(chunk.dictionary.to_pylist(), dtype=object)
+        return np.asarray(texts[np.from_dlpack(chunk.indices)])
     if pa.types.is_string(chunk.type):
-        return chunk.to_numpy(zero_copy_only=False)
-    return (
-        np.array(chunk.to_pylist(), bool)
-        if pa.types.is_boolean(chunk.type)
-        else np.from_dlpack(chunk)
-    )
+        return np.asarray(chunk.to_numpy(zero_copy_only=False))
+    if pa.types.is_boolean(chunk.type):
+        return np.array(chunk.to_pylist(), bool)
+    return np.from_dlpack(chunk)
 
 
-def _checked(
+def _check_block(
     path: str | Path, schema: TableSchema, block: Block
 ) -> dict[str, np.ndarray]:
-    """Arrays of a block in the order of the schema, of one length each."""
-    names = [c.name for c in schema.columns]
+    """Return the arrays of a block in the order of the schema, all of one length;
+    refuse a value that the schema does not allow."""
+    names = [column.name for column in schema.columns]
     if set(block) != set(names):
-        raise InputError(
-            path,
-            "columns",
-            ", ".join(sorted(set(block) ^ set(names))),
-            f"those of {schema.name}",
+        different = ", ".join(sorted(set(block) ^ set(names)))
+        raise InputError(path, "columns", different, f"those of {schema.name}")
+    arrays = {
+        column.name: np.ascontiguousarray(
+            block[column.name], object if column.is_text else column.type
         )
-    single = {name: value for name, value in block.items() if isinstance(value, str)}
-    values = {
-        c.name: np.ascontiguousarray(
-            block[c.name], object if c.type in _TEXTS else c.type
-        )
-        for c in schema.columns
+        for column in schema.columns
     }
-    lengths = {len(value) for name, value in values.items() if name not in single}
+    # A single text stands for a column of equal texts.
+    texts = {name: value for name, value in block.items() if isinstance(value, str)}
+    lengths = {len(array) for name, array in arrays.items() if name not in texts}
     if len(lengths) != 1:
-        raise InputError(
-            path, "rows", f"columns of {sorted(lengths)} rows", "columns of one length"
-        )
-    (rows,) = lengths
+        found = f"columns of {sorted(lengths)} rows"
+        raise InputError(path, "rows", found, "columns of one length")
     for column in schema.columns:
-        value = values[column.name]
-        finite = (
-            np.ones(len(value), bool)
-            if column.missing or column.type in _TEXTS
-            else np.isfinite(value)
-        )
-        large = (
-            np.ones(len(value), bool)
-            if column.minimum is None
-            else value >= column.minimum
-        )
-        for good, allowed in (
-            (finite, "finite numbers"),
-            (large, f">= {column.minimum}"),
-        ):
-            if not good.all():
-                row = int(np.argmin(good))
-                raise InputError(
-                    path, f"column {column.name}, row {row}", str(value[row]), allowed
-                )
-    return values | {
-        name: np.full(rows, value, dtype=object) for name, value in single.items()
-    }
+        _check_values(path, column, arrays[column.name])
+    (rows,) = lengths
+    for name, text in texts.items():
+        arrays[name] = np.full(rows, text, dtype=object)
+    return arrays
+
+
+def _check_values(path: str | Path, column: Column, values: np.ndarray) -> None:
+    """Refuse the first value that is not finite or below the minimum."""
+    if not column.missing and not column.is_text:
+        _check_rows(path, column, values, np.isfinite(values), "finite numbers")
+    if column.minimum is not None:
+        is_allowed = values >= column.minimum
+        _check_rows(path, column, values, is_allowed, f">= {column.minimum}")
+
+
+def _check_rows(
+    path: str | Path,
+    column: Column,
+    values: np.ndarray,
+    is_allowed: np.ndarray,
+    allowed: str,
+) -> None:
+    if not is_allowed.all():
+        row = int(np.argmin(is_allowed))
+        key = f"column {column.name}, row {row}"
+        raise InputError(path, key, str(values[row]), allowed)

@@ -1,7 +1,6 @@
-"""Bytes and texts of files that people hand in, and the numbers in them: bounded, and
-of regular files alone."""
+"""Read bytes, texts and numbers from files that people hand in: bounded in size, and
+from regular files only."""
 
-import math
 import os
 import re
 import stat
@@ -9,17 +8,19 @@ from pathlib import Path
 
 from elastocal.errors import InputError, describe_os_error
 
-# Python also takes 1_0 for 10, other scripts' digits, and words for what is no number.
+# A decimal number as people write it. Python's float also accepts 1_0, digits of other
+# scripts, "nan" and "inf".
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
-# No length, angle, force, mass or time of a robot is larger in any unit; squares and
-# products of such numbers are finite.
+# Upper bound on a number: no length, angle, force, mass or time of a robot is larger in
+# any unit. Squares and products of such numbers are finite.
 LARGEST_NUMBER = 1e12
 NUMBER_ALLOWED = f"a number such as -0.25 or 2.5e-3, up to {LARGEST_NUMBER:g} in size"
+# Upper bound on the characters of a number, so that parsing it takes no time.
 _LONGEST_NUMBER = 100
 
 
 def describe_file_kind(mode: int) -> str:
-    """What has a name, by the mode of its status."""
+    """Return what a path is, such as "a link", from the mode of its status."""
     kinds = {
         stat.S_IFREG: "file",
         stat.S_IFLNK: "link",
@@ -31,8 +32,8 @@ def describe_file_kind(mode: int) -> str:
 
 
 def check_file(path: str | Path, kind: str = "the path of a readable file") -> int:
-    """Size of a file in bytes; a pipe or a device is refused before it is opened, as it
-    might never end."""
+    """Return the size of a file in bytes. A pipe or a device, which might never end, is
+    refused before it is opened."""
     status = os.stat(path)
     if not stat.S_ISREG(status.st_mode):
         raise InputError(path, "", describe_file_kind(status.st_mode), kind)
@@ -42,11 +43,19 @@ def check_file(path: str | Path, kind: str = "the path of a readable file") -> i
 def read_bytes(
     path: str | Path, largest: int, kind: str = "the path of a readable file"
 ) -> bytes:
-    """Contents of a file of at most so many bytes; `kind` is what it should be, for
-    messages.
+    """Read a file of at most `largest` bytes.
 
-    An InputError refuses what is not there or may not be read, and a pipe or device,
-    which might never end.
+    Parameters
+    ----------
+    path : file.
+    largest : largest size in bytes.
+    kind : what the file should be, for messages.
+
+    Raises
+    ------
+    InputError
+        If the file does not exist, cannot be read, is too large, or is a pipe or a
+        device, which might never end.
     """
     try:
         if check_file(path, kind) <= largest:
@@ -60,7 +69,7 @@ def read_bytes(
     except OSError as error:
         raise InputError(path, "", describe_os_error(error), kind) from None
     except ValueError as error:
-        # A null character in the path; but an InputError is one too.
+        # The path has a null character. An InputError is a ValueError, too.
         if isinstance(error, InputError):
             raise
         raise InputError(path, "", str(error), kind) from None
@@ -69,18 +78,18 @@ def read_bytes(
 def read_text(
     path: str | Path, largest: int, kind: str = "the path of a readable file"
 ) -> str:
-    """Contents of a file in UTF-8, see `read_bytes`, without the byte order mark that
+    """Read a file in UTF-8 as `read_bytes`, without the byte order mark that
     spreadsheets write."""
     return decode_text(read_bytes(path, largest, kind), path)
 
 
 def decode_text(content: bytes, path: str | Path, encoding: str = "utf-8-sig") -> str:
-    """Text of the contents of a file; an InputError names the line of what is in
+    """Return the text of a file's contents; an InputError names the line that has
     another encoding."""
     try:
         return content.decode(encoding)
     except UnicodeDecodeError as error:
-        # Its object may lack the mark in front; lines are the same.
+        # The error's bytes may lack the byte order mark, which does not change the line.
         line = error.object[: error.start].count(b"\n") + 1
         name = encoding.upper().removesuffix("-SIG")
         raise InputError(
@@ -92,11 +101,9 @@ def decode_text(content: bytes, path: str | Path, encoding: str = "utf-8-sig") -
 
 
 def parse_number(text: str, largest: float = LARGEST_NUMBER) -> float | None:
-    """A decimal number as people write it; None for words, not-a-number, digits with
-    underscores, and what is larger."""
-    value = (
-        float(text)
-        if len(text) <= _LONGEST_NUMBER and _NUMBER.fullmatch(text)
-        else math.inf
-    )
+    """Return the decimal number that a text is; None for words, NaN, digits with
+    underscores, and a number of more than the largest size."""
+    if len(text) > _LONGEST_NUMBER or not _NUMBER.fullmatch(text):
+        return None
+    value = float(text)
     return value if abs(value) <= largest else None

@@ -34,6 +34,7 @@ from elastocal.fitting.noise import parse_noise
 from elastocal.io.json_files import read_json
 from elastocal.io.origin import configuration_sha256
 from elastocal.io.records import check_sources, trace_jobs
+from elastocal.io.typed_json import to_document
 from elastocal.loop.diagnosis_tables import load_case, rows_left_out, step_model
 from elastocal.remainder.corrected import predictor_of
 from elastocal.validation.conformity import (
@@ -43,28 +44,42 @@ from elastocal.validation.conformity import (
     find_joint_ranges,
     list_shortfalls,
 )
+from elastocal.verdict import read_verdict
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Collection, Iterable, Mapping, Sequence
 
     from elastocal.application.calibrated import CalibratedRobot
     from elastocal.fitting.model import Case
+    from elastocal.io.records import JobRecord
+    from elastocal.mechanics.robot import Robot
+    from elastocal.verdict import Verdict
 
 
 @dataclass(frozen=True)
 class Diagnosed:
-    """A campaign and what its diagnosis found.
+    """A campaign with the results of its diagnosis.
 
-    `folder`: of the campaign. `case`: of the training poses, without their gross errors.
-    `facts`, `verdict`: contents of diagnosis.json and verdict.json. `origin`:
-    ``commit`` of the jobs that made them, ``code_sha256`` and ``data_sha256`` of all
-    that they read of the program and of the campaign, ``environment``.
+    Attributes
+    ----------
+    folder : CampaignFolder
+        Folder of the campaign.
+    case : Case
+        Training poses without their gross errors.
+    facts : dict
+        Contents of diagnosis.json.
+    verdict : Verdict
+        Contents of verdict.json.
+    origin : dict
+        ``commit`` of the jobs that made these files, ``code_sha256`` and
+        ``data_sha256`` of everything that they read of the program and of the campaign,
+        and their ``environment``.
     """
 
     folder: CampaignFolder
     case: Case
     facts: dict[str, Any]
-    verdict: dict[str, Any]
+    verdict: Verdict
     origin: dict[str, Any]
 
     @property
@@ -74,190 +89,222 @@ class Diagnosed:
 
     @cached_property
     def calibrated(self) -> CalibratedRobot:
-        """By the final model, its errors as large as the verdict says after a look at
-        held-out poses."""
+        """The robot of the final model, with errors as large as the validation poses
+        show them."""
         step = self.facts["steps"][-1]
-        again = self.verdict["remainder"]
-        accuracy = self.verdict["accuracy"]
         model, estimate = step_model(self.case, step)
-        more = None
-        if again and again["regression"]:
-            predictor = predictor_of(again, model, estimate, self.case.observations)
-            noise_m = self.verdict["noise"]["position_m"]
-            more = build_residual_model(
-                self.case, estimate, predictor, again["spread"]["typical"], noise_m
+        regression = None
+        remainder = self.verdict.remainder
+        if remainder and remainder.regression and remainder.spread:
+            regression = build_residual_model(
+                self.case,
+                estimate,
+                predictor_of(
+                    to_document(remainder), model, estimate, self.case.observations
+                ),
+                remainder.spread.typical,
+                self.verdict.noise.position_m,
             )
-        found = calibrate_on_case(
+        robot = calibrate_on_case(
             self.case,
             model,
             estimate,
             np.array(self.facts["covariance"]),
             parse_noise(step),
-            more,
+            regression,
         )
-        contradicted = bool(accuracy and accuracy["contradicted"])
-        form_m = (
-            accuracy["form_m"]
-            if contradicted
-            else self.facts["document"].get("other_models_m") or 0.0
+        accuracy = self.verdict.accuracy
+        if accuracy and accuracy.contradicted:
+            return set_form_error(robot, accuracy.form_m, contradicted=True)
+        return set_form_error(
+            robot, self.verdict.other_models_m or 0.0, contradicted=False
         )
-        return set_form_error(found, form_m, contradicted=contradicted)
 
     def by_physics(self) -> Diagnosed:
-        """The same without the regression on the remainder, as if there were none."""
-        heldout = self.verdict["heldout"] | {
-            "delivered": self.verdict["heldout"]["after"]
-        }
-        alone = {"remainder": None, "heldout": heldout} | (
-            self.verdict["physics"] or {}
+        """Return the same campaign as if no regression had been asked for."""
+        verdict = replace(
+            self.verdict,
+            remainder=None,
+            heldout=replace(self.verdict.heldout, delivered=self.verdict.heldout.after),
         )
-        return replace(self, verdict=self.verdict | alone)
+        physics = self.verdict.physics
+        if physics:
+            verdict = replace(
+                verdict,
+                accuracy=physics.accuracy,
+                uncorrected_m=physics.uncorrected_m,
+            )
+        return replace(self, verdict=verdict)
 
 
 def load_diagnosed(
     folder: str | Path, robots_folder: str | Path, top: str | Path
 ) -> Diagnosed:
-    """A campaign that was diagnosed, of which nothing has changed since, in the folder
-    that holds results/ and reports/.
+    """Load a campaign and its diagnosis, if neither has changed since.
 
-    An InputError refuses what is not as `trace_jobs` asks of all jobs behind its
-    report or `check_sources` of those behind its verdict, and other files of the
-    campaign than were read.
+    Parameters
+    ----------
+    folder, robots_folder : str or path
+        As in `read_campaign_folder`.
+    top : str or path
+        Folder that holds results/ and reports/.
+
+    Raises
+    ------
+    InputError
+        If there is no diagnosis, if a file of a job behind its report has changed (see
+        `trace_jobs`), if the program has changed since (see `check_sources`), or if the
+        campaign has other files than those that were read.
     """
     campaign_folder = read_campaign_folder(folder, robots_folder)
     name = campaign_folder.name
     results = f"results/loop/{name}"
     reports = f"reports/loop/{name}"
     tables = Path(top, results)
-    verdict = Path(top, reports, "verdict.json")
-    fresh = f"elastocal diagnose {folder}"
-    if not verdict.exists() and not (tables / "diagnosis.json").exists():
-        raise InputError(folder, "", f"no diagnosis of it in {tables}", fresh)
-    # The report has all other files behind it.
+    verdict_path = Path(top, reports, "verdict.json")
+    command = f"elastocal diagnose {folder}"
+    if not verdict_path.exists() and not (tables / "diagnosis.json").exists():
+        raise InputError(folder, "", f"no diagnosis of it in {tables}", command)
+    # The report depends on all other files, so this checks every job.
     trace_jobs([f"{reports}/report.html"], top)
     jobs = trace_jobs([f"{reports}/verdict.json"], top)
-    check_sources(jobs, top, f"results of this version: {fresh}")
+    check_sources(jobs, top, f"results of this version: {command}")
     reader = next(job for job in jobs if f"{results}/campaign.json" in job.outputs)
-    # The user's files may have moved since.
-    data = {
-        (Path(file).name, reader.inputs[file])
-        for file in reader.own or reader.made_inputs
-    }
-    now = {
-        (Path(file).name, digest) for file, digest in campaign_folder.digests.items()
-    }
-    if (
-        not data
-        <= now
-        <= {
-            (Path(file).name, digest)
-            for job in jobs
-            for file, digest in job.inputs.items()
-        }
-    ):
+    data = _name_files(
+        {file: reader.inputs[file] for file in reader.own or reader.made_inputs}
+    )
+    read_by_jobs = {entry for job in jobs for entry in _name_files(job.inputs)}
+    if not data <= _name_files(campaign_folder.digests) <= read_by_jobs:
         raise InputError(
             folder,
             "",
             "changes since its diagnosis",
-            f"a campaign as it was diagnosed: {fresh}",
+            f"a campaign as it was diagnosed: {command}",
         )
     facts = read_json(tables / "diagnosis.json")
     case = load_case(tables / "campaign.json", tables / "training.parquet")
-    origin = {
-        "commit": _listed(job.origin.commit for job in jobs),
-        "code_sha256": configuration_sha256(
-            {file: digest for job in jobs for file, digest in job.sources.items()}
-        ),
-        "data_sha256": configuration_sha256(sorted(data)),
-        "environment": {
-            name: _listed(job.environment.get(name, "none") for job in jobs)
-            for name in jobs[-1].environment
-        },
-    }
     return Diagnosed(
         campaign_folder,
         case.select(~rows_left_out(case, facts)),
         facts,
-        read_json(verdict),
-        origin,
+        read_verdict(verdict_path),
+        _describe_origin(jobs, data),
     )
 
 
-def _listed(values: Iterable[str]) -> str:
+def _name_files(digests: Mapping[str, str]) -> set[tuple[str, str]]:
+    """Return names and digests of files without their folders: the user may have moved
+    them since."""
+    return {(Path(file).name, digest) for file, digest in digests.items()}
+
+
+def _describe_origin(
+    jobs: Sequence[JobRecord], data: Collection[tuple[str, str]]
+) -> dict[str, Any]:
+    """Return commit, digests and environment of the jobs behind a verdict."""
+    sources = {file: digest for job in jobs for file, digest in job.sources.items()}
+    return {
+        "commit": _join_distinct(job.origin.commit for job in jobs),
+        "code_sha256": configuration_sha256(sources),
+        "data_sha256": configuration_sha256(sorted(data)),
+        "environment": {
+            name: _join_distinct(job.environment.get(name, "none") for job in jobs)
+            for name in jobs[-1].environment
+        },
+    }
+
+
+def _join_distinct(values: Iterable[str]) -> str:
     return ", ".join(sorted(set(values)))
 
 
 def certificate(
-    found: Diagnosed, tolerance_m: float, accepted_risk: float
+    campaign: Diagnosed, tolerance_m: float, accepted_risk: float
 ) -> dict[str, Any]:
-    """Contents of a certificate: all of the corrected robot is predicted, at the poses
-    and loads of the campaign.
+    """Return the contents of a certificate.
 
-    `found`: the campaign. Returns JSON-serialisable.
+    All of the corrected robot is predicted, at the poses and loads of the campaign.
+
+    Parameters
+    ----------
+    campaign : Diagnosed
+        The campaign with its diagnosis.
+    tolerance_m : float
+        Largest allowed RMS position error, m.
+    accepted_risk : float
+        Accepted probability of a wrong decision.
+
+    Returns
+    -------
+    dict
+        JSON-serialisable.
     """
-    document = found.folder.document
-    calibrated, verdict, heldout = (
-        found.calibrated,
-        found.verdict,
-        found.verdict["heldout"],
-    )
+    document = campaign.folder.document
+    calibrated = campaign.calibrated
+    verdict = campaign.verdict
+    heldout = verdict.heldout
     robot = calibrated.robot
-    states = found.case.observations.states
-    poses = select_campaign_commands(calibrated)
-    prediction = predict_errors(calibrated, *poses)
+    states = campaign.case.observations.states
+    commands = select_campaign_commands(calibrated)
+    prediction = predict_errors(calibrated, *commands)
     accuracy = prediction.summarize(REGION)
-    worst = int(np.argmax(prediction.error_m))
     decision = decide_conformity(prediction.rms_m, tolerance_m, accepted_risk)
-    missing = list_shortfalls(heldout["configurations"], states, robot)
+    missing = list_shortfalls(heldout.configurations, states, robot)
     if not accuracy.fitted:
-        missing = [
+        missing.insert(
+            0,
             "nothing fitted: no error of 0 is predicted of a robot of which nothing was fitted",
-            *missing,
-        ]
+        )
     if missing and decision.decision == PASS:
         decision = replace(decision, decision=UNDECIDED)
-    joints = [
-        {"value": value, "unit": "m" if slides else "rad"}
-        for value, slides in zip(
-            poses[0][worst].tolist(), robot.chain.prismatic, strict=True
-        )
-    ]
+    budget = error_budget(calibrated, *commands)
     return {
-        "campaign": found.name,
+        "campaign": campaign.name,
         "robot": robot.name,
         "serial": document.get("serial_number", ""),
         "date": date.today().isoformat(),
         "stated": {"measured_on": document.get("measured_on", "")}
         | document.get("certificate", {}),
         "version": __version__,
-        "origin": found.origin,
+        "origin": campaign.origin,
         "files": {
-            Path(file).name: digest for file, digest in found.folder.digests.items()
+            Path(file).name: digest for file, digest in campaign.folder.digests.items()
         },
-        "verdict": verdict["verdict"],
-        "repeatable": verdict["repeatable"],
-        "effects": [effect["name"] for effect in verdict["effects"]],
+        "verdict": verdict.verdict,
+        "repeatable": to_document(verdict.repeatable),
+        "effects": [effect.name for effect in verdict.effects],
         "errors": tabulate_errors(verdict),
         "validation_rms_m": {
-            "uncorrected": heldout["uncalibrated"]["rms_m"],
-            "corrected": heldout["delivered"]["rms_m"],
+            "uncorrected": heldout.uncalibrated.rms_m,
+            "corrected": heldout.delivered.rms_m,
         },
-        "regression": (verdict["remainder"] or {}).get("words", ""),
-        "noise_floor_rms_m": heldout["noise_floor_rms_m"],
-        "accuracy": asdict(accuracy),
-        "point": describe_reference_point(found.case.campaign),
-        "misplaced": verdict["misplaced"],
-        "worst_pose": {"joints": joints, "error_m": float(prediction.error_m[worst])},
+        "regression": verdict.remainder.words if verdict.remainder else "",
+        "noise_floor_rms_m": heldout.noise_floor_rms_m,
+        "accuracy": to_document(accuracy),
+        "point": describe_reference_point(campaign.case.campaign),
+        "misplaced": to_document(verdict.misplaced),
+        "worst_pose": _describe_worst_pose(robot, commands[0], prediction.error_m),
         "conformity": asdict(decision)
-        | {"configurations": heldout["configurations"], "shortfalls": missing},
+        | {"configurations": heldout.configurations, "shortfalls": missing},
         "joint_ranges": find_joint_ranges(states, robot),
-        "budget": [
-            {"name": name, "rms_m": rms}
-            for name, rms in error_budget(calibrated, *poses).items()
-        ],
+        "budget": [{"name": name, "rms_m": rms_m} for name, rms_m in budget.items()],
         "budget_states": accuracy.poses,
         "tracker_rms_m": float(np.sqrt(3.0) * calibrated.noise.position_m),
     }
+
+
+def _describe_worst_pose(
+    robot: Robot, reported_angles: np.ndarray, error_m: np.ndarray
+) -> dict[str, Any]:
+    """Return the joint coordinates of the pose with the largest predicted error."""
+    worst = int(np.argmax(error_m))
+    joints = [
+        {"value": value, "unit": "m" if is_prismatic else "rad"}
+        for value, is_prismatic in zip(
+            reported_angles[worst].tolist(), robot.chain.prismatic, strict=True
+        )
+    ]
+    return {"joints": joints, "error_m": float(error_m[worst])}
 
 
 def error_budget(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,14 +19,17 @@ from elastocal.fitting.noise import parse_noise, serialize_noise
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import read_table, write_table
+from elastocal.io.typed_json import from_document
 from elastocal.loop.schemas import STEPS, measurements
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.random_streams import open_stream
+from elastocal.verdict import TrainingVerdict
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
     from pathlib import Path
 
+    from elastocal.diagnosis.verdict import Evidence
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Case, Model
 
@@ -52,13 +55,13 @@ def diagnose_campaign(job: Any) -> None:
         seed,
         lambda line: print(f"{name}: {line}", file=sys.stderr, flush=True),
     )
-    columns, facts = propose_experiment(
+    columns, proposal = propose_experiment(
         found,
         open_stream(seed, case.campaign.name, "next experiment", 0),
         job.params.states,
     )
     write_csv(job.output.experiment, pd.DataFrame(columns))
-    found = replace(found, document=found.document | {"next_experiment": asdict(facts)})
+    found = replace(found, verdict=replace(found.verdict, next_experiment=proposal))
     write_csv(job.output.candidates, pd.DataFrame(candidate_rows(found)))
     write_json(
         job.output.diagnosis,
@@ -152,7 +155,11 @@ def diagnosis_from(case: Case, facts: Mapping[str, Any]) -> Diagnosis:
         for step in facts["steps"]
     )
     return Diagnosis(
-        case, steps, None, facts["document"], measurements.select(left_out)
+        case,
+        steps,
+        None,
+        from_document(TrainingVerdict, facts["document"], "diagnosis.json"),
+        measurements.select(left_out),
     )
 
 
@@ -197,65 +204,64 @@ def step_model(case: Case, step: Mapping[str, Any]) -> tuple[Model, Estimate]:
 
 
 def candidate_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Rows of candidates.csv: those tested by falling Bayes factor, then the others
-    with the reason.
+    """Return the rows of candidates.csv.
 
-    ``log_bayes_factor``: of a candidate alone against the declared model, averaged over
-    its size; ``probability`` that it is in the model; ``chosen``: whether the most
-    probable model has it; ``note``: why it was not tested.
+    Tested candidates come first, by falling Bayes factor, then the others with a note
+    why they were not tested. ``log_bayes_factor`` is that of the candidate alone against
+    the declared model, averaged over its size; ``probability`` is that of being in the
+    model; ``chosen`` says whether the most probable model contains it.
     """
-    evidence = diagnosis.evidence
     candidates = diagnosis.case.candidates
-    rows: list[tuple[Any, ...]] = []
+    rows = []
     untestable = dict.fromkeys(candidates, "the measurements are at fault")
-    if evidence:
-        problem = evidence.linearized.problem
-        untestable = evidence.linearized.untestable
-        factors = screen_terms(problem)[1]
-        inclusion = np.zeros(len(problem.terms))
-        for model, probability in zip(
-            evidence.posterior.models, evidence.posterior.probabilities, strict=True
-        ):
-            inclusion[list(model.term_indices)] += probability
-        best = evidence.conclusion.best
-        chosen = (
-            set(evidence.posterior.models[best.model].term_indices)
-            if best.named
-            else set()
-        )
-        for number in np.argsort(-factors):
-            unit = problem.terms[number]
-            if unit.candidate:
-                shape = unit.shapes[0] if unit.shapes else None
-                rows.append(
-                    (
-                        unit.candidate,
-                        shape,
-                        factors[number],
-                        inclusion[number],
-                        number in chosen,
-                        "",
-                    )
-                )
-    tested = {row[0].key for row in rows}
-    rows += [
-        (each, None, None, None, False, untestable[key])
-        for key, each in candidates.items()
-        if key not in tested
-    ]
-    names = (
-        "candidate",
-        "family",
-        "shape",
-        "log_bayes_factor",
-        "probability",
-        "chosen",
-        "note",
-    )
-    return [
-        dict(zip(names, (each.key, each.family, *stated), strict=True))
-        for each, *stated in rows
-    ]
+    if diagnosis.evidence:
+        rows = _tested_candidate_rows(diagnosis.evidence)
+        untestable = diagnosis.evidence.linearized.untestable
+    tested = {row["candidate"] for row in rows}
+    for key, candidate in candidates.items():
+        if key not in tested:
+            rows.append(
+                {
+                    "candidate": candidate.key,
+                    "family": candidate.family,
+                    "shape": None,
+                    "log_bayes_factor": None,
+                    "probability": None,
+                    "chosen": False,
+                    "note": untestable[key],
+                }
+            )
+    return rows
+
+
+def _tested_candidate_rows(evidence: Evidence) -> list[dict[str, Any]]:
+    """Return the rows of the candidates that were tested, by falling Bayes factor."""
+    problem = evidence.linearized.problem
+    posterior = evidence.posterior
+    log_bayes_factors = screen_terms(problem)[1]
+    inclusion = np.zeros(len(problem.terms))
+    for model, probability in zip(
+        posterior.models, posterior.probabilities, strict=True
+    ):
+        inclusion[list(model.term_indices)] += probability
+    best = evidence.conclusion.best
+    chosen = set(posterior.models[best.model].term_indices) if best.named else set()
+    rows = []
+    for index in np.argsort(-log_bayes_factors):
+        term = problem.terms[index]
+        if term.candidate:
+            rows.append(
+                {
+                    "candidate": term.candidate.key,
+                    "family": term.candidate.family,
+                    "shape": term.shapes[0] if term.shapes else None,
+                    "log_bayes_factor": log_bayes_factors[index],
+                    "probability": inclusion[index],
+                    "chosen": index in chosen,
+                    "note": "",
+                }
+            )
+    return rows
 
 
 def parameter_columns(fitted: Fit) -> dict[str, np.ndarray | list[str]]:

@@ -1,8 +1,8 @@
-"""What a campaign can show, before anything is diagnosed: what was read, what is
-identified and testable, what is suspicious.
+"""Inspect a campaign before its diagnosis: what was read, what is identifiable and
+testable, and what is suspicious.
 
-Held-out poses are counted, and their joint angles compared with those fitted; what was
-measured at them is not looked at.
+Held-out poses are counted, and their joint angles are compared with the fitted ones.
+Their measurements are not used.
 """
 
 from __future__ import annotations
@@ -37,18 +37,19 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from elastocal.campaigns.campaign import Measurements
+    from elastocal.diagnosis.fitted_subset import FittedSubset
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Case
 
-# Held-out poses of which a 95 % interval of an RMS is wider than a factor of two.
+# With fewer held-out poses, the 95 % interval of an RMS is wider than a factor of two.
 FEWEST_HELD_OUT = 6
-# Loads whose directions span less than this share of the largest in a second direction
-# pull in one line.
-_ONE_DIRECTION = 0.05
-# A compliance is impossible where it is less than minus so many standard errors.
-_CLEAR = 2.0
-# Parameters that are not identifiable and are named; more would be too many to read.
-_NAMED = 8
+# Loads count as collinear if their second singular value is below this share of the
+# first.
+_COLLINEAR_SHARE = 0.05
+# A compliance is impossible if it is negative by more than this many standard errors.
+_NEGATIVE_STD_ERRORS = 2.0
+# Upper bound on the unidentifiable parameters that are named.
+_MAX_NAMED = 8
 _SOURCES = {
     "repeats": "repeats",
     "declared": "the campaign's declaration",
@@ -58,11 +59,20 @@ _SOURCES = {
 
 @dataclass(frozen=True)
 class Overview:
-    """A campaign in words: `rows` of a table, heading and words; `attention`, sentences
-    on faults and what looks suspicious.
+    """A campaign in words.
 
-    `testable`: number of candidate effects that can be tested. `diagnosable`: whether
-    no fault of the data forbids it.
+    Attributes
+    ----------
+    campaign : str
+        Name of the campaign.
+    diagnosable : bool
+        Whether the data have no fault that forbids a diagnosis.
+    testable : int
+        Number of candidate effects that can be tested.
+    rows : list of (str, str)
+        Rows of a table: heading and words.
+    attention : list of str
+        Sentences on faults and on what looks suspicious.
     """
 
     campaign: str
@@ -73,127 +83,136 @@ class Overview:
 
 
 def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
-    """Look through a campaign; `folder`, `robots_folder` as in `read_campaign_folder`.
-    Raises `InputError`.
+    """Inspect a campaign before its diagnosis.
 
-    What is misplaced is not looked for where a compliance comes out negative, for then
-    something is missing in the model.
+    Parameters
+    ----------
+    folder, robots_folder : str or path
+        As in `read_campaign_folder`.
+
+    Raises
+    ------
+    InputError
+        If the campaign cannot be read.
     """
     descriptions, training, held_out = load_campaign(
         read_campaign_folder(folder, robots_folder)
     )
     whole = build_case(descriptions, tabulate_measurements(training))
     settings = Settings()
-    part = select_initial_subset(whole, settings)
-    errors = find_gross_errors(
-        part.declared, part.noise, whole.campaign.measurements, part.kept, settings
-    )
-    left_out = describe_gross_errors(
-        replace(errors, gross=~part.kept), whole.campaign, held_out=False
-    )
-    case, campaign, declared = (
-        part.case,
-        part.case.campaign,
-        part.fit_to_all(part.declared),
-    )
+    subset = select_initial_subset(whole, settings)
+    case = subset.case
+    declared = subset.fit_to_all(subset.declared)
     untestable = build_candidate_design(
-        part.declared, part.search_sample, [*case.candidates.values()], settings
+        subset.declared, subset.search_sample, [*case.candidates.values()], settings
     ).untestable
     testable = len(case.candidates) - len(untestable)
-    found = faults(campaign)
-    negative = _negative_springs(declared)
-    diagnosable = not found
-    rows = _read(case, training, held_out)
-    rows.append(
+    data_faults = faults(case.campaign)
+    noise_um = 1e6 * subset.noise.position_m
+    rows = [
+        *_describe_measurements(case, training, held_out),
         (
             "noise",
-            f"{1e6 * part.noise.position_m:.0f} µm a coordinate, from {_SOURCES[part.noise.source]}",
-        )
-    )
-    rows += _identified(declared)
-    attention = [fault.detail for fault in found]
-    if diagnosable and not negative:
-        attention += [
-            frame.sentence
-            for frame in find_misplaced_frames(_with_base(declared, case), campaign)
-        ]
-    attention += [*controller_warnings(campaign), *part.warnings]
-    if negative:
-        joints = " and ".join(negative)
-        attention.append(
-            f"the compliance of joint {joints} comes out negative: the declared model lacks something"
-        )
-    attention += [
-        *format_gross_error_warnings(left_out),
-        *_suspicious(case, declared, training, held_out),
-        *warn_of_repeated_poses(training, held_out),
-    ]
-    reasons = Counter(untestable.values()).most_common()
-    rows += [
+            f"{noise_um:.0f} µm a coordinate, from {_SOURCES[subset.noise.source]}",
+        ),
+        *_describe_declared_model(declared),
         ("testable", format_count(testable, "candidate effect")),
-        *(("", f"{n} not testable: {why}") for why, n in reasons),
     ]
-    return Overview(campaign.name, diagnosable, testable, rows, attention)
+    for reason, count in Counter(untestable.values()).most_common():
+        rows.append(("", f"{count} not testable: {reason}"))
+    attention = [fault.detail for fault in data_faults]
+    negative = _find_negative_compliances(declared)
+    # A negative compliance means that the model lacks something, so the search for
+    # misplaced frames would mistake it for one.
+    if not data_faults and not negative:
+        attention += _describe_misplaced_frames(declared, case)
+    attention += [*controller_warnings(case.campaign), *subset.warnings]
+    if negative:
+        attention.append(
+            f"the compliance of joint {' and '.join(negative)} comes out negative: "
+            "the declared model lacks something"
+        )
+    attention += _describe_gross_errors(whole, subset, settings)
+    attention += _list_shortcomings(case, declared, training, held_out)
+    attention += warn_of_repeated_poses(training, held_out)
+    return Overview(case.campaign.name, not data_faults, testable, rows, attention)
 
 
-def _read(
+def _describe_gross_errors(
+    whole: Case, subset: FittedSubset, settings: Settings
+) -> list[str]:
+    """Return a sentence for each of the first rows that the declared model cannot
+    explain."""
+    outliers = find_gross_errors(
+        subset.declared,
+        subset.noise,
+        whole.campaign.measurements,
+        subset.kept,
+        settings,
+    )
+    gross_errors = describe_gross_errors(
+        replace(outliers, gross=~subset.kept), whole.campaign, held_out=False
+    )
+    return format_gross_error_warnings(gross_errors)
+
+
+def _describe_misplaced_frames(declared: Fit, case: Case) -> list[str]:
+    frames = find_misplaced_frames(_with_base(declared, case), case.campaign)
+    return [frame.sentence for frame in frames]
+
+
+def _describe_measurements(
     case: Case, training: Measurements, held_out: Measurements
 ) -> list[tuple[str, str]]:
-    """What was read."""
+    """Return rows on what was read."""
     campaign = case.campaign
     states = case.observations.states
     sessions = format_count(len(np.unique(states.session)), "session")
-    most = int(states.repeats.max())
-    force = np.linalg.norm(states.wrench[:, :3], axis=1).max()
-    # Numbers of loads are labels; 0 is none.
-    loaded = np.unique(states.load[states.load != 0]).size
-    loads = (
-        f"{format_count(loaded, 'load')} of up to {force:,.0f} N"
-        if loaded
-        else "no load"
-    )
+    max_repeats = int(states.repeats.max())
+    max_force = np.linalg.norm(states.wrench[:, :3], axis=1).max()
+    # Numbers of loads are labels; 0 means unloaded.
+    load_count = np.unique(states.load[states.load != 0]).size
+    loads = "no load"
+    if load_count:
+        loads = f"{format_count(load_count, 'load')} of up to {max_force:,.0f} N"
+    joints = format_count(campaign.robot.joints, "joint")
+    targets = ", ".join(target.name for target in campaign.targets)
+    fitted_poses = format_count(_count_poses(training), "pose")
+    validation_poses = format_count(_count_poses(held_out), "validation pose")
+    measurements = format_count(len(training), "measurement")
     return [
-        (
-            "read",
-            f"{campaign.name}: {campaign.robot.name}, {format_count(campaign.robot.joints, 'joint')}",
-        ),
-        (
-            "",
-            f"{campaign.measured} of {', '.join(target.name for target in campaign.targets)} in the {campaign.frame} frame",
-        ),
-        (
-            "",
-            f"{format_count(_poses(training), 'pose')} to fit and {format_count(_poses(held_out), 'validation pose')} in {sessions}",
-        ),
-        (
-            "",
-            f"{format_count(len(training), 'measurement')}, up to {most} of a state, {loads}",
-        ),
+        ("read", f"{campaign.name}: {campaign.robot.name}, {joints}"),
+        ("", f"{campaign.measured} of {targets} in the {campaign.frame} frame"),
+        ("", f"{fitted_poses} to fit and {validation_poses} in {sessions}"),
+        ("", f"{measurements}, up to {max_repeats} of a state, {loads}"),
     ]
 
 
-def _identified(declared: Fit) -> list[tuple[str, str]]:
-    """How well the declared model fits, and which of its parameters these poses
-    determine."""
-    rms = 1e3 * np.sqrt((declared.residual[:, :3] ** 2).sum(axis=1).mean())
-    named = [f"{owner} {parameter.name}" for owner, parameter in declared.parameters]
-    held = [
-        name for name, held in zip(named, declared.unidentifiable, strict=True) if held
+def _describe_declared_model(declared: Fit) -> list[tuple[str, str]]:
+    """Return rows on the fit of the declared model, and on the parameters that these
+    poses determine."""
+    rms_mm = 1e3 * np.sqrt((declared.residual[:, :3] ** 2).sum(axis=1).mean())
+    unidentifiable = [
+        f"{owner} {parameter.name}"
+        for (owner, parameter), is_held in zip(
+            declared.parameters, declared.unidentifiable, strict=True
+        )
+        if is_held
     ]
-    left = f"; not identifiable: {list_first(held, _NAMED)}" if held else ""
     count = format_count(int((~declared.unidentifiable).sum()), "parameter")
+    identified = f"{count}, effectively {count_effective_parameters(declared):.0f}"
+    if unidentifiable:
+        names = list_first(unidentifiable, _MAX_NAMED)
+        identified += f"; not identifiable: {names}"
     return [
-        ("declared model", f"residual of {rms:.3f} mm RMS on the fitted poses"),
-        (
-            "identified",
-            f"{count}, effectively {count_effective_parameters(declared):.0f}{left}",
-        ),
+        ("declared model", f"residual of {rms_mm:.3f} mm RMS on the fitted poses"),
+        ("identified", identified),
     ]
 
 
 def _with_base(declared: Fit, case: Case) -> Fit:
-    """The declared model with a base that may stand elsewhere than declared, where one
-    is."""
+    """Return the declared model with a fitted placement of the base, if the campaign
+    declares one."""
     base = case.candidates.get("base_placement")
     if base is None or case.campaign.frame != "base":
         return declared
@@ -204,62 +223,79 @@ def _with_base(declared: Fit, case: Case) -> Fit:
     )
 
 
-def _poses(part: Measurements) -> int:
-    return len(list_poses(part)[0])
+def _count_poses(measurements: Measurements) -> int:
+    return len(list_poses(measurements)[0])
 
 
-def _negative_springs(declared: Fit) -> list[str]:
-    """Joints whose compliance is negative by more than chance: what the declared model
-    lacks hides behind them."""
+def _find_negative_compliances(declared: Fit) -> list[str]:
+    """Return joints whose compliance is negative by more than chance; they absorb what
+    the declared model lacks."""
     if not declared.model.identifies_compliance:
         return []
-    mine = declared.parameter_indices("joint_compliance")
-    errors = np.where(
-        declared.unidentifiable[mine],
+    indices = declared.parameter_indices("joint_compliance")
+    std_error = np.where(
+        declared.unidentifiable[indices],
         np.inf,
-        np.sqrt(np.diag(declared.covariance))[mine],
+        np.sqrt(np.diag(declared.covariance))[indices],
     )
-    below = get_joint_compliances(declared.model, declared.estimate) < -_CLEAR * errors
-    return [str(joint + 1) for joint in np.flatnonzero(below)]
+    compliance = get_joint_compliances(declared.model, declared.estimate)
+    negative = compliance < -_NEGATIVE_STD_ERRORS * std_error
+    return [str(joint + 1) for joint in np.flatnonzero(negative)]
 
 
-def _suspicious(
+def _list_shortcomings(
     case: Case, declared: Fit, training: Measurements, held_out: Measurements
 ) -> list[str]:
-    """What little or one-sided measurements cannot show."""
-    found = []
+    """Return what too few or one-sided measurements cannot show."""
+    shortcomings = _warn_of_few_poses(declared, _count_poses(training))
     states = case.observations.states
+    if states.repeats.max() == 1:
+        shortcomings.append(
+            "no pose is repeated: the noise is what the campaign declares, "
+            "or what the model leaves"
+        )
+    validation_poses = _count_poses(held_out)
+    if validation_poses < FEWEST_HELD_OUT:
+        shortcomings.append(
+            f"{validation_poses} held-out poses say little of the error: "
+            f"{FEWEST_HELD_OUT} or more would"
+        )
+    forces = states.wrench[states.wrench.any(axis=1), :3]
+    if len(forces) and _are_collinear(forces):
+        shortcomings.append(
+            "all loads pull along one line: compliances across it are not shown"
+        )
+    if not len(forces) and case.campaign.compliance == "identify":
+        shortcomings.append(
+            "no measurement is under a load: compliances are not identifiable"
+        )
+    if len(np.unique(states.load)) == 2:
+        shortcomings.append(
+            "one load beside none: what is not linear in the load cannot be distinguished"
+        )
+    return shortcomings
+
+
+def _warn_of_few_poses(declared: Fit, poses: int) -> list[str]:
+    """Return a warning if poses are too few for the parameters of the declared model."""
     numbers = declared.residual.size
     effective = count_effective_parameters(declared)
     parameters = int((~declared.unidentifiable).sum())
-    poses = _poses(training)
-    least = int(np.ceil(poses * Settings().numbers_a_parameter * effective / numbers))
-    if least > poses:
-        found.append(
-            f"{poses} poses are few for {parameters} parameters, of which they determine about {effective:.0f}, by"
-            f" {numbers} numbers: other poses will be off by more than these. Measure about {least} poses to fit, or"
-            " orientations too, or declare fewer errors"
-        )
-    if states.repeats.max() == 1:
-        found.append(
-            "no pose is repeated: the noise is what the campaign declares, or what the model leaves"
-        )
-    if (judged := _poses(held_out)) < FEWEST_HELD_OUT:
-        found.append(
-            f"{judged} held-out poses say little of the error: {FEWEST_HELD_OUT} or more would"
-        )
-    forces = states.wrench[states.wrench.any(axis=1), :3]
-    if len(forces):
-        # A single force has a single singular value.
-        largest, second = [*np.linalg.svd(forces, compute_uv=False), 0.0][:2]
-        if second < _ONE_DIRECTION * largest:
-            found.append(
-                "all loads pull along one line: compliances across it are not shown"
-            )
-    elif case.campaign.compliance == "identify":
-        found.append("no measurement is under a load: compliances are not identifiable")
-    if len(np.unique(states.load)) == 2:
-        found.append(
-            "one load beside none: what is not linear in the load cannot be distinguished"
-        )
-    return found
+    needed = poses * Settings().numbers_a_parameter * effective / numbers
+    needed_poses = int(np.ceil(needed))
+    if needed_poses <= poses:
+        return []
+    return [
+        f"{poses} poses are few for {parameters} parameters, of which they determine "
+        f"about {effective:.0f}, by {numbers} numbers: other poses will be off by more "
+        f"than these. Measure about {needed_poses} poses to fit, or orientations too, "
+        "or declare fewer errors"
+    ]
+
+
+def _are_collinear(forces: np.ndarray) -> bool:
+    """Whether forces (N, 3) pull along one line."""
+    singular_values = np.linalg.svd(forces, compute_uv=False)
+    # A single force has a single singular value.
+    largest, second = [*singular_values, 0.0][:2]
+    return bool(second < _COLLINEAR_SHARE * largest)

@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 
 from elastocal.io.data_frames import read_frame, write_csv
-from elastocal.io.json_files import read_json
 from elastocal.loop.schemas import residuals
 from elastocal.random_streams import open_stream
 from elastocal.validation.held_out import (
@@ -17,6 +16,7 @@ from elastocal.validation.held_out import (
     compute_error_intervals,
     summarize_errors,
 )
+from elastocal.verdict import Verdict, read_verdict
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -29,13 +29,13 @@ def summarize_campaigns(job: Any) -> None:
     """The step of a rule: all campaigns of one kind as one table."""
     settings = job.params
     verdicts = {
-        name: read_json(path)
+        name: read_verdict(path)
         for name, path in zip(settings.campaigns, job.input.verdicts, strict=True)
     }
     held_out = {
-        name: read_frame(
-            path, residuals(len(verdicts[name]["noise"]["joint_rad"]))
-        ).query("held_out and not gross_error")
+        name: read_frame(path, residuals(len(verdicts[name].noise.joint_rad))).query(
+            "held_out and not gross_error"
+        )
         for name, path in zip(settings.campaigns, job.input.residuals, strict=True)
     }
     write_csv(
@@ -45,7 +45,7 @@ def summarize_campaigns(job: Any) -> None:
 
 
 def campaign_rows(
-    verdicts: Mapping[str, Mapping[str, Any]],
+    verdicts: Mapping[str, Verdict],
     residuals: Mapping[str, pd.DataFrame],
     folds: dict[str, list[str]],
     seed: int,
@@ -63,7 +63,7 @@ def campaign_rows(
     for name, members in groups.items():
         held_out = pd.concat([residuals[member] for member in members])
         stated = pd.Series(
-            [verdicts[member]["verdict"] for member in members]
+            [verdicts[member].verdict for member in members]
         ).value_counts()
         named = pd.Series(
             [_effects(verdicts[member]) for member in members]
@@ -83,10 +83,9 @@ def campaign_rows(
     return pd.DataFrame(rows)
 
 
-def _effects(verdict: Mapping[str, Any]) -> str:
+def _effects(verdict: Verdict) -> str:
     at = [
-        (effect["name"], ", ".join(map(str, effect["joints"])))
-        for effect in verdict["effects"]
+        (effect.name, ", ".join(map(str, effect.joints))) for effect in verdict.effects
     ]
     return (
         " + ".join(

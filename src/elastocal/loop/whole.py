@@ -3,7 +3,7 @@ notebooks use. The pipeline makes the same two calls, with tables between them."
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from elastocal.application.accuracy import (
@@ -20,13 +20,12 @@ from elastocal.application.scope import (
 )
 from elastocal.campaigns.campaign import tabulate_measurements
 from elastocal.campaigns.campaign_folder import read_campaign_folder
-from elastocal.data_checks.protocol import data_at_fault
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import generate_residual_blocks, judge
 from elastocal.diagnosis.misplaced import find_misplaced_frames
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.model import Case, build_case
-from elastocal.io.json_files import read_json, write_json
+from elastocal.io.json_files import read_json
 from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import write_table
 from elastocal.loop import diagnosis_tables as tables
@@ -34,6 +33,7 @@ from elastocal.loop.loading import load_campaign
 from elastocal.loop.schemas import residuals
 from elastocal.validation.held_out import compute_position_residuals
 from elastocal.validation.transfer import transfer_fit
+from elastocal.verdict import PredictedErrors, write_verdict
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -55,7 +55,7 @@ def judge_campaign(job: Any) -> None:
     held_out = tables.load_case(job.input.descriptions, job.input.held_out, "held_out")
     found = tables.diagnosis_from(case, read_json(job.input.diagnosis))
     verdict = judged(found, held_out, job.params.seed)
-    write_json(job.output.verdict, verdict.document, allow_nan=False)
+    write_verdict(job.output.verdict, verdict.verdict)
     write_csv(job.output.before_after, pd.DataFrame(verdict.rows))
     schema = residuals(case.campaign.robot.joints)
     write_table(
@@ -102,13 +102,22 @@ def calibrated_by(
     diagnosis: Diagnosis,
     held_out: Case,
     delivered: Corrected | None,
+    *,
     physics_only: bool = False,
 ) -> CalibratedRobot:
-    """The robot that a diagnosis found, with all that is known of its errors: held-out
-    rows without gross ones judge it.
+    """Return the robot of a diagnosis, with errors as large as validation poses show.
 
-    `delivered`: of `judge.apply_regression`. `physics_only`: corrected without its
-    regression; where there is one, what the final model leaves is known to be no noise.
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Result of the training poses.
+    held_out : Case
+        Validation poses without gross errors.
+    delivered : Corrected or None
+        Result of `judge.apply_regression`.
+    physics_only : bool
+        Whether to leave out the regression. The residual of the final model is then
+        still known not to be noise.
     """
     case = diagnosis.case
     final = diagnosis.final
@@ -116,23 +125,23 @@ def calibrated_by(
         *transfer_fit(final, case, held_out), held_out.observations
     )
     noise_m = final.noise.position_m
-    more = None
+    regression = None
     if delivered is not None and delivered.predictor is not None:
-        noise_m = diagnosis.document["noise"]["position_m"]
+        noise_m = diagnosis.verdict.noise.position_m
         if not physics_only:
             residual = delivered.residual
-            more = build_residual_model(
+            regression = build_residual_model(
                 case,
                 final.estimate,
                 delivered.predictor,
                 delivered.chosen["spread"]["typical"],
                 noise_m,
             )
-    found = calibrate_on_case(
-        case, final.model, final.estimate, final.covariance, final.noise, more
+    robot = calibrate_on_case(
+        case, final.model, final.estimate, final.covariance, final.noise, regression
     )
-    found = set_form_error(found, diagnosis.document["other_models_m"] or 0.0)
-    return inflate_to_held_out_errors(found, held_out, residual, noise_m)
+    robot = set_form_error(robot, diagnosis.verdict.other_models_m or 0.0)
+    return inflate_to_held_out_errors(robot, held_out, residual, noise_m)
 
 
 def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
@@ -147,46 +156,42 @@ def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
     a robot that is corrected without the regression on the remainder; None where there
     is none.
     """
-    verdict = judge(diagnosis, held_out, seed)
-    costs = dict[str, float]()
-    stated: dict[str, Any] = {
-        "accuracy": None,
-        "uncorrected_m": None,
-        "physics": None,
-        "misplaced": [],
-    }
-    if not data_at_fault(verdict.document):
-        found = calibrated_by(diagnosis, verdict.held_out, verdict.delivered)
-        stated |= _accuracy(found) | {
-            "misplaced": [
-                asdict(frame)
-                for frame in find_misplaced_frames(
-                    diagnosis.final, diagnosis.case.campaign
-                )
-            ]
-        }
-        if found.residual_model is not None:
-            stated["physics"] = _accuracy(
-                calibrated_by(
-                    diagnosis, verdict.held_out, verdict.delivered, physics_only=True
-                )
-            )
-        costs = compute_effect_contributions(
-            replace(found, residual_model=None), *select_campaign_commands(found)
+    judgement = judge(diagnosis, held_out, seed)
+    verdict = judgement.verdict
+    if verdict.faults:
+        return judgement
+    robot = calibrated_by(diagnosis, judgement.held_out, judgement.delivered)
+    physics = None
+    if robot.residual_model is not None:
+        physics_robot = calibrated_by(
+            diagnosis, judgement.held_out, judgement.delivered, physics_only=True
         )
-    effects = [
-        effect | {"cost_m": costs.get(effect["name"])}
-        for effect in verdict.document["effects"]
-    ]
-    return replace(verdict, document=verdict.document | stated | {"effects": effects})
-
-
-def _accuracy(found: CalibratedRobot) -> dict[str, Any]:
-    """Predicted accuracy of a corrected robot, and in the same frame the RMS error of
-    the uncorrected one at the same poses."""
-    return {
-        "accuracy": asdict(predict_campaign_accuracy(found)),
-        "uncorrected_m": compute_uncorrected_rms_m(
-            found, *select_campaign_commands(found)
+        physics = _predict_errors(physics_robot)
+    contributions = compute_effect_contributions(
+        replace(robot, residual_model=None), *select_campaign_commands(robot)
+    )
+    predicted = _predict_errors(robot)
+    misplaced = find_misplaced_frames(diagnosis.final, diagnosis.case.campaign)
+    return replace(
+        judgement,
+        verdict=replace(
+            verdict,
+            effects=tuple(
+                replace(effect, cost_m=contributions.get(effect.name))
+                for effect in verdict.missing_effects
+            ),
+            accuracy=predicted.accuracy,
+            uncorrected_m=predicted.uncorrected_m,
+            physics=physics,
+            misplaced=tuple(misplaced),
         ),
-    }
+    )
+
+
+def _predict_errors(robot: CalibratedRobot) -> PredictedErrors:
+    """Predict the accuracy of a corrected robot, and in the same frame the RMS error of
+    the uncorrected one at the same poses."""
+    return PredictedErrors(
+        predict_campaign_accuracy(robot),
+        compute_uncorrected_rms_m(robot, *select_campaign_commands(robot)),
+    )

@@ -18,7 +18,6 @@ measurements share; no noise need be known.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 from itertools import combinations
 from typing import TYPE_CHECKING
@@ -34,6 +33,7 @@ from elastocal.remainder.corrected import (
     geometric_inputs_of,
 )
 from elastocal.remainder.regressions import by_harmonics, of_two
+from elastocal.verdict import RepeatableResidual
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -59,24 +59,9 @@ _PENALTIES = (0.1, 1.0, 10.0)
 _LENGTH = 2.0
 
 
-@dataclass(frozen=True)
-class Repeatable:
-    """What left-out configurations say of a model's remainder.
-
-    `p_value`: that chance alone has them predicted so well, by the best of a few
-    regressions. `remains`: whether that is at most `LEVEL`. `rms_m`, `rms_std_error_m`:
-    of each position what is predictable, m.
-    """
-
-    p_value: float
-    remains: bool
-    rms_m: float
-    rms_std_error_m: float
-
-
 def repeatable_part(
     fitted: Fit, observations: Observations, seed: int
-) -> Repeatable | None:
+) -> RepeatableResidual | None:
     """Test whether a fitted model leaves something that is a function of the joints.
 
     `observations`: which it was fitted to. `seed`: of signs, folds and functions. None
@@ -173,7 +158,9 @@ def repeatable_part(
     )
     p_value = float((best >= best[0]).mean())
     gain = gain_of(of_residual, of_itself, len(some), _FOLDS)
-    return Repeatable(p_value, p_value <= LEVEL, gain["rms_m"], gain["rms_std_error_m"])
+    return RepeatableResidual(
+        p_value, bool(p_value <= LEVEL), gain["rms_m"], gain["rms_std_error_m"]
+    )
 
 
 def _kinds(

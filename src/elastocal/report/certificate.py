@@ -5,12 +5,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elastocal.application.accuracy import Accuracy
 from elastocal.application.statements import format_accuracy
 from elastocal.counting import format_count
 from elastocal.report import words as say
-from elastocal.report.loop_facts import title_of
+from elastocal.report.loop_facts import format_title
 from elastocal.report.typesetting import render_sentences
+from elastocal.verdict import Accuracy, JointRange, RepeatableResidual
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -38,9 +38,15 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
     `document`: of `calibrated_files.certificate`. Returns JSON-serialisable; strings
     ready to print, lists for tables.
     """
+    repeatable = document.get("repeatable")
     spoken = {
+        "joint_ranges": [JointRange(**ends) for ends in document["joint_ranges"]],
         "accuracy_sentence": format_accuracy(Accuracy(**document["accuracy"])),
-        "title": title_of(document),
+        "title": format_title(
+            document["verdict"],
+            document["effects"],
+            RepeatableResidual(**repeatable) if repeatable else None,
+        ),
     }
     stated = render_sentences(
         "certificate.txt", say.FILTERS, document=document, **spoken

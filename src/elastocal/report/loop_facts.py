@@ -4,23 +4,33 @@ sentences of `campaign.txt`."""
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal import __version__
 from elastocal.application.statements import tabulate_errors
-from elastocal.counting import format_count, format_integer, pluralize
-from elastocal.data_checks.protocol import OF_DATA, data_at_fault
+from elastocal.counting import format_integer, pluralize
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.effects.catalogue import list_effects
 from elastocal.effects.protocol import effect_of
 from elastocal.report import words as say
+from elastocal.report.measured import measured_rows
 from elastocal.report.typesetting import render_sentences
+from elastocal.verdict import DataFault, Effect, EffectParameter
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
     from typing import Any
+
+    from elastocal.verdict import (
+        Compliances,
+        FaultValue,
+        HeldOut,
+        RepeatableResidual,
+        Verdict,
+    )
 
 TITLES = {
     "adequate": "the declared model is adequate",
@@ -31,9 +41,9 @@ TITLES = {
     "not_testable": "these measurements can test no mechanism",
 }
 AT_FAULT = "the data are at fault"
-# Where what is left is a function of the joints.
+# Appended to a title if a part of the residual is a function of the joints.
 AND_MORE = "; more is missing that has no name"
-# Sections of the template that are lists; the others are one paragraph.
+# Sections of the template that are lists of sentences; the others are one paragraph.
 _LISTS = (
     "sentences",
     "now",
@@ -44,342 +54,436 @@ _LISTS = (
     "settings",
     "method",
 )
-# Causes and locations below this are not shown; from `_SURE` on a location is stated
-# without its alternatives, a cause is real.
-_LEAST_SHOWN = 0.01
-_SURE = 0.95
-# Causes of which page 1 has a bar, if they are not part of the verdict.
-_MOST_CAUSES = 6
+# Causes and locations below this probability are not shown.
+_MIN_SHOWN_PROBABILITY = 0.01
+# From this probability on, a location is stated without its alternatives, and a cause
+# counts as real.
+_CERTAIN = 0.95
+# Upper bound on the causes on page 1 that are not part of the verdict.
+_MAX_OTHER_CAUSES = 6
 # A cause is negligible below this share of the corrected robot's error: squares add up,
 # so that leaving it uncorrected raises the error by 5 % at most. Ellison, S. L. R. and
 # Williams, A. (eds.), EURACHEM/CITAC Guide CG 4, 2012, section 7.2.2: components below
 # a third of the largest need no closer look.
 NEGLIGIBLE = 1 / 3
-# The last digit of a cost.
-_FINEST_M = 1e-6
-# More than these would fill pages that nobody reads; the tables have them all.
-_MOST_NAMES = 8
-_MOST_PARAMETERS = 16
+# A cost is printed to a micrometre.
+_COST_RESOLUTION_M = 1e-6
+# Limits of the tables, so that they do not fill pages; the files have everything.
+_MAX_NAMES = 8
+_MAX_PARAMETERS = 16
 _SHOWN_PARAMETERS = 10
 METRICS = ("mean", "rms", "p95", "max")
-# Where a standard error is above this share of the prior's, the measurements say hardly
-# more than the prior.
+# Above this ratio of the standard error to that of the prior, the measurements say
+# hardly more about a parameter than its prior does.
 MOSTLY_PRIOR = 0.7
-# Letters of a list of places beyond which only the first few are shown.
-_LONGEST = 100
-_SHOWN = 4
+# A list of locations that is longer than this is cut to its first entries.
+_MAX_LOCATION_LETTERS = 100
+_SHOWN_LOCATIONS = 4
 
 
-def title_of(verdict: Mapping[str, Any]) -> str:
-    """Verdict in one line, with what remains without a name."""
-    remains = verdict["effects"] and (verdict.get("repeatable") or {}).get("remains")
-    return TITLES[verdict["verdict"]] + AND_MORE * bool(remains)
+def format_title(
+    verdict: str, effects: Sequence[object], repeatable: RepeatableResidual | None
+) -> str:
+    """Return a verdict in one line, with what remains without a name.
+
+    Parameters
+    ----------
+    verdict : str
+        One of the six verdicts.
+    effects : sequence
+        Missing effects.
+    repeatable : RepeatableResidual or None
+        Part of the residual that is a function of the joints.
+    """
+    remains = repeatable is not None and repeatable.remains
+    return TITLES[verdict] + (AND_MORE if effects and remains else "")
 
 
 def campaign_sentences(
-    verdict: Mapping[str, Any],
+    verdict: Verdict,
     steps: Sequence[Mapping[str, Any]] = (),
     experiment: Sequence[Mapping[str, Any]] = (),
     descriptions: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """What `campaign.txt` says of a campaign, by headings.
+    """Return what `campaign.txt` says of a campaign, by headings.
 
-    `verdict`: contents of verdict.json. `steps`, `experiment`: rows of before_after.csv
-    and next_experiment.csv. `descriptions`: contents of campaign.json; without them
-    nothing is stated of the method.
+    Parameters
+    ----------
+    verdict : Verdict
+        The verdict.
+    steps, experiment : sequence of mappings
+        Rows of before_after.csv and of next_experiment.csv.
+    descriptions : mapping, optional
+        Contents of campaign.json; without them nothing is stated of the method.
     """
-    faulty = data_at_fault(verdict)
-    facts = {
-        "effects": []
-        if faulty
-        else [
-            effect_facts(effect, verdict["heldout"]) for effect in verdict["effects"]
-        ],
-        "faulty": faulty,
-        "accuracy": verdict.get("accuracy"),
-        "ends": [_with_interval(step) for step in steps if step["kind"] != "frames"],
-        "new_poses": len({(row["effect"], row["pose"]) for row in experiment}),
-        "version": __version__,
-    }
+    effects = [
+        effect_facts(effect, verdict.heldout) for effect in verdict.missing_effects
+    ]
     return render_sentences(
         "campaign.txt",
         say.FILTERS,
-        verdict={"next_experiment": None, "repeatable": None, **verdict},
+        verdict=verdict,
         descriptions=descriptions,
-        **facts,
+        effects=effects,
+        faulty=bool(verdict.faults),
+        accuracy=verdict.accuracy,
+        ends=[_format_interval(step) for step in steps if step["kind"] != "frames"],
+        new_poses=len({(row["effect"], row["pose"]) for row in experiment}),
+        version=__version__,
     )
 
 
 def loop_facts(
-    verdict: Mapping[str, Any],
+    verdict: Verdict,
     steps: Sequence[Mapping[str, Any]],
     experiment: Sequence[Mapping[str, Any]],
     table: Mapping[str, np.ndarray],
     descriptions: Mapping[str, Any],
     parameters: Mapping[str, np.ndarray],
 ) -> dict[str, Any]:
-    """Facts for the report of a campaign.
+    """Return the facts of the report of a campaign.
 
-    `verdict`: contents of verdict.json. `steps`, `experiment`: rows of before_after.csv
-    and next_experiment.csv. `table`, `parameters` (N,): columns of the residuals and of
-    the parameters of the final model. `descriptions`: contents of campaign.json.
-    Returns JSON-serialisable; strings ready to print, lists for tables.
+    Parameters
+    ----------
+    verdict : Verdict
+        The verdict.
+    steps, experiment : sequence of mappings
+        Rows of before_after.csv and of next_experiment.csv.
+    table, parameters : mapping of (N,) arrays
+        Columns of the residuals, and of the parameters of the final model.
+    descriptions : mapping
+        Contents of campaign.json.
+
+    Returns
+    -------
+    dict
+        JSON-serialisable: strings ready to print, and lists for tables.
     """
-    faulty = data_at_fault(verdict)
-    heldout = verdict["heldout"]
+    heldout = verdict.heldout
+    faulty = bool(verdict.faults)
     stated = campaign_sentences(verdict, steps, experiment, descriptions)
-    # Probabilities are then those from before the measurements.
-    searched = {
-        entry["name"]
-        for effect in verdict["effects"]
-        for entry in effect["parameters"]
-        if entry.get("shape")
+    paragraphs = {
+        name: lines if name in _LISTS else " ".join(lines)
+        for name, lines in stated.items()
     }
-    held = [
-        *(name for name in verdict["held"] if name not in searched),
-        *left_to_priors(parameters),
-    ]
+    effects = [effect_facts(effect, heldout) for effect in verdict.missing_effects]
+    faults = [fault_facts(fault) for fault in verdict.faults]
+    title = format_title(verdict.verdict, verdict.effects, verdict.repeatable)
     return {
-        **{
-            name: lines if name in _LISTS else " ".join(lines)
-            for name, lines in stated.items()
-        },
+        **paragraphs,
         "method": dict(stated["method"]),
-        "campaign": verdict["campaign"],
+        "campaign": verdict.campaign,
         "robot": descriptions["robot"]["name"],
-        "verdict": AT_FAULT if faulty else title_of(verdict),
+        "verdict": AT_FAULT if faulty else title,
         "faulty": faulty,
         "headline": dict(stated["headline"]) or None,
-        "causes": [] if verdict["verdict"] == "not_testable" else cause_rows(verdict),
+        "causes": [] if verdict.verdict == "not_testable" else cause_rows(verdict),
         "errors": tabulate_errors(verdict),
         "measured": measured_rows(table, descriptions),
-        "floor": say.length(heldout["noise_floor_rms_m"]),
-        "steps": step_rows(steps, heldout["noise_floor_rms_m"]),
-        "effects": [effect_facts(effect, heldout) for effect in verdict["effects"]],
+        "floor": say.length(heldout.noise_floor_rms_m),
+        "steps": step_rows(steps, heldout.noise_floor_rms_m),
+        "effects": faults or effects,
         "experiment": experiment_facts(experiment),
-        "compliances": compliance_rows(verdict["compliance_urad_per_Nm"]),
-        "compliances_identified": any(verdict["compliance_urad_per_Nm"]["std_error"]),
-        "held": held_rows(held),
-        "untestable": untestable_rows(verdict["untestable"]),
-        "found": [effect["name"] for effect in verdict["effects"]],
+        "compliances": compliance_rows(verdict.compliance_urad_per_Nm),
+        "compliances_identified": any(verdict.compliance_urad_per_Nm.std_error),
+        "held": held_rows(_list_undetermined(verdict, parameters)),
+        "untestable": untestable_rows(verdict.untestable),
+        "found": [effect.name for effect in verdict.effects],
     }
 
 
-def cost_words(effect: Mapping[str, Any], heldout: Mapping[str, Any]) -> str:
-    """What an effect costs at the campaign's poses and loads: the RMS error if it alone
-    were left out of the correction."""
-    cost = effect["cost_m"]
-    if cost is None:
-        known = list_effects().get(effect["name"])
-        moves = known is None or known.moves_robot
-        return (
-            "in no command"
-            if moves
-            else "an error of the measurement, not of the robot"
-        )
-    if cost > NEGLIGIBLE * heldout["after"]["rms_m"]:
-        return f"{say.millimetres(cost)} mm"
-    # No finer than a micrometre, and what was found is not nothing.
-    stated = (
-        say.millimetres(cost)
-        if cost >= _FINEST_M / 2
-        else f"below {say.millimetres(_FINEST_M)}"
-    )
-    return (
-        f"{stated} mm: {'real, ' if effect['probability'] >= _SURE else ''}negligible"
-    )
+def _list_undetermined(
+    verdict: Verdict, parameters: Mapping[str, np.ndarray]
+) -> list[str]:
+    """Return the parameters that the measurements do not determine, without those that
+    the search has chosen."""
+    chosen_by_search = {
+        parameter.name
+        for effect in verdict.missing_effects
+        for parameter in effect.parameters
+        if parameter.shape
+    }
+    held = [name for name in verdict.held if name not in chosen_by_search]
+    return held + left_to_priors(parameters)
 
 
-def cause_rows(verdict: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """What may be missing, the most probable first: in words, with its probability and,
-    of what was found, cost and gain.
+def cost_words(effect: Effect, heldout: HeldOut) -> str:
+    """Return the contribution of an effect in words.
 
-    Mechanisms may act together, so that probabilities need not add up to one. The gain
-    is that of the validation poses.
+    Its cost is the RMS error at the campaign's poses and loads if the effect alone were
+    left out of the correction.
+
+    Parameters
+    ----------
+    effect : Effect
+        An effect that was found.
+    heldout : HeldOut
+        Errors of the validation poses.
     """
-    stated = verdict["probabilities"]
-    found = {effect["name"]: effect for effect in verdict["effects"]}
-    if stated is None:
+    cost_m = effect.cost_m
+    if cost_m is None:
+        definition = list_effects().get(effect.name)
+        if definition is None or definition.moves_robot:
+            return "in no command"
+        return "an error of the measurement, not of the robot"
+    if cost_m > NEGLIGIBLE * heldout.after.rms_m:
+        return f"{say.millimetres(cost_m)} mm"
+    size = say.millimetres(cost_m)
+    if cost_m < _COST_RESOLUTION_M / 2:
+        # An effect that was found must not be printed as zero.
+        size = f"below {say.millimetres(_COST_RESOLUTION_M)}"
+    certainty = "real, " if effect.probability >= _CERTAIN else ""
+    return f"{size} mm: {certainty}negligible"
+
+
+@dataclass(frozen=True)
+class _Cause:
+    """A possible cause in words, with its probability; cost and gain if it was found."""
+
+    name: str
+    probability: float
+    cost: str = ""
+    gain: float | None = None
+
+
+def cause_rows(verdict: Verdict) -> list[dict[str, Any]]:
+    """Return what may be missing, the most probable cause first.
+
+    Each row has the cause in words, its probability and, if it was found, its cost and
+    its gain at the validation poses. Mechanisms may act together, so probabilities need
+    not add up to one.
+    """
+    if verdict.probabilities is None:
         return []
-    rows: list[tuple[str, float, str, float | None]] = []
-    for name, each in found.items():
-        cost = cost_words(each, verdict["heldout"])
-        rows.append(
-            (
-                say.found_words(name, each["members"]),
-                each["probability"],
-                cost,
-                each["heldout_gain"],
-            )
+    causes = [
+        _Cause(
+            say.found_words(effect.name, effect.members),
+            effect.probability,
+            cost_words(effect, verdict.heldout),
+            effect.heldout_gain,
         )
-    # Beside a mechanism that was found, what is unknown is a related one.
-    unknown = say.RELATED if found else say.UNKNOWN
-    mechanisms = stated["mechanisms"].items()
-    others = [
-        (unknown if name == OTHER else say.physical_name(name), p)
-        for name, p in mechanisms
-        if name not in found
+        for effect in verdict.missing_effects
     ]
-    shown = [
-        each
-        for each in [*others, (say.NOTHING, stated["nothing"])]
-        if each[1] >= _LEAST_SHOWN
-    ]
-    rows += [
-        (*each, "", None)
-        for each in sorted(shown, key=lambda each: -each[1])[:_MOST_CAUSES]
-    ]
+    causes += _list_other_causes(verdict)
     return [
         {
-            "name": say.capital(name),
-            "probability": probability,
-            "words": say.probability_words(probability),
-            "cost": cost,
-            "gain": "" if gain is None else say.minus(f"{-100 * gain:+.0f} %"),
+            "name": say.capital(cause.name),
+            "probability": cause.probability,
+            "words": say.probability_words(cause.probability),
+            "cost": cause.cost,
+            "gain": ""
+            if cause.gain is None
+            else say.minus(f"{-100 * cause.gain:+.0f} %"),
         }
-        for name, probability, cost, gain in sorted(rows, key=lambda row: -row[1])
+        for cause in sorted(causes, key=lambda cause: -cause.probability)
     ]
 
 
-def effect_facts(
-    effect: Mapping[str, Any], heldout: Mapping[str, Any]
-) -> dict[str, Any]:
-    """Facts of one effect or fault of the data; `heldout`: of verdict.json."""
-    known = [
-        entry
-        for entry in effect["parameters"]
-        if entry.get("identifiable", not entry.get("held"))
+def _list_other_causes(verdict: Verdict) -> list[_Cause]:
+    """Return probable causes that are not part of the verdict, the most probable
+    first."""
+    assert verdict.probabilities is not None
+    found = {effect.name for effect in verdict.missing_effects}
+    # Together with a mechanism that was found, the competitor is a related mechanism.
+    competitor = say.RELATED if found else say.UNKNOWN
+    causes = []
+    for name, probability in verdict.probabilities.mechanisms.items():
+        if name not in found:
+            words = competitor if name == OTHER else say.physical_name(name)
+            causes.append(_Cause(words, probability))
+    causes.append(_Cause(say.NOTHING, verdict.probabilities.nothing))
+    shown = [cause for cause in causes if cause.probability >= _MIN_SHOWN_PROBABILITY]
+    shown.sort(key=lambda cause: -cause.probability)
+    return shown[:_MAX_OTHER_CAUSES]
+
+
+def effect_facts(effect: Effect, heldout: HeldOut) -> dict[str, Any]:
+    """Return the facts of an effect.
+
+    Parameters
+    ----------
+    effect : Effect
+        An effect that was found.
+    heldout : HeldOut
+        Errors of the validation poses.
+    """
+    identifiable = [entry for entry in effect.parameters if entry.identifiable]
+    shown = _select_parameters(identifiable)
+    rows = [_effect_parameter_row(entry, effect.members) for entry in shown]
+    locations = [
+        (
+            say.location_words(effect.name, entry.location),
+            say.probability_words(entry.probability),
+        )
+        for entry in effect.locations
+        if entry.probability >= _MIN_SHOWN_PROBABILITY
     ]
-    ranked = sorted(
-        known,
-        key=lambda entry: (
-            -abs(entry["value"]) / entry["std_error"] if entry["std_error"] else 0.0
-        ),
-    )
-    shown = ranked[:_SHOWN_PARAMETERS] if len(known) > _MOST_PARAMETERS else known
-    name = effect["name"]
-    members = effect["members"]
-    of_data = effect["family"] == OF_DATA
-    rows = [_parameter_row(entry, members) for entry in shown]
-    joints = effect["joints"] if of_data else ()
-    at = [
-        entry for entry in effect["locations"] if entry["probability"] >= _LEAST_SHOWN
-    ]
-    where = [
-        [
-            say.location_words(name, entry["location"]),
-            say.probability_words(entry["probability"]),
-        ]
-        for entry in at
-    ]
-    sure = len(members) > 1 or not at or at[0]["probability"] >= _SURE
-    others = effect["alternatives"]
-    evidence = effect.get("evidence") or ()
-    instead = others if of_data else [*map(say.alternative_words, others)]
+    alternatives = [say.alternative_words(name) for name in effect.alternatives]
     return {
-        "name": say.capital(say.words(name) if of_data else say.physical_name(name))
-        + (
-            f" of {pluralize('joint', len(joints))} {say.listed(map(str, joints))}"
-            if joints
-            else ""
-        ),
-        "found": say.found_words(name, members),
-        "bare": say.physical_name(name),
-        "catalogue": "" if of_data else name,
-        "family": effect["family"],
-        "description": say.as_sentence(effect.get("detail") or description(name)),
-        "locations": where if len(effect["locations"]) > 1 else [],
-        "unsure": []
-        if sure
-        else [f"{place} ({probability})" for place, probability in where],
+        "name": say.capital(say.physical_name(effect.name)),
+        "found": say.found_words(effect.name, effect.members),
+        "bare": say.physical_name(effect.name),
+        "catalogue": effect.name,
+        "family": effect.family,
+        "description": say.as_sentence(description(effect.name)),
+        "locations": locations if len(effect.locations) > 1 else [],
+        "unsure": _list_uncertain_locations(effect, locations),
         "parameters": rows,
-        "with_prior": any(entry.get("prior_std") for entry in shown),
-        "left_out": format_integer(len(known)) if len(known) > len(shown) else "",
+        "with_prior": any(entry.prior_std for entry in shown),
+        "left_out": format_integer(len(identifiable))
+        if len(identifiable) > len(shown)
+        else "",
         "with_angle": any("q)" in row[0] for row in rows),
-        "held": len(effect["parameters"]) - len(known),
-        "probability": ""
-        if effect["probability"] is None
-        else say.probability_words(effect["probability"]),
-        "cost": "" if of_data else cost_words(effect, heldout),
-        "cost_m": effect.get("cost_m"),
-        "gain": effect["heldout_gain"],
-        "adopted": effect["adopted"],
-        "alternatives": say.listed(instead, _MOST_NAMES) if others else "",
-        "instead": say.listed(instead, _MOST_NAMES, last="or") if others else "",
-        "common": say.in_common(name, others),
-        # RMS distance between measured and predicted positions as written and with the
-        # fault corrected.
-        "evidence": [say.length(value) for value in evidence[:2]]
-        if len(evidence) > 1 and None not in evidence
+        "held": len(effect.parameters) - len(identifiable),
+        "probability": say.probability_words(effect.probability),
+        "cost": cost_words(effect, heldout),
+        "cost_m": effect.cost_m,
+        "gain": effect.heldout_gain,
+        "adopted": effect.adopted,
+        "alternatives": say.listed(alternatives, _MAX_NAMES) if alternatives else "",
+        "instead": say.listed(alternatives, _MAX_NAMES, last="or")
+        if alternatives
+        else "",
+        "common": say.in_common(effect.name, effect.alternatives),
+        "evidence": [],
+    }
+
+
+def _list_uncertain_locations(
+    effect: Effect, locations: Sequence[tuple[str, str]]
+) -> list[str]:
+    """Return the locations of an effect with their probabilities, unless one of them is
+    certain or the effect acts at several."""
+    probabilities = [entry.probability for entry in effect.locations]
+    is_certain = not locations or probabilities[0] >= _CERTAIN
+    if is_certain or len(effect.members) > 1:
+        return []
+    return [f"{location} ({probability})" for location, probability in locations]
+
+
+def _select_parameters(parameters: list[EffectParameter]) -> list[EffectParameter]:
+    """Return all parameters, or of very many the most significant ones."""
+    if len(parameters) <= _MAX_PARAMETERS:
+        return parameters
+    ranked = sorted(
+        parameters,
+        key=lambda entry: -abs(entry.value) / entry.std_error if entry.std_error else 0,
+    )
+    return ranked[:_SHOWN_PARAMETERS]
+
+
+def fault_facts(fault: DataFault) -> dict[str, Any]:
+    """Return the facts of a fault of the data, with the keys of `effect_facts`."""
+    where = ""
+    if fault.joints:
+        noun = pluralize("joint", len(fault.joints))
+        where = f" of {noun} {say.listed(map(str, fault.joints))}"
+    # RMS distance between measured and predicted positions, as written and with the
+    # correction.
+    evidence = [value for value in fault.evidence if value is not None]
+    alternatives = fault.alternatives
+    return {
+        "name": say.capital(say.words(fault.name)) + where,
+        "found": say.found_words(fault.name, ()),
+        "bare": say.physical_name(fault.name),
+        "catalogue": "",
+        "family": fault.family,
+        "description": say.as_sentence(fault.detail),
+        "locations": [],
+        "unsure": [],
+        "parameters": [_fault_value_row(entry) for entry in fault.parameters],
+        "with_prior": False,
+        "left_out": "",
+        "with_angle": False,
+        "held": 0,
+        "probability": "",
+        "cost": "",
+        "cost_m": None,
+        "gain": None,
+        "adopted": False,
+        "alternatives": say.listed(alternatives, _MAX_NAMES) if alternatives else "",
+        "instead": say.listed(alternatives, _MAX_NAMES, last="or")
+        if alternatives
+        else "",
+        "common": say.in_common(fault.name, alternatives),
+        "evidence": [say.length(value) for value in evidence]
+        if len(evidence) == len(fault.evidence) == 2
         else [],
     }
 
 
-def _with_interval(step: Mapping[str, Any]) -> str:
-    """RMS error of a step on validation poses with its 95 % interval, in one unit."""
+def _format_interval(step: Mapping[str, Any]) -> str:
+    """Return the RMS error of a step on validation poses with its 95 % interval, in one
+    unit."""
     factor, unit = say.unit_of(step["heldout_rms_m"])
-    value, low, high = (
-        factor * step[f"heldout_rms_m{end}"] for end in ("", "_low", "_high")
-    )
-    interval = (
-        f" [{say.plain(low)}, {say.plain(high)}]"
-        if np.isfinite([low, high]).all()
-        else ""
-    )
-    return f"{say.plain(value)}{interval}\u00a0{unit}"
+    text = say.plain(factor * step["heldout_rms_m"])
+    low = factor * step["heldout_rms_m_low"]
+    high = factor * step["heldout_rms_m_high"]
+    if np.isfinite([low, high]).all():
+        text += f" [{say.plain(low)}, {say.plain(high)}]"
+    return f"{text}\u00a0{unit}"
 
 
 def description(effect: str) -> str:
-    """What an effect of the catalogue is, in the first line of its docstring, without
-    the formula."""
-    known = list_effects().get(effect)
-    summary = known.doc.split("\n")[0] if known and known.doc else say.words(effect)
+    """Return what an effect of the catalogue is: the first line of its docstring,
+    without the formula."""
+    definition = list_effects().get(effect)
+    summary = say.words(effect)
+    if definition and definition.doc:
+        summary = definition.doc.split("\n")[0]
     return re.sub(r", \w+\([^,]*=.*$", "", summary.split(":")[0]).rstrip(".")
 
 
-def _parameter_row(entry: Mapping[str, Any], members: Sequence[str]) -> list[str]:
-    # The longest, since keys may have blanks and one may begin another.
-    member = max(
-        (key for key in members if entry["name"].startswith(f"{key} ")),
-        key=len,
-        default=None,
+def _effect_parameter_row(
+    parameter: EffectParameter, members: Sequence[str]
+) -> list[str]:
+    """Return name, value, unit and source of a parameter of an effect."""
+    # Keys may have blanks, and one may begin another: the longest one is meant.
+    matching = [key for key in members if parameter.name.startswith(f"{key} ")]
+    member = max(matching, key=len, default="")
+    # A quantity of the whole effect, such as its largest sag, belongs to no member.
+    owner = member or effect_of(members[0])
+    name = say.parameter_words(
+        effect_of(owner), parameter.name.removeprefix(f"{owner} ")
     )
-    # What belongs to an effect as a whole, such as its largest sag, is no member's;
-    # faults of the data have none.
-    owner = member or (effect_of(members[0]) if members else "")
-    name = (
-        say.parameter_words(effect_of(owner), entry["name"].removeprefix(f"{owner} "))
-        if owner
-        else say.words(entry["name"])
-    )
-    where = f"{say.place_words([member])}: " if member and len(members) > 1 else ""
-    row = [where + name, *say.scaled(entry["value"], entry["std_error"], entry["unit"])]
-    if entry["unit"] == "–" and float(entry["value"]).is_integer():
-        row[1] = format_integer(int(entry["value"]))
-    return [
-        *row,
-        "measurements"
-        if entry["std_error"]
-        else "the best of those tried"
-        if entry.get("shape")
-        else "",
-    ]
+    if member and len(members) > 1:
+        name = f"{say.place_words([member])}: {name}"
+    source = ""
+    if parameter.std_error:
+        source = "measurements"
+    elif parameter.shape:
+        source = "the best of those tried"
+    return [name, *_format_value(parameter), source]
+
+
+def _fault_value_row(value: FaultValue) -> list[str]:
+    """Return name, value and unit of a number that describes a fault of the data."""
+    return [say.words(value.name), *_format_value(value), ""]
+
+
+def _format_value(entry: EffectParameter | FaultValue) -> tuple[str, str]:
+    """Return a value with its standard error, and its unit."""
+    number, unit = say.scaled(entry.value, entry.std_error, entry.unit)
+    if entry.unit == "–" and float(entry.value).is_integer():
+        number = format_integer(int(entry.value))
+    return number, unit
 
 
 def _cell(row: Mapping[str, Any], name: str, factor: float, unit: str) -> list[str]:
-    """A value and its interval, in lines."""
-    value, low, high = (factor * row[name + end] for end in ("", "_low", "_high"))
-    number, *ends = (
-        f"{each:.3f}"
-        if unit == "mm"
-        else say.minus(f"{each:.0f}")
-        if np.isfinite(each)
-        else ""
-        for each in (value, low, high)
-    )
+    """Return a value and its interval as the lines of a cell."""
+    number = _format_length(factor * row[name], unit)
+    low = factor * row[f"{name}_low"]
+    high = factor * row[f"{name}_high"]
     if np.isnan(low) or np.isnan(high):
         return [number, "–"]
-    return [number, f"[{ends[0]}, {ends[1]}]"]
+    return [number, f"[{_format_length(low, unit)}, {_format_length(high, unit)}]"]
+
+
+def _format_length(length: float, unit: str) -> str:
+    """Return a length of a table: micrometres whole, millimetres with three decimals."""
+    if unit == "mm":
+        return f"{length:.3f}"
+    return say.minus(f"{length:.0f}") if np.isfinite(length) else ""
 
 
 def step_rows(
@@ -454,105 +558,24 @@ def experiment_facts(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     }
 
 
-def measured_rows(
-    table: Mapping[str, np.ndarray], descriptions: Mapping[str, Any]
-) -> list[list[str]]:
-    """Rows of what was measured: name, at fitted poses, at validation poses."""
-    held_out = table["held_out"].astype(bool)
-    campaigns = [
-        descriptions["campaign"],
-        (descriptions["held_out"] or descriptions)["campaign"],
-    ]
-    masks = zip((~held_out, held_out), campaigns, strict=True)
-    parts = [
-        _part({name: values[mask] for name, values in table.items()}, campaign)
-        for mask, campaign in masks
-    ]
-    return [[name, *(part[name] for part in parts)] for name in parts[0]]
-
-
-def _part(
-    part: Mapping[str, np.ndarray], campaign: Mapping[str, Any]
-) -> dict[str, str]:
-    """What was measured in one part of the measurements."""
-    if not len(part["pose"]):
-        return dict.fromkeys(("campaign", "measurements"), "none")
-
-    def distinct(*names: str) -> np.ndarray:
-        """How often each combination of values of some columns occurs."""
-        return np.unique(
-            np.column_stack([part[name] for name in names]), axis=0, return_counts=True
-        )[1]
-
-    each = distinct("session", "pose", "load", "target")
-    oriented = campaign["measured"] == "pose"
-    force = np.linalg.norm([part[name] for name in ("fx", "fy", "fz")], axis=0)
-    loaded = force[force > 0]
-    loads = "none"
-    targets = list(campaign["targets"].items())
-    if len(loaded):
-        same = np.isclose(loaded.min(), loaded.max(), rtol=1e-3)
-        ends = " to ".join(
-            map(say.plain, [loaded.min()] if same else [loaded.min(), loaded.max()])
-        )
-        numbers = format_count(len(np.unique(part["load"][force > 0])), "load")
-        loads = f"{numbers} of {ends} N on {say.percent(len(loaded) / len(force))} of the measurements"
-    used = [
-        ("" if name == target["point"] else f"{name} ")
-        + f"at the measuring point {target['point']}{_mount(target, oriented)}"
-        for name, target in (targets[number] for number in np.unique(part["target"]))
-    ]
-    return {
-        "campaign": campaign["campaign"],
-        "measurements": f"{format_integer(len(force))}, each a {'position and orientation' if oriented else 'position'}",
-        "poses": f"{format_count(len(distinct('session', 'pose')), 'pose')} in {format_count(len(distinct('session')), 'session')}",
-        "states (pose and load)": format_integer(
-            len(distinct("session", "pose", "load"))
-        ),
-        "loads": loads,
-        "targets": say.listed(used, 12),
-        "repeats of a state": str(each.min())
-        if each.min() == each.max()
-        else f"{each.min()} to {each.max()}, median {np.median(each):g}",
-        "coordinate frame": "the tracker's; its placement is fitted"
-        if campaign["frame"] == "tracker"
-        else "the base's",
-        "time": "recorded" if np.isfinite(part["time_s"]).any() else "not recorded",
-    }
-
-
-def _mount(target: Mapping[str, Any], oriented: bool) -> str:
-    """What is fitted of how a target sits, and a known turn of its mount."""
-    rotation = target.get("rotation", target["offset_m"]) if oriented else ""
-    fitted = [
-        word
-        for word, value in (("place", target["offset_m"]), ("rotation", rotation))
-        if value == "unknown"
-    ]
-    known = (
-        "rotation" in target and oriented and rotation != "unknown" and any(rotation)
-    )
-    turned = f", turned by {np.degrees(np.linalg.norm(rotation)):.4g}°" if known else ""
-    return turned + (f", {' and '.join(fitted)} fitted" if fitted else "")
-
-
-def compliance_rows(compliance: Mapping[str, Sequence[float]]) -> list[list[str]]:
-    """Rows of the compliances: joint, before, after with its standard error; no number
-    of one that is not identifiable."""
+def compliance_rows(compliances: Compliances) -> list[list[str]]:
+    """Return joint, compliance before, and after with its standard error; a compliance
+    that is not identifiable has no number."""
     rows = []
-    columns = zip(
-        *(compliance[name] for name in ("before", "after", "std_error")), strict=True
-    )
-    identified = any(compliance["std_error"])
-    for joint, (before, after, error) in enumerate(columns, 1):
-        if identified and not error:
-            rows.append([str(joint), *["not identifiable"] * 2])
+    identified = any(compliances.std_error)
+    for joint, (before, after, error) in enumerate(
+        zip(compliances.before, compliances.after, compliances.std_error, strict=True),
+        1,
+    ):
+        if not error:
+            numbers = ["not identifiable"] * 2
+            if not identified:
+                numbers = [f"{before:.4g}", f"{after:.4g}"]
+            rows.append([str(joint), *numbers])
             continue
-        stated = say.pm(after, error) if error else f"{after:.4g}"
-        decimals = len(stated.rpartition(".")[2]) if "." in stated else 0
-        rows.append(
-            [str(joint), f"{before:.{decimals}f}" if error else f"{before:.4g}", stated]
-        )
+        estimate = say.pm(after, error)
+        decimals = len(estimate.rpartition(".")[2]) if "." in estimate else 0
+        rows.append([str(joint), f"{before:.{decimals}f}", estimate])
     return rows
 
 
@@ -595,7 +618,7 @@ def untestable_rows(untestable: Mapping[str, str]) -> list[list[str]]:
     rows = []
     for (effect, reason), keys in found.items():
         where = say.place_words(keys)
-        if len(where) > _LONGEST:
-            where = f"{say.place_words(keys[:_SHOWN])} and {len(keys) - _SHOWN} more"
+        if len(where) > _MAX_LOCATION_LETTERS:
+            where = f"{say.place_words(keys[:_SHOWN_LOCATIONS])} and {len(keys) - _SHOWN_LOCATIONS} more"
         rows.append([say.capital(say.physical_name(effect)), where or "–", reason])
     return sorted(rows, key=lambda row: (row[2], row[0]))

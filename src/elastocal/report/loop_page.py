@@ -1,5 +1,5 @@
-"""A campaign's page to look into: one HTML file that asks nothing of the network and
-draws on canvases of its own."""
+"""The interactive page of a campaign: one HTML file that needs no network and draws on
+its own canvases."""
 
 from __future__ import annotations
 
@@ -23,77 +23,118 @@ if TYPE_CHECKING:
     from elastocal.io.origin import Origin
     from elastocal.mechanics.robot import Robot
 
-# Measurements that a page shows: more are slow to turn on a phone.
-_MOST_SHOWN = 4000
+# Upper bound on the measurements of a page; more are slow to rotate on a phone.
+_MAX_MEASUREMENTS = 4000
 # Poses in which the robot can be drawn.
-_POSES = 40
-# Arrows of the middle length are this share of the width of what they are drawn in.
-_ARROW = 0.03
+_MAX_POSES = 40
+# Length of the median arrow as a share of the largest extent of the measured positions.
+_ARROW_SHARE = 0.03
+_STAGES = ("before", "after")
 
 
 def loop_page(
     facts: Mapping[str, Any], table: Mapping[str, np.ndarray], robot: Robot
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """What the page of a campaign says, and what it draws.
+    """Return what the page of a campaign states, and what it draws.
 
-    `facts`: from `loop_facts.loop_facts`. `table` (N,): columns of the residuals; joint
-    angles are the model's, as in a campaign, not the controller's. `robot`: as
-    declared. Returns `page`: texts and tables, worded; `data`: JSON-serialisable:
-    positions (m), residuals (µm), what they may be drawn against, corners, joints and
-    axes of the robot (m).
+    Parameters
+    ----------
+    facts : mapping
+        As `loop_facts.loop_facts` returns them.
+    table : mapping of (N,) arrays
+        Columns of the residuals; joint angles are those of the model, not those of the
+        controller.
+    robot : Robot
+        The robot as declared.
+
+    Returns
+    -------
+    page : dict
+        Texts and tables in words.
+    data : dict
+        JSON-serialisable: positions (m), residuals (µm), quantities to plot them
+        against, and corners, joints and axes of the robot (m).
     """
     count = len(table["x"])
-    shown = _spread(count, _MOST_SHOWN)
-    if len(shown) < count:
-        # The worst is among them whatever the others are.
-        shown = np.unique([*_spread(count, _MOST_SHOWN - 1), worst_measurement(table)])
-    some = {name: values[shown] for name, values in table.items()}
-    position = np.column_stack([some[name] for name in "xyz"])
-    off = {
-        step: say.MICRO * np.column_stack([some[f"{step}_d{axis}"] for axis in "xyz"])
-        for step in ("before", "after")
+    shown = _select_measurements(table)
+    selection = {name: values[shown] for name, values in table.items()}
+    position = np.column_stack([selection[name] for name in "xyz"])
+    residuals_um = {
+        stage: say.MICRO
+        * np.column_stack([selection[f"{stage}_d{axis}"] for axis in "xyz"])
+        for stage in _STAGES
     }
-    angles = angles_of(some, robot.joints)
-    # Validation poses of another campaign have numbers of their own.
-    pose = np.column_stack([some["held_out"], some["session"], some["pose"]])
-    first, of_pose = np.unique(pose, axis=0, return_index=True, return_inverse=True)[1:]
-    worst_pose = of_pose.ravel()[worst_measurement(some)]
-    in_order = np.argsort(first)
-    places = np.unique(
-        [*_spread(len(first), _POSES), np.flatnonzero(in_order == worst_pose)[0]]
+    has_changed = not np.allclose(
+        residuals_um["before"], residuals_um["after"], rtol=0, atol=0.01
     )
-    places = in_order[places]
-    drawn = first[places]
-    worst = int(np.flatnonzero(places == worst_pose)[0])
-    middle = np.median(np.linalg.norm(off["before"], axis=1)) / say.MICRO
     data = {
         "position": position.round(6).tolist(),
-        **{step: values.round(2).tolist() for step, values in off.items()},
-        "held_out": some["held_out"].astype(bool).tolist(),
-        "against": _against(some, angles, robot),
-        "outlines": corners(robot.chain, angles[drawn])
-        .swapaxes(0, 1)
-        .round(4)
-        .tolist(),
-        "joints": np.moveaxis(joint_axes(robot.chain, angles[drawn]), 2, 0)
-        .round(4)
-        .tolist(),
-        "worst": worst,
+        **{stage: values.round(2).tolist() for stage, values in residuals_um.items()},
+        "held_out": selection["held_out"].astype(bool).tolist(),
+        "against": _list_quantities(selection, robot),
+        **_draw_poses(selection, robot),
+        "usual_factor": _scale_arrows(position, residuals_um["before"]),
+        "changed": has_changed,
+    }
+    page = {
+        **facts,
+        "changed": has_changed,
+        "shown": [] if len(shown) == count else [len(shown), count],
+    }
+    return page, data
+
+
+def _select_measurements(table: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Return the rows that the page shows, evenly spread and with the worst one."""
+    count = len(table["x"])
+    if count <= _MAX_MEASUREMENTS:
+        return np.arange(count)
+    spread = _spread(count, _MAX_MEASUREMENTS - 1)
+    return np.unique([*spread, worst_measurement(table)])
+
+
+def _draw_poses(selection: Mapping[str, np.ndarray], robot: Robot) -> dict[str, Any]:
+    """Return the robot in some poses, the one with the largest error among them.
+
+    Poses are in the order of their first measurement. Validation poses of another
+    campaign have numbers of their own, so a pose is known by part, session and number.
+    """
+    keys = np.column_stack(
+        [selection["held_out"], selection["session"], selection["pose"]]
+    )
+    _, first_rows, inverse = np.unique(
+        keys, axis=0, return_index=True, return_inverse=True
+    )
+    pose_of_row = inverse.ravel()
+    worst_pose = pose_of_row[worst_measurement(selection)]
+    in_order = np.argsort(first_rows)
+    worst_place = np.flatnonzero(in_order == worst_pose)[0]
+    drawn = in_order[np.unique([*_spread(len(first_rows), _MAX_POSES), worst_place])]
+    rows = first_rows[drawn]
+    angles = angles_of(selection, robot.joints)[rows]
+    outlines = corners(robot.chain, angles).swapaxes(0, 1)
+    axes = np.moveaxis(joint_axes(robot.chain, angles), 2, 0)
+    return {
+        "outlines": outlines.round(4).tolist(),
+        "joints": axes.round(4).tolist(),
+        "worst": int(np.flatnonzero(drawn == worst_pose)[0]),
         "poses": [
-            f"{some['pose'][row]}" + (", validation" if some["held_out"][row] else "")
-            for row in drawn
+            f"{selection['pose'][row]}"
+            + (", validation" if selection["held_out"][row] else "")
+            for row in rows
         ],
         "targets": [
-            _targets(some, np.flatnonzero(of_pose.ravel() == place)) for place in places
+            _find_target_rows(selection, np.flatnonzero(pose_of_row == pose))
+            for pose in drawn
         ],
-        "usual_factor": float(
-            _ARROW * np.ptp(position, axis=0).max() / max(middle, 1e-9)
-        ),
-        "changed": not np.allclose(off["before"], off["after"], rtol=0, atol=0.01),
     }
-    page = {**facts, "changed": data["changed"]}
-    page["shown"] = [] if len(shown) == count else [len(shown), count]
-    return page, data
+
+
+def _scale_arrows(position: np.ndarray, residual_um: np.ndarray) -> float:
+    """Return the magnification at which the median arrow has its usual length."""
+    median_m = np.median(np.linalg.norm(residual_um, axis=1)) / say.MICRO
+    extent_m = np.ptp(position, axis=0).max()
+    return float(_ARROW_SHARE * extent_m / max(median_m, 1e-9))
 
 
 def write_loop_page(
@@ -102,16 +143,22 @@ def write_loop_page(
     data: Mapping[str, Any],
     origin: Origin | None = None,
 ) -> None:
-    """Write the page of a campaign; the file appears whole or not at all.
+    """Write the page of a campaign as an atomic write.
 
-    `path`: the HTML file. `page`, `data`: from `loop_page`. `origin`: named at the foot
-    of the page.
+    Parameters
+    ----------
+    path : str or path
+        The HTML file.
+    page, data : mapping
+        As `loop_page` returns them.
+    origin : Origin, optional
+        Named at the foot of the page.
     """
     script = (
         resources.files(__package__).joinpath("loop.js").read_text(encoding="utf-8")
     )
-    # Texts come from files of other people: they are escaped, and nothing in the data
-    # can end the script that holds it.
+    # Texts come from files of other people. So they are escaped, and nothing in the data
+    # can end the script that contains it.
     numbers = json.dumps(data, allow_nan=False).replace("<", "\\u003c")
     text = load_template("loop.html", say.FILTERS).render(
         page=page, origin=origin, data=Markup(numbers), script=Markup(script)
@@ -119,54 +166,47 @@ def write_loop_page(
     write_text(path, text)
 
 
-def _targets(some: Mapping[str, np.ndarray], rows: np.ndarray) -> list[int]:
-    """Of some rows the first of each target."""
-    return [
-        int(row) for row in rows[np.unique(some["target"][rows], return_index=True)[1]]
-    ]
+def _find_target_rows(
+    selection: Mapping[str, np.ndarray], rows: np.ndarray
+) -> list[int]:
+    """Return the first of some rows for each target."""
+    first = np.unique(selection["target"][rows], return_index=True)[1]
+    return [int(row) for row in rows[first]]
 
 
-def _spread(count: int, most: int) -> np.ndarray:
-    """Places of at most so many of `count` things, evenly spread."""
-    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int))
+def _spread(count: int, limit: int) -> np.ndarray:
+    """Return at most `limit` indices below `count`, evenly spread."""
+    indices = np.linspace(0, count - 1, min(count, limit))
+    return np.unique(indices.round().astype(int))
 
 
-def _against(
-    some: Mapping[str, np.ndarray], angles: np.ndarray, robot: Robot
+def _list_quantities(
+    selection: Mapping[str, np.ndarray], robot: Robot
 ) -> list[dict[str, Any]]:
-    """Quantities that a residual may be drawn against, those that vary."""
-    force = np.linalg.norm(
-        np.column_stack([some[f"f{axis}"] for axis in "xyz"]), axis=1
-    )
-    found = []
-    for joint, prismatic in enumerate(robot.chain.prismatic):
-        name, unit = (
-            (f"joint {joint + 1}", "m")
-            if prismatic
-            else (f"angle of joint {joint + 1}", "°")
-        )
-        found.append(
-            (
-                name,
-                unit,
-                angles[:, joint] if prismatic else np.degrees(angles[:, joint]),
-            )
-        )
-    found += [
-        ("force", "N", force),
-        *((f"force along {axis}", "N", some[f"f{axis}"]) for axis in "xyz"),
-    ]
-    found += [(f"position {axis}", "m", some[axis]) for axis in "xyz"]
-    found += [
-        ("order of measurement", "row", some["row"]),
-        ("time", "s", some.get("time_s", np.zeros(0))),
-    ]
+    """Return the quantities that vary, to plot residuals against."""
+    angles = angles_of(selection, robot.joints)
+    quantities = []
+    for joint, is_prismatic in enumerate(robot.chain.prismatic):
+        if is_prismatic:
+            quantities.append((f"joint {joint + 1}", "m", angles[:, joint]))
+        else:
+            degrees = np.degrees(angles[:, joint])
+            quantities.append((f"angle of joint {joint + 1}", "°", degrees))
+    forces = np.column_stack([selection[f"f{axis}"] for axis in "xyz"])
+    quantities.append(("force", "N", np.linalg.norm(forces, axis=1)))
+    for axis in "xyz":
+        quantities.append((f"force along {axis}", "N", selection[f"f{axis}"]))
+    for axis in "xyz":
+        quantities.append((f"position {axis}", "m", selection[axis]))
+    quantities.append(("order of measurement", "row", selection["row"]))
+    if "time_s" in selection:
+        quantities.append(("time", "s", selection["time_s"]))
     return [
         {
             "name": name,
             "unit": unit,
             "values": [float(f"{value:.5g}") for value in values],
         }
-        for name, unit, values in found
-        if len(values) and np.isfinite(values).all() and np.ptp(values) > 0
+        for name, unit, values in quantities
+        if np.isfinite(values).all() and np.ptp(values) > 0
     ]

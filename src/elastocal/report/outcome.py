@@ -1,22 +1,22 @@
-"""The outcome of a finished run: where each report is that it made and, of a campaign,
-the verdict."""
+"""Report the outcome of a finished run: its reports, and the verdict on a campaign."""
 
 from __future__ import annotations
 
-import json
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from elastocal.data_checks.protocol import data_at_fault
+from elastocal.verdict import read_verdict
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from elastocal.verdict import Verdict
+
 _CAMPAIGN = re.compile(r"reports/loop/([^/]+)/report\.pdf")
-# Verdicts after which the robot is corrected; after the others its report says what to
-# do.
-_OF_USE = ("adequate", "named", "class", "several")
+# Verdicts after which the robot is corrected; after the others its report advises what
+# to do.
+_CORRECTABLE = ("adequate", "named", "class", "several")
 _REPORTS = {
     "reports/paper.pdf": "the paper, regenerated",
     "reports/study.pdf": "the study",
@@ -25,35 +25,47 @@ _REPORTS = {
 
 
 def outcome(made: Iterable[str], workplace: str | Path = "") -> list[str]:
-    """Lines about the reports among the files that a run has made, which are named from
-    the workplace."""
-    # Only a run that has made a report needs what makes its sentences.
-    from elastocal.report.loop_facts import campaign_sentences
+    """Return lines about the reports among the files that a run has made.
 
+    Parameters
+    ----------
+    made : iterable of str
+        Files, relative to the workplace.
+    workplace : str or path
+        Folder of the run.
+    """
     lines = []
-    following = []
+    advice = []
     for path in sorted(map(str, made)):
         if path in _REPORTS:
             lines.append(f"{_REPORTS[path]}: {path}")
-        if match := _CAMPAIGN.fullmatch(path):
-            verdict = json.loads(
-                Path(workplace, path)
-                .with_name("verdict.json")
-                .read_text(encoding="utf-8")
-            )
-            of_use = verdict["verdict"] in _OF_USE and not data_at_fault(verdict)
-            stated = campaign_sentences(verdict)
-            errors = [f"  {line}" for line in stated["headline_line"]]
-            lines += [
-                f"{'✓' if of_use else '!'} {match[1]}: {stated['sentences'][0]}",
-                *errors,
-                f"  report: {path}",
-            ]
-            then = (
-                "elastocal correct, elastocal certificate"
-                if of_use
-                else '"What to do now" on the first page of the report'
-            )
-            following.append(f"next: {then}")
-    # Of several campaigns each report says it.
-    return [*lines, *(following if len(following) == 1 else [])]
+        match = _CAMPAIGN.fullmatch(path)
+        if match:
+            verdict = read_verdict(Path(workplace, path).with_name("verdict.json"))
+            lines += [*_describe_campaign(match[1], verdict), f"  report: {path}"]
+            advice.append(_advise(verdict))
+    # With several campaigns, each report has its own advice.
+    return lines + advice if len(advice) == 1 else lines
+
+
+def _describe_campaign(name: str, verdict: Verdict) -> list[str]:
+    """Return the verdict on a campaign and its errors."""
+    # Import the templates only here, because a run without a report does not need them.
+    from elastocal.report.loop_facts import campaign_sentences
+
+    stated = campaign_sentences(verdict)
+    mark = "✓" if _is_correctable(verdict) else "!"
+    return [
+        f"{mark} {name}: {stated['sentences'][0]}",
+        *(f"  {line}" for line in stated["headline_line"]),
+    ]
+
+
+def _advise(verdict: Verdict) -> str:
+    if _is_correctable(verdict):
+        return "next: elastocal correct, elastocal certificate"
+    return 'next: "What to do now" on the first page of the report'
+
+
+def _is_correctable(verdict: Verdict) -> bool:
+    return verdict.verdict in _CORRECTABLE and not verdict.faults

@@ -1,5 +1,5 @@
-"""The sheet of a plan, to take to the cell: a row for each pose with a box for each
-measurement, pictures, what it is worth."""
+"""The sheet of a plan for the robot cell: a row for each pose with a box for each
+measurement, pictures, and the expected accuracy."""
 
 from __future__ import annotations
 
@@ -19,72 +19,98 @@ if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Target
 
 _UNITS = {"deg": "°", "mm": "mm"}
-_LOADS = {0.0: "0", 1.0: "+F", -1.0: "−F"}
+# How a load is written on the sheet, by its share of the full force.
+_LOAD_NAMES = {0.0: "0", 1.0: "+F", -1.0: "−F"}
 
 
 def plan_facts(
     survey: Survey, plan: Plan, rows: pd.DataFrame, worth: Sequence[str]
 ) -> dict[str, Any]:
-    """What the sheet shows: names and counts, heads of the table, and for each pose its
-    cells and how often a load is read."""
-    angles = [
+    """Return what the sheet of a plan shows.
+
+    Parameters
+    ----------
+    survey : Survey
+        The robot, its targets and loads.
+    plan : Plan
+        The poses.
+    rows : pd.DataFrame
+        One row for each measurement, as `build_sheet` returns them.
+    worth : sequence of str
+        Sentences on the expected accuracy.
+
+    Returns
+    -------
+    dict
+        Names and counts, the heads of the table, and for each pose its cells and the
+        number of measurements under each load.
+    """
+    angle_columns = [
         name
         for name in map(str, rows)
         if name.startswith("q") and name.rpartition("_")[2] in DISPLAY_UNITS
     ]
-    heads = [
-        "pose",
-        *(
-            f"{name.partition('_')[0]} ({_UNITS[name.partition('_')[2]]})"
-            for name in angles
-        ),
+    force_columns = ["fx", "fy", "fz"] if survey.loaded else []
+    heads = ["pose"]
+    for name in angle_columns:
+        joint, _, unit = name.partition("_")
+        heads.append(f"{joint} ({_UNITS[unit]})")
+    heads += [f"F{name[1]} (N)" for name in force_columns]
+    poses = [
+        {
+            "cells": _format_pose(pose, part, angle_columns, force_columns),
+            "visits": _count_visits(survey, part),
+        }
+        for pose, part in rows.groupby("pose")
     ]
-    forces = ["fx", "fy", "fz"] if survey.loaded else []
-    poses = []
-    for pose, part in rows.groupby("pose"):
-        pulled = part[part["load"] == 1] if survey.loaded else part
-        cells = [str(pose), *(f"{part[name].iloc[0]:.2f}" for name in angles)]
-        counts = [
-            part.loc[part["load"] == load, "repeat"].nunique()
-            for load in range(len(survey.shares))
-        ]
-        visits = [
-            {"load": _LOADS[share], "count": int(n)}
-            for share, n in zip(survey.shares, counts, strict=True)
-            if n
-        ]
-        poses.append(
-            {
-                "cells": [
-                    *cells,
-                    *(f"{round(pulled[name].iloc[0]) + 0:d}" for name in forces),
-                ],
-                "visits": visits,
-            }
-        )
     fitted = len(plan.fitted.joint_angles)
     return {
         "robot": survey.robot.name,
-        "targets": [_where(target) for target in survey.targets],
+        "targets": [_describe_target(target) for target in survey.targets],
         "loaded": survey.loaded,
         "counts": [
             format_count(fitted, "pose"),
             f"{len(poses) - fitted}",
             format_count(len(rows), "measurement"),
         ],
-        "heads": [*heads, *(f"F{name[1]} (N)" for name in forces), "measured"],
+        "heads": [*heads, "measured"],
         "rows": poses,
         "fitted": fitted,
         "worth": " ".join(worth),
     }
 
 
-def _where(target: Target) -> str:
-    """A target with its measuring point and offset: the reflector has to sit there, or
-    the robot is corrected elsewhere."""
-    at = target.offset_m and ", ".join(
-        f"{1e3 * value:.2f}" for value in target.offset_m
-    )
-    return f"{target.name} on {target.point}, " + (
-        f"at ({at}) mm of it" if at else "at an offset that is fitted"
-    )
+def _format_pose(
+    pose: object,
+    part: pd.DataFrame,
+    angle_columns: Sequence[str],
+    force_columns: Sequence[str],
+) -> list[str]:
+    """Return number, joint coordinates and full force of a pose as cells."""
+    cells = [str(pose)]
+    cells += [f"{part[name].iloc[0]:.2f}" for name in angle_columns]
+    # Load 1 is the full force; adding zero removes the sign of a negative zero.
+    full_load = part[part["load"] == 1]
+    cells += [f"{round(full_load[name].iloc[0]) + 0:d}" for name in force_columns]
+    return cells
+
+
+def _count_visits(survey: Survey, part: pd.DataFrame) -> list[dict[str, Any]]:
+    """Return how often a pose is measured under each load."""
+    visits = []
+    for load, share in enumerate(survey.shares):
+        count = part.loc[part["load"] == load, "repeat"].nunique()
+        if count:
+            visits.append({"load": _LOAD_NAMES[share], "count": int(count)})
+    return visits
+
+
+def _describe_target(target: Target) -> str:
+    """Return a target with its measuring point and offset.
+
+    The reflector has to sit there; otherwise the robot is corrected for another point.
+    """
+    if not target.offset_m:
+        return f"{target.name} on {target.point}, at an offset that is fitted"
+    offset = ", ".join(f"{1e3 * value:.2f}" for value in target.offset_m)
+    return f"{target.name} on {target.point}, at ({offset}) mm of it"

@@ -8,7 +8,7 @@ Sentences stand in templates, which have the functions of this module as filters
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,6 +20,8 @@ from elastocal.effects.protocol import effect_of
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping, Sequence
+
+    from elastocal.verdict import JointRange, MechanismSet
 
 MICRO = 1e6
 MILLI = 1e3
@@ -57,138 +59,157 @@ _IN_COMMON = {
     "load": "an error of the load",
     "drift": "drift of the set-up or by warmth",
 }
-# Locations that have no joint: what stands there in the place of one.
+# Parts of a robot that stand in a location in the place of a joint.
 _PARTS = ("column", "base")
-# Bands of orders, variants and the like are given for as many locations; of more only
-# their joints.
-_MOST_DETAILED = 2
+# Upper bound on the locations that are listed with details, such as bands of orders; of
+# more locations only the joints are listed.
+_MAX_DETAILED = 2
 
 
 def physical_name(effect: str) -> str:
-    """Physical name of an effect; its own name as words where the catalogue does not
-    have it."""
+    """Return the physical name of an effect; an effect that the catalogue does not have
+    is called by its own name."""
     return getattr(list_effects().get(effect), "words", words(effect))
 
 
 def parameter_words(effect: str, name: str) -> str:
-    """A parameter of an effect as an engineer would call it: shift along x for dx,
-    cos(2q) for cos_2q.
+    """Return a parameter as an engineer would call it: shift along x for dx, cos(2q) for
+    cos_2q.
 
-    `effect`: by its name in the catalogue; what is not there, such as a frame, has no
-    words of its own.
+    Parameters
+    ----------
+    effect : str
+        Name in the catalogue. An owner that is not there, such as a frame, has no words
+        of its own.
+    name : str
+        Name of the parameter.
     """
-    text = getattr(list_effects().get(effect), "parameter_words", {}).get(
-        name, words(name)
-    )
-    for pattern, instead in _PARAMETER_WORDS:
-        text = re.sub(pattern, instead, text)
+    own_words = getattr(list_effects().get(effect), "parameter_words", {})
+    text = own_words.get(name, words(name))
+    for pattern, replacement in _PARAMETER_WORDS:
+        text = re.sub(pattern, replacement, text)
     return text
 
 
 def effect_words(effect: str, locations: Iterable[str] = ()) -> str:
-    """An effect and where it acts, by locations as verdict.json has them: gravity sag
-    of joints 2 and 3."""
-    return physical_name(effect) + _where(effect, map(_LOCATION.match, locations))
+    """Return an effect with its locations as verdict.json has them: gravity sag of
+    joints 2 and 3."""
+    return physical_name(effect) + _format_locations(
+        effect, map(_LOCATION.match, locations)
+    )
 
 
 def found_words(effect: str, keys: Iterable[str]) -> str:
-    """The same by the keys of its candidates."""
-    return physical_name(effect) + _where(effect, map(_ANY_KEY.match, keys))
+    """Return an effect with the locations of its candidates, which keys give."""
+    return physical_name(effect) + _format_locations(effect, map(_ANY_KEY.match, keys))
 
 
 def candidate_words(key: str) -> str:
-    """The key of a candidate in words: zero offset of joint 3, gear transmission error
-    of joint 1 (orders 1-2)."""
-    found = _ANY_KEY.match(key)
-    return found_words(found["effect"], [key]) if found else words(key)
+    """Return the key of a candidate in words: zero offset of joint 3, gear transmission
+    error of joint 1 (orders 1-2)."""
+    match = _ANY_KEY.match(key)
+    return found_words(match["effect"], [key]) if match else words(key)
 
 
 def location_words(effect: str, location: str) -> str:
-    """A location without its effect: links 1, 2 and 3 (one section)."""
-    return (
-        _where(effect, [_LOCATION.match(location)]).strip().removeprefix("of ")
-        or "the whole robot"
-    )
+    """Return a location without its effect: links 1, 2 and 3 (one section)."""
+    text = _format_locations(effect, [_LOCATION.match(location)])
+    return text.removeprefix(" of ").strip() or "the whole robot"
 
 
 def place_words(keys: Sequence[str]) -> str:
-    """Where candidates of one effect act, without its name: joints 2 and 3, or
-    nothing."""
-    return (
-        _where(effect_of(keys[0]), map(_ANY_KEY.match, keys))
-        .strip()
-        .removeprefix("of ")
-    )
+    """Return the locations of candidates of one effect without its name: joints 2 and 3;
+    empty if they have none."""
+    text = _format_locations(effect_of(keys[0]), map(_ANY_KEY.match, keys))
+    return text.removeprefix(" of ").strip()
 
 
 def at_joints(effect: str, joints: Collection[int]) -> str:
-    """Where an effect acts: " of joint 3", or nothing where it is no joint's."""
-    part = getattr(list_effects().get(effect), "part", "joint")
-    return (
-        f" of {pluralize(part, len(joints))} {listed(map(str, joints))}"
-        if joints
-        else ""
-    )
+    """Return the joints or links of an effect, " of joint 3"; empty without joints."""
+    if not joints:
+        return ""
+    noun = getattr(list_effects().get(effect), "part", "joint")
+    return f" of {pluralize(noun, len(joints))} {listed(map(str, joints))}"
 
 
-def _where(effect: str, found: Iterable[re.Match[str] | None]) -> str:
-    """Where an effect acts, by joints or links and details of keys or locations: " of
-    joint 4 (orders 1-2)"."""
-    details: dict[tuple[int, ...], list[str]] = {}
-    for match in found:
-        assert match is not None
-        details.setdefault(
-            tuple(map(int, re.findall(r"\d+", match["joints"] or ""))), []
-        ).append(match["detail"] or "")
-    singles = len(details) > 1 and all(len(numbers) == 1 for numbers in details)
-    if singles and (
-        len(details) > _MOST_DETAILED or not any(map(any, details.values()))
-    ):
-        return at_joints(effect, sorted(numbers[0] for numbers in details))
-    parts = []
-    for numbers, which in details.items():
-        detail = ", ".join(filter(None, which))
-        # A variant in words, where it has some.
-        detail = getattr(list_effects().get(effect), "detail_words", {}).get(
-            detail, detail
-        )
-        # What is no joint's needs a place of its own only in a list with those that
-        # are.
-        where = at_joints(effect, numbers) or (
-            " of the whole arm" if len(details) > 1 else ""
-        )
-        in_place = (
-            f" of the {detail}"
-            if not numbers and detail in _PARTS
-            else where + (f" ({detail})" if detail else "")
-        )
-        parts.append(in_place.strip())
-    return f" {listed(parts)}" if any(parts) else ""
+def _format_locations(effect: str, matches: Iterable[re.Match[str] | None]) -> str:
+    """Return joints or links with their details: " of joint 4 (orders 1-2)".
 
-
-def hypotheses_words(sets: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Hypotheses, each a set of mechanisms; those that hold all of the first and more
-    by what they add to it.
-
-    `sets`: as in verdict.json, the most probable first. `OTHER` alone is something that
-    the catalogue does not have; beside a mechanism, that a related one may act.
+    Parameters
+    ----------
+    effect : str
+        Name in the catalogue.
+    matches : iterable of re.Match
+        Locations or keys, as `_LOCATION` and `_ANY_KEY` match them.
     """
-    first = set(sets[0]["mechanisms"]) if sets else set()
-    found = []
-    for entry in sets:
-        names = set(entry["mechanisms"])
+    details_by_joints: dict[tuple[int, ...], list[str]] = {}
+    for match in matches:
+        assert match is not None
+        joints = tuple(map(int, re.findall(r"\d+", match["joints"] or "")))
+        details = details_by_joints.setdefault(joints, [])
+        if match["detail"]:
+            details.append(match["detail"])
+    if _can_list_joints_alone(details_by_joints):
+        return at_joints(effect, sorted(joints[0] for joints in details_by_joints))
+    in_list = len(details_by_joints) > 1
+    locations = [
+        _format_location(effect, joints, ", ".join(details), in_list=in_list)
+        for joints, details in details_by_joints.items()
+    ]
+    return f" {listed(locations)}" if any(locations) else ""
+
+
+def _can_list_joints_alone(
+    details_by_joints: Mapping[tuple[int, ...], Sequence[str]],
+) -> bool:
+    """Whether several single joints are listed without details: they have none, or too
+    many to read."""
+    count = len(details_by_joints)
+    if count < 2 or any(len(joints) != 1 for joints in details_by_joints):
+        return False
+    return count > _MAX_DETAILED or not any(details_by_joints.values())
+
+
+def _format_location(
+    effect: str, joints: tuple[int, ...], detail: str, *, in_list: bool
+) -> str:
+    """Return one location with its detail: of joint 4 (orders 1-2)."""
+    detail = getattr(list_effects().get(effect), "detail_words", {}).get(detail, detail)
+    if not joints and detail in _PARTS:
+        return f"of the {detail}"
+    location = at_joints(effect, joints)
+    # A location without joints needs words only in a list with other locations.
+    if not joints and in_list:
+        location = " of the whole arm"
+    if detail:
+        location += f" ({detail})"
+    return location.strip()
+
+
+def hypotheses_words(sets: Sequence[MechanismSet]) -> list[str]:
+    """Return hypotheses in words, the most probable one first.
+
+    A hypothesis that contains all mechanisms of the first one is described by what it
+    adds. `OTHER` alone is something that the catalogue does not have; together with a
+    mechanism it means that a related mechanism may act.
+    """
+    first = set(sets[0].mechanisms) if sets else set()
+    hypotheses = []
+    for hypothesis in sets:
+        names = set(hypothesis.mechanisms)
+        added = names - first
         if not names:
-            found.append(NOTHING)
+            hypotheses.append(NOTHING)
         elif not first or not first < names:
-            found.append(mechanisms_words(entry["mechanisms"], entry["locations"]))
-        elif names - first == {OTHER}:
-            found.append(f"the same or {RELATED}")
-        else:
-            found.append(
-                "the same with "
-                + mechanisms_words(sorted(names - first), entry["locations"])
+            hypotheses.append(
+                mechanisms_words(hypothesis.mechanisms, hypothesis.locations)
             )
-    return found
+        elif added == {OTHER}:
+            hypotheses.append(f"the same or {RELATED}")
+        else:
+            words = mechanisms_words(sorted(added), hypothesis.locations)
+            hypotheses.append(f"the same with {words}")
+    return hypotheses
 
 
 def mechanisms_words(
@@ -254,17 +275,25 @@ def words(name: str) -> str:
 
 
 def listed(items: Iterable[str], most: int | None = None, last: str = "and") -> str:
-    """Items in a sentence, at most so many of them."""
-    items = list(items)
-    if most is not None and len(items) > most:
-        items = [*items[:most], f"{len(items) - most} more"]
-    return (
-        items[0]
-        if len(items) == 1
-        else ", ".join(items[:-1]) + f" {last} " + items[-1]
-        if items
-        else "none"
-    )
+    """Return items as they stand in a sentence.
+
+    Parameters
+    ----------
+    items : iterable of str
+        The items.
+    most : int, optional
+        Upper bound on their number; the others are counted.
+    last : str
+        Word before the last item.
+    """
+    shown = list(items)
+    if most is not None and len(shown) > most:
+        shown = [*shown[:most], f"{len(shown) - most} more"]
+    if not shown:
+        return "none"
+    if len(shown) == 1:
+        return shown[0]
+    return f"{', '.join(shown[:-1])} {last} {shown[-1]}"
 
 
 def capital(text: str) -> str:
@@ -288,17 +317,16 @@ def true_minus(text: str) -> str:
     return re.sub(r"(?<= )-(?=\d)", "−", text)
 
 
-def span_words(joint_ranges: Sequence[Mapping[str, Any]]) -> str:
-    """Where the joints stood, as of `validation.span.joint_ranges`."""
-    each = []
+def span_words(joint_ranges: Sequence[JointRange]) -> str:
+    """Return the range of each joint in words."""
+    ranges = []
     for joint, ends in enumerate(joint_ranges, 1):
-        unit, digits = ("°", 0) if ends["unit"] == "deg" else (" m", 2)
-        each.append(
-            minus(
-                f"joint {joint} {ends['low']:.{digits}f} to {ends['high']:.{digits}f}{unit}"
-            )
-        )
-    return ", ".join(each)
+        if ends.unit == "deg":
+            text = f"joint {joint} {ends.low:.0f} to {ends.high:.0f}°"
+        else:
+            text = f"joint {joint} {ends.low:.2f} to {ends.high:.2f} m"
+        ranges.append(minus(text))
+    return ", ".join(ranges)
 
 
 def unit_of(metres: float) -> tuple[float, str]:
@@ -358,54 +386,57 @@ def probability_words(probability: float) -> str:
 
 
 def scaled(value: float, error: float | None, unit: str) -> tuple[str, str]:
-    """A value with its standard error in a unit that suits it.
+    """Return a value with its standard error, and the unit that suits it.
 
-    `error`: two of its digits are given; none where it is not known or zero. `unit`: as
-    in the tables: rad/(N m), 1 for none.
+    Parameters
+    ----------
+    value : float
+        The value.
+    error : float or None
+        Its standard error, of which two digits are given; none if it is unknown or zero.
+    unit : str
+        As in the tables: rad/(N m); 1 for none.
     """
-    factor, shown = _unit(value, unit)
+    factor, shown_unit = _choose_unit(value, unit)
     number = factor * value
-    error = factor * error if error else 0.0
-    if not np.isfinite(error) or error <= 0:
-        error = 0.0
-    size = max(abs(number), error)
-    # What no prefix makes handy gets a power of ten.
-    power = 0 if size == 0 or 1e-3 <= size < 1e5 else int(np.floor(np.log10(size)))
+    std_error = factor * error if error else 0.0
+    if not np.isfinite(std_error) or std_error <= 0:
+        std_error = 0.0
+    size = max(abs(number), std_error)
+    # A number that no prefix makes handy gets a power of ten.
+    power = 0
+    if size and not 1e-3 <= size < 1e5:
+        power = int(np.floor(np.log10(size)))
     number = number / 10.0**power
-    error = error / 10.0**power
-    text = pm(number, error) if error else minus(plain(number, 4))
+    std_error = std_error / 10.0**power
+    text = pm(number, std_error) if std_error else minus(plain(number, 4))
     if power:
-        text = (
-            (f"({text})" if error else text)
-            + " · 10"
-            + str(power).translate(_SUPERSCRIPTS)
-        )
-    return text, shown
+        mantissa = f"({text})" if std_error else text
+        text = f"{mantissa} · 10{str(power).translate(_SUPERSCRIPTS)}"
+    return text, shown_unit
 
 
-def _unit(value: float, unit: str) -> tuple[float, str]:
-    shown = {"1": "", "–": ""}.get(unit, unit)
+def _choose_unit(value: float, unit: str) -> tuple[float, str]:
+    """Return the factor of a prefix that suits a value, and the unit with it."""
     factor = 1.0
+    prefix = ""
     if re.match(r"rad\b(?!/rad)", unit) and abs(value) < 1e-2:
         factor = MICRO
-        shown = "µ" + shown
-    elif re.match(r"m\b(?!/m)", unit):
-        factor, prefix = (
-            (MICRO, "µ")
-            if abs(value) < 1e-3
-            else (MILLI, "m")
-            if abs(value) < 1
-            else (1.0, "")
-        )
-        shown = prefix + shown
-    for power, sign in (("^2", "²"), ("^3", "³")):
-        shown = shown.replace(power, sign)
+        prefix = "µ"
+    elif re.match(r"m\b(?!/m)", unit) and abs(value) < 1e-3:
+        factor = MICRO
+        prefix = "µ"
+    elif re.match(r"m\b(?!/m)", unit) and abs(value) < 1:
+        factor = MILLI
+        prefix = "m"
+    shown = prefix + ("" if unit in ("1", "–") else unit)
+    shown = shown.replace("^2", "²").replace("^3", "³")
     return factor, re.sub(r"(?<=\w|²|³) (?=\w)", "·", shown)
 
 
-# What sentences and pages may apply to what they show.
+# Functions that templates may use as filters.
 FILTERS = {
-    name: each
-    for name, each in {**vars(counting), **globals()}.items()
-    if callable(each) and name[0] != "_"
+    name: function
+    for name, function in {**vars(counting), **globals()}.items()
+    if callable(function) and name[0] != "_"
 }

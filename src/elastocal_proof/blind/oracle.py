@@ -36,6 +36,7 @@ from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.model import Case
 from elastocal.fitting.noise import fit_declared_model, parse_noise
 from elastocal.io.json_files import read_json, write_json
+from elastocal.io.typed_json import to_document
 from elastocal.loop.whole import cases_in
 from elastocal.validation.transfer import find_extrapolated_poses
 from elastocal_proof.blind.cases import NAMED, absent_on, defects_of, yardstick_of
@@ -108,7 +109,7 @@ def oracle(
     _, heldout, _ = compare_held_out_errors(
         [Step("oracle", "declared", fitted)], case, unseen, outside, seed
     )
-    return _outcome(members, p_value, heldout["before"])
+    return _outcome(members, p_value, to_document(heldout.before))
 
 
 def members_of(

@@ -59,35 +59,53 @@ def test_no_thin_link_hides_a_target_from_a_tracker_above(survey, angles):
     assert check(cell, survey, angles)["sight"].all()
 
 
-@pytest.mark.parametrize("name", ["abb", "iiwa14"])
-def test_neither_forearm_nor_target_is_below_the_floor_or_in_the_column(name):
-    robot = analysed(name)
+@pytest.fixture(params=["abb", "iiwa14"])
+def robot(request):
+    return analysed(request.param)
+
+
+@pytest.fixture
+def reported(robot):
     low, high = robot.joint_limits.T
     shares = np.random.default_rng(1).random((2000, robot.joints))
-    reported = robot.reported_angles(low + (high - low) * shares)
+    return robot.reported_angles(low + (high - low) * shares)
+
+
+def check_with_target(cell, robot, reported):
+    """Check configurations with a target 0.2 m beyond the end effector."""
+    target = Target("A", robot.chain.end_effector.name, (0.0, 0.0, 0.2))
+    return check_configurations(cell, robot, (target,), reported)
+
+
+def test_neither_forearm_nor_target_is_below_the_floor(robot, reported):
     angles = robot.model_angles(reported)
-    offset_m = (0.0, 0.0, 0.2)
-    targets = (Target("A", robot.chain.end_effector.name, offset_m),)
     position, rotation = poses(robot.chain, angles, robot.chain.end_effector)
-    height = (position + rotation @ offset_m)[:, 2]
+    height = (position + rotation @ [0.0, 0.0, 0.2])[:, 2]
     forearm = sample_links(robot, angles, 2)
     is_below = (height < 0.0) | (forearm[..., 2] < 0.0).any(axis=0)
-    column_m = COLUMN_SHARE * compute_reach_m(robot)
-    cell = Cell((), None, 0.02, 0.0, column_m)
-    allowed = check_configurations(cell, robot, targets, reported)
+    above = check_with_target(Cell((), None, 0.02, 0.0), robot, reported)["floor"]
     assert is_below.sum() > 50
-    assert not (allowed["floor"] & is_below).any() and allowed["floor"].sum() > 200
+    assert not (above & is_below).any() and above.sum() > 200
     # More configurations are allowed above a floor that is half a metre lower.
     lower_floor = Cell((), None, 0.02, -0.5)
-    above = check_configurations(lower_floor, robot, targets, reported)["floor"]
-    assert above.sum() > allowed["floor"].sum()
-    in_an_empty_cell = check_configurations(
-        Cell((), None, 0.02), robot, targets, reported
-    )
-    assert all(constraint.all() for constraint in in_an_empty_cell.values())
+    above_lower_floor = check_with_target(lower_floor, robot, reported)["floor"]
+    assert above_lower_floor.sum() > above.sum()
+
+
+def test_the_forearm_is_outside_the_column(robot, reported):
+    angles = robot.model_angles(reported)
+    column_m = COLUMN_SHARE * compute_reach_m(robot)
+    forearm = sample_links(robot, angles, 2)
     shoulder_height = sample_links(robot, angles, 1)[0, :, 2]
     distance = np.linalg.norm(forearm[..., :2], axis=-1)
     is_inside = (distance < column_m) & (forearm[..., 2] < shoulder_height)
     is_inside = is_inside.any(axis=0)
+    cell = Cell((), None, 0.02, 0.0, column_m)
+    outside = check_with_target(cell, robot, reported)["column"]
     assert is_inside.any()
-    assert not (allowed["column"] & is_inside).any() and allowed["column"].mean() > 0.5
+    assert not (outside & is_inside).any() and outside.mean() > 0.5
+
+
+def test_an_empty_cell_allows_everything(robot, reported):
+    constraints = check_with_target(Cell((), None, 0.02), robot, reported)
+    assert all(is_met.all() for is_met in constraints.values())

@@ -37,10 +37,8 @@ def with_plausible_priors(model):
     return replace(model, effects=(compliance, *priors))
 
 
-@pytest.mark.parametrize("measured", ["position", "pose"])
-def test_information_is_the_inverse_of_the_covariance_of_a_fit_with_priors(measured):
-    survey = made_survey(measured=measured)
-    candidates = made_candidates(survey, 40)
+def fit_with_priors(survey, candidates):
+    """Fit exact measurements of a survey with the priors of the plan."""
     model, estimate = declare_model(survey)
     model = with_plausible_priors(model)
     observations = build_observations(survey, candidates.joint_angles, candidates.force)
@@ -54,8 +52,15 @@ def test_information_is_the_inverse_of_the_covariance_of_a_fit_with_priors(measu
         rotation = None
     exact = replace(observations, position=position, rotation=rotation)
     noise = Noise("declared", survey.position_m, survey.orientation_rad, np.zeros(6))
-    fit = fit_model(model, exact, noise, estimate)
-    parameters = list_parameters(model, estimate)
+    return fit_model(model, exact, noise, estimate)
+
+
+@pytest.mark.parametrize("measured", ["position", "pose"])
+def test_information_is_the_inverse_of_the_covariance_of_a_fit_with_priors(measured):
+    survey = made_survey(measured=measured)
+    candidates = made_candidates(survey, 40)
+    fit = fit_with_priors(survey, candidates)
+    parameters = list_parameters(*declare_model(survey))
     without_prior = ("frame", "target", "joint_compliance")
     prior = np.diag(
         [0.0 if owner.startswith(without_prior) else 1.0 for owner, _ in parameters]
