@@ -189,14 +189,11 @@ def test_the_page_has_the_rows_of_each_table():
             load_template("study_tables.md").render(stated),
             flags=re.MULTILINE,
         )
-        rows = {
-            title: re.findall(r"^\| (.*) \|$", text, re.MULTILINE)
-            for title, text in zip(parts[::2], parts[1::2], strict=True)
-        }
-        return {
-            title: [line.split(" | ") for line in lines]
-            for title, lines in rows.items()
-        }
+        tables = {}
+        for title, text in zip(parts[::2], parts[1::2], strict=True):
+            lines = re.findall(r"^\| (.*) \|$", text, re.MULTILINE)
+            tables[title] = [line.split(" | ") for line in lines]
+        return tables
 
     page_tables = tables_of(EVERY)
     assert [len(rows) - 1 for rows in page_tables.values()] == [

@@ -191,11 +191,12 @@ def draw_residual_arrows(
 def _average_repeats(table: Mapping[str, np.ndarray]) -> _States:
     """Mean position and residuals of each state and target."""
     keys = ["held_out", "session", "pose", "load", "target"]
-    columns = {stage: [f"{stage}_d{axis}" for axis in "xyz"] for stage in STAGES}
-    names = [*keys, *"xyz", *columns["before"], *columns["after"]]
+    before = ["before_dx", "before_dy", "before_dz"]
+    after = ["after_dx", "after_dy", "after_dz"]
+    names = [*keys, *"xyz", *before, *after]
     frame = pd.DataFrame({name: table[name] for name in names})
     means = frame.groupby(keys, dropna=False, observed=True).mean()
-    residuals = {stage: means[columns[stage]].to_numpy() for stage in STAGES}
+    residuals = {"before": means[before].to_numpy(), "after": means[after].to_numpy()}
     return _States(means[[*"xyz"]].to_numpy(), residuals)
 
 

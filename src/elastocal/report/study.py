@@ -317,10 +317,10 @@ def _list_estimators(table: pd.DataFrame, configurations: int) -> list[dict[str,
             continue
         listed.add(key)
         cells_by_average = {
-            average: [_format_median(row, name, configurations) for name in quantities]
+            average: _format_medians(row, quantities, configurations)
             for average, row in by_average.items()
         }
-        fixed_cells = [_format_median(usual, name, configurations) for name in fixed]
+        fixed_cells = _format_medians(usual, fixed, configurations)
         rows.append(
             {
                 "robot": robot,
@@ -332,6 +332,13 @@ def _list_estimators(table: pd.DataFrame, configurations: int) -> list[dict[str,
     return rows
 
 
+def _format_medians(
+    row: Mapping[str, Any], names: Sequence[str], configurations: int
+) -> list[str]:
+    """Format several medians of a row, see `_format_median`."""
+    return [_format_median(row, name, configurations) for name in names]
+
+
 def _find_table4_quantities(table: pd.DataFrame) -> list[str]:
     """Columns of the four quantities of Table 4 and the RMS error, for any length and
     limits."""
@@ -340,8 +347,10 @@ def _find_table4_quantities(table: pd.DataFrame) -> list[str]:
         for name in table.columns
         if not name.endswith("_std") and "fixed_joints" not in name
     ]
-    starts = ("k_sigma_", "n_k_sigma_", "dev_", "n_dev_", "rms_")
-    return [next(name for name in names if name.startswith(start)) for start in starts]
+    quantities = []
+    for start in ("k_sigma_", "n_k_sigma_", "dev_", "n_dev_", "rms_"):
+        quantities.append(next(name for name in names if name.startswith(start)))
+    return quantities
 
 
 def _describe_strategy(strategy: Strategy) -> list[str]:
