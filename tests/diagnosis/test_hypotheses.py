@@ -137,10 +137,10 @@ def test_plausible_sizes_fall_with_the_order_of_a_harmonic_and_signs_are_those_o
 ):
     effects = ("transmission_harmonic", "stiffening", "base_compliance")
     candidates = [candidate for candidate in catalogue if candidate.effect in effects]
-    shape_values = [
-        (candidate, [tuple(shape.start for shape in candidate.shapes)])
-        for candidate in candidates
-    ]
+    shape_values = []
+    for candidate in candidates:
+        start = tuple(shape.start for shape in candidate.shapes)
+        shape_values.append((candidate, [start]))
     terms = build_terms(shape_values, [], SETTINGS)
     for term, candidate in zip(terms, candidates, strict=True):
         orders = np.array([parameter.order for parameter in candidate.parameters])

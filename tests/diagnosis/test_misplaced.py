@@ -1,5 +1,5 @@
-"""What is declared wrongly by millimetres is found where it sits, and nothing is on a
-robot that is merely inexact."""
+"""Frames that are declared wrongly by millimetres are found where they are, and none on
+a robot with inexact geometry."""
 
 import numpy as np
 import pytest
@@ -18,66 +18,77 @@ from elastocal.mechanics.kinematics import poses
 from elastocal.mechanics.sites import sites_of
 
 DECLARED_M = np.array([0.1, 0.0, 0.05])
-# A heavy arm, a middling one, a light one.
+POSES = 40
+# A heavy arm, a medium one and a light one.
 ARMS = ("kuka", "abb", "ur10")
 
 
-def misdeclared_folder(folder, robot, name, place, shift_m, poses_measured=40, seed=1):
-    """Unloaded poses of one target on the end effector, 60 µm and 60 µrad of noise;
-    `place`: "tool", "base", "link 3" or ""."""
-    draws = np.random.default_rng(seed)
+def deviating_coordinates(robot, angles, place, shift_m, draws):
+    """Coordinates (P, C) of a robot with usual errors of geometry, at some joint angles
+    (P, n), whose base or link is shifted."""
     sites = sites_of(robot)
-    end = robot.chain.end_effector
-    low, high = robot.joint_limits.T
-    angles = low + (high - low) * draws.random((poses_measured, robot.joints))
-    coordinates = np.zeros((poses_measured, sites.chain.coordinates))
-    coordinates[:, : robot.joints] = angles + 5e-4 * draws.standard_normal(robot.joints)
+    coordinates = np.zeros((len(angles), sites.chain.coordinates))
+    offsets = 5e-4 * draws.standard_normal(robot.joints)
+    coordinates[:, : robot.joints] = angles + offsets
     for link in range(1, robot.joints + 1):
         coordinates[:, sites.link_end[link]] += 3e-4 * draws.standard_normal(6)
     if place == "base":
         coordinates[:, sites.base[:3]] += shift_m
     elif place.startswith("link"):
-        coordinates[:, sites.link_end[int(place[5:])][:3]] += shift_m
-    at, turned = poses(sites.chain, coordinates, sites.chain.end_effector)
-    at = at + turned @ (DECLARED_M + (np.array(shift_m) if place == "tool" else 0.0))
-    turn = Rotation.from_rotvec(
-        6e-5 * draws.standard_normal(at.shape)
-    ) * Rotation.from_matrix(turned)
-    none = np.zeros(poses_measured, int)
+        link = int(place.removeprefix("link "))
+        coordinates[:, sites.link_end[link][:3]] += shift_m
+    return coordinates
+
+
+def misdeclared_folder(folder, robot, name, place, shift_m, seed=1):
+    """A campaign of unloaded poses of one target on the end effector, with 60 µm and
+    60 µrad of noise.
+
+    `place`: what is not where it is declared: "tool", "base", "link 3" or "" for
+    nothing.
+    """
+    draws = np.random.default_rng(seed)
+    low, high = robot.joint_limits.T
+    angles = low + (high - low) * draws.random((POSES, robot.joints))
+    coordinates = deviating_coordinates(robot, angles, place, shift_m, draws)
+    chain = sites_of(robot).chain
+    end = chain.end_effector
+    position, rotation = poses(chain, coordinates, end)
+    target_m = DECLARED_M + (np.array(shift_m) if place == "tool" else 0.0)
+    position = position + rotation @ target_m
+    turn = Rotation.from_rotvec(6e-5 * draws.standard_normal(position.shape))
+    measured_turn = (turn * Rotation.from_matrix(rotation)).as_rotvec()
+    position = position + 6e-5 * draws.standard_normal(position.shape)
+    zeros = np.zeros(POSES, int)
     table = {
-        "pose": np.arange(1, poses_measured + 1),
-        "load": none,
-        "repeat": none,
-        "target": np.repeat("A", poses_measured),
+        "pose": np.arange(1, POSES + 1),
+        "load": zeros,
+        "repeat": zeros,
+        "target": np.repeat("A", POSES),
     }
-    table |= {
-        f"q{joint}": column
-        for joint, column in enumerate(robot.reported_angles(angles).T, 1)
-    }
-    table |= dict(
-        zip("xyz", (at + 6e-5 * draws.standard_normal(at.shape)).T, strict=True)
+    reported = robot.reported_angles(angles).T
+    table |= {f"q{joint}": column for joint, column in enumerate(reported, 1)}
+    table |= dict(zip("xyz", position.T, strict=True))
+    table |= dict(zip(("rx", "ry", "rz"), measured_turn.T, strict=True))
+    return made_folder(
+        folder,
+        robot,
+        table=table,
+        robot=name,
+        measured="pose",
+        targets={"A": {"point": end.name, "offset_m": DECLARED_M.tolist()}},
+        declared=["joint_offset", "link_geometry"],
+        compliance="nominal",
+        noise={"position_m": 6e-5, "orientation_rad": 6e-5},
     )
-    table |= dict(zip(("rx", "ry", "rz"), turn.as_rotvec().T, strict=True))
-    targets = {"A": {"point": end.name, "offset_m": DECLARED_M.tolist()}}
-    changes = {
-        "robot": name,
-        "measured": "pose",
-        "targets": targets,
-        "declared": ["joint_offset", "link_geometry"],
-    }
-    changes |= {
-        "compliance": "nominal",
-        "noise": {"position_m": 6e-5, "orientation_rad": 6e-5},
-    }
-    return made_folder(folder, robot, table=table, **changes)
 
 
-def findings(folder):
+def find_in(folder):
+    """Misplaced frames of a campaign."""
     case, _ = cases_in(folder, ROBOTS)
-    return find_misplaced_frames(
-        fit_declared_model(case.model, case.observations, estimate_noise(case)[0]),
-        case.campaign,
-    )
+    noise, _ = estimate_noise(case)
+    fitted = fit_declared_model(case.model, case.observations, noise)
+    return find_misplaced_frames(fitted, case.campaign)
 
 
 @pytest.mark.parametrize("name", ARMS)
@@ -93,51 +104,43 @@ def findings(folder):
 def test_a_wrong_target_or_length_is_found_with_its_size(
     tmp_path, name, place, shift_m
 ):
-    (found,) = findings(
-        misdeclared_folder(tmp_path / "made", analysed(name), name, place, shift_m)
-    )
-    # Of parallel axes one link says as well as the other.
-    assert place in (found.place, *found.alternatives)
-    assert np.linalg.norm(found.shift_m) == pytest.approx(
-        np.linalg.norm(shift_m), rel=0.2
-    )
+    folder = misdeclared_folder(tmp_path / "made", analysed(name), name, place, shift_m)
+    (frame,) = find_in(folder)
+    # Of links with parallel axes, either explains the measurements as well.
+    assert place in (frame.place, *frame.alternatives)
+    length_m = np.linalg.norm(shift_m)
+    assert np.linalg.norm(frame.shift_m) == pytest.approx(length_m, rel=0.2)
     if place == "tool":
-        np.testing.assert_allclose(found.shift_m, shift_m, atol=1e-3)
-        assert "the flange is not certified, the reflector is" in found.sentence
+        np.testing.assert_allclose(frame.shift_m, shift_m, atol=1e-3)
+        assert "the flange is not certified, the reflector is" in frame.sentence
 
 
 @pytest.mark.parametrize("name", ARMS)
-def test_a_base_that_stands_elsewhere_is_said_before_any_diagnosis_and_a_wrong_target_too(
-    tmp_path, name
-):
+def test_a_misplaced_base_or_target_is_reported_before_any_diagnosis(tmp_path, name):
     robot = analysed(name)
-    said = overview(
-        misdeclared_folder(tmp_path / "base", robot, name, "base", [0, 5e-3, 0]), ROBOTS
-    ).attention
-    assert "base stands 5." in said[0] or "base stands 4.9" in said[0]
-    said = overview(
-        misdeclared_folder(tmp_path / "tool", robot, name, "tool", [5e-3, 0, 0]), ROBOTS
-    ).attention
-    assert "along x of" in said[0] and not any("base stands" in each for each in said)
+    base = misdeclared_folder(tmp_path / "base", robot, name, "base", [0, 5e-3, 0])
+    first = overview(base, ROBOTS).attention[0]
+    assert "base stands 5." in first or "base stands 4.9" in first
+    tool = misdeclared_folder(tmp_path / "tool", robot, name, "tool", [5e-3, 0, 0])
+    sentences = overview(tool, ROBOTS).attention
+    assert "along x of" in sentences[0]
+    assert not any("base stands" in sentence for sentence in sentences)
 
 
+@pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("name", ARMS)
-def test_inexact_geometry_is_nothing_misplaced(tmp_path, name):
-    for seed in range(5):
-        assert (
-            findings(
-                misdeclared_folder(
-                    tmp_path / f"{seed}", analysed(name), name, "", 0.0, seed=seed
-                )
-            )
-            == []
-        )
-
-
-def test_the_point_is_named_with_what_was_declared_of_its_target(tmp_path):
-    case, _ = cases_in(
-        misdeclared_folder(tmp_path / "made", analysed("kuka"), "kuka", "", 0.0), ROBOTS
+def test_nothing_is_misplaced_on_a_robot_with_inexact_geometry(tmp_path, name, seed):
+    folder = misdeclared_folder(
+        tmp_path / "made", analysed(name), name, "", 0.0, seed=seed
     )
-    assert "6DoF" in describe_reference_point(
-        case.campaign
-    ) and "(100.0, 0.0, 50.0) mm" in describe_reference_point(case.campaign)
+    assert find_in(folder) == []
+
+
+def test_the_reference_point_is_described_with_the_declared_offset_of_its_target(
+    tmp_path,
+):
+    folder = misdeclared_folder(tmp_path / "made", analysed("kuka"), "kuka", "", 0.0)
+    case, _ = cases_in(folder, ROBOTS)
+    sentence = describe_reference_point(case.campaign)
+    assert "6DoF" in sentence
+    assert "(100.0, 0.0, 50.0) mm" in sentence

@@ -53,8 +53,8 @@ PROBLEM = made_problem(
     ),
     UNITS,
 )[0]
-RAISED = Alarm(0.002, 9.0, True)
-SILENT = Alarm(0.4, -1.0, False)
+RAISED = Alarm(0.002, 9.0, raised=True)
+SILENT = Alarm(0.4, -1.0, raised=False)
 
 
 def made_posterior(*pairs):

@@ -159,7 +159,7 @@ def test_results_of_another_engine_are_refused(checkout, tmp_path):
     ("share", "judged", "decision"),
     [(0.2, 8, "fail"), (2.0, 8, "pass"), (2.0, 3, "undecided")],
 )
-def test_a_certificate_passes_below_and_fails_above_what_is_predicted_if_enough_configurations_judge(
+def test_a_certificate_follows_the_prediction_if_enough_configurations_judge(
     checkout, share, judged, decision
 ):
     found = load_diagnosed(checkout / "made", ROBOTS, checkout)

@@ -200,9 +200,9 @@ def parse_targets(
     targets = []
     for name, target in described.items():
         if not isinstance(name, str):
-            found = f"the name {name!r}, which YAML takes for no text"
+            finding = f"the name {name!r}, which YAML takes for no text"
             raise InputError(
-                source, "targets", found, "a name, in quotes where need be"
+                source, "targets", finding, "a name, in quotes where need be"
             )
         point = target["point"]
         if point not in points:

@@ -85,8 +85,8 @@ class CampaignFolder:
         if not is_file_in(folder / DOCUMENT, self.path.resolve().parent):
             raise InputError(self.source, key, repr(stated), allowed)
         if folder.samefile(self.path):
-            found = f"{stated!r}, the campaign itself"
-            raise InputError(self.source, key, found, allowed)
+            finding = f"{stated!r}, the campaign itself"
+            raise InputError(self.source, key, finding, allowed)
         return folder
 
     @cached_property

@@ -163,7 +163,7 @@ def _check_sizes(
     held_out_count = len(np.unique(configuration[held_out]))
     if training_count >= FEWEST_TRAINING_POSES and held_out_count >= fewest_held_out:
         return
-    found = (
+    finding = (
         f"{format_count(training_count, 'configuration')} to fit "
         f"and {held_out_count} held out"
     )
@@ -171,7 +171,7 @@ def _check_sizes(
     if fewest_held_out:
         allowed += f" and {fewest_held_out} held out"
     allowed += "; poses with the same joint angles are one"
-    raise InputError(source, "holdout", found, allowed)
+    raise InputError(source, "holdout", finding, allowed)
 
 
 def number_configurations(joint_angles: np.ndarray, pose: np.ndarray) -> np.ndarray:

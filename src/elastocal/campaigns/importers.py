@@ -150,9 +150,9 @@ def fetch(
             pooch.retrieve(file.address, f"sha256:{file.sha256}", download, folder)
         )
     except ValueError as error:
-        found = f"other contents ({error})"
+        finding = f"other contents ({error})"
         allowed = f"SHA-256 {file.sha256}"
-        raise InputError(file.address, "", found, allowed) from None
+        raise InputError(file.address, "", finding, allowed) from None
     except OSError as error:
         allowed = f"a network, or the folder in {FOLDER_VARIABLE} with {file.local}"
         raise InputError(file.address, "", f"no download ({error})", allowed) from None
@@ -307,10 +307,9 @@ class Importer:
             ]
         else:
             tables = [_tabulate(measured[0], self.same_pose_rad)]
-        table = {
-            column: np.concatenate([table[column] for table in tables])
-            for column in tables[0]
-        }
+        table = {}
+        for column in tables[0]:
+            table[column] = np.concatenate([session[column] for session in tables])
         targets = [
             target for measurements in measured for target in measurements.positions
         ]
@@ -531,9 +530,9 @@ def find_user_campaign(
         raise InputError(folder.source, "campaign", repr(name), allowed)
     earlier_path = _folder_of_results(Path(results, name))
     if earlier_path is not None and not earlier_path.samefile(path):
-        found = f"{name!r}, whose results are of {earlier_path.as_posix()}"
+        finding = f"{name!r}, whose results are of {earlier_path.as_posix()}"
         allowed = f"another name, or first take away {Path(results, name).as_posix()}"
-        raise InputError(folder.source, "campaign", found, allowed)
+        raise InputError(folder.source, "campaign", finding, allowed)
     return {name: folder}
 
 

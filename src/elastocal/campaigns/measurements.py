@@ -133,8 +133,8 @@ def find_files(folder: str | Path, *names: str) -> list[Path]:
                 path, "", f"{kind} that leads to no file", "the file itself"
             )
         if not is_file_in(path, folder):
-            found = "a link out of the campaign's folder"
-            raise InputError(path, "", found, "the file itself")
+            finding = "a link out of the campaign's folder"
+            raise InputError(path, "", finding, "the file itself")
     return paths
 
 
@@ -156,8 +156,10 @@ def read_measurements(folder: Path, joints: int, measured: str) -> Cells:
     """
     paths = find_files(folder, CSV, PARQUET)
     if len(paths) != 1:
-        found = f"both {CSV} and {PARQUET}" if paths else f"neither {CSV} nor {PARQUET}"
-        raise InputError(folder.as_posix(), "", found, "one of them")
+        finding = (
+            f"both {CSV} and {PARQUET}" if paths else f"neither {CSV} nor {PARQUET}"
+        )
+        raise InputError(folder.as_posix(), "", finding, "one of them")
     table = _read(paths[0], joints)
     if len(table.rows) == 0:
         allowed = "one row for each measurement of one target"
@@ -251,8 +253,8 @@ def check_column_names(names: Collection[str], joints: int, path: str) -> None:
     earlier = set()
     for name in names:
         if name in earlier:
-            found = f"column {name!r} twice"
-            raise InputError(path, "header", found, "each column once")
+            finding = f"column {name!r} twice"
+            raise InputError(path, "header", finding, "each column once")
         earlier.add(name)
     for name in names:
         if name not in known and name not in displayed and name != TICK_COLUMN:
@@ -364,8 +366,8 @@ def _read_parquet(path: str, joints: int) -> Cells:
         )
         table.validate(full=True)
     except (OSError, pa.ArrowException, UnicodeDecodeError) as error:
-        found = f"no readable Parquet file ({error})"
-        raise InputError(path, "", found, "a Parquet file") from None
+        finding = f"no readable Parquet file ({error})"
+        raise InputError(path, "", finding, "a Parquet file") from None
     columns = dict(zip(table.column_names, table.columns, strict=True))
     return Cells(path, columns, np.arange(1, table.num_rows + 1, dtype=np.int32))
 

@@ -106,13 +106,13 @@ def read_held_out_campaign(
     key = "holdout.campaign"
     if held_out.robot.chain != folder.robot.chain:
         allowed = f"a campaign of the same chain, {folder.robot.name}"
-        found = f"another chain, of {held_out.robot.name}"
-        raise InputError(folder.source, key, found, allowed)
+        finding = f"another chain, of {held_out.robot.name}"
+        raise InputError(folder.source, key, finding, allowed)
     pose_count = len(list_poses(held_out.measurements)[0])
     if pose_count < FEWEST_HELD_OUT_POSES:
-        found = f"{format_count(pose_count, 'pose')} there"
+        finding = f"{format_count(pose_count, 'pose')} there"
         allowed = f"{FEWEST_HELD_OUT_POSES} or more"
-        raise InputError(folder.source, key, found, allowed)
+        raise InputError(folder.source, key, finding, allowed)
     return held_out
 
 
@@ -165,9 +165,9 @@ def _check_compliance(folder: CampaignFolder, measurements: Measurements) -> Non
     nominal = folder.document.get("compliance", "nominal") == "nominal"
     if nominal and not folder.robot.compliance_known and measurements.wrench.any():
         file = folder.robot_file.name
-        found = f"nominal, but no compliance_urad_per_Nm in {file}, and loads"
+        finding = f"nominal, but no compliance_urad_per_Nm in {file}, and loads"
         allowed = "identify, or nominal with compliance_urad_per_Nm in the robot file"
-        raise InputError(folder.source, "compliance", found, allowed)
+        raise InputError(folder.source, "compliance", finding, allowed)
 
 
 def _check_noise(
@@ -181,16 +181,16 @@ def _check_noise(
     if noise is None:
         return
     if "position_m" in noise and measurements.u95_m is not None:
-        found = "beside a column u95_m of the measurements"
-        raise InputError(source, "noise.position_m", found, "one of them")
+        finding = "beside a column u95_m of the measurements"
+        raise InputError(source, "noise.position_m", finding, "one of them")
     if "position_m" not in noise and measurements.u95_m is None:
         allowed = "position_m, or a column u95_m of the measurements"
         raise InputError(source, "noise", "no position_m", allowed)
     joint_rad = noise.get("joint_rad", 0.0)
     if isinstance(joint_rad, list) and len(joint_rad) != robot.joints:
-        found = format_count(len(joint_rad), "number")
+        finding = format_count(len(joint_rad), "number")
         allowed = f"one for all joints, or {robot.joints}"
-        raise InputError(source, "noise.joint_rad", found, allowed)
+        raise InputError(source, "noise.joint_rad", finding, allowed)
 
 
 def _build_measurements(
@@ -298,9 +298,9 @@ def _refuse_duplicates(
         if name in table.columns
     ]
     target = targets[keys[row, -1]].name
-    found = f"{', '.join(numbers)}, target {target} again"
+    finding = f"{', '.join(numbers)}, target {target} again"
     allowed = f"each once (first in {table.place(first[group[row]])})"
-    raise table.fault(row, "", allowed, found)
+    raise table.fault(row, "", allowed, finding)
 
 
 def _refuse_undeclared_loads(measurements: Measurements, table: Cells) -> None:

@@ -293,7 +293,7 @@ class _Header:
         return f"line {self.line}" if self.line else "--columns"
 
 
-def read_text_table(
+def read_text_table(  # noqa: PLR0913 - independent options
     path: str | Path,
     is_header: Callable[[Sequence[str]], bool],
     stated: Dialect = _UNSTATED,
@@ -522,9 +522,9 @@ def _read_rows(data_lines: _NumberedLines, header: _Header, source: str) -> _Row
         while len(cells) > length and not cells[-1]:
             cells.pop()
         if len(cells) != length:
-            found = format_count(len(cells), "cell")
+            finding = format_count(len(cells), "cell")
             allowed = f"{length}, one for each column of {header.place}"
-            raise InputError(source, f"line {number}", found, allowed)
+            raise InputError(source, f"line {number}", finding, allowed)
         rows.append((number, cells))
     return rows
 
@@ -589,12 +589,12 @@ def _find_decimal(
     if comma is None:
         return "point"
     if point is not None:
-        found = f"{point[1]!r} in line {point[0]} and {comma[1]!r} in line {comma[0]}"
+        finding = f"{point[1]!r} in line {point[0]} and {comma[1]!r} in line {comma[0]}"
         allowed = (
             "one decimal mark, and none between thousands; --decimal point or comma "
             "says which"
         )
-        raise InputError(source, "", found, allowed)
+        raise InputError(source, "", finding, allowed)
     if separator == "comma" or not find_first(_CERTAIN_DECIMAL_COMMA, ","):
         allowed = (
             "--decimal comma where the comma is the decimal mark, or numbers without "

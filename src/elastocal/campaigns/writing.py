@@ -1,5 +1,5 @@
-"""A campaign's folder, written so that it is never half a campaign, and one to begin
-with: every key explained."""
+"""Write a campaign's folder, which is never half a campaign, and templates of
+``campaign.yaml`` and of a sheet."""
 
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -29,20 +29,27 @@ def write_campaign(
     joints: int,
     kind: str = "parquet",
 ) -> None:
-    """Write a campaign's folder; each file appears whole or not at all,
-    ``campaign.yaml`` last.
+    """Write a campaign's folder atomically, ``campaign.yaml`` last.
 
-    `folder`: made where it is not there. `document`: contents of ``campaign.yaml``.
-    `table`: columns of one length, named as in `file_columns`. `kind`: one of
-    "parquet", "csv". Raises `InputError`: a document that the schema refuses, or a
-    column that the format does not have.
+    Parameters
+    ----------
+    folder : made if it does not exist.
+    document : contents of ``campaign.yaml``.
+    table : columns of one length, named as in `describe_columns`.
+    joints : number of joints of the robot.
+    kind : "parquet" or "csv".
+
+    Raises
+    ------
+    InputError
+        If the schema refuses the document, or the format does not have a column.
     """
     folder = Path(folder)
     check_document(document, "campaign", (folder / DOCUMENT).as_posix())
     path = folder / (PARQUET if kind == "parquet" else CSV)
     check_column_names(table, joints, path.as_posix())
-    # Until its document is there the folder is no campaign; nor may it hold
-    # measurements of both kinds.
+    # The document is written last, because a folder without it is no campaign. Old
+    # measurements of the other kind are removed.
     with write_together(folder, (CSV, PARQUET, DOCUMENT)) as partial:
         write_measurements(partial / path.name, table, joints)
         text = yaml.safe_dump(
@@ -58,11 +65,14 @@ def write_campaign(
 def format_campaign_template(
     name: str, robot: Robot, targets: Sequence[str] = (), measured: str = "position"
 ) -> str:
-    """Text of a campaign.yaml to fill in, each key explained; those that it leaves out
-    stand as comments.
+    """Return the text of a campaign.yaml to fill in, with every key explained; optional
+    keys are comments.
 
-    `robot`: whose file is robot.yaml beside it. `targets`, `measured`: as the
-    measurements have them that lie there.
+    Parameters
+    ----------
+    name : name of the campaign.
+    robot : robot of the file robot.yaml in the same folder.
+    targets, measured : as in the measurements of the folder.
     """
     document = {
         "campaign": name,
@@ -95,7 +105,7 @@ def format_campaign_template(
 
 
 def format_sheet_header(joints: int) -> str:
-    """Header of a measurements.csv to fill in, without optional covariates."""
+    """Return the header of a measurements.csv to fill in, without optional columns."""
     optional = (
         "session",
         "approach",

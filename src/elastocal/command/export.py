@@ -109,15 +109,14 @@ def _describe_losses(
 
     warnings = []
     calibrated = campaign.calibrated
-    if calibrated.residual_model is not None:
-        remainder = campaign.verdict.remainder
-        name = remainder.words if remainder else ""
+    remainder = campaign.verdict.remainder
+    if remainder and calibrated.residual_model:
         displacements = predict_residual_displacements(
             calibrated, reported_angles, wrench
         )
         size = _format_size(np.linalg.norm(displacements, axis=1))
         warnings.append(
-            f"! no file holds the {name} on the remainder,"
+            f"! no file holds the {remainder.words} on the remainder,"
             f" which elastocal correct adds: {size}"
         )
     if folded.left_out:

@@ -304,15 +304,14 @@ def find_oversized_effects(fitted: Fit, names: Collection[str]) -> set[str]:
     names : collection of str
         Effects to look at.
     """
-    return {
-        effect.effect
-        for effect in fitted.model.effects
-        if effect.effect in names
-        and any(
-            _is_oversized(value, std_error, parameter)
-            for value, std_error, parameter in _generate_estimates(fitted, effect)
-        )
-    }
+    oversized = set()
+    for effect in fitted.model.effects:
+        if effect.effect not in names:
+            continue
+        for value, std_error, parameter in _generate_estimates(fitted, effect):
+            if _is_oversized(value, std_error, parameter):
+                oversized.add(effect.effect)
+    return oversized
 
 
 def _generate_estimates(

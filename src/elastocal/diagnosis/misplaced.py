@@ -85,8 +85,7 @@ class _FreeParameters:
             [kind in (_BASE, _LINK, _OFFSET) for kind in kinds], bool
         )
         is_angle = np.array([p.unit == "rad" for p in parameters], bool)
-        has_reflector = any(t.offset_m is not None for t in _end_targets(campaign))
-        tool = f"{_LINK}@{campaign.robot.joints}" if has_reflector else ""
+        tool = _find_tool(campaign)
         places = {}
         for index, (owner, kind) in enumerate(zip(owners, kinds, strict=True)):
             if kind in (_BASE, _LINK) and parameters[index].unit == "m":
@@ -277,11 +276,10 @@ def _find_wrong_shifts(equations: _NormalEquations) -> _WrongShifts:
 def _list_shifts(places: dict[int, str]) -> list[tuple[int, ...]]:
     """Ways to shift a frame, as indices of parameters: along one axis, or along all."""
     single = [(index,) for index in places]
-    whole = [
-        tuple(index for index in places if places[index] == place)
-        for place in dict.fromkeys(places.values())
-    ]
-    return list(dict.fromkeys([*single, *whole]))
+    whole: dict[str, tuple[int, ...]] = {}
+    for index, place in places.items():
+        whole[place] = (*whole.get(place, ()), index)
+    return list(dict.fromkeys([*single, *whole.values()]))
 
 
 def _choose_shift(
@@ -325,6 +323,14 @@ def describe_reference_point(campaign: Campaign) -> str:
             offset = _format_millimetres(target.offset_m)
             descriptions.append(f"{target.name} at {offset} of it")
     return f"All errors are those of {end}, measured by the target {'; '.join(descriptions)}."
+
+
+def _find_tool(campaign: Campaign) -> str:
+    """Key of the last link, whose end is the tool if a target with a declared offset is
+    on it; empty otherwise."""
+    if any(target.offset_m is not None for target in _end_targets(campaign)):
+        return f"{_LINK}@{campaign.robot.joints}"
+    return ""
 
 
 def _end_targets(campaign: Campaign) -> list[Target]:

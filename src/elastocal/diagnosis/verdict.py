@@ -167,6 +167,26 @@ def conclude(problem: SearchProblem, posterior: Posterior, alarm: Alarm) -> Conc
         return Conclusion(
             ADEQUATE, hypotheses, nothing, {}, mechanisms, nothing.probability
         )
+    return _choose_verdict(hypotheses, mechanisms, problem.settings)
+
+
+def _choose_verdict(
+    hypotheses: tuple[Hypothesis, ...],
+    mechanisms: dict[str, float],
+    settings: Settings,
+) -> Conclusion:
+    """Choose a verdict after an alarm, which has decided that something is missing.
+
+    Parameters
+    ----------
+    hypotheses : tuple of Hypothesis
+        The most probable one first.
+    mechanisms : dict
+        Posterior inclusion probabilities.
+    settings : Settings
+        The losses.
+    """
+    nothing = next(h for h in hypotheses if not h.mechanisms)
     missing = [hypothesis for hypothesis in hypotheses if hypothesis.mechanisms]
     by_verdict: dict[str, list[Hypothesis]] = {UNEXPLAINED: [], CLASS: [], SEVERAL: []}
     for hypothesis in missing:
@@ -174,9 +194,7 @@ def conclude(problem: SearchProblem, posterior: Posterior, alarm: Alarm) -> Conc
     verdict = max(by_verdict, key=lambda name: _sum_probabilities(by_verdict[name]))
     best = next(iter(by_verdict[verdict]), nothing)
     competitors = [hypothesis for hypothesis in missing if hypothesis != best]
-    state_alone, stated = _minimize_expected_loss(
-        [best, *competitors], problem.settings
-    )
+    state_alone, stated = _minimize_expected_loss([best, *competitors], settings)
     alternatives: dict[str, tuple[str, ...]] = {}
     if verdict == UNEXPLAINED or not stated:
         verdict = UNEXPLAINED

@@ -73,9 +73,9 @@ class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[mi
                 continue
             first = first_nodes.setdefault(key.value, key)
             if first is not key:
-                found = f"the key {key.value!r} again"
+                finding = f"the key {key.value!r} again"
                 allowed = f"each key once (first in line {first.start_mark.line + 1})"
-                raise _UnclearError(key.start_mark, found, allowed)
+                raise _UnclearError(key.start_mark, finding, allowed)
         mapping: dict[Any, Any] = super().construct_mapping(node, deep)
         return mapping
 
@@ -164,15 +164,15 @@ def parse_yaml(text: str, source: str | Path) -> Any:
         return yaml.load(text, Loader=_Loader)
     except yaml.reader.ReaderError as error:
         line = text.count("\n", 0, error.position) + 1
-        found = f"the control character {chr(error.character)!r}"
-        raise InputError(source, f"line {line}", found, "YAML") from None
+        finding = f"the control character {chr(error.character)!r}"
+        raise InputError(source, f"line {line}", finding, "YAML") from None
     except _UnclearError as error:
-        found = str(error.problem)
-        raise InputError(source, f"line {error.line}", found, error.allowed) from None
+        finding = str(error.problem)
+        raise InputError(source, f"line {error.line}", finding, error.allowed) from None
     except yaml.MarkedYAMLError as error:
         mark: Any = error.problem_mark or error.context_mark
-        found = _describe_yaml_error(str(error.problem), text, mark)
-        raise InputError(source, f"line {mark.line + 1}", found, "YAML") from None
+        finding = _describe_yaml_error(str(error.problem), text, mark)
+        raise InputError(source, f"line {mark.line + 1}", finding, "YAML") from None
 
 
 def _describe_yaml_error(problem: str, text: str, mark: Any) -> str:
@@ -199,26 +199,26 @@ def _check_events(text: str) -> None:
     for event in yaml.parse(text, Loader=_Loader):
         if isinstance(event, yaml.ScalarEvent | yaml.CollectionStartEvent):
             if event.tag is not None:
-                found = f"the tag {event.tag}"
-                raise _UnclearError(event.start_mark, found, "values without tags")
+                finding = f"the tag {event.tag}"
+                raise _UnclearError(event.start_mark, finding, "values without tags")
             value_count += 1
             expanded_count += 1
         if isinstance(event, yaml.AliasEvent):
             if any(anchors):
-                found = f"the alias *{event.anchor}"
-                raise _UnclearError(event.start_mark, found, "one in no other anchor")
+                finding = f"the alias *{event.anchor}"
+                raise _UnclearError(event.start_mark, finding, "one in no other anchor")
             expanded_count += value_count
         if isinstance(event, yaml.CollectionStartEvent):
             anchors.append(event.anchor)
         elif isinstance(event, yaml.CollectionEndEvent):
             anchors.pop()
         if len(anchors) >= DEEPEST:
-            found = "lists or keys in each other"
-            raise _UnclearError(event.start_mark, found, f"at most {DEEPEST} deep")
+            finding = "lists or keys in each other"
+            raise _UnclearError(event.start_mark, finding, f"at most {DEEPEST} deep")
         if expanded_count > MOST_VALUES:
-            found = "more values than a document has"
+            finding = "more values than a document has"
             allowed = f"at most {MOST_VALUES} with aliases"
-            raise _UnclearError(event.start_mark, found, allowed)
+            raise _UnclearError(event.start_mark, finding, allowed)
 
 
 def format_one_line(value: Any) -> str:
@@ -340,8 +340,8 @@ def _explain(error: Any) -> tuple[list[str | int], str, str]:
         )
         allowed = _describe_schema(schema["properties"][missing])
         return [*path, missing], "nothing", allowed
-    found = "nothing" if error.instance is None else repr(error.instance)
-    return path, found, _describe_schema(schema) or error.message
+    finding = "nothing" if error.instance is None else repr(error.instance)
+    return path, finding, _describe_schema(schema) or error.message
 
 
 _KINDS = {

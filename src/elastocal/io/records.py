@@ -104,8 +104,8 @@ def read_record(path: str, within: str | Path = "") -> tuple[JobRecord, dict[str
     """
     record_path = locate_record(path, within)
     if not record_path.is_file():
-        found = f"no record of the job that made it, {record_path}"
-        raise InputError(Path(within, path), "", found, _AS_WRITTEN.format("it"))
+        finding = f"no record of the job that made it, {record_path}"
+        raise InputError(Path(within, path), "", finding, _AS_WRITTEN.format("it"))
     try:
         record = read_json(record_path)
         if record.pop(_DIGEST) != configuration_sha256(record):

@@ -161,9 +161,11 @@ def _check_schema(path: str | Path, file: pq.ParquetFile, schema: TableSchema) -
     for column in schema.columns:
         expected = _arrow_type(column)
         if types.get(column.name) != expected:
-            found = f"type {types[column.name]}" if column.name in types else "nothing"
+            finding = (
+                f"type {types[column.name]}" if column.name in types else "nothing"
+            )
             key = f"column {column.name}"
-            raise InputError(path, key, found, f"type {expected}")
+            raise InputError(path, key, finding, f"type {expected}")
 
 
 def _read_row_group(
@@ -172,8 +174,8 @@ def _read_row_group(
     try:
         table = file.read_row_group(group, names, use_threads=False)
     except (OSError, pa.ArrowException) as error:
-        found = f"unreadable data ({error})"
-        raise InputError(path, f"row group {group}", found, _AS_WRITTEN) from None
+        finding = f"unreadable data ({error})"
+        raise InputError(path, f"row group {group}", finding, _AS_WRITTEN) from None
     return {name: _to_numpy(table.column(name)) for name in names}
 
 
@@ -187,8 +189,8 @@ def read_table(
     blocks = list(read_blocks(path, schema, columns, **where))
     if where and not blocks:
         key = ", ".join(where)
-        found = ", ".join(map(repr, where.values()))
-        raise InputError(path, key, found, "values in the file")
+        finding = ", ".join(map(repr, where.values()))
+        raise InputError(path, key, finding, "values in the file")
     wanted = [
         column for column in schema.columns if columns is None or column.name in columns
     ]
@@ -198,7 +200,10 @@ def read_table(
             for column in wanted
         }
     names = [column.name for column in wanted]
-    return {name: np.concatenate([block[name] for block in blocks]) for name in names}
+    table = {}
+    for name in names:
+        table[name] = np.concatenate([block[name] for block in blocks])
+    return table
 
 
 def read_provenance(path: str | Path) -> dict[str, Any]:
@@ -213,8 +218,8 @@ def _open_parquet(path: str | Path) -> pq.ParquetFile:
         check_file(path)
         return pq.ParquetFile(path)
     except (OSError, pa.ArrowException) as error:
-        found = f"no readable Parquet file ({error})"
-        raise InputError(path, "", found, _AS_WRITTEN) from None
+        finding = f"no readable Parquet file ({error})"
+        raise InputError(path, "", finding, _AS_WRITTEN) from None
 
 
 def _read_metadata(
@@ -309,8 +314,8 @@ def _check_block(
     texts = {name: value for name, value in block.items() if isinstance(value, str)}
     lengths = {len(array) for name, array in arrays.items() if name not in texts}
     if len(lengths) != 1:
-        found = f"columns of {sorted(lengths)} rows"
-        raise InputError(path, "rows", found, "columns of one length")
+        finding = f"columns of {sorted(lengths)} rows"
+        raise InputError(path, "rows", finding, "columns of one length")
     for column in schema.columns:
         _check_values(path, column, arrays[column.name])
     (rows,) = lengths

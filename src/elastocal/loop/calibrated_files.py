@@ -202,15 +202,18 @@ def _describe_origin(
     jobs: Sequence[JobRecord], data: Collection[tuple[str, str]]
 ) -> dict[str, Any]:
     """Return commit, digests and environment of the jobs behind a verdict."""
-    sources = {file: digest for job in jobs for file, digest in job.sources.items()}
+    sources: dict[str, str] = {}
+    environment = {}
+    for job in jobs:
+        sources |= job.sources
+    for name in jobs[-1].environment:
+        versions = [job.environment.get(name, "none") for job in jobs]
+        environment[name] = _join_distinct(versions)
     return {
         "commit": _join_distinct(job.origin.commit for job in jobs),
         "code_sha256": configuration_sha256(sources),
         "data_sha256": configuration_sha256(sorted(data)),
-        "environment": {
-            name: _join_distinct(job.environment.get(name, "none") for job in jobs)
-            for name in jobs[-1].environment
-        },
+        "environment": environment,
     }
 
 

@@ -26,10 +26,11 @@ from elastocal.random_streams import open_stream
 from elastocal.verdict import TrainingVerdict
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
     from pathlib import Path
 
     from elastocal.diagnosis.verdict import Evidence
+    from elastocal.effects.protocol import Candidate
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Case, Model
 
@@ -107,27 +108,30 @@ def diagnosis_facts(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def _step_facts(step: Step) -> dict[str, Any]:
+    """Return model, priors and estimate of a step, as diagnosis.json has them."""
     effects = step.fitted.model.effects
     estimate = step.fitted.estimate
-    parts: dict[str, Any] = {
-        name: getattr(estimate, name).tolist() for name in _PLACEMENTS
-    }
-    parts |= {
-        name: [values.tolist() for values in getattr(estimate, name)]
-        for name in _OF_EFFECTS
-    }
+    stated: dict[str, Any] = {"sessions": [int(entry) for entry in estimate.sessions]}
+    for name in _PLACEMENTS:
+        stated[name] = getattr(estimate, name).tolist()
+    for name in _OF_EFFECTS:
+        stated[name] = _list_arrays(getattr(estimate, name))
     return {
         "name": step.name,
         "kind": step.kind,
         "noise": serialize_noise(step.fitted.noise),
         "effects": [effect.key for effect in effects],
-        "priors": [
-            [parameter.prior_std for parameter in effect.parameters]
-            for effect in effects
-        ],
-        "estimate": {"sessions": [int(session) for session in estimate.sessions]}
-        | parts,
+        "priors": [_list_priors(effect) for effect in effects],
+        "estimate": stated,
     }
+
+
+def _list_arrays(arrays: Iterable[np.ndarray]) -> list[list[float]]:
+    return [values.tolist() for values in arrays]
+
+
+def _list_priors(effect: Candidate) -> list[float | None]:
+    return [parameter.prior_std for parameter in effect.parameters]
 
 
 def final_parameters(
@@ -160,6 +164,7 @@ def diagnosis_from(case: Case, facts: Mapping[str, Any]) -> Diagnosis:
         None,
         from_document(TrainingVerdict, facts["document"], "diagnosis.json"),
         measurements.select(left_out),
+        Settings.from_document(facts["document"]["settings"]),
     )
 
 
@@ -179,28 +184,25 @@ def step_fit(case: Case, step: Mapping[str, Any]) -> Fit:
 
 
 def step_model(case: Case, step: Mapping[str, Any]) -> tuple[Model, Estimate]:
-    """Model of one step of diagnosis.json and its estimate, without fitting it
-    again."""
-    known = {effect.key: effect for effect in case.model.effects} | case.candidates
-    stated = step["estimate"]
+    """Return model and estimate of one step of diagnosis.json, without a fit."""
+    catalogue = {effect.key: effect for effect in case.model.effects} | case.candidates
     effects = []
     for key, priors in zip(step["effects"], step["priors"], strict=True):
-        # A prior that the catalogue does not have is one whose size was estimated.
+        effect = catalogue[key]
+        # A prior that differs from the catalogue's is one whose size was estimated.
         parameters = tuple(
-            replace(p, prior_std=prior, sized=prior != p.prior_std)
-            for p, prior in zip(known[key].parameters, priors, strict=True)
+            replace(parameter, prior_std=prior, sized=prior != parameter.prior_std)
+            for parameter, prior in zip(effect.parameters, priors, strict=True)
         )
-        effects.append(replace(known[key], parameters=parameters))
-    parts: dict[str, Any] = {
-        name: np.array(stated[name], float) for name in _PLACEMENTS
-    }
-    parts |= {
-        name: tuple(np.array(values, float) for values in stated[name])
-        for name in _OF_EFFECTS
-    }
-    return replace(case.model, effects=tuple(effects)), Estimate(
-        tuple(stated["sessions"]), **parts
-    )
+        effects.append(replace(effect, parameters=parameters))
+    stated = step["estimate"]
+    values: dict[str, Any] = {}
+    for name in _PLACEMENTS:
+        values[name] = np.array(stated[name], float)
+    for name in _OF_EFFECTS:
+        values[name] = tuple(np.array(entry, float) for entry in stated[name])
+    model = replace(case.model, effects=tuple(effects))
+    return model, Estimate(tuple(stated["sessions"]), **values)
 
 
 def candidate_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:

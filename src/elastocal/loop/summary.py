@@ -50,12 +50,18 @@ def campaign_rows(
     folds: dict[str, list[str]],
     seed: int,
 ) -> pd.DataFrame:
-    """One row for each campaign and session, and one for all folds of a campaign
-    together.
+    """Return one row for each campaign and session, and one for all folds of a campaign.
 
-    `verdicts`: contents of verdict.json by campaign. `residuals`: held-out rows of
-    residuals.parquet. `folds`: campaigns that hold out the folds of one set of
-    measurements, by a name for all. `seed`: of the bootstrap over poses.
+    Parameters
+    ----------
+    verdicts : mapping of Verdict
+        Verdicts by name of the campaign.
+    residuals : mapping of pd.DataFrame
+        Held-out rows of the residuals tables.
+    folds : dict
+        Campaigns that hold out the folds of one set of measurements, by a common name.
+    seed : int
+        Seed of the bootstrap over poses.
     """
     pooled = {name for names in folds.values() for name in names}
     groups = {name: [name] for name in verdicts if name not in pooled} | folds

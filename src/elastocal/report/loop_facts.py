@@ -489,31 +489,36 @@ def _format_length(length: float, unit: str) -> str:
 def step_rows(
     steps: Sequence[Mapping[str, Any]], floor_m: float | None
 ) -> dict[str, Any]:
-    """Rows of the table before and after; each error as a list of lines: value,
-    interval, multiple of the noise floor."""
+    """Return the table of errors before and after, with its unit.
+
+    Parameters
+    ----------
+    steps : sequence of mappings
+        Rows of before_after.csv.
+    floor_m : float or None
+        RMS error of the noise alone.
+
+    Returns
+    -------
+    dict
+        ``unit`` and ``rows``; each error is a list of lines: value, interval, multiple
+        of the noise floor.
+    """
     factor, unit = say.unit_of(max(step["heldout_max_m"] for step in steps))
     rows = []
     for step in steps:
-        multiples = {
-            name: [f"{step[f'heldout_{name}_over_floor']:.2f} × floor"]
-            if floor_m
-            else []
-            for name in METRICS
-        }
-        cells = [
-            [*_cell(step, f"heldout_{name}_m", factor, unit), *multiples[name]]
-            for name in METRICS
-        ]
-        train = factor * step["train_rms_m"]
-        row = {
-            "name": say.in_words(step["step"]),
-            "kind": step["kind"],
-            "parameters": str(int(step["parameters"])),
-        }
+        cells = []
+        for metric in METRICS:
+            cell = _cell(step, f"heldout_{metric}_m", factor, unit)
+            if floor_m:
+                cell.append(f"{step[f'heldout_{metric}_over_floor']:.2f} × floor")
+            cells.append(cell)
         rows.append(
-            row
-            | {
-                "training": f"{train:.3f}" if unit == "mm" else f"{train:.0f}",
+            {
+                "name": say.in_words(step["step"]),
+                "kind": step["kind"],
+                "parameters": str(int(step["parameters"])),
+                "training": _format_length(factor * step["train_rms_m"], unit),
                 "cells": cells,
             }
         )
@@ -521,38 +526,25 @@ def step_rows(
 
 
 def experiment_facts(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Table of the states proposed, angles in degrees."""
+    """Return the table of the proposed states, with angles in degrees."""
     if not rows:
         return {"loaded": False, "heads": [], "rows": [], "points": ""}
     angles = [name for name in rows[0] if re.fullmatch(r"q\d+", name)]
     loads = {"fx": "N", "fy": "N", "fz": "N", "mx": "N·m", "my": "N·m", "mz": "N·m"}
-    # There are no columns of loads where all states are unloaded.
-    loads = loads if any(row[name] for row in rows for name in loads) else {}
+    # Without loads the table has no columns for them.
+    if not any(row[name] for row in rows for name in loads):
+        loads = {}
     shown = []
     for row in rows:
-        cells = [
-            *(f"{np.degrees(row[name]):.1f}" for name in angles),
-            *(f"{round(row[name])}" for name in loads),
-        ]
-        shown.append(
-            [
-                say.minus(cell)
-                for cell in (
-                    *cells,
-                    say.plain(row["separation"]),
-                    say.percent(row["resolved"]),
-                )
-            ]
-        )
-    heads = [
-        *(f"{name} °" for name in angles),
-        *(f"{name} {unit}" for name, unit in loads.items()),
-        "separation",
-        "resolved",
-    ]
+        cells = [f"{np.degrees(row[name]):.1f}" for name in angles]
+        cells += [f"{round(row[name])}" for name in loads]
+        cells += [say.plain(row["separation"]), say.percent(row["resolved"])]
+        shown.append([say.minus(cell) for cell in cells])
+    heads = [f"{name} °" for name in angles]
+    heads += [f"{name} {unit}" for name, unit in loads.items()]
     return {
         "loaded": bool(loads),
-        "heads": heads,
+        "heads": [*heads, "separation", "resolved"],
         "rows": shown,
         "points": say.listed(rows[0]["point"].split()),
     }
@@ -580,45 +572,41 @@ def compliance_rows(compliances: Compliances) -> list[list[str]]:
 
 
 def held_rows(held: Iterable[str]) -> list[list[str]]:
-    """Parameters that the measurements do not determine, one row for each owner."""
-    owners: dict[str, list[str]] = {}
-    for owner, _, parameter in (name.rpartition(" ") for name in held):
-        owners.setdefault(owner, []).append(
-            say.parameter_words(effect_of(owner), parameter)
-        )
+    """Return the parameters that the measurements do not determine, one row for each
+    owner."""
+    names_by_owner: dict[str, list[str]] = {}
+    for key in held:
+        owner, _, parameter = key.rpartition(" ")
+        words = say.parameter_words(effect_of(owner), parameter)
+        names_by_owner.setdefault(owner, []).append(words)
     return [
         [say.capital(say.candidate_words(owner)), ", ".join(names)]
-        for owner, names in owners.items()
+        for owner, names in names_by_owner.items()
     ]
 
 
 def left_to_priors(parameters: Mapping[str, np.ndarray]) -> list[str]:
-    """Parameters about which the measurements say hardly more than their priors: owner
-    and name, as in ``held``."""
-    mine = (
-        parameters["std_error"] > MOSTLY_PRIOR * parameters["prior_std"]
-    ) & ~parameters["held"].astype(bool)
-    return [
-        f"{owner} {name}"
-        for owner, name in zip(
-            parameters["owner"][mine], parameters["parameter"][mine], strict=True
-        )
-    ]
+    """Return the parameters about which the measurements say hardly more than their
+    priors: owner and name."""
+    is_wide = parameters["std_error"] > MOSTLY_PRIOR * parameters["prior_std"]
+    selected = is_wide & ~parameters["held"].astype(bool)
+    owners = parameters["owner"][selected]
+    names = parameters["parameter"][selected]
+    return [f"{owner} {name}" for owner, name in zip(owners, names, strict=True)]
 
 
 def untestable_rows(untestable: Mapping[str, str]) -> list[list[str]]:
-    """Candidates that were not tested, by their reasons, one row for each effect and
-    reason."""
-    found: dict[tuple[str, str], list[str]] = {}
+    """Return the candidates that were not tested, one row for each effect and reason."""
+    keys_by_cause: dict[tuple[str, str], list[str]] = {}
     for key, reason in untestable.items():
-        found.setdefault(
-            (effect_of(key), reason.replace("no approach", "no direction of approach")),
-            [],
-        ).append(key)
+        words = reason.replace("no approach", "no direction of approach")
+        keys_by_cause.setdefault((effect_of(key), words), []).append(key)
     rows = []
-    for (effect, reason), keys in found.items():
-        where = say.place_words(keys)
-        if len(where) > _MAX_LOCATION_LETTERS:
-            where = f"{say.place_words(keys[:_SHOWN_LOCATIONS])} and {len(keys) - _SHOWN_LOCATIONS} more"
-        rows.append([say.capital(say.physical_name(effect)), where or "–", reason])
+    for (effect, reason), keys in keys_by_cause.items():
+        locations = say.place_words(keys)
+        if len(locations) > _MAX_LOCATION_LETTERS:
+            first = say.place_words(keys[:_SHOWN_LOCATIONS])
+            locations = f"{first} and {len(keys) - _SHOWN_LOCATIONS} more"
+        name = say.capital(say.physical_name(effect))
+        rows.append([name, locations or "–", reason])
     return sorted(rows, key=lambda row: (row[2], row[0]))

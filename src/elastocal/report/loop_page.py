@@ -59,11 +59,7 @@ def loop_page(
     shown = _select_measurements(table)
     selection = {name: values[shown] for name, values in table.items()}
     position = np.column_stack([selection[name] for name in "xyz"])
-    residuals_um = {
-        stage: say.MICRO
-        * np.column_stack([selection[f"{stage}_d{axis}"] for axis in "xyz"])
-        for stage in _STAGES
-    }
+    residuals_um = {stage: _stack_residuals_um(selection, stage) for stage in _STAGES}
     has_changed = not np.allclose(
         residuals_um["before"], residuals_um["after"], rtol=0, atol=0.01
     )
@@ -130,6 +126,12 @@ def _draw_poses(selection: Mapping[str, np.ndarray], robot: Robot) -> dict[str, 
     }
 
 
+def _stack_residuals_um(selection: Mapping[str, np.ndarray], stage: str) -> np.ndarray:
+    """Return the position residuals (N, 3) of a stage, µm."""
+    components = [selection[f"{stage}_d{axis}"] for axis in "xyz"]
+    return say.MICRO * np.column_stack(components)
+
+
 def _scale_arrows(position: np.ndarray, residual_um: np.ndarray) -> float:
     """Return the magnification at which the median arrow has its usual length."""
     median_m = np.median(np.linalg.norm(residual_um, axis=1)) / say.MICRO
@@ -180,6 +182,11 @@ def _spread(count: int, limit: int) -> np.ndarray:
     return np.unique(indices.round().astype(int))
 
 
+def _round_values(values: np.ndarray) -> list[float]:
+    """Round to five significant digits."""
+    return [float(f"{value:.5g}") for value in values]
+
+
 def _list_quantities(
     selection: Mapping[str, np.ndarray], robot: Robot
 ) -> list[dict[str, Any]]:
@@ -205,7 +212,7 @@ def _list_quantities(
         {
             "name": name,
             "unit": unit,
-            "values": [float(f"{value:.5g}") for value in values],
+            "values": _round_values(values),
         }
         for name, unit, values in quantities
         if np.isfinite(values).all() and np.ptp(values) > 0

@@ -420,13 +420,12 @@ def _choose_unit(value: float, unit: str) -> tuple[float, str]:
     """Return the factor of a prefix that suits a value, and the unit with it."""
     factor = 1.0
     prefix = ""
-    if re.match(r"rad\b(?!/rad)", unit) and abs(value) < 1e-2:
+    is_angle = bool(re.match(r"rad\b(?!/rad)", unit))
+    is_length = bool(re.match(r"m\b(?!/m)", unit))
+    if (is_angle and abs(value) < 1e-2) or (is_length and abs(value) < 1e-3):
         factor = MICRO
         prefix = "µ"
-    elif re.match(r"m\b(?!/m)", unit) and abs(value) < 1e-3:
-        factor = MICRO
-        prefix = "µ"
-    elif re.match(r"m\b(?!/m)", unit) and abs(value) < 1:
+    elif is_length and abs(value) < 1:
         factor = MILLI
         prefix = "m"
     shown = prefix + ("" if unit in ("1", "–") else unit)
