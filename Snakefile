@@ -1,5 +1,7 @@
-"""`snakemake -j2` makes the paper's tables and figures from seeds and closes the loop on a simulated and a measured robot; the
-target `study` makes the rest of the study: further questions, repeated studies and designs."""
+"""Regenerate the paper's tables and figures from seeds, and close the loop on a simulated and a measured robot: `snakemake -j2`.
+
+The target `study` makes the rest of the study: further questions, repeated studies and designs.
+"""
 
 
 include: "workflow/rules/begin.smk"
@@ -8,7 +10,7 @@ include: "workflow/rules/begin.smk"
 configfile: f"{workflow.basedir}/config.yaml"
 
 
-# What stands above the results in `snakemake --report`.
+# Introduction of `snakemake --report`.
 report: f"{workflow.basedir}/workflow/report/workflow.rst"
 
 
@@ -35,24 +37,21 @@ watch_sources()
 
 
 onstart:
-    # While Snakemake limits how many jobs start in a time, and by default it does, to 100 a second, each look at what is ready
-    # starts a timer for another look, so a second later there are as many looks as there were, and each job adds one for good.
-    # No machine of ours starts 100 jobs in a second: what limits them is cores, or Slurm.
-    limit = workflow.scheduling_settings.max_jobs_per_timespan
-    if limit is not None and limit.max_jobs >= 100 * limit.timespan:
-        workflow.scheduler.job_rate_limiter = None
-    remember_checksums()
-    # Not of jobs that another machine runs; on Linux alone a process can wait for others and for requests at once.
-    if workflow.local_exec and hasattr(os, "pidfd_open"):
-        start_warm()
+    snakemake_internals.lift_rate_limit(workflow)
+    snakemake_internals.remember_checksums()
+    if snakemake_internals.runs_jobs_here(workflow):
+        start_script = start_server()
+        # Without a server Snakemake starts an interpreter for each job, which is slower and otherwise the same.
+        if start_script is not None:
+            snakemake_internals.replace_script_runner(start_script)
 
 
 onsuccess:
-    for line in outcome(file for job in workflow.dag.jobs for file in job.output):
+    for line in outcome(snakemake_internals.files_of_jobs(workflow)):
         logger.info(line)
 
 
-# The paper's Tables 1-4 and Figures 2-5, each printed figure beside ours.
+# The paper's Tables 1 to 4 and Figures 2 to 5, with each printed figure beside ours.
 rule paper:
     input:
         rules.compile_paper.output.report,
@@ -65,7 +64,7 @@ rule paper:
         lambda wildcards: files_behind(rules.paper.input),
 
 
-# What the study asks beyond the paper's tables, and its report.
+# The questions of the study beyond the paper's tables, and its report.
 rule study:
     input:
         rules.paper.input,

@@ -1,5 +1,7 @@
 """Sentences and tables of an accuracy statement."""
 
+from types import SimpleNamespace
+
 import pytest
 
 from elastocal.application.accuracy import Accuracy
@@ -37,4 +39,5 @@ def test_a_bound_is_stated_if_there_is_one():
 
 
 def test_no_errors_are_tabulated_if_the_data_are_at_fault():
-    assert tabulate_errors({"accuracy": None}) == []
+    verdict = SimpleNamespace(accuracy=None, uncorrected_m=None)
+    assert tabulate_errors(verdict) == []

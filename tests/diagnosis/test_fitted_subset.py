@@ -48,7 +48,7 @@ def test_the_last_step_of_a_long_campaign_leaves_at_most_a_tenth_of_a_standard_e
     converged = subset.fit_to_all(subset.declared)
     for module in ("fitting.least_squares", "diagnosis.fitted_subset"):
         monkeypatch.setattr(f"elastocal.{module}.LARGE_FIT_SIZE", 30)
-    monkeypatch.setattr("elastocal.fitting.least_squares._STEPPING_STONE", 36)
+    monkeypatch.setattr("elastocal.fitting.least_squares._INTERMEDIATE_SAMPLE_SIZE", 36)
     one_step = subset.fit_to_all(subset.declared)
     exact = fit_model(converged.model, subset.case.observations, converged.noise)
     after_one_step, after_convergence, at_optimum = (

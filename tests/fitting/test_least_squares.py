@@ -178,7 +178,7 @@ def test_a_linear_problem_has_the_generalized_least_squares_solution_with_its_pr
 
 
 @pytest.mark.parametrize("plausible", [1e-8, 1.0])
-def test_what_has_a_prior_or_starts_larger_is_as_large_as_these_say_however_small_its_plausible_size(
+def test_plausible_sizes_are_no_smaller_than_the_prior_and_the_start(
     plausible,
 ):
     model = gantry_model(linear_law(3, [None, 3e-6, None], plausible))

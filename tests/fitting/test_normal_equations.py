@@ -47,9 +47,12 @@ from elastocal.fitting.observations import Observations
 
 
 def solved(
-    left, right, plausible, frozen=False, penalty=0.0, present=0.0, nonlinear=False
+    left, right, plausible, *, frozen=False, penalty=0.0, present=0.0, nonlinear=False
 ):
-    """By the normal equations of whitened sensitivities and residual."""
+    """Solve the normal equations of whitened sensitivities and residual.
+
+    Returns the step, the covariance, and which parameters are unidentifiable.
+    """
     scaled = left * plausible
     frozen, penalty, present, nonlinear = (
         np.broadcast_to(values, len(plausible))
@@ -75,7 +78,7 @@ def test_solution_with_a_prior_is_that_of_numpy_with_a_row_for_each_prior():
     rows = np.concatenate([left, root])
     ends = np.concatenate([right, -root @ present])
     step, covariance, held = solved(
-        left, right, np.full(6, 2.0), False, penalty, present
+        left, right, np.full(6, 2.0), penalty=penalty, present=present
     )
     np.testing.assert_allclose(step, np.linalg.lstsq(rows, ends)[0], rtol=1e-9)
     np.testing.assert_allclose(

@@ -4,7 +4,7 @@
 hold, reports/audit.txt; where one does not, it ends with an error. Files of other targets, such as blind, are audited where they are.
 """
 
-# Targets that are audited where they have finished, by what each makes last.
+# Targets that are audited too if they have finished, with the last file of each.
 AUDITED_TOO = {
     "study": "reports/study.pdf",
     "loop": "reports/loop/campaigns.csv",
@@ -26,9 +26,9 @@ rule audit_files:
     params:
         robots=STUDY.robots,
         strategies=STUDY.strategies,
-        configuration={key: config[key] for key in AUDITED},
+        configuration={key: config[key] for key in AUDITED_KEYS},
         rows=config["audit"]["rows"],
-        # Where another target has run since, the audit is anew; it makes none of them run.
+        # The audit runs again after another target has finished; it does not start one.
         others=lambda wildcards: {
             target: compute_sha256(file) if Path(file).is_file() else ""
             for target, file in AUDITED_TOO.items()

@@ -1,8 +1,7 @@
-"""What all rules share: the checked configuration, the names that paths are made of, and the sources behind each script."""
+"""What all rules share: the checked configuration, the names in paths, and the sources of each script."""
 
 import gc
 import hashlib
-import os
 import re
 import sys
 from functools import cache
@@ -10,14 +9,11 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import elastocal
-from snakemake.io import _IOFile
-from snakemake.iocontainers import Wildcards
-
 from elastocal.campaigns.importers import (
+    read_campaign_sources,
     find_importer,
     find_user_campaign,
     list_league_data,
-    read_campaign_sources,
 )
 from elastocal.errors import InputError
 from elastocal.io.origin import SOURCES_DIGEST, Origin, configuration_sha256, environment
@@ -25,13 +21,10 @@ from elastocal.io.records import compute_sha256
 from elastocal.report.outcome import outcome
 from elastocal.study.configuration import check_study, count_components, override_entries
 
-ROOT = Path(workflow.basedir)
-sys.path.insert(0, str(ROOT / "workflow" / "rules"))
-
 from commit import commit_of
 from import_closure import closure
 from one_run import begin
-from warm_start import start_warm
+from warm_start import start_server
 
 # In a checkout the package stands beside the rules; a wheel puts them apart.
 PACKAGES = ROOT / "src" if (ROOT / "src").is_dir() else Path(elastocal.__file__).parents[1]
@@ -39,17 +32,22 @@ PACKAGES = ROOT / "src" if (ROOT / "src").is_dir() else Path(elastocal.__file__)
 
 @cache
 def placed(file):
-    """A file of the workflow or the package by the name that rules have for it: in a checkout, which may move, without the folders above."""
-    return (file.relative_to(Path.cwd()) if file.is_relative_to(Path.cwd()) else file).as_posix()
+    """Return the name that rules use for a file of the workflow or the package.
+
+    Inside the working directory it is relative, so that a checkout may move.
+    """
+    if file.is_relative_to(Path.cwd()):
+        file = file.relative_to(Path.cwd())
+    return file.as_posix()
 
 
 CONFIG = placed(ROOT / "config")
 # Measured data that come with the project.
-BOX = placed(ROOT / "data" / "measured")
+INCLUDED_DATA = placed(ROOT / "data" / "measured")
 
 
 def shown(file, caption, category, **labels):
-    """An output that `snakemake --report` shows; its caption is a page of workflow/report."""
+    """Mark an output for `snakemake --report`, with a caption from workflow/report."""
     return report(
         file,
         caption=str(ROOT / "workflow" / "report" / f"{caption}.rst"),
@@ -59,27 +57,26 @@ def shown(file, caption, category, **labels):
 
 
 # Categories of the report.
-PAPER, ABOUT = "Tables and figures of the paper", "Questions beyond the paper"
+PAPER = "Tables and figures of the paper"
+QUESTIONS_BEYOND = "Questions beyond the paper"
 
 
-def table_of(name, category, caption=None, shows=None):
-    """A table for people, shown where it has a caption."""
-    file = f"reports/tables/{name}.csv"
-    return shown(file, caption, category, shows=shows, kind="table") if caption else file
+def shown_table(file, caption, category, shows):
+    return shown(file, caption, category, shows=shows, kind="table")
 
 
-# Tables of the study: of each rule the module of its step, inputs, outputs and parameters; tables.smk makes the rules.
-STUDY_TABLES = {}
-REFERENCE = {"reference": f"{CONFIG}/paper/reference.csv"}
+def shown_figure(file, caption, category, shows):
+    return shown(file, caption, category, shows=shows, kind="figure")
 
-# What Snakemake and we have imported by now stays to the end; to look through it for garbage, again and again while the jobs are
-# laid out, took a fifth of a rerun with nothing to do.
+
+# The modules imported so far stay until the end. Without this line, garbage collection searches them again and again while Snakemake
+# plans the jobs, which took a fifth of a rerun that had nothing to do.
 gc.freeze()
 
-# What --config says; Snakemake takes numbers inside of a mapping for texts.
+# Entries of --config. They are read again here, because Snakemake reads numbers inside a mapping as text.
 CHANGES = [
     entry
-    for entry in workflow.config_settings.config_args or ()
+    for entry in snakemake_internals.config_arguments(workflow)
     if not entry.startswith("campaign=")
 ]
 
@@ -91,22 +88,21 @@ try:
         " with --config ".join(["config.yaml", *(entry.partition("=")[0] for entry in CHANGES)]),
     )
     SOURCES = read_campaign_sources(config, CONFIG)
-    # The user's own campaign by its name, if there is one.
+    # The user's own campaign by its name, if one is given.
     OWN = find_user_campaign(config, f"{CONFIG}/robots", "results/loop")
-    # Not of the jobs of this run, and not where nothing is written.
-    if workflow.is_main_process and not workflow.dryrun:
+    if snakemake_internals.is_starting_run(workflow):
         RUN = begin(Path(".snakemake"), ["data", "results", "reports"])
 except InputError as error:
     sys.exit(str(error))
 
-# All that decides what the results hold, but for code and measured data; which campaign of a user is asked for decides nothing.
+# Everything that the results depend on, except code and measured data. The choice of a user's campaign is left out: it changes no result.
 RESOLVED = {
     "config": {key: value for key, value in config.items() if key not in ("campaign", "origin")},
     "robots": STUDY.robots,
     "strategies": STUDY.strategies,
     "campaigns": SOURCES,
 }
-# Scripts find it in the configuration, an edit of which reruns nothing by itself: a new commit makes no figure anew.
+# Scripts find the origin in the configuration, whose changes alone rerun nothing: a new commit does not draw a figure again.
 ORIGIN = Origin(
     commit_of(
         ROOT,
@@ -136,23 +132,27 @@ STUDY_SIZE = {
     "tests": config["test_configurations"],
     "noise": 1e-6 * config["tables"]["noise_um"],
 }
-# Keys of config.yaml that the files of study, loop and league depend on, and so their audit.
-AUDITED = [
-    *(
-        "seed",
-        "robots",
-        "strategies",
-        "noise_um",
-        "data_sets",
-        "configurations",
-        "test_configurations",
-        "loading",
-    ),
-    *("interpretations", "evaluation", "tables", "questions", "loop", "league"),
+# Keys of config.yaml on which the files of study, loop and league depend, and so their audit.
+AUDITED_KEYS = [
+    "seed",
+    "robots",
+    "strategies",
+    "noise_um",
+    "data_sets",
+    "configurations",
+    "test_configurations",
+    "loading",
+    "interpretations",
+    "evaluation",
+    "tables",
+    "questions",
+    "loop",
+    "league",
 ]
-# Files that jobs make.
-MADE = re.compile("(data|results|reports)/")
+# Names of files that jobs make.
+MADE_FILE = re.compile("(data|results|reports)/")
 NAMES = {name: document["name"] for name, document in STUDY.strategies.items()}
+# Robots with and without elastic links.
 EXTENDED = [name for name in config["robots"] if "links" in STUDY.robots[name]]
 REDUCED = [name for name in config["robots"] if name not in EXTENDED]
 
@@ -166,30 +166,16 @@ wildcard_constraints:
     test="(/test)?",
 
 
-def draw_panel(panels, function, caption, words, limit):
-    def settings(wildcards):
-        robot = panels[wildcards.panel]
-        return {"title": TITLES[robot], "robot": robot, "order": list(NAMES.values())} | limit
-
-    tables = {
-        "metrics": lambda wildcards: cells("metrics", panels[wildcards.panel], TABLE_NOISE),
-        "printed": f"{CONFIG}/paper/reference.csv",
-    }
-    return (
-        (function, "figure5{panel}", caption, PAPER, f"Figure 5{{panel}}: {words}"),
-        tables,
-        settings,
-    )
-
-
 def sources(step):
-    """A script, or the one that calls a function of the packages, and the package modules that it runs.
+    """Return the script that runs a step, and the package modules that it imports, as inputs of a rule.
 
-    Their dates count for nothing: `watch_sources` has their digests. The parameter `step` of a rule names the same function.
+    `step` is a script, or a function of the packages that `run_step.py` calls. The files are `ancient`, because their dates do not
+    matter: `watch_sources` compares their contents.
     """
-    script, modules = (
-        (step, ()) if step.endswith(".py") else ("run_step.py", [step.rpartition(".")[0]])
-    )
+    if step.endswith(".py"):
+        script, modules = step, []
+    else:
+        script, modules = "run_step.py", [step.rpartition(".")[0]]
     path = ROOT / "workflow" / "scripts" / script
     try:
         files = [path, *closure(path, PACKAGES, *modules)]
@@ -198,84 +184,67 @@ def sources(step):
     return [ancient(placed(file)) for file in files]
 
 
-def digest_of(files):
-    """One digest of all that some files hold."""
-    return hashlib.sha256(" ".join(map(checksum_once, files)).encode()).hexdigest()[:16]
-
-
 checksum_once = cache(compute_sha256)
 
 
-def remember_checksums():
-    """Snakemake digests all inputs of a job that has ended once for each of its outputs: of a file that stays, once is enough."""
-    digest, known = _IOFile.checksum, {}
-
-    async def checksum(file, *asked, **settings):
-        status = os.stat(file) if os.path.exists(file) else None
-        key = (
-            str(file),
-            status and (status.st_ino, status.st_mtime_ns, status.st_size),
-            asked,
-            *settings.items(),
-        )
-        if key not in known:
-            known[key] = await digest(file, *asked, **settings)
-        return known[key]
-
-    _IOFile.checksum = checksum
+def digest_of(files):
+    """Return one digest of the contents of several files."""
+    return hashlib.sha256(" ".join(map(checksum_once, files)).encode()).hexdigest()[:16]
 
 
 def complete_rules():
-    """What rules have alike: a log and a time by their names and wildcards; of those with a script its sources among the inputs."""
-    for each in workflow.rules:
-        if each.norun:
+    """Give each rule a log and a benchmark named after it and its wildcards, and each script its sources as inputs."""
+    for workflow_rule in workflow.rules:
+        if snakemake_internals.runs_no_job(workflow_rule):
             continue
-        each.log_modifier = each.benchmark_modifier = each.input_modifier = each.output_modifier
-        place = Path(
-            each.name, *(f"{{{name}}}" for name in re.findall(r"{(\w+)", each.output[0]))
-        ).as_posix()
-        if not each.log:
-            each.set_log(f"results/logs/{place}.log")
-        if not each.benchmark:
-            each.benchmark = f"results/timings/{place}.tsv"
-        if each.is_script and "sources" not in each.input.keys():
-            each.set_input(sources=sources(each.params.get("step") or Path(each.script).name))
+        wildcards = [f"{{{name}}}" for name in re.findall(r"{(\w+)", workflow_rule.output[0])]
+        name = Path(workflow_rule.name, *wildcards).as_posix()
+        snakemake_internals.set_log_and_benchmark(
+            workflow_rule, f"results/logs/{name}.log", f"results/timings/{name}.tsv"
+        )
+        if workflow_rule.is_script and "sources" not in workflow_rule.input.keys():
+            step = workflow_rule.params.get("step") or snakemake_internals.name_of_script(
+                workflow_rule
+            )
+            workflow_rule.set_input(sources=sources(step))
 
 
 def watch_sources():
-    """An edit of a source reruns the jobs that depend on it, and no others, whatever the date of the file.
+    """Let an edit of a source rerun the jobs that depend on it, and no others, whatever the date of the file.
 
-    Another environment, be it one of the libraries or the list of pins, reruns every job with a script.
+    A change of the installed libraries or of the list of pins reruns every job that has a script.
     """
     environment_sha256 = configuration_sha256(environment(ROOT))
-    watched = {
-        each: [
+    for workflow_rule in workflow.rules:
+        if "sources" not in workflow_rule.input.keys():
+            continue
+        files = [
             file
-            for file in each.input
-            if isinstance(file, str) and not MADE.match(file) and Path(file).is_file()
+            for file in workflow_rule.input
+            if isinstance(file, str) and not MADE_FILE.match(file) and Path(file).is_file()
         ]
-        for each in workflow.rules
-        if "sources" in each.input.keys()
-    }
-    for each, files in watched.items():
-        each.set_params(**{SOURCES_DIGEST: f"{digest_of(files)} {environment_sha256}"})
+        workflow_rule.set_params(**{SOURCES_DIGEST: f"{digest_of(files)} {environment_sha256}"})
 
 
 def files_behind(targets):
-    """All that the jobs behind some targets write, by names: one that was deleted is made again although later ones are there."""
-    found, left = set(), [target for target in targets if isinstance(target, str)]
-    while left:
-        path = left.pop()
-        if path in found or not MADE.match(path):
+    """Return all files that the jobs behind some targets make.
+
+    As targets of their own they are made again if somebody deletes one, although later files exist.
+    """
+    files = set()
+    pending = [target for target in targets if isinstance(target, str)]
+    while pending:
+        path = pending.pop()
+        if path in files or not MADE_FILE.match(path):
             continue
-        maker = next((each for each in workflow.rules if each.is_producer(path)), None)
-        if maker is None:
-            # Of the user, who keeps it in a folder of the pipeline.
+        producer = snakemake_internals.find_producer(workflow.rules, path)
+        if producer is None:
+            # The file is a user's own, kept in a folder of the pipeline.
             continue
-        wildcards = Wildcards(fromdict=maker.get_wildcards(path))
-        found.update(maker.expand_output(wildcards)[0])
-        left += map(str, maker.expand_input(wildcards)[0])
-    return sorted(map(str, found))
+        inputs, outputs = snakemake_internals.expand_files(producer, path)
+        files.update(outputs)
+        pending += inputs
+    return sorted(files)
 
 
 def robot_document(wildcards):
@@ -287,22 +256,24 @@ def strategy_document(wildcards):
 
 
 def study_in_memory(**size):
-    """What a script draws the study of a robot from: the robot, the seed, how the paper is read, the study's size."""
-    read = {key: INTERPRETATIONS[key] for key in ("wrench_at", "average")} | {
-        "rows": count_components(INTERPRETATIONS["measured"])
+    """Return what a step draws the data sets of a robot from: robot, seed, interpretation of the paper, and size of the study."""
+    interpretation = {
+        "wrench_at": INTERPRETATIONS["wrench_at"],
+        "average": INTERPRETATIONS["average"],
+        "rows": count_components(INTERPRETATIONS["measured"]),
     }
     return lambda wildcards: {
         "robot": robot_document(wildcards),
         "seed": config["seed"],
         "tool_offset_m": INTERPRETATIONS["tool_offset_m"],
         "loading": LOADING,
-        "interpretation": read,
+        "interpretation": interpretation,
         "size": STUDY_SIZE | size,
     }
 
 
 def cells(kind, robots, noise, strategies=config["strategies"]):
-    """Results of one kind for robots, noise levels and strategies."""
+    """Return the results of one kind for robots, noise levels and strategies."""
     return expand(
         f"results/{kind}/{{robot}}/{{noise}}um/{{strategy}}.parquet",
         robot=robots,
@@ -324,26 +295,27 @@ def files_of(wildcards):
 
 
 def files_of_campaign(campaign):
-    """Files that a campaign is read from, those of the campaign that holds its test included."""
+    """Return the files that a campaign is read from, including those of the campaign that tests it."""
     if campaign in OWN:
         return OWN[campaign].files()
     source = SOURCES[campaign]
-    # Who reads the test looks whether the campaign is there that tests this one in turn; two may test each other.
-    names = [campaign]
-    while (other := SOURCES[names[-1]].get("holdout", {}).get("campaign")) and Path(
-        other
-    ).name not in names:
-        names.append(Path(other).name)
+    # The campaign that tests this one is read too, and the one that tests it in turn. Two campaigns may test each other.
+    names = []
+    name = campaign
+    while name and name not in names:
+        names.append(name)
+        test = SOURCES[name].get("holdout", {}).get("campaign")
+        name = Path(test).name if test else None
     files = expand(
         "data/campaigns/{name}/{file}", name=names, file=["campaign.yaml", "measurements.parquet"]
     )
-    # An import has its robots among its inputs; a simulation does not have the robot that it declares.
+    # The robots of an import are among its inputs. A simulation does not read the robot that its campaign declares.
     declared = [source["declared_robot"]] if source["source"] == "simulated" else []
     return files + expand(f"{CONFIG}/robots/{{robot}}.yaml", robot=declared)
 
 
 def robots_of_import(wildcards):
-    """Files of the robots that an importer reads or names."""
+    """Return the files of the robots that an importer reads or names."""
     source = find_importer(
         SOURCES[wildcards.campaign]["importer"], CONFIG, f"campaign {wildcards.campaign}"
     )
@@ -363,7 +335,7 @@ def reports_of_own(wildcards):
 
 
 def folds_of_one(campaigns):
-    """Campaigns that hold out the folds of the same measurements, by the importer of these."""
+    """Group the campaigns that hold out the folds of the same measurements by their importer."""
     folds = {}
     for name in campaigns:
         if "fold" in SOURCES[name]:
@@ -372,7 +344,10 @@ def folds_of_one(campaigns):
 
 
 def audited(wildcards):
-    """What is audited; asked for before any job of the run begins, so that nobody waits for results that cannot be audited."""
+    """Return the files to audit.
+
+    Snakemake asks for them before the first job, so a missing library is reported before anybody has waited for results.
+    """
     if find_spec("pinocchio") is None:
         sys.exit(
             str(

@@ -1,16 +1,19 @@
-"""Which data sets of the league are at hand, and the names of its files: functions for league.smk."""
+"""Available data sets of the league, and the names of its files: functions for league.smk."""
 
-from elastocal.campaigns.importers import find_missing
+from elastocal.campaigns.importers import find_importer, find_missing
 
 LEAGUE = config["league"]
 
 
 def missing_data(names):
-    """A file that is missing of each data set of which one is."""
+    """Return a missing file for each data set that is incomplete."""
     sources = {name: SOURCES[name] for name in names if SOURCES[name]["source"] == "public"}
     files = {
         name: find_missing(
-            source["files"], find_importer(source["importer"], CONFIG, name).files, "data/public", BOX
+            source["files"],
+            find_importer(source["importer"], CONFIG, name).files,
+            "data/public",
+            INCLUDED_DATA,
         )
         for name, source in sources.items()
     }
@@ -18,41 +21,45 @@ def missing_data(names):
 
 
 MISSING_DATA = missing_data(list_league_data(config))
-# Robots of each league with the data sets that are at hand.
-LEAGUES = {
-    league: {
-        robot: there
+
+
+def available_data(robots):
+    """Return the robots of a league with their available data sets; a robot without any is left out."""
+    available = {
+        robot: [name for name in names if name not in MISSING_DATA]
         for robot, names in robots.items()
-        if (there := [name for name in names if name not in MISSING_DATA])
     }
-    for league, robots in LEAGUE["data"].items()
-}
+    return {robot: names for robot, names in available.items() if names}
+
+
+LEAGUES = {league: available_data(robots) for league, robots in LEAGUE["data"].items()}
 
 
 def missing_of(league):
-    """Data sets of a league that are left out, with the file that each lacks."""
+    """Return the data sets that a league leaves out, with a missing file of each."""
     named = {name for names in LEAGUE["data"][league].values() for name in names}
     return {name: file for name, file in MISSING_DATA.items() if name in named}
 
 
 def sessions_of(data):
-    """Other data sets of the same robot, in any league."""
+    """Return the other data sets of the same robot, in any league."""
     robots = [names for league in LEAGUES.values() for names in league.values() if data in names]
     return list(dict.fromkeys(name for names in robots for name in names if name != data))
 
 
 def rounds_of(league):
-    """Pairs of data set and split; sessions only where a robot has several data sets."""
-    names = [name for names in LEAGUES[league].values() for name in names]
-    return [
-        (name, split)
-        for name in names
-        for split in ("random", "blocks", *(["session"] if sessions_of(name) else []))
-    ]
+    """Return pairs of data set and split; the split by session needs a robot with several data sets."""
+    rounds = []
+    for name in [name for names in LEAGUES[league].values() for name in names]:
+        splits = ["random", "blocks"]
+        if sessions_of(name):
+            splits.append("session")
+        rounds += [(name, split) for split in splits]
+    return rounds
 
 
 def league_files(kind):
-    """Tables of a data set, and of those that test it where the split is by session."""
+    """Return tables of a data set and, if the split is by session, of the data sets that test it."""
 
     def files(wildcards):
         others = sessions_of(wildcards.data) if wildcards.split == "session" else []
@@ -62,7 +69,7 @@ def league_files(kind):
 
 
 def diagnosed_facts(wildcards):
-    """Diagnoses of the folds, for a method that needs them."""
+    """Return the diagnoses of the folds for a method that needs them."""
     needed = LEAGUE["methods"][wildcards.method]["physics"] == "diagnosis"
     return rules.diagnose_league_folds.output.facts if needed else []
 
@@ -74,6 +81,6 @@ def entry_keys(league):
 
 
 def of_rounds(pattern, keys):
-    """A file for each data set, split and, where there is one, method."""
+    """Return a file for each data set, split and, if the pattern has one, method."""
     names = ("data", "split", "method")
     return [pattern.format(**dict(zip(names, key))) for key in keys]

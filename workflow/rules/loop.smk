@@ -6,7 +6,7 @@ results/loop/{campaign}/, a table for each step, and reports/loop/{campaign}/. N
 
 SIMULATED = [name for name, source in SOURCES.items() if source["source"] == "simulated"]
 PUBLIC = [name for name in SOURCES if name not in SIMULATED]
-# Pictures of a campaign, with what `snakemake --report` says that each shows.
+# Figures of a campaign, with their titles in `snakemake --report`.
 LOOP_FIGURES = {
     "before_after": "Errors before and after",
     "arrows": "Residuals in space",
@@ -49,7 +49,7 @@ rule import_campaign:
     params:
         source=lambda wildcards: SOURCES[wildcards.campaign],
         kept="data/public",
-        box=BOX,
+        box=INCLUDED_DATA,
     script:
         "../scripts/import_campaign.py"
 

@@ -1,4 +1,4 @@
-"""Studies over again: how far apart two studies of one size lie, and Table 4 over them.
+"""Repeated studies: how much two studies of the same size differ, and Table 4 over all of them.
 
 Needs the configuration alone. Writes results/studies/{robot}.parquet and reports/tables/strategies_over_studies.csv.
 """
@@ -16,23 +16,23 @@ rule repeat_studies:
         "../scripts/run_step.py"
 
 
-ONE_STUDY = {"studies": expand(rules.repeat_studies.output.repeated, robot=REDUCED)}
-STUDY_TABLES |= {
-    "tabulate_studies": (
-        "evaluation",
-        ONE_STUDY,
-        {
-            "table": table_of(
-                "strategies_over_studies", PAPER, "strategies_over_studies", "Table 4 over studies"
-            )
+rule tabulate_studies:
+    input:
+        studies=expand(rules.repeat_studies.output.repeated, robot=REDUCED),
+    output:
+        table=shown_table(
+            "reports/tables/strategies_over_studies.csv",
+            "strategies_over_studies",
+            PAPER,
+            "Table 4 over studies",
+        ),
+    params:
+        step="elastocal.study.evaluation.tabulate_studies",
+        slugs={name: key for key, name in NAMES.items()},
+        length=config["tables"]["length"],
+        limits={
+            "k_sigma": config["tables"]["k_sigma_limit_percent"],
+            "deviation": config["tables"]["deviation_limit_um"],
         },
-        {
-            "slugs": {name: key for key, name in NAMES.items()},
-            "length": config["tables"]["length"],
-            "limits": {
-                "k_sigma": config["tables"]["k_sigma_limit_percent"],
-                "deviation": config["tables"]["deviation_limit_um"],
-            },
-        },
-    ),
-}
+    script:
+        "../scripts/run_step.py"

@@ -4,7 +4,7 @@ Needs reports/tables/ and reports/figures/. Writes reports/paper.pdf, reports/an
 documentation, docs/study_tables.md.
 """
 
-# What the text of the report says of loads and places.
+# Loads and sizes that the text of the report states.
 STATED = {
     "force_N": config["loading"]["force_N"],
     "offset_m": max(map(abs, config["loading"]["offset_m"])),

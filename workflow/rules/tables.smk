@@ -1,7 +1,9 @@
 """Tables: the paper's, those beside them, and the comparison with the printed figures.
 
-Needs results/. Writes reports/tables/*.csv and, for each, the same as Markdown and LaTeX.
+Needs results/. Writes reports/tables/*.csv and, for the paper's tables, the same as Markdown and LaTeX.
 """
+
+PRINTED_FIGURES = f"{CONFIG}/paper/reference.csv"
 
 
 rule summarize_initial:
@@ -17,93 +19,127 @@ rule summarize_initial:
         "../scripts/run_step.py"
 
 
-INITIAL = {"initial": expand(rules.summarize_initial.output.initial, robot=config["robots"])}
-AT = {"noise_um": config["tables"]["noise_um"], "length": config["tables"]["length"]}
-STUDY_TABLES |= {
-    "tabulate_compliances": (
-        "tables",
-        {},
-        {"table": table_of("table1", PAPER, "table1", "Table 1: compliances")},
-        {"robots": {name: STUDY.robots[name] for name in REDUCED}},
-    ),
-    "tabulate_initial": (
-        "tables",
-        INITIAL,
-        {"table": table_of("table2", PAPER, "table2", "Table 2: deflection before calibration")},
-        {
-            "robots": config["robots"],
-            "seed": config["seed"],
-            "replicates": config["evaluation"]["bootstrap_replicates"],
-        },
-    ),
-    "tabulate_identified": (
-        "tables",
-        {"metrics": cells("metrics", REDUCED, TABLE_NOISE, CLASSICAL)},
-        {"table": table_of("table3", PAPER, "table3", "Table 3: identified compliances")},
-        {"robots": REDUCED, "strategy": NAMES[CLASSICAL]} | AT,
-    ),
-    "tabulate_strategies": (
-        "tables",
-        all_cells(REDUCED),
-        {"table": table_of("table4", PAPER, "table4", "Table 4: strategies")},
-        {
-            "robots": REDUCED,
-            "strategies": {name: key for key, name in NAMES.items()},
-            "cells": {
-                key: value for key, value in config["tables"].items() if key != "classical_strategy"
-            },
-        },
-    ),
-    "tabulate_extended": (
-        "tables",
-        all_cells(EXTENDED),
-        {"table": table_of("extended", ABOUT, "extended", "Elastic links")},
-        {"robots": EXTENDED, "strategies": list(NAMES.values())} | AT,
-    ),
-    "compare_with_paper": (
-        "printed",
-        REFERENCE
-        | {
-            name: f"reports/tables/{name}.csv"
-            for name in ("table1", "table2", "table3", "table4", "extended")
-        }
-        | all_cells(config["robots"]),
-        {
-            "table": table_of(
-                "beside_paper", PAPER, "beside_paper", "Every printed figure beside ours"
-            )
-        },
-        AT,
-    ),
-    "compare_with_studies": (
-        "printed",
-        {"beside": "reports/tables/beside_paper.csv"} | ONE_STUDY | INITIAL | REFERENCE,
-        {
-            "table": table_of(
-                "comparison", PAPER, "comparison", "Every printed figure among further studies"
-            ),
-            "joint": table_of("joint_test", PAPER),
-        },
-        {"robots": config["robots"], "length": config["tables"]["length"]},
-    ),
-}
+rule tabulate_compliances:
+    output:
+        table=shown_table("reports/tables/table1.csv", "table1", PAPER, "Table 1: compliances"),
+    params:
+        step="elastocal.study.tables.tabulate_compliances",
+        robots={name: STUDY.robots[name] for name in REDUCED},
+    script:
+        "../scripts/run_step.py"
 
 
-for tabulated, (module, given, made, settings) in STUDY_TABLES.items():
-    step = f"elastocal.study.{module}.{tabulated}"
+rule tabulate_initial:
+    input:
+        initial=expand(rules.summarize_initial.output.initial, robot=config["robots"]),
+    output:
+        table=shown_table(
+            "reports/tables/table2.csv", "table2", PAPER, "Table 2: deflection before calibration"
+        ),
+    params:
+        step="elastocal.study.tables.tabulate_initial",
+        robots=config["robots"],
+        seed=config["seed"],
+        replicates=config["evaluation"]["bootstrap_replicates"],
+    script:
+        "../scripts/run_step.py"
 
-    rule:
-        name:
-            tabulated
-        input:
-            **given,
-        output:
-            **made,
-        params:
-            **settings,
-            step=step,
-        script:
-            "../scripts/run_step.py"
+
+rule tabulate_identified:
+    input:
+        metrics=cells("metrics", REDUCED, TABLE_NOISE, CLASSICAL),
+    output:
+        table=shown_table(
+            "reports/tables/table3.csv", "table3", PAPER, "Table 3: identified compliances"
+        ),
+    params:
+        step="elastocal.study.tables.tabulate_identified",
+        robots=REDUCED,
+        strategy=NAMES[CLASSICAL],
+        noise_um=config["tables"]["noise_um"],
+        length=config["tables"]["length"],
+    script:
+        "../scripts/run_step.py"
+
+
+rule tabulate_strategies:
+    input:
+        metrics=cells("metrics", REDUCED, TABLE_NOISE),
+        replicates=cells("replicates", REDUCED, TABLE_NOISE),
+    output:
+        table=shown_table("reports/tables/table4.csv", "table4", PAPER, "Table 4: strategies"),
+    params:
+        step="elastocal.study.tables.tabulate_strategies",
+        robots=REDUCED,
+        strategies={name: key for key, name in NAMES.items()},
+        cells={key: value for key, value in config["tables"].items() if key != "classical_strategy"},
+    script:
+        "../scripts/run_step.py"
+
+
+rule tabulate_extended:
+    input:
+        metrics=cells("metrics", EXTENDED, TABLE_NOISE),
+        replicates=cells("replicates", EXTENDED, TABLE_NOISE),
+    output:
+        table=shown_table(
+            "reports/tables/extended.csv", "extended", QUESTIONS_BEYOND, "Elastic links"
+        ),
+    params:
+        step="elastocal.study.tables.tabulate_extended",
+        robots=EXTENDED,
+        strategies=list(NAMES.values()),
+        noise_um=config["tables"]["noise_um"],
+        length=config["tables"]["length"],
+    script:
+        "../scripts/run_step.py"
+
+
+rule compare_with_paper:
+    input:
+        reference=PRINTED_FIGURES,
+        table1=rules.tabulate_compliances.output.table,
+        table2=rules.tabulate_initial.output.table,
+        table3=rules.tabulate_identified.output.table,
+        table4=rules.tabulate_strategies.output.table,
+        extended=rules.tabulate_extended.output.table,
+        metrics=cells("metrics", config["robots"], TABLE_NOISE),
+        replicates=cells("replicates", config["robots"], TABLE_NOISE),
+    output:
+        table=shown_table(
+            "reports/tables/beside_paper.csv",
+            "beside_paper",
+            PAPER,
+            "Every printed figure beside ours",
+        ),
+    params:
+        step="elastocal.study.printed.compare_with_paper",
+        noise_um=config["tables"]["noise_um"],
+        length=config["tables"]["length"],
+    script:
+        "../scripts/run_step.py"
+
+
+rule compare_with_studies:
+    input:
+        beside=rules.compare_with_paper.output.table,
+        studies=expand(rules.repeat_studies.output.repeated, robot=REDUCED),
+        initial=expand(rules.summarize_initial.output.initial, robot=config["robots"]),
+        reference=PRINTED_FIGURES,
+    output:
+        table=shown_table(
+            "reports/tables/comparison.csv",
+            "comparison",
+            PAPER,
+            "Every printed figure among further studies",
+        ),
+        joint="reports/tables/joint_test.csv",
+    params:
+        step="elastocal.study.printed.compare_with_studies",
+        robots=config["robots"],
+        length=config["tables"]["length"],
+    script:
+        "../scripts/run_step.py"
 
 
 rule typeset_table:

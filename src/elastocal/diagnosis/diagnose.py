@@ -1,5 +1,7 @@
-"""The two calls: `diagnose` looks at training poses alone, `judge` opens the held-out
-ones, once, at the end."""
+"""Find what the declared model of a campaign lacks, by its training poses alone.
+
+The held-out poses are opened by `judge`, once, at the end.
+"""
 
 from __future__ import annotations
 
@@ -28,6 +30,7 @@ from elastocal.diagnosis.gross_errors import (
     find_gross_errors,
 )
 from elastocal.diagnosis.search import screen_terms, search_models
+from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.training_verdict import TrainingResult, state_training_verdict
 from elastocal.diagnosis.verdict import Evidence
 from elastocal.effects.catalogue import list_effects
@@ -48,15 +51,20 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from elastocal.campaigns.campaign import Measurements
-    from elastocal.diagnosis.settings import Settings
+    from elastocal.data_checks.protocol import Fault
+    from elastocal.diagnosis.alarm import Alarm
+    from elastocal.diagnosis.candidate_design import CandidateDesign
+    from elastocal.diagnosis.search import Posterior, ScoredModel
     from elastocal.fitting.least_squares import Fit
+    from elastocal.fitting.noise import Noise
     from elastocal.verdict import RepeatableResidual, TrainingVerdict
 
-# Mechanisms that are added one at a time, each by a fit; of more, only the first.
-_MOST_STEPS = 4
-# Standard errors by which parameters move where nothing else is found: they change a
-# log likelihood by 0.03 each.
-_HARDLY = 0.25
+# Number of mechanisms that are added one at a time, each by a fit of its own. With more
+# mechanisms, only the first has a step of its own.
+_MAX_STEPS = 4
+# Shift of the parameters, in standard errors, below which a new search would find the
+# same: it changes a log likelihood by 0.03 a parameter.
+_NEGLIGIBLE_SHIFT = 0.25
 
 
 @dataclass(frozen=True)
@@ -64,8 +72,15 @@ class Step:
     """One model on the way from the nominal robot to all effects found, fitted to the
     training poses.
 
-    `kind`: of the last, "kept" where frames alone predict training poses better than
-    what was fitted.
+    Attributes
+    ----------
+    name
+        For tables and reports.
+    kind
+        "frames", "declared", "effect"; or "kept", of a last step whose frames alone
+        predict training poses better than the declared model.
+    fitted
+        Its fit.
     """
 
     name: str
@@ -75,10 +90,22 @@ class Step:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What training poses say of a campaign.
+    """What the training poses say of a campaign.
 
-    `steps`: the last is the final model. `verdict`: the part of the verdict that the
-    training poses decide. `left_out`: gross errors, which are no part of the case.
+    Attributes
+    ----------
+    case
+        Training poses without the gross errors.
+    steps
+        Models from the frames to the final one.
+    evidence
+        Result of the search; None if the data are at fault.
+    verdict
+        The verdict, without what held-out poses add.
+    left_out
+        Gross errors.
+    settings
+        Settings of the diagnosis.
     """
 
     case: Case
@@ -86,6 +113,7 @@ class Diagnosis:
     evidence: Evidence | None
     verdict: TrainingVerdict = field(repr=False)
     left_out: Measurements
+    settings: Settings = field(default_factory=Settings, repr=False)
 
     @cached_property
     def document(self) -> dict[str, Any]:
@@ -104,6 +132,103 @@ class Diagnosis:
         return self.steps[-1].fitted
 
 
+@dataclass(frozen=True)
+class _Context:
+    """What every stage of a diagnosis needs: the whole case, settings, seed of the
+    random streams, and a function that reports progress in a line."""
+
+    case: Case
+    settings: Settings
+    seed: int
+    report: Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class _SearchRound:
+    """Where a round of the search starts.
+
+    Attributes
+    ----------
+    number
+        From 0; the first round about a model that a former search found is 1.
+    reference
+        Fit about which the problem is linearised.
+    named
+        Mechanisms that this model has beyond the declared one; None for the declared
+        model.
+    max_pose_error_rad
+        Largest error common to the measurements of a pose that is considered.
+    tested
+        The last fit whose residual was tested for a repeatable part, and the outcome.
+    """
+
+    number: int
+    reference: Fit
+    named: tuple[str, ...] | None
+    max_pose_error_rad: float = np.inf
+    tested: tuple[Fit, RepeatableResidual | None] | None = None
+
+
+@dataclass(frozen=True)
+class _RowRound:
+    """Where a search with some of the rows starts.
+
+    Attributes
+    ----------
+    number
+        Number of row selections so far.
+    subset
+        Rows to fit.
+    readmitted
+        (N,) of bool, rows that stay because a model without them explained them.
+    reference, named
+        As of `_SearchRound`; `reference` is None for the declared model.
+    max_pose_error_rad
+        As of `_SearchRound`.
+    """
+
+    number: int
+    subset: FittedSubset
+    readmitted: np.ndarray
+    reference: Fit | None = None
+    named: tuple[str, ...] | None = None
+    max_pose_error_rad: float = np.inf
+
+
+@dataclass(frozen=True)
+class _SettledRows:
+    """Rows that no further search would change.
+
+    Attributes
+    ----------
+    subset
+        Rows that are fitted.
+    outliers
+        Last test of all rows.
+    evidence
+        Result of the last search; None if the data are at fault.
+    fitted
+        The most probable model, fitted to the search sample of the subset.
+    """
+
+    subset: FittedSubset
+    outliers: OutlierTest
+    evidence: Evidence | None
+    fitted: Fit
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    """The model that is kept, and what has to be said about it; see `TrainingResult`."""
+
+    steps: list[Step]
+    full_model: Fit
+    evidence: Evidence | None
+    warnings: list[str]
+    contradictions: list[str]
+    repeatable: RepeatableResidual | None
+
+
 def diagnose(
     case: Case,
     settings: Settings,
@@ -112,397 +237,554 @@ def diagnose(
 ) -> Diagnosis:
     """Find what the declared model of a campaign lacks.
 
-    `case`: of training poses. `seed`: of the simulated null distribution. `progress`:
-    gets a line after each stage.
+    Parameters
+    ----------
+    case
+        Training poses.
+    settings
+        Settings of the diagnosis.
+    seed
+        Seed of the simulated null distribution and of the cross-validation.
+    progress
+        Called with a line after each stage.
     """
-    whole = case.campaign
-    tell = progress or (lambda line: None)
-    part = select_initial_subset(case, settings)
-    known = faults(part.case.campaign)
-    if known:
-        # Where all measurements mean something else, no single row is wrong.
-        part = fit_subset(
-            case, np.ones(len(case.campaign.measurements), bool), settings
-        )
+    report = progress or (lambda line: None)
+    campaign = case.campaign
+    subset, data_faults = _select_first_subset(case, settings)
+    count = format_count(len(subset.case.observations), "measurement")
+    report(f"declared model fitted to {count}")
+    if data_faults:
+        outliers = OutlierTest.none(len(subset.kept), case.model.rows)
+        rows = _SettledRows(subset, outliers, None, subset.declared)
     else:
-        part = choose_centre_prior(part, settings)
-        case = replace(case, model=part.case.model)
-    tell(
-        f"declared model fitted to {format_count(len(part.case.observations), 'measurement')}"
-    )
-    found: Evidence | None = None
-    about = part.declared
-    start = None
-    most_pose_error_rad = np.inf
-    measurements = case.campaign.measurements
-    errors = OutlierTest.none(len(part.kept), case.model.rows)
-    good = np.zeros(len(part.kept), bool)
-    for number in range(0 if known else settings.gross_error_rounds):
-        if not found:
-            found = _explained(part, settings, seed, tell, start, most_pose_error_rad)
-            about = found.fitted
-        errors = find_gross_errors(about, part.noise, measurements, part.kept, settings)
-        # A row that a model without it explains stays, whatever the next model says of
-        # it: no set of rows comes back.
-        good |= ~part.kept & ~errors.gross
-        remaining = ~errors.gross | good
-        if (remaining == part.kept).all() or number + 1 == settings.gross_error_rounds:
-            break
-        # The model found looks at all rows once more, without these, before another
-        # search is made.
-        some = sample_for_search(case, case.select(remaining), settings)
-        about = fit_model(
-            about.model,
-            some,
-            about.noise,
-            about.estimate,
-            reweight_first_step=True,
-            tolerance=INTERMEDIATE_TOLERANCE,
-        )
-        errors = find_gross_errors(about, part.noise, measurements, remaining, settings)
-        good |= ~remaining & ~errors.gross
-        last = part
-        part = fit_subset(case, ~errors.gross | good, settings, part)
-        if part is last:
-            break
-        tell(
-            f"{format_count((~part.kept).sum(), 'gross error')} in {format_count(len(good), 'row')}: once more without"
-        )
-        if serialize_noise(part.noise) == serialize_noise(last.noise):
-            again = about
-            if (part.kept != remaining).any():
-                again = fit_model(
-                    about.model,
-                    part.search_sample,
-                    about.noise,
-                    about.estimate,
-                    reweight_first_step=True,
-                    tolerance=INTERMEDIATE_TOLERANCE,
-                )
-            moved = np.subtract(
-                *(
-                    get_parameter_values(each.model, each.estimate)
-                    for each in (again, found.fitted)
-                )
-            )
-            if (
-                np.abs(moved) <= _HARDLY * np.sqrt(np.diag(found.fitted.covariance))
-            ).all():
-                # Rows of so little weight that the search would find the same.
-                about = again
-                continue
-        # What was linearised about a model found is so again: from the declared one the
-        # way is the same and twice as long.
-        relinearized = len(found.linearized.reference_fit.model.effects) > len(
-            part.declared.model.effects
-        )
-        start = (about, found.conclusion.best.named) if relinearized else None
-        most_pose_error_rad = found.linearized.max_pose_error_rad
-        # Its statistics make room for those of the next search.
-        found = None
-    errors = replace(errors, gross=~part.kept)
-    case = part.case
-    noise = part.noise
-    declared = part.fit_to_all(part.declared)
-    bare = fit_model(
-        replace(case.model, effects=()),
-        case.observations,
-        noise,
-        tolerance=INTERMEDIATE_TOLERANCE,
-    )
-    steps = [
-        Step("frames and targets", "frames", bare),
-        Step("declared model", "declared", declared),
-    ]
-    final = declared
-    lost = list[str]()
-    contradicting = list[str]()
-    repeatable = None
-    warnings = [*part.warnings]
-    if found:
-        final = about
-        if about is not found.fitted or part.search_sample is not case.observations:
-            final = part.fit_to_all(about)
-        named = found.conclusion.best.named
-        word = found.conclusion.verdict
-        found = replace(
-            found,
-            conclusion=verdict.allow_related_mechanisms(
-                found.conclusion, find_oversized_effects(final, named)
-            ),
-        )
-        if not found.adopted:
-            # Under the noise that it leaves itself, for nothing else enters the model
-            # that is kept.
-            line = found.linearized
-            left = refit.estimate_residual_noise(
-                line.problem,
-                found.posterior.empty_model,
-                line.reference_fit.noise,
-                declared.noise,
-            )
-            alone = (
-                fit_model(
-                    declared.model,
-                    case.observations,
-                    left,
-                    declared.estimate,
-                    reweight_first_step=True,
-                )
-                if named
-                else final
-            )
-            steps[-1] = replace(steps[-1], fitted=alone)
-        lost = _losses(
-            bare,
-            [steps[-1].fitted, *([final] if found.adopted else [])],
-            case.observations,
-            settings,
-        )
-        found = replace(found, adopted=found.adopted and not lost)
-        if found.adopted:
-            steps += _effect_steps(part, final, found)
-        elif lost and lost[0]:
-            kept = fit_model(
-                bare.model, case.observations, steps[-1].fitted.noise, bare.estimate
-            )
-            steps.append(Step("frames and targets, kept", "kept", kept))
-        kept, (asked, repeatable) = steps[-1].fitted, found.tested or (None, None)
-        if asked is not kept:
-            repeatable = repeatable_part(kept, case.observations, seed)
-        unnamed = verdict.describe_repeatable_residual(repeatable)
-        if word in (verdict.ADEQUATE, verdict.NOT_TESTABLE):
-            contradicting = unnamed or (
-                verdict.find_contradictions(final, noise, settings)
-                if word == verdict.ADEQUATE
-                else []
-            )
-        if contradicting:
-            found = replace(
-                found, conclusion=replace(found.conclusion, verdict=verdict.UNEXPLAINED)
-            )
-        warnings = [*contradicting, *warnings, *filter(None, lost)]
-        warnings += (
-            []
-            if unnamed
-            else verdict.warn_of_pose_error(
-                kept.noise, found.linearized.pose_std_error_rad
-            )
-        )
-    stated = state_training_verdict(
+        case = replace(case, model=subset.case.model)
+        rows = _settle_rows(_Context(case, settings, seed, report), subset)
+    outcome = _choose_model(rows, settings, seed)
+    subset = rows.subset
+    outliers = replace(rows.outliers, gross=~subset.kept)
+    training_verdict = state_training_verdict(
         TrainingResult(
-            case=case,
-            noise=noise,
-            steps=tuple(steps),
-            full_model=final,
-            evidence=found,
-            faults=known,
-            warnings=tuple(warnings),
-            contradictions=tuple(contradicting),
-            repeatable=repeatable,
-            gross_errors=tuple(describe_gross_errors(errors, whole, held_out=False)),
+            case=subset.case,
+            noise=subset.noise,
+            steps=tuple(outcome.steps),
+            full_model=outcome.full_model,
+            evidence=outcome.evidence,
+            faults=data_faults,
+            warnings=tuple(outcome.warnings),
+            contradictions=tuple(outcome.contradictions),
+            repeatable=outcome.repeatable,
+            gross_errors=tuple(
+                describe_gross_errors(outliers, campaign, held_out=False)
+            ),
         ),
         settings,
     )
+    left_out = campaign.measurements.select(outliers.gross)
     return Diagnosis(
-        case, tuple(steps), found, stated, whole.measurements.select(errors.gross)
+        subset.case,
+        tuple(outcome.steps),
+        outcome.evidence,
+        training_verdict,
+        left_out,
+        settings,
     )
 
 
-def _losses(
-    bare: Fit, models: Sequence[Fit], observations: Observations, settings: Settings
-) -> list[str]:
-    """A sentence for each model that predicts left-out training poses worse than frames
-    alone, empty for one that does not.
+def _select_first_subset(
+    case: Case, settings: Settings
+) -> tuple[FittedSubset, Sequence[Fault]]:
+    """Select the rows of the first search, and look for faults of the data."""
+    subset = select_initial_subset(case, settings)
+    data_faults = faults(subset.case.campaign)
+    if data_faults:
+        # If the whole data set has a fault, such as a wrong unit or frame, do not look
+        # for single bad rows.
+        every_row = np.ones(len(case.campaign.measurements), bool)
+        return fit_subset(case, every_row, settings), data_faults
+    return choose_centre_prior(subset, settings), []
 
-    Of the declared model and, if it is given, that with effects; nothing where the last
-    holds.
+
+def _settle_rows(context: _Context, subset: FittedSubset) -> _SettledRows:
+    """Search for the model, judge all rows by it, and search again without the gross
+    errors until they stay the same.
+
+    A round returns where the next one starts, and not its evidence: so the statistics
+    of one search are released before the next search allocates its own.
     """
-    found = []
-    for fitted, name in zip(
-        models, ("declared model", "model with the effects found"), strict=False
-    ):
-        effective = count_effective_parameters(fitted)
-        words = ""
-        if fitted.residual.size < settings.numbers_a_parameter * effective:
-            mine, others = (
-                predict_left_out_squares(each, observations) for each in (fitted, bare)
-            )
-            off = mine - others
-            if off.mean() > off.std(ddof=1) / np.sqrt(len(off)):
-                rms = [
-                    f"{1e3 * np.sqrt(each.mean()):.2f} mm" for each in (mine, others)
-                ]
-                words = (
-                    f"training poses left out in turn are off by {rms[0]} RMS by the {name}, by {rms[1]} with frames and"
-                    f" targets alone: {len(mine)} poses are too few for {effective:.0f} parameters, and the {name} is not kept"
-                )
-        found.append(words)
-    return found if found[-1] else []
-
-
-def _explained(
-    part: FittedSubset,
-    settings: Settings,
-    seed: int,
-    tell: Callable[[str], None],
-    start: tuple[Fit, tuple[str, ...]] | None,
-    most_pose_error_rad: float,
-) -> Evidence:
-    """Evidence about the declared model, and again about the model found where that, or
-    its noise, is far from it.
-
-    At once about a model, with the mechanisms that it has beyond the declared one,
-    where the search is to ``start``. What an error common to the measurements of a pose
-    takes beyond what robots repeat to must be chance: where it is a function of the
-    joints no more of it is thought of. And where what is left is one, the search goes
-    on about each model that is new.
-    """
-    candidates = list(part.case.candidates.values())
-    searched = part.search_sample
-    declared = part.declared
-    about, before = start or (declared, None)
-    tested: tuple[Fit, RepeatableResidual | None] | None = None
-    # The fit to all measurements starts where that to some ends.
-    enough = (
-        CONVERGENCE_TOLERANCE
-        if searched is part.case.observations
-        else INTERMEDIATE_TOLERANCE
+    state: _RowRound | _SettledRows = _RowRound(
+        0, subset, np.zeros(len(subset.kept), bool)
     )
-    if start:
-        about = fit_model(
-            about.model,
-            searched,
-            about.noise,
-            about.estimate,
-            reweight_first_step=True,
-            tolerance=INTERMEDIATE_TOLERANCE,
+    while isinstance(state, _RowRound):
+        state = _search_and_judge_rows(context, state)
+    return state
+
+
+def _search_and_judge_rows(
+    context: _Context, start: _RowRound
+) -> _RowRound | _SettledRows:
+    """Search for the model with some rows, and judge all rows by it; the start of the
+    next search if other rows change the model."""
+    case = context.case
+    settings = context.settings
+    measurements = case.campaign.measurements
+    subset = start.subset
+    evidence = _search_until_settled(context, start)
+    fitted = evidence.fitted
+    outliers = OutlierTest.none(len(subset.kept), case.model.rows)
+    # A row that a model without it explains stays, whatever the next model says of it.
+    # Therefore no set of rows comes back.
+    readmitted = start.readmitted.copy()
+    for number in range(start.number, settings.gross_error_rounds):
+        outliers = find_gross_errors(
+            fitted, subset.noise, measurements, subset.kept, settings
         )
-    for round_number in range(1 if start else 0, settings.linearizations):
-        problem = build_candidate_design(
-            about, searched, candidates, settings, most_pose_error_rad
-        )
-        near = about if before else None
-        nothing, alone = screen_terms(problem.problem)
-        draws = open_stream(
-            seed, part.case.campaign.name, "null distribution", round_number
-        )
-        alarm = run_alarm_test(
-            problem.problem, problem.products, nothing.pose_error_rad, draws
-        )
-        # The alarm comes before the measurements choose at which shapes to look more
-        # closely: it would no longer be exact.
-        if alarm.raised:
-            problem = refine_shapes(problem, alone)
-        found = search_models(
-            problem.problem, {effect.key for effect in about.model.effects}
-        )
-        conclusion = verdict.conclude(problem.problem, found, alarm)
-        # Rows of a long campaign make room for the fit, and for those of the next
-        # linearisation.
-        problem = problem.without_rows
-        named = conclusion.best.named
-        taken = about.noise
-        model = found.models[conclusion.best.model] if named else found.empty_model
-        # No verdict yet, and no probability: a later search, or the poses left out, may
-        # say otherwise.
-        words = [
-            getattr(list_effects().get(name), "words", "an unknown mechanism")
-            for name in conclusion.best.mechanisms
-        ]
-        leading = " with ".join(words) or "nothing is missing"
-        tell(
-            f"search {round_number + 1} of at most {settings.linearizations}: leading so far, {leading}"
-        )
-        noise = refit.estimate_residual_noise(
-            problem.problem, model, taken, declared.noise
-        )
-        about = refit.fit_selected_effects(
-            declared,
-            searched,
-            noise,
-            refit.select_effects(problem, model),
-            near,
-            tolerance=enough,
-        )
-        off = noise.position_m > settings.relinearize_noise * taken.position_m
-        small = not named or alarm.statistic < settings.relinearize_above
-        ends = not off and (
-            small
-            or named == before
-            or abs(refit.compute_reduced_chi_square(about) - 1.0)
-            < settings.linear_misfit
-        )
-        # What is a function of the joints is no error of poses, and about a model that
-        # is new the problem is another one.
-        large = model.pose_error_rad > settings.pose_repeatability_rad
-        left = None
-        if large or (ends and named not in (before, ())):
-            left = repeatable_part(about, searched, seed)
-            tested = about, left
-        remains = left is not None and left.remains
-        settled = ends and not remains
-        adopted = bool(named) and model_averaging.is_expected_to_help(
-            problem.problem, found, model
-        )
-        evidence = Evidence(
-            problem, found, alarm, conclusion, adopted, settled, about, tested
-        )
-        if settled:
+        readmitted |= ~subset.kept & ~outliers.gross
+        remaining = ~outliers.gross | readmitted
+        is_last = number + 1 == settings.gross_error_rounds
+        if is_last or (remaining == subset.kept).all():
             break
-        if remains:
-            most_pose_error_rad = settings.pose_repeatability_rad
-            if large:
-                noise = refit.limit_pose_error(about, searched, most_pose_error_rad)
-                about = fit_model(
-                    about.model,
-                    searched,
-                    noise,
-                    about.estimate,
-                    reweight_first_step=True,
-                    tolerance=enough,
-                )
-        before = named
-        if round_number + 1 < settings.linearizations:
-            # The next problem takes the room of this one.
-            del problem, found, conclusion, evidence
-    return replace(evidence, fitted=about)
-
-
-def _effect_steps(part: FittedSubset, final: Fit, found: Evidence) -> list[Step]:
-    """One step for each mechanism, that which explains most first, each with those
-    before it; of many, the rest together.
-
-    All but the last come from what a search looks at: only their errors are shown.
-    """
-    model = found.posterior.models[found.conclusion.best.model]
-    chosen = [
-        (effect, final.effect_values(effect.key)[1])
-        for effect, _ in refit.select_effects(found.linearized, model)
-    ]
-    explained = model_averaging.compute_explained_squares(
-        found.linearized.problem, model
-    )
-    names = sorted(found.conclusion.best.named, key=lambda name: -explained[name])
-    alone = names[:-1] if len(names) <= _MOST_STEPS else names[:1]
-    rest = names[len(alone) :]
-    steps = [
-        Step(
-            f"with {rest[0] if len(rest) == 1 else f'{len(rest)} further effects'}",
-            "effect",
-            final,
+        # Refit the current model without the rejected rows, and judge all rows by it,
+        # before starting another search.
+        sample = sample_for_search(case, case.select(remaining), settings)
+        fitted = _refit_from(fitted, sample, fitted.noise, INTERMEDIATE_TOLERANCE)
+        outliers = find_gross_errors(
+            fitted, subset.noise, measurements, remaining, settings
         )
+        readmitted |= ~remaining & ~outliers.gross
+        previous = subset
+        subset = fit_subset(case, ~outliers.gross | readmitted, settings, previous)
+        if subset is previous:
+            break
+        count = format_count((~subset.kept).sum(), "gross error")
+        total = format_count(len(readmitted), "row")
+        context.report(f"{count} in {total}: once more without")
+        if serialize_noise(subset.noise) != serialize_noise(previous.noise):
+            return _restart_search(number + 1, subset, readmitted, evidence, fitted)
+        refitted = fitted
+        if (subset.kept != remaining).any():
+            refitted = _refit_from(
+                fitted, subset.search_sample, fitted.noise, INTERMEDIATE_TOLERANCE
+            )
+        if not _is_shift_negligible(evidence.fitted, refitted):
+            return _restart_search(number + 1, subset, readmitted, evidence, fitted)
+        fitted = refitted
+    return _SettledRows(subset, outliers, evidence, fitted)
+
+
+def _is_shift_negligible(searched: Fit, refitted: Fit) -> bool:
+    """Whether the rows that changed have so little weight that a new search would find
+    the same."""
+    shift = np.subtract(
+        get_parameter_values(refitted.model, refitted.estimate),
+        get_parameter_values(searched.model, searched.estimate),
+    )
+    std_error = np.sqrt(np.diag(searched.covariance))
+    return bool((np.abs(shift) <= _NEGLIGIBLE_SHIFT * std_error).all())
+
+
+def _restart_search(
+    number: int,
+    subset: FittedSubset,
+    readmitted: np.ndarray,
+    evidence: Evidence,
+    fitted: Fit,
+) -> _RowRound:
+    """Start the next search at the model found so far if the last one was linearised
+    about a model that it had found; starting at the declared model would repeat the
+    same steps."""
+    design = evidence.linearized
+    declared_effects = subset.declared.model.effects
+    relinearized = len(design.reference_fit.model.effects) > len(declared_effects)
+    return _RowRound(
+        number,
+        subset,
+        readmitted,
+        fitted if relinearized else None,
+        evidence.conclusion.best.named if relinearized else None,
+        design.max_pose_error_rad,
+    )
+
+
+def _refit_from(
+    fitted: Fit, observations: Observations, noise: Noise, tolerance: float
+) -> Fit:
+    """Fit the model of a fit to other observations, or with other noise, from its
+    estimate on."""
+    return fit_model(
+        fitted.model,
+        observations,
+        noise,
+        fitted.estimate,
+        reweight_first_step=True,
+        tolerance=tolerance,
+    )
+
+
+def _search_until_settled(context: _Context, start: _RowRound) -> Evidence:
+    """Search about the declared model, or the one to start from, and again about the
+    model found while that, or its noise, is far from the one before.
+
+    As in `_settle_rows`, a round releases its statistics before the next one starts.
+    """
+    state: _SearchRound | Evidence
+    if start.reference is None:
+        state = _SearchRound(0, start.subset.declared, None, start.max_pose_error_rad)
+    else:
+        reference = _refit_from(
+            start.reference,
+            start.subset.search_sample,
+            start.reference.noise,
+            INTERMEDIATE_TOLERANCE,
+        )
+        state = _SearchRound(1, reference, start.named, start.max_pose_error_rad)
+    while isinstance(state, _SearchRound):
+        state = _run_search_round(context, start.subset, state)
+    return state
+
+
+def _run_search_round(
+    context: _Context, subset: FittedSubset, start: _SearchRound
+) -> _SearchRound | Evidence:
+    """Linearise about a model, search, and fit the model found; the evidence if the
+    search has settled or has had its rounds, and the start of the next round if not.
+
+    An error common to the measurements of a pose that is larger than robots repeat to
+    must be random. If the residual is a function of the joints, no larger pose error
+    than that is considered from then on, and the search goes on.
+    """
+    settings = context.settings
+    sample = subset.search_sample
+    design, posterior, alarm = _search(context, subset, start)
+    conclusion = verdict.conclude(design.problem, posterior, alarm)
+    named = conclusion.best.named
+    model = posterior.empty_model
+    if named:
+        model = posterior.models[conclusion.best.model]
+    _report_leading(context, start.number, conclusion.best.mechanisms)
+    fitted = _fit_model_found(subset, start, design, model)
+    is_linear = _is_linear(start, fitted, alarm, named, settings)
+    # A residual that depends on the joint angles is not random pose error. Test for it
+    # again whenever the model has changed.
+    has_large_pose_error = model.pose_error_rad > settings.pose_repeatability_rad
+    tested = start.tested
+    remains = False
+    if has_large_pose_error or (is_linear and named not in (start.named, ())):
+        repeatable = repeatable_part(fitted, sample, context.seed)
+        tested = (fitted, repeatable)
+        remains = repeatable is not None and repeatable.remains
+    max_pose_error_rad = start.max_pose_error_rad
+    if remains:
+        max_pose_error_rad = settings.pose_repeatability_rad
+        if has_large_pose_error:
+            noise = refit.limit_pose_error(fitted, sample, max_pose_error_rad)
+            fitted = _refit_from(fitted, sample, noise, _choose_tolerance(subset))
+    settled = is_linear and not remains
+    if settled or start.number + 1 >= settings.linearizations:
+        adopted = bool(named) and model_averaging.is_expected_to_help(
+            design.problem, posterior, model
+        )
+        return Evidence(
+            design, posterior, alarm, conclusion, adopted, settled, fitted, tested
+        )
+    return _SearchRound(start.number + 1, fitted, named, max_pose_error_rad, tested)
+
+
+def _choose_tolerance(subset: FittedSubset) -> float:
+    """Tolerance of a fit to the search sample, which is intermediate if a fit to all
+    observations follows."""
+    if subset.search_sample is subset.case.observations:
+        return CONVERGENCE_TOLERANCE
+    return INTERMEDIATE_TOLERANCE
+
+
+def _fit_model_found(
+    subset: FittedSubset,
+    start: _SearchRound,
+    design: CandidateDesign,
+    model: ScoredModel,
+) -> Fit:
+    """Fit the model that a search found, under the noise that it leaves."""
+    noise = refit.estimate_residual_noise(
+        design.problem, model, start.reference.noise, subset.declared.noise
+    )
+    return refit.fit_selected_effects(
+        subset.declared,
+        subset.search_sample,
+        noise,
+        refit.select_effects(design, model),
+        start.reference if start.named else None,
+        tolerance=_choose_tolerance(subset),
+    )
+
+
+def _is_linear(
+    start: _SearchRound,
+    fitted: Fit,
+    alarm: Alarm,
+    named: tuple[str, ...],
+    settings: Settings,
+) -> bool:
+    """Whether the problem was linear enough at the point of linearisation.
+
+    The noise must not be far above the one by which the problem was whitened, because
+    plausible sizes are in units of that noise. Then it is enough that little or nothing
+    is missing, that the same effects were named before, or that the exact fit keeps
+    what the linear problem promised.
+    """
+    whitening_noise = start.reference.noise
+    ratio = settings.relinearize_noise
+    if fitted.noise.position_m > ratio * whitening_noise.position_m:
+        return False
+    if not named or alarm.statistic < settings.relinearize_above:
+        return True
+    if named == start.named:
+        return True
+    misfit = abs(refit.compute_reduced_chi_square(fitted) - 1.0)
+    return misfit < settings.linear_misfit
+
+
+def _search(
+    context: _Context, subset: FittedSubset, start: _SearchRound
+) -> tuple[CandidateDesign, Posterior, Alarm]:
+    """Linearise about a model, test whether anything is missing, and search. The rows
+    of the design are released."""
+    settings = context.settings
+    candidates = list(subset.case.candidates.values())
+    design = build_candidate_design(
+        start.reference,
+        subset.search_sample,
+        candidates,
+        settings,
+        start.max_pose_error_rad,
+    )
+    empty_model, log_bayes_factors = screen_terms(design.problem)
+    generator = open_stream(
+        context.seed, subset.case.campaign.name, "null distribution", start.number
+    )
+    alarm = run_alarm_test(
+        design.problem, design.products, empty_model.pose_error_rad, generator
+    )
+    # The alarm comes before the measurements choose the shapes that are refined; after
+    # that choice it would no longer be exact.
+    if alarm.raised:
+        design = refine_shapes(design, log_bayes_factors)
+    known = {effect.key for effect in start.reference.model.effects}
+    posterior = search_models(design.problem, known)
+    return design.without_rows, posterior, alarm
+
+
+def _report_leading(
+    context: _Context, number: int, mechanisms: tuple[str, ...]
+) -> None:
+    """Report the mechanisms that lead so far. This is no verdict yet: a later search,
+    or the poses left out, may say otherwise."""
+    names = [
+        getattr(list_effects().get(mechanism), "words", "an unknown mechanism")
+        for mechanism in mechanisms
     ]
-    for number in range(len(alone), 0, -1):
-        some = tuple(entry for entry in chosen if entry[0].effect in alone[:number])
-        # Errors that a tenth of a standard error in a parameter hardly moves.
+    leading = " with ".join(names) or "nothing is missing"
+    limit = context.settings.linearizations
+    context.report(f"search {number + 1} of at most {limit}: leading so far, {leading}")
+
+
+def _choose_model(rows: _SettledRows, settings: Settings, seed: int) -> _Outcome:
+    """Fit the frames, the declared model and the effects found, and choose the model
+    that is kept."""
+    subset = rows.subset
+    observations = subset.case.observations
+    declared = subset.fit_to_all(subset.declared)
+    frames = fit_model(
+        replace(subset.case.model, effects=()),
+        observations,
+        subset.noise,
+        tolerance=INTERMEDIATE_TOLERANCE,
+    )
+    steps = [
+        Step("frames and targets", "frames", frames),
+        Step("declared model", "declared", declared),
+    ]
+    evidence = rows.evidence
+    if evidence is None:
+        return _Outcome(steps, declared, None, subset.warnings, [], None)
+    full_model = rows.fitted
+    if full_model is not evidence.fitted or subset.search_sample is not observations:
+        full_model = subset.fit_to_all(full_model)
+    named = evidence.conclusion.best.named
+    oversized = find_oversized_effects(full_model, named)
+    conclusion = verdict.allow_related_mechanisms(evidence.conclusion, oversized)
+    if not evidence.adopted:
+        alone = full_model
+        if named:
+            alone = _refit_declared(evidence, declared, observations)
+        steps[-1] = replace(steps[-1], fitted=alone)
+    compared = [steps[-1].fitted]
+    if evidence.adopted:
+        compared.append(full_model)
+    losses = _describe_losses(frames, compared, observations, settings)
+    evidence = replace(
+        evidence, conclusion=conclusion, adopted=evidence.adopted and not losses
+    )
+    if evidence.adopted:
+        steps += _effect_steps(subset, full_model, evidence)
+    elif losses and losses[0]:
+        kept = fit_model(
+            frames.model, observations, steps[-1].fitted.noise, frames.estimate
+        )
+        steps.append(Step("frames and targets, kept", "kept", kept))
+    return _contradict(
+        _Outcome(
+            steps,
+            full_model,
+            evidence,
+            [*subset.warnings, *filter(None, losses)],
+            [],
+            _test_repeatable(evidence, steps[-1].fitted, observations, seed),
+        ),
+        evidence,
+        subset.noise,
+        settings,
+    )
+
+
+def _refit_declared(
+    evidence: Evidence, declared: Fit, observations: Observations
+) -> Fit:
+    """Fit the declared model under the noise that it leaves by itself, because no
+    effect is adopted."""
+    design = evidence.linearized
+    noise = refit.estimate_residual_noise(
+        design.problem,
+        evidence.posterior.empty_model,
+        design.reference_fit.noise,
+        declared.noise,
+    )
+    return _refit_from(declared, observations, noise, CONVERGENCE_TOLERANCE)
+
+
+def _test_repeatable(
+    evidence: Evidence, kept: Fit, observations: Observations, seed: int
+) -> RepeatableResidual | None:
+    """Test whether the kept model leaves a function of the joints, unless the search
+    tested that fit."""
+    if evidence.tested is not None and evidence.tested[0] is kept:
+        return evidence.tested[1]
+    return repeatable_part(kept, observations, seed)
+
+
+def _contradict(
+    outcome: _Outcome, evidence: Evidence, noise: Noise, settings: Settings
+) -> _Outcome:
+    """Withdraw a verdict of adequacy if something contradicts it, and warn."""
+    kept = outcome.steps[-1].fitted
+    repeatable_warnings = verdict.describe_repeatable_residual(outcome.repeatable)
+    conclusion = evidence.conclusion
+    contradictions: list[str] = []
+    if conclusion.verdict in (verdict.ADEQUATE, verdict.NOT_TESTABLE):
+        contradictions = repeatable_warnings
+    if conclusion.verdict == verdict.ADEQUATE and not contradictions:
+        contradictions = verdict.find_contradictions(
+            outcome.full_model, noise, settings
+        )
+    if contradictions:
+        conclusion = replace(conclusion, verdict=verdict.UNEXPLAINED)
+    warnings = [*contradictions, *outcome.warnings]
+    if not repeatable_warnings:
+        warnings += verdict.warn_of_pose_error(
+            kept.noise, evidence.linearized.pose_std_error_rad
+        )
+    return replace(
+        outcome,
+        evidence=replace(evidence, conclusion=conclusion),
+        warnings=warnings,
+        contradictions=contradictions,
+    )
+
+
+def _describe_losses(
+    frames: Fit, models: Sequence[Fit], observations: Observations, settings: Settings
+) -> list[str]:
+    """Describe how models predict left-out training poses worse than frames alone.
+
+    Parameters
+    ----------
+    frames
+        Fit of frames and targets alone.
+    models
+        The declared model and, if it has any, the one with the effects found.
+    observations
+        What all were fitted to.
+    settings
+        Settings of the diagnosis.
+
+    Returns
+    -------
+    list of str
+        A sentence for each model, empty for one that does not predict worse; no
+        sentences at all if the last model does not.
+    """
+    names = ("declared model", "model with the effects found")
+    sentences = [
+        _describe_loss(frames, fitted, name, observations, settings)
+        for fitted, name in zip(models, names, strict=False)
+    ]
+    return sentences if sentences[-1] else []
+
+
+def _describe_loss(
+    frames: Fit, fitted: Fit, name: str, observations: Observations, settings: Settings
+) -> str:
+    """A sentence if one model with few measurements for its parameters predicts
+    left-out training poses worse than frames alone by more than a standard error."""
+    effective = count_effective_parameters(fitted)
+    if fitted.residual.size >= settings.numbers_a_parameter * effective:
+        return ""
+    squares = predict_left_out_squares(fitted, observations)
+    frames_squares = predict_left_out_squares(frames, observations)
+    loss = squares - frames_squares
+    if not loss.mean() > loss.std(ddof=1) / np.sqrt(len(loss)):
+        return ""
+    rms_mm = 1e3 * np.sqrt(squares.mean())
+    frames_rms_mm = 1e3 * np.sqrt(frames_squares.mean())
+    return (
+        f"training poses left out in turn are off by {rms_mm:.2f} mm RMS by the {name},"
+        f" by {frames_rms_mm:.2f} mm with frames and targets alone: {len(loss)} poses"
+        f" are too few for {effective:.0f} parameters, and the {name} is not kept"
+    )
+
+
+def _effect_steps(subset: FittedSubset, final: Fit, evidence: Evidence) -> list[Step]:
+    """Add the mechanisms one at a time, the one that explains most first; of many, add
+    only the first alone, and the others together.
+
+    All steps but the last are fits to the search sample, because only their errors are
+    shown.
+    """
+    problem = evidence.linearized.problem
+    best = evidence.conclusion.best
+    model = evidence.posterior.models[best.model]
+    effects = [
+        (effect, final.effect_values(effect.key)[1])
+        for effect, _ in refit.select_effects(evidence.linearized, model)
+    ]
+    explained = model_averaging.compute_explained_squares(problem, model)
+    names = sorted(best.named, key=lambda name: -explained[name])
+    single = names[:-1] if len(names) <= _MAX_STEPS else names[:1]
+    together = names[len(single) :]
+    last = together[0] if len(together) == 1 else f"{len(together)} further effects"
+    steps = [Step(f"with {last}", "effect", final)]
+    for count in range(len(single), 0, -1):
+        included = tuple(
+            entry for entry in effects if entry[0].effect in single[:count]
+        )
+        # Intermediate models need no tight convergence: a tenth of a standard error
+        # does not change the errors that are shown.
         fitted = refit.fit_selected_effects(
-            part.declared,
-            part.search_sample,
+            subset.declared,
+            subset.search_sample,
             final.noise,
-            some,
+            included,
             steps[0].fitted,
             tolerance=INTERMEDIATE_TOLERANCE,
         )
-        steps.insert(0, Step(f"with {alone[number - 1]}", "effect", fitted))
+        steps.insert(0, Step(f"with {single[count - 1]}", "effect", fitted))
     return steps

@@ -17,7 +17,6 @@ from elastocal.diagnosis.gross_errors import (
     find_held_out_gross_errors,
     format_gross_error_warnings,
 )
-from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.studentized_residuals import estimate_prediction_uncertainty
 from elastocal.fitting.model import (
     Case,
@@ -209,7 +208,7 @@ def remove_gross_errors(
     errors = OutlierTest.none(len(measurements), held_out.model.rows)
     if diagnosis.verdict.faults:
         return errors, part, poses
-    settings = Settings()
+    settings = diagnosis.settings
     noise = parse_noise(diagnosis.document).without_pose_error
     fitted_uncertainty = estimate_prediction_uncertainty(
         final, noise, diagnosis.case.campaign.measurements

@@ -1,16 +1,16 @@
-"""What the columns of other people's tables are: by their names, and in which unit;
-what is ambiguous is asked for.
+"""Recognize the columns of tables of other programs, and their units.
 
-A column is recognized by what it is usually called, such as ``J1``, ``A1``, ``Joint 1``
-or ``q1 [deg]`` for the first joint. Its unit stands in brackets or behind the name
-(``x_mm``), in a row under the names, or is stated by an option. Orientations come in
-several notations, of which some say by themselves what they are.
+A column is recognized by its usual names, such as ``J1``, ``A1``, ``Joint 1`` or ``q1
+[deg]`` for the first joint. Its unit is in brackets or behind the name (``x_mm``), in a
+row under the names, or an option states it. Orientations have several notations, some of
+which are recognized by their columns. Errors ask the user about what is ambiguous.
 """
 
 import itertools
 import math
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import constants
@@ -28,7 +28,7 @@ MOMENT = "moment"
 TIME = "time"
 TEMPERATURE = "temperature"
 NONE = "none"
-# SI value of one of each unit, by kind.
+# SI values of the units, by kind of quantity.
 UNITS: dict[str, dict[str, float]] = {
     LENGTH: {
         "m": 1.0,
@@ -80,20 +80,23 @@ _NOTATIONS: dict[str, tuple[str, ...]] = {
 }
 _CERTAIN = (HOMOGENEOUS_MATRICES, QUATERNIONS, "matrix")
 _ALLOWED = (
-    "none, vector, quaternion, matrix, homogeneous, or euler: with three axes such as euler:ZYX (about axes that turn with the "
-    "body; small letters, euler:xyz: about fixed ones)"
+    "none, vector, quaternion, matrix, homogeneous, or euler: with three axes such as"
+    " euler:ZYX (about axes that turn with the body; small letters, euler:xyz: about"
+    " fixed ones)"
 )
-# Rounded to four digits, a quaternion's length and a matrix' columns are off by less.
+# Upper bound on the error of a quaternion's length and of a matrix product R' R; rounding
+# to four digits causes less.
 UNIT_LENGTH = 2e-3
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*(.*?)\s*[\])]\s*")
 _INDEX = re.compile(r"([^\[(]*?)\s*[\[(]\s*([0-9]+)\s*[\])](.*)", re.ASCII)
-# Of what has a usual unit; angles and lengths have two each and must be stated.
+# Units that a column has if none is stated. Angles and lengths have two usual units each
+# and must be stated.
 _USUAL = {FORCE: "N", MOMENT: "Nm", TIME: "s", TEMPERATURE: "C"}
-# What has no unit, as people write it.
+# How people write that a column has no unit.
 _NO_UNIT = ("", "-", "1", "#", "–", "none")
 _BEHIND = re.compile(r"(.+?)[_/ ]([A-Za-zµ°]+)")
-# No arm has a hundred joints, and a table is looked through for each up to the last
-# that it names.
+# Names of joint angles. A joint has at most two digits; a larger number does not belong
+# to a joint.
 _JOINT = re.compile(
     r"(q|j|a|axis|joint|theta|jointangle|actualq|targetq|qactual|rax|jointpos|jointposition|jointpositions|joints)([0-9]{1,2})"
 )
@@ -167,25 +170,23 @@ def has_position(names: Collection[str | None]) -> bool:
 
 
 def lengths_in(headers: Iterable[str]) -> list[str]:
-    """Headers of lengths that are none of a position, as of a draw wire or a ball
+    """List headers of lengths that belong to no position, as of a draw wire or a ball
     bar."""
-    parts = [(header, *split_unit(header)) for header in headers]
-    called = ("l", "length", "distance", "wirelength", "wire")
-    return [
-        h
-        for h, text, unit in parts
-        if (unit in UNITS[LENGTH] and not _find_name(text)) or _simplify(text) in called
-    ]
+    names = ("l", "length", "distance", "wirelength", "wire")
+    lengths = []
+    for header in headers:
+        text, unit = split_unit(header)
+        has_length_unit = unit in UNITS[LENGTH] and not _find_name(text)
+        if has_length_unit or _simplify(text) in names:
+            lengths.append(header)
+    return lengths
 
 
 def find_joints(names: Iterable[str]) -> list[str]:
-    """Names of joint angles among names, from q1 on."""
-    return [
-        f"q{number}"
-        for number in sorted(
-            int(name[1:]) for name in names if re.fullmatch(r"q[0-9]+", name)
-        )
-    ]
+    """List the names of joint angles among names, in the order of the joints."""
+    angles = [name for name in names if re.fullmatch(r"q[0-9]+", name)]
+    joints = sorted(int(name[1:]) for name in angles)
+    return [f"q{joint}" for joint in joints]
 
 
 def _scale(unit: str, kinds: Iterable[str]) -> float | None:
@@ -200,12 +201,14 @@ def scales_of(units: Mapping[str, str]) -> dict[str, float]:
 
 
 def read_units(cells: Sequence[str]) -> list[str] | None:
-    """Units of a row that has nothing else, such as ``deg; [mm]; -``, "" for none; None
-    where it has anything else."""
-    bare = [re.sub(r"^[\[(](.*)[\])]$", r"\1", cell).strip() for cell in cells]
-    units = ["" if unit in _NO_UNIT else _simplify_unit(unit) for unit in bare]
-    known = {unit for of_kind in UNITS.values() for unit in of_kind}
-    return units if any(units) and known.issuperset(units) else None
+    """Read a row that has only units, such as ``deg; [mm]; -``; "" stands for no unit.
+
+    Returns None if the row has anything else.
+    """
+    texts = [re.sub(r"^[\[(](.*)[\])]$", r"\1", cell).strip() for cell in cells]
+    units = ["" if text in _NO_UNIT else _simplify_unit(text) for text in texts]
+    known_units = set(itertools.chain.from_iterable(UNITS.values()))
+    return units if any(units) and known_units.issuperset(units) else None
 
 
 def recognize_column(header: str) -> tuple[str | None, str | None]:
@@ -244,13 +247,15 @@ def split_unit(header: str) -> tuple[str, str | None]:
 
 
 def _find_name(text: str) -> str | None:
+    """Name of a column that is called so, None if it is unknown."""
     plain = _simplify(text)
     for pattern, letter in ((_JOINT, "q"), (_APPROACH, "approach")):
-        # Joint 0 is somebody's first: whose, an option has to say.
-        if (match := pattern.fullmatch(plain)) and (
-            number := int(match[match.lastindex or 1])
-        ):
-            return f"{letter}{number}"
+        match = pattern.fullmatch(plain)
+        if match:
+            number = int(match[match.lastindex or 1])
+            # If a table counts from joint 0, an option must state the first joint.
+            if number:
+                return f"{letter}{number}"
     return _KNOWN.get(plain)
 
 
@@ -264,84 +269,126 @@ def _simplify_unit(unit: str) -> str:
     )
 
 
+@dataclass(frozen=True)
+class _Header:
+    """A header of a table: `text`, the column's name as this module has it, None if it
+    is unknown, and the unit, None if none is stated."""
+
+    text: str
+    name: str | None
+    unit: str | None
+
+
 def find_columns(
     text: TextTable, mapped: Mapping[str, str], robot: Robot | None
 ) -> tuple[dict[str, str], dict[str, str]]:
-    """Headers by name, those of the options first, and the units that headers and the
-    row under them state, by name."""
-    for header in mapped.values():
-        if header not in text.columns:
-            raise InputError(
-                text.path,
-                "header",
-                f"no column {header!r}",
-                suggest_names(header, list(text.columns)),
-            )
-    of_joints = {
-        _simplify(called): f"q{joint}"
-        for joint, called in enumerate((robot and robot.joint_names) or (), 1)
-    }
-    guesses = {header: recognize_column(header) for header in text.columns}
-    parts = {name for name, _ in guesses.values()} | {*mapped}
-    found = dict(mapped)
-    stated = dict[str, str]()
-    for header, (guess, unit) in guesses.items():
-        for plain, beside in (split_unit(header), (header, None)):
-            if name := of_joints.get(_simplify(plain)):
-                guess = name
-                unit = beside
-        if (
-            _simplify(header) == "q0"
-            and {"qx", "qy", "qz"} <= parts
-            and "qw" not in parts
-        ):
-            guess = "qw"
-            unit = None
-        below = text.units.get(header)
-        if unit and below and unit != below:
-            allowed = f"one unit; --ignore {header!r}, or a table with one of them"
-            raise InputError(
-                text.path,
-                "header",
-                f"{header!r} and {below!r} in the row under it",
-                allowed,
-            )
-        unit = unit or below
-        meant = next((name for name, named in mapped.items() if named == header), guess)
-        counted = _JOINT.fullmatch(_simplify(split_unit(header)[0]))
-        if meant is None and counted and int(counted[2]) == 0 and "q1" not in mapped:
-            allowed = f"--column q1={header!r} …, each joint's, or --ignore {header!r}"
-            raise InputError(
-                text.path, "header", f"{header!r}, counted from 0", allowed
-            )
-        if meant is None or mapped.get(meant, header) != header:
+    """Find out what the columns of a table are.
+
+    Parameters
+    ----------
+    text : the table
+    mapped : headers that options state, by name
+    robot : robot whose joints columns may be named after
+
+    Returns
+    -------
+    columns : headers by name, those of the options first.
+    stated_units : units by name, from the headers and the row under them.
+
+    Raises
+    ------
+    InputError
+        A stated header is missing, two columns have one name, or a header is ambiguous.
+    """
+    for stated_header in mapped.values():
+        if stated_header not in text.columns:
+            found = f"no column {stated_header!r}"
+            allowed = suggest_names(stated_header, list(text.columns))
+            raise InputError(text.path, "header", found, allowed)
+    columns = dict(mapped)
+    stated_units: dict[str, str] = {}
+    for header in _recognize_headers(text, mapped, robot):
+        _refuse_count_from_zero(text, mapped, header)
+        name = header.name
+        # An option may state another column of this name.
+        if name is None or mapped.get(name, header.text) != header.text:
             continue
-        if found.get(meant, header) != header:
-            quaternion = (
-                "; of a quaternion --column qw=NAME …"
-                if meant in ("q1", "q2", "q3", "q4")
-                else ""
+        if columns.get(name, header.text) != header.text:
+            raise _duplicate_error(text, name, columns[name], header.text)
+        has_unit = header.unit not in (None, *_NO_UNIT)
+        if has_unit and name not in mapped and kind_of(name) == (NONE,):
+            found = f"{header.text!r}, a {name} with a unit"
+            allowed = (
+                f"--ignore {header.text!r}, --column {name}={header.text!r} where it"
+                f" numbers or names each {name}, or --column NAME=…"
             )
-            allowed = f"--column {meant}=NAME, or --ignore NAME{quaternion}"
-            raise InputError(
-                text.path,
-                "header",
-                f"both {found[meant]!r} and {header!r} for {meant}",
-                allowed,
-            )
-        if (
-            meant not in mapped
-            and unit not in (None, *_NO_UNIT)
-            and kind_of(meant) == (NONE,)
-        ):
-            allowed = f"--ignore {header!r}, --column {meant}={header!r} where it numbers or names each {meant}, or --column NAME=…"
-            raise InputError(
-                text.path, "header", f"{header!r}, a {meant} with a unit", allowed
-            )
-        found[meant] = header
-        if unit is not None:
-            stated[meant] = unit
-    return found, stated
+            raise InputError(text.path, "header", found, allowed)
+        columns[name] = header.text
+        if header.unit is not None:
+            stated_units[name] = header.unit
+    return columns, stated_units
+
+
+def _recognize_headers(
+    text: TextTable, mapped: Mapping[str, str], robot: Robot | None
+) -> Iterator[_Header]:
+    """Recognize each header: by an option, by the robot's joint names, or by what such
+    a column is usually called."""
+    joint_names = (robot.joint_names if robot else None) or ()
+    names_of_joints = {
+        _simplify(joint_name): f"q{joint}"
+        for joint, joint_name in enumerate(joint_names, 1)
+    }
+    names_of_options = {header: name for name, header in reversed([*mapped.items()])}
+    usual = {header: recognize_column(header) for header in text.columns}
+    usual_names = {name for name, _ in usual.values()} | {*mapped}
+    is_quaternion = {"qx", "qy", "qz"} <= usual_names and "qw" not in usual_names
+    for header, (name, unit) in usual.items():
+        for plain_text, plain_unit in (split_unit(header), (header, None)):
+            joint = names_of_joints.get(_simplify(plain_text))
+            if joint:
+                name = joint
+                unit = plain_unit
+        if is_quaternion and _simplify(header) == "q0":
+            name = "qw"
+            unit = None
+        unit = _choose_unit(text, header, unit)
+        yield _Header(header, names_of_options.get(header, name), unit)
+
+
+def _choose_unit(text: TextTable, header: str, unit: str | None) -> str | None:
+    """Unit of a header, or of the row under it; refuse two different ones."""
+    unit_below = text.units.get(header)
+    if unit and unit_below and unit != unit_below:
+        found = f"{header!r} and {unit_below!r} in the row under it"
+        allowed = f"one unit; --ignore {header!r}, or a table with one of them"
+        raise InputError(text.path, "header", found, allowed)
+    return unit or unit_below
+
+
+def _refuse_count_from_zero(
+    text: TextTable, mapped: Mapping[str, str], header: _Header
+) -> None:
+    """Refuse an unknown joint 0: an option must state which joint is the first."""
+    if header.name is not None or "q1" in mapped:
+        return
+    joint = _JOINT.fullmatch(_simplify(split_unit(header.text)[0]))
+    if joint and int(joint[2]) == 0:
+        found = f"{header.text!r}, counted from 0"
+        allowed = (
+            f"--column q1={header.text!r} …, each joint's, or --ignore {header.text!r}"
+        )
+        raise InputError(text.path, "header", found, allowed)
+
+
+def _duplicate_error(text: TextTable, name: str, first: str, second: str) -> InputError:
+    """Make the error of two headers for one name."""
+    quaternion = ""
+    if name in ("q1", "q2", "q3", "q4"):
+        quaternion = "; of a quaternion --column qw=NAME …"
+    found = f"both {first!r} and {second!r} for {name}"
+    allowed = f"--column {name}=NAME, or --ignore NAME{quaternion}"
+    return InputError(text.path, "header", found, allowed)
 
 
 def find_units(
@@ -377,7 +424,8 @@ def find_units(
                 f"{option} or such, or --unit {name}=UNIT",
             )
         if _scale(unit, kinds) is None:
-            allowed = f"{', '.join(unit for kind in kinds for unit in UNITS[kind])}, by --unit {name}=UNIT"
+            units = itertools.chain.from_iterable(UNITS[kind] for kind in kinds)
+            allowed = f"{', '.join(units)}, by --unit {name}=UNIT"
             raise InputError(
                 text.path, f"unit of {columns[name]!r}", repr(unit), allowed
             )

@@ -35,7 +35,7 @@ from typing import Any
 
 import numpy as np
 
-from elastocal.campaigns.tables import Dialect, read_text_table
+from elastocal.campaigns.tables import Cells, Dialect, TextTable, read_text_table
 from elastocal.counting import format_count
 from elastocal.errors import InputError, suggest_names
 from elastocal.exchange.column_names import ANGLE, LENGTH, UNITS, read_units, split_unit
@@ -107,38 +107,35 @@ def robot_from_dh(
     """
     source = Path(path).as_posix()
     if Path(path).suffix.lower() in (".yaml", ".yml"):
-        if option := "--modified" if modified else "--ignore" if options.ignore else "":
-            raise InputError(
-                option,
-                "",
-                f"a file of {_KINEMATICS}, which is no table",
-                f"the file without {option}",
-            )
+        for option, is_given in (
+            ("--modified", modified),
+            ("--ignore", options.ignore),
+        ):
+            if is_given:
+                found = f"a file of {_KINEMATICS}, which is no table"
+                raise InputError(option, "", found, f"the file without {option}")
         return _robot_from_kinematics(path, name)
-    names, rows, notes = _read_table(path, options)
+    table = _read_table(path, options)
     document: dict[str, Any] = {"name": name or Path(path).stem}
+    names = table.joint_names
     # Numbers alone only count the joints.
-    if any(names) and not all(each.isdecimal() for each in names):
-        if wrong := [each for each in names if not each or names.count(each) > 1]:
-            raise InputError(
-                source,
-                "column joint",
-                repr(wrong[0]),
-                "a name for every joint, each once",
-            )
+    if any(names) and not all(joint_name.isdecimal() for joint_name in names):
+        for joint_name in names:
+            if not joint_name or names.count(joint_name) > 1:
+                allowed = "a name for every joint, each once"
+                raise InputError(source, "column joint", repr(joint_name), allowed)
         document["joint_names"] = names
-    words = _words(rows, modified)
-    near = _slid_words(rows, modified)
-    written, short = (
-        sum(abs(float(match[1])) for each in both if (match := _SHIFT.fullmatch(each)))
-        for both in (words, near)
-    )
-    notes += _LACKS
-    if short < _MUCH_SHORTER * written:
-        words = near
+    words = _words(table.rows, modified)
+    shortest_words = _slid_words(table.rows, modified)
+    length = _total_shift(words)
+    shortest_length = _total_shift(shortest_words)
+    notes = [*table.notes, *_LACKS]
+    if shortest_length < _MUCH_SHORTER * length:
+        words = shortest_words
         notes.append(
-            f"lengths of {written:.4g} m that cancel along nearly parallel axes became {short:.4g} m in the chain, "
-            "whose joints are at other places of the same axes: the pose at the end is the same"
+            f"lengths of {length:.4g} m that cancel along nearly parallel axes became"
+            f" {shortest_length:.4g} m in the chain, whose joints are at other places of"
+            " the same axes: the pose at the end is the same"
         )
     document["chain"] = " ".join([*words, "[flange]"])
     return check_imported(
@@ -149,19 +146,29 @@ def robot_from_dh(
     )
 
 
-def _read_table(
-    path: str | Path, options: DhOptions
-) -> tuple[list[str], np.ndarray, list[str]]:
-    """Names of joints, rows (n, 4) of theta, d, a, alpha in rad and m, and notes how
-    they were understood."""
+@dataclass(frozen=True)
+class _DhTable:
+    """The table: names of the joints, empty if there are none; `rows` (n, 4) of theta,
+    d, a and alpha, rad and m; and notes how its columns were understood."""
+
+    joint_names: list[str]
+    rows: np.ndarray
+    notes: list[str]
+
+
+def _total_shift(words: list[str]) -> float:
+    """Sum of the lengths of the shifts in a chain, m."""
+    shifts = (_SHIFT.fullmatch(text) for text in words)
+    return sum(abs(float(shift[1])) for shift in shifts if shift)
+
+
+def _read_table(path: str | Path, options: DhOptions) -> _DhTable:
+    """Read a table and check it cell by cell."""
     source = Path(path).as_posix()
-    if Path(path).suffix.lower() != ".csv":
-        raise InputError(
-            source,
-            "",
-            f"a file that ends in {Path(path).suffix!r}",
-            f".csv, or .yaml with {_KINEMATICS}",
-        )
+    suffix = Path(path).suffix
+    if suffix.lower() != ".csv":
+        found = f"a file that ends in {suffix!r}"
+        raise InputError(source, "", found, f".csv, or .yaml with {_KINEMATICS}")
     text = read_text_table(
         path,
         lambda cells: any(split_unit(cell)[0] in _NEEDED for cell in cells),
@@ -170,68 +177,93 @@ def _read_table(
         "columns d, a and alpha, such as d_m or d_mm",
         read_units,
     )
+    headers, units = _find_columns(text, options)
+    if len(text.lines) > _MOST_ROWS:
+        found = format_count(len(text.lines), "row")
+        allowed = f"at most {_MOST_ROWS}, one for each joint"
+        raise InputError(source, "", found, allowed)
+    scales = {name: UNITS[_KINDS[name]][unit] for name, unit in units.items()}
+    cells = text.cells(headers, scales)
+    if "type" in headers:
+        _check_types(cells)
+    rows = np.zeros((len(text.lines), len(_KINDS)))
+    for column, name in enumerate(_KINDS):
+        if name in headers:
+            rows[:, column] = cells.numbers(name)
+            _check_angles(cells, name, rows[:, column], units[name])
+    joint_names = cells.texts("joint") if "joint" in headers else []
+    return _DhTable(joint_names, rows, _notes_on(text, headers, units, options))
+
+
+def _find_columns(
+    text: TextTable, options: DhOptions
+) -> tuple[dict[str, str], dict[str, str]]:
+    """Find the headers and the units of the columns, by name."""
     headers: dict[str, str] = {}
     units: dict[str, str] = {}
     for header in text.columns:
         name, stated = (header, None) if header in _WORDS else split_unit(header)
         if name not in (*_KINDS, *_WORDS):
-            allowed = f"{suggest_names(header, _USUAL)}; import dh --ignore {header!r} leaves it out"
-            raise InputError(source, "header", repr(header), allowed)
+            suggestion = suggest_names(header, _USUAL)
+            allowed = f"{suggestion}; import dh --ignore {header!r} leaves it out"
+            raise InputError(text.path, "header", repr(header), allowed)
         if name in headers:
-            raise InputError(source, "header", f"{name} twice", "each column once")
+            raise InputError(text.path, "header", f"{name} twice", "each column once")
         headers[name] = header
         if name in _KINDS:
-            units[name] = _unit(
-                header, _KINDS[name], stated, text.units.get(header), options, source
+            below = text.units.get(header)
+            units[name] = _unit(header, _KINDS[name], stated, below, options, text.path)
+    for name in _NEEDED:
+        if name not in headers:
+            allowed = "theta_offset, d, a and alpha, such as d_m or d_mm"
+            raise InputError(text.path, "header", f"no column {name}", allowed)
+    return headers, units
+
+
+def _check_types(cells: Cells) -> None:
+    """Refuse joints that are not revolute."""
+    for row, joint_type in enumerate(cells.texts("type")):
+        if joint_type.upper()[:1] not in ("R", ""):
+            allowed = (
+                "R (revolute); what shifts or is fixed is written into the robot file"
             )
-    if missing := [name for name in _NEEDED if name not in headers]:
-        raise InputError(
-            source,
-            "header",
-            f"no column {missing[0]}",
-            "theta_offset, d, a and alpha, such as d_m or d_mm",
-        )
-    if len(text.lines) > _MOST_ROWS:
-        raise InputError(
-            source,
-            "",
-            format_count(len(text.lines), "row"),
-            f"at most {_MOST_ROWS}, one for each joint",
-        )
-    read = text.cells(
-        headers, {name: UNITS[_KINDS[name]][unit] for name, unit in units.items()}
-    )
-    for place, kind in enumerate(read.texts("type") if "type" in headers else ()):
-        if kind.upper()[:1] not in ("R", ""):
-            raise read.fault(
-                place,
-                "type",
-                "R (revolute); what shifts or is fixed is written into the robot file",
-            )
-    rows = np.column_stack(
-        [
-            read.numbers(name) if name in headers else np.zeros(len(text.lines))
-            for name in _KINDS
-        ]
-    )
-    for column, name in enumerate(_KINDS):
-        # 90 is in degrees, whatever is stated.
-        most = 2 if units.get(name) == "rad" else MOST_TURNS
-        wrong = np.abs(rows[:, column]) > 2.0 * math.pi * most
-        if _KINDS[name] == ANGLE and wrong.any():
-            allowed = f"a number, {most} turns at most{'; degrees are --angles deg' * (most == 2)}"
-            raise read.fault(int(np.argmax(wrong)), name, allowed)
-    understood = (
-        f"{header!r} as {name}{f' in {units[name]}' if name in units else ''}"
-        for name, header in headers.items()
-    )
+            raise cells.fault(row, "type", allowed)
+
+
+def _check_angles(cells: Cells, name: str, values: np.ndarray, unit: str) -> None:
+    """Refuse angles, rad, of more turns than a joint makes."""
+    if _KINDS[name] != ANGLE:
+        return
+    # A number such as 90 is in degrees, whatever unit is stated.
+    turns = 2 if unit == "rad" else MOST_TURNS
+    is_wrong = np.abs(values) > 2.0 * math.pi * turns
+    if is_wrong.any():
+        advice = "; degrees are --angles deg" if unit == "rad" else ""
+        allowed = f"a number, {turns} turns at most{advice}"
+        raise cells.fault(int(np.argmax(is_wrong)), name, allowed)
+
+
+def _notes_on(
+    text: TextTable,
+    headers: dict[str, str],
+    units: dict[str, str],
+    options: DhOptions,
+) -> list[str]:
+    """Tell how the columns and the file were understood."""
+    understood = []
+    for name, header in headers.items():
+        unit = f" in {units[name]}" if name in units else ""
+        understood.append(f"{header!r} as {name}{unit}")
+    dialect = text.dialect
     notes = [
         f"read: {'; '.join(understood)}",
-        f"file: names of columns in line {text.dialect.header}, separator {text.dialect.separator}, "
-        f"decimal {text.dialect.decimal}, encoding {text.dialect.encoding}",
-        *([f"not used: {', '.join(options.ignore)}"] if options.ignore else []),
+        f"file: names of columns in line {dialect.header},"
+        f" separator {dialect.separator}, decimal {dialect.decimal},"
+        f" encoding {dialect.encoding}",
     ]
-    return read.texts("joint") if "joint" in headers else [], rows, notes
+    if options.ignore:
+        notes.append(f"not used: {', '.join(options.ignore)}")
+    return notes
 
 
 def _unit(
@@ -305,68 +337,79 @@ def _slid_words(rows: np.ndarray, modified: bool) -> list[str]:
 
 
 def _robot_from_kinematics(path: str | Path, name: str | None) -> Imported:
-    """The robot of a kinematics file, its links in the order of the arm; other keys and
-    what is no number are refused."""
+    """Read the robot of a kinematics file, its links in the order of the arm."""
+    source = Path(path).as_posix()
+    links, has_digest = _read_links(path)
+    words: list[str] = []
+    for joint, (link, origin) in enumerate(links.items(), 1):
+        values = _read_origin(origin, source, f"{_KINEMATICS}.{link}")
+        words += displacement_words(origin_transform(values[:3], values[3:]))
+        words.append(f"Rz(q{joint})")
+    joint_names = [_JOINTS.get(link, link) for link in links]
+    last_link = [*links][-1]
+    chain = " ".join([*words, f"[{point_name(last_link)}]"])
+    document = {
+        "name": name or Path(path).stem,
+        "joint_names": joint_names,
+        "chain": chain,
+    }
+    joints = [
+        f"q{joint} is {joint_name} of {link!r}"
+        for joint, (joint_name, link) in enumerate(
+            zip(joint_names, links, strict=True), 1
+        )
+    ]
+    notes = [f"read: {', '.join(joints)}"]
+    if has_digest:
+        notes.append("not used: hash")
+    notes += _LACKS
+    notes.append(
+        "base axes are the controller's (base, not base_link, which is turned half round)"
+    )
+    options = "the kinematics of a calibrated robot as ROS has them"
+    return check_imported(document, path, options, notes)
+
+
+def _read_links(path: str | Path) -> tuple[dict[str, Any], bool]:
+    """Read the entries of the links of a kinematics file, in the order of the arm, and
+    whether a digest of the calibration is among them."""
     source = Path(path).as_posix()
     document = read_document(path)
-    wanted = f"links, each with {', '.join(_KEYS)}"
     if not isinstance(document, dict) or _KINEMATICS not in document:
-        raise InputError(
-            source,
-            "",
-            f"no {_KINEMATICS}",
-            f"{_KINEMATICS} as ROS drivers write them, or a table as .csv",
-        )
-    described = document[_KINEMATICS]
-    if not isinstance(described, dict):
-        raise InputError(source, _KINEMATICS, type(described).__name__, wanted)
-    # A digest of the calibration stands beside the links.
-    links = {str(link): origin for link, origin in described.items() if link != "hash"}
+        allowed = f"{_KINEMATICS} as ROS drivers write them, or a table as .csv"
+        raise InputError(source, "", f"no {_KINEMATICS}", allowed)
+    entries = document[_KINEMATICS]
+    allowed = f"links, each with {', '.join(_KEYS)}"
+    if not isinstance(entries, dict):
+        raise InputError(source, _KINEMATICS, type(entries).__name__, allowed)
+    links = {str(link): origin for link, origin in entries.items() if link != "hash"}
     if not links:
-        raise InputError(source, _KINEMATICS, "no link", wanted)
-    if set(links) <= {*_JOINTS}:
+        raise InputError(source, _KINEMATICS, "no link", allowed)
+    if set(links) <= set(_JOINTS):
         links = {link: links[link] for link in _JOINTS if link in links}
-        if missing := [
-            link
-            for link in [*_JOINTS][: [*_JOINTS].index([*links][-1])]
-            if link not in links
-        ]:
+        last_link = [*links][-1]
+        for link in _JOINTS:
+            if link == last_link:
+                break
+            if link not in links:
+                allowed = f"every link before {last_link}"
+                raise InputError(source, _KINEMATICS, f"no link {link}", allowed)
+    return links, "hash" in entries
+
+
+def _read_origin(origin: object, source: str, key: str) -> list[float]:
+    """Read x, y, z (m), roll, pitch and yaw (rad) of a link."""
+    if not isinstance(origin, dict):
+        raise InputError(source, key, type(origin).__name__, ", ".join(_KEYS))
+    if set(origin) != set(_KEYS):
+        found = ", ".join(map(str, origin)) or "nothing"
+        raise InputError(source, key, found, ", ".join(_KEYS))
+    values = []
+    for name in _KEYS:
+        value = parse_number(str(origin[name]))
+        if value is None:
             raise InputError(
-                source,
-                _KINEMATICS,
-                f"no link {missing[0]}",
-                f"every link before {[*links][-1]}",
+                source, f"{key}.{name}", repr(origin[name]), NUMBER_ALLOWED
             )
-    words: list[str] = []
-    for number, (link, origin) in enumerate(links.items(), 1):
-        where = f"{_KINEMATICS}.{link}"
-        if not isinstance(origin, dict) or set(origin) != set(_KEYS):
-            found = (
-                ", ".join(map(str, origin))
-                if isinstance(origin, dict)
-                else type(origin).__name__
-            )
-            raise InputError(source, where, found or "nothing", ", ".join(_KEYS))
-        values: list[float] = []
-        for key in _KEYS:
-            if (value := parse_number(str(origin[key]))) is None:
-                raise InputError(
-                    source, f"{where}.{key}", repr(origin[key]), NUMBER_ALLOWED
-                )
-            values.append(value)
-        words += [
-            *displacement_words(origin_transform(values[:3], values[3:])),
-            f"Rz(q{number})",
-        ]
-    names = [_JOINTS.get(link, link) for link in links]
-    chain = " ".join([*words, f"[{point_name([*links][-1])}]"])
-    contents = {"name": name or Path(path).stem, "joint_names": names, "chain": chain}
-    notes = [
-        f"read: {', '.join(f'q{n} is {name} of {link!r}' for n, (name, link) in enumerate(zip(names, links, strict=True), 1))}",
-        *(["not used: hash"] if "hash" in described else []),
-        *_LACKS,
-        "base axes are the controller's (base, not base_link, which is turned half round)",
-    ]
-    return check_imported(
-        contents, path, "the kinematics of a calibrated robot as ROS has them", notes
-    )
+        values.append(value)
+    return values

@@ -1,16 +1,19 @@
-"""Measurements of another program's table, as a campaign has them.
+"""Measurements from a table of another program, as a campaign has them.
 
-What a name, a unit or a notation leaves open is asked for, never guessed: an angle
-without unit, ``rx, ry, rz`` that may be a rotation vector or Euler angles. What was
-found out is returned, too.
+The user is asked for what names, units and notations leave open, such as the unit of an
+angle, or whether ``rx, ry, rz`` is a rotation vector or Euler angles; nothing is guessed.
+The result states all options, including those that were recognized.
 """
 
+from __future__ import annotations
+
+import itertools
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -43,30 +46,38 @@ from elastocal.io.texts import parse_number
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 
-# Angles that a controller reports twice at one standstill agree to better; poses of a
-# plan lie degrees apart.
+# Joint angles that differ by less, rad, belong to one pose: a controller reports one
+# standstill twice within this tolerance, and poses of a plan lie degrees apart.
 SAME_POSE = 1e-3
-# Nanoseconds since 1970 are 2e18.
+# Upper bound on a number in a column of times; nanoseconds since 1970 are 2e18.
 _LARGEST_TIME = 1e19
-# What programs write where nothing was measured.
+# What programs write into a cell without a measurement.
 _EMPTY = re.compile(
     r"|[+-]?nan(\(\w+\))?|[-–—]+|#?n/?a|n\.a\.|null|none", re.IGNORECASE
 )
+# Columns that a campaign can do without.
+_OPTIONAL = ("time_s", "temperature_c", "u95_m")
+_Value = TypeVar("_Value")
 
 
 @dataclass(frozen=True)
 class ImportOptions(Dialect):
-    """How a table is read; what is None or absent is found out, or refused where it is
+    """How a table is read; what is None or absent is recognized, or refused if it is
     ambiguous.
 
-    `ignore`: headers of columns that are left out. `columns`: headers by the names of
-    `column_names`. `units`: units by the same names; ``angles`` and ``lengths`` for all
-    that have no other. `rotation`: notation of `rotations`. `target`: name for all rows
-    where no column has it. `targets`: of rows that hold several, headers of x, y and z
-    by the targets' names. `wrench`: what the forces act on; those that the robot
-    exerts, ``by-robot``, are turned round. `skip_empty`: whether rows without a
-    position are left out. `names`: of the columns of a table without a header, in their
-    order.
+    Attributes
+    ----------
+    columns : headers by the names of `column_names`.
+    units : units by the same names; ``angles`` and ``lengths`` for all columns that
+        have no other unit.
+    rotation : notation of the orientations, see `find_rotation`.
+    target : name for all rows if no column has it.
+    wrench : ``on-robot`` or ``by-robot``: what the forces act on. Forces that the robot
+        exerts have their signs changed.
+    skip_empty : whether rows without a position are left out.
+    ignore : headers of columns that are left out.
+    targets : headers of x, y and z by the names of the targets, if a row holds several.
+    names : names of the columns of a table without a header, in their order.
     """
 
     columns: Mapping[str, str] = field(default_factory=dict)
@@ -80,98 +91,19 @@ class ImportOptions(Dialect):
     names: Sequence[str] = ()
 
 
-def _one_row_each(text: TextTable, targets: Mapping[str, Sequence[str]]) -> TextTable:
-    """A table with one row for each target of a row, whose position has the headers of
-    the first target's."""
-    for name, headers in targets.items():
-        for header, axis in zip(headers, POSITION, strict=True):
-            if header not in text.columns:
-                raise InputError(
-                    text.path,
-                    "header",
-                    f"no column {header!r}",
-                    f"{axis} of {name}: {', '.join(text.columns)}",
-                )
-    units = [
-        {text.units.get(h) or recognize_column(h)[1] for h in axis}
-        for axis in zip(*targets.values(), strict=True)
-    ]
-    if any(len(each) > 1 for each in units):
-        raise InputError(
-            text.path,
-            "header",
-            "positions of targets in several units",
-            "one unit for all targets",
-        )
-    others = {header for headers in targets.values() for header in headers}
-    columns = {
-        name: tuple(c for c in cells for _ in targets)
-        for name, cells in text.columns.items()
-        if name not in others
-    }
-    for headers in zip(*targets.values(), strict=True):
-        columns[headers[0]] = tuple(
-            c
-            for row in zip(*(text.columns[h] for h in headers), strict=True)
-            for c in row
-        )
-    columns["target"] = tuple(targets) * len(text.lines)
-    return replace(
-        text, columns=columns, lines=tuple(line for line in text.lines for _ in targets)
-    )
-
-
-def _filled_rows(
-    text: TextTable,
-    columns: Mapping[str, str],
-    position: Sequence[str],
-    skip_empty: bool,
-) -> np.ndarray:
-    """Rows that have a position; `skip_empty`: NaN, - and N/A are none either."""
-    empty = _EMPTY.fullmatch if skip_empty else re.compile("").fullmatch
-    filled = np.array(
-        [[not empty(cell) for cell in text.columns[columns[name]]] for name in position]
-    ).all(axis=0)
-    if not filled.all() and not skip_empty:
-        row = int(np.argmin(filled))
-        of = (
-            f" of {text.columns[columns['target']][row]}" if "target" in columns else ""
-        )
-        allowed = "three numbers, or --skip-empty to leave such rows out"
-        raise InputError(
-            text.path, f"line {text.lines[row]}", f"no position{of}", allowed
-        )
-    if not filled.any():
-        raise InputError(
-            text.path, "", "no position in any row", "at least one measurement"
-        )
-    return np.flatnonzero(filled)
-
-
-def _times(read: Cells) -> np.ndarray:
-    """Times (N,), s: of numbers, or of dates of ISO 8601: since 1970, at Greenwich
-    without a zone."""
-    cells = read.texts("time_s")
-    numbers = [parse_number(cell, _LARGEST_TIME) for cell in cells]
-    if None not in numbers:
-        return read.bounded("time_s", np.array(numbers, float) * read.scales["time_s"])
-    with suppress(ValueError, OverflowError):
-        dates = pd.to_datetime(pd.Series(cells), format="ISO8601", utc=True)
-        if dates.notna().all() and all("-" in cell or "/" in cell for cell in cells):
-            return (dates - pd.Timestamp(0, tz="UTC")).dt.total_seconds().to_numpy()
-    raise read.fault(
-        numbers.index(None), "time_s", "numbers, or dates as 2023-05-04 10:20:33"
-    )
-
-
 @dataclass(frozen=True)
 class ImportedMeasurements:
     """Measurements as a campaign has them.
 
-    `table` (N,): columns of measurements.csv. `options`: those given, and what was
-    found out. `ignored`: headers of columns that are not used. `skipped`: rows without
-    a position that were left out. `notes`: how columns were understood that may
-    surprise, and which were not read.
+    Attributes
+    ----------
+    table : columns of measurements.csv, ndarrays (N,).
+    joints : number of joints.
+    options : the given options, and those that were recognized.
+    ignored : headers of columns that are not used.
+    skipped : number of rows without a position that were left out.
+    notes : which columns were understood in a way that may surprise, and which were not
+        read.
     """
 
     table: dict[str, np.ndarray]
@@ -182,42 +114,156 @@ class ImportedMeasurements:
     notes: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True)
+class _Layout:
+    """How the columns of a table are understood.
+
+    `text`: the table, one row a target. `columns`: headers by name. `stated_units`:
+    units that headers state, by name. `rotation`: notation of the orientations.
+    """
+
+    text: TextTable
+    columns: dict[str, str]
+    stated_units: dict[str, str]
+    rotation: str
+
+    @property
+    def angles(self) -> list[str]:
+        return find_joints(self.columns)
+
+    @property
+    def position(self) -> tuple[str, ...]:
+        return TRANSLATION if self.rotation == HOMOGENEOUS_MATRICES else POSITION
+
+    @property
+    def orientation(self) -> tuple[str, ...]:
+        return columns_of_rotation(self.rotation, self.columns)
+
+    @property
+    def wrench(self) -> list[str]:
+        return [name for name in WRENCH_NAMES if name in self.columns]
+
+    @property
+    def with_units(self) -> list[str]:
+        """Names of all columns that must have a unit."""
+        return [*self.angles, *self.position, *self.orientation, *self.wrench]
+
+
+@dataclass(frozen=True)
+class _OptionalColumns:
+    """Time, temperature and uncertainty of measurements: `columns` and `units` of those
+    that could be read, by name, and `notes` about the others."""
+
+    columns: dict[str, np.ndarray]
+    units: dict[str, str]
+    notes: list[str]
+
+
 def read_measurement_table(
     path: str | Path, options: ImportOptions, robot: Robot | None = None
 ) -> ImportedMeasurements:
     """Read measurements from a table of another program.
 
-    `robot`: whose joints they are: columns may be called as its file names them, and
-    there have to be as many. Raises `InputError`: what is missing or ambiguous, with
-    the option that says it; or line and column of what is no number or no rotation.
+    Parameters
+    ----------
+    path : file of the table
+    options : how it is read
+    robot : robot that was measured. Columns may have the names of its joints, and there
+        must be a column for each joint.
+
+    Raises
+    ------
+    InputError
+        Something is missing or ambiguous: the error has the option that states it. Or a
+        cell is not a number, or not a rotation: the error has its line and column.
     """
-    mapped = dict(options.columns)
-    for name in (*mapped, *(set(options.units) - {"angles", "lengths"})):
+    _check_names(options)
+    text = _read_cells(path, options)
+    notes = []
+    if text.units:
+        notes.append(f"units in the row under the header: {len(text.units)}")
+    headers = dict(options.columns)
+    if options.targets:
+        text = _split_targets(text, options.targets)
+        first_headers = next(iter(options.targets.values()))
+        headers |= dict(zip(POSITION, first_headers, strict=True))
+        headers["target"] = "target"
+        notes += [
+            f"{name} has {', '.join(map(repr, columns))}"
+            for name, columns in options.targets.items()
+        ]
+    layout = _find_layout(text, headers, options, robot)
+    units = find_units(
+        text,
+        layout.columns,
+        layout.with_units,
+        layout.stated_units,
+        options.units,
+        robot,
+    )
+    rows = _find_filled_rows(layout, skip_empty=options.skip_empty)
+    optional = _read_optional_columns(layout, headers, options, rows)
+    cells = text.cells(layout.columns, scales_of(units), rows)
+    table = _read_columns(cells, layout, options) | optional.columns
+    table |= {
+        name: cells.numbers(name)
+        for name in (f"approach{joint[1:]}" for joint in layout.angles)
+        if name in layout.columns
+    }
+    table["target"] = _read_targets(cells, options.target)
+    table |= _number_loads_and_repeats(cells, table)
+    used = {
+        name: header
+        for name, header in layout.columns.items()
+        if name in table or name in layout.with_units
+    }
+    ignored = [header for header in text.columns if header not in used.values()]
+    if options.targets:
+        del used["target"]
+    resolved = replace(
+        options,
+        **asdict(text.dialect),
+        columns=used,
+        units=units | optional.units,
+        rotation=layout.rotation,
+    )
+    return ImportedMeasurements(
+        table,
+        len(layout.angles),
+        resolved,
+        (*ignored, *options.ignore),
+        len(text.lines) - len(rows),
+        (*notes, *optional.notes),
+    )
+
+
+def _check_names(options: ImportOptions) -> None:
+    """Refuse options for columns that cannot be imported."""
+    names = [*options.columns, *(set(options.units) - {"angles", "lengths"})]
+    for name in names:
         if not is_name(name):
-            raise InputError(
-                "--column",
-                "",
-                repr(name),
-                suggest_names(name, [*describe_columns(6), "qw", "e1", "r11", "t11"]),
-            )
+            known = [*describe_columns(6), "qw", "e1", "r11", "t11"]
+            raise InputError("--column", "", repr(name), suggest_names(name, known))
+
+
+def _read_cells(path: str | Path, options: ImportOptions) -> TextTable:
+    """Read the cells of the table, below the first line that looks like a header."""
+    target_headers = set[str]().union(*options.targets.values())
 
     def is_header(cells: Sequence[str]) -> bool:
-        if options.targets and {
-            header for headers in options.targets.values() for header in headers
-        } <= {*cells}:
+        if target_headers and target_headers <= {*cells}:
             return True
-        names = {recognize_column(cell)[0] for cell in cells} | {
-            name for name, header in mapped.items() if header in cells
-        }
-        # Joints without a position are a header too, of which is said what it lacks.
-        only_joints = (
-            any(name and find_joints([name]) for name in names) and len(cells) > 1
-        )
-        return has_position(names) or (
-            only_joints and not any(parse_number(cell) is not None for cell in cells)
-        )
+        names = {recognize_column(cell)[0] for cell in cells}
+        names |= {name for name, header in options.columns.items() if header in cells}
+        if has_position(names):
+            return True
+        # Joint angles without a position are a header too, so that the error can say
+        # what the table lacks.
+        has_joints = bool(find_joints(name for name in names if name))
+        has_numbers = any(parse_number(cell) is not None for cell in cells)
+        return has_joints and len(cells) > 1 and not has_numbers
 
-    text = read_text_table(
+    return read_text_table(
         path,
         is_header,
         options,
@@ -225,200 +271,277 @@ def read_measurement_table(
         units_in=read_units,
         names=options.names,
     )
-    notes = (
-        [f"units in the row under the header: {len(text.units)}"] if text.units else []
-    )
-    if options.targets:
-        text = _one_row_each(text, options.targets)
-        first = next(iter(options.targets.values()))
-        mapped |= dict(zip(POSITION, first, strict=True)) | {"target": "target"}
-        notes += [
-            f"{name} has {', '.join(map(repr, headers))}"
-            for name, headers in options.targets.items()
-        ]
-    columns, stated = find_columns(text, mapped, robot)
-    if (
-        find_joints(columns)
-        and not has_position(columns)
-        and (lengths := lengths_in(text.columns))
-    ):
-        allowed = "columns x, y, z of a point; distances alone, as of a draw wire or a ball bar, cannot be used yet"
-        raise InputError(
-            text.path,
-            "header",
-            f"{', '.join(map(repr, lengths))} and no position",
-            allowed,
-        )
-    rotation = find_rotation(text, columns, options.rotation)
-    position = TRANSLATION if rotation == HOMOGENEOUS_MATRICES else POSITION
-    angles = find_joints(columns)
-    orientation = columns_of_rotation(rotation, columns)
-    _check_complete(text, columns, angles, (*position, *orientation), robot)
-    wanted = [
-        *angles,
-        *position,
-        *orientation,
-        *(name for name in WRENCH_NAMES if name in columns),
-    ]
-    given = options.units
-    units = find_units(text, columns, wanted, stated, given, robot)
-    kept = _filled_rows(text, columns, position, options.skip_empty)
-    read = text.cells(columns, scales_of(units), kept)
-    table = _number_poses(read, angles)
-    table |= {name: read.numbers(name) for name in angles}
-    if forces := [name for name in WRENCH_NAMES if name in columns]:
-        sign = -1.0 if options.wrench == "by-robot" else 1.0
-        zeros = np.zeros(len(kept))
-        # A minus sign before a zero would be read by people as a force.
-        table |= {
-            name: sign * read.numbers(name) + 0.0 if name in forces else zeros
-            for name in WRENCH_NAMES
-        }
-    table |= {
-        axis: read.numbers(name) for axis, name in zip(POSITION, position, strict=True)
-    }
-    if orientation:
-        vectors, off = rotation_vectors(rotation, read.matrix(orientation))
-        if off.any():
-            allowed = (
-                "a quaternion of length 1"
-                if rotation == QUATERNIONS
-                else "a rotation matrix, row by row"
-            )
-            raise read.fault(int(np.argmax(off)), orientation[0], allowed)
-        table |= dict(zip(VECTOR, vectors.T, strict=True))
-    for name in (
-        name for name in ("time_s", "temperature_c", "u95_m") if name in columns
-    ):
-        try:
-            unit = find_units(text, columns, [name], stated, given)
-            one = text.cells({name: columns[name]}, scales_of(unit), kept)
-            table[name] = _times(one) if name == "time_s" else one.numbers(name)
-            units |= unit
-        except InputError as error:
-            # Time and temperature are left out where nobody asked for them.
-            if name in mapped or name in given or name == "u95_m":
-                raise InputError(
-                    error.source,
-                    error.key,
-                    error.found,
-                    f"{error.allowed}, or --ignore {columns[name]!r}",
-                ) from None
-            notes.append(f"{columns[name]!r} not read: {error.key} has {error.found}")
-    table |= {
-        f"approach{j}": read.numbers(f"approach{j}")
-        for j in range(1, len(angles) + 1)
-        if f"approach{j}" in columns
-    }
-    table["target"] = _targets(read, options.target)
-    table |= _ordinals(read, table)
-    used = {
-        name: header for name, header in columns.items() if name in {*wanted, *table}
-    }
-    resolved = replace(
-        options,
-        **asdict(text.dialect),
-        columns={
-            name: header
-            for name, header in used.items()
-            if not (name == "target" and options.targets)
-        },
-        units=units,
-        rotation=rotation,
-    )
-    ignored = (
-        *(header for header in text.columns if header not in used.values()),
-        *options.ignore,
-    )
-    skipped = len(text.lines) - len(kept)
-    return ImportedMeasurements(
-        table, len(angles), resolved, ignored, skipped, tuple(notes)
-    )
 
 
-def _check_complete(
-    text: TextTable,
-    columns: Mapping[str, str],
-    angles: Sequence[str],
-    needed: Sequence[str],
-    robot: Robot | None,
+def _split_targets(text: TextTable, targets: Mapping[str, Sequence[str]]) -> TextTable:
+    """Give each target of a row a row of its own.
+
+    `targets`: headers of x, y and z by the names of the targets. The positions have the
+    headers of the first target; a new column ``target`` has the names.
+    """
+    _check_target_headers(text, targets)
+    # Headers of x of all targets, then of y, then of z.
+    headers_by_axis = list(zip(*targets.values(), strict=True))
+    positions = {header for headers in targets.values() for header in headers}
+    columns = {
+        header: _repeat_each(cells, len(targets))
+        for header, cells in text.columns.items()
+        if header not in positions
+    }
+    for headers in headers_by_axis:
+        rows = zip(*(text.columns[header] for header in headers), strict=True)
+        columns[headers[0]] = tuple(itertools.chain.from_iterable(rows))
+    columns["target"] = tuple(targets) * len(text.lines)
+    return replace(text, columns=columns, lines=_repeat_each(text.lines, len(targets)))
+
+
+def _repeat_each(values: Sequence[_Value], count: int) -> tuple[_Value, ...]:
+    return tuple(value for value in values for _ in range(count))
+
+
+def _check_target_headers(
+    text: TextTable, targets: Mapping[str, Sequence[str]]
 ) -> None:
-    """Refuse a table without all joint angles of the robot (`angles`), or without one
-    of the columns that are needed."""
-    unused = (
-        ", ".join(header for header in text.columns if header not in columns.values())[
-            :200
-        ]
-        or "none"
-    )
-    if not angles:
-        named = (
-            f" or as the robot has them: {', '.join(robot.joint_names)}"
-            if robot and robot.joint_names
-            else ""
-        )
-        allowed = f"columns q1, q2 …{named}, --column q1=NAME, or --robot FILE with joint_names; not yet used: {unused}"
-        raise InputError(text.path, "header", "no joint angles", allowed)
-    if robot and len(angles) > robot.joints:
-        found = f"{format_count(len(angles), 'joint')}: {', '.join(columns[name] for name in angles)}"
-        raise InputError(
-            text.path,
-            "header",
-            found,
-            f"{robot.joints}, as {robot.name} has; --ignore NAME leaves a column out",
-        )
-    last = robot.joints if robot else int(angles[-1][1:])
-    for group in ([f"q{j}" for j in range(1, last + 1)], needed):
-        if missing := [name for name in group if name not in columns]:
-            allowed = f"--column {missing[0]}=NAME; not yet used: {unused}"
-            raise InputError(
-                text.path, "header", f"no column {', '.join(missing)}", allowed
+    """Refuse headers that the table lacks, and targets in different units."""
+    for name, headers in targets.items():
+        for header, axis in zip(headers, POSITION, strict=True):
+            if header not in text.columns:
+                allowed = f"{axis} of {name}: {', '.join(text.columns)}"
+                raise InputError(text.path, "header", f"no column {header!r}", allowed)
+    for headers in zip(*targets.values(), strict=True):
+        units = {
+            text.units.get(header) or recognize_column(header)[1] for header in headers
+        }
+        if len(units) > 1:
+            found = "positions of targets in several units"
+            raise InputError(text.path, "header", found, "one unit for all targets")
+
+
+def _find_layout(
+    text: TextTable,
+    headers: Mapping[str, str],
+    options: ImportOptions,
+    robot: Robot | None,
+) -> _Layout:
+    """Find out what the columns of a table are; `headers`: those that are stated, by
+    name."""
+    columns, stated_units = find_columns(text, headers, robot)
+    if find_joints(columns) and not has_position(columns):
+        lengths = lengths_in(text.columns)
+        if lengths:
+            found = f"{', '.join(map(repr, lengths))} and no position"
+            allowed = (
+                "columns x, y, z of a point; distances alone, as of a draw wire or a"
+                " ball bar, cannot be used yet"
             )
+            raise InputError(text.path, "header", found, allowed)
+    rotation = find_rotation(text, columns, options.rotation)
+    layout = _Layout(text, columns, stated_units, rotation)
+    _check_complete(layout, robot)
+    return layout
 
 
-def _targets(read: Cells, name: str | None) -> np.ndarray:
-    if "target" not in read.columns and name is None:
-        allowed = "--target NAME, the target of all rows, or --column target=NAME"
-        raise InputError(read.path, "header", "no column target", allowed)
-    names = (
-        read.texts("target")
-        if "target" in read.columns
-        else [name or ""] * len(read.rows)
-    )
-    if fault := next(
-        (fault for each in dict.fromkeys(names) if (fault := find_text_fault(each))),
-        None,
-    ):
-        where = (
-            (read.path, f"column {read.headers['target']}")
-            if "target" in read.columns
-            else ("--target", "")
+def _check_complete(layout: _Layout, robot: Robot | None) -> None:
+    """Refuse a table without all joint angles of the robot, or without a column that
+    its positions or orientations need."""
+    path = layout.text.path
+    columns = layout.columns
+    unused_headers = [
+        header for header in layout.text.columns if header not in columns.values()
+    ]
+    unused = f"not yet used: {', '.join(unused_headers)[:200] or 'none'}"
+    angles = layout.angles
+    if not angles:
+        joint_names = ""
+        if robot and robot.joint_names:
+            joint_names = f" or as the robot has them: {', '.join(robot.joint_names)}"
+        allowed = (
+            f"columns q1, q2 …{joint_names}, --column q1=NAME, or --robot FILE with"
+            f" joint_names; {unused}"
         )
-        raise InputError(*where, *fault)
-    return np.array(names)
-
-
-def _number_poses(read: Cells, angles: Sequence[str]) -> dict[str, np.ndarray]:
-    """Session and pose: labels are numbered; where no column has it, a pose is what has
-    the same joint angles."""
-    table: dict[str, Any] = {}
-    if "session" in read.columns:
-        table["session"] = read.integers("session")
-    if "pose" in read.columns:
-        labels = read.texts("pose")
-        numbered = all(label.isdigit() for label in labels)
-        table["pose"] = (
-            read.integers("pose")
-            if numbered
-            else pd.factorize(pd.Series(labels))[0] + 1
+        raise InputError(path, "header", "no joint angles", allowed)
+    if robot and len(angles) > robot.joints:
+        headers = ", ".join(columns[name] for name in angles)
+        found = f"{format_count(len(angles), 'joint')}: {headers}"
+        allowed = (
+            f"{robot.joints}, as {robot.name} has; --ignore NAME leaves a column out"
         )
-    else:
-        table["pose"] = number_close_points(read.matrix(angles), SAME_POSE) + 1
+        raise InputError(path, "header", found, allowed)
+    joints = robot.joints if robot else int(angles[-1][1:])
+    all_angles = [f"q{joint}" for joint in range(1, joints + 1)]
+    for needed in (all_angles, [*layout.position, *layout.orientation]):
+        missing = [name for name in needed if name not in columns]
+        if missing:
+            found = f"no column {', '.join(missing)}"
+            allowed = f"--column {missing[0]}=NAME; {unused}"
+            raise InputError(path, "header", found, allowed)
+
+
+def _find_filled_rows(layout: _Layout, *, skip_empty: bool) -> np.ndarray:
+    """Find the rows that have a position, ndarray of int.
+
+    With `skip_empty`, cells such as NaN, - and N/A are empty too. Without it, an empty
+    cell is an error.
+    """
+    text = layout.text
+    columns = layout.columns
+    is_empty = _EMPTY.fullmatch if skip_empty else re.compile("").fullmatch
+    filled = np.ones(len(text.lines), bool)
+    for name in layout.position:
+        filled &= [not is_empty(cell) for cell in text.columns[columns[name]]]
+    if not filled.all() and not skip_empty:
+        row = int(np.argmin(filled))
+        target = ""
+        if "target" in columns:
+            target = f" of {text.columns[columns['target']][row]}"
+        allowed = "three numbers, or --skip-empty to leave such rows out"
+        raise InputError(
+            text.path, f"line {text.lines[row]}", f"no position{target}", allowed
+        )
+    if not filled.any():
+        found = "no position in any row"
+        raise InputError(text.path, "", found, "at least one measurement")
+    return np.flatnonzero(filled)
+
+
+def _read_columns(
+    cells: Cells, layout: _Layout, options: ImportOptions
+) -> dict[str, np.ndarray]:
+    """Read pose numbers, joint angles, wrench, position and orientation."""
+    table = _number_poses(cells, layout.angles)
+    for name in layout.angles:
+        table[name] = cells.numbers(name)
+    if layout.wrench:
+        sign = -1.0 if options.wrench == "by-robot" else 1.0
+        for name in WRENCH_NAMES:
+            table[name] = np.zeros(len(cells.rows))
+            if name in layout.wrench:
+                # Adding zero removes the minus sign of a zero, which people would read
+                # as a force.
+                table[name] = sign * cells.numbers(name) + 0.0
+    for axis, name in zip(POSITION, layout.position, strict=True):
+        table[axis] = cells.numbers(name)
+    if layout.orientation:
+        vectors = _read_rotation_vectors(cells, layout)
+        table |= dict(zip(VECTOR, vectors.T, strict=True))
     return table
 
 
-def _ordinals(read: Cells, table: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Loads and repeats: as their columns have them, or counted by first appearance."""
+def _read_rotation_vectors(cells: Cells, layout: _Layout) -> np.ndarray:
+    """Read the orientations as rotation vectors, ndarray (N, 3), rad."""
+    values = cells.matrix(layout.orientation)
+    vectors, is_wrong = rotation_vectors(layout.rotation, values)
+    if is_wrong.any():
+        allowed = "a rotation matrix, row by row"
+        if layout.rotation == QUATERNIONS:
+            allowed = "a quaternion of length 1"
+        raise cells.fault(int(np.argmax(is_wrong)), layout.orientation[0], allowed)
+    return vectors
+
+
+def _read_optional_columns(
+    layout: _Layout,
+    headers: Mapping[str, str],
+    options: ImportOptions,
+    rows: np.ndarray,
+) -> _OptionalColumns:
+    """Read time, temperature and uncertainty if they are there.
+
+    A time or a temperature that cannot be read is left out with a note, unless an
+    option asks for it. `headers`: those that options state, by name.
+    """
+    optional = _OptionalColumns({}, {}, [])
+    for name in _OPTIONAL:
+        if name not in layout.columns:
+            continue
+        header = layout.columns[name]
+        try:
+            unit = find_units(
+                layout.text,
+                layout.columns,
+                [name],
+                layout.stated_units,
+                options.units,
+            )
+            cells = layout.text.cells({name: header}, scales_of(unit), rows)
+            values = _read_times(cells) if name == "time_s" else cells.numbers(name)
+        except InputError as error:
+            if name in headers or name in options.units or name == "u95_m":
+                allowed = f"{error.allowed}, or --ignore {header!r}"
+                raise InputError(
+                    error.source, error.key, error.found, allowed
+                ) from None
+            note = f"{header!r} not read: {error.key} has {error.found}"
+            optional.notes.append(note)
+        else:
+            optional.columns[name] = values
+            optional.units.update(unit)
+    return optional
+
+
+def _read_times(cells: Cells) -> np.ndarray:
+    """Read times, ndarray (N,), s.
+
+    Times are numbers, or dates of ISO 8601, which count from 1970; a date without a
+    time zone is in UTC.
+    """
+    texts = cells.texts("time_s")
+    numbers = [parse_number(text, _LARGEST_TIME) for text in texts]
+    if None not in numbers:
+        seconds = np.array(numbers, float) * cells.scales["time_s"]
+        return cells.bounded("time_s", seconds)
+    with suppress(ValueError, OverflowError):
+        dates = pd.to_datetime(pd.Series(texts), format="ISO8601", utc=True)
+        # Pandas reads plain numbers as years too.
+        are_dates = all("-" in text or "/" in text for text in texts)
+        if dates.notna().all() and are_dates:
+            return (dates - pd.Timestamp(0, tz="UTC")).dt.total_seconds().to_numpy()
+    allowed = "numbers, or dates as 2023-05-04 10:20:33"
+    raise cells.fault(numbers.index(None), "time_s", allowed)
+
+
+def _read_targets(cells: Cells, stated_name: str | None) -> np.ndarray:
+    """Read the names of the targets (N,), or repeat the stated one."""
+    if "target" in cells.columns:
+        names = cells.texts("target")
+        source = cells.path
+        key = f"column {cells.headers['target']}"
+    elif stated_name is not None:
+        names = [stated_name] * len(cells.rows)
+        source = "--target"
+        key = ""
+    else:
+        allowed = "--target NAME, the target of all rows, or --column target=NAME"
+        raise InputError(cells.path, "header", "no column target", allowed)
+    for name in dict.fromkeys(names):
+        fault = find_text_fault(name)
+        if fault:
+            raise InputError(source, key, *fault)
+    return np.array(names)
+
+
+def _number_poses(cells: Cells, angles: Sequence[str]) -> dict[str, np.ndarray]:
+    """Read session and pose; a pose that no column numbers consists of the rows with
+    the same joint angles."""
+    table: dict[str, Any] = {}
+    if "session" in cells.columns:
+        table["session"] = cells.integers("session")
+    if "pose" not in cells.columns:
+        table["pose"] = number_close_points(cells.matrix(angles), SAME_POSE) + 1
+        return table
+    labels = cells.texts("pose")
+    if all(label.isdigit() for label in labels):
+        table["pose"] = cells.integers("pose")
+    else:
+        table["pose"] = pd.factorize(pd.Series(labels))[0] + 1
+    return table
+
+
+def _number_loads_and_repeats(
+    cells: Cells, table: Mapping[str, np.ndarray]
+) -> dict[str, np.ndarray]:
+    """Read loads and repeats from their columns, or count them in the order in which
+    they first appear."""
     states = pd.DataFrame(
         {
             "session": table.get("session", 0),
@@ -426,22 +549,27 @@ def _ordinals(read: Cells, table: Mapping[str, np.ndarray]) -> dict[str, np.ndar
             "target": table["target"],
         }
     )
-    wrench = pd.DataFrame(
-        {name: table.get(name, 0.0) for name in WRENCH_NAMES}, index=states.index
-    )
-    if "load" in read.columns:
-        states["load"] = read.integers("load")
+    if "load" in cells.columns:
+        states["load"] = cells.integers("load")
     else:
-        loads = pd.concat([states[["session", "pose"]], wrench], axis=1)
-        different = loads[wrench.any(axis=1)].drop_duplicates()
-        different["load"] = different.groupby(["session", "pose"]).cumcount() + 1
-        states["load"] = (
-            loads.merge(different, how="left")["load"].fillna(0).astype(np.int64)
-        )
-    if "repeat" in read.columns:
-        states["repeat"] = read.integers("repeat")
+        states["load"] = _number_loads(states[["session", "pose"]], table)
+    if "repeat" in cells.columns:
+        states["repeat"] = cells.integers("repeat")
     else:
-        states["repeat"] = states.groupby(
-            ["session", "pose", "load", "target"]
-        ).cumcount()
+        same_state = states.groupby(["session", "pose", "load", "target"])
+        states["repeat"] = same_state.cumcount()
     return {name: states[name].to_numpy() for name in ("load", "repeat")}
+
+
+def _number_loads(
+    poses: pd.DataFrame, table: Mapping[str, np.ndarray]
+) -> pd.Series[int]:
+    """Number the different wrenches of each pose from 1; no wrench is load 0."""
+    wrench = pd.DataFrame(
+        {name: table.get(name, 0.0) for name in WRENCH_NAMES}, index=poses.index
+    )
+    loads = pd.concat([poses, wrench], axis=1)
+    different = loads[wrench.any(axis=1)].drop_duplicates()
+    different["load"] = different.groupby(["session", "pose"]).cumcount() + 1
+    merged = loads.merge(different, how="left")
+    return merged["load"].fillna(0).astype(np.int64)

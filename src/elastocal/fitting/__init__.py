@@ -1,5 +1,5 @@
-"""The model of a campaign and its fit: covariance of the measurements, registration,
-generalized least squares with priors.
+"""The model of a campaign and its fit by generalized least squares with priors.
 
-Imports `campaigns`, `effects` and what these import; knows nothing of hypotheses.
+Also: noise of the measurements, and registration of frames and targets. Imports
+`campaigns`, `effects` and what these import; knows nothing of hypotheses.
 """

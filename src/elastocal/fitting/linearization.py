@@ -467,14 +467,25 @@ def _load_effect_basis(
         for effect, before in zip(influenced, present, strict=True):
             if loaded is not None and loaded.isdisjoint(before):
                 continue
-            for coordinate, change in sum_displacements([effect], changed).items():
-                change -= before[coordinate]
-                if change.any():
-                    change /= step
-                    if coordinate in functions:
-                        change += functions[coordinate]
-                    functions[coordinate] = change
+            after = sum_displacements([effect], changed)
+            _add_slopes(functions, before, after, step)
     return basis
+
+
+def _add_slopes(
+    functions: dict[int, np.ndarray],
+    before: dict[int, np.ndarray],
+    after: dict[int, np.ndarray],
+    step: float,
+) -> None:
+    """Add the forward difference of displacements to a basis function."""
+    for coordinate, change in after.items():
+        change -= before[coordinate]
+        if change.any():
+            change /= step
+            if coordinate in functions:
+                change += functions[coordinate]
+            functions[coordinate] = change
 
 
 def _depends_on(effect: Candidate, *, is_compliance: bool) -> bool:

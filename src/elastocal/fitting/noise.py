@@ -552,12 +552,15 @@ def find_declared_geometry(model: Model) -> set[str]:
 
     These are the effects whose parameters have no prior of their own, except springs.
     """
-    return {
-        effect.effect
-        for effect in model.effects
-        if effect.family != "declared"
-        and all(p.prior_std is None or p.sized for p in effect.parameters)
-    }
+    return {effect.effect for effect in model.effects if _has_no_fixed_prior(effect)}
+
+
+def _has_no_fixed_prior(effect: Candidate) -> bool:
+    """Whether an effect is geometry whose priors, if any, were estimated."""
+    return effect.family != "declared" and all(
+        parameter.prior_std is None or parameter.sized
+        for parameter in effect.parameters
+    )
 
 
 def set_prior_scale(model: Model, scale: float) -> Model:

@@ -164,6 +164,7 @@ def diagnosis_from(case: Case, facts: Mapping[str, Any]) -> Diagnosis:
         None,
         from_document(TrainingVerdict, facts["document"], "diagnosis.json"),
         measurements.select(left_out),
+        Settings.from_document(facts["document"]["settings"]),
     )
 
 
