@@ -1,5 +1,5 @@
-"""Pictures of arms: seen from the side and a little from above, with what the tables
-and the plan hold."""
+"""Pictures of arms, from the side and a little from above, show the values of their
+tables and plans."""
 
 from dataclasses import replace
 
