@@ -109,7 +109,7 @@ def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
         subset.declared, subset.search_sample, [*case.candidates.values()], settings
     ).untestable
     testable = len(case.candidates) - len(untestable)
-    data_faults = faults(case.campaign)
+    data_faults = find_faults(case.campaign)
     rows = [
         *_describe_measurements(case, training, held_out),
         ("noise", _describe_noise(subset.noise)),
