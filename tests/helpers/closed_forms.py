@@ -43,7 +43,7 @@ class Arm:
     Vectors are in base axes, ndarrays (S, ...).
     """
 
-    def __init__(self, chain, pulled=False):
+    def __init__(self, chain, *, pulled):
         self.chain, self.joints = chain, chain.coordinates
         # From a load that play takes up to one beyond the knee of every gear.
         self.states = make_states(self.joints, STATES, seed=1, force=1.0)
