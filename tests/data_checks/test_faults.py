@@ -8,10 +8,10 @@ import pytest
 from made_campaigns import (
     POINTS,
     Plan,
-    made,
-    with_geometric_errors,
-    with_measured,
-    with_other_compliances,
+    add_geometric_errors,
+    change_compliances,
+    make_campaign,
+    replace_measured_columns,
 )
 from support import PinocchioPoint
 from synthetic import NOISE
@@ -50,8 +50,10 @@ def test_no_fault_is_found_where_the_model_is_right(fanuc, plan, seed):
 def test_no_fault_is_found_where_the_model_lacks_something(kuka, plan, seed):
     """Springs, zeros, a sag and lengths off, which is most at once."""
     offsets = np.random.default_rng(seed).normal(0.0, 3e-3, kuka.joints)
-    true_robot = with_geometric_errors(
-        with_other_compliances(kuka, seed, 0.5), seed, 0.01
+    true_robot = add_geometric_errors(change_compliances(kuka, seed, 0.5), seed, 0.01)
+    assert (
+        faults(make_campaign(kuka, seed, PLANS[plan], true_robot, offsets, sag=3e-3))
+        == ()
     )
     assert (
         find_faults(made(kuka, seed, PLANS[plan], true_robot, offsets, sag=3e-3)) == ()
@@ -59,8 +61,8 @@ def test_no_fault_is_found_where_the_model_lacks_something(kuka, plan, seed):
 
 
 def test_a_wrong_sign_is_found_alone(fanuc):
-    campaign = made(fanuc, 1, Plan(poses=20))
-    turned = with_measured(
+    campaign = make_campaign(fanuc, 1, Plan(poses=20))
+    turned = replace_measured_columns(
         campaign, joint_angles=campaign.measurements.joint_angles * [1, 1, -1, 1, 1, 1]
     )
     assert [fault.name for fault in find_faults(turned)] == ["wrong_sign"]
@@ -68,7 +70,7 @@ def test_a_wrong_sign_is_found_alone(fanuc):
 
 @pytest.fixture(scope="module", params=["base", "tracker"])
 def twelve_poses(request, fanuc):
-    return made(fanuc, 1, Plan(poses=12, tracker=request.param == "tracker"))
+    return make_campaign(fanuc, 1, Plan(poses=12, tracker=request.param == "tracker"))
 
 
 @pytest.mark.parametrize(
@@ -87,7 +89,7 @@ def test_angles_that_stand_still_while_the_measurements_move_are_named_unless_it
     twelve_poses,
 ):
     seen = twelve_poses.measurements
-    still = with_measured(
+    still = replace_measured_columns(
         twelve_poses, joint_angles=np.full_like(seen.joint_angles, 0.4)
     )
     (fault,) = find_constant_columns(still)
@@ -97,7 +99,7 @@ def test_angles_that_stand_still_while_the_measurements_move_are_named_unless_it
 
 
 def test_a_robot_that_moves_in_a_plane_may_have_a_constant_coordinate(fanuc):
-    campaign = made(
+    campaign = make_campaign(
         fanuc,
         1,
         Plan(poses=12, noise=0.0, loads=0),
@@ -112,17 +114,17 @@ def test_a_robot_that_moves_in_a_plane_may_have_a_constant_coordinate(fanuc):
 
 @pytest.fixture(scope="module", params=["base", "tracker"])
 def campaign(request, fanuc):
-    return made(
+    return make_campaign(
         fanuc,
         1,
         Plan(tracker=request.param == "tracker"),
-        with_other_compliances(fanuc, 1, 0.3),
+        change_compliances(fanuc, 1, 0.3),
     )
 
 
 def with_rows(campaign, source):
     seen = campaign.measurements
-    return with_measured(
+    return replace_measured_columns(
         campaign,
         position=seen.position[source],
         rotation_vector=seen.rotation_vector[source],
@@ -147,11 +149,11 @@ def test_measurements_of_another_robot_are_named_and_those_of_one_off_by_centime
     (fault,) = find_implausible_measurements(replace(campaign, robot=kuka))
     assert fault.name == "implausible_measurements"
     assert fault.parameters[0].value > 0.1 and "\n" not in fault.detail
-    off = made(
+    off = make_campaign(
         fanuc,
         1,
         Plan(poses=20, tracker=tracker),
-        with_geometric_errors(fanuc, 1, 0.01),
+        add_geometric_errors(fanuc, 1, 0.01),
         5e-3,
         sag=5e-3,
     )
@@ -162,7 +164,7 @@ def warned(robot, factors=1.0, turned=1.0, known=True):
     """Warnings of a fit of the compliances of a robot that are so many times those that
     its file states, or are usual."""
     file = replace(robot, compliance_known=known)
-    campaign = made(
+    campaign = make_campaign(
         file, 1, Plan(poses=12), replace(robot, compliance=robot.compliance * factors)
     )
     campaign = with_measured(campaign, wrench=turned * campaign.measurements.wrench)
@@ -208,7 +210,7 @@ def test_loads_turned_round_are_seen_by_compliances_below_zero_and_joints_withou
         and "usual for such a robot" in warning
     )
     rigid = replace(
-        made(replace(fanuc, compliance_known=False), 1), compliance="nominal"
+        make_campaign(replace(fanuc, compliance_known=False), 1), compliance="nominal"
     )
     (warning,) = warn_of_compliances(
         fit_model(
@@ -224,7 +226,7 @@ def test_positions_of_the_files_own_kinematics_are_said_to_be_no_measurements(
     fanuc, tracker, decimals_deg, decimals_mm
 ):
     """Angles and positions rounded as a controller shows them."""
-    campaign = made(
+    campaign = make_campaign(
         fanuc, 1, Plan(poses=14, loads=0, tracker=tracker, oriented=False, noise=0.0)
     )
     angles = np.radians(
@@ -252,7 +254,7 @@ JOINTS = 6
 
 @pytest.fixture(scope="module")
 def exact(fanuc):
-    return made(fanuc, 1, EXACT)
+    return make_campaign(fanuc, 1, EXACT)
 
 
 def expected_parts(robot, seen, part):
@@ -304,7 +306,7 @@ def selected(campaign, kept):
 def test_joints_off_their_zeros_leave_no_trace_in_the_deflections(fanuc):
     plan = Plan(poses=40, loads=1, noise=0.0)
     straight, off = (
-        made(fanuc, 1, plan, true_offset=offset)
+        make_campaign(fanuc, 1, plan, true_offset=offset)
         for offset in (0.0, 2e-3 * np.array([1, -1, 1, -1, 1, -1]))
     )
     assert (
@@ -425,11 +427,11 @@ def test_of_two_units_within_reach_the_one_by_which_compliances_are_nearest_nomi
 
 @pytest.fixture(scope="module", params=["base", "tracker"])
 def loaded(request, fanuc):
-    return made(
+    return make_campaign(
         fanuc,
         2,
         Plan(poses=20, tracker=request.param == "tracker"),
-        with_other_compliances(fanuc, 1, 0.3),
+        change_compliances(fanuc, 1, 0.3),
     )
 
 

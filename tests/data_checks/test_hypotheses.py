@@ -5,7 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_campaigns import Plan, made, with_measured, with_other_compliances
+from made_campaigns import (
+    Plan,
+    change_compliances,
+    make_campaign,
+    replace_measured_columns,
+)
 from scipy.spatial.transform import Rotation
 
 from elastocal.data_checks.hypotheses import (
@@ -18,8 +23,8 @@ from elastocal.mechanics.kinematics import poses
 
 
 def softer_by_chance(robot, tracker):
-    return made(
-        robot, 1, Plan(poses=12, tracker=tracker), with_other_compliances(robot, 1, 0.3)
+    return make_campaign(
+        robot, 1, Plan(poses=12, tracker=tracker), change_compliances(robot, 1, 0.3)
     )
 
 
@@ -42,7 +47,7 @@ def test_a_joint_counted_the_other_way_round_is_named(fanuc, joint, tracker):
 
 def test_loads_that_are_numbered_throughout_have_no_row_beside_them(campaign):
     seen = campaign.measurements
-    turned = with_measured(
+    turned = replace_measured_columns(
         campaign, joint_angles=-seen.joint_angles, load=np.arange(len(seen)) + 1
     )
     assert not [
@@ -75,7 +80,7 @@ def test_the_sign_is_that_of_the_column_of_the_file(fanuc):
         reported_matrix=reported_matrix,
         reported_offset=np.radians([0, -40, 60, 0, 0, 0]),
     )
-    campaign = made(robot, 3, Plan(poses=14))
+    campaign = make_campaign(robot, 3, Plan(poses=14))
     reported = (
         campaign.measurements.joint_angles - robot.reported_offset
     ) @ reported_matrix
@@ -102,7 +107,7 @@ def with_turned_mount(campaign, turn, moved_m=0.0):
     measured = Rotation.from_rotvec(campaign.measurements.rotation_vector)
     place = np.where(mine, measured.apply([0.0, 0.0, moved_m]), 0.0)
     vectors = np.where(mine, (measured * turn).as_rotvec(), measured.as_rotvec())
-    return with_measured(
+    return replace_measured_columns(
         campaign,
         position=campaign.measurements.position + place,
         rotation_vector=vectors,
@@ -149,7 +154,7 @@ def test_angles_in_the_columns_of_the_rotation_vector_are_named(
 
 
 def test_each_session_has_a_transform_of_its_own(fanuc):
-    campaign = made(fanuc, 1, Plan(poses=14, oriented=False))
+    campaign = make_campaign(fanuc, 1, Plan(poses=14, oriented=False))
     measurements = campaign.measurements
     rotation = ELSEWHERE[0]
     session = (measurements.pose >= 10).astype(np.int32)
@@ -186,7 +191,7 @@ def known_targets(fanuc, factor=1.0, which=slice(None)):
     )
     chain = replace(fanuc.chain, points=points)
     rng = np.random.default_rng(4)
-    plain = made(fanuc, 1, Plan(poses=14))
+    plain = make_campaign(fanuc, 1, Plan(poses=14))
     position = np.empty_like(plain.measurements.position)
     for number, point in enumerate(chain.points):
         mask = plain.measurements.target == number
@@ -238,7 +243,7 @@ def test_a_last_link_that_is_a_little_longer_than_its_file_is_left_to_physics(
         fanuc,
         chain=replace(fanuc.chain, transforms=(*fanuc.chain.transforms[:-1], last)),
     )
-    campaign = made(fanuc, 1, Plan(poses=14, oriented=False), longer)
+    campaign = make_campaign(fanuc, 1, Plan(poses=14, oriented=False), longer)
     assert [
         fault.name for fault in find_better_interpretation(of_the_end(campaign))
     ] == names
@@ -248,8 +253,8 @@ def test_a_last_link_that_is_a_little_longer_than_its_file_is_left_to_physics(
     ("shift", "names"), [(0.0, []), (0.004, []), (0.03, []), (0.06, ["wrong_frame"])]
 )
 def test_a_base_that_stands_a_little_off_is_left_to_physics(fanuc, shift, names):
-    campaign = made(fanuc, 1, Plan(poses=14))
-    moved = with_measured(
+    campaign = make_campaign(fanuc, 1, Plan(poses=14))
+    moved = replace_measured_columns(
         campaign, position=campaign.measurements.position + np.array([0.0, 0.0, shift])
     )
     assert [fault.name for fault in find_better_interpretation(moved)] == names
@@ -258,7 +263,7 @@ def test_a_base_that_stands_a_little_off_is_left_to_physics(fanuc, shift, names)
 def test_what_fits_as_well_is_listed_as_an_alternative(fanuc):
     """In a frame that nobody knows, axes and rotation vectors exchanged together are
     mirrored in one way or another."""
-    campaign = made(fanuc, 1, Plan(poses=14, tracker=True))
+    campaign = make_campaign(fanuc, 1, Plan(poses=14, tracker=True))
     seen = campaign.measurements
     exchanged = {
         name: getattr(seen, name)[:, [1, 0, 2]]
@@ -285,7 +290,9 @@ def test_measurements_of_nothing_are_mended_by_nothing(campaign):
 def test_a_robot_that_hardly_moves_is_not_fitted_by_gathering_measurements_in_one_place(
     fanuc,
 ):
-    campaign = made(fanuc, 1, Plan(poses=8, loads=1, tracker=True, oriented=False))
+    campaign = make_campaign(
+        fanuc, 1, Plan(poses=8, loads=1, tracker=True, oriented=False)
+    )
     angles = 0.3 + 1e-3 * np.random.default_rng(2).normal(size=(8, 6))
     position = np.random.default_rng(3).normal(0.0, 1.0, (8, 3))
     pose = campaign.measurements.pose
@@ -301,7 +308,7 @@ def test_a_robot_that_hardly_moves_is_not_fitted_by_gathering_measurements_in_on
 def test_a_mount_that_is_turned_otherwise_is_named_with_the_remedy_and_fitted_only_where_that_is_stated(
     fanuc, degrees, moved_m
 ):
-    campaign = made(fanuc, 1, Plan(poses=14))
+    campaign = make_campaign(fanuc, 1, Plan(poses=14))
     turn = Rotation.from_rotvec(
         [0.0, 0.6 * np.radians(degrees), 0.8 * np.radians(degrees)]
     )
@@ -350,7 +357,7 @@ def test_what_is_simple_comes_first_and_no_each_is_there_twice(fanuc):
 def test_measured_columns_of_each_target_or_pose_moved_by_one_are_named(
     fanuc, kind, keys, steps
 ):
-    campaign = made(fanuc, 1, Plan(poses=14, loads=1))
+    campaign = make_campaign(fanuc, 1, Plan(poses=14, loads=1))
     measurements = campaign.measurements
     source = np.arange(14 * 8)
     groups = np.unique(
