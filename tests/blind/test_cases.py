@@ -9,6 +9,7 @@ import pytest
 from analysed_robots import ROBOTS
 from made_blind_documents import PLAN
 
+from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.reading import read_campaign
 from elastocal_proof.blind.cases import (
     CATALOGUE_EFFECTS,
@@ -55,7 +56,8 @@ def made(case, folder):
     digest = write_sealed_case(case, folder / "blind", folder / "sealed", ROBOTS)
     text = (folder / "sealed" / f"{case.name}.json").read_bytes()
     assert hashlib.sha256(text).hexdigest() == digest
-    return read_campaign(folder / "blind" / case.name, ROBOTS), json.loads(text)
+    files = read_campaign_folder(folder / "blind" / case.name, ROBOTS)
+    return read_campaign(files), json.loads(text)
 
 
 def sized(case):
