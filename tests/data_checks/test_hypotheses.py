@@ -39,7 +39,9 @@ def campaign(fanuc):
 def test_a_joint_counted_the_other_way_round_is_named(fanuc, joint, tracker):
     campaign = softer_by_chance(fanuc, tracker)
     angles = campaign.measurements.joint_angles * (1.0 - 2.0 * np.eye(6)[joint])
-    (fault,) = find_better_interpretation(with_measured(campaign, joint_angles=angles))
+    (fault,) = find_better_interpretation(
+        replace_measured_columns(campaign, joint_angles=angles)
+    )
     assert (fault.name, fault.joints) == ("wrong_sign", (joint + 1,))
     before, after = fault.evidence
     assert before > 0.02 and after < 1e-3
@@ -66,7 +68,9 @@ def test_a_joint_counted_from_its_neighbour_is_named_with_it(
 ):
     angles = campaign.measurements.joint_angles.copy()
     angles[:, joint] += sign * angles[:, joint - 1]
-    (fault,) = find_better_interpretation(with_measured(campaign, joint_angles=angles))
+    (fault,) = find_better_interpretation(
+        replace_measured_columns(campaign, joint_angles=angles)
+    )
     assert fault.joints == (joint, joint + 1)
     assert words in fault.detail
 
@@ -86,13 +90,17 @@ def test_the_sign_is_that_of_the_column_of_the_file(fanuc):
     ) @ reported_matrix
     reported[:, 2] *= -1
     angles = reported @ reported_matrix + robot.reported_offset
-    (fault,) = find_better_interpretation(with_measured(campaign, joint_angles=angles))
+    (fault,) = find_better_interpretation(
+        replace_measured_columns(campaign, joint_angles=angles)
+    )
     assert fault.joints == (3,)
 
 
 def test_orientations_turned_round_are_named(campaign):
     (fault,) = find_better_interpretation(
-        with_measured(campaign, rotation_vector=-campaign.measurements.rotation_vector)
+        replace_measured_columns(
+            campaign, rotation_vector=-campaign.measurements.rotation_vector
+        )
     )
     assert fault.joints == ()
     assert "rotation vectors" in fault.detail
@@ -124,7 +132,9 @@ EXCHANGED = {
 @pytest.mark.parametrize("words", EXCHANGED)
 def test_exchanged_axes_of_positions_are_named(campaign, words):
     written = campaign.measurements.position @ np.array(EXCHANGED[words], float).T
-    (fault,) = find_better_interpretation(with_measured(campaign, position=written))
+    (fault,) = find_better_interpretation(
+        replace_measured_columns(campaign, position=written)
+    )
     assert fault.name == "swapped_axes"
     assert fault.detail.endswith(f"measurements fit with {words}")
 
@@ -132,7 +142,9 @@ def test_exchanged_axes_of_positions_are_named(campaign, words):
 @pytest.mark.parametrize(("factor", "unit"), [(1000, "millimetres"), (0.1, "tenth")])
 def test_positions_in_another_unit_are_named(campaign, factor, unit):
     (fault,) = find_better_interpretation(
-        with_measured(campaign, position=factor * campaign.measurements.position)
+        replace_measured_columns(
+            campaign, position=factor * campaign.measurements.position
+        )
     )
     assert fault.name == "wrong_unit" and unit in fault.detail
     assert f"fit {1 / factor:g} times" in fault.detail
@@ -148,7 +160,7 @@ def test_angles_in_the_columns_of_the_rotation_vector_are_named(
         letters
     )
     (fault,) = find_better_interpretation(
-        with_measured(campaign, rotation_vector=angles)
+        replace_measured_columns(campaign, rotation_vector=angles)
     )
     assert words in fault.detail
 
@@ -162,7 +174,7 @@ def test_each_session_has_a_transform_of_its_own(fanuc):
         session[:, None], [0.0, 3.0, 0.0], [1.0, 0.0, 0.0]
     )
     (fault,) = find_better_interpretation(
-        with_measured(campaign, session=session, position=position)
+        replace_measured_columns(campaign, session=session, position=position)
     )
     # That of the session that stands farther off.
     assert (
@@ -269,7 +281,9 @@ def test_what_fits_as_well_is_listed_as_an_alternative(fanuc):
         name: getattr(seen, name)[:, [1, 0, 2]]
         for name in ("position", "rotation_vector")
     }
-    (fault,) = find_better_interpretation(with_measured(campaign, **exchanged))
+    (fault,) = find_better_interpretation(
+        replace_measured_columns(campaign, **exchanged)
+    )
     assert fault.name == "swapped_axes" and len(fault.alternatives) >= 3
     assert all("rotation vectors likewise" in words for words in fault.alternatives)
 
@@ -278,7 +292,7 @@ def test_measurements_of_nothing_are_mended_by_nothing(campaign):
     rng = np.random.default_rng(5)
     assert (
         find_better_interpretation(
-            with_measured(
+            replace_measured_columns(
                 campaign,
                 position=rng.normal(0.0, 1.0, campaign.measurements.position.shape),
             )
@@ -298,7 +312,9 @@ def test_a_robot_that_hardly_moves_is_not_fitted_by_gathering_measurements_in_on
     pose = campaign.measurements.pose
     assert (
         find_better_interpretation(
-            with_measured(campaign, joint_angles=angles[pose], position=position[pose])
+            replace_measured_columns(
+                campaign, joint_angles=angles[pose], position=position[pose]
+            )
         )
         == []
     )
@@ -332,7 +348,7 @@ def test_a_mount_that_is_turned_otherwise_is_named_with_the_remedy_and_fitted_on
 
 
 def test_what_is_simple_comes_first_and_no_each_is_there_twice(fanuc):
-    campaign = made(fanuc, 1, Plan(poses=10))
+    campaign = make_campaign(fanuc, 1, Plan(poses=10))
     single = [*list_discrete_hypotheses(campaign), *list_row_shifts(campaign)]
     assert single[0].joints == (1,)
     details = [each.detail for each in single]
@@ -370,7 +386,7 @@ def test_measured_columns_of_each_target_or_pose_moved_by_one_are_named(
         source[members] = np.roll(members, steps)
     turned = measurements.rotation_vector[source]
     (fault,) = find_better_interpretation(
-        with_measured(
+        replace_measured_columns(
             campaign, position=measurements.position[source], rotation_vector=turned
         )
     )

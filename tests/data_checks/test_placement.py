@@ -64,7 +64,7 @@ def test_one_measurement_in_four_far_off_moves_the_robust_fit_by_nothing_and_the
     position = campaign.measurements.position.copy()
     far = rng.random(len(position)) < 0.25
     position[far] += [0.3, 0.0, 0.0]
-    campaign = with_measured(campaign, position=position)
+    campaign = replace_measured_columns(campaign, position=position)
     robust = place_robustly(campaign)
     np.testing.assert_allclose(robust.distance[far], 0.3, rtol=1e-6)
     np.testing.assert_allclose(robust.distance[~far], 0.0, atol=1e-6)
@@ -83,7 +83,7 @@ def test_the_robust_fit_of_normal_errors_is_the_fit_to_all_and_single_rows_are_n
     one = np.where(exact.measurements.pose[:, None] == 3, 0.3, 0.0)
     assert (
         place_measurements(
-            with_measured(exact, position=exact.measurements.position + one)
+            replace_measured_columns(exact, position=exact.measurements.position + one)
         ).misfit.max()
         < 1e-6
     )
