@@ -21,11 +21,11 @@ from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.measurements import CSV
 from elastocal.errors import InputError
 from elastocal_proof.blind.rehearsal import (
+    build_hidden_robot,
+    describe_hidden_effects,
     fill_sheet,
-    hidden_robot,
-    hidden_words,
-    measured_errors,
-    with_misplaced_base,
+    measure_errors,
+    misplace_base,
     write_milling_path,
 )
 
@@ -44,7 +44,7 @@ def path(given, robot, campaign):
 
 
 def move(given, robot, campaign):
-    errors_m = measured_errors(given.path, given.targets, robot, given.seed)
+    errors_m = measure_errors(given.path, given.targets, robot, given.seed)
     rms = {name: 1e3 * np.sqrt((error**2).mean()) for name, error in errors_m.items()}
     for name, error in errors_m.items():
         largest = 1e3 * error.max()
@@ -85,11 +85,13 @@ if __name__ == "__main__":
     given = parser.parse_args()
     try:
         campaign = read_campaign_folder(given.folder, ROBOTS)
-        robot, defects = hidden_robot(campaign.robot_file, given.seed, given.effect)
+        robot, defects = build_hidden_robot(
+            campaign.robot_file, given.seed, given.effect
+        )
         if given.misplaced_base:
-            robot = with_misplaced_base(robot, given.seed)
+            robot = misplace_base(robot, given.seed)
         given.run(given, robot, campaign)
     except InputError as error:
         sys.exit(str(error))
     if given.reveal:
-        print(f"hidden: {hidden_words(defects, given.effect)}")
+        print(f"hidden: {describe_hidden_effects(defects, given.effect)}")
