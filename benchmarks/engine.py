@@ -25,7 +25,7 @@ from elastocal.fitting.least_squares import fit_model, register_placement
 from elastocal.fitting.model import list_parameters
 from elastocal.fitting.noise import estimate_noise
 from elastocal.io.documents import read_document
-from elastocal.loop.whole import cases_in
+from elastocal.loop.whole import read_cases
 from elastocal_proof.blind.cases import cases_of, make_case
 from elastocal_proof.blind.folders import campaign_document, write_robot
 from elastocal_proof.plant.arm import arm_from_file
@@ -136,7 +136,7 @@ def rows(work: Path, setting: Setting) -> Iterator[Row]:
 def _fit(work: Path, measurements: int, repetitions: int) -> Row:
     """A robust fit of many effects, to its end, against one dense least-squares problem
     of as many rows and columns."""
-    case, _ = cases_in(_large(work, measurements), ROBOTS)
+    case, _ = read_cases(_large(work, measurements), ROBOTS)
     effects = tuple(
         each
         for each in case.candidates.values()

@@ -32,7 +32,7 @@ from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.settings import Settings
 from elastocal.exchange.target_path import OK
-from elastocal.loop.whole import calibrated_by
+from elastocal.loop.whole import build_calibrated_robot
 
 GOAL = 1.3
 
@@ -89,7 +89,7 @@ def closed(poses: int, size: float, seed: int) -> dict[str, float]:
         return root_mean_square(left[:, :3, 0])
 
     corrected = {
-        name: calibrated_by(
+        name: build_calibrated_robot(
             found, verdict.held_out, verdict.delivered, physics_only=name == "physics"
         )
         for name in ("physics", "delivered")

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 from import_log import write_log
 
 from elastocal.errors import InputError, describe_system_fault
-from elastocal.io.origin import Origin, environment
+from elastocal.io.origin import Origin, list_versions
 from elastocal.io.records import JobRecord, digest_inputs, write_records
 
 # With the Snakefile; the name of this file goes by the folder of the rules.
@@ -99,7 +99,7 @@ def _record(
         own,
         outputs,
         origin_of(job),
-        environment(TOP),
+        list_versions(TOP),
     )
 
 
