@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from loop_scripts import ANALYSIS, Files, run_loop
-from made_folders import PLAN, made_folder, made_table
+from made_folders import PLAN, make_folder, make_table
 
 from elastocal.loop.diagnosis_tables import tabulate_candidates
 from elastocal.loop.whole import diagnose_folder
@@ -24,9 +24,9 @@ def both(kuka, tmp_path_factory):
     that the seed is seen in the alarm."""
     found = {}
     for kind, offset in (("named", 1e-3), ("adequate", 0.0)):
-        table = made_table(kuka, "made", plan=PLAN, offset_of_joint_3=offset)
-        folder = made_folder(tmp_path_factory.mktemp(kind) / "made", kuka, table=table)
-        verdict = as_json(diagnose_folder(folder.as_posix(), ROBOTS.as_posix(), SEED))
+        table = make_table(kuka, "made", plan=PLAN, offset_of_joint_3=offset)
+        folder = make_folder(tmp_path_factory.mktemp(kind) / "made", kuka, table=table)
+        verdict = as_json(diagnosed(folder.as_posix(), ROBOTS.as_posix(), SEED))
         assert verdict["verdict"] == kind
         found[kind] = folder, verdict
     assert [effect["name"] for effect in found["named"][1]["effects"]] == [

@@ -4,7 +4,7 @@ import json
 
 import pytest
 from drawn_figures import empty_pictures
-from made_certificates import made_document
+from made_certificates import make_document
 
 from elastocal.report.certificate import collect_certificate_facts, name_budget_entry
 from elastocal.report.typesetting import compile_document
@@ -48,7 +48,7 @@ def test_decisions_come_with_their_criterion_and_risk(decision, changed, words):
 
 
 def test_a_correction_that_makes_validation_poses_worse_is_advised_against():
-    document = made_document()
+    document = make_document()
     document["validation_rms_m"]["corrected"] = 2e-3
     assert collect_certificate_facts(document)["now"].startswith(
         "Do not correct the robot by this campaign"

@@ -13,7 +13,7 @@ from made_loop_tables import (
     effect_entry,
     experiment_rows,
     facts_of,
-    made_verdict,
+    make_verdict,
     plainly,
     step_rows,
 )
@@ -64,7 +64,7 @@ def test_what_to_do_follows_from_the_verdict_and_from_the_gain():
 
     ends = ((0.15, 0.32), (-0.3, -0.1), (-0.1, 0.3))
     gained, lost, unsure = (
-        now(made_verdict(NAMED, [effect_entry()], reduction=each))[0] for each in ends
+        now(make_verdict(NAMED, [effect_entry()], reduction=each))[0] for each in ends
     )
     assert (
         gained.startswith("Use the corrected model")
