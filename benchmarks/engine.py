@@ -25,7 +25,7 @@ from elastocal.fitting.least_squares import fit_model, register_placement
 from elastocal.fitting.model import list_parameters
 from elastocal.fitting.noise import estimate_noise
 from elastocal.io.documents import read_document
-from elastocal.loop.whole import cases_in
+from elastocal.loop.whole import read_cases
 from elastocal_proof.blind.cases import list_cases, write_sealed_case
 from elastocal_proof.blind.folders import build_campaign_document, write_robot_file
 from elastocal_proof.plant.arm import arm_from_file

@@ -14,7 +14,7 @@ def cases(kuka, config_folder, tmp_path_factory):
     reports, which is not declared."""
     folder = tmp_path_factory.mktemp("cases") / "made"
     make_folder(folder, kuka, table=make_table(kuka, "made", offset_of_joint_3=1e-3))
-    return cases_in(folder, config_folder / "robots")
+    return read_cases(folder, config_folder / "robots")
 
 
 @pytest.fixture(scope="session")

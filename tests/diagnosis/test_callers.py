@@ -26,7 +26,7 @@ def both(kuka, tmp_path_factory):
     for kind, offset in (("named", 1e-3), ("adequate", 0.0)):
         table = make_table(kuka, "made", plan=PLAN, offset_of_joint_3=offset)
         folder = make_folder(tmp_path_factory.mktemp(kind) / "made", kuka, table=table)
-        verdict = as_json(diagnosed(folder.as_posix(), ROBOTS.as_posix(), SEED))
+        verdict = as_json(diagnose_folder(folder.as_posix(), ROBOTS.as_posix(), SEED))
         assert verdict["verdict"] == kind
         found[kind] = folder, verdict
     assert [effect["name"] for effect in found["named"][1]["effects"]] == [

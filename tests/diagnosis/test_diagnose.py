@@ -33,7 +33,7 @@ def diagnosed(kuka, config_folder, tmp_path_factory):
             for name, values in table.items()
         }
         changes = {"noise": {"position_m": declared_m}, "declared": ["link_geometry"]}
-        case, _ = cases_in(
+        case, _ = read_cases(
             make_folder(folder, kuka, table=table, **changes), config_folder / "robots"
         )
         found[declared_m] = diagnose(case, Settings(), 1)
@@ -44,7 +44,7 @@ def test_a_model_that_is_kept_without_what_was_found_has_the_noise_that_it_leave
     kuka, config_folder, tmp_path
 ):
     table = make_table(kuka, "made", plan=PLAN, offset_of_joint_3=OFFSET)
-    case, _ = cases_in(
+    case, _ = read_cases(
         make_folder(tmp_path / "made", kuka, table=table, declared=[]),
         config_folder / "robots",
     )
@@ -98,7 +98,7 @@ def test_an_error_that_all_measurements_of_a_pose_share_is_noise_of_the_model_an
         f"q{joint}": table[f"q{joint}"] + drawn[table["pose"], joint - 1]
         for joint in range(1, 7)
     }
-    case, _ = cases_in(
+    case, _ = read_cases(
         make_folder(tmp_path / "made", kuka, table=table), config_folder / "robots"
     )
     found = diagnose(case, Settings(), 1)

@@ -162,7 +162,7 @@ def test_each_observation_has_its_pose_target_and_residual(data, tmp_path):
 def diagnosed(kuka, config_folder, tmp_path_factory):
     folder = tmp_path_factory.mktemp("diagnosed") / "made"
     make_folder(folder, kuka, table=make_table(kuka, "made", offset_of_joint_3=1e-3))
-    case, _ = cases_in(folder, config_folder / "robots")
+    case, _ = read_cases(folder, config_folder / "robots")
     return case, diagnose(case, Settings(), 1)
 
 

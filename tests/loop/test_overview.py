@@ -13,7 +13,7 @@ from elastocal.loop.overview import inspect_campaign
 @pytest.fixture(scope="module")
 def found(kuka, tmp_path_factory):
     return inspect_campaign(
-        made_folder(tmp_path_factory.mktemp("o") / "made", kuka), ROBOTS
+        make_folder(tmp_path_factory.mktemp("o") / "made", kuka), ROBOTS
     )
 
 
@@ -47,7 +47,7 @@ def test_a_compliance_that_comes_out_negative_is_said(kuka, tmp_path):
         replace(kuka, compliance=kuka.compliance * [1.0, 1.0, -1.0, 1.0, 1.0, 1.0]),
         "made",
     )
-    found = inspect_campaign(made_folder(tmp_path / "made", kuka, table=table), ROBOTS)
+    found = inspect_campaign(make_folder(tmp_path / "made", kuka, table=table), ROBOTS)
     assert said(found, "the compliance of joint 3 comes out negative")
 
 

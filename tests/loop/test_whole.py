@@ -144,7 +144,7 @@ def test_no_step_before_the_judgement_depends_on_held_out_measurements(kuka, tmp
         ("fx", 300.0 * (table["load"] != 0)),
     ):
         table[name] = table[name] + change * mine
-    spoilt_folder = made_folder(tmp_path / "spoilt" / "made", kuka, table=table)
+    spoilt_folder = make_folder(tmp_path / "spoilt" / "made", kuka, table=table)
     spoilt, spoilt_held_out = read_cases(spoilt_folder, ROBOTS)
     assert (
         np.abs(

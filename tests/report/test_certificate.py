@@ -33,7 +33,7 @@ from elastocal.report.typesetting import compile_document
     ],
 )
 def test_decisions_come_with_their_criterion_and_risk(decision, changed, words):
-    text = collect_certificate_facts(made_document(decision, **changed))[
+    text = collect_certificate_facts(make_document(decision, **changed))[
         "decision_sentences"
     ]
     criterion = "the predicted RMS position error of the corrected robot, 95 % sure to be below 0.160 mm, against the tolerance of"
@@ -58,11 +58,11 @@ def test_a_correction_that_makes_validation_poses_worse_is_advised_against():
 @pytest.mark.parametrize("decision", ["pass", "fail", "undecided"])
 def test_every_kind_of_certificate_is_typeset(tmp_path, decision):
     facts = collect_certificate_facts(
-        made_document(decision, misplaced=decision == "fail")
+        make_document(decision, misplaced=decision == "fail")
     )
     json.dumps(facts, allow_nan=False)
     small = collect_certificate_facts(
-        made_document() | {"budget": [{"name": "payload", "rms_m": 5e-8}]}
+        make_document() | {"budget": [{"name": "payload", "rms_m": 5e-8}]}
     )
     assert small["budget"] == [["weight of an undeclared payload", "below 0.1\u00a0µm"]]
     assert (

@@ -119,7 +119,7 @@ def test_causes_are_those_found_and_what_else_is_probable_with_the_probabilities
         ({}, 0.04),
     ]
     rows = tabulate_causes(
-        made_verdict(NAMED, [replace(effect_entry(), probability=0.6)], sets=sets)
+        make_verdict(NAMED, [replace(effect_entry(), probability=0.6)], sets=sets)
     )
     assert [(row["name"], plainly(row["words"]), row["cost"]) for row in rows] == [
         ("Lost motion (backlash) of joint 3", "60 %", "0.085 mm"),

@@ -29,7 +29,7 @@ from elastocal.exchange.target_path import read_target_path
 from elastocal.io.atomic_writes import atomic_write, check_places
 from elastocal.io.texts import read_text
 from elastocal.mechanics.components import WRENCH_NAMES
-from elastocal.report.words import at_joints, listed, physical_name
+from elastocal.report.words import format_joints, join_items, name_effect
 from elastocal_proof.blind.cases import draw_misplaced_base
 from elastocal_proof.plant.arm import arm_from_file, rotation_vector
 from elastocal_proof.plant.campaigns import SECONDS_PER_STATE, usual_force_N
