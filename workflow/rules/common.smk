@@ -166,6 +166,11 @@ wildcard_constraints:
     test="(/test)?",
 
 
+def panel_settings(robot, **limit):
+    """Settings of one panel of Figure 5: its robot, the order of the strategies, and the limit that it shows."""
+    return {"title": TITLES[robot], "robot": robot, "order": list(NAMES.values())} | limit
+
+
 def sources(step):
     """Return the script that runs a step, and the package modules that it imports, as inputs of a rule.
 
