@@ -17,7 +17,7 @@ from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.noise import Noise
 from elastocal.loop.whole import read_cases
 from elastocal.mechanics.sites import sites_of
-from elastocal.remainder.corrected import is_commanded
+from elastocal.residual_model.selection import is_commanded
 
 STATES = make_states(6, 60)
 

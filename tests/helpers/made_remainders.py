@@ -5,8 +5,8 @@ import numpy as np
 from made_folders import make_folder, make_table
 
 from elastocal.campaigns.simulation import Plan
-from elastocal.loop.whole import read_cases
-from elastocal.remainder.regressions import Inputs
+from elastocal.loop.whole import cases_in
+from elastocal.residual_model.regressions import Inputs
 
 NOISE_M = 2e-5
 SMOOTH_M = 4e-4

@@ -103,7 +103,7 @@ class DiagnosedCampaign:
             regression = build_residual_model(
                 self.case,
                 estimate,
-                predictor_of(
+                fit_to_observations(
                     to_document(remainder), model, estimate, self.case.observations
                 ),
                 remainder.spread.typical,
