@@ -23,7 +23,7 @@ from elastocal.campaigns.simulation import draw_measurements
 from elastocal.campaigns.writing import write_campaign
 from elastocal.fitting.model import Case
 from elastocal.fitting.noise import Noise, fit_declared_model
-from elastocal.loop.whole import cases_in
+from elastocal.loop.whole import read_cases
 from elastocal.residual_model.repeatable import detect_repeatable_residual
 from elastocal.residual_model.selection import build_inputs, validate_residual_model
 from elastocal.validation.held_out import compute_position_residuals

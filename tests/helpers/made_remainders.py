@@ -5,7 +5,7 @@ import numpy as np
 from made_folders import make_folder, make_table
 
 from elastocal.campaigns.simulation import Plan
-from elastocal.loop.whole import cases_in
+from elastocal.loop.whole import read_cases
 from elastocal.residual_model.regressions import Inputs
 
 NOISE_M = 2e-5

@@ -40,7 +40,7 @@ from elastocal.loop.diagnosis_tables import (
     load_case,
     restore_step_model,
 )
-from elastocal.remainder.corrected import predictor_of
+from elastocal.residual_model.selection import fit_to_observations
 from elastocal.validation.conformity import (
     PASS,
     UNDECIDED,

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from elastocal.campaigns.campaign_folder import CampaignFolder
 
 # Values that `remainder` of campaign.yaml may have besides plug-ins. They are listed
-# here because reading a campaign must not import `remainder.regressions`.
+# here because reading a campaign must not import `residual_model.regressions`.
 REMAINDERS = (
     "auto",
     "none",

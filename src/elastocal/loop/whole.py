@@ -126,7 +126,7 @@ def build_calibrated_robot(
         Result of the training poses.
     held_out : Case
         Validation poses without gross errors.
-    delivered : Corrected or None
+    delivered : CorrectedResiduals or None
         Result of `judge.apply_regression`.
     physics_only : bool
         Whether to leave out the regression. The residual of the final model is then
