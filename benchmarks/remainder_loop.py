@@ -133,7 +133,6 @@ def close_loop(poses: int, size: float, seed: int) -> dict[str, float]:
         physics alone (physics), and with the regression (delivered).
     """
     deviating = DeviatingRobot.draw(seed, size)
-    robot = deviating.robot
     table, angles = deviating.draw_campaign(poses + HELD_OUT, 0)
     reported = angles - deviating.joint_errors(angles)
     table |= {f"q{joint}": column for joint, column in enumerate(reported.T, 1)}
