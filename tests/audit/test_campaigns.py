@@ -12,12 +12,12 @@ from made_audits import CONFIGURATION, ROBOT, altered, failed
 
 from elastocal.campaigns.simulation import Plan, draw_measurements
 from elastocal.mechanics.robot_file import parse_robot
-from elastocal_proof.audit.audited import FinishedRun
 from elastocal_proof.audit.campaigns import (
     check_seals,
     check_simulated_campaign,
     check_split,
 )
+from elastocal_proof.audit.finished_run import FinishedRun
 
 PLAN = {
     **{

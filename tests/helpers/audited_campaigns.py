@@ -16,8 +16,8 @@ from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop import schemas
 from elastocal.loop.loading import load_campaign
 from elastocal.loop.whole import judged
-from elastocal_proof.audit.audited import FinishedRun
-from elastocal_proof.audit.whole import find_checks
+from elastocal_proof.audit.audit_run import find_checks
+from elastocal_proof.audit.finished_run import FinishedRun
 from elastocal_proof.blind.folders import write_blind_campaign
 from elastocal_proof.plant.arm import arm_from_file
 from elastocal_proof.plant.campaigns import Design, schedule_of

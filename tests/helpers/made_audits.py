@@ -15,7 +15,7 @@ import yaml
 from elastocal.io.origin import Origin
 from elastocal.io.records import JobRecord, write_records
 from elastocal_proof.audit.arm import Arm
-from elastocal_proof.audit.audited import (
+from elastocal_proof.audit.finished_run import (
     COMPONENTS,
     WRENCH,
     FinishedRun,

@@ -10,8 +10,8 @@ import yaml
 from durations import HUNG_S
 from made_audits import altered
 
-from elastocal_proof.audit.audited import FinishedRun
-from elastocal_proof.audit.whole import audit_run
+from elastocal_proof.audit.audit_run import audit_run
+from elastocal_proof.audit.finished_run import FinishedRun
 
 pytestmark = pytest.mark.slow
 

@@ -7,8 +7,8 @@ from job import Job, origin_of, run
 from elastocal import __version__
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.data_frames import write_csv
-from elastocal_proof.audit.audited import FinishedRun
-from elastocal_proof.audit.whole import audit_run, render_page, tabulate_findings
+from elastocal_proof.audit.audit_run import audit_run, render_page, tabulate_findings
+from elastocal_proof.audit.finished_run import FinishedRun
 
 
 def audit_files(job: Job) -> None:

@@ -12,7 +12,7 @@ import pinocchio as pin
 import yaml
 
 from elastocal_proof.audit.arm import Arm
-from elastocal_proof.audit.audited import (
+from elastocal_proof.audit.finished_run import (
     POSITION,
     WRENCH,
     Finding,

@@ -22,7 +22,7 @@ from scipy.spatial.transform import Rotation
 from statsmodels.robust.norms import HuberT
 
 from elastocal_proof.audit.arm import Arm, compute_link_compliance
-from elastocal_proof.audit.audited import (
+from elastocal_proof.audit.finished_run import (
     COMPONENTS,
     POSITION,
     WRENCH,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from elastocal_proof.audit.audited import (
+from elastocal_proof.audit.finished_run import (
     ROUNDING,
     Finding,
     FinishedRun,

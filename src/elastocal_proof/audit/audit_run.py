@@ -19,7 +19,7 @@ from jinja2 import Environment
 from elastocal import __version__
 from elastocal.io.records import RECORDS, list_recorded_files
 from elastocal_proof.audit import campaigns, fits, study
-from elastocal_proof.audit.audited import Finding, FinishedRun, require
+from elastocal_proof.audit.finished_run import Finding, FinishedRun, require
 
 _SHA = "hashlib, SHA-256"
 _OWN_WORDS = "its own metadata"

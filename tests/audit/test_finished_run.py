@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from elastocal.random_streams import open_stream
-from elastocal_proof.audit.audited import (
+from elastocal_proof.audit.finished_run import (
     compare,
     open_philox_stream,
     require,

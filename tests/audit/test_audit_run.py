@@ -7,8 +7,7 @@ from elastocal.io.origin import describe_provenance as written_by
 from elastocal.io.records import list_recorded_files
 from elastocal.io.storage import write_table
 from elastocal.study.simulation import INITIAL
-from elastocal_proof.audit.audited import Finding, FinishedRun
-from elastocal_proof.audit.whole import (
+from elastocal_proof.audit.audit_run import (
     CHECKS,
     audit_run,
     check_checksum,
@@ -16,6 +15,7 @@ from elastocal_proof.audit.whole import (
     render_page,
     tabulate_findings,
 )
+from elastocal_proof.audit.finished_run import Finding, FinishedRun
 
 FILE = "results/initial/two.parquet"
 
