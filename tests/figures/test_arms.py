@@ -1,5 +1,5 @@
-"""Pictures of arms: seen from the side and a little from above, with what the tables
-and the plan hold."""
+"""Pictures of arms, from the side and a little from above, show the values of their
+tables and plans."""
 
 from dataclasses import replace
 
@@ -51,11 +51,13 @@ def test_each_panel_has_its_errors_and_their_rms(table):
         "0.12 mm",
     ]
     for axis, stage in zip(figure.axes, ("before", "after"), strict=True):
-        (arrows,) = [found for found in axis.collections if found.get_gid() == stage]
-        off = np.column_stack([table[f"{stage}_d{each}"] for each in "xyz"])[::3]
+        (arrows,) = [quiver for quiver in axis.collections if quiver.get_gid() == stage]
+        errors = np.column_stack(
+            [table[f"{stage}_d{component}"] for component in "xyz"]
+        )[::3]
         drawn = np.column_stack([arrows.U, arrows.V])
-        times = np.linalg.norm(drawn) / np.linalg.norm(project_view(off))
-        np.testing.assert_allclose(drawn, times * project_view(off), atol=1e-12)
+        times = np.linalg.norm(drawn) / np.linalg.norm(project_view(errors))
+        np.testing.assert_allclose(drawn, times * project_view(errors), atol=1e-12)
         assert times == pytest.approx(400)
     assert (
         "4 held-out poses" in figure.get_supxlabel()
