@@ -49,7 +49,7 @@ def test_columns_times_the_true_compliances_are_the_linear_deflection(
 ):
     """The springs' own elements in beam axes, against J C J'w of the extended chain."""
     drawn, columns = loaded
-    chain = extended_chain(kuka_extended)
+    chain = build_extended_chain(kuka_extended)
     n = kuka_extended.joints
     coordinates = np.zeros((*drawn.joint_angles.shape[:-1], chain.coordinates))
     coordinates[..., :n] = drawn.joint_angles

@@ -152,7 +152,7 @@ def robot_from_urdf(
         "name": urdf.name,
         "joint_names": [joint.name for joint in chain.joints],
     }
-    document |= {"chain": chain.format_chain, "joint_limits_deg": limits}
+    document |= {"chain": chain.notation, "joint_limits_deg": limits}
     # The tree's root is upright.
     before = np.linalg.multi_dot(
         [np.eye(4), np.eye(4), *(joint.origin for joint in urdf.path_to(base, None))]
