@@ -1,4 +1,4 @@
-"""A finished run checked by independent paths: a table of all checks, and a page."""
+"""Check a finished run by independent calculations: a table of checks, and a page."""
 
 from pathlib import Path
 
@@ -20,16 +20,16 @@ def audit_files(job: Job) -> None:
         settings.strategies,
         settings.rows,
     )
-    table = tabulate_findings(audit_run(finished))
-    made = [target for target, digest in settings.others.items() if digest]
+    table = as_table(audit(finished))
+    finished_targets = [target for target, digest in settings.others.items() if digest]
+    absent_targets = [
+        target for target in settings.others if target not in finished_targets
+    ]
     facts = {
         "Seed of the random numbers": str(finished.seed),
         "Rows sampled of a large file": str(settings.rows),
-        "Other targets audited": ", ".join(made) or "none has finished",
-        "Absent, so not audited": ", ".join(
-            target for target in settings.others if target not in made
-        )
-        or "none",
+        "Other targets audited": ", ".join(finished_targets) or "none has finished",
+        "Absent, so not audited": ", ".join(absent_targets) or "none",
         "Version of elastocal": __version__,
         "Origin": origin_of(job).words,
     }
@@ -37,5 +37,5 @@ def audit_files(job: Job) -> None:
     write_csv(job.output.table, table)
 
 
-# What was altered is to be found, not to be refused.
+# The audit reports altered files; a job that checks its inputs would refuse them.
 run(audit_files, snakemake, checked=())

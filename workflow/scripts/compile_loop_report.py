@@ -1,4 +1,4 @@
-"""The report of a campaign: as PDF, and as a page to look into."""
+"""Write the report of a campaign as PDF and as an interactive page."""
 
 from job import Job, origin_of, run
 

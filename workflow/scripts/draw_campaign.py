@@ -1,5 +1,4 @@
-"""Pictures of a campaign: its residuals, what may be missing in its model, its
-errors."""
+"""Draw the figures of a campaign: residuals, candidate effects and errors."""
 
 from job import Job, origin_of, run
 
@@ -27,7 +26,7 @@ def draw_campaign(job: Job) -> None:
     candidates = pd.read_csv(job.input.candidates).fillna({"note": ""})
     verdict = read_verdict(job.input.verdict)
     errors = pd.read_csv(job.input.before_after).to_dict("records")
-    drawn = {
+    figures = {
         "before_after": draw_before_after(errors, verdict.heldout.noise_floor_rms_m),
         "arrows": draw_residual_arrows(table, arm),
         "candidates": draw_probabilities(
@@ -38,7 +37,7 @@ def draw_campaign(job: Job) -> None:
     for name, pdf, png in zip(
         job.params.figures, job.output.pdf, job.output.png, strict=True
     ):
-        save(drawn[name], pdf, png, origin_of(job))
+        save(figures[name], pdf, png, origin_of(job))
 
 
 run(draw_campaign, snakemake)

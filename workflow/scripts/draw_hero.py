@@ -1,4 +1,4 @@
-"""The arm of a campaign with its errors at held-out poses, before and after."""
+"""Draw the arm of a campaign with its errors at held-out poses, before and after."""
 
 from job import Job, origin_of, run
 

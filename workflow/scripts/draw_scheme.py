@@ -1,4 +1,4 @@
-"""Figures 2 and 3: the robot's kinematic scheme, and its springs."""
+"""Draw Figures 2 and 3: the kinematic scheme of a robot, and its springs."""
 
 from job import Job, origin_of, run
 

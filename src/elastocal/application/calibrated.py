@@ -35,8 +35,12 @@ from elastocal.fitting.model import (
     list_parameters,
 )
 from elastocal.fitting.observations import Observations, States, select_states
-from elastocal.mechanics.kinematics import compute_pose_differences, compute_poses
-from elastocal.remainder.corrected import beyond_regressed, inputs_of, is_commanded
+from elastocal.mechanics.kinematics import pose_differences, poses
+from elastocal.residual_model.selection import (
+    build_inputs,
+    find_beyond_regression,
+    is_commanded,
+)
 from elastocal.validation.transfer import find_beyond_campaign, find_larger_loads
 
 if TYPE_CHECKING:
@@ -44,7 +48,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.noise import Noise
     from elastocal.mechanics.robot import Robot
-    from elastocal.remainder.regressions import Inputs, Predictor
+    from elastocal.residual_model.regressions import Inputs, Predictor
 
 # States at a time, so that the intermediate results of a walk along all sites stay in
 # the processor's cache.
@@ -288,10 +292,10 @@ def select_regression_inputs(
     if residual_model is None:
         return np.zeros(len(reported_angles), bool), None
     observations = build_observations(build_states(calibrated, reported_angles, wrench))
-    active = ~beyond_regressed(
+    active = ~find_beyond_regression(
         calibrated.states, observations.states.joint_angles, wrench
     )
-    inputs = inputs_of(
+    inputs = build_inputs(
         calibrated.model, calibrated.estimate, select_states(observations, active)
     )
     offset_m = np.broadcast_to(residual_model.target_offset_m, (len(inputs), 3))

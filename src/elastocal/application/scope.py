@@ -34,8 +34,8 @@ from elastocal.fitting.model import (
     list_parameters,
 )
 from elastocal.fitting.noise import estimate_joint_repeatability
-from elastocal.mechanics.kinematics import compute_pose_differences, compute_poses
-from elastocal.remainder.corrected import is_commanded
+from elastocal.mechanics.kinematics import pose_differences, poses
+from elastocal.residual_model.selection import is_commanded
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.model import Case, Estimate, Model
     from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import States
-    from elastocal.remainder.regressions import Predictor
+    from elastocal.residual_model.regressions import Predictor
 
 
 def calibrate_on_case(
