@@ -16,7 +16,7 @@ from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.noise import Noise
 from elastocal.loop.whole import cases_in
-from elastocal.mechanics.sites import sites_of
+from elastocal.mechanics.sites import build_sites
 from elastocal.residual_model.selection import is_commanded
 
 STATES = make_states(6, 60)

@@ -13,7 +13,7 @@ from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.model import evaluate_conditions, locate_targets, predict
 from elastocal.fitting.noise import Noise
-from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.kinematics import compute_poses
 from elastocal.residual_model.regressions import REGRESSIONS, Predictor, Regression
 from elastocal.residual_model.selection import (
     build_inputs,

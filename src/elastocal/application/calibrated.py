@@ -35,7 +35,7 @@ from elastocal.fitting.model import (
     list_parameters,
 )
 from elastocal.fitting.observations import Observations, States, select_states
-from elastocal.mechanics.kinematics import pose_differences, poses
+from elastocal.mechanics.kinematics import compute_pose_differences, compute_poses
 from elastocal.residual_model.selection import (
     build_inputs,
     find_beyond_regression,

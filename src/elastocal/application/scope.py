@@ -34,7 +34,7 @@ from elastocal.fitting.model import (
     list_parameters,
 )
 from elastocal.fitting.noise import estimate_joint_repeatability
-from elastocal.mechanics.kinematics import pose_differences, poses
+from elastocal.mechanics.kinematics import compute_pose_differences, compute_poses
 from elastocal.residual_model.selection import is_commanded
 
 if TYPE_CHECKING:
