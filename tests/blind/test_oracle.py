@@ -27,7 +27,7 @@ def keys(effect, joints, robot):
     return [
         [c.key for c in members]
         for members in list_variants(
-            effect, joints, candidates_on(sites_of(robot)).values()
+            effect, joints, candidates_on(build_sites(robot)).values()
         )
     ]
 

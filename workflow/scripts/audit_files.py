@@ -20,7 +20,7 @@ def audit_files(job: Job) -> None:
         settings.strategies,
         settings.rows,
     )
-    table = as_table(audit(finished))
+    table = tabulate_findings(audit_run(finished))
     finished_targets = [target for target, digest in settings.others.items() if digest]
     absent_targets = [
         target for target in settings.others if target not in finished_targets

@@ -12,7 +12,7 @@ from elastocal.mechanics.robot_file import parse_robot
 def simulate_campaign(job: Job) -> None:
     settings = job.params.source
     name = job.wildcards.campaign
-    robot = robot_from_document(settings["robot_document"], settings["robot"])
+    robot = parse_robot(settings["robot_document"], settings["robot"])
     plan_settings = {
         key: tuple(value) if isinstance(value, list) else value
         for key, value in settings.items()
