@@ -34,7 +34,7 @@ from elastocal.io.storage import read_table, write_table
 from elastocal.loop.diagnosis_tables import diagnosis_facts, step_fit
 from elastocal.loop.loading import described_campaign
 from elastocal.loop.schemas import measurements
-from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.mechanics.robot_file import parse_robot
 from elastocal.random_streams import open_stream
 from elastocal.residual_model.regressions import REGRESSIONS
 from elastocal.residual_model.selection import validate_residual_model
@@ -90,7 +90,7 @@ def load_data_set(
 ) -> DataSet:
     """Read a data set from files as `deal_league_folds` wrote them."""
     descriptions = read_json(descriptions_path)
-    joints = robot_from_document(descriptions["robot"], descriptions["source"]).joints
+    joints = parse_robot(descriptions["robot"], descriptions["source"]).joints
     return DataSet(
         descriptions,
         read_table(measurements_path, measurements(joints)),
