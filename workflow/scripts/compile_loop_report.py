@@ -8,9 +8,9 @@ from elastocal.io.json_files import read_json
 from elastocal.io.storage import read_table
 from elastocal.loop.diagnosis_tables import select_final_parameters
 from elastocal.loop.schemas import STEPS, read_residuals
-from elastocal.mechanics.robot_file import robot_from_document
-from elastocal.report.loop_facts import collect_loop_facts
-from elastocal.report.loop_page import build_loop_page, write_loop_page
+from elastocal.mechanics.robot_file import parse_robot
+from elastocal.report.loop_facts import loop_facts
+from elastocal.report.loop_page import loop_page, write_loop_page
 from elastocal.report.typesetting import compile_document
 from elastocal.verdict import read_verdict
 
@@ -18,7 +18,7 @@ from elastocal.verdict import read_verdict
 def compile_loop_report(job: Job) -> None:
     verdict = read_verdict(job.input.verdict)
     descriptions = read_json(job.input.descriptions)
-    robot = robot_from_document(descriptions["robot"])
+    robot = parse_robot(descriptions["robot"])
     rows = [
         pd.read_csv(path).to_dict("records")
         for path in (job.input.before_after, job.input.experiment)

@@ -41,8 +41,8 @@ from elastocal.fitting.observations import select_states
 from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import write_table
-from elastocal.loop.whole import build_calibrated_robot, read_cases
-from elastocal.mechanics.kinematics import jacobians, pose_differences
+from elastocal.loop.whole import calibrated_by, cases_in
+from elastocal.mechanics.kinematics import compute_jacobians, compute_pose_differences
 from elastocal.random_streams import open_stream as analysis_stream
 from elastocal.validation.conformity import decide_conformity
 from elastocal_proof.blind import schemas
@@ -342,11 +342,13 @@ def _by_plant(
     certain = replace(made.plant, repeatability_rad=())
     commands = wanted.start.copy()
     inverse = np.linalg.pinv(
-        jacobians(robot.chain, robot.model_angles(commands), robot.chain.end_effector)
+        compute_jacobians(
+            robot.chain, robot.model_angles(commands), robot.chain.end_effector
+        )
     )
 
     def off() -> np.ndarray:
-        return pose_differences(
+        return compute_pose_differences(
             wanted.position,
             wanted.rotation,
             *move_robot(certain, commands, wanted.wrench, seed),
