@@ -158,7 +158,7 @@ def _fit(work: Path, measurements: int, repetitions: int) -> Row:
 
     The problem has as many rows and columns as the fit.
     """
-    case, _ = cases_in(_large(work, measurements), ROBOTS)
+    case, _ = read_cases(_large(work, measurements), ROBOTS)
     effects = tuple(
         candidate
         for candidate in case.candidates.values()

@@ -15,7 +15,7 @@ from elastocal.application.scope import calibrate_on_case, determine_scope
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.noise import Noise
-from elastocal.loop.whole import cases_in
+from elastocal.loop.whole import read_cases
 from elastocal.mechanics.sites import build_sites
 from elastocal.residual_model.selection import is_commanded
 

@@ -11,7 +11,7 @@ from made_blind_documents import PLAN
 from scipy.stats import multivariate_normal
 
 from elastocal.effects.catalogue import candidates_on
-from elastocal.loop.whole import diagnosed
+from elastocal.loop.whole import diagnose_folder
 from elastocal.mechanics.sites import build_sites
 from elastocal_proof.blind import oracle as module
 from elastocal_proof.blind.cases import BlindCase, list_cases, write_sealed_case

@@ -12,8 +12,8 @@ from elastocal.diagnosis.misplaced import (
     find_misplaced_frames,
 )
 from elastocal.fitting.noise import estimate_noise, fit_declared_model
-from elastocal.loop.overview import overview
-from elastocal.loop.whole import cases_in
+from elastocal.loop.overview import inspect_campaign
+from elastocal.loop.whole import read_cases
 from elastocal.mechanics.kinematics import compute_poses
 from elastocal.mechanics.sites import build_sites
 

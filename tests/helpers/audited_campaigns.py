@@ -15,7 +15,7 @@ from elastocal.io.storage import write_table
 from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop import schemas
 from elastocal.loop.loading import load_campaign
-from elastocal.loop.whole import judged
+from elastocal.loop.whole import judge_and_predict
 from elastocal_proof.audit.audit_run import find_checks
 from elastocal_proof.audit.finished_run import FinishedRun
 from elastocal_proof.blind.folders import write_blind_campaign

@@ -9,8 +9,8 @@ from elastocal.io.storage import read_table
 from elastocal.loop.diagnosis_tables import select_final_parameters
 from elastocal.loop.schemas import STEPS, read_residuals
 from elastocal.mechanics.robot_file import parse_robot
-from elastocal.report.loop_facts import loop_facts
-from elastocal.report.loop_page import loop_page, write_loop_page
+from elastocal.report.loop_facts import collect_loop_facts
+from elastocal.report.loop_page import build_loop_page, write_loop_page
 from elastocal.report.typesetting import compile_document
 from elastocal.verdict import read_verdict
 

@@ -81,7 +81,7 @@ def check_study(
     }
     _check_distinct_names(documents, folder)
     chains = {
-        name: parse_robot(robot, document_path(folder, "robots", name)).chain
+        name: parse_robot(robot, locate_document(folder, "robots", name)).chain
         for name, robot in robots.items()
     }
     strategies = {

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from elastocal.io.data_frames import read_long
+from elastocal.io.data_frames import read_robot_tables
 from elastocal.mechanics.robot_file import parse_robot
 from elastocal.study.evaluation import (
     REPLICATES,

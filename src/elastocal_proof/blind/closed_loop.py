@@ -41,7 +41,7 @@ from elastocal.fitting.observations import select_states
 from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import write_table
-from elastocal.loop.whole import calibrated_by, cases_in
+from elastocal.loop.whole import build_calibrated_robot, read_cases
 from elastocal.mechanics.kinematics import compute_jacobians, compute_pose_differences
 from elastocal.random_streams import open_stream as analysis_stream
 from elastocal.validation.conformity import decide_conformity

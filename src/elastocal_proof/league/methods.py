@@ -31,9 +31,9 @@ from elastocal.fitting.noise import estimate_noise, fit_declared_model
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import read_table, write_table
-from elastocal.loop.diagnosis_tables import diagnosis_facts, step_fit
-from elastocal.loop.loading import described_campaign
-from elastocal.loop.schemas import measurements
+from elastocal.loop.diagnosis_tables import refit_step, serialize_diagnosis
+from elastocal.loop.loading import read_described_campaign
+from elastocal.loop.schemas import build_measurements_schema
 from elastocal.mechanics.robot_file import parse_robot
 from elastocal.random_streams import open_stream
 from elastocal.residual_model.regressions import REGRESSIONS
