@@ -218,7 +218,7 @@ def candidate_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     untestable = dict.fromkeys(candidates, "the measurements are at fault")
     if diagnosis.evidence:
         rows = _tested_candidate_rows(diagnosis.evidence)
-        untestable = diagnosis.evidence.linearized.untestable
+        untestable = diagnosis.evidence.design.untestable
     tested = {row["candidate"] for row in rows}
     for key, candidate in candidates.items():
         if key not in tested:
@@ -238,7 +238,7 @@ def candidate_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 def _tested_candidate_rows(evidence: Evidence) -> list[dict[str, Any]]:
     """Return the rows of the candidates that were tested, by falling Bayes factor."""
-    problem = evidence.linearized.problem
+    problem = evidence.design.problem
     posterior = evidence.posterior
     log_bayes_factors = screen_terms(problem)[1]
     inclusion = np.zeros(len(problem.terms))

@@ -217,7 +217,7 @@ def mechanism_columns(
     if evidence := diagnosis.evidence:
         mechanisms = evidence.conclusion.mechanisms
         best = evidence.conclusion.best
-        problem = evidence.linearized.problem
+        problem = evidence.design.problem
         explained = (
             compute_explained_squares(problem, evidence.posterior.models[best.model])
             if best.named
