@@ -9,13 +9,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 from support import ODD_CHAINS, OTHER_CHAINS, PinocchioPoint, robot_of
 from synthetic import (
-    candidate_on,
     conditions_on,
     displacements,
-    made_estimate,
-    made_model,
-    made_states,
-    seen_exactly,
+    find_candidate,
+    make_estimate,
+    make_model,
+    make_states,
+    observe_exactly,
     slopes,
 )
 
@@ -28,9 +28,9 @@ from elastocal.fitting.model import (
     evaluate_conditions,
     list_parameters,
 )
-from elastocal.mechanics.kinematics import motion
+from elastocal.mechanics.kinematics import compute_motion
 from elastocal.mechanics.robot import Mass
-from elastocal.mechanics.sites import sites_of
+from elastocal.mechanics.sites import build_sites
 
 PLACE = np.array([0.1, -0.4, 0.25])
 TILTED = (3.0, -4.0, -8.0)
@@ -74,11 +74,11 @@ def test_gravity_on_every_coordinate_where_the_robot_has_yielded_is_that_of_pino
     robot = weighed(
         fanuc if name == "fanuc" else robot_of((OTHER_CHAINS | ODD_CHAINS)[name])
     )
-    sites = sites_of(robot)
+    sites = build_sites(robot)
     base = candidates_on(sites)["base_compliance"]
-    model = made_model(robot, effects=(base,))
-    estimate = made_estimate(model, seed=2, size=1.0)
-    states = made_states(robot.joints, 3, seed=3, force=300.0)
+    model = make_model(robot, effects=(base,))
+    estimate = make_estimate(model, seed=2, size=1.0)
+    states = make_states(robot.joints, 3, seed=3, force=300.0)
     around = evaluate_conditions(model, estimate, states)
     at = compute_displaced_coordinates(model, estimate, around)
     corrections = around.mass_corrections.reshape(-1, 4)
@@ -108,7 +108,7 @@ def test_masses_and_compliances_have_exact_sensitivities_with_all_that_they_load
     fanuc, identified
 ):
     robot = weighed(fanuc)
-    known = candidates_on(sites_of(robot))
+    known = candidates_on(build_sites(robot))
     keys = (
         "stiffening@2",
         "lost_motion@3",
@@ -117,20 +117,20 @@ def test_masses_and_compliances_have_exact_sensitivities_with_all_that_they_load
         "payload",
         "force_misalignment[flange axes]",
     )
-    model = made_model(
+    model = make_model(
         robot,
         rows=6,
         compliance=fanuc.compliance,
         identified=identified,
         effects=[known[key] for key in keys],
     )
-    estimate = made_estimate(model, seed=4)
-    states = made_states(6, 8, seed=5)
+    estimate = make_estimate(model, seed=4)
+    states = make_states(6, 8, seed=5)
     if identified:
         estimate = replace(
             estimate, coefficients=(fanuc.compliance, *estimate.coefficients[1:])
         )
-    seen = seen_exactly(model, estimate, states)
+    seen = observe_exactly(model, estimate, states)
     around = evaluate_conditions(model, estimate, states)
     listed = list_parameters(model, estimate)
     sizes = [
@@ -167,10 +167,10 @@ def test_priors_are_those_of_the_robot_file(fanuc):
             Mass(3, 50.0, (0.0, 0.0, 0.01), 0.2),
         ),
     )
-    found = declared_weight(sites_of(robot)).parameters
+    found = declared_weight(build_sites(robot)).parameters
     # A centre is off by its relative error times its distance from the joint, and lies
     # anywhere in the girth of its link.
-    width = 0.1 * np.linalg.norm(sites_of(robot).link_vectors_m, axis=1).sum()
+    width = 0.1 * np.linalg.norm(build_sites(robot).link_vectors_m, axis=1).sum()
     assert 0.3 < width < 0.7
     first = np.hypot(20.0 * 0.5, 200.0 * width / 12**0.5)
     second = np.hypot(10.0 * 0.1, 50.0 * width / 12**0.5)
@@ -206,7 +206,7 @@ def test_plausible_payload_is_a_share_of_what_the_robot_carries_as_far_as_that_i
         for link, mass in enumerate(known.get("masses", ()))
     )
     sites = replace(
-        sites_of(replace(fanuc, payload_kg=None)),
+        build_sites(replace(fanuc, payload_kg=None)),
         masses=masses,
         payload_kg=known.get("payload_kg"),
     )
@@ -235,14 +235,14 @@ def test_moments_that_are_a_hundredth_off_still_have_a_place_that_turns_with_the
 
 
 def test_a_bias_is_there_wherever_something_is_recorded_be_it_a_moment_alone(fanuc):
-    states = made_states(6, 3, seed=4)
+    states = make_states(6, 3, seed=4)
     states.wrench[:] = [
         [300.0, 20.0, 10.0, 1.0, 2.0, 3.0],
         [0, 0, 0, 0, 5.0, 0],
         [0] * 6,
     ]
     around = conditions_on(fanuc.chain, states)
-    made = displacements(candidate_on(fanuc.chain, "force_bias[base axes]"), around)[
+    made = displacements(find_candidate(fanuc.chain, "force_bias[base axes]"), around)[
         ..., :6
     ]
     for axis, turned in enumerate(made):
@@ -259,15 +259,15 @@ def test_structure_bears_the_usual_weight_where_neither_masses_nor_loads_are_kno
 ):
     """Half of each link at either end, six times the rated load in all: slopes of its
     potential energy."""
-    states = made_states(6, 4, seed=7)
+    states = make_states(6, 4, seed=7)
     states.wrench[:] = 0.0
-    sites = replace(sites_of(replace(fanuc, payload_kg=100.0)), usual_weight=True)
+    sites = replace(build_sites(replace(fanuc, payload_kg=100.0)), usual_weight=True)
     around = conditions_of(sites, fanuc.compliance, states)
     assert sites.usual_masses.sum() == pytest.approx(600.0)
     assert offered(sites, states) & {"load", "load on the joints"} == {"load"}
 
     def energy(coordinates):
-        ends = motion(sites.chain, coordinates, sites.followed).position[
+        ends = compute_motion(sites.chain, coordinates, sites.followed).position[
             1 : sites.joints + 2
         ]
         return -np.einsum(

@@ -6,7 +6,7 @@ from xml.etree import ElementTree as Xml
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from made_calibrated import made_calibrated
+from made_calibrated import make_calibrated_robot
 from made_urdf import assert_same_poses, joint, link, segments, written
 from support import refused
 
@@ -14,7 +14,7 @@ from elastocal.application.exported import fold_effects
 from elastocal.effects.catalogue import candidates_on
 from elastocal.exchange.urdf import robot_from_urdf
 from elastocal.exchange.urdf_writing import write_calibrated_origins
-from elastocal.mechanics.sites import sites_of
+from elastocal.mechanics.sites import build_sites
 
 # With what people have in their files: comments, meshes, other programs' elements, a
 # mimic, an origin that is not written.
@@ -47,12 +47,12 @@ PARTS = (
 
 def calibrated_of(robot, seed=4):
     places = range(1, robot.joints + 1)
-    known = candidates_on(sites_of(robot))
+    known = candidates_on(build_sites(robot))
     keys = [
         *(f"joint_offset@{place}" for place in places),
         *(f"link_geometry@{place}" for place in places),
     ]
-    made = made_calibrated(
+    made = make_calibrated_robot(
         robot, *(key for key in keys if key in known), identified=False, seed=seed
     )
     return fold_effects(made).robot

@@ -8,7 +8,7 @@ import pytest
 from analysed_robots import analysed
 from drawn_figures import legend_entries
 from made_loop_tables import CAMPAIGNS
-from made_surveys import OPEN, made_candidates, made_survey
+from made_surveys import OPEN, make_candidates, make_survey
 
 from elastocal.application.planning.cell import Cell
 from elastocal.application.planning.plan import choose_plan
@@ -66,8 +66,8 @@ def test_each_panel_has_its_errors_and_their_rms(table):
 
 
 def test_views_show_boxes_tracker_and_both_kinds_of_poses():
-    survey = made_survey()
-    plan = choose_plan(survey, made_candidates(survey, 300), 14, 4, 1)
+    survey = make_survey()
+    plan = choose_plan(survey, make_candidates(survey, 300), 14, 4, 1)
     cell = Cell(
         (np.array([[1.0, 2.0], [0.0, 1.0], [0.0, 1.0]]),),
         np.array([3.0, 1.0, 1.0]),
@@ -88,8 +88,8 @@ def test_views_show_boxes_tracker_and_both_kinds_of_poses():
 
 
 def test_every_pose_has_a_picture_with_its_number_and_pages_are_full():
-    survey = made_survey()
-    plan = choose_plan(survey, made_candidates(survey, 300), 55, 4, 1)
+    survey = make_survey()
+    plan = choose_plan(survey, make_candidates(survey, 300), 55, 4, 1)
     pages = draw_poses(survey.robot, plan)
     titles = [
         axis.get_title(loc="left")

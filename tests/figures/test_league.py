@@ -3,7 +3,7 @@
 import pandas as pd
 import pytest
 from drawn_figures import legend_entries, row_labels
-from made_leagues import made_results
+from made_leagues import make_results
 
 from elastocal_proof.figures.league import league_picture, mechanism_picture
 from elastocal_proof.league.methods import Method
@@ -18,7 +18,7 @@ METHODS = {
 @pytest.fixture(scope="module")
 def table():
     return league_table(
-        made_results(), {"A robot": ["one"], "Another": ["two"]}, "geometry", 1
+        make_results(), {"A robot": ["one"], "Another": ["two"]}, "geometry", 1
     )
 
 

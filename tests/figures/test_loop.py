@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from drawn_figures import assert_nothing_cut_off, legend_entries, row_labels, texts
-from made_certificates import made_document
+from made_certificates import make_document
 from made_loop_tables import candidate_table, plainly, residual_table, step_rows
 from made_loop_tables import probabilities as stated
 from matplotlib.quiver import Quiver, QuiverKey
@@ -251,7 +251,7 @@ def test_a_figure_states_that_no_candidate_can_be_tested():
 
 
 def test_the_budget_has_a_bar_for_each_line_that_is_not_zero_the_largest_first_from_zero_on():
-    budget = made_document()["budget"]
+    budget = make_document()["budget"]
     figure = draw_budget_bars(budget, [line["name"] for line in budget], 2e-4, 1.5e-4)
     axis = figure.axes[0]
     assert row_labels(axis) == [

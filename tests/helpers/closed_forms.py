@@ -12,12 +12,12 @@ from pathlib import Path
 
 import numpy as np
 from support import OTHER_CHAINS, TRACK, PinocchioPoint, chain_of
-from synthetic import displacements, equipped, made_states
+from synthetic import displacements, equipped, make_states
 
 from elastocal.campaigns.reading import read_robot
 from elastocal.effects.conditions import conditions_of
 from elastocal.mechanics.chain import MeasuringPoint
-from elastocal.mechanics.kinematics import poses_and_jacobians
+from elastocal.mechanics.kinematics import compute_poses_and_jacobians
 from elastocal.mechanics.robot import Mass
 
 ROBOTS = Path(__file__).resolve().parents[2] / "config" / "robots"
@@ -46,7 +46,7 @@ class Arm:
     def __init__(self, chain, *, pulled):
         self.chain, self.joints = chain, chain.coordinates
         # From a load that play takes up to one beyond the knee of every gear.
-        self.states = made_states(self.joints, STATES, seed=1, force=1.0)
+        self.states = make_states(self.joints, STATES, seed=1, force=1.0)
         self.states.wrench[:] *= np.geomspace(10.0, 2e4, STATES)[:, None]
         self.compliance = 1e-6 * np.arange(1, self.joints + 1)
         self._frames = {}
@@ -193,7 +193,8 @@ def arm_on(chain_name, kind):
     coordinates[:, : arm.joints] = arm.states.joint_angles
     points = [replace(point, offset_m=(0.0, 0.0, 0.0)) for point in sites.chain.points]
     jacobians = [
-        poses_and_jacobians(sites.chain, coordinates, point)[2] for point in points
+        compute_poses_and_jacobians(sites.chain, coordinates, point)[2]
+        for point in points
     ]
     conditions = conditions_of(sites, arm.compliance, arm.states)
     return arm, conditions, np.stack(jacobians, axis=1)

@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
-from synthetic import measurements_of
+from synthetic import fill_measurements
 
 from elastocal.campaigns.campaign import Campaign, Target
-from elastocal.mechanics.elastostatics import generalized_forces
-from elastocal.mechanics.kinematics import poses, poses_and_jacobians
+from elastocal.mechanics.elastostatics import compute_generalized_forces
+from elastocal.mechanics.kinematics import compute_poses, compute_poses_and_jacobians
 
 POINTS = ("2DoF", "3DoF", "4DoF", "6DoF")
 
@@ -33,12 +33,12 @@ class Plan:
     force: float = 1000.0
 
 
-def with_measured(campaign, **columns):
+def replace_measured_columns(campaign, **columns):
     """A campaign with other columns of its measurements."""
     return replace(campaign, measurements=replace(campaign.measurements, **columns))
 
 
-def made(
+def make_campaign(
     robot, seed, plan=Plan(), true_robot=None, true_offset=0.0, sag=0.0, moving=None
 ):
     """A campaign of a robot, measured as planned.
@@ -63,8 +63,14 @@ def made(
     wrenches = np.concatenate([force, np.cross([0.0, 0.5, 0.0], force)], axis=-1)
     q = angles[pose]
     wrench = wrenches[pose, load]
-    end = poses_and_jacobians(true_robot.chain, q, true_robot.chain.end_effector)[2]
-    moved = q + true_offset + generalized_forces(end, wrench) * true_robot.compliance
+    end = compute_poses_and_jacobians(
+        true_robot.chain, q, true_robot.chain.end_effector
+    )[2]
+    moved = (
+        q
+        + true_offset
+        + compute_generalized_forces(end, wrench) * true_robot.compliance
+    )
     moved[:, 1] += sag * np.cos(q[:, 1])
     offsets = (
         rng.uniform(-0.15, 0.15, (len(POINTS), 3))
@@ -76,7 +82,9 @@ def made(
     for index, name in enumerate(POINTS):
         point = replace(true_robot.chain.point(name), offset_m=tuple(offsets[index]))
         mask = target == index
-        position[mask], rotation[mask] = poses(true_robot.chain, moved[mask], point)
+        position[mask], rotation[mask] = compute_poses(
+            true_robot.chain, moved[mask], point
+        )
     if plan.tracker:
         frame = Rotation.random(random_state=seed).as_matrix()
         position = position @ frame.T + rng.uniform(-3, 3, 3)
@@ -86,7 +94,7 @@ def made(
         plan.noise * rng.standard_normal(position.shape)
     ) * Rotation.from_matrix(rotation)
     places = {"pose": pose, "load": load, "repeat": repeat, "target": target}
-    measurements = measurements_of(
+    measurements = fill_measurements(
         **{name: index.astype(np.int32) for name, index in places.items()},
         joint_angles=q,
         wrench=wrench,
@@ -110,7 +118,7 @@ def made(
     )
 
 
-def with_geometric_errors(robot, seed, size_m):
+def add_geometric_errors(robot, seed, size_m):
     """The same robot with other lengths, m."""
     rng = np.random.default_rng(seed)
     transforms = tuple(
@@ -124,7 +132,7 @@ def with_geometric_errors(robot, seed, size_m):
     return replace(robot, chain=replace(robot.chain, transforms=transforms))
 
 
-def with_other_compliances(robot, seed, share):
+def change_compliances(robot, seed, share):
     """The same robot with compliances off by up to a share."""
     factors = 1 + np.random.default_rng(seed).uniform(-share, share, robot.joints)
     return replace(robot, compliance=robot.compliance * factors)

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import yaml
-from made_folders import made_folder
+from made_folders import make_folder
 
 from elastocal.campaigns.simulation import Plan, draw_measurements
-from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.mechanics.robot_file import parse_robot
 
 SERVICE_ARM = yaml.safe_load(
     Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8")
@@ -27,7 +27,7 @@ def service_arm_folder(folder, seed, poses=34, noise_m=3e-4):
         for name, value in SERVICE_ARM["lengths_m"].items()
     }
     true = replace(
-        robot_from_document(SERVICE_ARM | {"lengths_m": lengths}),
+        parse_robot(SERVICE_ARM | {"lengths_m": lengths}),
         compliance=np.zeros(8),
     )
     plan = Plan(("8DoF",), poses, 0.0, (0,), (0.0, 0.0, 0.0), 1, 0, 1e-3, 1e-3)
@@ -48,6 +48,6 @@ def service_arm_folder(folder, seed, poses=34, noise_m=3e-4):
         "declared": ["joint_offset", "link_geometry"],
         "noise": {"position_m": noise_m},
     }
-    made_folder(folder, true, "service", table=table, **changes)
+    make_folder(folder, true, "service", table=table, **changes)
     (folder / "robot.yaml").write_text(yaml.safe_dump(SERVICE_ARM), encoding="utf-8")
     return folder

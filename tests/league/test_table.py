@@ -3,7 +3,7 @@ each in words that a stranger knows."""
 
 import pandas as pd
 import pytest
-from made_leagues import made_results
+from made_leagues import make_results
 
 from elastocal_proof.league.methods import Method
 from elastocal_proof.league.table import league_page, league_table
@@ -38,7 +38,7 @@ def written(table):
 
 @pytest.fixture(scope="module")
 def page():
-    return written(league_table(made_results(), ROBOTS, "geometry", 1))
+    return written(league_table(make_results(), ROBOTS, "geometry", 1))
 
 
 def test_each_split_has_a_table_in_which_the_best_is_bold(page):
@@ -54,7 +54,7 @@ def test_each_split_has_a_table_in_which_the_best_is_bold(page):
 
 def test_a_split_that_no_data_set_has_is_left_out():
     page = written(
-        league_table(made_results(splits=("random", "session")), ROBOTS, "geometry", 1)
+        league_table(make_results(splits=("random", "session")), ROBOTS, "geometry", 1)
     )
     assert (
         "Random poses" in page
@@ -68,7 +68,7 @@ def test_improbable_mechanisms_are_left_out(page):
 
 
 def test_the_page_says_first_how_often_a_diagnosis_leads_and_how_surely(page):
-    results = made_results()
+    results = make_results()
     assert (
         "has the smallest RMS error in 6 of 6 rows, in 6 with 95 % confidence" in page
     )

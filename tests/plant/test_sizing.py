@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elastocal_proof.blind.cases import size_for
+from elastocal_proof.blind.cases import find_size
 from elastocal_proof.plant.campaigns import Design, schedule_of
 from elastocal_proof.plant.kinds import KINDS, Defect, drawn_defect, with_defects
 from elastocal_proof.plant.physical_robot import Motion
@@ -26,7 +26,7 @@ def test_a_defect_is_sized_to_its_non_centrality(
     def robot_of_size(size):
         return with_defects(fanuc_specimen, [replace(defect, size=size)])
 
-    size = size_for(
+    size = find_size(
         yardstick, robot_of_size, defect.size, target, quantity, KINDS[kind].largest
     )
     assert yardstick.signal(robot_of_size(size))[quantity] == pytest.approx(
@@ -41,7 +41,7 @@ def test_a_wrong_force_scale_is_absorbed_at_any_size_but_for_what_the_weights_te
         return lambda size: with_defects(robot, [Defect("force_scale", (), size)])
 
     with pytest.raises(ValueError, match="no size found"):
-        size_for(
+        find_size(
             Yardstick(weightless, schedule),
             scaled(weightless),
             0.02,
@@ -50,7 +50,7 @@ def test_a_wrong_force_scale_is_absorbed_at_any_size_but_for_what_the_weights_te
         )
     yardstick = Yardstick(fanuc_specimen, schedule, declared=fanuc_specimen.arm.masses)
     with pytest.raises(ValueError, match="no size found"):
-        size_for(
+        find_size(
             yardstick,
             scaled(fanuc_specimen),
             0.02,

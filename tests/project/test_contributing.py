@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support import refused
-from synthetic import displacements, made_states
+from synthetic import displacements, make_states
 
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.importers import find_importer
@@ -21,7 +21,7 @@ from elastocal.effects.conditions import conditions_of
 from elastocal.effects.protocol import Effect
 from elastocal.exchange.controllers import CONTROLLERS, axes_of, targets_of
 from elastocal.io.documents import check_document, read_document
-from elastocal.mechanics.sites import sites_of
+from elastocal.mechanics.sites import build_sites
 from elastocal.study.strategies import check_strategy, strategy_from_document
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -87,8 +87,8 @@ def test_the_strategy_is_one_that_the_papers_robots_can_carry_out_and_none_of_th
 def test_the_effect_displaces_each_joint_as_its_formula_says(import_example, kuka):
     effect = import_example(examples("An effect")[0]).hoses
     assert isinstance(effect, Effect) and "k q^3" in effect.doc
-    sites = sites_of(kuka)
-    states = made_states(6, 5)
+    sites = build_sites(kuka)
+    states = make_states(6, 5)
     candidates = effect.candidates(sites)
     keys = [candidate.key for candidate in candidates]
     assert keys == [f"hoses@{joint}" for joint in range(1, 7)]

@@ -14,13 +14,23 @@ import numpy as np
 import pandas as pd
 import pytest
 from made_blind_documents import PLAN, effect, frame, oracle, truth, verdict
-from made_leagues import made_entries
+from made_leagues import make_entries
 
 from elastocal.io.data_frames import write_csv
 from elastocal.random_streams import open_stream
-from elastocal_proof.blind.closed_loop import MODELS, PARTS, case_errors, goals, summary
-from elastocal_proof.blind.scores import intervals_of
-from elastocal_proof.blind.summary import rates, reliability, summarize
+from elastocal_proof.blind.closed_loop import (
+    MODELS,
+    PARTS,
+    compute_case_errors,
+    count_cases_within_goal,
+    summarize_errors,
+)
+from elastocal_proof.blind.scores import list_intervals
+from elastocal_proof.blind.summary import (
+    summarize_figures,
+    tabulate_rates,
+    tabulate_reliability,
+)
 from elastocal_proof.league.methods import dealt
 from elastocal_proof.league.table import league_table, mechanism_table
 
@@ -42,25 +52,25 @@ def made_tables():
         [
             row
             for document, said, _ in entries
-            for row in intervals_of(PLAN, document, said)
+            for row in list_intervals(PLAN, document, said)
         ]
     )
     moves = _moves()
     moves.loc[(moves["pose"] == 3) & (moves["model"] == "geometry"), "corrected"] = (
         False
     )
-    errors = case_errors({"kuka": moves})
+    errors = compute_case_errors({"kuka": moves})
     blind = {
         "cases": cases,
         "intervals": spans,
-        "rates": rates(cases),
-        "reliability": reliability(cases),
+        "rates": tabulate_rates(cases),
+        "reliability": tabulate_reliability(cases),
     }
-    blind |= {"summary": summarize(PLAN, cases, spans, SEED)}
+    blind |= {"summary": summarize_figures(PLAN, cases, spans, SEED)}
     loop = {
         "cases": errors,
-        "closed_loop": summary(errors, SEED),
-        "goals": goals(errors),
+        "closed_loop": summarize_errors(errors, SEED),
+        "goals": count_cases_within_goal(errors),
     }
     groups = {"blind": blind, "closed_loop": loop, "league_small": _league()}
     return {
@@ -152,7 +162,7 @@ def _moves(cases=8, poses=30, seed=2, reached=0.5):
 
 
 def _league():
-    pose = made_entries(1e-4, 40)["pose"].to_numpy()
+    pose = make_entries(1e-4, 40)["pose"].to_numpy()
     angles = np.random.default_rng(5).uniform(-1, 1, (pose.max() + 1, 3))[pose]
     measured = SimpleNamespace(
         session=np.zeros(len(pose), np.int32), pose=pose, joint_angles=angles
@@ -166,7 +176,7 @@ def _league():
         ("half", 1e-4, None),
         ("process", 1.2e-4, 1.2e-4),
     ):
-        results["one", "random", method] = made_entries(
+        results["one", "random", method] = make_entries(
             size, 40, len(method), std
         ).assign(fold=folds)
     found = pd.DataFrame(

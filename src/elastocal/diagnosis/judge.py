@@ -28,7 +28,11 @@ from elastocal.fitting.noise import parse_noise
 from elastocal.fitting.observations import index_poses, separate_measurements
 from elastocal.io.typed_json import from_document, to_document
 from elastocal.random_streams import open_stream
-from elastocal.remainder.corrected import Corrected, corrected, remainder_facts
+from elastocal.residual_model.selection import (
+    CorrectedResiduals,
+    summarize_residual_model,
+    validate_residual_model,
+)
 from elastocal.validation.conformity import count_configurations, find_joint_ranges
 from elastocal.validation.held_out import (
     METRICS,
@@ -101,7 +105,7 @@ class Judgement:
     held_out: Case
     left_out: Measurements
     outside: np.ndarray
-    delivered: Corrected | None
+    delivered: CorrectedResiduals | None
 
     @cached_property
     def document(self) -> dict[str, Any]:
@@ -185,12 +189,12 @@ def _add_gains(
 
 
 def _state_remainder(
-    diagnosis: Diagnosis, held_out: Case, delivered: Corrected, seed: int
+    diagnosis: Diagnosis, held_out: Case, delivered: CorrectedResiduals, seed: int
 ) -> Remainder:
     """State what a regression on the residual of the final model improves."""
     case = diagnosis.case
     stream = open_stream(seed, case.campaign.name, "remainder", 0)
-    facts = remainder_facts(
+    facts = summarize_residual_model(
         delivered, diagnosis.declared, diagnosis.final, case, held_out, stream
     )
     return from_document(Remainder, facts, "regression on the remainder")
@@ -198,7 +202,7 @@ def _state_remainder(
 
 def apply_regression(
     diagnosis: Diagnosis, held_out: Case, seed: int
-) -> Corrected | None:
+) -> CorrectedResiduals | None:
     """Predict held-out poses by the final model and the regression of the campaign.
 
     Parameters
@@ -212,7 +216,7 @@ def apply_regression(
 
     Returns
     -------
-    Corrected or None
+    CorrectedResiduals or None
         None if the campaign asks for no regression, or if its data are at fault.
     """
     campaign = diagnosis.case.campaign
@@ -220,7 +224,7 @@ def apply_regression(
         return None
     # Poses that were held out at random have neighbours among the fitted ones. Others
     # have none, and the poses that set the intervals must not have any either.
-    return corrected(
+    return validate_residual_model(
         diagnosis.final,
         diagnosis.case,
         held_out,

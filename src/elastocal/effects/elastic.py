@@ -62,12 +62,12 @@ def joint_compliance(sites: Sites) -> Candidate:
 def _springs(groups: Iterable[Iterable[int]]) -> Law:
     """Make the law of coordinates that each yield to their own load; one parameter
     belongs to each group of coordinates."""
-    groups = [tuple(group) for group in groups]
+    members = [tuple(group) for group in groups]
 
     def loads(around: Conditions, group: tuple[int, ...]) -> dict[int, np.ndarray]:
         return {coordinate: around.total[:, coordinate] for coordinate in group}
 
-    return lambda around: [loads(around, group) for group in groups]
+    return lambda around: [loads(around, group) for group in members]
 
 
 def _bending(sites: Sites) -> list[tuple[tuple[int, ...], str]]:

@@ -30,7 +30,7 @@ from elastocal.io.atomic_writes import atomic_write, check_places
 from elastocal.io.texts import read_text
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.report.words import at_joints, listed, physical_name
-from elastocal_proof.blind.cases import misplaced_base
+from elastocal_proof.blind.cases import draw_misplaced_base
 from elastocal_proof.plant.arm import arm_from_file, rotation_vector
 from elastocal_proof.plant.campaigns import SECONDS_PER_STATE, usual_force_N
 from elastocal_proof.plant.kinds import (
@@ -69,7 +69,7 @@ _BOW_POSES = 50
 _TRIES = 200
 
 
-def hidden_robot(
+def build_hidden_robot(
     robot_file: str | Path, seed: int, effects: Sequence[str] = ()
 ) -> tuple[PhysicalRobot, list[Defect]]:
     """The robot that stands in, and its defects.
@@ -114,8 +114,8 @@ def hidden_robot(
     return with_defects(robot, defects), defects
 
 
-def hidden_words(defects: Sequence[Defect], effects: Sequence[str]) -> str:
-    """What `hidden_robot` hid of effects that were asked for, or drew; the small errors
+def describe_hidden_effects(defects: Sequence[Defect], effects: Sequence[str]) -> str:
+    """What `build_hidden_robot` hid of effects that were asked for, or drew; the small errors
     that every robot has stand before."""
     hidden = defects[-max(len(effects), 1) :]
     return listed(
@@ -124,11 +124,11 @@ def hidden_words(defects: Sequence[Defect], effects: Sequence[str]) -> str:
     )
 
 
-def with_misplaced_base(robot: PhysicalRobot, seed: int) -> PhysicalRobot:
+def misplace_base(robot: PhysicalRobot, seed: int) -> PhysicalRobot:
     """The robot beside a tracker whose frame of the base is off by some 0.3 mrad and
     0.2 mm."""
     return replace(
-        robot, tracker=replace(robot.tracker, misplaced=misplaced_base(seed))
+        robot, tracker=replace(robot.tracker, misplaced=draw_misplaced_base(seed))
     )
 
 
@@ -211,7 +211,7 @@ def write_milling_path(
     """Write wanted poses along a bow as for milling, under half the usual force of such
     a robot; returns how many."""
     check_places(path)
-    at, turned, angles = bow(
+    at, turned, angles = draw_milling_path(
         declared, _BOW * robot.arm.reach_m, _BOW_POSES, np.random.default_rng(seed)
     )
     force = np.tile(
@@ -234,7 +234,7 @@ def write_milling_path(
     return len(at)
 
 
-def measured_errors(
+def measure_errors(
     path: Path, targets: Path, robot: PhysicalRobot, seed: int
 ) -> dict[str, np.ndarray]:
     """Distances (N,), m, of where the tracker sees the robot from the wanted poses, in
@@ -257,7 +257,7 @@ def measured_errors(
         require_numbers(table, columns, source)
         angles = table[columns].to_numpy(float)
         visits = [
-            reached(robot, angles, wrench, number, source)
+            move_robot(robot, angles, wrench, number, source)
             for number in (seed, seed + 1)
         ]
         position, rotation = (part[:, None] for part in visits[0])
@@ -275,7 +275,7 @@ def measured_errors(
     return off
 
 
-def reached(
+def move_robot(
     robot: PhysicalRobot,
     shown: np.ndarray,
     wrench: np.ndarray,
@@ -303,7 +303,7 @@ def reached(
     return position[:, -1], rotation[:, -1]
 
 
-def bow(
+def draw_milling_path(
     robot: Robot, length_m: float, count: int, draws: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """A path in a level plane at one orientation, in a posture that keeps within the

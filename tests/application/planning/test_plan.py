@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_surveys import OPEN, made_candidates, made_survey
+from made_surveys import OPEN, make_candidates, make_survey
 
 from elastocal.application.planning.plan import (
     Candidates,
@@ -14,17 +14,17 @@ from elastocal.application.planning.plan import (
 )
 from elastocal.campaigns.campaign import Target
 from elastocal.errors import InputError
-from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.mechanics.robot_file import parse_robot
 
 
 @pytest.fixture(scope="module")
 def survey():
-    return made_survey()
+    return make_survey()
 
 
 @pytest.fixture(scope="module")
 def candidates(survey):
-    return made_candidates(survey, 300)
+    return make_candidates(survey, 300)
 
 
 def test_a_plan_is_better_than_random_designs(survey, candidates):
@@ -67,7 +67,7 @@ def test_candidates_lie_within_the_limits_and_the_loads_pull_or_hang(
     ],
 )
 def test_targets_that_no_joint_moves_are_refused(survey, target):
-    robot = robot_from_document(
+    robot = parse_robot(
         {
             "name": "t",
             "chain": "Tz(d1) [elbow] Rz(q1) [tool0]",
