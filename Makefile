@@ -60,6 +60,10 @@ lint: .venv/ready-for-tests
 catalogue: .venv/ready-for-tests
 	PYTHONPATH=tests/helpers $(BIN)/python tests/helpers/catalogue_lists.py
 
+# Lines of code and syntax nodes of each package.
+sizes:
+	@$(PYTHON) workflow/sizes.py
+
 bench: .venv/ready-for-tests
 	$(BIN)/python benchmarks/run.py
 

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_calibrated import USUAL, made_calibrated
-from made_folders import made_folder, made_table
+from made_calibrated import USUAL, make_calibrated_robot
+from made_folders import make_folder, make_table
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi, norm
-from synthetic import made_states
+from synthetic import make_states
 
 from elastocal.application.accuracy import (
     compute_length_quantiles,
@@ -28,7 +28,7 @@ from elastocal.loop.whole import cases_in
 from elastocal.validation.held_out import compute_position_residuals
 from elastocal.validation.transfer import transfer_fit
 
-STATES = replace(made_states(6, 60), wrench=np.zeros((60, 6)))
+STATES = replace(make_states(6, 60), wrench=np.zeros((60, 6)))
 
 
 def with_scope(calibrated, *, unknown_base):
@@ -64,7 +64,9 @@ def test_bounds_hold_for_95_percent_of_robots_drawn_from_the_covariance(
     fanuc, unknown_base
 ):
     """Of 150 robots; 90 to 100 % are within nearly three standard errors."""
-    calibrated = with_scope(made_calibrated(fanuc, *USUAL), unknown_base=unknown_base)
+    calibrated = with_scope(
+        make_calibrated_robot(fanuc, *USUAL), unknown_base=unknown_base
+    )
     commands = calibrated.robot.reported_angles(STATES.joint_angles)
     accuracy = predict_errors(calibrated, commands, STATES.wrench).summarize("")
     assert accuracy.frame == (ROBOT if unknown_base else BASE)
@@ -78,7 +80,7 @@ def test_bounds_hold_for_95_percent_of_robots_drawn_from_the_covariance(
 
 
 def test_a_misplaced_base_is_an_error_only_if_the_base_is_known(fanuc):
-    calibrated = made_calibrated(fanuc, "joint_offset@1")
+    calibrated = make_calibrated_robot(fanuc, "joint_offset@1")
     coefficients = (*calibrated.estimate.coefficients[:-1], np.array([1e-3]))
     estimate = replace(calibrated.estimate, coefficients=coefficients)
     calibrated = replace(calibrated, estimate=estimate)
@@ -114,7 +116,7 @@ def test_quantiles_are_exact_in_one_and_in_three_directions():
 def campaign(kuka, tmp_path_factory, config_folder):
     """Case, held-out case, fit and calibrated robot of a campaign."""
     folder = tmp_path_factory.mktemp("judged") / "made"
-    folder = made_folder(folder, kuka, table=made_table(kuka, "made"))
+    folder = make_folder(folder, kuka, table=make_table(kuka, "made"))
     case, held_out = cases_in(folder, config_folder / "robots")
     noise = Noise("declared", 6e-5, 6e-5, np.zeros(6))
     fit = fit_model(case.model, case.observations, noise)
@@ -147,7 +149,7 @@ def test_held_out_poses_with_larger_errors_raise_the_prediction_if_the_noise_is_
 
 
 def test_no_error_of_zero_is_predicted_of_a_robot_of_which_nothing_was_fitted(fanuc):
-    calibrated = made_calibrated(fanuc, relative_std=0.0)
+    calibrated = make_calibrated_robot(fanuc, relative_std=0.0)
     commands, wrench = np.zeros((2, 3, 6))
     accuracy = predict_errors(calibrated, commands, wrench).summarize("some poses")
     assert accuracy.rms_m == 0.0 and not accuracy.fitted
@@ -156,7 +158,7 @@ def test_no_error_of_zero_is_predicted_of_a_robot_of_which_nothing_was_fitted(fa
 
 
 def test_the_uncertain_form_of_the_model_is_in_every_figure(fanuc):
-    calibrated = made_calibrated(fanuc, relative_std=0.0)
+    calibrated = make_calibrated_robot(fanuc, relative_std=0.0)
     scope = replace(calibrated.scope, form_m=1e-3, contradicted=True)
     contradicted = replace(calibrated, scope=scope)
     prediction = predict_errors(contradicted, *np.zeros((2, 3, 6)))

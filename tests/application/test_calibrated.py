@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_calibrated import USUAL, made_calibrated, plain_estimate, plain_model
+from made_calibrated import USUAL, make_calibrated_robot, plain_estimate, plain_model
 from scipy.spatial.transform import Rotation
 from support import robot_of
-from synthetic import NOISE, made_states
+from synthetic import NOISE, make_states
 
 from elastocal.application.calibrated import (
     calibrate_by_model,
@@ -58,7 +58,7 @@ def test_spring_and_weight_of_one_joint_are_in_equilibrium(command, force):
     not at the commanded one."""
     weight = Mass(1, 20.0, (0.4, 0.0, 0.1), 0.1)
     robot = replace(robot_of(ONE_JOINT, [2e-5]), masses=(weight,))
-    calibrated = made_calibrated(robot, identified=False, size=0.0)
+    calibrated = make_calibrated_robot(robot, identified=False, size=0.0)
     wrench = np.array([[0, 0, force, 0, 0, 0.0]])
     position, rotation = predict_poses(calibrated, np.array([[command]]), wrench)
     angle = command
@@ -76,10 +76,10 @@ def test_spring_and_weight_of_one_joint_are_in_equilibrium(command, force):
 
 
 def test_sensitivities_are_the_derivatives_of_the_poses_by_every_parameter(fanuc):
-    calibrated = made_calibrated(
+    calibrated = make_calibrated_robot(
         fanuc, *USUAL, "transmission_harmonic@2[orders 1-2]", relative_std=0.01
     )
-    states = made_states(6, 2, seed=4)
+    states = make_states(6, 2, seed=4)
     commands = states.joint_angles, states.wrench
     pose = predict_poses(calibrated, *commands)
     sensitivities = compute_pose_sensitivities(calibrated, *commands)

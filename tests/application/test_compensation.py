@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from analysed_robots import analysed
-from made_calibrated import USUAL, made_calibrated
+from made_calibrated import USUAL, make_calibrated_robot
 
 from elastocal.application.accuracy import predict_errors
 from elastocal.application.calibrated import compute_nominal_poses, find_equilibrium
@@ -31,7 +31,7 @@ BENT = np.array([0.0, 0.2, 0.1, 0.3, 0.7, 0.0])
 
 def make_calibrated(name, *keys):
     """A calibrated robot whose joints repeat to 10 µrad."""
-    calibrated = made_calibrated(analysed(name), *keys)
+    calibrated = make_calibrated_robot(analysed(name), *keys)
     joint_rad = np.full(calibrated.robot.joints, 1e-5)
     return replace(calibrated, noise=replace(calibrated.noise, joint_rad=joint_rad))
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from analysed_robots import analysed
-from made_calibrated import made_calibrated, plain_estimate, plain_model
+from made_calibrated import make_calibrated_robot, plain_estimate, plain_model
 
 from elastocal.application.calibrated import (
     calibrate_by_model,
@@ -48,7 +48,7 @@ def calibrate_by_file(robot):
         coefficients.append(robot.compliance if is_compliance else zeros)
     count = sum(len(values) for values in coefficients)
     estimate = plain_estimate(model, coefficients)
-    noise = made_calibrated(robot).noise
+    noise = make_calibrated_robot(robot).noise
     return calibrate_by_model(robot, model, estimate, np.zeros((count, count)), noise)
 
 
@@ -71,7 +71,7 @@ def test_poses_of_a_robot_file_under_load_are_those_of_the_calibrated_robot(
     robot = analysed(name)
     candidates = candidates_on(sites_of(robot))
     keys = (*GEOMETRY, "link_geometry@6", *additional)
-    calibrated = made_calibrated(
+    calibrated = make_calibrated_robot(
         robot, *(key for key in keys if key in candidates), size=1.0
     )
     folded = fold_effects(calibrated)
@@ -86,7 +86,7 @@ def test_poses_of_a_robot_file_under_load_are_those_of_the_calibrated_robot(
 
 def test_effects_that_a_robot_file_cannot_hold_are_left_out_and_change_nothing_else():
     keys = ["lost_motion@2", "transmission_harmonic@1[orders 1-2]"]
-    calibrated = made_calibrated(analysed("gp180"), *GEOMETRY, *keys)
+    calibrated = make_calibrated_robot(analysed("gp180"), *GEOMETRY, *keys)
     folded = fold_effects(calibrated)
     assert [calibrated.model.effects[number].key for number in folded.left_out] == keys
     commands, wrench = draw_states(calibrated.robot)

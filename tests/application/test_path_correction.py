@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from analysed_robots import analysed
-from made_calibrated import made_calibrated
-from synthetic import made_states
+from made_calibrated import make_calibrated_robot
+from synthetic import make_states
 
 from elastocal.application.calibrated import compute_nominal_poses
 from elastocal.application.path_correction import (
@@ -26,9 +26,9 @@ BENT = np.array([0.0, 0.2, 0.1, 0.3, 0.7, 0.0])
 @pytest.fixture(scope="module")
 def calibrated():
     """A robot that was fitted in states all around the path."""
-    calibrated = made_calibrated(analysed("gp180"), "joint_offset@2")
+    calibrated = make_calibrated_robot(analysed("gp180"), "joint_offset@2")
     middle = calibrated.robot.joint_limits.mean(axis=1) + BENT
-    states = made_states(6, 60)
+    states = make_states(6, 60)
     angles = middle + np.linspace(-0.5, 0.5, 60)[:, None]
     return replace(calibrated, fitted=replace(states, joint_angles=angles))
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_calibrated import made_calibrated, plain_model
-from made_folders import made_folder, made_table
+from made_calibrated import make_calibrated_robot, plain_model
+from made_folders import make_folder, make_table
 from scipy.linalg import block_diag
-from synthetic import made_states
+from synthetic import make_states
 
 from elastocal.application.accuracy import predict_campaign_accuracy
 from elastocal.application.scope import calibrate_on_case, determine_scope
@@ -19,7 +19,7 @@ from elastocal.loop.whole import cases_in
 from elastocal.mechanics.sites import sites_of
 from elastocal.remainder.corrected import is_commanded
 
-STATES = made_states(6, 60)
+STATES = make_states(6, 60)
 
 
 def scope_with(robot, candidate, values, shapes, std=0.0):
@@ -27,7 +27,7 @@ def scope_with(robot, candidate, values, shapes, std=0.0):
 
     `std` is the standard deviation of its parameters in units of their plausible sizes.
     """
-    calibrated = made_calibrated(robot, "joint_offset@2")
+    calibrated = make_calibrated_robot(robot, "joint_offset@2")
     model = plain_model(robot, "joint_offset@2")
     model = replace(model, effects=(*calibrated.model.effects, candidate))
     estimate = replace(
@@ -62,7 +62,7 @@ def test_every_effect_that_no_command_contains_counts_as_error(fanuc):
 
 
 def test_an_unknown_offset_of_the_target_at_the_end_effector_is_no_error(fanuc):
-    calibrated = made_calibrated(fanuc, "link_geometry@6")
+    calibrated = make_calibrated_robot(fanuc, "link_geometry@6")
     target = calibrated.model.targets[0]
     variances = [0.0] * (len(calibrated.covariance) - 6) + [1e-3] * 3 + [0.0] * 3
     sizes = []
@@ -83,7 +83,7 @@ def test_an_unknown_offset_of_the_target_at_the_end_effector_is_no_error(fanuc):
 @pytest.fixture(scope="module")
 def case(kuka, tmp_path_factory, config_folder):
     folder = tmp_path_factory.mktemp("repeated") / "made"
-    folder = made_folder(folder, kuka, table=made_table(kuka, "made"))
+    folder = make_folder(folder, kuka, table=make_table(kuka, "made"))
     return cases_in(folder, config_folder / "robots")[0]
 
 

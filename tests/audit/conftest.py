@@ -2,7 +2,7 @@
 
 import pytest
 from audited_campaigns import diagnosed_campaign
-from made_audits import made_run
+from made_audits import make_run
 
 
 @pytest.fixture(scope="session")
@@ -19,4 +19,4 @@ def diagnosed(tmp_path_factory):
 @pytest.fixture
 def run(tmp_path):
     """Experiments, deflections and estimates of a robot of two joints."""
-    return made_run(tmp_path)
+    return make_run(tmp_path)

@@ -100,7 +100,7 @@ def test_the_truth_on_the_plant_is_near_what_is_stated_whether_the_base_is_known
         assert row["rms_m"] < row["rms_bound_m"] < 2.0 * row["rms_m"]
 
 
-def made_rows(true_rms_m, decision="pass", verdict="named", frame="base"):
+def make_rows(true_rms_m, decision="pass", verdict="named", frame="base"):
     count = len(true_rms_m)
     stated = {
         "rms_m": 2e-5,
@@ -123,8 +123,8 @@ def test_shares_are_of_the_cases_that_a_question_concerns_with_exact_intervals()
     found = coverage(
         pd.concat(
             [
-                made_rows([1e-5, 2e-5, 5e-5]),
-                made_rows([3.5e-5], "fail", "several", "tracker"),
+                make_rows([1e-5, 2e-5, 5e-5]),
+                make_rows([3.5e-5], "fail", "several", "tracker"),
             ]
         )
     )

@@ -5,7 +5,7 @@ import subprocess
 import sys
 
 import pytest
-from made_folders import made_folder, made_table
+from made_folders import make_folder, make_table
 
 WATCHED = """
 import json, sys
@@ -26,8 +26,8 @@ print(json.dumps({"opened": opened, "modules": modules, "verdicts": len(json.loa
 def test_diagnosing_opens_no_sealed_file_and_knows_no_plant(
     kuka, config_folder, tmp_path
 ):
-    table = made_table(kuka, "case_1", offset_of_joint_3=6e-4)
-    made_folder(tmp_path / "blind" / "case_1", kuka, "case_1", table=table)
+    table = make_table(kuka, "case_1", offset_of_joint_3=6e-4)
+    make_folder(tmp_path / "blind" / "case_1", kuka, "case_1", table=table)
     (tmp_path / "sealed").mkdir()
     (tmp_path / "sealed" / "case_1.json").write_text("{}", encoding="utf-8")
     places = [

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from analysed_robots import analysed
-from made_folders import made_folder, made_table
+from made_folders import make_folder, make_table
 
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.command import campaign
@@ -81,7 +81,7 @@ def test_a_sheet_without_a_header_is_refused(refusal, tmp_path):
 
 
 def test_a_check_says_what_was_read_identified_and_testable(elastocal, tmp_path):
-    folder = made_folder(tmp_path / "made", analysed("kuka"))
+    folder = make_folder(tmp_path / "made", analysed("kuka"))
     result = elastocal("check", folder)
     assert result.exit_code == 0, result.output
     answer, *details = result.output.splitlines()
@@ -94,9 +94,9 @@ def test_a_check_says_what_was_read_identified_and_testable(elastocal, tmp_path)
 
 def test_faults_of_the_data_end_in_exit_code_one(elastocal, tmp_path):
     robot = analysed("kuka")
-    table = made_table(robot, "made")
+    table = make_table(robot, "made")
     table["q3"] = -table["q3"]
-    result = elastocal("check", made_folder(tmp_path / "made", robot, table=table))
+    result = elastocal("check", make_folder(tmp_path / "made", robot, table=table))
     assert result.exit_code == 1 and "next: mend the data" in result.output
     answer = "! made cannot be diagnosed: the data are at fault"
     assert result.output.startswith(answer) and "joint 3" in result.output
@@ -106,10 +106,10 @@ def test_an_empty_cell_is_refused_with_its_line(refusal, tmp_path):
     robot = analysed("kuka")
     table = {
         name: np.asarray(values).astype(object)
-        for name, values in made_table(robot, "made").items()
+        for name, values in make_table(robot, "made").items()
     }
     table["x"][3] = ""
-    folder = made_folder(tmp_path / "empty", robot, table=table)
+    folder = make_folder(tmp_path / "empty", robot, table=table)
     assert "line 5, column x: found nothing" in refusal("check", folder)
 
 

@@ -8,10 +8,10 @@ import pytest
 from made_campaigns import (
     POINTS,
     Plan,
-    made,
-    with_geometric_errors,
-    with_measured,
-    with_other_compliances,
+    add_geometric_errors,
+    change_compliances,
+    make_campaign,
+    replace_measured_columns,
 )
 from support import PinocchioPoint
 from synthetic import NOISE
@@ -43,22 +43,23 @@ PLANS = {
 # Each plan with a seed of its own.
 @pytest.mark.parametrize(("seed", "plan"), list(enumerate(PLANS)))
 def test_no_fault_is_found_where_the_model_is_right(fanuc, plan, seed):
-    assert faults(made(fanuc, seed, PLANS[plan])) == ()
+    assert faults(make_campaign(fanuc, seed, PLANS[plan])) == ()
 
 
 @pytest.mark.parametrize(("seed", "plan"), list(enumerate(PLANS)))
 def test_no_fault_is_found_where_the_model_lacks_something(kuka, plan, seed):
     """Springs, zeros, a sag and lengths off, which is most at once."""
     offsets = np.random.default_rng(seed).normal(0.0, 3e-3, kuka.joints)
-    true_robot = with_geometric_errors(
-        with_other_compliances(kuka, seed, 0.5), seed, 0.01
+    true_robot = add_geometric_errors(change_compliances(kuka, seed, 0.5), seed, 0.01)
+    assert (
+        faults(make_campaign(kuka, seed, PLANS[plan], true_robot, offsets, sag=3e-3))
+        == ()
     )
-    assert faults(made(kuka, seed, PLANS[plan], true_robot, offsets, sag=3e-3)) == ()
 
 
 def test_a_wrong_sign_is_found_alone(fanuc):
-    campaign = made(fanuc, 1, Plan(poses=20))
-    turned = with_measured(
+    campaign = make_campaign(fanuc, 1, Plan(poses=20))
+    turned = replace_measured_columns(
         campaign, joint_angles=campaign.measurements.joint_angles * [1, 1, -1, 1, 1, 1]
     )
     assert [fault.name for fault in faults(turned)] == ["wrong_sign"]
@@ -66,7 +67,7 @@ def test_a_wrong_sign_is_found_alone(fanuc):
 
 @pytest.fixture(scope="module", params=["base", "tracker"])
 def twelve_poses(request, fanuc):
-    return made(fanuc, 1, Plan(poses=12, tracker=request.param == "tracker"))
+    return make_campaign(fanuc, 1, Plan(poses=12, tracker=request.param == "tracker"))
 
 
 @pytest.mark.parametrize(
@@ -76,7 +77,7 @@ def twelve_poses(request, fanuc):
 @pytest.mark.parametrize(("value", "same"), [(0.0, "zero"), (1.5, "the same")])
 def test_positions_that_stand_still_are_named(twelve_poses, kept, words, value, same):
     still = np.where(kept, twelve_poses.measurements.position, value)
-    (fault,) = constant_columns(with_measured(twelve_poses, position=still))
+    (fault,) = constant_columns(replace_measured_columns(twelve_poses, position=still))
     assert fault.name == "constant_columns"
     assert fault.detail.startswith(words) and f" {same} in all 12 poses" in fault.detail
 
@@ -85,17 +86,17 @@ def test_angles_that_stand_still_while_the_measurements_move_are_named_unless_it
     twelve_poses,
 ):
     seen = twelve_poses.measurements
-    still = with_measured(
+    still = replace_measured_columns(
         twelve_poses, joint_angles=np.full_like(seen.joint_angles, 0.4)
     )
     (fault,) = constant_columns(still)
     assert fault.detail.startswith("the joint angles are the same in all 12 poses")
     again = seen.position[: len(POINTS)][seen.target] + 1e-5 * seen.pose[:, None]
-    assert constant_columns(with_measured(still, position=again)) == []
+    assert constant_columns(replace_measured_columns(still, position=again)) == []
 
 
 def test_a_robot_that_moves_in_a_plane_may_have_a_constant_coordinate(fanuc):
-    campaign = made(
+    campaign = make_campaign(
         fanuc,
         1,
         Plan(poses=12, noise=0.0, loads=0),
@@ -110,17 +111,17 @@ def test_a_robot_that_moves_in_a_plane_may_have_a_constant_coordinate(fanuc):
 
 @pytest.fixture(scope="module", params=["base", "tracker"])
 def campaign(request, fanuc):
-    return made(
+    return make_campaign(
         fanuc,
         1,
         Plan(tracker=request.param == "tracker"),
-        with_other_compliances(fanuc, 1, 0.3),
+        change_compliances(fanuc, 1, 0.3),
     )
 
 
 def with_rows(campaign, source):
     seen = campaign.measurements
-    return with_measured(
+    return replace_measured_columns(
         campaign,
         position=seen.position[source],
         rotation_vector=seen.rotation_vector[source],
@@ -141,15 +142,15 @@ def test_measured_columns_moved_by_one_row_are_named(campaign, steps, words):
 def test_measurements_of_another_robot_are_named_and_those_of_one_off_by_centimetres_are_not(
     fanuc, kuka, tracker
 ):
-    campaign = made(fanuc, 1, Plan(poses=20, tracker=tracker))
+    campaign = make_campaign(fanuc, 1, Plan(poses=20, tracker=tracker))
     (fault,) = implausible_measurements(replace(campaign, robot=kuka))
     assert fault.name == "implausible_measurements"
     assert fault.parameters[0].value > 0.1 and "\n" not in fault.detail
-    off = made(
+    off = make_campaign(
         fanuc,
         1,
         Plan(poses=20, tracker=tracker),
-        with_geometric_errors(fanuc, 1, 0.01),
+        add_geometric_errors(fanuc, 1, 0.01),
         5e-3,
         sag=5e-3,
     )
@@ -160,10 +161,12 @@ def warned(robot, factors=1.0, turned=1.0, known=True):
     """Warnings of a fit of the compliances of a robot that are so many times those that
     its file states, or are usual."""
     file = replace(robot, compliance_known=known)
-    campaign = made(
+    campaign = make_campaign(
         file, 1, Plan(poses=12), replace(robot, compliance=robot.compliance * factors)
     )
-    campaign = with_measured(campaign, wrench=turned * campaign.measurements.wrench)
+    campaign = replace_measured_columns(
+        campaign, wrench=turned * campaign.measurements.wrench
+    )
     return compliance_warnings(
         fit_model(
             build_declared_model(campaign),
@@ -206,7 +209,7 @@ def test_loads_turned_round_are_seen_by_compliances_below_zero_and_joints_withou
         and "usual for such a robot" in warning
     )
     rigid = replace(
-        made(replace(fanuc, compliance_known=False), 1), compliance="nominal"
+        make_campaign(replace(fanuc, compliance_known=False), 1), compliance="nominal"
     )
     (warning,) = compliance_warnings(
         fit_model(
@@ -222,7 +225,7 @@ def test_positions_of_the_files_own_kinematics_are_said_to_be_no_measurements(
     fanuc, tracker, decimals_deg, decimals_mm
 ):
     """Angles and positions rounded as a controller shows them."""
-    campaign = made(
+    campaign = make_campaign(
         fanuc, 1, Plan(poses=14, loads=0, tracker=tracker, oriented=False, noise=0.0)
     )
     angles = np.radians(
@@ -230,7 +233,7 @@ def test_positions_of_the_files_own_kinematics_are_said_to_be_no_measurements(
     )
     position = (1e3 * campaign.measurements.position).round(decimals_mm) / 1e3
     (sentence,) = controller_warnings(
-        with_measured(campaign, joint_angles=angles, position=position)
+        replace_measured_columns(campaign, joint_angles=angles, position=position)
     )
     assert "no measurements" in sentence and "own kinematics" in sentence
     measured = position + 6e-5 * np.random.default_rng(1).standard_normal(
@@ -238,7 +241,7 @@ def test_positions_of_the_files_own_kinematics_are_said_to_be_no_measurements(
     )
     assert (
         controller_warnings(
-            with_measured(campaign, joint_angles=angles, position=measured)
+            replace_measured_columns(campaign, joint_angles=angles, position=measured)
         )
         == []
     )
@@ -250,7 +253,7 @@ JOINTS = 6
 
 @pytest.fixture(scope="module")
 def exact(fanuc):
-    return made(fanuc, 1, EXACT)
+    return make_campaign(fanuc, 1, EXACT)
 
 
 def expected_parts(robot, seen, part):
@@ -302,7 +305,7 @@ def selected(campaign, kept):
 def test_joints_off_their_zeros_leave_no_trace_in_the_deflections(fanuc):
     plan = Plan(poses=40, loads=1, noise=0.0)
     straight, off = (
-        made(fanuc, 1, plan, true_offset=offset)
+        make_campaign(fanuc, 1, plan, true_offset=offset)
         for offset in (0.0, 2e-3 * np.array([1, -1, 1, -1, 1, -1]))
     )
     assert (
@@ -321,7 +324,9 @@ def test_nothing_is_said_without_differing_loads_or_known_compliances_or_with_to
 ):
     seen = exact.measurements
     assert deflections(selected(exact, seen.load == 1)) is None
-    assert deflections(with_measured(exact, wrench=0.0 * seen.wrench)) is None
+    assert (
+        deflections(replace_measured_columns(exact, wrench=0.0 * seen.wrench)) is None
+    )
     assert (
         deflections(replace(exact, robot=replace(exact.robot, compliance_known=False)))
         is None
@@ -417,11 +422,11 @@ def test_of_two_units_within_reach_the_one_by_which_compliances_are_nearest_nomi
 
 @pytest.fixture(scope="module", params=["base", "tracker"])
 def loaded(request, fanuc):
-    return made(
+    return make_campaign(
         fanuc,
         2,
         Plan(poses=20, tracker=request.param == "tracker"),
-        with_other_compliances(fanuc, 1, 0.3),
+        change_compliances(fanuc, 1, 0.3),
     )
 
 
@@ -437,7 +442,9 @@ def loaded(request, fanuc):
 )
 def test_loads_in_another_unit_are_named_with_its_factor(loaded, factor):
     written = loaded.measurements.wrench / np.repeat(factor, 3)
-    (fault,) = wrong_loads(*deflections(with_measured(loaded, wrench=written)))
+    (fault,) = wrong_loads(
+        *deflections(replace_measured_columns(loaded, wrench=written))
+    )
     assert (fault.name, fault.joints) == ("wrong_unit", ())
     assert [value.value for value in fault.parameters[:2]] == pytest.approx(factor)
     assert fault.evidence[1] < 0.5 * fault.evidence[0]
@@ -445,7 +452,9 @@ def test_loads_in_another_unit_are_named_with_its_factor(loaded, factor):
 
 def test_loads_turned_round_are_named(loaded):
     (fault,) = wrong_loads(
-        *deflections(with_measured(loaded, wrench=-loaded.measurements.wrench))
+        *deflections(
+            replace_measured_columns(loaded, wrench=-loaded.measurements.wrench)
+        )
     )
     assert (fault.name, fault.joints) == ("wrong_sign", ()) and "loads" in fault.detail
     assert -2.0 < fault.parameters[0].value < -0.5

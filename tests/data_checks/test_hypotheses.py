@@ -5,7 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_campaigns import Plan, made, with_measured, with_other_compliances
+from made_campaigns import (
+    Plan,
+    change_compliances,
+    make_campaign,
+    replace_measured_columns,
+)
 from scipy.spatial.transform import Rotation
 
 from elastocal.data_checks.hypotheses import (
@@ -18,8 +23,8 @@ from elastocal.mechanics.kinematics import poses
 
 
 def softer_by_chance(robot, tracker):
-    return made(
-        robot, 1, Plan(poses=12, tracker=tracker), with_other_compliances(robot, 1, 0.3)
+    return make_campaign(
+        robot, 1, Plan(poses=12, tracker=tracker), change_compliances(robot, 1, 0.3)
     )
 
 
@@ -34,7 +39,9 @@ def campaign(fanuc):
 def test_a_joint_counted_the_other_way_round_is_named(fanuc, joint, tracker):
     campaign = softer_by_chance(fanuc, tracker)
     angles = campaign.measurements.joint_angles * (1.0 - 2.0 * np.eye(6)[joint])
-    (fault,) = other_interpretations(with_measured(campaign, joint_angles=angles))
+    (fault,) = other_interpretations(
+        replace_measured_columns(campaign, joint_angles=angles)
+    )
     assert (fault.name, fault.joints) == ("wrong_sign", (joint + 1,))
     before, after = fault.evidence
     assert before > 0.02 and after < 1e-3
@@ -42,7 +49,7 @@ def test_a_joint_counted_the_other_way_round_is_named(fanuc, joint, tracker):
 
 def test_loads_that_are_numbered_throughout_have_no_row_beside_them(campaign):
     seen = campaign.measurements
-    turned = with_measured(
+    turned = replace_measured_columns(
         campaign, joint_angles=-seen.joint_angles, load=np.arange(len(seen)) + 1
     )
     assert not [
@@ -61,7 +68,9 @@ def test_a_joint_counted_from_its_neighbour_is_named_with_it(
 ):
     angles = campaign.measurements.joint_angles.copy()
     angles[:, joint] += sign * angles[:, joint - 1]
-    (fault,) = other_interpretations(with_measured(campaign, joint_angles=angles))
+    (fault,) = other_interpretations(
+        replace_measured_columns(campaign, joint_angles=angles)
+    )
     assert fault.joints == (joint, joint + 1)
     assert words in fault.detail
 
@@ -75,19 +84,23 @@ def test_the_sign_is_that_of_the_column_of_the_file(fanuc):
         reported_matrix=reported_matrix,
         reported_offset=np.radians([0, -40, 60, 0, 0, 0]),
     )
-    campaign = made(robot, 3, Plan(poses=14))
+    campaign = make_campaign(robot, 3, Plan(poses=14))
     reported = (
         campaign.measurements.joint_angles - robot.reported_offset
     ) @ reported_matrix
     reported[:, 2] *= -1
     angles = reported @ reported_matrix + robot.reported_offset
-    (fault,) = other_interpretations(with_measured(campaign, joint_angles=angles))
+    (fault,) = other_interpretations(
+        replace_measured_columns(campaign, joint_angles=angles)
+    )
     assert fault.joints == (3,)
 
 
 def test_orientations_turned_round_are_named(campaign):
     (fault,) = other_interpretations(
-        with_measured(campaign, rotation_vector=-campaign.measurements.rotation_vector)
+        replace_measured_columns(
+            campaign, rotation_vector=-campaign.measurements.rotation_vector
+        )
     )
     assert fault.joints == ()
     assert "rotation vectors" in fault.detail
@@ -102,7 +115,7 @@ def with_turned_mount(campaign, turn, moved_m=0.0):
     measured = Rotation.from_rotvec(campaign.measurements.rotation_vector)
     place = np.where(mine, measured.apply([0.0, 0.0, moved_m]), 0.0)
     vectors = np.where(mine, (measured * turn).as_rotvec(), measured.as_rotvec())
-    return with_measured(
+    return replace_measured_columns(
         campaign,
         position=campaign.measurements.position + place,
         rotation_vector=vectors,
@@ -119,7 +132,9 @@ EXCHANGED = {
 @pytest.mark.parametrize("words", EXCHANGED)
 def test_exchanged_axes_of_positions_are_named(campaign, words):
     written = campaign.measurements.position @ np.array(EXCHANGED[words], float).T
-    (fault,) = other_interpretations(with_measured(campaign, position=written))
+    (fault,) = other_interpretations(
+        replace_measured_columns(campaign, position=written)
+    )
     assert fault.name == "swapped_axes"
     assert fault.detail.endswith(f"measurements fit with {words}")
 
@@ -127,7 +142,9 @@ def test_exchanged_axes_of_positions_are_named(campaign, words):
 @pytest.mark.parametrize(("factor", "unit"), [(1000, "millimetres"), (0.1, "tenth")])
 def test_positions_in_another_unit_are_named(campaign, factor, unit):
     (fault,) = other_interpretations(
-        with_measured(campaign, position=factor * campaign.measurements.position)
+        replace_measured_columns(
+            campaign, position=factor * campaign.measurements.position
+        )
     )
     assert fault.name == "wrong_unit" and unit in fault.detail
     assert f"fit {1 / factor:g} times" in fault.detail
@@ -142,12 +159,14 @@ def test_angles_in_the_columns_of_the_rotation_vector_are_named(
     angles = Rotation.from_rotvec(campaign.measurements.rotation_vector).as_euler(
         letters
     )
-    (fault,) = other_interpretations(with_measured(campaign, rotation_vector=angles))
+    (fault,) = other_interpretations(
+        replace_measured_columns(campaign, rotation_vector=angles)
+    )
     assert words in fault.detail
 
 
 def test_each_session_has_a_transform_of_its_own(fanuc):
-    campaign = made(fanuc, 1, Plan(poses=14, oriented=False))
+    campaign = make_campaign(fanuc, 1, Plan(poses=14, oriented=False))
     measurements = campaign.measurements
     rotation = ELSEWHERE[0]
     session = (measurements.pose >= 10).astype(np.int32)
@@ -155,7 +174,7 @@ def test_each_session_has_a_transform_of_its_own(fanuc):
         session[:, None], [0.0, 3.0, 0.0], [1.0, 0.0, 0.0]
     )
     (fault,) = other_interpretations(
-        with_measured(campaign, session=session, position=position)
+        replace_measured_columns(campaign, session=session, position=position)
     )
     # That of the session that stands farther off.
     assert (
@@ -184,7 +203,7 @@ def known_targets(fanuc, factor=1.0, which=slice(None)):
     )
     chain = replace(fanuc.chain, points=points)
     rng = np.random.default_rng(4)
-    plain = made(fanuc, 1, Plan(poses=14))
+    plain = make_campaign(fanuc, 1, Plan(poses=14))
     position = np.empty_like(plain.measurements.position)
     for number, point in enumerate(chain.points):
         mask = plain.measurements.target == number
@@ -236,7 +255,7 @@ def test_a_last_link_that_is_a_little_longer_than_its_file_is_left_to_physics(
         fanuc,
         chain=replace(fanuc.chain, transforms=(*fanuc.chain.transforms[:-1], last)),
     )
-    campaign = made(fanuc, 1, Plan(poses=14, oriented=False), longer)
+    campaign = make_campaign(fanuc, 1, Plan(poses=14, oriented=False), longer)
     assert [
         fault.name for fault in other_interpretations(of_the_end(campaign))
     ] == names
@@ -246,8 +265,8 @@ def test_a_last_link_that_is_a_little_longer_than_its_file_is_left_to_physics(
     ("shift", "names"), [(0.0, []), (0.004, []), (0.03, []), (0.06, ["wrong_frame"])]
 )
 def test_a_base_that_stands_a_little_off_is_left_to_physics(fanuc, shift, names):
-    campaign = made(fanuc, 1, Plan(poses=14))
-    moved = with_measured(
+    campaign = make_campaign(fanuc, 1, Plan(poses=14))
+    moved = replace_measured_columns(
         campaign, position=campaign.measurements.position + np.array([0.0, 0.0, shift])
     )
     assert [fault.name for fault in other_interpretations(moved)] == names
@@ -256,13 +275,13 @@ def test_a_base_that_stands_a_little_off_is_left_to_physics(fanuc, shift, names)
 def test_what_fits_as_well_is_listed_as_an_alternative(fanuc):
     """In a frame that nobody knows, axes and rotation vectors exchanged together are
     mirrored in one way or another."""
-    campaign = made(fanuc, 1, Plan(poses=14, tracker=True))
+    campaign = make_campaign(fanuc, 1, Plan(poses=14, tracker=True))
     seen = campaign.measurements
     exchanged = {
         name: getattr(seen, name)[:, [1, 0, 2]]
         for name in ("position", "rotation_vector")
     }
-    (fault,) = other_interpretations(with_measured(campaign, **exchanged))
+    (fault,) = other_interpretations(replace_measured_columns(campaign, **exchanged))
     assert fault.name == "swapped_axes" and len(fault.alternatives) >= 3
     assert all("rotation vectors likewise" in words for words in fault.alternatives)
 
@@ -271,7 +290,7 @@ def test_measurements_of_nothing_are_mended_by_nothing(campaign):
     rng = np.random.default_rng(5)
     assert (
         other_interpretations(
-            with_measured(
+            replace_measured_columns(
                 campaign,
                 position=rng.normal(0.0, 1.0, campaign.measurements.position.shape),
             )
@@ -283,13 +302,17 @@ def test_measurements_of_nothing_are_mended_by_nothing(campaign):
 def test_a_robot_that_hardly_moves_is_not_fitted_by_gathering_measurements_in_one_place(
     fanuc,
 ):
-    campaign = made(fanuc, 1, Plan(poses=8, loads=1, tracker=True, oriented=False))
+    campaign = make_campaign(
+        fanuc, 1, Plan(poses=8, loads=1, tracker=True, oriented=False)
+    )
     angles = 0.3 + 1e-3 * np.random.default_rng(2).normal(size=(8, 6))
     position = np.random.default_rng(3).normal(0.0, 1.0, (8, 3))
     pose = campaign.measurements.pose
     assert (
         other_interpretations(
-            with_measured(campaign, joint_angles=angles[pose], position=position[pose])
+            replace_measured_columns(
+                campaign, joint_angles=angles[pose], position=position[pose]
+            )
         )
         == []
     )
@@ -299,7 +322,7 @@ def test_a_robot_that_hardly_moves_is_not_fitted_by_gathering_measurements_in_on
 def test_a_mount_that_is_turned_otherwise_is_named_with_the_remedy_and_fitted_only_where_that_is_stated(
     fanuc, degrees, moved_m
 ):
-    campaign = made(fanuc, 1, Plan(poses=14))
+    campaign = make_campaign(fanuc, 1, Plan(poses=14))
     turn = Rotation.from_rotvec(
         [0.0, 0.6 * np.radians(degrees), 0.8 * np.radians(degrees)]
     )
@@ -323,7 +346,7 @@ def test_a_mount_that_is_turned_otherwise_is_named_with_the_remedy_and_fitted_on
 
 
 def test_what_is_simple_comes_first_and_no_each_is_there_twice(fanuc):
-    campaign = made(fanuc, 1, Plan(poses=10))
+    campaign = make_campaign(fanuc, 1, Plan(poses=10))
     single = [*discrete(campaign), *shifts(campaign)]
     assert single[0].joints == (1,)
     details = [each.detail for each in single]
@@ -348,7 +371,7 @@ def test_what_is_simple_comes_first_and_no_each_is_there_twice(fanuc):
 def test_measured_columns_of_each_target_or_pose_moved_by_one_are_named(
     fanuc, kind, keys, steps
 ):
-    campaign = made(fanuc, 1, Plan(poses=14, loads=1))
+    campaign = make_campaign(fanuc, 1, Plan(poses=14, loads=1))
     measurements = campaign.measurements
     source = np.arange(14 * 8)
     groups = np.unique(
@@ -361,7 +384,7 @@ def test_measured_columns_of_each_target_or_pose_moved_by_one_are_named(
         source[members] = np.roll(members, steps)
     turned = measurements.rotation_vector[source]
     (fault,) = other_interpretations(
-        with_measured(
+        replace_measured_columns(
             campaign, position=measurements.position[source], rotation_vector=turned
         )
     )

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_campaigns import POINTS, Plan, made, with_measured
+from made_campaigns import POINTS, Plan, make_campaign, replace_measured_columns
 from scipy.spatial.transform import Rotation
 from support import PinocchioPoint
 
@@ -17,7 +17,7 @@ EXACT = Plan(poses=12, loads=1, noise=0.0, force=0.0)
 @pytest.fixture(scope="module", params=["base", "tracker"])
 def exact(request, fanuc):
     """Without loads and without noise."""
-    return made(fanuc, 1, replace(EXACT, tracker=request.param == "tracker"))
+    return make_campaign(fanuc, 1, replace(EXACT, tracker=request.param == "tracker"))
 
 
 @pytest.mark.parametrize("place", [placed, robustly_placed])
@@ -28,7 +28,7 @@ def test_measurements_of_the_nominal_robot_lie_where_it_puts_them(exact, place):
 
 
 def test_known_targets_are_predicted_by_pinocchio(fanuc):
-    campaign = made(fanuc, 1, replace(EXACT, noise=1e-3))
+    campaign = make_campaign(fanuc, 1, replace(EXACT, noise=1e-3))
     moved = tuple(
         replace(target, offset_m=(0.1, -0.2, 0.05 * k))
         for k, target in enumerate(campaign.targets)
@@ -55,12 +55,12 @@ def test_known_targets_are_predicted_by_pinocchio(fanuc):
 def test_one_measurement_in_four_far_off_moves_the_robust_fit_by_nothing_and_the_other_one_by_much(
     fanuc,
 ):
-    campaign = made(fanuc, 1, replace(EXACT, tracker=True, poses=16))
+    campaign = make_campaign(fanuc, 1, replace(EXACT, tracker=True, poses=16))
     rng = np.random.default_rng(2)
     position = campaign.measurements.position.copy()
     far = rng.random(len(position)) < 0.25
     position[far] += [0.3, 0.0, 0.0]
-    campaign = with_measured(campaign, position=position)
+    campaign = replace_measured_columns(campaign, position=position)
     robust = robustly_placed(campaign)
     np.testing.assert_allclose(robust.distance[far], 0.3, rtol=1e-6)
     np.testing.assert_allclose(robust.distance[~far], 0.0, atol=1e-6)
@@ -70,16 +70,16 @@ def test_one_measurement_in_four_far_off_moves_the_robust_fit_by_nothing_and_the
 def test_the_robust_fit_of_normal_errors_is_the_fit_to_all_and_single_rows_are_no_misfit(
     fanuc,
 ):
-    campaign = made(fanuc, 1, Plan(poses=12, loads=0, tracker=True))
+    campaign = make_campaign(fanuc, 1, Plan(poses=12, loads=0, tracker=True))
     np.testing.assert_array_equal(
         robustly_placed(campaign).estimate.frame_position,
         placed(campaign).estimate.frame_position,
     )
-    exact = made(fanuc, 1, EXACT)
+    exact = make_campaign(fanuc, 1, EXACT)
     one = np.where(exact.measurements.pose[:, None] == 3, 0.3, 0.0)
     assert (
         placed(
-            with_measured(exact, position=exact.measurements.position + one)
+            replace_measured_columns(exact, position=exact.measurements.position + one)
         ).misfit.max()
         < 1e-6
     )
@@ -91,7 +91,7 @@ def test_the_robust_fit_of_normal_errors_is_the_fit_to_all_and_single_rows_are_n
 def test_poses_are_spread_over_the_campaign_at_their_lowest_load_and_first_repeat(
     fanuc, wanted, poses
 ):
-    campaign = made(fanuc, 1, Plan(poses=12, loads=2, repeats=2))
+    campaign = make_campaign(fanuc, 1, Plan(poses=12, loads=2, repeats=2))
     some = campaign.measurements.select(campaign.measurements.load > 0)
     order = np.random.default_rng(5).permutation(len(some))
     found = spread(

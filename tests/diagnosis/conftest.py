@@ -1,7 +1,7 @@
 """Fixtures: a robot that stands off, and its diagnosis."""
 
 import pytest
-from made_folders import made_folder, made_table
+from made_folders import make_folder, make_table
 
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.settings import Settings
@@ -13,7 +13,7 @@ def cases(kuka, config_folder, tmp_path_factory):
     """Training and held-out part of a robot whose joint 3 stands 1 mrad beyond what it
     reports, which is not declared."""
     folder = tmp_path_factory.mktemp("cases") / "made"
-    made_folder(folder, kuka, table=made_table(kuka, "made", offset_of_joint_3=1e-3))
+    make_folder(folder, kuka, table=make_table(kuka, "made", offset_of_joint_3=1e-3))
     return cases_in(folder, config_folder / "robots")
 
 

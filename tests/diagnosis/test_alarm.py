@@ -6,25 +6,25 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from made_problems import made_problem, made_rows, made_unit
+from made_problems import make_problem, make_rows, make_term
 
 from elastocal.diagnosis.alarm import run_alarm_test
 from elastocal.diagnosis.evidence import evaluate_model, log_sum_exp
 from elastocal.diagnosis.hypotheses import OTHER
 
 TERMS = (
-    made_unit("offset", (1,), 0),
-    made_unit("offset", (2,), 1),
-    made_unit("tilt", (1,), [2, 3], signs=1),
-    made_unit(OTHER, (1,), [4, 5, 6]),
+    make_term("offset", (1,), 0),
+    make_term("offset", (2,), 1),
+    make_term("tilt", (1,), [2, 3], signs=1),
+    make_term(OTHER, (1,), [4, 5, 6]),
 )
 
 
 def problem_with_tilt(size):
     """A problem whose tilt has both coefficients of a given size, and its products."""
-    rows = made_rows(5, candidates=8)
+    rows = make_rows(5, candidates=8)
     signal = size * rows.candidates[:, 2:4] @ [1.0, 1.0]
-    return made_problem(replace(rows, residual=rows.residual + signal), TERMS)
+    return make_problem(replace(rows, residual=rows.residual + signal), TERMS)
 
 
 def test_statistic_rises_and_p_value_falls_with_the_size_of_the_missing_effect():
@@ -98,12 +98,12 @@ def test_a_mechanism_also_counts_as_a_whole_with_one_variant_at_all_its_location
     two_slopes = SimpleNamespace(detail="two slopes")
     half = np.log(0.5)
     terms = (
-        made_unit("stiffening", (1,), 0, candidate=plain, smallest=1, log_prior=half),
-        made_unit("stiffening", (2,), [1, 2], candidate=plain, log_prior=half),
-        made_unit("stiffening", (1,), 3, candidate=two_slopes),
-        made_unit("payload", (), 4, candidate=plain),
+        make_term("stiffening", (1,), 0, candidate=plain, smallest=1, log_prior=half),
+        make_term("stiffening", (2,), [1, 2], candidate=plain, log_prior=half),
+        make_term("stiffening", (1,), 3, candidate=two_slopes),
+        make_term("payload", (), 4, candidate=plain),
     )
-    problem, products = made_problem(made_rows(5, candidates=8), terms)
+    problem, products = make_problem(make_rows(5, candidates=8), terms)
     alarm = run_alarm_test(problem, products, 0.0, np.random.default_rng(7))
     whole = replace(
         terms[0],

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from analysed_robots import ROBOTS, analysed
-from made_folders import PLAN, made_folder, made_table
+from made_folders import PLAN, make_folder, make_table
 
 from elastocal.application.calibrated import compute_nominal_poses
 from elastocal.campaigns.writing import write_campaign
@@ -160,7 +160,7 @@ def imported(folder, table, lost):
         folder / "table.csv", ImportOptions(target="6DoF"), robot
     )
     target = {"6DoF": {"point": "6DoF", "offset_m": [0, 0, 0]}}
-    return made_folder(
+    return make_folder(
         folder, robot, table=found.table, targets=target, compliance="nominal"
     )
 
@@ -189,7 +189,7 @@ def assert_a_lost_held_out_row_changes_nothing(folder, number, whole):
         repeats=1,
         repeated_poses=0,
     )
-    table = made_table(analysed("kuka"), "made", number, plan, 3e-4 * (number % 5))
+    table = make_table(analysed("kuka"), "made", number, plan, 3e-4 * (number % 5))
     order = np.lexsort([table["load"], table["pose"]])
     table = {name: column[order] for name, column in table.items()}
     clean = imported(folder / "clean", table, [])

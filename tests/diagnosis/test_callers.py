@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from loop_scripts import ANALYSIS, Files, run_loop
-from made_folders import PLAN, made_folder, made_table
+from made_folders import PLAN, make_folder, make_table
 
 from elastocal.loop.diagnosis_tables import candidate_rows
 from elastocal.loop.whole import diagnosed
@@ -24,8 +24,8 @@ def both(kuka, tmp_path_factory):
     that the seed is seen in the alarm."""
     found = {}
     for kind, offset in (("named", 1e-3), ("adequate", 0.0)):
-        table = made_table(kuka, "made", plan=PLAN, offset_of_joint_3=offset)
-        folder = made_folder(tmp_path_factory.mktemp(kind) / "made", kuka, table=table)
+        table = make_table(kuka, "made", plan=PLAN, offset_of_joint_3=offset)
+        folder = make_folder(tmp_path_factory.mktemp(kind) / "made", kuka, table=table)
         verdict = as_json(diagnosed(folder.as_posix(), ROBOTS.as_posix(), SEED))
         assert verdict["verdict"] == kind
         found[kind] = folder, verdict

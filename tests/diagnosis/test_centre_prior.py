@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from planted import two_loads_a_pose
-from synthetic import NOISE, made_estimate, made_model, seen_exactly, with_noise
+from synthetic import NOISE, add_noise, make_estimate, make_model, observe_exactly
 
 from elastocal.campaigns.campaign import Target
 from elastocal.diagnosis.centre_prior import choose_centre_prior
@@ -30,7 +30,7 @@ TARGETS = (
 def fitted_subset(robot, deviation=0.0, payload_kg=0.0):
     """Measurements with two loads a pose of a robot whose first moments deviate by some
     standard deviations of the wide prior, fitted with that prior."""
-    model = made_model(
+    model = make_model(
         robot,
         TARGETS,
         fitted_frames=False,
@@ -44,12 +44,12 @@ def fitted_subset(robot, deviation=0.0, payload_kg=0.0):
         if parameter.name.startswith("moment"):
             moments[index] = deviation * parameter.prior_std * (-1) ** index
     truth = replace(
-        made_estimate(model, size=0.0).with_effects([payload]),
+        make_estimate(model, size=0.0).with_effects([payload]),
         coefficients=(robot.compliance, moments, np.array([payload_kg])),
     )
     states = two_loads_a_pose(6, 30, 5)
-    exact = seen_exactly(model.with_effects([payload]), truth, states)
-    observations = with_noise(exact, np.random.default_rng(6))
+    exact = observe_exactly(model.with_effects([payload]), truth, states)
+    observations = add_noise(exact, np.random.default_rng(6))
     noise = replace(NOISE, joint_rad=np.zeros(6))
     return FittedSubset(
         Case(None, observations, model, candidates),

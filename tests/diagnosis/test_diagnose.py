@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_folders import PLAN, made_folder, made_table
+from made_folders import PLAN, make_folder, make_table
 
 from elastocal.data_checks.protocol import Fault
 from elastocal.diagnosis import diagnose as module
@@ -26,7 +26,7 @@ def diagnosed(kuka, config_folder, tmp_path_factory):
     found = {}
     for declared_m in (6e-5, 1e-6):
         folder = tmp_path_factory.mktemp("noise") / "made"
-        table = made_table(kuka, "made", plan=PLAN, offset_of_joint_3=OFFSET)
+        table = make_table(kuka, "made", plan=PLAN, offset_of_joint_3=OFFSET)
         first = [repeat == 0 for repeat in table["repeat"]]
         table = {
             name: [value for value, kept in zip(values, first, strict=True) if kept]
@@ -34,7 +34,7 @@ def diagnosed(kuka, config_folder, tmp_path_factory):
         }
         changes = {"noise": {"position_m": declared_m}, "declared": ["link_geometry"]}
         case, _ = cases_in(
-            made_folder(folder, kuka, table=table, **changes), config_folder / "robots"
+            make_folder(folder, kuka, table=table, **changes), config_folder / "robots"
         )
         found[declared_m] = diagnose(case, Settings(), 1)
     return found
@@ -43,9 +43,9 @@ def diagnosed(kuka, config_folder, tmp_path_factory):
 def test_a_model_that_is_kept_without_what_was_found_has_the_noise_that_it_leaves(
     kuka, config_folder, tmp_path
 ):
-    table = made_table(kuka, "made", plan=PLAN, offset_of_joint_3=OFFSET)
+    table = make_table(kuka, "made", plan=PLAN, offset_of_joint_3=OFFSET)
     case, _ = cases_in(
-        made_folder(tmp_path / "made", kuka, table=table, declared=[]),
+        make_folder(tmp_path / "made", kuka, table=table, declared=[]),
         config_folder / "robots",
     )
     kept = diagnose(case, Settings(useful=1e9), 1)
@@ -90,7 +90,7 @@ def test_an_error_that_all_measurements_of_a_pose_share_is_noise_of_the_model_an
 ):
     """Joints that stand otherwise in each pose than they report, by the same in all of
     its measurements."""
-    table = made_table(kuka, "made", plan=replace(PLAN, poses=40))
+    table = make_table(kuka, "made", plan=replace(PLAN, poses=40))
     drawn = error_rad * np.random.default_rng(3).standard_normal(
         (max(table["pose"]) + 1, 6)
     )
@@ -99,7 +99,7 @@ def test_an_error_that_all_measurements_of_a_pose_share_is_noise_of_the_model_an
         for joint in range(1, 7)
     }
     case, _ = cases_in(
-        made_folder(tmp_path / "made", kuka, table=table), config_folder / "robots"
+        make_folder(tmp_path / "made", kuka, table=table), config_folder / "robots"
     )
     found = diagnose(case, Settings(), 1)
     said = [line for line in found.document["warnings"] if "err together" in line]
@@ -159,8 +159,8 @@ def test_measurements_at_fault_end_the_diagnosis_at_the_declared_model(
 def test_frames_alone_are_kept_where_they_predict_left_out_poses_better(
     kuka, config_folder, tmp_path, monkeypatch
 ):
-    table = made_table(kuka, "made", offset_of_joint_3=OFFSET)
-    folder = made_folder(
+    table = make_table(kuka, "made", offset_of_joint_3=OFFSET)
+    folder = make_folder(
         tmp_path / "made", kuka, table=table, declared=["link_geometry"]
     )
     case, held_out = cases_in(folder, config_folder / "robots")

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from support import SEVEN_JOINTS, robot_of
-from synthetic import conditions_on, made_states
+from synthetic import conditions_on, make_states
 
 from elastocal.diagnosis.discrepancy import (
     BASE_M,
@@ -43,7 +43,7 @@ EVERY_DISCREPANCY = pytest.mark.parametrize(("joint", "name"), DISCREPANCIES)
 
 
 def conditions_of_seven_joints(count=60, force=500.0):
-    states = made_states(7, count, seed=1, force=force)
+    states = make_states(7, count, seed=1, force=force)
     return conditions_on(robot_of(SEVEN_JOINTS), states)
 
 

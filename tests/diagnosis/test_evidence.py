@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_problems import made_rows, made_unit
+from made_problems import make_rows, make_term
 from scipy.integrate import dblquad, quad
 from scipy.optimize import minimize_scalar
 from scipy.special import logsumexp
@@ -28,15 +28,15 @@ LOG_POSE = compute_pose_error_log_prior(TAU, SETTINGS)
 # densities are normal.
 QUIET = 0.5
 TERMS = (
-    made_unit("a", (1,), [0, 1]),
-    made_unit("b", (1,), 2),
-    made_unit("c", (1,), [3, 4, 5]),
+    make_term("a", (1,), [0, 1]),
+    make_term("b", (1,), 2),
+    make_term("c", (1,), [3, 4, 5]),
 )
 
 
 def quiet_rows(seed, signal=()):
     """Rows with less noise than declared, and a signal of some candidates."""
-    rows = made_rows(seed, poses=12)
+    rows = make_rows(seed, poses=12)
     signal = np.array([*signal, *np.zeros(rows.candidates.shape[1] - len(signal))])
     noise = QUIET * (rows.residual - rows.expected)
     return replace(rows, residual=rows.expected + noise + rows.candidates @ signal)
@@ -158,7 +158,7 @@ def test_half_normal_priors_are_exact_for_one_coefficient_and_independent_for_tw
     coefficients with a correlation of 0.2 that is right to 0.05 nats."""
     rows = quiet_rows(12, size * np.bincount(columns, signs, 6))
     scale = 0.3 if len(columns) == 1 else 0.1
-    term = replace(made_unit("b", (1,), columns), signs=np.array(signs))
+    term = replace(make_term("b", (1,), columns), signs=np.array(signs))
     statistics = compute_statistics(rows.products, [0.3])
     grid = grid_of_one(scale)
     with_term = evaluate_model(statistics, [term], grid, np.zeros(1), [scale])

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bad_rows import damaged
-from made_folders import PLAN, made_folder, made_table
+from made_folders import PLAN, make_folder, make_table
 
 from elastocal.diagnosis.fitted_subset import fit_subset, select_initial_subset
 from elastocal.diagnosis.settings import Settings
@@ -76,8 +76,8 @@ def test_rows_with_wrong_loads_that_pull_the_fit_are_left_out_together(case, fac
 def test_an_outlying_repeat_that_no_average_contains_is_left_out(
     kuka, config_folder, tmp_path
 ):
-    table = made_table(kuka, "made", plan=replace(PLAN, repeats=3, repeated_poses=4))
-    folder = made_folder(tmp_path / "made", kuka, table=table)
+    table = make_table(kuka, "made", plan=replace(PLAN, repeats=3, repeated_poses=4))
+    folder = make_folder(tmp_path / "made", kuka, table=table)
     case, _ = cases_in(folder, config_folder / "robots")
     measurements = case.campaign.measurements
     states = list(

@@ -4,7 +4,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from made_problems import made_unit
+from made_problems import make_term
 from support import UR10, robot_of
 from synthetic import equipped
 
@@ -17,13 +17,13 @@ SETTINGS = Settings()
 THIRD = float(np.log(1 / 3))
 # A mechanism at three locations, one of which has three variants.
 TERMS = (
-    made_unit("harmonic", (1,), 0),
-    made_unit("harmonic", (2,), 1),
-    *(made_unit("harmonic", (3,), column, log_prior=THIRD) for column in (2, 3, 4)),
+    make_term("harmonic", (1,), 0),
+    make_term("harmonic", (2,), 1),
+    *(make_term("harmonic", (3,), column, log_prior=THIRD) for column in (2, 3, 4)),
 )
 DISCREPANCIES = (
-    made_unit(OTHER, (1,), 5),
-    made_unit(OTHER, (1,), 6, law=NEIGHBOURS),
+    make_term(OTHER, (1,), 5),
+    make_term(OTHER, (1,), 6, law=NEIGHBOURS),
 )
 PRIOR = build_model_prior([*TERMS, *DISCREPANCIES], SETTINGS)
 

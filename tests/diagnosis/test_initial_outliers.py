@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bad_rows import damaged
-from made_folders import PLAN, made_folder, made_table
+from made_folders import PLAN, make_folder, make_table
 
 from elastocal.diagnosis.fitted_subset import select_initial_subset
 from elastocal.diagnosis.settings import Settings
@@ -31,12 +31,12 @@ def test_bad_rows_are_found_although_the_model_lacks_an_effect(cases, shifts_m):
 def test_an_error_that_the_measurements_of_a_pose_share_makes_no_gross_errors(
     error_rad, kuka, config_folder, tmp_path
 ):
-    table = made_table(kuka, "made", plan=replace(PLAN, poses=40))
+    table = make_table(kuka, "made", plan=replace(PLAN, poses=40))
     poses = max(table["pose"]) + 1
     joint_error = error_rad * np.random.default_rng(0).standard_normal((poses, 6))
     for joint in range(1, 7):
         error = joint_error[table["pose"], joint - 1]
         table[f"q{joint}"] = table[f"q{joint}"] + error
-    folder = made_folder(tmp_path / "made", kuka, table=table)
+    folder = make_folder(tmp_path / "made", kuka, table=table)
     case, _ = cases_in(folder, config_folder / "robots")
     assert select_initial_subset(case, SETTINGS).kept.all()

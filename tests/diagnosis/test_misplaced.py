@@ -4,7 +4,7 @@ a robot with inexact geometry."""
 import numpy as np
 import pytest
 from analysed_robots import ROBOTS, analysed
-from made_folders import made_folder
+from made_folders import make_folder
 from scipy.spatial.transform import Rotation
 
 from elastocal.diagnosis.misplaced import (
@@ -70,7 +70,7 @@ def misdeclared_folder(folder, robot, name, place, shift_m, seed=1):
     table |= {f"q{joint}": column for joint, column in enumerate(reported, 1)}
     table |= dict(zip("xyz", position.T, strict=True))
     table |= dict(zip(("rx", "ry", "rz"), measured_turn.T, strict=True))
-    return made_folder(
+    return make_folder(
         folder,
         robot,
         table=table,

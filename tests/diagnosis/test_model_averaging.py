@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from made_problems import made_problem, made_rows, made_unit
+from made_problems import make_problem, make_rows, make_term
 from scipy.optimize import minimize
 
 from elastocal.diagnosis.evidence import ModelDensity
@@ -35,9 +35,9 @@ def candidate(key, count):
 
 
 UNITS = (
-    made_unit("a", (1,), [0, 1], candidate=candidate("a", 2)),
-    made_unit("b", (1,), 2, candidate=candidate("b", 1)),
-    made_unit("other", (1,), [3, 4]),
+    make_term("a", (1,), [0, 1], candidate=candidate("a", 2)),
+    make_term("b", (1,), 2, candidate=candidate("b", 1)),
+    make_term("other", (1,), [3, 4]),
 )
 
 
@@ -45,7 +45,7 @@ UNITS = (
 def made():
     """Quiet rows with something of each unit in them, so that the size of the noise is
     at its floor, and their problem."""
-    rows = made_rows(1, poses=12)
+    rows = make_rows(1, poses=12)
     noise = 0.5 * (rows.residual - rows.expected)
     rows = replace(
         rows,
@@ -53,7 +53,7 @@ def made():
         + noise
         + rows.candidates @ [0.2, -0.1, 0.2, 0.1, 0.0, 0.0],
     )
-    problem, products = made_problem(rows, UNITS, tau=TAU)
+    problem, products = make_problem(rows, UNITS, tau=TAU)
     return rows, SimpleNamespace(problem=problem, products=products)
 
 
@@ -249,7 +249,7 @@ def test_squares_beyond_the_others_are_what_is_left_where_the_others_fit_them_wi
     """As the least penalised sum of squares, found by a search, and all of them where
     nothing else is in the model."""
     rows, _ = made
-    problem, _ = made_problem(rows, UNITS, tau=TAU)
+    problem, _ = make_problem(rows, UNITS, tau=TAU)
     model = ScoredModel((0, 2), 0.0, np.array([0.3, 0.1]), 0.0)
     coefficients = most_probable(rows, problem, model)
     gram = projected_gram(rows)

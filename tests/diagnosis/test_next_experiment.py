@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from made_problems import made_problem, made_rows, made_unit
+from made_problems import make_problem, make_rows, make_term
 from planted import planted, two_loads_a_pose
 
 from elastocal.diagnosis.alarm import Alarm
@@ -230,9 +230,9 @@ def test_experiments_have_the_loads_of_the_campaign_scaled_up_to_the_payload(kuk
 
 
 TERMS = (
-    made_unit("offset", (1,), 0),
-    made_unit("tilt", (1,), [2, 3]),
-    made_unit("sag", (2,), [4, 5]),
+    make_term("offset", (1,), 0),
+    make_term("tilt", (1,), [2, 3]),
+    make_term("sag", (2,), [4, 5]),
 )
 # Columns of the terms; column 1 of the statistics belongs to none.
 COLUMNS = np.array([0, 2, 3, 4, 5])
@@ -245,8 +245,8 @@ def test_posteriors_are_those_of_dense_generalized_least_squares(factor):
 
     A larger noise widens every standard deviation and leaves the means.
     """
-    rows = made_rows(1, prior=0.5)
-    problem, products = made_problem(rows, TERMS, tau=np.array([0.0, 0.4]))
+    rows = make_rows(1, prior=0.5)
+    problem, products = make_problem(rows, TERMS, tau=np.array([0.0, 0.4]))
     models = [
         ScoredModel((0, 2), 0.5, np.array([0.5, 2.0]), 0.4),
         ScoredModel((1,), 1.0, np.array([1.5]), 0.0),

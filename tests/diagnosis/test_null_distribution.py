@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from made_problems import made_rows
+from made_problems import make_rows
 
 from elastocal.diagnosis import statistics
 from elastocal.diagnosis.null_distribution import simulate_null_statistics
@@ -49,7 +49,7 @@ def test_null_draws_have_the_moments_of_simulated_measurements(
     """W'My has covariance W'M Sigma M'W; y'My has mean tr(M Sigma) and variance 2 tr(M
     Sigma M Sigma)."""
     monkeypatch.setattr(statistics, "_AT_ONCE", at_once)
-    rows = made_rows(9, **CASES[case])
+    rows = make_rows(9, **CASES[case])
     scores, all_squares = simulate_null_statistics(
         rows.products, tau, TAU, DRAWS, np.random.default_rng(10)
     )

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from made_problems import made_problem, made_rows, made_unit
+from made_problems import make_problem, make_rows, make_term
 
 from elastocal.diagnosis.discrepancy import NEIGHBOURS
 from elastocal.diagnosis.evidence import evaluate_model, log_sum_exp
@@ -18,13 +18,13 @@ TAU = [0.0, 0.3, 0.9]
 # Two mechanisms at three and two locations, one of them with two variants at one
 # location, and a discrepancy.
 TERMS = (
-    made_unit("offset", (1,), 0),
-    made_unit("offset", (2,), 1),
-    made_unit("offset", (3,), 2),
-    made_unit("tilt", (1,), [3, 4]),
-    made_unit("tilt", (2,), 5, log_prior=np.log(0.5)),
-    made_unit("tilt", (2,), 6, log_prior=np.log(0.5)),
-    made_unit(OTHER, (1,), [7, 8, 9]),
+    make_term("offset", (1,), 0),
+    make_term("offset", (2,), 1),
+    make_term("offset", (3,), 2),
+    make_term("tilt", (1,), [3, 4]),
+    make_term("tilt", (2,), 5, log_prior=np.log(0.5)),
+    make_term("tilt", (2,), 6, log_prior=np.log(0.5)),
+    make_term(OTHER, (1,), [7, 8, 9]),
 )
 SIGNALS = {
     "nothing": {},
@@ -36,12 +36,12 @@ SIGNALS = {
 
 
 def problem_with_signal(name, seed=0):
-    rows = made_rows(seed, poses=14, candidates=10)
+    rows = make_rows(seed, poses=14, candidates=10)
     signal = sum(
         size * rows.candidates[:, column] for column, size in SIGNALS[name].items()
     )
     rows = replace(rows, residual=rows.residual + signal)
-    problem, _ = made_problem(rows, TERMS, tau=TAU)
+    problem, _ = make_problem(rows, TERMS, tau=TAU)
     return problem
 
 
@@ -51,14 +51,14 @@ def problem_with_cancelling_columns(size, terms):
 
     Its search extends only the best model, and only once.
     """
-    rows = made_rows(3, poses=14, candidates=6)
+    rows = make_rows(3, poses=14, candidates=6)
     common = 30 * np.random.default_rng(4).standard_normal(len(rows.pose))
     candidates = rows.candidates.copy()
     candidates[:, :3] += np.outer(common, [1, 1, -2])
     signal = size * candidates[:, :3].sum(axis=1)
     rows = replace(rows, candidates=candidates, residual=rows.residual + signal)
     settings = replace(Settings(), beam=1, patience=1)
-    problem, _ = made_problem(rows, terms, settings, TAU)
+    problem, _ = make_problem(rows, terms, settings, TAU)
     return problem
 
 
@@ -103,24 +103,24 @@ def test_posterior_is_that_of_all_models(signal, seed):
 
 
 def test_discrepancies_of_different_causes_at_one_location_join_in_one_model():
-    rows = made_rows(poses=14)
+    rows = make_rows(poses=14)
     terms = (
-        made_unit(OTHER, (1,), [0, 1]),
-        made_unit(OTHER, (1,), [2, 3], law=NEIGHBOURS),
+        make_term(OTHER, (1,), [0, 1]),
+        make_term(OTHER, (1,), [2, 3], law=NEIGHBOURS),
     )
     signal = 0.8 * rows.candidates[:, :4].sum(axis=1)
     rows = replace(rows, residual=rows.residual + signal)
-    problem, _ = made_problem(rows, terms, tau=TAU)
+    problem, _ = make_problem(rows, terms, tau=TAU)
     assert search_models(problem).models[0].term_indices == (0, 1)
 
 
 def test_a_search_finds_a_good_model_that_it_is_told_even_if_no_step_leads_there():
     """The model has three mechanisms, of which no single one shows, nor any two."""
     terms = [
-        made_unit(name, (1,), column, candidate=SimpleNamespace(key=name))
+        make_term(name, (1,), column, candidate=SimpleNamespace(key=name))
         for column, name in enumerate("abc")
     ]
-    terms += [made_unit("d", (1,), 3), made_unit("e", (1,), 4)]
+    terms += [make_term("d", (1,), 3), make_term("e", (1,), 4)]
     problem = problem_with_cancelling_columns(1.5, terms)
     best_untold = max(
         search_models(problem, keys).models[0].log_odds for keys in ((), ("a",))

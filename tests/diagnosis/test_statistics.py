@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_problems import made_rows
+from made_problems import make_rows
 
 from elastocal.diagnosis import statistics
 from elastocal.diagnosis.statistics import (
@@ -57,7 +57,7 @@ def test_statistics_are_those_of_dense_generalized_least_squares(
     error is dense or in factors."""
     monkeypatch.setattr(statistics, "_AT_ONCE", at_once)
     monkeypatch.setattr(statistics, "_COLUMNS_A_ROW", columns_a_row)
-    rows = made_rows(1, **CASES[case])
+    rows = make_rows(1, **CASES[case])
     computed = compute_statistics(rows.products, TAU)
     gram, score, squares, log_likelihood = dense_statistics(rows)
     columns = np.arange(gram.shape[1])
@@ -83,7 +83,7 @@ def test_normal_equations_need_no_rows_at_a_pose_error_that_was_met(
 ):
     """They are the same as those that are computed from the rows."""
     monkeypatch.setattr(statistics, "_COLUMNS_A_ROW", columns_a_row)
-    rows = made_rows(1)
+    rows = make_rows(1)
     columns = np.array([0, 2, 3])
     products = rows.products
     compute_statistics(products, TAU)
@@ -107,7 +107,7 @@ def badly_scaled_rows():
     """Declared columns of sizes from 1e-8 to 1e6, two of them equal to 1e-6, and
     candidates that they nearly span."""
     rng = np.random.default_rng(4)
-    rows = made_rows(4, declared=4, candidates=3)
+    rows = make_rows(4, declared=4, candidates=3)
     X = rows.declared.copy()
     X[:, 1] = X[:, 0] + 1e-6 * X[:, 1]
     outside = rng.standard_normal((len(X), 3))

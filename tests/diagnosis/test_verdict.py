@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from made_problems import made_problem, made_rows, made_unit
+from made_problems import make_problem, make_rows, make_term
 from planted import planted
 
 from elastocal.diagnosis.alarm import Alarm
@@ -36,17 +36,17 @@ SETTINGS = Settings()
 OF_THE_ROBOT = SimpleNamespace(family="geometry")
 OF_THE_SETUP = SimpleNamespace(family="drift")
 UNITS = (
-    made_unit("offset", (2,), 0, candidate=OF_THE_ROBOT),
-    made_unit("offset", (3,), 1, candidate=OF_THE_ROBOT),
-    made_unit("payload", (), 2, candidate=OF_THE_ROBOT),
-    made_unit("tilt", (2,), 3, candidate=OF_THE_ROBOT),
-    made_unit(OTHER, (1,), 4),
-    made_unit(OTHER, (2,), 5),
+    make_term("offset", (2,), 0, candidate=OF_THE_ROBOT),
+    make_term("offset", (3,), 1, candidate=OF_THE_ROBOT),
+    make_term("payload", (), 2, candidate=OF_THE_ROBOT),
+    make_term("tilt", (2,), 3, candidate=OF_THE_ROBOT),
+    make_term(OTHER, (1,), 4),
+    make_term(OTHER, (2,), 5),
 )
 OFFSET_2, OFFSET_3, PAYLOAD, TILT, OTHER_1, OTHER_2 = range(6)
-ROWS = made_rows()
+ROWS = make_rows()
 # An offset of joint 3 and a smooth error of joint 2, each of its plausible size.
-PROBLEM = made_problem(
+PROBLEM = make_problem(
     replace(
         ROWS,
         residual=ROWS.expected + ROWS.candidates[:, [OFFSET_3, OTHER_2]].sum(axis=1),
@@ -199,7 +199,7 @@ def test_a_set_up_that_holds_still_is_no_test_of_the_robot():
     problem = replace(
         PROBLEM,
         terms=(
-            made_unit("setup_step", (), 0, candidate=OF_THE_SETUP),
+            make_term("setup_step", (), 0, candidate=OF_THE_SETUP),
             *UNITS[OTHER_1:],
         ),
     )
@@ -258,13 +258,13 @@ def test_a_mechanism_whose_size_is_wrong_is_stated_with_something_related():
     )
 
 
-def with_noise(fitted, **changes):
+def add_noise(fitted, **changes):
     return replace(fitted, noise=replace(fitted.noise, **changes))
 
 
 @pytest.mark.parametrize(("factor", "count"), [(4.9, 0), (5.1, 1), (270.0, 1)])
 def test_scatter_far_beyond_the_noise_measured_is_one(fitted, factor, count):
-    left = with_noise(fitted, position_m=factor * fitted.noise.position_m)
+    left = add_noise(fitted, position_m=factor * fitted.noise.position_m)
     repeats = replace(fitted.noise, source="repeats")
     found = find_contradictions(left, repeats, SETTINGS)
     assert len(found) == count
@@ -277,7 +277,7 @@ def test_scatter_far_beyond_the_noise_measured_is_one(fitted, factor, count):
 @pytest.mark.parametrize(("pose_rad", "count"), [(4e-4, 0), (1e-3, 1)])
 def test_an_error_of_a_pose_beyond_that_of_drives_is_one(fitted, pose_rad, count):
     found = find_contradictions(
-        with_noise(fitted, pose_rad=pose_rad), fitted.noise, SETTINGS
+        add_noise(fitted, pose_rad=pose_rad), fitted.noise, SETTINGS
     )
     assert len(found) == count
     assert all("1000 µrad" in sentence for sentence in found)

@@ -14,10 +14,10 @@ from synthetic import (
     conditions_on,
     displacements,
     equipped,
-    made_estimate,
-    made_model,
-    made_states,
-    seen_exactly,
+    make_estimate,
+    make_model,
+    make_states,
+    observe_exactly,
     slopes,
     small_steps,
 )
@@ -57,8 +57,8 @@ def test_laws_that_are_fixed_are_the_same_under_other_loads_and_springs_and_at_o
     chain,
 ):
     joints = equipped(chain).joints
-    states = made_states(joints, 5, seed=1)
-    elsewhere = made_states(joints, 5, seed=2)
+    states = make_states(joints, 5, seed=1)
+    elsewhere = make_states(joints, 5, seed=2)
     one = conditions_on(chain, states)
     other = replace(
         conditions_on(chain, elsewhere, 2 * one.compliance),
@@ -152,12 +152,12 @@ def test_nest_is_no_candidate_where_the_last_joint_does_not_turn():
 
 
 def test_plausible_sizes_move_the_end_by_what_a_deviation_can(fanuc):
-    around = conditions_on(fanuc.chain, made_states(6, 30, seed=1), fanuc.compliance)
-    model = made_model(fanuc.chain)
-    states = made_states(6, 30, seed=1)
-    estimate = made_estimate(model)
+    around = conditions_on(fanuc.chain, make_states(6, 30, seed=1), fanuc.compliance)
+    model = make_model(fanuc.chain)
+    states = make_states(6, 30, seed=1)
+    estimate = make_estimate(model)
     jacobian = linearize(
-        model, estimate, seen_exactly(model, estimate, states), around
+        model, estimate, observe_exactly(model, estimate, states), around
     ).coordinate_jacobian
     for candidate in candidates_on(around.sites).values():
         made = displacements(
@@ -175,18 +175,18 @@ def test_sensitivities_of_every_candidate_are_central_differences(chain):
         Target("A", chain.end_effector.name, None),
         Target("B", chain.points[0].name, (0.1, -0.2, 0.05)),
     )
-    bare = made_model(chain, targets, rows=6)
-    states = made_states(chain.coordinates, 4, seed=2)
+    bare = make_model(chain, targets, rows=6)
+    states = make_states(chain.coordinates, 4, seed=2)
     rng = np.random.default_rng(0)
     for candidate in candidates_on(bare.sites).values():
-        model = made_model(
+        model = make_model(
             chain, targets[1:], 6, fitted_frames=False, effects=(candidate,)
         )
         if candidate.effect in ("joint_offset", "payload", "lost_motion"):
-            model = made_model(chain, targets, 6, effects=(candidate,))
-        estimate = made_estimate(model, seed=3)
+            model = make_model(chain, targets, 6, effects=(candidate,))
+        estimate = make_estimate(model, seed=3)
         around = evaluate_conditions(model, estimate, states)
-        seen = seen_exactly(model, estimate, states)
+        seen = observe_exactly(model, estimate, states)
         steps = np.diag(small_steps(model, estimate))
         # Of a long law, steps of all parameters at once.
         steps = (
@@ -201,7 +201,7 @@ def test_sensitivities_of_every_candidate_are_central_differences(chain):
 
 
 def test_effects_that_need_a_load_do_nothing_without_and_the_others_do_something(chain):
-    states = made_states(chain.coordinates, 6, seed=7)
+    states = make_states(chain.coordinates, 6, seed=7)
     states.wrench[:] = 0.0
     around = conditions_on(chain, states)
     for candidate in candidates_on(around.sites).values():
@@ -216,7 +216,7 @@ def test_effects_that_need_a_load_do_nothing_without_and_the_others_do_something
 
 
 def test_needs_are_those_covariates_that_the_displacement_reads(fanuc):
-    around = conditions_on(fanuc.chain, made_states(6, 5, seed=8))
+    around = conditions_on(fanuc.chain, make_states(6, 5, seed=8))
     for candidate in candidates_on(around.sites).values():
         for name, attribute in (
             ("approach", "approach"),
@@ -235,7 +235,7 @@ def test_needs_are_those_covariates_that_the_displacement_reads(fanuc):
 def test_laws_go_with_the_loads_of_no_other_coordinates_than_they_displace(chain):
     """What errors of masses do by way of an effect is asked for on these coordinates
     alone."""
-    around = conditions_on(chain, made_states(chain.coordinates, 6, seed=12))
+    around = conditions_on(chain, make_states(chain.coordinates, 6, seed=12))
     for candidate in candidates_on(around.sites).values():
         start = [shape.start for shape in candidate.shapes]
         laws = candidate.displacement(around, *start)
@@ -290,15 +290,15 @@ def test_adding_an_effect_is_adding_one_module(fanuc, add_module):
     before = set(list_bundled_effects())
     add_module("anything", NEW)
     assert set(list_bundled_effects()) == {*before, "sinking_foot"}
-    model = made_model(
+    model = make_model(
         fanuc.chain, (Target("A", "6DoF", (0, 0, 0)),), fitted_frames=False
     )
     candidate = candidates_on(model.sites)["sinking_foot"]
     assert declared_candidates(["sinking_foot"], model.sites)[0].key == "sinking_foot"
     sunk = model.with_effects((candidate,))
-    states = made_states(6, 3)
+    states = make_states(6, 3)
     states.wrench[:] = 0
-    estimate = made_estimate(model).with_effects((candidate,))
+    estimate = make_estimate(model).with_effects((candidate,))
     estimate.coefficients[0][:] = 0.02
     expected = poses(fanuc.chain, states.joint_angles, fanuc.chain.end_effector)[0] - [
         0,
@@ -306,7 +306,7 @@ def test_adding_an_effect_is_adding_one_module(fanuc, add_module):
         0.02,
     ]
     np.testing.assert_allclose(
-        seen_exactly(sunk, estimate, states).position, expected, atol=1e-14
+        observe_exactly(sunk, estimate, states).position, expected, atol=1e-14
     )
 
 

@@ -5,14 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic import made_states
+from synthetic import make_states
 
 from elastocal.effects.conditions import offered, progress_of
 from elastocal.mechanics.sites import sites_of
 
 
 def test_progress_counts_rows_of_the_campaign_or_else_poses():
-    states = made_states(6, 5, seed=16)
+    states = make_states(6, 5, seed=16)
     np.testing.assert_allclose(progress_of(states), np.arange(5) / 4)
     # Some of the rows of a longer campaign.
     np.testing.assert_allclose(progress_of(states, (1, 21)), np.arange(5) / 20)
@@ -27,7 +27,7 @@ def test_progress_counts_rows_of_the_campaign_or_else_poses():
 )
 def test_time_and_temperature_are_there_where_they_change(kuka, column, name):
     sites = sites_of(kuka)
-    states = made_states(6, 5, seed=1)
+    states = make_states(6, 5, seed=1)
     assert name in offered(sites, replace(states, **{column: np.arange(5.0)}))
     assert name not in offered(sites, replace(states, **{column: np.full(5, 20.0)}))
     assert name not in offered(sites, replace(states, **{column: None}))

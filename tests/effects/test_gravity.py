@@ -9,13 +9,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 from support import ODD_CHAINS, OTHER_CHAINS, PinocchioPoint, robot_of
 from synthetic import (
-    candidate_on,
     conditions_on,
     displacements,
-    made_estimate,
-    made_model,
-    made_states,
-    seen_exactly,
+    find_candidate,
+    make_estimate,
+    make_model,
+    make_states,
+    observe_exactly,
     slopes,
 )
 
@@ -76,9 +76,9 @@ def test_gravity_on_every_coordinate_where_the_robot_has_yielded_is_that_of_pino
     )
     sites = sites_of(robot)
     base = candidates_on(sites)["base_compliance"]
-    model = made_model(robot, effects=(base,))
-    estimate = made_estimate(model, seed=2, size=1.0)
-    states = made_states(robot.joints, 3, seed=3, force=300.0)
+    model = make_model(robot, effects=(base,))
+    estimate = make_estimate(model, seed=2, size=1.0)
+    states = make_states(robot.joints, 3, seed=3, force=300.0)
     around = evaluate_conditions(model, estimate, states)
     at = compute_displaced_coordinates(model, estimate, around)
     corrections = around.mass_corrections.reshape(-1, 4)
@@ -117,20 +117,20 @@ def test_masses_and_compliances_have_exact_sensitivities_with_all_that_they_load
         "payload",
         "force_misalignment[flange axes]",
     )
-    model = made_model(
+    model = make_model(
         robot,
         rows=6,
         compliance=fanuc.compliance,
         identified=identified,
         effects=[known[key] for key in keys],
     )
-    estimate = made_estimate(model, seed=4)
-    states = made_states(6, 8, seed=5)
+    estimate = make_estimate(model, seed=4)
+    states = make_states(6, 8, seed=5)
     if identified:
         estimate = replace(
             estimate, coefficients=(fanuc.compliance, *estimate.coefficients[1:])
         )
-    seen = seen_exactly(model, estimate, states)
+    seen = observe_exactly(model, estimate, states)
     around = evaluate_conditions(model, estimate, states)
     listed = list_parameters(model, estimate)
     sizes = [
@@ -235,14 +235,14 @@ def test_moments_that_are_a_hundredth_off_still_have_a_place_that_turns_with_the
 
 
 def test_a_bias_is_there_wherever_something_is_recorded_be_it_a_moment_alone(fanuc):
-    states = made_states(6, 3, seed=4)
+    states = make_states(6, 3, seed=4)
     states.wrench[:] = [
         [300.0, 20.0, 10.0, 1.0, 2.0, 3.0],
         [0, 0, 0, 0, 5.0, 0],
         [0] * 6,
     ]
     around = conditions_on(fanuc.chain, states)
-    made = displacements(candidate_on(fanuc.chain, "force_bias[base axes]"), around)[
+    made = displacements(find_candidate(fanuc.chain, "force_bias[base axes]"), around)[
         ..., :6
     ]
     for axis, turned in enumerate(made):
@@ -259,7 +259,7 @@ def test_structure_bears_the_usual_weight_where_neither_masses_nor_loads_are_kno
 ):
     """Half of each link at either end, six times the rated load in all: slopes of its
     potential energy."""
-    states = made_states(6, 4, seed=7)
+    states = make_states(6, 4, seed=7)
     states.wrench[:] = 0.0
     sites = replace(sites_of(replace(fanuc, payload_kg=100.0)), usual_weight=True)
     around = conditions_of(sites, fanuc.compliance, states)

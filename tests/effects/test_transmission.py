@@ -10,7 +10,7 @@ from synthetic import (
     conditions_on,
     displacements,
     equipped,
-    made_states,
+    make_states,
 )
 
 from elastocal.effects.catalogue import candidates_on
@@ -18,7 +18,7 @@ from elastocal.effects.catalogue import candidates_on
 
 def test_order_may_lie_anywhere_between_two_integers_and_away_from_both(fanuc):
     known = candidates_on(equipped(fanuc))
-    states = made_states(6, 5, seed=3)
+    states = make_states(6, 5, seed=3)
     bands = [
         c
         for c in known.values()

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_targets import ANGLES, RAIL, made_targets, numbers
+from made_targets import ANGLES, RAIL, make_targets, numbers
 from support import refused
 
 from elastocal.exchange.controllers import (
@@ -35,7 +35,7 @@ WHOLE = {
 
 
 def targets(name, **options):
-    text = ALL[name].program("go", made_targets(ALL[name], **options))
+    text = ALL[name].program("go", make_targets(ALL[name], **options))
     assert text.startswith(WHOLE[name][0]) and text.endswith(WHOLE[name][1])
     return re.findall(TARGET[name], text), text
 

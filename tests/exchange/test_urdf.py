@@ -6,7 +6,7 @@ import pytest
 import yaml
 from made_urdf import Pinocchio, assert_same_poses, joint, link, robot, written
 from support import refused
-from synthetic import made_states
+from synthetic import make_states
 
 from elastocal.effects.conditions import conditions_of
 from elastocal.exchange import urdf
@@ -74,7 +74,7 @@ def through_its_file(result):
 
 
 def assert_same_weight(arm, path, within=None):
-    states = made_states(arm.joints, 6, seed=3)
+    states = make_states(arm.joints, 6, seed=3)
     by_pinocchio = Pinocchio(path)
     own = conditions_of(sites_of(arm), arm.compliance, states).gravity[:, : arm.joints]
     for angles, torque in zip(states.joint_angles, own, strict=True):

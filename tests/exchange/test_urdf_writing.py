@@ -6,7 +6,7 @@ from xml.etree import ElementTree as Xml
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from made_calibrated import made_calibrated
+from made_calibrated import make_calibrated_robot
 from made_urdf import assert_same_poses, joint, link, segments, written
 from support import refused
 
@@ -52,7 +52,7 @@ def calibrated_of(robot, seed=4):
         *(f"joint_offset@{place}" for place in places),
         *(f"link_geometry@{place}" for place in places),
     ]
-    made = made_calibrated(
+    made = make_calibrated_robot(
         robot, *(key for key in keys if key in known), identified=False, seed=seed
     )
     return fold_effects(made).robot

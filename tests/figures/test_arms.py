@@ -1,5 +1,5 @@
-"""Pictures of arms: seen from the side and a little from above, with what the tables
-and the plan hold."""
+"""Pictures of arms, from the side and a little from above, show the values of their
+tables and plans."""
 
 from dataclasses import replace
 
@@ -8,7 +8,7 @@ import pytest
 from analysed_robots import analysed
 from drawn_figures import legend_entries
 from made_loop_tables import CAMPAIGNS
-from made_surveys import OPEN, made_candidates, made_survey
+from made_surveys import OPEN, make_candidates, make_survey
 
 from elastocal.application.planning.cell import Cell
 from elastocal.application.planning.plan import choose_plan
@@ -51,11 +51,13 @@ def test_each_panel_has_its_errors_and_their_rms(table):
         "0.12 mm",
     ]
     for axis, stage in zip(figure.axes, ("before", "after"), strict=True):
-        (arrows,) = [found for found in axis.collections if found.get_gid() == stage]
-        off = np.column_stack([table[f"{stage}_d{each}"] for each in "xyz"])[::3]
+        (arrows,) = [quiver for quiver in axis.collections if quiver.get_gid() == stage]
+        errors = np.column_stack(
+            [table[f"{stage}_d{component}"] for component in "xyz"]
+        )[::3]
         drawn = np.column_stack([arrows.U, arrows.V])
-        times = np.linalg.norm(drawn) / np.linalg.norm(project_view(off))
-        np.testing.assert_allclose(drawn, times * project_view(off), atol=1e-12)
+        times = np.linalg.norm(drawn) / np.linalg.norm(project_view(errors))
+        np.testing.assert_allclose(drawn, times * project_view(errors), atol=1e-12)
         assert times == pytest.approx(400)
     assert (
         "4 held-out poses" in figure.get_supxlabel()
@@ -64,8 +66,8 @@ def test_each_panel_has_its_errors_and_their_rms(table):
 
 
 def test_views_show_boxes_tracker_and_both_kinds_of_poses():
-    survey = made_survey()
-    plan = choose_plan(survey, made_candidates(survey, 300), 14, 4, 1)
+    survey = make_survey()
+    plan = choose_plan(survey, make_candidates(survey, 300), 14, 4, 1)
     cell = Cell(
         (np.array([[1.0, 2.0], [0.0, 1.0], [0.0, 1.0]]),),
         np.array([3.0, 1.0, 1.0]),
@@ -86,8 +88,8 @@ def test_views_show_boxes_tracker_and_both_kinds_of_poses():
 
 
 def test_every_pose_has_a_picture_with_its_number_and_pages_are_full():
-    survey = made_survey()
-    plan = choose_plan(survey, made_candidates(survey, 300), 55, 4, 1)
+    survey = make_survey()
+    plan = choose_plan(survey, make_candidates(survey, 300), 55, 4, 1)
     pages = draw_poses(survey.robot, plan)
     titles = [
         axis.get_title(loc="left")

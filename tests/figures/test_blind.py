@@ -95,7 +95,7 @@ def test_power_map_has_a_share_for_each_effect_and_level_and_marks_what_is_absor
     )
 
 
-def test_the_reliability_diagram_shows_shares_with_their_intervals_against_what_was_stated_and_numbers_of_cases():
+def test_the_reliability_diagram_shows_observed_against_stated_shares_and_numbers_of_cases():
     rows = [
         ("all", 0.9, 1.0, 0.97, 0.95, 0.9, 0.99, 100),
         ("all", 0.3, 0.4, 0.35, 0.25, 0.0, 0.8, 4),
@@ -119,14 +119,14 @@ def test_every_error_is_drawn_where_its_model_stands():
     rows = [
         {
             "robot": robot,
-            "part": part,
+            "part": task,
             "model": model,
             "rms_mm": 1.0 + number,
             "rms_mm_low": 0.9,
             "rms_mm_high": 6.0,
         }
         for robot in ("gp180", "kuka", "all")
-        for part in PARTS
+        for task in PARTS
         for number, model in enumerate(MODELS)
     ]
     figure = draw_correction_errors(
@@ -138,8 +138,8 @@ def test_every_error_is_drawn_where_its_model_stands():
         "milling path",
     ]
     assert legend_entries(figure) == ["Yaskawa GP180", "KUKA KR 270"]
-    words = row_labels(figure.axes[0])
-    assert words[0] == "uncorrected" and words[-1].startswith("true model")
+    labels = row_labels(figure.axes[0])
+    assert labels[0] == "uncorrected" and labels[-1].startswith("true model")
     drawn = figure.axes[0].containers[0].lines[0]
     assert drawn.get_xdata().tolist() == [1.0, 2.0, 3.0, 4.0, 5.0]
     assert (pd.Series(drawn.get_ydata()).diff().dropna() < 0).all()

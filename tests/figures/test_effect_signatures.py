@@ -17,10 +17,13 @@ def arm():
 @pytest.mark.parametrize("name", list_bundled_effects())
 def test_every_effect_of_the_catalogue_displaces_the_reflector_somewhere(name, arm):
     shown = compute_signature(name, arm)
-    moved = shown.displacement_mm.values()
-    assert all(np.isfinite(each).all() and each.shape[1] == 3 for each in moved)
-    # By more than a tracker's noise and by less than would be seen without one.
-    assert 5e-3 < max(np.abs(each).max() for each in moved) < 50
+    displacements = shown.displacement_mm.values()
+    assert all(
+        np.isfinite(displacement).all() and displacement.shape[1] == 3
+        for displacement in displacements
+    )
+    # The displacement exceeds a tracker's noise but is too small to see by eye.
+    assert 5e-3 < max(np.abs(displacement).max() for displacement in displacements) < 50
     assert shown.candidate.key in {
         candidate.key for candidate in list_candidates(name, arm)
     }

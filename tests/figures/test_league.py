@@ -3,7 +3,7 @@
 import pandas as pd
 import pytest
 from drawn_figures import legend_entries, row_labels
-from made_leagues import made_results
+from made_leagues import make_results
 
 from elastocal_proof.figures.league import draw_mechanisms, draw_method_errors
 from elastocal_proof.league.methods import Method

@@ -1,11 +1,10 @@
-"""Figures of a campaign: what is drawn is what the tables hold, and nothing is cut
-off."""
+"""Figures of a campaign show the values of their tables, and nothing is cut off."""
 
 import numpy as np
 import pandas as pd
 import pytest
 from drawn_figures import assert_nothing_cut_off, legend_entries, row_labels, texts
-from made_certificates import made_document
+from made_certificates import make_document
 from made_loop_tables import candidate_table, plainly, residual_table, step_rows
 from made_loop_tables import probabilities as stated
 from matplotlib.quiver import Quiver, QuiverKey
@@ -66,21 +65,17 @@ def quivers(axis):
 
 
 def state_means(table):
-    """Places and residuals (states, 3) in m, averaged over the repeats of each held-out
-    flag, pose, load and target."""
-    keys = np.column_stack(
-        [table[name] for name in ("held_out", "pose", "load", "target")]
-    )
+    """Positions and residuals (states, 3) in m, averaged over the repeats of each
+    held-out flag, pose, load and target."""
+    names = ("held_out", "pose", "load", "target")
+    keys = np.column_stack([table[name] for name in names])
     members = [(keys == key).all(axis=1) for key in np.unique(keys, axis=0)]
-    return (
-        np.array(
-            [
-                [table[f"{start}{axis}"][mine].mean() for axis in "xyz"]
-                for mine in members
-            ]
-        )
-        for start in ("", "before_d")
-    )
+
+    def average(columns):
+        values = np.column_stack([table[column] for column in columns])
+        return np.array([values[rows].mean(axis=0) for rows in members])
+
+    return average("xyz"), average([f"before_d{axis}" for axis in "xyz"])
 
 
 def test_arrows_begin_at_their_state_and_are_its_mean_residual_enlarged_as_the_arrow_of_the_scale():
@@ -88,7 +83,7 @@ def test_arrows_begin_at_their_state_and_are_its_mean_residual_enlarged_as_the_a
     figure = draw_residual_arrows(table)
     (key,) = figure.findobj(QuiverKey)
     assert key.label == "200 µm"
-    place, off = state_means(table)
+    positions, residuals = state_means(table)
     for view, axes in ((0, [0, 2]), (1, [0, 1])):
         (quiver,) = [
             quiver
@@ -99,20 +94,20 @@ def test_arrows_begin_at_their_state_and_are_its_mean_residual_enlarged_as_the_a
             figure.axes[view].get_xlabel() == "x (m)"
             and figure.axes[view].get_ylabel() == f"{'xyz'[axes[1]]} (m)"
         )
-        np.testing.assert_allclose(quiver.XY, place[:, axes])
+        np.testing.assert_allclose(quiver.XY, positions[:, axes])
         drawn = np.column_stack([quiver.U, quiver.V])
         np.testing.assert_allclose(
-            drawn, off[:, axes] * key.U / 200e-6, rtol=1e-9, atol=1e-12
+            drawn, residuals[:, axes] * key.U / 200e-6, rtol=1e-9, atol=1e-12
         )
 
 
-def test_where_nothing_changed_the_residuals_are_drawn_once():
+def test_residuals_that_no_effect_changed_are_drawn_once():
     table = residual_table()
     same = table | {f"after_d{axis}": table[f"before_d{axis}"] for axis in "xyz"}
-    drawn = [
-        {quiver.get_gid() for quiver in quivers(draw_residual_arrows(each).axes[0])}
-        for each in (table, same)
-    ]
+    drawn = []
+    for residuals in (table, same):
+        axis = draw_residual_arrows(residuals).axes[0]
+        drawn.append({quiver.get_gid() for quiver in quivers(axis)})
     assert drawn == [{"before", "after"}, {"before"}]
 
 
@@ -164,8 +159,8 @@ def test_bars_for_every_model_and_measure_from_top_to_bottom_with_diamonds_for_f
 def test_an_interval_reaches_from_end_to_end_or_is_not_drawn():
     steps = step_rows(effects=())
     mean, *_, largest = draw_before_after(steps).axes
-    for step, (one, other) in zip(steps, lines_of(mean, "interval"), strict=True):
-        assert [one[0], other[0]] == pytest.approx(
+    for step, (lower, upper) in zip(steps, lines_of(mean, "interval"), strict=True):
+        assert [lower[0], upper[0]] == pytest.approx(
             [1e6 * step["heldout_mean_m_low"], 1e6 * step["heldout_mean_m_high"]]
         )
     assert np.isnan(
@@ -208,7 +203,7 @@ def test_each_campaign_has_both_errors_at_their_values():
         for container in axis.containers
         for line in container.lines[2]
     )
-    # Sessions of one campaign stand by their poses.
+    # Sessions of one campaign are distinguished by their numbers of poses.
     assert row_labels(
         draw_errors_by_campaign(TABLE.assign(campaign="fanuc_joint")).axes[0]
     ) == [
@@ -242,13 +237,13 @@ def test_each_hypothesis_has_a_bar_as_long_as_its_probability():
     assert [plainly(text.get_text()) for text in certain.texts] == ["> 99 %", "< 1 %"]
 
 
-def test_of_many_hypotheses_the_leading_have_bars_and_the_rest_has_one():
+def test_leading_hypotheses_have_their_bars_and_all_others_have_one_together():
     sets = [({f"effect_{number}": []}, 0.1) for number in range(10)]
     axis = draw_probabilities(stated(sets), candidate_table()).axes[0]
     assert [bar.get_width() for bar in axis.patches] == pytest.approx([10] * 8 + [20])
 
 
-def test_where_nothing_can_be_tested_the_figure_says_so():
+def test_a_figure_states_that_no_candidate_can_be_tested():
     figure = draw_probabilities(stated([({}, 1.0)]), candidate_table(count=0, chosen=0))
     assert texts(figure) == [
         "None of 5 candidate causes can be tested with these measurements."
@@ -256,7 +251,7 @@ def test_where_nothing_can_be_tested_the_figure_says_so():
 
 
 def test_the_budget_has_a_bar_for_each_line_that_is_not_zero_the_largest_first_from_zero_on():
-    budget = made_document()["budget"]
+    budget = make_document()["budget"]
     figure = draw_budget_bars(budget, [line["name"] for line in budget], 2e-4, 1.5e-4)
     axis = figure.axes[0]
     assert row_labels(axis) == [

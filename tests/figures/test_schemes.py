@@ -26,7 +26,10 @@ CHAINS = {
     "three joints, turned frames": "Rz(q1) Ry(q2) Tx(1.0) Rx(90deg) Ry(q3) Rz(-30deg) Tx(0.5) [EE]",
     "one joint, no length": "Rz(q1) [EE]",
     "three axes that meet": "Tz(0.5) Rx(q1) Ry(q2) Rz(q3) Tx(0.4) Ry(-q4) Ty(0.1) Tx(0.3) [EE]",
-    "pitch about x": "Tz(0.34) Rz(q1) Rx(q2) Tz(0.4) Rz(q3) Rx(-q4) Tz(0.4) Rz(q5) Rx(q6) Rz(q7) Tz(0.126) [flange]",
+    "pitch about x": (
+        "Tz(0.34) Rz(q1) Rx(q2) Tz(0.4) Rz(q3) Rx(-q4) Tz(0.4) "
+        "Rz(q5) Rx(q6) Rz(q7) Tz(0.126) [flange]"
+    ),
 }
 for description, chain in CHAINS.items():
     joint_count = chain.count("q")

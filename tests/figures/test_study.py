@@ -1,4 +1,4 @@
-"""Figures of the study: lines, bands, bars and marks are where the tables have them, in
+"""Figures of the study draw lines, bands, bars and marks at the values of the tables, in
 their units."""
 
 import numpy as np
@@ -65,7 +65,7 @@ def band(collection):
     }
 
 
-def test_noise_levels_are_lines_in_micrometres_that_are_thick_only_where_they_are_trustworthy():
+def test_noise_levels_are_lines_in_micrometres_and_thick_where_they_are_trustworthy():
     frame = pd.concat(
         [
             metrics_of("kuka", "6DoF", size, noise, 2)
@@ -92,7 +92,7 @@ def test_noise_levels_are_lines_in_micrometres_that_are_thick_only_where_they_ar
             thin.get_linewidth() < thick.get_linewidth()
             and thin.get_color() == thick.get_color() == PALETTE[index]
         )
-        # A tenth either way, as a factor.
+        # The band is a factor of a tenth upwards and downwards.
         assert band(axis.collections[index])[4] == pytest.approx(
             (np.exp(-0.1) * size / 4, np.exp(0.1) * size / 4)
         )
@@ -105,32 +105,34 @@ def test_noise_levels_are_lines_in_micrometres_that_are_thick_only_where_they_ar
     assert_nothing_cut_off(figure)
 
 
-def test_stiffness_errors_stand_under_both_counts_of_joints_with_their_limit():
+def test_stiffness_errors_have_a_panel_for_each_count_of_joints_with_their_limit():
     figure = draw_stiffness_errors(METRICS, PRINTED, "Kuka", "kuka", ORDER, 3.0)
-    whole, first = figure.axes
-    for axis, scale in ((whole, 1.0), (first, 0.5)):
-        one, other, limit = axis.lines[:3]
-        np.testing.assert_allclose(one.get_ydata(), 10 * scale / LENGTHS)
-        np.testing.assert_allclose(other.get_ydata(), 20 * scale / LENGTHS)
+    all_joints, fixed_joints = figure.axes
+    for axis, scale in ((all_joints, 1.0), (fixed_joints, 0.5)):
+        first_curve, second_curve, limit = axis.lines[:3]
+        np.testing.assert_allclose(first_curve.get_ydata(), 10 * scale / LENGTHS)
+        np.testing.assert_allclose(second_curve.get_ydata(), 20 * scale / LENGTHS)
         assert band(axis.collections[1])[2] == pytest.approx((9 * scale, 11 * scale))
         assert list(limit.get_ydata()) == [3.0, 3.0] and [
             text.get_text() for text in axis.texts
         ] == ["3 %"]
     assert (
-        "all joints" in whole.get_title()
-        and "fixed in the last stage" in first.get_title()
+        "all joints" in all_joints.get_title()
+        and "fixed in the last stage" in fixed_joints.get_title()
     )
-    assert whole.get_ylabel() == r"$k_\Sigma$ (%)"
+    assert all_joints.get_ylabel() == r"$k_\Sigma$ (%)"
     assert legend_entries(figure) == [*ORDER, PAPER]
     assert_nothing_cut_off(figure)
-    # Both counts are those of the fixed joints in the paper: its score at 4
-    # configurations, and where it reaches 3 %.
-    marks = [line for line in first.lines if line.get_marker() == "D"]
-    assert len(whole.lines) == 3 and [line.get_xydata().tolist() for line in marks] == [
+    # The paper's marks belong to the fixed joints: its score at 4 configurations, and the
+    # length at which it reaches 3 %.
+    marks = [line for line in fixed_joints.lines if line.get_marker() == "D"]
+    assert len(all_joints.lines) == 3 and [
+        line.get_xydata().tolist() for line in marks
+    ] == [
         [[4, 2.2]],
         [[5, 3]],
     ]
-    assert marks[0].get_color() == first.lines[1].get_color()
+    assert marks[0].get_color() == fixed_joints.lines[1].get_color()
 
 
 def find_points(axis, marker):
@@ -144,7 +146,7 @@ def find_points(axis, marker):
     ]
 
 
-def test_each_printed_figure_of_table_4_stands_among_the_studies_of_its_robot():
+def test_each_printed_figure_of_table_4_is_drawn_with_the_studies_of_its_robot():
     columns = ["robot", "quantity", "paper", "studies_mean", "studies_std", "p_holm"]
     rows = [
         ("kuka", "k_sigma_20", 1.5, 1.75, 0.1, 0.002),

@@ -52,12 +52,12 @@ def test_a_figure_names_commit_configuration_and_seed_in_both_files(tmp_path):
             str(tmp_path / f"{name}.png"),
             given,
         )
-    words = "commit c0ffee, configuration SHA-256 d16e57, seed 7"
+    subject = "commit c0ffee, configuration SHA-256 d16e57, seed 7"
     assert Image.open(tmp_path / "named.png").text == {
-        "Description": words,
+        "Description": subject,
         "Source": "c0ffee",
     }
-    assert f"/Subject ({words})".encode() in (tmp_path / "named.pdf").read_bytes()
+    assert f"/Subject ({subject})".encode() in (tmp_path / "named.pdf").read_bytes()
     assert b"/Keywords (c0ffee d16e57 7)" in (tmp_path / "named.pdf").read_bytes()
     assert (
         b"c0ffee"

@@ -1,7 +1,7 @@
 """Fixtures of the tests of the model."""
 
 import pytest
-from synthetic import made_estimate, made_model, made_states, seen_exactly
+from synthetic import make_estimate, make_model, make_states, observe_exactly
 
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
@@ -17,12 +17,12 @@ TARGETS = (
 def full_case(request, fanuc):
     """Two sessions, three targets, two effects and springs that are identified; every
     parameter somewhere."""
-    known = candidates_on(made_model(fanuc.chain).sites)
+    known = candidates_on(make_model(fanuc.chain).sites)
     effects = known["lost_motion@2"], known["link_geometry@3"]
-    model = made_model(
+    model = make_model(
         fanuc.chain, TARGETS, request.param, effects=effects, identified=True
     )
-    estimate = made_estimate(model, (0, 4), seed=1)
-    states = made_states(6, 8, seed=2, sessions=2)
+    estimate = make_estimate(model, (0, 4), seed=1)
+    states = make_states(6, 8, seed=2, sessions=2)
     states.session[:] = 4 * states.session
-    return model, estimate, seen_exactly(model, estimate, states)
+    return model, estimate, observe_exactly(model, estimate, states)

@@ -9,15 +9,15 @@ import statsmodels.api as sm
 from fitted_models import (
     GANTRY_NOISES,
     TARGETS,
-    bent,
-    gantry_covariance,
-    gantry_model,
-    gantry_states,
-    linear_law,
-    model_of,
-    names_held,
-    seen_off,
-    waves,
+    build_model,
+    compute_gantry_covariance,
+    evaluate_waves,
+    list_held_parameters,
+    make_gantry_model,
+    make_gantry_states,
+    make_linear_law,
+    observe_bent_law,
+    observe_with_errors,
 )
 from planted import two_loads_a_pose
 from scipy.linalg import block_diag
@@ -25,11 +25,11 @@ from scipy.stats import chi2
 from support import chain_of
 from synthetic import (
     NOISE,
-    made_estimate,
-    made_model,
-    made_states,
-    seen_exactly,
-    with_noise,
+    add_noise,
+    make_estimate,
+    make_model,
+    make_states,
+    observe_exactly,
 )
 
 from elastocal.campaigns.campaign import Target
@@ -59,14 +59,14 @@ from elastocal.fitting.normal_equations import LeastSquaresProblem
     ids=lambda keys: "+".join(keys) or "frames alone",
 )
 def test_noiseless_measurements_give_back_every_parameter(fanuc, keys, rows):
-    model = model_of(fanuc, *keys, targets=TARGETS, rows=rows)
-    true = made_estimate(model, (0, 1), seed=1)
-    states = made_states(6, 40, seed=2, sessions=2)
+    model = build_model(fanuc, *keys, targets=TARGETS, rows=rows)
+    true = make_estimate(model, (0, 1), seed=1)
+    states = make_states(6, 40, seed=2, sessions=2)
     # Loads as large as such an arm carries, with which the measurements show where the
     # laws of a gear bend.
     states.wrench[:] *= 1.5
-    found = fit_model(model, seen_exactly(model, true, states), NOISE)
-    assert names_held(found) == []
+    found = fit_model(model, observe_exactly(model, true, states), NOISE)
+    assert list_held_parameters(found) == []
     np.testing.assert_allclose(found.residual, 0.0, atol=1e-9)
     for owner in (
         "frame_position",
@@ -111,14 +111,14 @@ PRIORS = [None, None, 2e-5, 1e-3, 5e-6]
 def linear_problem(noise, count=40, priors=PRIORS):
     """Observations of a linear law, none so far off that it loses weight; their design,
     data and covariance."""
-    model = gantry_model(linear_law(len(priors), priors))
-    states = gantry_states(count, 16)
-    sigma = gantry_covariance(states, noise)
+    model = make_gantry_model(make_linear_law(len(priors), priors))
+    states = make_gantry_states(count, 16)
+    sigma = compute_gantry_covariance(states, noise)
     rng = np.random.default_rng(93)
     errors = np.linalg.cholesky(sigma) @ rng.uniform(-1.0, 1.0, 3 * count)
-    left = waves(states.joint_angles, len(priors)).reshape(3 * count, -1)
+    left = evaluate_waves(states.joint_angles, len(priors)).reshape(3 * count, -1)
     right = left @ rng.normal(0, 3e-5, len(priors)) + errors
-    return model, seen_off(states, right.reshape(-1, 3)), left, right, sigma
+    return model, observe_with_errors(states, right.reshape(-1, 3)), left, right, sigma
 
 
 def generalized_least_squares(left, right, sigma, priors):
@@ -147,7 +147,7 @@ def test_a_linear_problem_has_the_generalized_least_squares_solution_with_its_pr
     deviation = np.sqrt(np.diag(covariance))
     # Data and priors both count, or it would be no test of either.
     assert (np.abs(alone - expected) > deviation).any()
-    nothing = made_estimate(model, size=0.0)
+    nothing = make_estimate(model, size=0.0)
     begin = {"nothing": None, "the data alone": replace(nothing, coefficients=(alone,))}
     begin["far away"] = replace(
         nothing, coefficients=(np.array([1e-2, -1e-2, 5e-3, 0.0, -5e-3]),)
@@ -181,9 +181,9 @@ def test_a_linear_problem_has_the_generalized_least_squares_solution_with_its_pr
 def test_plausible_sizes_are_no_smaller_than_the_prior_and_the_start(
     plausible,
 ):
-    model = gantry_model(linear_law(3, [None, 3e-6, None], plausible))
+    model = make_gantry_model(make_linear_law(3, [None, 3e-6, None], plausible))
     start = replace(
-        made_estimate(model, size=0.0), coefficients=(np.array([0.0, 0.0, -2e-7]),)
+        make_estimate(model, size=0.0), coefficients=(np.array([0.0, 0.0, -2e-7]),)
     )
     expected = [plausible, max(plausible, 3e-6), max(plausible, 2e-7)]
     np.testing.assert_array_equal(get_plausible_sizes(model, start), expected)
@@ -225,20 +225,20 @@ def test_a_fit_to_more_than_it_starts_from_is_that_to_all_of_them(long, monkeypa
 def test_frames_are_fitted_to_targets_that_stay_as_they_were_found(fanuc, rows):
     """Exact measurements of the same targets from elsewhere give back the frame; others
     have their own."""
-    model = model_of(
+    model = build_model(
         fanuc, "joint_offset@3", "lost_motion@2", targets=TARGETS, rows=rows
     )
-    true = made_estimate(model, seed=36)
+    true = make_estimate(model, seed=36)
     fitted = fit_model(
-        model, seen_exactly(model, true, made_states(6, 40, seed=37)), NOISE
+        model, observe_exactly(model, true, make_states(6, 40, seed=37)), NOISE
     )
     elsewhere = replace(
-        made_estimate(model, seed=38),
+        make_estimate(model, seed=38),
         coefficients=true.coefficients,
         shapes=true.shapes,
     )
     found = fit_placement(
-        fitted, model, seen_exactly(model, elsewhere, made_states(6, 10, seed=39))
+        fitted, model, observe_exactly(model, elsewhere, make_states(6, 10, seed=39))
     )
     for name in ("frame_position", "frame_rotation", "target_offset"):
         np.testing.assert_allclose(
@@ -267,7 +267,7 @@ def robust_objective(found):
 def test_steps_that_do_not_help_are_halved_until_the_fit_converges(
     fanuc, seed, lag, monkeypatch
 ):
-    model, seen = bent(fanuc, seed, lag)
+    model, seen = observe_bent_law(fanuc, seed, lag)
     found = fit_model(model, seen, NOISE)
     assert found.converged
     monkeypatch.setattr("elastocal.fitting.least_squares._MAX_HALVINGS", 0)
@@ -280,7 +280,7 @@ def test_steps_that_do_not_help_are_halved_until_the_fit_converges(
     ("seed", "lag", "end"), [(4, 8000.0, 36000.0), (8, 3000.0, 900.0)]
 )
 def test_fit_converges_at_the_end_of_the_range_of_a_shape(fanuc, seed, lag, end):
-    model, seen = bent(fanuc, seed, lag)
+    model, seen = observe_bent_law(fanuc, seed, lag)
     found = fit_model(model, seen, NOISE)
     assert found.converged and found.estimate.shapes[0][0] == end
     # The others are where they are best given that end: held there they do not move.
@@ -308,15 +308,15 @@ def with_outliers(rows, count=40):
     """Observations of a linear law, of which five are far off; design (S, 3, 3) and
     what is off, in positions and turns."""
     rng = np.random.default_rng(95)
-    states = replace(gantry_states(count), repeats=np.ones(count, int))
-    left = waves(states.joint_angles, 3)
+    states = replace(make_gantry_states(count), repeats=np.ones(count, int))
+    left = evaluate_waves(states.joint_angles, 3)
     off = 1e-4 * rng.standard_normal((count, 3)) + left @ [4e-5, -8e-5, 1e-4]
     off[[3, 11, 17, 30, 38]] += 1e-3 * np.array(
         [[1, 0, 0], [0, -2, 0], [0, 0, 3], [2, 2, 0], [5, 0, 0]]
     )
     turned = 5e-5 * rng.standard_normal((count, 3)) if rows == 6 else None
-    model = gantry_model(linear_law(3, WEAK), rows=rows)
-    return model, seen_off(states, off, turned), left, off, turned
+    model = make_gantry_model(make_linear_law(3, WEAK), rows=rows)
+    return model, observe_with_errors(states, off, turned), left, off, turned
 
 
 def distances(off, turned, left, values, factor):
@@ -399,18 +399,18 @@ def test_a_fit_has_converged_where_its_step_is_below_a_share_of_the_standard_err
 ):
     """Of measurements that scatter more than the noise, of their own standard error:
     all errors are of one size."""
-    states = replace(gantry_states(30), repeats=np.ones(30, int))
-    left = waves(states.joint_angles, 1)[..., 0]
+    states = replace(make_gantry_states(30), repeats=np.ones(30, int))
+    left = evaluate_waves(states.joint_angles, 1)[..., 0]
     off = 1e-4 * spread * np.random.default_rng(96).choice([-1.0, 1.0], (30, 3))
-    model = gantry_model(linear_law(1))
-    seen = seen_off(states, off)
+    model = make_gantry_model(make_linear_law(1))
+    seen = observe_with_errors(states, off)
     best = (left * off).sum() / (left**2).sum()
     deviation = 1e-4 / np.sqrt((left**2).sum())
     # All distances are alike but for what the one parameter takes: their median is
     # their root mean square.
     scale = max(1.0, spread / np.sqrt(chi2.ppf(0.5, 3) / 3))
     start = replace(
-        made_estimate(model, size=0.0),
+        make_estimate(model, size=0.0),
         coefficients=(np.array([best + share * settled * scale * deviation]),),
     )
     monkeypatch.setattr("elastocal.fitting.least_squares._MAX_STEPS", 1)
@@ -451,11 +451,11 @@ def assert_known(found, true, rows=3):
 )
 def test_frames_and_targets_are_found_from_nothing(fanuc, rows, sessions, seen_of):
     """All measurements of a target may be held out: it stays where it was."""
-    model = model_of(fanuc, targets=TARGETS, rows=rows)
-    states = unloaded(made_states(6, 40, seed=1, sessions=len(sessions)))
+    model = build_model(fanuc, targets=TARGETS, rows=rows)
+    states = unloaded(make_states(6, 40, seed=1, sessions=len(sessions)))
     states.session[:] = np.array(sessions)[states.session]
-    true = made_estimate(model, sessions, seed=2)
-    seen = seen_exactly(model, true, states)
+    true = make_estimate(model, sessions, seed=2)
+    seen = observe_exactly(model, true, states)
     mine = seen.target < seen_of
     rotation = None if seen.rotation is None else seen.rotation[mine]
     seen = replace(
@@ -479,34 +479,36 @@ def test_a_known_mount_keeps_its_turn_and_an_unknown_one_is_found(fanuc, fitted_
         Target("A", "6DoF", None, (0.1, -1.5, 0.2)),
         Target("B", "4DoF", (0.1, 0.0, 0.2), None),
     )
-    model = made_model(fanuc.chain, targets, rows=6, fitted_frames=fitted_frames)
-    states = unloaded(made_states(6, 15, seed=7))
-    true = made_estimate(model, seed=8)
-    found = register_placement(model, seen_exactly(model, true, states))
+    model = make_model(fanuc.chain, targets, rows=6, fitted_frames=fitted_frames)
+    states = unloaded(make_states(6, 15, seed=7))
+    true = make_estimate(model, seed=8)
+    found = register_placement(model, observe_exactly(model, true, states))
     assert_known(found, true, 6)
     np.testing.assert_array_equal(found.target_offset[1], (0.1, 0.0, 0.2))
 
 
 def test_frame_is_no_reflection_where_all_points_lie_in_a_plane():
-    model = made_model(
+    model = make_model(
         chain_of("Tz(0.3) Rz(q1) Tx(0.5) Rz(q2) Tx(0.5) [end]"),
         (Target("A", "end", (0.0, 0.0, 0.0)),),
     )
     for seed in range(8):
-        states = unloaded(made_states(2, 20, seed=seed))
-        true = made_estimate(model, seed=seed + 10)
-        assert_known(register_placement(model, seen_exactly(model, true, states)), true)
+        states = unloaded(make_states(2, 20, seed=seed))
+        true = make_estimate(model, seed=seed + 10)
+        assert_known(
+            register_placement(model, observe_exactly(model, true, states)), true
+        )
 
 
 @pytest.mark.parametrize("joint_rad", [0.0, 2e-5])
 def test_a_fit_of_more_states_than_are_kept_is_the_same_and_keeps_no_jacobian(
     fanuc, monkeypatch, joint_rad
 ):
-    model = model_of(fanuc, "joint_offset@3", "stiffening@2", targets=TARGETS)
-    seen = seen_exactly(
-        model, made_estimate(model, seed=64), two_loads_a_pose(6, 20, seed=65)
+    model = build_model(fanuc, "joint_offset@3", "stiffening@2", targets=TARGETS)
+    seen = observe_exactly(
+        model, make_estimate(model, seed=64), two_loads_a_pose(6, 20, seed=65)
     )
-    seen = with_noise(seen, np.random.default_rng(66))
+    seen = add_noise(seen, np.random.default_rng(66))
     seen.position[[5, 20]] += 3e-3
     noise = replace(NOISE, joint_rad=np.full(6, joint_rad))
     kept = fit_model(model, seen, noise)

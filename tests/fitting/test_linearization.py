@@ -10,11 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from synthetic import (
     NOISE,
-    candidate_on,
-    made_estimate,
-    made_model,
-    made_states,
-    seen_exactly,
+    find_candidate,
+    make_estimate,
+    make_model,
+    make_states,
+    observe_exactly,
     slopes,
     small_steps,
 )
@@ -141,18 +141,18 @@ def test_a_mount_of_unknown_turn_and_a_known_one_at_an_unknown_place_have_their_
         Target("turned", "6DoF", (0.1, 0.0, 0.2), None),
         Target("placed", "3DoF", None, (0.3, -1.0, 0.2)),
     )
-    model = made_model(fanuc.chain, targets, rows=6)
-    estimate = made_estimate(model, seed=1)
-    states = made_states(6, 8, seed=2)
-    assert_slopes(model, estimate, seen_exactly(model, estimate, states), (16, 6))
+    model = make_model(fanuc.chain, targets, rows=6)
+    estimate = make_estimate(model, seed=1)
+    states = make_states(6, 8, seed=2)
+    assert_slopes(model, estimate, observe_exactly(model, estimate, states), (16, 6))
 
 
 def test_the_place_of_a_jump_has_no_slope_where_a_row_is_within_a_step_of_it(fanuc):
-    model = made_model(fanuc.chain, effects=[candidate_on(fanuc.chain, "setup_step")])
-    states = made_states(6, 9, seed=3)
-    seen = seen_exactly(model, made_estimate(model, seed=4), states)
+    model = make_model(fanuc.chain, effects=[find_candidate(fanuc.chain, "setup_step")])
+    states = make_states(6, 9, seed=3)
+    seen = observe_exactly(model, make_estimate(model, seed=4), states)
     # A row at a half lies on the other side of the jump a step further on.
-    estimate = replace(made_estimate(model, seed=5), shapes=(np.array([0.5 - 1e-6]),))
+    estimate = replace(make_estimate(model, seed=5), shapes=(np.array([0.5 - 1e-6]),))
     line = linearize(
         model, estimate, seen, evaluate_conditions(model, estimate, states)
     )

@@ -5,16 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fitted_models import model_of
-from made_campaigns import POINTS, Plan, made
+from fitted_models import build_model
+from made_campaigns import POINTS, Plan, make_campaign
 from scipy.optimize import root
 from support import OTHER_CHAINS, chain_of
 from synthetic import (
-    made_estimate,
-    made_measurements,
-    made_model,
-    made_states,
-    seen_exactly,
+    make_estimate,
+    make_measurements,
+    make_model,
+    make_states,
+    observe_exactly,
 )
 
 from elastocal.campaigns.campaign import Campaign, Target, tabulate_measurements
@@ -39,7 +39,7 @@ TWO = Target("A", "6DoF", None), Target("B", "3DoF", (0.1, 0.0, -0.2))
 
 @pytest.fixture(scope="module")
 def campaign(kuka):
-    return made(kuka, 1, Plan(poses=5, loads=1, repeats=4, tracker=True))
+    return make_campaign(kuka, 1, Plan(poses=5, loads=1, repeats=4, tracker=True))
 
 
 def described(campaign, config_folder, **changes):
@@ -125,15 +125,15 @@ def test_the_model_has_the_declared_effects_and_the_candidates_are_all_others(
 def test_declared_model_is_that_of_the_campaign(
     fanuc, measured, rows, frame, fitted, compliance
 ):
-    bare = made_model(fanuc.chain, (Target("A", "6DoF", (0, 0, 0)),))
-    measurements = made_measurements(bare, np.random.default_rng(0), 2, 1, 0.0, 0.0)
+    bare = make_model(fanuc.chain, (Target("A", "6DoF", (0, 0, 0)),))
+    measurements = make_measurements(bare, np.random.default_rng(0), 2, 1, 0.0, 0.0)
     measurements = replace(
         measurements, time_s=np.array([7.0, 5.0]), row=np.array([4, 9])
     )
     campaign = Campaign(
         "c", fanuc, measured, frame, TWO, compliance, (), None, {}, measurements
     )
-    offset = candidates_on(made_model(fanuc.chain).sites)["joint_offset@2"]
+    offset = candidates_on(make_model(fanuc.chain).sites)["joint_offset@2"]
     model = build_declared_model(campaign, (offset,))
     assert (model.rows, model.fitted_frames, model.targets) == (rows, fitted, TWO)
     assert model.identifies_compliance == (compliance == "identify")
@@ -176,8 +176,8 @@ def test_of_a_target_only_what_is_unknown_is_a_parameter(fanuc):
     }
     both = {6: ["dx", "dy", "dz", "rx", "ry", "rz"], 3: ["dx", "dy", "dz"]}
     for rows in (6, 3):
-        model = made_model(fanuc.chain, targets, rows=rows, fitted_frames=False)
-        estimate = made_estimate(model, seed=3)
+        model = make_model(fanuc.chain, targets, rows=rows, fitted_frames=False)
+        estimate = make_estimate(model, seed=3)
         expected = [*names[rows], *(f"both {name}" for name in both[rows])]
         owned = list_parameters(model, estimate)
         assert [
@@ -201,8 +201,8 @@ def test_of_a_target_only_what_is_unknown_is_a_parameter(fanuc):
 @pytest.fixture
 def two_laws(fanuc):
     """A model of two laws with a shape of one name, and one without, somewhere."""
-    model = model_of(fanuc, "lost_motion@2", "link_geometry@3", "stiffening@4")
-    return model, made_estimate(model, seed=7)
+    model = build_model(fanuc, "lost_motion@2", "link_geometry@3", "stiffening@4")
+    return model, make_estimate(model, seed=7)
 
 
 def owned(model, estimate, key, name):
@@ -252,12 +252,12 @@ def test_nominal_springs_deflect_as_equation_9_with_exact_kinematics(fanuc):
     targets = tuple(
         Target(p.name, p.name, (0.05, 0.1, -0.1)) for p in fanuc.chain.points
     )
-    model = made_model(
+    model = make_model(
         fanuc.chain, targets, 6, fitted_frames=False, compliance=fanuc.compliance
     )
-    estimate = made_estimate(model)
-    states = made_states(6, 6, seed=4)
-    seen = seen_exactly(model, estimate, states)
+    estimate = make_estimate(model)
+    states = make_states(6, 6, seed=4)
+    seen = observe_exactly(model, estimate, states)
     position, rotation = predict(
         model, estimate, seen, evaluate_conditions(model, estimate, states)
     )
@@ -280,13 +280,13 @@ def test_nominal_springs_deflect_as_equation_9_with_exact_kinematics(fanuc):
 @pytest.mark.parametrize("name", OTHER_CHAINS)
 def test_effects_at_zero_leave_the_declared_model(name):
     chain = chain_of(OTHER_CHAINS[name])
-    model = made_model(chain, rows=6)
-    estimate = made_estimate(model, seed=8)
-    states = made_states(chain.coordinates, 4, seed=9)
+    model = make_model(chain, rows=6)
+    estimate = make_estimate(model, seed=8)
+    states = make_states(chain.coordinates, 4, seed=9)
     effects = tuple(candidates_on(model.sites).values())
     more = model.with_effects(effects)
     same = estimate.with_effects(effects)
-    seen = seen_exactly(model, estimate, states)
+    seen = observe_exactly(model, estimate, states)
     np.testing.assert_allclose(
         compute_residuals(more, same, seen, evaluate_conditions(more, same, states)),
         0.0,

@@ -9,13 +9,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_campaigns import Plan, made
+from made_campaigns import Plan, make_campaign
 from planted import planted
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 from support import chain_of
-from synthetic import made_estimate, made_measurements, made_model
+from synthetic import make_estimate, make_measurements, make_model
 
 from elastocal.campaigns.campaign import Campaign, Target
 from elastocal.fitting import noise as noise_module
@@ -63,14 +63,14 @@ def campaign(robot, **noise):
 
 
 def drawn(robot, seed, poses=20, repeats=5, joint_rad=0.0, rows=3, targets=TARGETS):
-    model = made_model(
+    model = make_model(
         robot.chain, targets, rows, fitted_frames=False, compliance=robot.compliance
     )
     rng = np.random.default_rng(seed)
-    measurements = made_measurements(
+    measurements = make_measurements(
         model, rng, poses, repeats, SENSOR_M, joint_rad, SENSOR_RAD
     )
-    return model, made_estimate(model), measurements
+    return model, make_estimate(model), measurements
 
 
 def test_uncertainties_of_measurements_are_the_declared_noise(fanuc):
@@ -87,7 +87,7 @@ HANDS = tuple(Target(name, "hand", (0.0, 0.0, 0.0)) for name in "AB")
 def off_by(model, off, turned=None):
     """Repeats that are off the model by exactly so much: ndarray (poses, repeats,
     targets, 3), m and rad."""
-    exact = made_measurements(
+    exact = make_measurements(
         model, np.random.default_rng(20), *off.shape[:2], 0.0, 0.0
     )
     moved = replace(exact, position=exact.position + off.reshape(-1, 3))
@@ -108,8 +108,8 @@ def mirrored(parts):
 def gantry(text="Tx(q1) [hand]", targets=1, rows=3):
     """A model whose joints shift or turn all targets alike in every pose, so that the
     likelihood has a closed form."""
-    model = made_model(chain_of(text), HANDS[:targets], rows, fitted_frames=False)
-    return model, made_estimate(model)
+    model = make_model(chain_of(text), HANDS[:targets], rows, fitted_frames=False)
+    return model, make_estimate(model)
 
 
 def safe_side(approaches):
@@ -379,7 +379,7 @@ def case_of(robot, off=0.0, turned=0.0, noise=None, oriented=True, repeats=1):
     plan = Plan(
         poses=8, loads=1, repeats=repeats, noise=0.0, force=0.0, oriented=oriented
     )
-    campaign = replace(made(robot, 3, plan), compliance="nominal", noise=noise)
+    campaign = replace(make_campaign(robot, 3, plan), compliance="nominal", noise=noise)
     seen = campaign.measurements
     seen = replace(seen, position=seen.position + off)
     if oriented:

@@ -8,22 +8,22 @@ import pytest
 from fitted_models import (
     GANTRY_NOISES,
     TARGETS,
-    gantry_covariance,
-    gantry_model,
-    gantry_states,
-    linear_law,
-    model_of,
-    names_held,
-    seen_off,
-    waves,
+    build_model,
+    compute_gantry_covariance,
+    evaluate_waves,
+    list_held_parameters,
+    make_gantry_model,
+    make_gantry_states,
+    make_linear_law,
+    observe_with_errors,
 )
 from synthetic import (
     NOISE,
-    made_estimate,
-    made_model,
-    made_states,
-    seen_exactly,
-    with_noise,
+    add_noise,
+    make_estimate,
+    make_model,
+    make_states,
+    observe_exactly,
 )
 
 from elastocal.campaigns.campaign import Target
@@ -141,21 +141,21 @@ def test_a_standard_error_of_the_plausible_size_is_the_largest_that_is_estimated
     ],
 )
 def test_what_the_frame_or_the_target_makes_as_well_is_held_and_named(fanuc, key, held):
-    model = model_of(fanuc, key, "joint_offset@3")
-    true = made_estimate(model, seed=13)
-    seen = with_noise(
-        seen_exactly(model, true, made_states(6, 40, seed=14)),
+    model = build_model(fanuc, key, "joint_offset@3")
+    true = make_estimate(model, seed=13)
+    seen = add_noise(
+        observe_exactly(model, true, make_states(6, 40, seed=14)),
         np.random.default_rng(15),
     )
     found = fit_model(model, seen, NOISE)
-    assert names_held(found) == held
+    assert list_held_parameters(found) == held
     assert not found.estimate.coefficients[0].any()
     assert (
         not found.covariance[found.unidentifiable].any()
         and not found.covariance[:, found.unidentifiable].any()
     )
     # It is not shrunk towards zero by a penalty: without it the fit is the very same.
-    without = fit_model(model_of(fanuc, "joint_offset@3"), seen, NOISE)
+    without = fit_model(build_model(fanuc, "joint_offset@3"), seen, NOISE)
     np.testing.assert_allclose(
         found.estimate.coefficients[1], without.estimate.coefficients[0], rtol=1e-9
     )
@@ -217,16 +217,16 @@ OF_JOINTS = Noise("repeats", 60e-6, 40e-6, 1e-6 * np.array([30.0, 40, 50, 60, 70
 def case(request, fanuc):
     """Observations of one to three targets a state, averaged over one to four repeats,
     and their Jacobian."""
-    model = made_model(fanuc.chain, THREE, request.param, fitted_frames=False)
-    states = made_states(6, 7, seed=1)
+    model = make_model(fanuc.chain, THREE, request.param, fitted_frames=False)
+    states = make_states(6, 7, seed=1)
     states.repeats[:] = [1, 4, 2, 3, 1, 2, 4]
-    whole = seen_exactly(model, made_estimate(model), states)
+    whole = observe_exactly(model, make_estimate(model), states)
     kept = np.array([0, 1, 2, 4, 6, 7, 8, 9, 12, 13, 14, 17, 18, 19, 20])
     rotation = None if whole.rotation is None else whole.rotation[kept]
     seen = Observations(
         states, whole.state[kept], whole.target[kept], whole.position[kept], rotation
     )
-    estimate = made_estimate(model)
+    estimate = make_estimate(model)
     jacobian = linearize(
         model, estimate, seen, evaluate_conditions(model, estimate, states)
     ).coordinate_jacobian[..., :6]
@@ -289,7 +289,7 @@ def test_products_by_factors_are_those_of_the_columns_written_out(
     """Targets that are fitted and that are known; errors of a state alone, and of a
     pose that has several."""
     targets = tuple(replace(target, offset_m=offset) for target in TARGETS)
-    model = model_of(
+    model = build_model(
         fanuc,
         "joint_offset@2",
         "lost_motion@3",
@@ -298,10 +298,12 @@ def test_products_by_factors_are_those_of_the_columns_written_out(
         rows=6,
     )
     states = replace(
-        made_states(6, 12, seed=88), pose=np.arange(12) // 3, load=np.arange(12) % 3
+        make_states(6, 12, seed=88), pose=np.arange(12) // 3, load=np.arange(12) % 3
     )
-    estimate = made_estimate(model, seed=87)
-    seen = with_noise(seen_exactly(model, estimate, states), np.random.default_rng(89))
+    estimate = make_estimate(model, seed=87)
+    seen = add_noise(
+        observe_exactly(model, estimate, states), np.random.default_rng(89)
+    )
     joints = 1e-6 * np.array([40.0, 15, 15, 30, 45, 220])
     noise = Noise("declared", 5e-6, 1e-5, joints, pose_rad=pose_rad)
     plausible = np.array(
@@ -347,23 +349,23 @@ def test_normal_equations_of_a_linear_problem_are_those_written_out(
             "elastocal.fitting.observations._MAX_SENSITIVITIES", 3 * 60 * at_once
         )
     noise = GANTRY_NOISES[kind]
-    states = gantry_states(20, 8)
+    states = make_gantry_states(20, 8)
     plausible = np.array([0.1, 2.0, 0.5])
     rng = np.random.default_rng(98)
-    left = waves(states.joint_angles, 3)
+    left = evaluate_waves(states.joint_angles, 3)
     off = 1e-4 * rng.standard_normal((20, 3))
     weights = rng.uniform(0.2, 1.0, 20)
-    model = gantry_model(linear_law(3))
-    seen = seen_off(states, off)
+    model = make_gantry_model(make_linear_law(3))
+    seen = observe_with_errors(states, off)
     estimate = replace(
-        made_estimate(model), coefficients=(np.array([1e-4, -2e-4, 3e-5]),)
+        make_estimate(model), coefficients=(np.array([1e-4, -2e-4, 3e-5]),)
     )
     parts = LeastSquaresProblem(model, seen, noise, estimate, plausible)
     assert len(parts.blocks) == 1 if at_once is None else len(parts.blocks) > 2
     parts.linearize(estimate)
     parts.whiten()
     residual = off - left @ estimate.coefficients[0]
-    inverse = np.linalg.inv(gantry_covariance(states, noise))
+    inverse = np.linalg.inv(compute_gantry_covariance(states, noise))
     root = np.repeat(np.sqrt(weights), 3)
     columns = root[:, None] * left.reshape(60, 3) * plausible
     gram, along = parts.normal_equations(weights)
@@ -393,10 +395,10 @@ def test_normal_equations_of_a_linear_problem_are_those_written_out(
 def test_squares_of_another_estimate_are_whitened_in_the_axes_in_which_the_step_began(
     fanuc,
 ):
-    model = model_of(fanuc, targets=TARGETS)
-    estimate = made_estimate(model, seed=3)
-    seen = with_noise(
-        seen_exactly(model, estimate, made_states(6, 9, seed=4)),
+    model = build_model(fanuc, targets=TARGETS)
+    estimate = make_estimate(model, seed=3)
+    seen = add_noise(
+        observe_exactly(model, estimate, make_states(6, 9, seed=4)),
         np.random.default_rng(5),
     )
     parts = LeastSquaresProblem(model, seen, OF_JOINTS, estimate, np.ones(12))

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
-from synthetic import measurements_of
+from synthetic import fill_measurements
 
 from elastocal.fitting.observations import (
     average_repeats,
@@ -27,7 +27,7 @@ def measurements(keys, position=None, **others):
     )
     places = dict(zip(names, np.array(keys).T, strict=True))
     position = place if position is None else np.array(position, float)
-    return measurements_of(
+    return fill_measurements(
         joint_angles=angles, wrench=wrench, position=position, **places, **others
     )
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from made_targets import made_targets
+from made_targets import make_targets
 
 from elastocal.exchange.controllers import CONTROLLERS
 
@@ -57,7 +57,7 @@ def test_no_text_adds_a_statement_to_a_program_and_the_targets_come_back(
     language, notes
 ):
     module = CONTROLLERS[language]
-    targets = made_targets(module)
+    targets = make_targets(module)
     text = module.program("go", targets, notes)
     assert statements(language, text) == statements(
         language, module.program("go", targets)

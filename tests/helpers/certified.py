@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from analysed_robots import ROBOTS, analysed
 from loop_scripts import ANALYSIS, run_loop
-from made_folders import PLAN, made_folder, made_table
+from made_folders import PLAN, make_folder, make_table
 
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.io.origin import Origin, environment
@@ -39,11 +39,11 @@ def certified_checkout(top, name="made", offset=3e-4, made=None):
         (top / ENGINE).write_text("'''Made it.'''\n", encoding="utf-8")
     robot = analysed("kuka")
     if made is None:
-        folder = made_folder(
+        folder = make_folder(
             top / name,
             robot,
             name,
-            table=made_table(robot, name, plan=_PLAN, offset_of_joint_3=offset),
+            table=make_table(robot, name, plan=_PLAN, offset_of_joint_3=offset),
         )
     else:
         folder = made(top / name, robot, name)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from support import OTHER_CHAINS, TRACK, PinocchioPoint, chain_of
-from synthetic import displacements, equipped, made_states
+from synthetic import displacements, equipped, make_states
 
 from elastocal.campaigns.reading import read_robot
 from elastocal.effects.conditions import conditions_of
@@ -43,10 +43,10 @@ class Arm:
     Vectors are in base axes, ndarrays (S, ...).
     """
 
-    def __init__(self, chain, pulled=False):
+    def __init__(self, chain, *, pulled):
         self.chain, self.joints = chain, chain.coordinates
         # From a load that play takes up to one beyond the knee of every gear.
-        self.states = made_states(self.joints, STATES, seed=1, force=1.0)
+        self.states = make_states(self.joints, STATES, seed=1, force=1.0)
         self.states.wrench[:] *= np.geomspace(10.0, 2e4, STATES)[:, None]
         self.compliance = 1e-6 * np.arange(1, self.joints + 1)
         self._frames = {}

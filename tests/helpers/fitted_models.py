@@ -8,12 +8,12 @@ from scipy.linalg import block_diag
 from scipy.spatial.transform import Rotation
 from support import chain_of
 from synthetic import (
-    candidate_on,
-    made_estimate,
-    made_model,
-    made_states,
-    seen_exactly,
-    with_noise,
+    add_noise,
+    find_candidate,
+    make_estimate,
+    make_model,
+    make_states,
+    observe_exactly,
 )
 
 from elastocal.campaigns.campaign import Target
@@ -24,16 +24,16 @@ from elastocal.fitting.observations import Observations
 TARGETS = Target("A", "6DoF", None), Target("B", "3DoF", None)
 
 
-def model_of(robot, *keys, targets=TARGETS[:1], **options):
+def build_model(robot, *keys, targets=TARGETS[:1], **options):
     """A model of a robot with its nominal springs and these candidates of the
     catalogue; one target by default."""
-    effects = tuple(candidate_on(robot.chain, key) for key in keys)
-    return made_model(
+    effects = tuple(find_candidate(robot.chain, key) for key in keys)
+    return make_model(
         robot.chain, targets, effects=effects, compliance=robot.compliance, **options
     )
 
 
-def names_held(found):
+def list_held_parameters(found):
     """Owners and names of the parameters that a fit held."""
     return [
         f"{owner} {p.name}"
@@ -42,14 +42,14 @@ def names_held(found):
     ]
 
 
-def bent(fanuc, seed, shape, key="thermal_growth[time]"):
+def observe_bent_law(fanuc, seed, shape, key="thermal_growth[time]"):
     """Noisy measurements of a law with a shape somewhere in its range, and the model
     that made them."""
-    model = model_of(fanuc, key)
-    true = made_estimate(model, seed=seed)
+    model = build_model(fanuc, key)
+    true = make_estimate(model, seed=seed)
     true = replace(true, shapes=(np.array([shape]),))
-    seen = seen_exactly(model, true, made_states(6, 30, seed=seed, force=300.0))
-    return model, with_noise(seen, np.random.default_rng(seed))
+    seen = observe_exactly(model, true, make_states(6, 30, seed=seed, force=300.0))
+    return model, add_noise(seen, np.random.default_rng(seed))
 
 
 # A gantry carries its hand where its joints say: a law that shifts the joints is
@@ -62,7 +62,7 @@ GANTRY_NOISES = {
 }
 
 
-def waves(joint_angles, count, seed=0):
+def evaluate_waves(joint_angles, count, seed=0):
     """Columns of a made law: smooth in the joints, alike in size, ndarray (S, 3,
     count)."""
     rng = np.random.default_rng((90, seed))
@@ -71,16 +71,16 @@ def waves(joint_angles, count, seed=0):
     return np.sin(np.einsum("icj,sj->sic", turns, joint_angles) + phases)
 
 
-def linear_law(count, priors=None, plausible=0.1, seed=0):
+def make_linear_law(count, priors=None, plausible=0.1, seed=0):
     """A law of so many parameters that shifts the three joints of the gantry by
-    `waves`."""
+    `evaluate_waves`."""
     priors = [None] * count if priors is None else priors
     listed = tuple(
         Parameter(f"p{n}", "m", plausible, prior) for n, prior in enumerate(priors)
     )
 
     def displacement(around):
-        columns = waves(around.joint_angles, count, seed)
+        columns = evaluate_waves(around.joint_angles, count, seed)
         return [
             {axis: columns[:, axis, number] for axis in range(3)}
             for number in range(count)
@@ -89,9 +89,9 @@ def linear_law(count, priors=None, plausible=0.1, seed=0):
     return Candidate("made_law", "made", (1,), "", listed, displacement)
 
 
-def gantry_model(*laws, rows=3):
+def make_gantry_model(*laws, rows=3):
     """A model of the gantry with these laws, its foot and its target known."""
-    return made_model(
+    return make_model(
         chain_of(GANTRY),
         (Target("A", "hand", (0.0, 0.0, 0.0)),),
         rows,
@@ -100,10 +100,10 @@ def gantry_model(*laws, rows=3):
     )
 
 
-def gantry_states(count, poses=None, seed=0):
+def make_gantry_states(count, poses=None, seed=0):
     """Unloaded states of the gantry, so many of them to a pose one after the other;
     repeated once to four times."""
-    states = made_states(3, count, (91, seed), force=0.0)
+    states = make_states(3, count, (91, seed), force=0.0)
     pose = np.arange(count) * (poses or count) // count
     return replace(
         states,
@@ -112,7 +112,7 @@ def gantry_states(count, poses=None, seed=0):
     )
 
 
-def seen_off(states, off, turned=None):
+def observe_with_errors(states, off, turned=None):
     """Observations of the gantry that are off its commanded positions, and turned, by
     just so much: ndarrays (S, 3)."""
     rotation = None if turned is None else Rotation.from_rotvec(turned).as_matrix()
@@ -126,7 +126,7 @@ def seen_off(states, off, turned=None):
     )
 
 
-def gantry_covariance(states, noise):
+def compute_gantry_covariance(states, noise):
     """Covariance of all positions of the gantry, written out: its Jacobian is the
     identity."""
     one = block_diag(

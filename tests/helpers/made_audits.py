@@ -23,7 +23,7 @@ ROBOT, STRATEGY, CONFIGURATION = (
 )
 
 
-def made_run(folder):
+def make_run(folder):
     """Experiments, exact and noisy deflections and estimates of one robot, by
     pinocchio."""
     arm = Arm(ROBOT)

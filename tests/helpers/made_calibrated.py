@@ -56,7 +56,7 @@ def plain_estimate(model, coefficients, shapes=None):
     )
 
 
-def made_calibrated(
+def make_calibrated_robot(
     robot, *keys, seed=0, size=0.3, relative_std=0.02, identified=True, noise=None
 ):
     """A calibrated robot with every parameter at up to `size` of its plausible size,

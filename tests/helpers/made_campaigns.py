@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
-from synthetic import measurements_of
+from synthetic import fill_measurements
 
 from elastocal.campaigns.campaign import Campaign, Target
 from elastocal.mechanics.elastostatics import generalized_forces
@@ -33,12 +33,12 @@ class Plan:
     force: float = 1000.0
 
 
-def with_measured(campaign, **columns):
+def replace_measured_columns(campaign, **columns):
     """A campaign with other columns of its measurements."""
     return replace(campaign, measurements=replace(campaign.measurements, **columns))
 
 
-def made(
+def make_campaign(
     robot, seed, plan=Plan(), true_robot=None, true_offset=0.0, sag=0.0, moving=None
 ):
     """A campaign of a robot, measured as planned.
@@ -86,7 +86,7 @@ def made(
         plan.noise * rng.standard_normal(position.shape)
     ) * Rotation.from_matrix(rotation)
     places = {"pose": pose, "load": load, "repeat": repeat, "target": target}
-    measurements = measurements_of(
+    measurements = fill_measurements(
         **{name: index.astype(np.int32) for name, index in places.items()},
         joint_angles=q,
         wrench=wrench,
@@ -110,7 +110,7 @@ def made(
     )
 
 
-def with_geometric_errors(robot, seed, size_m):
+def add_geometric_errors(robot, seed, size_m):
     """The same robot with other lengths, m."""
     rng = np.random.default_rng(seed)
     transforms = tuple(
@@ -124,7 +124,7 @@ def with_geometric_errors(robot, seed, size_m):
     return replace(robot, chain=replace(robot.chain, transforms=transforms))
 
 
-def with_other_compliances(robot, seed, share):
+def change_compliances(robot, seed, share):
     """The same robot with compliances off by up to a share."""
     factors = 1 + np.random.default_rng(seed).uniform(-share, share, robot.joints)
     return replace(robot, compliance=robot.compliance * factors)

@@ -8,7 +8,7 @@ import yaml
 from elastocal.verdict import Accuracy
 
 
-def made_document(decision="pass", misplaced=False, **conformity):
+def make_document(decision="pass", misplaced=False, **conformity):
     document = yaml.safe_load(
         Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8")
     )

@@ -11,7 +11,7 @@ from elastocal.campaigns.writing import write_campaign
 PLAN = Plan(("3DoF", "6DoF"), 14, 800.0, (0, 1), (0.0, 0.5, 0.0), 2, 4, 6e-5, 6e-5)
 
 
-def made_table(robot, name, seed=1, plan=PLAN, offset_of_joint_3=0.0):
+def make_table(robot, name, seed=1, plan=PLAN, offset_of_joint_3=0.0):
     """Measurements of a robot whose third joint stands beyond what it reports, in no
     order."""
     table = draw_measurements(robot, plan, seed, name)
@@ -20,9 +20,9 @@ def made_table(robot, name, seed=1, plan=PLAN, offset_of_joint_3=0.0):
     return {column: np.asarray(values)[order] for column, values in table.items()}
 
 
-def made_folder(folder, robot, /, name="made", kind="csv", table=None, **changes):
+def make_folder(folder, robot, /, name="made", kind="csv", table=None, **changes):
     """A campaign's folder."""
-    table = made_table(robot, name) if table is None else table
+    table = make_table(robot, name) if table is None else table
     document = yaml.safe_load(
         Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8")
     )

@@ -10,7 +10,7 @@ from elastocal.loop.loading import described_campaign
 from elastocal_proof.league.methods import DataSet, deal_folds
 
 
-def made_data_set(folder, robot, robots_folder, poses=24, **changes):
+def make_data_set(folder, robot, robots_folder, poses=24, **changes):
     """A data set of an unloaded robot that misses its poses by something smooth."""
     changes = {
         "frame": "tracker",
@@ -29,7 +29,7 @@ def made_data_set(folder, robot, robots_folder, poses=24, **changes):
     )
 
 
-def made_entries(size_m, poses=40, seed=1, std_m=None, folds=4):
+def make_entries(size_m, poses=40, seed=1, std_m=None, folds=4):
     """Rows of the entries table with errors of some size, each pose seen by two
     targets."""
     draws = np.random.default_rng(seed)
@@ -52,7 +52,7 @@ def made_entries(size_m, poses=40, seed=1, std_m=None, folds=4):
     )
 
 
-def made_results(data=("one", "two"), splits=("random", "blocks", "session")):
+def make_results(data=("one", "two"), splits=("random", "blocks", "session")):
     """Entries of three methods, by data set, split and method: geometry, one half as
     wrong, and one that states intervals."""
     found = {}
@@ -63,7 +63,7 @@ def made_results(data=("one", "two"), splits=("random", "blocks", "session")):
                 ("half", 1e-4, None),
                 ("process", 1.2e-4, 1.2e-4),
             ):
-                found[name, split, method] = made_entries(
+                found[name, split, method] = make_entries(
                     size, 30 + 10 * number, number + 1, std
                 )
     return found

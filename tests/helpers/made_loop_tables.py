@@ -189,7 +189,7 @@ def effect_entry(
     return from_document(Effect, document, "made up")
 
 
-def made_verdict(
+def make_verdict(
     word,
     effects=(),
     warnings=(),
@@ -251,45 +251,45 @@ REMAINDER = DATA["remainder"] | {
 }
 TWO_PLACES = [("joint 3", 0.8), ("joint 5", 0.2)]
 CAMPAIGNS = {
-    "adequate": made_verdict(
+    "adequate": make_verdict(
         ADEQUATE, sets=[({}, 0.97), ({"lost_motion": ["joint 3"]}, 0.02)]
     ),
-    "named": made_verdict(NAMED, [effect_entry()]),
-    "named, location uncertain": made_verdict(
+    "named": make_verdict(NAMED, [effect_entry()]),
+    "named, location uncertain": make_verdict(
         NAMED, [effect_entry(locations=TWO_PLACES)]
     ),
-    "class": made_verdict(
+    "class": make_verdict(
         CLASS, [effect_entry(alternatives=["joint_tilt", "link_elasticity"])]
     ),
-    "class with a related mechanism": made_verdict(
+    "class with a related mechanism": make_verdict(
         CLASS, [effect_entry(alternatives=["other"])]
     ),
-    "several": made_verdict(
+    "several": make_verdict(
         SEVERAL, [effect_entry(), effect_entry("payload", ["payload"], (), ["mass"])]
     ),
-    "named, not adopted": made_verdict(NAMED, [effect_entry(adopted=False)]),
-    "class, not adopted": made_verdict(
+    "named, not adopted": make_verdict(NAMED, [effect_entry(adopted=False)]),
+    "class, not adopted": make_verdict(
         CLASS, [effect_entry(alternatives=["joint_tilt"], adopted=False)]
     ),
-    "unexplained": made_verdict(
+    "unexplained": make_verdict(
         UNEXPLAINED, sets=[({"other": ["joint 2"]}, 0.9), ({}, 0.1)]
     ),
-    "not_testable": made_verdict(NOT_TESTABLE, sets=[({}, 1.0)]),
-    "fault of the data": made_verdict(
+    "not_testable": make_verdict(NOT_TESTABLE, sets=[({}, 1.0)]),
+    "fault of the data": make_verdict(
         NAMED,
         [from_document(DataFault, DATA["fault"], "made up")],
         ["the fit of the final model did not converge"],
     ),
-    "noise not known": made_verdict(
+    "noise not known": make_verdict(
         ADEQUATE, noise="residual", warnings=["no repeats and no declared noise"]
     ),
-    "hundreds of parameters": made_verdict(
+    "hundreds of parameters": make_verdict(
         SEVERAL, [effect_entry("transmission_harmonic", HARMONICS, range(1, 7), WAVES)]
     ),
-    "with a remainder": made_verdict(
+    "with a remainder": make_verdict(
         NAMED, [effect_entry()], outside=3, remainder=REMAINDER
     ),
-    "poses outside the range": made_verdict(NAMED, [effect_entry()], outside=3),
+    "poses outside the range": make_verdict(NAMED, [effect_entry()], outside=3),
 }
 
 

@@ -82,7 +82,7 @@ class Rows:
         return replace(self, residual=self.expected + noise)
 
 
-def made_rows(
+def make_rows(
     seed=0, poses=8, size=(3, 9), declared=4, candidates=6, joints=2, prior=10.0
 ):
     """Rows of poses of unequal sizes, in no order."""
@@ -104,7 +104,7 @@ def made_rows(
     return rows.drawn(rng)
 
 
-def made_unit(
+def make_term(
     mechanism,
     location,
     columns,
@@ -137,7 +137,7 @@ def made_unit(
     )
 
 
-def made_problem(rows, units, settings=None, tau=None):
+def make_problem(rows, units, settings=None, tau=None):
     """The problem of some rows, at the engine's own sizes of the pose error by default,
     and its products."""
     settings = settings or Settings()

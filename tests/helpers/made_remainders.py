@@ -2,7 +2,7 @@
 inputs of a regression to find it."""
 
 import numpy as np
-from made_folders import made_folder, made_table
+from made_folders import make_folder, make_table
 
 from elastocal.campaigns.simulation import Plan
 from elastocal.loop.whole import cases_in
@@ -36,7 +36,7 @@ def smoothly_wrong_folder(
 ):
     """A campaign's folder of an unloaded robot that misses its poses by `smooth`."""
     plan = Plan(("6DoF",), poses, 100.0, (0,), (0.0, 0.0, 0.0), 1, 0, NOISE_M, NOISE_M)
-    table = made_table(robot, name, seed, plan)
+    table = make_table(robot, name, seed, plan)
     off = smooth(
         np.column_stack([table[f"q{joint}"] for joint in range(1, robot.joints + 1)])
     )
@@ -53,7 +53,7 @@ def smoothly_wrong_folder(
         "compliance": "nominal",
         "noise": {"position_m": NOISE_M},
     } | changes
-    return made_folder(folder, robot, name, table=table, **changes)
+    return make_folder(folder, robot, name, table=table, **changes)
 
 
 def smoothly_wrong_cases(folder, robot, robots_folder, **changes):

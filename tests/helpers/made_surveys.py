@@ -11,7 +11,7 @@ from elastocal.campaigns.campaign import Target
 OPEN = Cell((), None, 0.1)
 
 
-def made_survey(name="ur10", measured="position", unknown_base=True):
+def make_survey(name="ur10", measured="position", unknown_base=True):
     """One reflector at an unknown place of the end effector."""
     robot = analysed(name)
     target = Target("T", robot.chain.end_effector.name, None)
@@ -20,7 +20,7 @@ def made_survey(name="ur10", measured="position", unknown_base=True):
     )
 
 
-def made_rows(count=40, numbers=6, parameters=5, seed=1):
+def make_rows(count=40, numbers=6, parameters=5, seed=1):
     """Rows of candidates of unlike size and direction."""
     draws = np.random.default_rng(seed)
     return (
@@ -29,6 +29,6 @@ def made_rows(count=40, numbers=6, parameters=5, seed=1):
     ).astype(np.float32)
 
 
-def made_candidates(survey, count=200, cell=OPEN):
+def make_candidates(survey, count=200, cell=OPEN):
     """Configurations that a cell allows."""
     return find_allowed_candidates(survey, cell, count, 1)

@@ -10,7 +10,7 @@ ANGLES = np.random.default_rng(6).uniform(-3, 3, (4, 6))
 RAIL = np.array([[0.25], [-1.5], [0.0], [3.125]])
 
 
-def made_targets(controller, rail=False, stated=""):
+def make_targets(controller, rail=False, stated=""):
     """Four targets of six axes, with `rail` on a rail before them."""
     angles = np.hstack([RAIL, ANGLES]) if rail else ANGLES
     prismatic = (True,) * rail + (False,) * 6

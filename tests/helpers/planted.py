@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from synthetic import (
     NOISE,
-    made_estimate,
-    made_model,
-    made_states,
-    seen_exactly,
-    with_noise,
+    add_noise,
+    make_estimate,
+    make_model,
+    make_states,
+    observe_exactly,
 )
 
 from elastocal.campaigns.campaign import Target
@@ -41,7 +41,7 @@ class Planted:
 
 def two_loads_a_pose(joints, poses, seed, force=800.0):
     """States of `poses` poses, each unloaded and under a load of its own."""
-    states = made_states(joints, 2 * poses, seed, force)
+    states = make_states(joints, 2 * poses, seed, force)
     wrench = states.wrench * (np.arange(2 * poses) % 2)[:, None]
     pose = np.arange(2 * poses) // 2
     return replace(
@@ -67,21 +67,21 @@ def planted(
         "identified": True,
         "compliance": robot.compliance,
     } | model
-    declared = made_model(robot.chain, targets, **settings)
+    declared = make_model(robot.chain, targets, **settings)
     states = (
         two_loads_a_pose(declared.sites.joints, poses, (5, seed))
         if states is None
         else states
     )
     candidates = candidates_on(declared.sites)
-    start = made_estimate(declared, seed=seed)
+    start = make_estimate(declared, seed=seed)
     if declared.identifies_compliance:
         start = replace(start, coefficients=(robot.compliance, *start.coefficients[1:]))
     added = [candidates[key] for key in sizes]
     true = start.with_effects(added)
     for number, size in enumerate(sizes.values()):
         true.coefficients[len(start.coefficients) + number][:] = size
-    seen = seen_exactly(declared.with_effects(added), true, states)
-    seen = with_noise(seen, np.random.default_rng((6, seed)))
+    seen = observe_exactly(declared.with_effects(added), true, states)
+    seen = add_noise(seen, np.random.default_rng((6, seed)))
     noise = replace(NOISE, joint_rad=np.zeros(declared.sites.joints))
     return Planted(fit_model(declared, seen, noise, start), seen, candidates)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import yaml
-from made_folders import made_folder
+from made_folders import make_folder
 
 from elastocal.campaigns.simulation import Plan, draw_measurements
 from elastocal.mechanics.robot_file import robot_from_document
@@ -48,6 +48,6 @@ def service_arm_folder(folder, seed, poses=34, noise_m=3e-4):
         "declared": ["joint_offset", "link_geometry"],
         "noise": {"position_m": noise_m},
     }
-    made_folder(folder, true, "service", table=table, **changes)
+    make_folder(folder, true, "service", table=table, **changes)
     (folder / "robot.yaml").write_text(yaml.safe_dump(SERVICE_ARM), encoding="utf-8")
     return folder

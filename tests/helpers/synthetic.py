@@ -30,7 +30,7 @@ from elastocal.mechanics.sites import sites_of
 NOISE = Noise("declared", 60e-6, 60e-6, np.zeros(6))
 
 
-def made_states(joints, count, seed=0, force=500.0, span=1.2, sessions=1, repeats=1):
+def make_states(joints, count, seed=0, force=500.0, span=1.2, sessions=1, repeats=1):
     """States anywhere, each under a load of its own, with everything that an effect may
     ask for."""
     rng = np.random.default_rng(seed)
@@ -69,7 +69,7 @@ def equipped(holder):
     )
 
 
-def made_model(
+def make_model(
     holder,
     targets=None,
     rows=3,
@@ -103,7 +103,7 @@ def made_model(
     )
 
 
-def made_estimate(model, sessions=(0,), seed=0, size=0.3):
+def make_estimate(model, sessions=(0,), seed=0, size=0.3):
     """Frames and targets anywhere; every parameter of an effect at up to `size` times
     its plausible size."""
     rng = np.random.default_rng(seed)
@@ -147,7 +147,7 @@ def made_estimate(model, sessions=(0,), seed=0, size=0.3):
     )
 
 
-def seen_exactly(model, estimate, states):
+def observe_exactly(model, estimate, states):
     """Every target in every state, read without noise in the frame of its session."""
     state = np.repeat(np.arange(len(states)), len(model.targets))
     target = np.tile(np.arange(len(model.targets)), len(states))
@@ -164,7 +164,7 @@ def seen_exactly(model, estimate, states):
     )
 
 
-def with_noise(observations, rng, position_m=60e-6, orientation_rad=60e-6):
+def add_noise(observations, rng, position_m=60e-6, orientation_rad=60e-6):
     """The same observations, each component of each wrong by itself."""
     position = observations.position + position_m * rng.standard_normal(
         observations.position.shape
@@ -178,7 +178,7 @@ def with_noise(observations, rng, position_m=60e-6, orientation_rad=60e-6):
     return replace(observations, position=position, rotation=rotation)
 
 
-def measurements_of(pose, joint_angles, position, **others):
+def fill_measurements(pose, joint_angles, position, **others):
     """Measurements without loads and repeats, of one target, and with nothing that is
     optional, but for what is given."""
     none = np.zeros(len(pose), np.int32)
@@ -197,7 +197,7 @@ def measurements_of(pose, joint_angles, position, **others):
     )
 
 
-def made_measurements(
+def make_measurements(
     model, rng, poses_count, repeats, sensor_m, joint_rad, sensor_rad=0.0
 ):
     """Repeats of poses in base axes: the joints come to rest anew at each approach, the
@@ -224,7 +224,7 @@ def made_measurements(
     turned = Rotation.from_rotvec(
         sensor_rad * rng.standard_normal((len(pose), 3))
     ) * Rotation.from_matrix(rotation)
-    return measurements_of(
+    return fill_measurements(
         pose=pose,
         repeat=repeat,
         target=target,
@@ -243,7 +243,7 @@ def conditions_on(holder, states, compliance=None):
     return conditions_of(sites, compliance, states)
 
 
-def candidate_on(holder, key):
+def find_candidate(holder, key):
     """One candidate of the catalogue, on a chain or a robot."""
     return candidates_on(equipped(holder))[key]
 

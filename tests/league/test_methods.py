@@ -3,8 +3,8 @@ seen."""
 
 import numpy as np
 import pytest
-from made_folders import made_folder, made_table
-from made_leagues import made_data_set
+from made_folders import make_folder, make_table
+from made_leagues import make_data_set
 
 from elastocal.campaigns.campaign import build_measurements
 from elastocal.diagnosis.diagnose import diagnose
@@ -32,7 +32,7 @@ from elastocal_proof.league.schemas import ENTRIES, FOLDS
 
 @pytest.fixture(scope="module")
 def data(kuka, config_folder, tmp_path_factory):
-    return made_data_set(
+    return make_data_set(
         tmp_path_factory.mktemp("data_set"), kuka, config_folder / "robots"
     )
 
@@ -81,7 +81,7 @@ def test_the_poses_of_a_fold_are_either_trained_on_or_held_out(data, split):
 def test_another_session_is_tested_as_a_whole_by_all_training_poses(
     data, kuka, config_folder, tmp_path
 ):
-    other = made_data_set(
+    other = make_data_set(
         tmp_path, kuka, config_folder / "robots", poses=8, seed=3, name="other"
     )
     ((fold, training, tests),) = split_rounds("session", data, [other])
@@ -161,7 +161,7 @@ def test_each_observation_has_its_pose_target_and_residual(data, tmp_path):
 @pytest.fixture(scope="module")
 def diagnosed(kuka, config_folder, tmp_path_factory):
     folder = tmp_path_factory.mktemp("diagnosed") / "made"
-    made_folder(folder, kuka, table=made_table(kuka, "made", offset_of_joint_3=1e-3))
+    make_folder(folder, kuka, table=make_table(kuka, "made", offset_of_joint_3=1e-3))
     case, _ = cases_in(folder, config_folder / "robots")
     return case, diagnose(case, Settings(), 1)
 

@@ -3,7 +3,7 @@ each in words that a stranger knows."""
 
 import pandas as pd
 import pytest
-from made_leagues import made_results
+from made_leagues import make_results
 
 from elastocal_proof.league.methods import Method
 from elastocal_proof.league.table import compare_methods, format_league_page
@@ -70,7 +70,7 @@ def test_improbable_mechanisms_are_left_out(page):
 
 
 def test_the_page_says_first_how_often_a_diagnosis_leads_and_how_surely(page):
-    results = made_results()
+    results = make_results()
     assert (
         "has the smallest RMS error in 6 of 6 rows, in 6 with 95 % confidence" in page
     )

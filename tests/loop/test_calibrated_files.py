@@ -16,7 +16,7 @@ import pandas as pd
 import pytest
 from analysed_robots import ROBOTS
 from certified import ENGINE
-from made_calibrated import USUAL, made_calibrated
+from made_calibrated import USUAL, make_calibrated_robot
 from made_remainders import NOISE_M
 from support import refused
 
@@ -194,7 +194,7 @@ def states(fanuc):
 def test_each_line_of_the_budget_is_what_the_robot_misses_without_that_effect(
     fanuc, states
 ):
-    calibrated = made_calibrated(fanuc, *USUAL)
+    calibrated = make_calibrated_robot(fanuc, *USUAL)
     found, (whole, _) = (
         error_budget(calibrated, *states),
         predict_poses(calibrated, *states),
@@ -225,7 +225,7 @@ def test_each_line_of_the_budget_is_what_the_robot_misses_without_that_effect(
 
 
 def test_springs_of_the_robot_file_cost_what_they_give_under_load(fanuc, states):
-    calibrated = made_calibrated(fanuc, "joint_offset@2", identified=False)
+    calibrated = make_calibrated_robot(fanuc, "joint_offset@2", identified=False)
     rigid = replace(
         calibrated, model=replace(calibrated.model, nominal_compliance=np.zeros(6))
     )

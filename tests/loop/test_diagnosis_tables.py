@@ -6,9 +6,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from made_folders import made_folder
+from made_folders import make_folder
 from support import chain_of, changed
-from synthetic import NOISE, made_estimate, made_model
+from synthetic import NOISE, make_estimate, make_model
 
 from elastocal.campaigns.campaign import Target, tabulate_measurements
 from elastocal.campaigns.campaign_folder import read_campaign_folder
@@ -46,7 +46,7 @@ TARGETS = (
 def test_a_case_is_the_folder_and_a_test_may_be_of_another_campaign(
     kuka, config_folder, tmp_path
 ):
-    folder = made_folder(tmp_path / "made", kuka, declared=["joint_offset"])
+    folder = make_folder(tmp_path / "made", kuka, declared=["joint_offset"])
     descriptions, training, _ = load_campaign(
         read_campaign_folder(folder, config_folder / "robots")
     )
@@ -83,7 +83,7 @@ def test_models_and_estimates_come_back_from_json_and_parameters_from_their_tabl
     chain = chain_of(
         "Tz(0.4) Rz(q1) Tx(0.1) Ry(q2) Tx(0.7) [elbow] Ry(q3) Tx(0.6) [hand]"
     )
-    declared = made_model(
+    declared = make_model(
         chain, TARGETS if settings["fitted_frames"] else TARGETS[:1], **settings
     )
     candidates = candidates_on(declared.sites)
@@ -98,7 +98,7 @@ def test_models_and_estimates_come_back_from_json_and_parameters_from_their_tabl
         for each in (candidates[key] for key in keys)
     ]
     model = declared.with_effects(sized)
-    estimate = made_estimate(
+    estimate = make_estimate(
         model, sessions=(0, 7) if settings["fitted_frames"] else (3,), seed=1
     )
     listed = list_parameters(model, estimate)

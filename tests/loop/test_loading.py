@@ -1,7 +1,7 @@
 """What a campaign leaves out is written down for the steps that follow."""
 
 import yaml
-from made_folders import made_folder
+from made_folders import make_folder
 from support import refused
 
 from elastocal.campaigns.campaign_folder import read_campaign_folder
@@ -10,7 +10,7 @@ from elastocal.remainder.regressions import REGRESSIONS
 
 
 def test_descriptions_hold_what_a_campaign_may_leave_out(kuka, config_folder, tmp_path):
-    folder = made_folder(tmp_path / "campaign", kuka)
+    folder = make_folder(tmp_path / "campaign", kuka)
     path = folder / "campaign.yaml"
     document = yaml.safe_load(path.read_text(encoding="utf-8"))
     for key in ("declared", "compliance", "holdout"):
@@ -31,7 +31,7 @@ def test_descriptions_hold_what_a_campaign_may_leave_out(kuka, config_folder, tm
 def test_a_regression_that_neither_the_package_nor_a_plug_in_has_is_refused(
     kuka, config_folder, tmp_path
 ):
-    folder = made_folder(tmp_path / "campaign", kuka)
+    folder = make_folder(tmp_path / "campaign", kuka)
     path = folder / "campaign.yaml"
     document = yaml.safe_load(path.read_text(encoding="utf-8"))
     document["remainder"] = "tea_leaves"

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 from analysed_robots import ROBOTS
-from made_folders import made_folder, made_table
+from made_folders import make_folder, make_table
 from small_data import service_arm_folder
 
 from elastocal.loop.overview import overview
@@ -12,7 +12,7 @@ from elastocal.loop.overview import overview
 
 @pytest.fixture(scope="module")
 def found(kuka, tmp_path_factory):
-    return overview(made_folder(tmp_path_factory.mktemp("o") / "made", kuka), ROBOTS)
+    return overview(make_folder(tmp_path_factory.mktemp("o") / "made", kuka), ROBOTS)
 
 
 def said(found, words):
@@ -41,11 +41,11 @@ def test_what_was_read_and_can_be_tested_stands_in_the_table_and_what_is_little_
 
 def test_a_compliance_that_comes_out_negative_is_said(kuka, tmp_path):
     """What the declared model lacks hides behind it, and behind all others."""
-    table = made_table(
+    table = make_table(
         replace(kuka, compliance=kuka.compliance * [1.0, 1.0, -1.0, 1.0, 1.0, 1.0]),
         "made",
     )
-    found = overview(made_folder(tmp_path / "made", kuka, table=table), ROBOTS)
+    found = overview(make_folder(tmp_path / "made", kuka, table=table), ROBOTS)
     assert said(found, "the compliance of joint 3 comes out negative")
 
 

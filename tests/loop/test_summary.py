@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from made_loop_tables import effect_entry, made_verdict
+from made_loop_tables import effect_entry, make_verdict
 
 from elastocal.loop.summary import campaign_rows
 
@@ -14,7 +14,7 @@ def verdict(word, *effects):
     missing = [
         replace(effect_entry(name), joints=tuple(joints)) for name, joints in effects
     ]
-    return made_verdict(word, missing)
+    return make_verdict(word, missing)
 
 
 def errors(before, after=None, pose=None, repeat=None, session=0):

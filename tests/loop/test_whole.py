@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from analysed_robots import ROBOTS
-from made_folders import PLAN, made_folder, made_table
+from made_folders import PLAN, make_folder, make_table
 from selected import slow_but
 from small_data import service_arm_folder
 
@@ -75,8 +75,8 @@ def in_order(table):
 
 def folder_of(path, robot, kind):
     change, plan, settings = KINDS[kind]
-    table = in_order(change(made_table(robot, "made", seed=3, plan=plan)))
-    return made_folder(path / "made", robot, table=table, **settings)
+    table = in_order(change(make_table(robot, "made", seed=3, plan=plan)))
+    return make_folder(path / "made", robot, table=table, **settings)
 
 
 @pytest.mark.parametrize("kind", slow_but(["several", "named"], KINDS))
@@ -132,7 +132,7 @@ def test_no_step_before_the_judgement_depends_on_held_out_measurements(kuka, tmp
             strict=True,
         )
     )
-    table = in_order(offset_and_harmonic(made_table(kuka, "made", seed=3, plan=USUAL)))
+    table = in_order(offset_and_harmonic(make_table(kuka, "made", seed=3, plan=USUAL)))
     mine = np.array(
         [(0, pose) in unseen or (1, pose) in unseen for pose in table["pose"]]
     )
@@ -144,7 +144,7 @@ def test_no_step_before_the_judgement_depends_on_held_out_measurements(kuka, tmp
         ("fx", 300.0 * (table["load"] != 0)),
     ):
         table[name] = table[name] + change * mine
-    spoilt_folder = made_folder(tmp_path / "spoilt" / "made", kuka, table=table)
+    spoilt_folder = make_folder(tmp_path / "spoilt" / "made", kuka, table=table)
     spoilt, spoilt_held_out = cases_in(spoilt_folder, ROBOTS)
     assert (
         np.abs(

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support import refused
-from synthetic import displacements, made_states
+from synthetic import displacements, make_states
 
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.importers import find_importer
@@ -88,7 +88,7 @@ def test_the_effect_displaces_each_joint_as_its_formula_says(import_example, kuk
     effect = import_example(examples("An effect")[0]).hoses
     assert isinstance(effect, Effect) and "k q^3" in effect.doc
     sites = sites_of(kuka)
-    states = made_states(6, 5)
+    states = make_states(6, 5)
     candidates = effect.candidates(sites)
     keys = [candidate.key for candidate in candidates]
     assert keys == [f"hoses@{joint}" for joint in range(1, 7)]

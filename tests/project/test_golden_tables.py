@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from made_blind_documents import PLAN, effect, frame, oracle, truth, verdict
-from made_leagues import made_entries
+from made_leagues import make_entries
 
 from elastocal.io.data_frames import write_csv
 from elastocal.random_streams import open_stream
@@ -158,7 +158,7 @@ def _moves(cases=8, poses=30, seed=2, reached=0.5):
 
 
 def _league():
-    pose = made_entries(1e-4, 40)["pose"].to_numpy()
+    pose = make_entries(1e-4, 40)["pose"].to_numpy()
     angles = np.random.default_rng(5).uniform(-1, 1, (pose.max() + 1, 3))[pose]
     measured = SimpleNamespace(
         session=np.zeros(len(pose), np.int32), pose=pose, joint_angles=angles
@@ -172,7 +172,7 @@ def _league():
         ("half", 1e-4, None),
         ("process", 1.2e-4, 1.2e-4),
     ):
-        results["one", "random", method] = made_entries(
+        results["one", "random", method] = make_entries(
             size, 40, len(method), std
         ).assign(fold=folds)
     found = pd.DataFrame(

@@ -11,7 +11,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from made_folders import made_folder
+from made_folders import make_folder
 
 import elastocal
 
@@ -153,7 +153,7 @@ def test_the_installed_pipeline_reads_a_campaign_in_the_working_directory(
 ):
     """A robot of config/robots; the first step runs, and what the others read is looked
     for: a diagnosis takes too long."""
-    made_folder(tmp_path / "cell", kuka)
+    make_folder(tmp_path / "cell", kuka)
     snakefile = installed / "share" / "elastocal" / "Snakefile"
     for target in (["results/loop/made/campaign.json"], ["diagnose", "-n", "-p"]):
         words = [

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_remainders import SMOOTH_M, made_inputs, smoothly_wrong_cases
-from synthetic import made_estimate, made_model, made_states, seen_exactly
+from synthetic import make_estimate, make_model, make_states, observe_exactly
 
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.least_squares import fit_model
@@ -46,9 +46,9 @@ def made(kuka, config_folder, tmp_path_factory):
 
 @pytest.fixture
 def seen(fanuc):
-    model = made_model(fanuc.chain, rows=3, compliance=fanuc.compliance)
-    estimate = made_estimate(model, (0,), seed=3)
-    return model, estimate, seen_exactly(model, estimate, made_states(6, 9, seed=4))
+    model = make_model(fanuc.chain, rows=3, compliance=fanuc.compliance)
+    estimate = make_estimate(model, (0,), seed=3)
+    return model, estimate, observe_exactly(model, estimate, make_states(6, 9, seed=4))
 
 
 def timed(observations):

@@ -13,7 +13,7 @@ from made_loop_tables import (
     effect_entry,
     experiment_rows,
     facts_of,
-    made_verdict,
+    make_verdict,
     plainly,
     step_rows,
 )
@@ -64,7 +64,7 @@ def test_what_to_do_follows_from_the_verdict_and_from_the_gain():
 
     ends = ((0.15, 0.32), (-0.3, -0.1), (-0.1, 0.3))
     gained, lost, unsure = (
-        now(made_verdict(NAMED, [effect_entry()], reduction=each))[0] for each in ends
+        now(make_verdict(NAMED, [effect_entry()], reduction=each))[0] for each in ends
     )
     assert (
         gained.startswith("Use the corrected model")
@@ -119,7 +119,7 @@ def test_causes_are_those_found_and_what_else_is_probable_with_the_probabilities
         ({}, 0.04),
     ]
     rows = cause_rows(
-        made_verdict(NAMED, [replace(effect_entry(), probability=0.6)], sets=sets)
+        make_verdict(NAMED, [replace(effect_entry(), probability=0.6)], sets=sets)
     )
     assert [(row["name"], plainly(row["words"]), row["cost"]) for row in rows] == [
         ("Lost motion (backlash) of joint 3", "60 %", "0.085 mm"),

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 from drawn_figures import empty_pictures
-from made_surveys import made_candidates, made_survey
+from made_surveys import make_candidates, make_survey
 
 from elastocal.application.planning.plan import choose_plan
 from elastocal.application.planning.sheet import build_sheet
@@ -15,8 +15,8 @@ from elastocal.report.typesetting import compile_document
 
 
 def made():
-    survey = made_survey()
-    plan = choose_plan(survey, made_candidates(survey, 300), 14, 4, 1)
+    survey = make_survey()
+    plan = choose_plan(survey, make_candidates(survey, 300), 14, 4, 1)
     return survey, plan, build_sheet(survey, plan)
 
 

@@ -1,5 +1,5 @@
-"""What the report of the study states follows from its tables, with errors and
-intervals; the report and its page show it."""
+"""The statements in the report of the study follow from its tables, with errors and
+intervals, and the report and its page show them."""
 
 import json
 import re
@@ -63,13 +63,13 @@ def facts(**changed):
         "path_m": 0.5,
         "cutting_N": 500,
     }
-    found = collect_study_facts(
+    study_facts = collect_study_facts(
         {name: table(name) for name in FILES} | changed,
         names,
         ["kuka"],
         settings | {"stated": stated},
     )
-    return found | {
+    return study_facts | {
         "citation": {
             "authors": "the developers",
             "date": "2026-11-25",
@@ -166,7 +166,7 @@ ROWS = {
 @pytest.mark.parametrize("name", ROWS)
 def test_rows_of_tables_have_their_values_with_errors_and_intervals(name):
     assert EVERY[name][0][: len(ROWS[name])] == ROWS[name]
-    assert len({len(each) for each in EVERY[name]}) == 1
+    assert len({len(row) for row in EVERY[name]}) == 1
 
 
 def test_figures_that_differ_are_those_below_the_level_after_correction():
@@ -178,8 +178,8 @@ def test_figures_that_differ_are_those_below_the_level_after_correction():
     changed = table("comparison")
     changed.loc[changed.p_value < 0.05, "p_holm"] = 0.01
     changed.loc[changed.table == "2", "p_value"] = np.nan
-    found = facts(comparison=changed)
-    assert (found["differ"], found["one_set"][0][-1]) == ("1", "fitted")
+    changed_facts = facts(comparison=changed)
+    assert (changed_facts["differ"], changed_facts["one_set"][0][-1]) == ("1", "fitted")
 
 
 def test_the_page_has_the_rows_of_each_table():
@@ -189,17 +189,14 @@ def test_the_page_has_the_rows_of_each_table():
             load_template("study_tables.md").render(stated),
             flags=re.MULTILINE,
         )
-        rows = {
-            title: re.findall(r"^\| (.*) \|$", text, re.MULTILINE)
-            for title, text in zip(parts[::2], parts[1::2], strict=True)
-        }
-        return {
-            title: [line.split(" | ") for line in lines]
-            for title, lines in rows.items()
-        }
+        tables = {}
+        for title, text in zip(parts[::2], parts[1::2], strict=True):
+            lines = re.findall(r"^\| (.*) \|$", text, re.MULTILINE)
+            tables[title] = [line.split(" | ") for line in lines]
+        return tables
 
-    found = tables_of(EVERY)
-    assert [len(rows) - 1 for rows in found.values()] == [
+    page_tables = tables_of(EVERY)
+    assert [len(rows) - 1 for rows in page_tables.values()] == [
         len(EVERY[name])
         for name in (
             *(
@@ -215,8 +212,10 @@ def test_the_page_has_the_rows_of_each_table():
             ),
         )
     ]
-    assert found["Random configurations for an accuracy"][1] == EVERY["needed"][0]
-    assert all(len(row) == len(rows[0]) for rows in found.values() for row in rows)
+    assert page_tables["Random configurations for an accuracy"][1] == EVERY["needed"][0]
+    assert all(
+        len(row) == len(rows[0]) for rows in page_tables.values() for row in rows
+    )
 
 
 @pytest.fixture(scope="module")

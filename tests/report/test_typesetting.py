@@ -52,7 +52,7 @@ def test_a_document_reads_its_data_and_pictures_as_they_were_given(written, tmp_
         ("unknown.typ", {}, [], FileNotFoundError, "unknown.typ"),
     ],
 )
-def test_what_cannot_be_compiled_leaves_the_earlier_pdf_as_it_was(
+def test_a_document_that_cannot_be_compiled_leaves_the_earlier_pdf_unchanged(
     written, document, data, pictures, error, message
 ):
     (written / "report.pdf").write_text("earlier", encoding="utf-8")
@@ -69,11 +69,11 @@ def test_a_template_has_paragraphs_and_rows_and_keeps_what_may_not_break(
     made += "## rows\na ¦ {{ b }} ¦\n{# no #}\n\nc ¦ d ¦ e\n"
     (tmp_path / "made.txt").write_text(made, encoding="utf-8")
     monkeypatch.setattr(resources, "files", {"elastocal.report": tmp_path}.__getitem__)
-    said = render_sentences("made.txt", FILTERS, b="x")
-    assert said == {
+    sections = render_sentences("made.txt", FILTERS, b="x")
+    assert sections == {
         "one": ["A >\u00a099\u00a0% line."] * 2,
         "rows": [["a", "x", ""], ["c", "d", "e"]],
     }
-    # What a template shows and nobody gave is an error and no hole.
+    # A fact that a template shows but nobody passed is an error, not a gap.
     with pytest.raises(UndefinedError, match="b"):
         render_sentences("made.txt", FILTERS)

@@ -77,8 +77,8 @@ FAULTS = {
 def test_fault_is_one_line_that_names_file_key_and_what_is_allowed(
     config, config_folder, fault
 ):
-    path, value, key, words = FAULTS[fault]
-    with refused("study.yaml", f"{key}:", *words):
+    path, value, key, allowed = FAULTS[fault]
+    with refused("study.yaml", f"{key}:", *allowed):
         check_study(changed(config, path, value), config_folder, "study.yaml")
 
 
@@ -110,10 +110,10 @@ def other_folder(tmp_path):
 
 @pytest.fixture
 def other_config(config):
-    other = deepcopy(config) | {"robots": ["arm"], "strategies": ["plain"]}
-    other["tables"]["classical_strategy"] = "plain"
-    other["questions"]["point_sets"] = {"B": ["B"]}
-    return other
+    changed_config = deepcopy(config) | {"robots": ["arm"], "strategies": ["plain"]}
+    changed_config["tables"]["classical_strategy"] = "plain"
+    changed_config["questions"]["point_sets"] = {"B": ["B"]}
+    return changed_config
 
 
 FAULTY_FILES = {
@@ -137,7 +137,8 @@ FAULTY_FILES = {
     ),
     "no compliances": (
         "robots/arm.yaml",
-        "name: arm\nchain: Rz(q1) Tx(1) [A] Ry(q2) Tx(1) [B]\njoint_limits_deg: [[-180, 180], [-90, 90]]\n",
+        "name: arm\nchain: Rz(q1) Tx(1) [A] Ry(q2) Tx(1) [B]\n"
+        "joint_limits_deg: [[-180, 180], [-90, 90]]\n",
         "compliance_urad_per_Nm",
         ["nothing", "simulate"],
     ),
@@ -148,9 +149,9 @@ FAULTY_FILES = {
 def test_fault_in_a_named_file_is_one_line_that_names_that_file(
     other_config, other_folder, fault
 ):
-    name, text, key, words = FAULTY_FILES[fault]
+    name, text, key, allowed = FAULTY_FILES[fault]
     (other_folder / name).write_text(text)
-    with refused((other_folder / name).as_posix(), key, *words):
+    with refused((other_folder / name).as_posix(), key, *allowed):
         check_study(other_config, other_folder, "study.yaml")
 
 
@@ -167,7 +168,7 @@ def test_two_strategies_of_one_name_are_refused(other_config, other_folder):
         check_study(both, other_folder)
 
 
-def test_what_the_command_line_changes_is_read_as_in_the_file(config, config_folder):
+def test_values_on_the_command_line_are_read_as_in_the_file(config, config_folder):
     changed = override_entries(
         config,
         ["seed=7", "evaluation={studies: 3}", "interpretations={offset_frame: tool}"],

@@ -41,8 +41,8 @@ NAMES = [
     "3-6DoF-after-2DoF",
     "5-6DoF-after-4DoF",
 ]
-# Not the paper's, but allowed: a later stage that holds nothing need not make the
-# earlier ones superfluous.
+# Allowed, though not in the paper: a later stage that fixes no joint need not supersede
+# the earlier ones.
 REFINED = Strategy(
     "3DoF after 6DoF", (Stage(("6DoF",), tuple(range(6))), Stage(("3DoF",), (0, 1, 2)))
 )
@@ -146,20 +146,16 @@ def test_estimates_of_every_prefix_are_those_of_a_plain_loop(
 ):
     strategy = strategy_called(name)
     data = data_of(key, rows, robots)
-    found = estimate_compliance(strategy, data.measurements(), 6)[0]
-    # One position says two things about three joints that meet in a wrist, so one
+    compliance = estimate_compliance(strategy, data.measurements(), 6)[0]
+    # One position gives two equations for three joints that meet in a wrist, so one
     # configuration is not enough.
     for k, s in product(range(1 if rows == 6 else 2, CONFIGURATIONS + 1), range(SETS)):
-        expected = plain(
-            strategy,
-            *(
-                {name: part[s, :k] for name, part in all_.items()}
-                for all_ in (data.matrix, data.measured)
-            ),
-        )
+        matrix = {name: values[s, :k] for name, values in data.matrix.items()}
+        measured = {name: values[s, :k] for name, values in data.measured.items()}
+        expected = plain(strategy, matrix, measured)
         tolerance = {6: 1e-9, 3: 1e-8}[rows]
         np.testing.assert_allclose(
-            found[k - 1, :, s],
+            compliance[k - 1, :, s],
             expected,
             rtol=0,
             atol=tolerance * np.abs(expected).max(),
@@ -188,32 +184,33 @@ def test_first_solvable_length_counts_measurements_against_unknowns_of_a_stage(
     )
 
 
-def test_a_prefix_that_has_measurements_enough_but_not_the_right_ones_is_undetermined(
+def test_a_prefix_with_enough_measurements_but_not_the_right_ones_is_undetermined(
     robots, strategies
 ):
-    # One position of the end-effector cannot tell three joints that meet in a wrist
-    # apart.
+    # One position of the end-effector cannot distinguish three joints that meet in a
+    # wrist.
     strategy = strategies["4-6DoF-after-3DoF"]
     measurements = data_of("kuka", 3, robots).measurements()
     compliance, triangles = estimate_compliance(strategy, measurements, 6)
     unknown = find_undetermined_prefixes(strategy, 3, triangles)
     assert unknown[0].all() and not unknown[1:].any()
-    # Nor are its compliances rounding over rounding where no condition is asked for.
+    # Its compliances are NaN even if nobody asks for the condition number; they would be
+    # quotients of rounding errors.
     assert np.isnan(compliance[0, 3:]).all()
 
 
-def test_undetermined_are_the_prefixes_beyond_the_largest_condition():
+def test_prefixes_above_the_largest_condition_number_are_undetermined():
     rng = np.random.default_rng(5)
     strategy = Strategy("A", (Stage(("A",), (0, 1, 2)),))
     sets = 200
-    # The third column is the first but for parts from 1e-4 to 1e-9, on either side of
-    # the largest condition.
+    # The third column differs from the first by relative amounts from 1e-4 to 1e-9, on
+    # both sides of the largest condition number.
     matrix = rng.standard_normal((6, 3, 2, sets))
     matrix[:, 2] = matrix[:, 0] + np.logspace(-9, -4, sets) * matrix[:, 2]
     triangles = estimate_compliance(
         strategy, {"A": Measurements(matrix, np.zeros((6, 2, sets)))}, 3
     )[1]
-    found = find_undetermined_prefixes(strategy, 6, triangles)
+    undetermined = find_undetermined_prefixes(strategy, 6, triangles)
     for length in (1, 2):
         conditions = np.array(
             [
@@ -225,12 +222,12 @@ def test_undetermined_are_the_prefixes_beyond_the_largest_condition():
         )
         clear = np.abs(np.log(conditions / MAX_CONDITION_NUMBER)) > 0.1
         np.testing.assert_array_equal(
-            found[length - 1][clear], (conditions > MAX_CONDITION_NUMBER)[clear]
+            undetermined[length - 1][clear], (conditions > MAX_CONDITION_NUMBER)[clear]
         )
-        assert 0 < found[length - 1].sum() < sets
+        assert 0 < undetermined[length - 1].sum() < sets
 
 
-def test_nothing_is_identified_before_anything_loads_the_robot_and_everything_after(
+def test_compliances_are_identified_from_the_first_loaded_configuration_on(
     kuka, strategies
 ):
     (experiments,) = experiments_of(kuka, sets=2)
@@ -254,11 +251,11 @@ def test_regressors_are_those_of_equation_10_by_pinocchio(at, rows):
         unpack_experiments(block), robot.chain, ("elbow", "flange"), rows, at
     )
     assert set(regressors) == {"elbow", "flange"}
-    for name, found in regressors.items():
-        assert found.shape == (rows, 7, 3, 2)
+    for name, matrix in regressors.items():
+        assert matrix.shape == (rows, 7, 3, 2)
         expected = pinocchio_regressors(robot.chain, block, name, at, rows).reshape(
             2, 3, rows, 7
         )
         np.testing.assert_allclose(
-            found, expected.transpose(2, 3, 1, 0), rtol=0, atol=1e-9
+            matrix, expected.transpose(2, 3, 1, 0), rtol=0, atol=1e-9
         )

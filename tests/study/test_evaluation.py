@@ -67,10 +67,10 @@ def blocks_of(estimates, weights, *cuts):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_averages_are_those_written_out_whatever_the_blocks(
+def test_averages_equal_explicit_ones_for_any_blocks(
     judge, estimates, weights, counts, method
 ):
-    found = average_estimates(
+    averages = average_estimates(
         iter(blocks_of(estimates, weights, 1, 20, 21)), judge, method, counts
     )
     for replicate in (0, 1, REPLICATES):
@@ -79,27 +79,27 @@ def test_averages_are_those_written_out_whatever_the_blocks(
             "stiffness": lambda drawn: 1 / (1 / drawn).mean(axis=0),
             "compliance": lambda drawn: drawn.mean(axis=0),
         }[method](drawn)
-        np.testing.assert_allclose(found.compliance[replicate], expected, rtol=1e-12)
+        np.testing.assert_allclose(averages.compliance[replicate], expected, rtol=1e-12)
         tests = counts[replicate].astype(int)
         deviation = np.repeat(
             compute_position_errors(judge, expected), tests, axis=1
         ).mean(axis=1)
         np.testing.assert_allclose(
-            found.initial_deviation[replicate],
+            averages.initial_deviation[replicate],
             np.repeat(judge.initial_errors, tests).mean(),
             rtol=1e-12,
         )
-        np.testing.assert_allclose(found.deviation[replicate], deviation, rtol=1e-9)
+        np.testing.assert_allclose(averages.deviation[replicate], deviation, rtol=1e-9)
     relative = estimates / judge.reference
     np.testing.assert_allclose(
-        found.relative_spread,
+        averages.relative_spread,
         (relative.std(axis=0) / relative.mean(axis=0)).max(axis=-1),
         rtol=1e-9,
     )
-    assert (found.nonpositive_share == 0).all()
+    assert (averages.nonpositive_share == 0).all()
 
 
-def test_share_of_nonpositive_compliances_counts_data_sets_and_takes_trust_away(
+def test_nonpositive_compliances_are_counted_by_data_sets_and_make_a_length_untrustworthy(
     judge, estimates, weights, counts
 ):
     spoiled = estimates.copy()
@@ -139,7 +139,7 @@ def test_metrics_are_equations_13_and_14_of_the_averages(
     np.testing.assert_array_equal(table["deviation"], averages.deviation[0])
 
 
-def test_replicates_are_every_one_but_the_first_and_their_spread_is_the_standard_error(
+def test_replicates_start_after_the_first_and_their_spread_is_the_standard_error(
     judge, estimates, weights, counts
 ):
     averages = average_estimates(
@@ -173,17 +173,21 @@ def test_replicates_are_every_one_but_the_first_and_their_spread_is_the_standard
         (0.25, (0.5, 0.75, -1.0), np.inf, (6, 9, 12)),
     ],
 )
-def test_a_length_comes_with_the_spread_of_replicates_that_go_on_beyond_their_curves(
+def test_the_error_of_a_length_is_the_spread_of_extrapolated_replicates(
     limit, ends, length, lengths
 ):
-    """As one over the length: from 0.5, 0.75 and 1 at length 3 to 0.25."""
+    """Curves are extrapolated as one over the length: from 0.5, 0.75 and 1 at length 3 to
+    0.25."""
     replicates = np.column_stack([[3.0, 3.0, 2.0], [0.9, 2.6, 0.9], ends])
-    found, error = find_length_with_error(np.array([3.0, 0.9, 0.5]), replicates, limit)
-    assert found == length and error == pytest.approx(np.std(lengths, ddof=1))
+    first_length, error = find_length_with_error(
+        np.array([3.0, 0.9, 0.5]), replicates, limit
+    )
+    assert first_length == length and error == pytest.approx(np.std(lengths, ddof=1))
 
 
 def test_table_4_over_studies_is_their_median_with_a_spread_that_one_outlier_does_not_move():
-    """Biases of 20, 22 and 24, then one far out, over the length: percent and µm."""
+    """The scores are biases of 20, 22, 24 and an outlier over the length, in percent and
+    µm."""
     frame = studies_of(biases=(20.0, 22.0, 24.0, 22.0, 900.0)).assign(
         mean_square=25e-12
     )

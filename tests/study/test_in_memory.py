@@ -24,19 +24,19 @@ def test_data_sets_of_studies_follow_on_each_other_without_overlap(kuka):
 
 def test_measurements_are_those_of_the_pipelines_steps(kuka):
     (block,) = deflections_of(kuka, experiments_of(kuka, 4, 5), SIZE.noise)["3DoF"]
-    found = study_of(kuka).measure(np.arange(4), ("3DoF",))["3DoF"]
+    measurements = study_of(kuka).measure(np.arange(4), ("3DoF",))["3DoF"]
     np.testing.assert_allclose(
-        np.moveaxis(found.deflection, (0, 1), (2, 1)),
+        np.moveaxis(measurements.deflection, (0, 1), (2, 1)),
         unpack_deflections(block),
         rtol=1e-12,
     )
 
 
-def test_the_score_sheet_of_the_study_of_the_tables_is_the_pipelines(kuka):
-    found = study_of(kuka).make_validation_set()
+def test_the_validation_set_of_the_study_of_the_tables_is_the_pipelines(kuka):
+    validation = study_of(kuka).make_validation_set()
     models = 1.1 * kuka.compliance[None]
     np.testing.assert_allclose(
-        compute_position_errors(found, models),
+        compute_position_errors(validation, models),
         compute_position_errors(judge(kuka), models),
         rtol=1e-9,
     )

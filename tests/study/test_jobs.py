@@ -26,10 +26,10 @@ MODULES = [
     for path in Path(study.__file__).parent.glob("[a-z]*.py")
 ]
 SCHEMAS = {
-    thing.name: thing
+    value.name: value
     for module in MODULES
-    for thing in vars(module).values()
-    if isinstance(thing, TableSchema)
+    for value in vars(module).values()
+    if isinstance(value, TableSchema)
 }
 BY_JOINTS = (
     make_experiments_schema,

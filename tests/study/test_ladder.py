@@ -1,5 +1,5 @@
-"""The ladder of models: against dense least squares, and on a robot whose links
-yield."""
+"""The ladder of models, against dense least squares and on a robot with elastic
+links."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ FOLDS = 4
 
 
 @pytest.fixture(scope="module")
-def seen(kuka_extended):
+def loaded(kuka_extended):
     drawn = draw_random_experiments(
         RandomDesign(kuka_extended.chain, kuka_extended.joint_limits, PAPER, "x"),
         1,
@@ -45,10 +45,10 @@ def folds_of(columns, deflection):
 
 
 def test_columns_times_the_true_compliances_are_the_linear_deflection(
-    kuka_extended, seen
+    kuka_extended, loaded
 ):
     """The springs' own elements in beam axes, against J C J'w of the extended chain."""
-    drawn, columns = seen
+    drawn, columns = loaded
     chain = extended_chain(kuka_extended)
     n = kuka_extended.joints
     coordinates = np.zeros((*drawn.joint_angles.shape[:-1], chain.coordinates))
@@ -58,47 +58,49 @@ def test_columns_times_the_true_compliances_are_the_linear_deflection(
         kuka_extended
     )
     expected = (jacobian @ springs[..., None])[..., 0]
-    found, *_ = np.linalg.lstsq(
+    coefficients, *_ = np.linalg.lstsq(
         columns.reshape(-1, columns.shape[-1]), expected.ravel(), rcond=1e-12
     )
     np.testing.assert_allclose(
-        columns @ found, expected, atol=1e-6 * np.abs(expected).max()
+        columns @ coefficients, expected, atol=1e-6 * np.abs(expected).max()
     )
 
 
-def test_cross_validation_is_that_of_fits_to_all_other_folds(kuka_extended, seen):
+def test_cross_validation_is_that_of_fits_to_all_other_folds(kuka_extended, loaded):
     """Joints alone, by numpy's least squares for each fold."""
-    drawn, columns = seen
+    drawn, columns = loaded
     deflection = compute_true_deflections(
         kuka_extended, drawn, kuka_extended.chain.end_effector, "end_effector"
     )
-    found = build_ladder(folds_of(columns, deflection), 6, len(kuka_extended.links))
-    place = np.arange(24)
+    ladder = build_ladder(folds_of(columns, deflection), 6, len(kuka_extended.links))
+    configuration = np.arange(24)
     total = 0.0
     for fold in range(FOLDS):
-        inside = place % FOLDS != fold
-        outside = place % FOLDS == fold
-        left = columns[0, inside][..., :6].reshape(-1, 6)
-        fitted = np.linalg.lstsq(left, deflection[0, inside].ravel(), rcond=None)[0]
+        training = configuration % FOLDS != fold
+        validation = configuration % FOLDS == fold
+        matrix = columns[0, training][..., :6].reshape(-1, 6)
+        fitted = np.linalg.lstsq(matrix, deflection[0, training].ravel(), rcond=None)[0]
         total += (
-            (deflection[0, outside] - columns[0, outside][..., :6] @ fitted) ** 2
+            (deflection[0, validation] - columns[0, validation][..., :6] @ fitted) ** 2
         ).sum()
-    assert found.cross_validated[0, 0] == pytest.approx(total, rel=1e-6)
+    assert ladder.cross_validated[0, 0] == pytest.approx(total, rel=1e-6)
 
 
-def test_a_robot_with_one_yielding_link_gets_that_spring_first_and_nothing_of_worth_after(
-    kuka_extended, seen
+def test_the_only_elastic_link_comes_first_and_further_springs_add_nothing(
+    kuka_extended, loaded
 ):
-    """A noise of 1 µm beside 0.1 mm of the link: what the best of four further links
-    takes off by chance is a few percent."""
-    _, columns = seen
+    """The noise is 1 µm and the link deflects by 0.1 mm, so the best of four further links
+    reduces the error by chance by a few percent."""
+    _, columns = loaded
     weights = np.zeros(columns.shape[-1])
     weights[:6] = kuka_extended.compliance
     weights[6 + 8 * 2 : 6 + 8 * 3] = 1e-6
     noise = 1e-6 * np.random.default_rng(3).standard_normal(columns.shape[:3])
-    found = build_ladder(
+    ladder = build_ladder(
         folds_of(columns, columns @ weights + noise), 6, len(kuka_extended.links)
     )
-    assert (found.order[:, 0] == 2).all() and (found.chosen >= 1).all()
-    assert (found.cross_validated[:, 0] > 100 * found.cross_validated[:, 1]).all()
-    assert (found.cross_validated[:, 1] < 1.1 * found.cross_validated.min(axis=1)).all()
+    assert (ladder.order[:, 0] == 2).all() and (ladder.chosen >= 1).all()
+    assert (ladder.cross_validated[:, 0] > 100 * ladder.cross_validated[:, 1]).all()
+    assert (
+        ladder.cross_validated[:, 1] < 1.1 * ladder.cross_validated.min(axis=1)
+    ).all()

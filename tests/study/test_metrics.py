@@ -1,4 +1,4 @@
-"""Equations 12-15: closed forms, and the score sheet against exact kinematics."""
+"""Equations 12-15: closed forms, and the validation set against exact kinematics."""
 
 import numpy as np
 import pytest
@@ -53,28 +53,28 @@ def exact_errors(robot, loads, compliance):
 def test_position_errors_are_those_of_the_exact_kinematics(robot):
     loads = random_loads(robot, 1, 40)
     models = robot.compliance * (1 + RELATIVE_ERRORS)
-    found = compute_position_errors(judge_of(robot, loads), models)
-    assert found.shape == (3, 40)
-    for model, errors in zip(models[:2], found, strict=False):
+    errors_by_model = compute_position_errors(judge_of(robot, loads), models)
+    assert errors_by_model.shape == (3, 40)
+    for model, errors in zip(models[:2], errors_by_model, strict=False):
         expected = exact_errors(robot, loads, model)
         assert errors.mean() == pytest.approx(expected.mean(), rel=1e-3)
-        # Second order: an error of up to a third of the compliance turns by up to a
-        # milliradian more.
+        # The prediction is linear; an error of up to a third of the compliance rotates the
+        # joints by up to a milliradian more.
         np.testing.assert_allclose(errors, expected, rtol=0, atol=3e-3 * expected.max())
-    # Root of rounding: squares of 1e-3 m lose sixteen digits.
-    np.testing.assert_allclose(found[2], 0, atol=1e-10)
+    # The tolerance is the root of the rounding error of squares of 1e-3 m.
+    np.testing.assert_allclose(errors_by_model[2], 0, atol=1e-10)
 
 
 def test_mean_deviation_counts_each_test_configuration_as_often_as_it_weighs(kuka):
-    judge = judge_of(kuka)
+    validation = judge_of(kuka)
     models = kuka.compliance * (1 + RELATIVE_ERRORS[[[0, 1], [1, 0]]])
     counts = np.random.default_rng(1).poisson(1.0, (2, 40))
-    found = compute_mean_deviation(judge, models, counts)
+    deviations = compute_mean_deviation(validation, models, counts)
     for group in range(2):
         expected = np.repeat(
-            compute_position_errors(judge, models[group]), counts[group], axis=1
+            compute_position_errors(validation, models[group]), counts[group], axis=1
         ).mean(axis=1)
-        np.testing.assert_allclose(found[group], expected, rtol=1e-12)
+        np.testing.assert_allclose(deviations[group], expected, rtol=1e-12)
 
 
 def test_k_sigma_is_the_signed_sum_over_all_joints_or_some():
@@ -91,12 +91,12 @@ def test_k_sigma_is_the_signed_sum_over_all_joints_or_some():
     )
 
 
-def test_what_is_not_determined_counts_as_above_the_limit():
-    found = [
+def test_undetermined_values_count_as_above_the_limit():
+    lengths = [
         find_first_length_below(np.array(values), 1.0)
         for values in ([np.nan, np.nan, 0.1], [np.nan] * 2, [np.inf, -1.0])
     ]
-    assert found == [3, np.inf, 2]
+    assert lengths == [3, np.inf, 2]
 
 
 @given(
@@ -106,11 +106,11 @@ def test_what_is_not_determined_counts_as_above_the_limit():
     st.integers(1, 40),
 )
 def test_lengths_follow_a_bias_over_the_length_to_any_limit(bias, limit, sign, lengths):
-    """It is below the limit from the first whole length beyond bias / limit on, and
-    past the curve it goes on to just that."""
+    """The values are below the limit from the first whole length above bias / limit on;
+    beyond the curve the extrapolated length is bias / limit."""
     values = sign * bias / np.arange(1, lengths + 1)
     crossing = bias / limit
-    # Exactly at a whole length rounding decides.
+    # If the crossing is exactly at a whole length, rounding decides.
     assume(abs(crossing - np.round(crossing)) > 1e-9 * crossing)
     whole = max(np.ceil(crossing), 1.0)
     reached = whole <= lengths

@@ -1,4 +1,4 @@
-"""Sets of points compared: made-up errors, by hand."""
+"""Comparisons of sets of points, on constructed errors with known results."""
 
 import numpy as np
 import pandas as pd
@@ -42,7 +42,7 @@ def frame_of(scatter=0.2):
 
 
 def test_pairs_are_compared_data_set_by_data_set():
-    """The scatter that both share is in neither interval."""
+    """The scatter that both sets share widens neither interval."""
     table = build_paired_table({"arm": frame_of()}, POINT_SETS, 6)
     assert table.points.tolist() == ["E twice", "three"]
     assert table.measurements.tolist() == [
@@ -54,7 +54,7 @@ def test_pairs_are_compared_data_set_by_data_set():
 
 
 def test_the_interval_of_a_ratio_is_that_of_the_bootstrap_over_data_sets():
-    """2,000 replicates: its ends are known to 3 %."""
+    """With 2,000 replicates the ends of the interval are known to 3 %."""
     rng = np.random.default_rng(4)
     ours, theirs = rng.chisquare(5, (2, 200))
     drawn = rng.integers(0, 200, (2000, 200))
@@ -76,7 +76,7 @@ def test_lengths_are_exact_with_an_interval():
     assert np.isinf(table[table.accuracy_um == 1].configurations).all()
 
 
-def test_a_length_counts_where_the_accuracy_is_kept_for_good():
+def test_a_length_counts_if_all_longer_ones_keep_the_accuracy():
     frame = frame_of(0.0)
     frame.loc[frame.length == 9, "mean_square"] = 1.0
     assert (
@@ -124,13 +124,13 @@ def test_the_length_is_where_the_curve_crosses_the_accuracy():
         interpolate_configurations(squares, 1.0) == np.inf
         and interpolate_configurations(squares, 400.0) == 1.0
     )
-    # From no estimate at all to one that is better: the first that there is.
+    # If there is no estimate before a sufficient one, the first estimate counts.
     assert interpolate_configurations(
         np.array([np.nan, 50.0**2, 40.0**2]), 60.0
     ) == pytest.approx(2.0)
 
 
-def test_a_set_pays_from_the_cost_on_at_which_both_cost_the_same(weights):
+def test_a_set_pays_above_the_cost_at_which_both_sets_cost_the_same(weights):
     table = build_break_even_table(
         {"arm": frame()}, POINT_SETS_OF_COSTS, [60.0], weights
     ).set_index("points")

@@ -29,11 +29,11 @@ def test_a_p_value_is_that_of_one_more_study():
     dummy = np.append(np.zeros(5), 1.0)
     regressors = np.column_stack([np.ones(6), dummy])
     fitted = OLS(np.append(VALUES, 1.5), regressors).fit()
-    exact = StudyScatter(VALUES, False, 0.0)
+    exact = StudyScatter(VALUES, logarithmic=False, digit=0.0)
     assert exact.compute_p_value(1.5) == pytest.approx(fitted.pvalues[1], rel=1e-9)
     assert exact.compute_p_value(float(VALUES.mean())) == pytest.approx(1.0)
     # A rounded figure is less certain.
-    rounded = StudyScatter(VALUES, False, 2.0)
+    rounded = StudyScatter(VALUES, logarithmic=False, digit=2.0)
     assert rounded.compute_p_value(1.5) > exact.compute_p_value(1.5)
 
 

@@ -1,4 +1,4 @@
-"""Data sets as the paper makes them: random loads with the right distribution, exact
+"""Simulated data sets as in the paper: random loads with the right distribution, exact
 deflections, noise."""
 
 from dataclasses import replace
@@ -56,9 +56,9 @@ def draw(
 )
 def test_another_seed_robot_purpose_or_set_gives_other_experiments(kuka, change):
     loads = draw(kuka)
-    others = draw(kuka, **change)
-    assert not np.isin(loads.joint_angles, others.joint_angles).any()
-    assert not np.isin(loads.wrench[..., :3], others.wrench[..., :3]).any()
+    other_loads = draw(kuka, **change)
+    assert not np.isin(loads.joint_angles, other_loads.joint_angles).any()
+    assert not np.isin(loads.wrench[..., :3], other_loads.wrench[..., :3]).any()
 
 
 def test_forces_are_uniform_on_the_sphere(kuka):
@@ -69,9 +69,9 @@ def test_forces_are_uniform_on_the_sphere(kuka):
         / 1000
     )
     five_sigma = 5 / np.sqrt(len(direction))
-    # Kolmogorov-Smirnov at 1e-4: of 20,000 it sees a distribution that is off by 0.025
-    # anywhere with a power of 0.99. Each component of a direction uniform on the sphere
-    # is uniform in [-1, 1] (Archimedes).
+    # With 20,000 values, a Kolmogorov-Smirnov test at 1e-4 detects a distribution that
+    # deviates by 0.025 anywhere, with a power of 0.99. Each component of a direction
+    # that is uniform on the sphere is uniform in [-1, 1] (Archimedes).
     for component in direction.T:
         assert kstest(component, "uniform", (-1, 2)).pvalue > 1e-4
     np.testing.assert_allclose(
@@ -94,7 +94,7 @@ def test_joint_angles_are_uniform_over_the_full_turn_or_within_the_limits(
         fanuc, loading, data_sets=range(10), configurations=500
     ).joint_angles.reshape(-1, 6)
     ranges = fanuc.joint_limits if joint_range == "limits" else [(-np.pi, np.pi)] * 6
-    # Of 5,000 it sees 0.05 anywhere with a power of 0.99.
+    # With 5,000 values the test detects a deviation of 0.05 with a power of 0.99.
     for joint, (low, high) in zip(angles.T, ranges, strict=True):
         assert kstest(joint, "uniform", (low, high - low)).pvalue > 1e-4
         assert low <= joint.min() and joint.max() <= high
@@ -114,8 +114,8 @@ def test_offset_in_the_tool_frame_turns_with_the_tool(kuka):
 
 def test_noise_is_standard_normal_and_independent_between_components():
     noise = draw_measurement_noise(1, "kuka", "6DoF", range(20), 500).reshape(-1, 6)
-    # Of 10,000 it sees 0.035 anywhere with a power of 0.99: a standard deviation off by
-    # 16 %.
+    # With 10,000 values the test detects a deviation of 0.035 with a power of 0.99, which
+    # is that of a standard deviation wrong by 16 %.
     for component in noise.T:
         assert kstest(component, "norm").pvalue > 1e-4
     np.testing.assert_allclose(
@@ -133,37 +133,39 @@ def test_numbers_of_a_data_set_do_not_depend_on_how_many_there_are_or_how_long_t
         np.testing.assert_array_equal(many[name][shared], values)
 
 
+def pose_difference(point, before, after):
+    """Displacement and rotation vector (6,) of a point between two configurations."""
+    position, rotation = point.pose_and_jacobian(before)[:2]
+    new_position, new_rotation = point.pose_and_jacobian(after)[:2]
+    turn = Rotation.from_matrix(new_rotation @ rotation.T).as_rotvec()
+    return [*(new_position - position), *turn]
+
+
 @pytest.mark.parametrize("at", AT)
 @pytest.mark.parametrize("name", ["three joints", "fixed rotations"])
-def test_ideal_deflections_are_the_poses_by_pinocchio_with_the_joints_yielded(name, at):
+def test_ideal_deflections_are_pose_differences_by_pinocchio_after_the_joints_yield(
+    name, at
+):
     robot = robot_of(OTHER_CHAINS[name])
     experiments = experiments_of(robot, sets=2, configurations=2)
-    found = list(simulate_blocks(experiments, robot, at))
-    assert [block["point"] for block in found] == [
-        point.name for point in robot.chain.points
-    ]
+    blocks = list(simulate_blocks(experiments, robot, at))
+    names = [point.name for point in robot.chain.points]
+    assert [block["point"] for block in blocks] == names
     loads = joined(experiments)
     angles = np.column_stack([loads[f"q{j + 1}"] for j in range(robot.joints)])
     wrench = np.column_stack([loads[component] for component in WRENCH])
-    for block, point in zip(found, robot.chain.points, strict=True):
-        assert block["data_set"].tolist() == [0, 0, 1, 1] and block[
-            "configuration"
-        ].tolist() == [0, 1, 0, 1]
-        seen = PinocchioPoint(robot.chain, point)
-        loaded = PinocchioPoint(
-            robot.chain,
-            without_tool(robot.chain.end_effector) if at == "end_effector" else point,
-        )
-        found = unpack_deflections(block).reshape(-1, 6)
-        for q, force, row in zip(angles, wrench, found, strict=True):
-            yielded = q + robot.compliance * (loaded.pose_and_jacobian(q)[2].T @ force)
-            (before, turned_before), (after, turned_after) = (
-                seen.pose_and_jacobian(each)[:2] for each in (q, yielded)
-            )
-            turn = Rotation.from_matrix(turned_after @ turned_before.T).as_rotvec()
-            np.testing.assert_allclose(
-                row, [*(after - before), *turn], rtol=0, atol=1e-12
-            )
+    for block, point in zip(blocks, robot.chain.points, strict=True):
+        assert block["data_set"].tolist() == [0, 0, 1, 1]
+        assert block["configuration"].tolist() == [0, 1, 0, 1]
+        loaded_point = point
+        if at == "end_effector":
+            loaded_point = without_tool(robot.chain.end_effector)
+        deflections = unpack_deflections(block).reshape(-1, 6)
+        for q, force, deflection in zip(angles, wrench, deflections, strict=True):
+            jacobian = PinocchioPoint(robot.chain, loaded_point).pose_and_jacobian(q)[2]
+            yielded = q + robot.compliance * (jacobian.T @ force)
+            expected = pose_difference(PinocchioPoint(robot.chain, point), q, yielded)
+            np.testing.assert_allclose(deflection, expected, rtol=0, atol=1e-12)
 
 
 def test_measurements_are_ideal_plus_scaled_noise_of_each_point(kuka):
@@ -180,8 +182,8 @@ def test_measurements_are_ideal_plus_scaled_noise_of_each_point(kuka):
 
 
 def test_statistics_are_of_the_lengths_of_the_displacements_set_by_set():
-    """Lengths 5 and 1; 7 and 13; what follows the displacements does not count."""
-    found = summarize_displacements(
+    """The lengths are 5 and 1, and 7 and 13; the rotations do not count."""
+    statistics = summarize_displacements(
         np.pad(
             [[[3.0, 4, 0], [0, 0, 1]], [[2, 3, 6], [0, -5, 12]]],
             ((0, 0), (0, 0), (0, 3)),
@@ -193,7 +195,7 @@ def test_statistics_are_of_the_lengths_of_the_displacements_set_by_set():
         "mean_square": [13.0, 109.0],
         "maximum": [5.0, 13.0],
     }
-    assert {name: values.tolist() for name, values in found.items()} == expected
+    assert {name: values.tolist() for name, values in statistics.items()} == expected
 
 
 def test_the_weights_table_gives_back_the_weights_whatever_its_blocks(monkeypatch):
@@ -221,15 +223,15 @@ def test_numbers_do_not_depend_on_blocks(kuka, strategies, monkeypatch):
             kuka, strategies["4-6DoF-after-6+3DoF"], experiments, deflections
         )
         tables.append((joined(experiments), joined(deflections["3DoF"]), table))
-    for other in tables[1:]:
+    for table in tables[1:]:
         for name, values in tables[0][0].items():
-            np.testing.assert_array_equal(other[0][name], values)
+            np.testing.assert_array_equal(table[0][name], values)
         for name in ("dx", "rz"):
-            # Whole vectors and their remainders may round otherwise.
+            # Full SIMD vectors and their remainders may round differently.
             np.testing.assert_allclose(
-                other[1][name], tables[0][1][name], rtol=0, atol=1e-14
+                table[1][name], tables[0][1][name], rtol=0, atol=1e-14
             )
         for name, values in tables[0][2].items():
             np.testing.assert_allclose(
-                other[2][name], values, rtol=1e-6, atol=1e-12, err_msg=name
+                table[2][name], values, rtol=1e-6, atol=1e-12, err_msg=name
             )

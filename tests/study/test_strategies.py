@@ -1,5 +1,5 @@
-"""Strategies as data: what the eight files say, and that what a chain cannot carry out
-is refused in one line."""
+"""Strategies as data: the contents of the eight files, and strategies that a chain
+cannot carry out are refused in one line."""
 
 import pytest
 from support import chain_of, refused
@@ -11,7 +11,7 @@ from elastocal.study.strategies import (
 )
 
 ALL = (0, 1, 2, 3, 4, 5)
-# Joints that the last stage takes over, else all, and points that are measured.
+# Joints that the last stage fixes, or all if it fixes none, and measured points.
 PAPERS = {
     "6DoF": (ALL, {"6DoF"}),
     "6DoF-after-3DoF": (ALL, {"3DoF", "6DoF"}),
@@ -31,7 +31,7 @@ def test_the_repository_has_the_eight_strategies_of_the_paper(strategies):
 
 
 @pytest.mark.parametrize("name", PAPERS)
-def test_fixed_joints_are_those_that_the_last_stage_takes_over_and_each_point_is_named_once(
+def test_fixed_joints_are_those_of_the_last_stage_and_each_point_is_named_once(
     strategies, name
 ):
     fixed, points = PAPERS[name]
@@ -41,17 +41,19 @@ def test_fixed_joints_are_those_that_the_last_stage_takes_over_and_each_point_is
     ) == len(points)
 
 
-def test_a_stage_that_identifies_every_joint_forgets_those_before_it(strategies):
-    left = {
+def test_a_stage_that_identifies_every_joint_supersedes_the_stages_before_it(
+    strategies,
+):
+    kept_stages = {
         name: drop_superseded_stages(strategy, 6).stages
         for name, strategy in strategies.items()
     }
     assert (
-        left.pop("6DoF-after-3DoF")
-        == left.pop("6DoF-after-3+3DoF")
+        kept_stages.pop("6DoF-after-3DoF")
+        == kept_stages.pop("6DoF-after-3+3DoF")
         == strategies["6DoF"].stages
     )
-    assert left == {name: strategies[name].stages for name in left}
+    assert kept_stages == {name: strategies[name].stages for name in kept_stages}
 
 
 CHAIN = chain_of("Rz(q1) Tx(1) Ry(q2) Tx(1) [A] Ry(q3) Tx(1) [B]")
@@ -122,7 +124,7 @@ FAULTS = {
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_faulty_strategy_is_refused_in_one_line(fault):
-    documents, key, words = FAULTS[fault]
+    documents, key, allowed = FAULTS[fault]
     strategy = strategy_from_document({"name": fault, "stages": documents})
-    with refused("strategies/x.yaml", f"{key}:", *words):
+    with refused("strategies/x.yaml", f"{key}:", *allowed):
         check_strategy(strategy, CHAIN, "strategies/x.yaml")

@@ -112,8 +112,8 @@ def average(strategy, k_sigma, fixed):
 
 @pytest.fixture(scope="module")
 def found():
-    """Strategy B leaves 1.5 times the error of A; C is A under another name; only the
-    fixed joints of B look better."""
+    """Strategy B leaves 1.5 times the error of A, C is A under another name, and only the
+    fixed joints of B have a better score."""
     uses = pd.concat([uses_of("A", 50.0), uses_of("B", 75.0), uses_of("C", 50.0)])
     both = [average("A", 4.0, 4.0), average("B", 6.0, 2.0), average("C", 4.0, 4.0)]
     metrics, replicates = (pd.concat(parts) for parts in zip(*both, strict=True))
@@ -150,13 +150,13 @@ def test_one_estimator_under_two_names_has_one_rank_and_ratio_one(found):
     }
 
 
-def test_only_the_metric_that_puts_them_in_the_other_order_reverses(found):
+def test_only_a_metric_with_the_opposite_order_is_marked_as_reversed(found):
     table = build_pairs_table(found)
     assert set(table.strategy) == {"A"} and set(table.other) == {"B"}
     assert table[table.reversed].metric.tolist() == ["k_sigma_percent_fixed_joints"]
 
 
-def test_metrics_at_places_that_a_robot_does_not_reach_are_left_out():
+def test_metrics_of_unreachable_positions_are_left_out():
     uses = uses_of("A", 50.0).assign(iso_9283=np.nan)
-    found = score_strategies(uses, *average("A", 4.0, 4.0), LENGTH)
-    assert "iso_9283_um" not in found and {REFERENCE, "path_rms_um"} < set(found)
+    scored = score_strategies(uses, *average("A", 4.0, 4.0), LENGTH)
+    assert "iso_9283_um" not in scored and {REFERENCE, "path_rms_um"} < set(scored)

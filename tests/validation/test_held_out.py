@@ -9,11 +9,11 @@ from planted import ELBOW_AND_HAND, planted
 from scipy.stats import t as student
 from synthetic import (
     NOISE,
-    made_estimate,
-    made_model,
-    made_states,
-    seen_exactly,
-    with_noise,
+    add_noise,
+    make_estimate,
+    make_model,
+    make_states,
+    observe_exactly,
 )
 
 from elastocal.campaigns.campaign import Target
@@ -179,23 +179,23 @@ def test_noise_floor_is_what_the_noise_alone_leaves(rows, repeats, fanuc):
     noise = Noise(
         "repeats", 40e-6, 80e-6, np.array([30, 20, 25, 0, 10, 40]) * 1e-6, 1000
     )
-    model = made_model(
+    model = make_model(
         fanuc.chain,
         ELBOW_AND_HAND,
         rows,
         fitted_frames=False,
         compliance=fanuc.compliance,
     )
-    states = made_states(6, 20, seed=8, repeats=repeats)
-    estimate = made_estimate(model, seed=9)
-    seen = seen_exactly(model, estimate, states)
+    states = make_states(6, 20, seed=8, repeats=repeats)
+    estimate = make_estimate(model, seed=9)
+    seen = observe_exactly(model, estimate, states)
     fitted = fit_model(model, seen, noise, estimate)
     rng = np.random.default_rng(10)
     off = []
     for _ in range(60):
         rests = noise.joint_rad * rng.standard_normal((repeats, 20, 6))
         moved = [
-            seen_exactly(
+            observe_exactly(
                 model,
                 estimate,
                 replace(states, joint_angles=states.joint_angles + rest),
@@ -307,15 +307,15 @@ def loaded_in(robot, loaded, poses=24):
     """A fit of joint compliances twice the nominal ones to poses of which only some
     carry a load, and its observations."""
     targets = [Target(name, robot.chain.end_effector.name, None) for name in "AB"]
-    model = made_model(
+    model = make_model(
         robot.chain, targets, compliance=robot.compliance, identified=True
     )
-    states = made_states(6, poses, seed=1)
+    states = make_states(6, poses, seed=1)
     states = replace(states, wrench=np.where(loaded[:, None], states.wrench, 0.0))
     estimate = replace(
-        made_estimate(model, (0,), seed=2), coefficients=(2.0 * robot.compliance,)
+        make_estimate(model, (0,), seed=2), coefficients=(2.0 * robot.compliance,)
     )
-    seen = with_noise(seen_exactly(model, estimate, states), np.random.default_rng(3))
+    seen = add_noise(observe_exactly(model, estimate, states), np.random.default_rng(3))
     return fit_model(model, seen, NOISE), seen
 
 
@@ -402,11 +402,11 @@ def test_a_target_that_only_the_part_left_out_shows_is_placed_as_from_nothing(fa
 
 def of_sessions(robot, poses=24, sessions=3):
     """A fit with a frame for each session, and its observations."""
-    model = made_model(robot.chain, compliance=robot.compliance, identified=True)
-    states = made_states(6, poses, seed=1, sessions=sessions)
-    estimate = made_estimate(model, tuple(range(sessions)), seed=2)
+    model = make_model(robot.chain, compliance=robot.compliance, identified=True)
+    states = make_states(6, poses, seed=1, sessions=sessions)
+    estimate = make_estimate(model, tuple(range(sessions)), seed=2)
     estimate = replace(estimate, coefficients=(robot.compliance,))
-    seen = with_noise(seen_exactly(model, estimate, states), np.random.default_rng(3))
+    seen = add_noise(observe_exactly(model, estimate, states), np.random.default_rng(3))
     return fit_model(model, seen, NOISE), seen
 
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from planted import planted
-from synthetic import made_estimate, made_model, made_states, seen_exactly, with_noise
+from synthetic import add_noise, make_estimate, make_model, make_states, observe_exactly
 
 from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.linearization import linearize
@@ -34,12 +34,12 @@ FOUND = ("joint_offset@2", "joint_offset@3", "payload", "base_compliance")
 def test_a_session_that_the_fit_has_not_seen_gets_a_frame_of_its_own_and_nothing_else(
     rows, fanuc
 ):
-    model = made_model(fanuc.chain, rows=rows, compliance=fanuc.compliance)
-    true = made_estimate(model, (2, 5, 7), seed=3)
-    states = made_states(6, 45, seed=4)
+    model = make_model(fanuc.chain, rows=rows, compliance=fanuc.compliance)
+    true = make_estimate(model, (2, 5, 7), seed=3)
+    states = make_states(6, 45, seed=4)
     # So few in the new one that a target fitted to them would be another one.
     states.session[:] = np.repeat([2, 5, 7], [20, 3, 22])
-    seen = with_noise(seen_exactly(model, true, states), np.random.default_rng(5))
+    seen = add_noise(observe_exactly(model, true, states), np.random.default_rng(5))
     known = states.session != 5
     fitted = fit_model(
         model, select_states(seen, known), Noise("declared", 6e-5, 6e-5, np.zeros(6))
@@ -66,7 +66,7 @@ def test_a_session_that_the_fit_has_not_seen_gets_a_frame_of_its_own_and_nothing
         true,
         target_offset=true.target_offset + 1e-3 * np.eye(len(true.target_offset), 3),
     )
-    off = select_states(seen_exactly(model, moved, states), ~known)
+    off = select_states(observe_exactly(model, moved, states), ~known)
     assert (
         compute_position_errors(
             model, place_unseen_sessions(fitted, off), off
@@ -292,8 +292,8 @@ def test_poses_forces_and_moments_beyond_those_of_a_campaign_are_marked(fanuc):
     [(1, 8, "all 8 validation poses repeat"), (2, 8, ""), (3, 10, "8 of 10")],
 )
 def test_poses_that_repeat_fitted_configurations_are_told(seed, poses, words):
-    fitted = made_states(6, 8, seed=1)
-    states = made_states(6, poses, seed=seed)
+    fitted = make_states(6, 8, seed=1)
+    states = make_states(6, poses, seed=seed)
     if poses > 8:
         states.joint_angles[:8] = fitted.joint_angles
     warnings = warn_of_repeated_poses(fitted, states)

@@ -9,7 +9,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 import yaml
-from made_folders import made_folder, made_table
+from made_folders import make_folder, make_table
 from study_folder import Study
 from typer.testing import CliRunner
 
@@ -29,8 +29,8 @@ def diagnosed(kuka, tmp_path_factory):
     """The sources, a campaign of a robot whose joint 3 stands 1 mrad off, its
     diagnosis, and some data of the study."""
     study = Study.of_sources(tmp_path_factory.mktemp("loop") / "study")
-    made_folder(
-        study.path(CELL), kuka, table=made_table(kuka, "made", offset_of_joint_3=OFFSET)
+    make_folder(
+        study.path(CELL), kuka, table=make_table(kuka, "made", offset_of_joint_3=OFFSET)
     )
     study.run(OF_THE_STUDY, *OWN)
     return study
@@ -220,7 +220,7 @@ def test_a_campaign_is_one_however_it_is_spelled(cell):
 
 
 def test_a_broken_campaign_ends_with_one_line(unstarted, kuka):
-    made_folder(unstarted.path(CELL), kuka, table=made_table(kuka, "made"))
+    make_folder(unstarted.path(CELL), kuka, table=make_table(kuka, "made"))
     file = unstarted.path(CELL) / "measurements.csv"
     table = pd.read_csv(file)
     table.loc[7, "y"] = np.nan

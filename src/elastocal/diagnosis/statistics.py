@@ -268,7 +268,7 @@ def compute_cross_products(
     present : (P,), present value of each declared parameter less its prior mean
     """
     declared_count = rows.declared.shape[2]
-    declared = rows.declared.reshape(-1, declared_count)
+    declared = rows.declared.reshape(rows.residual.size, declared_count)
     augmented = np.concatenate([declared, np.diag(1.0 / prior_std)])
     norms = np.linalg.norm(augmented, axis=0)
     basis, triangle = np.linalg.qr(augmented / norms)

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
     from elastocal.fitting.observations import States
 
-# For each mass that the robot file declares: of the mass itself, and of its first
-# moments along the axes of its frame.
+# Parameters of each mass that the robot file declares: the mass itself, and its first
+# moments along the three axes of its frame.
 MASS_PARAMETERS = 4
 
 
@@ -88,39 +88,39 @@ class Conditions:
     def gravity(self) -> np.ndarray:
         """Generalized force of the declared masses on every coordinate of the sites,
         ndarray (S, C)."""
-        sites = self.sites
+        masses, first_moments = self._masses_and_first_moments()
+        bodies = self.sites.followed[self.sites.joints + 2 :]
+        _, coordinates, states = self.motion.twist.shape
+        is_carried = self.motion.place[:, None] < [body.after for body in bodies]
+        # Neighbouring coordinates that carry the same masses have one wrench.
+        is_edge = (is_carried[1:] != is_carried[:-1]).any(axis=1)
+        edges = np.flatnonzero(is_edge) + 1
+        force = np.empty((coordinates, states))
+        for start, end in pairwise([0, *edges.tolist(), coordinates]):
+            carried = is_carried[start]
+            wrench = self._falling(
+                float(masses[carried].sum()), first_moments[carried].sum(axis=0)
+            )
+            twist = self.motion.twist[:, start:end]
+            np.einsum("iks,is->ks", twist, wrench, out=force[start:end])
+        return force.T
+
+    def _masses_and_first_moments(self) -> tuple[np.ndarray, np.ndarray]:
+        """Declared masses with their corrections (m,), kg, and first moments about the
+        base's origin (m, 3, S), kg m."""
         corrections = self.mass_corrections.reshape(-1, MASS_PARAMETERS)
-        masses = np.array([mass.mass_kg for mass in sites.masses]) + corrections[:, 0]
-        along = (
-            masses[:, None] * [mass.centre_m for mass in sites.masses]
-            + corrections[:, 1:]
-        )
-        bodies, (_, count, states) = (
-            slice(sites.joints + 2, len(sites.followed)),
-            self.motion.twist.shape,
-        )
+        declared = np.array([mass.mass_kg for mass in self.sites.masses])
+        centres = [mass.centre_m for mass in self.sites.masses]
+        masses = declared + corrections[:, 0]
+        local_moments = masses[:, None] * centres + corrections[:, 1:]
+        bodies = slice(self.sites.joints + 2, len(self.sites.followed))
         position = self.motion.position[bodies]
         rotation = self.motion.rotation[bodies]
-        first = masses[:, None, None] * position + sum(
-            along[:, j, None, None] * rotation[:, :, j] for j in range(3)
+        first_moments = masses[:, None, None] * position + sum(
+            local_moments[:, axis, None, None] * rotation[:, :, axis]
+            for axis in range(3)
         )
-        behind = self.motion.place[:, None] < [
-            body.after for body in sites.followed[bodies]
-        ]
-        # Neighbours carry the same masses.
-        edges = np.flatnonzero((behind[1:] != behind[:-1]).any(axis=1)) + 1
-        found = np.empty((count, states))
-        for start, end in pairwise([0, *edges.tolist(), count]):
-            falling = self._falling(
-                float(masses[behind[start]].sum()), first[behind[start]].sum(axis=0)
-            )
-            np.einsum(
-                "iks,is->ks",
-                self.motion.twist[:, start:end],
-                falling,
-                out=found[start:end],
-            )
-        return found.T
+        return masses, first_moments
 
     def gravity_of_corrections(
         self, coordinates: slice | list[int]
@@ -177,19 +177,14 @@ class Conditions:
     def total(self) -> np.ndarray:
         """External load and weight of the declared masses, or of usual ones, on every
         coordinate of the sites, (S, C)."""
-        weight = (
-            self.usual_gravity
-            if self.sites.usual_weight
-            else self.gravity
-            if self.sites.masses
-            else 0.0
-        )
-        # Without a wrench, weight alone.
-        return (
-            np.asarray(weight)
-            if np.ndim(weight) and not self.wrench.any()
-            else self.load + weight
-        )
+        if self.sites.usual_weight:
+            weight = self.usual_gravity
+        elif self.sites.masses:
+            weight = self.gravity
+        else:
+            return self.load + 0.0
+        # Without a wrench the load is zero and need not be computed.
+        return self.load + weight if self.wrench.any() else weight
 
     @cached_property
     def mass_torques(self) -> np.ndarray:
@@ -324,22 +319,28 @@ def with_total(conditions: Conditions, total: np.ndarray) -> Conditions:
 
 
 def offered(sites: Sites, states: States) -> frozenset[str]:
-    """What is there that effects may need.
+    """List which needs of effects the data meet.
 
-    Returns "load": an external load or a weight; "load on the joints": that, or
-    declared masses; "external load", without which the compliances are not
-    identifiable; "approach", where it is known somewhere; "time" and "temperature",
-    where they change.
+    Returns
+    -------
+    "load" for an external load or a weight; "load on the joints" for an external load
+    or declared masses; "external load", without which the compliances are not
+    identifiable; "approach" if it is known in some state; "time" and "temperature" if
+    they change.
     """
     external = bool(states.wrench.any())
     loaded = bool(sites.masses) or external
-    there = {
+    has_approach = states.approach is not None and bool(states.approach.any())
+    has_time = states.time_s is not None and np.ptp(states.time_s) > 0
+    has_temperature = (
+        states.temperature_c is not None and np.ptp(states.temperature_c) > 0
+    )
+    is_offered = {
         "load": sites.usual_weight or loaded,
         "load on the joints": loaded,
         "external load": external,
-        "approach": states.approach is not None and bool(states.approach.any()),
-        "time": states.time_s is not None and np.ptp(states.time_s) > 0,
-        "temperature": states.temperature_c is not None
-        and np.ptp(states.temperature_c) > 0,
+        "approach": has_approach,
+        "time": has_time,
+        "temperature": has_temperature,
     }
-    return frozenset(name for name, present in there.items() if present)
+    return frozenset(need for need, present in is_offered.items() if present)

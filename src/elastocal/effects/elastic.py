@@ -41,11 +41,11 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
 def joint_compliance(sites: Sites) -> Candidate:
-    """Compliances of all joints as one candidate: each a spring, theta_i = c_i tau_i
-    (equation 7).
+    """Make one candidate of the compliances of all joints, each a torsional spring:
+    theta_i = c_i tau_i (equation 7).
 
-    No effect, for nothing is missing: the declared model has it where the compliances
-    are to be identified.
+    It is not an effect of the catalogue: the declared model contains it if the
+    compliances are to be identified.
     """
     units = ["m/N" if prismatic else "rad/(N m)" for prismatic in sites.prismatic]
     sizes = [_OVER_USUAL * compliance for compliance in sites.compliance]
@@ -60,10 +60,14 @@ def joint_compliance(sites: Sites) -> Candidate:
 
 
 def _springs(groups: Iterable[Iterable[int]]) -> Law:
-    """Law of coordinates that each yield to their own load, each group of them by one
-    parameter."""
-    each = [tuple(group) for group in groups]
-    return lambda around: [{c: around.total[:, c] for c in group} for group in each]
+    """Make the law of coordinates that each yield to their own load; one parameter
+    belongs to each group of coordinates."""
+    members = [tuple(group) for group in groups]
+
+    def loads(around: Conditions, group: tuple[int, ...]) -> dict[int, np.ndarray]:
+        return {coordinate: around.total[:, coordinate] for coordinate in group}
+
+    return lambda around: [loads(around, group) for group in members]
 
 
 def _bending(sites: Sites) -> list[tuple[tuple[int, ...], str]]:
@@ -106,13 +110,16 @@ def link_elasticity(
     """A link that bends and twists: a cantilever between two joints.
 
     y = F_y l^3 a/EI + M_z l^2 b/EI, r_z = F_y l^2 b/EI + M_z l c/EI, likewise in the
-    other plane, r_x = M_x l c/GJ,
+    other plane, r_x = M_x l c/GJ.
 
-    are shift (m) and turns (rad) of the far end under force F (N) and moment M (N m) there, with x along the link of length l
-    (m): Euler-Bernoulli and St Venant (Timoshenko and Gere 1972). A uniform link has a, b, c = 1/3, 1/2, 1; one whose diameter
-    falls linearly by a share t to its far end, thin-walled, the integrals over s from 0 to 1 of (1 - s)^2, 1 - s and 1 over (1
-    - t s)^3. Linear in 1/EI and 1/GJ, 1/(N m^2), of the uniform link that a force shifts and a moment along twists as far.
-    Stretching and shear are left out, small in links much longer than wide.
+    y, r_z and r_x are shift (m) and rotations (rad) of the far end under force F (N)
+    and moment M (N m) there, with x along the link of length l (m): Euler-Bernoulli and St Venant
+    (Timoshenko and Gere 1972). For a uniform link a, b, c = 1/3, 1/2, 1. For a thin-
+    walled link whose diameter falls linearly by a share t to its far end, they are the
+    integrals over s from 0 to 1 of (1 - s)^2, 1 - s and 1 over (1 - t s)^3. The law is
+    linear in 1/EI and 1/GJ, 1/(N m^2), of the uniform link that a force shifts, and a
+    moment along it twists, as far. Stretching and shear, which are small in links much
+    longer than wide, are left out.
     """
     # A fit asks for the same taper under one load after the other.
     compliances = lru_cache(maxsize=4)(

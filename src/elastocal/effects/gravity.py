@@ -141,73 +141,105 @@ def link_weight(entry: Effect, sites: Sites) -> Candidates:
     if sites.masses:
         return
     joints = [joint for (joint,) in turning_joints(sites) if sites.carried_links(joint)]
+    if joints:
+        yield from _sag_of_arm(entry, sites, joints[0])
     near = {joint: sites.carried_links(joint)[:_LINKS] for joint in joints}
+    for joint, links in near.items():
+        yield _sag_of_joint(entry, sites, joint, links)
+    for joint, links in near.items():
+        axes = _moment_axes(sites, links, [joint])
+        if axes:
+            yield _sag_of_joint(entry, sites, joint, links, axes, _OFF_THE_LINE)
 
-    def across(links: Sequence[int], turned: Sequence[int]) -> list[tuple[int, int]]:
-        axes = [(k, axis) for k in links for axis in sites.transverse_axes(k)]
-        return [
-            pair
-            for pair in axes
-            if any(sites.moment_turns(*pair, joint) for joint in turned)
-        ]
 
-    def form(
-        joint: int | None,
-        links: Sequence[int],
-        axes: Sequence[tuple[int, int]],
-        detail: str,
-    ) -> Candidate:
-        of, unit = (
-            ("", "{}") if joint is None else ("compliance_times_", "rad {}/(N m)")
-        )
-        size = (
-            entry.size("mass", sites)
-            if joint is None
-            else entry.size("mass of one joint", sites, joint)
-        )
-        parameters = [
-            Parameter(f"{of}mass_at_end_of_link_{k}", unit.format("kg"), size)
-            for k in links
-        ]
-        for k, axis in axes:
-            parameters.append(
-                Parameter(
-                    f"{of}moment_{'xyz'[axis]}_of_link_{k}",
-                    unit.format("kg m"),
-                    _OFF_M * size,
-                )
-            )
-        places = [*((k, None) for k in links), *axes]
-        if joint is None:
-            # Without a load the compliances are not identifiable, and nominal ones are
-            # far off.
-            law = partial(_sagging, places=places)
-            needs = {"external load"}
-            return entry.candidate(
-                (), parameters, law, needs, detail=detail, location_name="arm"
-            )
-        return entry.of_joint(
-            joint,
-            parameters,
-            lambda at: [at.weight(*place)[:, joint] for place in places],
-            detail=detail,
-        )
-
-    # The links behind the first joint that weight can turn turn all others too.
-    for first in joints[:1]:
-        carried = sites.carried_links(first)
-        every = range(sites.joints)
-        yield form(None, near[first], (), "")
-        if off := across(near[first], every):
-            yield form(None, near[first], off, _OFF_THE_LINE)
-        if len(carried) > _LINKS:
-            yield form(None, carried, across(carried, every), "all links")
-    yield from [form(joint, links, (), "") for joint, links in near.items()]
-    yield from [
-        form(joint, links, off, _OFF_THE_LINE)
-        for joint, links in near.items()
-        if (off := across(links, [joint]))
+def _moment_axes(
+    sites: Sites, links: Sequence[int], joints: Iterable[int]
+) -> list[tuple[int, int]]:
+    """List each link with each axis across its line along which a first moment turns
+    one of some joints."""
+    joints = list(joints)
+    return [
+        (link, axis)
+        for link in links
+        for axis in sites.transverse_axes(link)
+        if any(sites.moment_turns(link, axis, joint) for joint in joints)
     ]
+
+
+def _sag_of_arm(entry: Effect, sites: Sites, first: int) -> Candidates:
+    """Masses that turn all joints at once: those behind the first joint that weight can
+    turn."""
+    carried = sites.carried_links(first)
+    near = carried[:_LINKS]
+    axes = _moment_axes(sites, near, range(sites.joints))
+    variants: list[tuple[Sequence[int], Sequence[tuple[int, int]], str]] = [
+        (near, (), "")
+    ]
+    if axes:
+        variants.append((near, axes, _OFF_THE_LINE))
+    if len(carried) > _LINKS:
+        all_axes = _moment_axes(sites, carried, range(sites.joints))
+        variants.append((carried, all_axes, "all links"))
+    size = entry.size("mass", sites)
+    for links, moment_axes, detail in variants:
+        law = partial(_sagging, places=_mass_places(links, moment_axes))
+        parameters = _mass_parameters(links, moment_axes, size, "", "{}")
+        # Without a load the compliances are not identifiable, and nominal ones are far
+        # off.
+        needs = {"external load"}
+        yield entry.candidate(
+            (), parameters, law, needs, detail=detail, location_name="arm"
+        )
+
+
+def _sag_of_joint(
+    entry: Effect,
+    sites: Sites,
+    joint: int,
+    links: Sequence[int],
+    axes: Sequence[tuple[int, int]] = (),
+    detail: str = "",
+) -> Candidate:
+    """Masses that turn one joint, in the products with its compliance."""
+    size = entry.size("mass of one joint", sites, joint)
+    places = _mass_places(links, axes)
+    return entry.of_joint(
+        joint,
+        _mass_parameters(links, axes, size, "compliance_times_", "rad {}/(N m)"),
+        lambda around: [around.weight(*place)[:, joint] for place in places],
+        detail=detail,
+    )
+
+
+def _mass_places(
+    links: Sequence[int], axes: Sequence[tuple[int, int]]
+) -> list[tuple[int, int | None]]:
+    """Arguments of `Conditions.weight`: a mass at the end of each link, then a first
+    moment along each axis."""
+    return [*((link, None) for link in links), *axes]
+
+
+def _mass_parameters(
+    links: Sequence[int],
+    axes: Sequence[tuple[int, int]],
+    size: float,
+    prefix: str,
+    unit: str,
+) -> list[Parameter]:
+    """Parameters in the order of `_mass_places`; `unit` has a gap for kg or kg m."""
+    masses = [
+        Parameter(f"{prefix}mass_at_end_of_link_{link}", unit.format("kg"), size)
+        for link in links
+    ]
+    moments = [
+        Parameter(
+            f"{prefix}moment_{'xyz'[axis]}_of_link_{link}",
+            unit.format("kg m"),
+            _OFF_M * size,
+        )
+        for link, axis in axes
+    ]
+    return [*masses, *moments]
 
 
 @_gravity(
@@ -221,11 +253,11 @@ def link_weight(entry: Effect, sites: Sites) -> Candidates:
 )
 def declared_masses(entry: Effect, sites: Sites) -> Candidates:
     """Declared masses that are farther off than the robot file says: all by one factor,
-    or each by its entry.
+    or each by its own.
 
     theta_i = c_i sum_k s_k m_k tau_ik(q), with theta_i in rad, c_i the compliance
     (rad/(N m)), m_k the declared mass of link k (kg), tau_ik its torque on joint i (N
-    m/kg) and s_k the share by which it is heavier, one for all links or each its entry. A
+    m/kg) and s_k the share by which it is heavier, one for all links or each its own. A
     mass takes its declared centre with it. Without a load the compliances are free, and
     no factor of all masses is distinguishable from them.
     """

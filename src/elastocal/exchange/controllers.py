@@ -33,16 +33,16 @@ class JointTargets:
     def rows(self, names: Sequence[str]) -> list[list[str | None]]:
         """Numbers as all controllers read them, target for target, of these axes; None
         of one that the robot does not have."""
-        places = [
-            self.axes.index(name) if name in self.axes else None for name in names
-        ]
         return [
-            [
-                None if place is None else f"{round(row[place], 6) + 0.0:.6f}"
-                for place in places
-            ]
-            for row in self.values
+            [texts.get(name) for name in names]
+            for texts in map(self._format_target, self.values)
         ]
+
+    def _format_target(self, values: np.ndarray) -> dict[str, str]:
+        """Numbers of one target (n,) by axis. Adding zero removes the minus sign of a
+        zero."""
+        texts = [f"{round(value, 6) + 0.0:.6f}" for value in values]
+        return dict(zip(self.axes, texts, strict=True))
 
 
 @dataclass(frozen=True)
@@ -109,9 +109,9 @@ def _krl(name: str, targets: JointTargets, notes: Sequence[str]) -> list[str]:
         "  ENDFOR",
     ]
     for row in targets.rows(targets.axes):
-        lines.append(
-            f"  PTP {{E6AXIS: {', '.join(f'{axis} {value}' for axis, value in zip(targets.axes, row, strict=True))}}}"
-        )
+        pairs = zip(targets.axes, row, strict=True)
+        position = ", ".join(f"{axis} {value}" for axis, value in pairs)
+        lines.append(f"  PTP {{E6AXIS: {position}}}")
     return [*lines, "END"]
 
 
@@ -183,9 +183,8 @@ def _urscript(name: str, targets: JointTargets, notes: Sequence[str]) -> list[st
         *remarks(notes, "  # "),
     ]
     for row in np.radians(targets.values[:, order]):
-        lines.append(
-            f"  movej([{', '.join(f'{round(value, 9) + 0.0:.9f}' for value in row)}], a=0.5, v=0.2)"
-        )
+        position = ", ".join(f"{round(value, 9) + 0.0:.9f}" for value in row)
+        lines.append(f"  movej([{position}], a=0.5, v=0.2)")
     return [*lines, "end"]
 
 
@@ -197,22 +196,46 @@ _UR_AXES = ("base", "shoulder", "elbow", "wrist1", "wrist2", "wrist3")
 _NAMED = "letters, digits and underscores that begin with"
 _CONTROLLERS = (
     Controller(
-        "krl", "KUKA KRL", ".src", tuple(f"A{axis}" for axis in range(1, 7)), tuple(f"E{axis}" for axis in range(1, 7)),
-        r"[A-Za-z_]\w{0,23}", f"up to 24 {_NAMED} no digit", _krl,
+        name="krl",
+        words="KUKA KRL",
+        suffix=".src",
+        axes=tuple(f"A{axis}" for axis in range(1, 7)),
+        external=tuple(f"E{axis}" for axis in range(1, 7)),
+        pattern=r"[A-Za-z_]\w{0,23}",
+        pattern_words=f"up to 24 {_NAMED} no digit",
+        write=_krl,
     ),
     Controller(
-        "rapid", "ABB RAPID", ".mod", _RAPID_AXES, _RAPID_EXTERNAL, r"(?!(?i:target_\d+)$)[A-Za-z]\w{0,31}",
-        f"up to 32 {_NAMED} a letter", _rapid,
+        name="rapid",
+        words="ABB RAPID",
+        suffix=".mod",
+        axes=_RAPID_AXES,
+        external=_RAPID_EXTERNAL,
+        pattern=r"(?!(?i:target_\d+)$)[A-Za-z]\w{0,31}",
+        pattern_words=f"up to 32 {_NAMED} a letter",
+        write=_rapid,
     ),
     Controller(
-        "tp", "FANUC TP", ".ls", _TP_AXES, _TP_EXTERNAL,
-        r"[A-Za-z]\w{0,35}", f"up to 36 {_NAMED} a letter", _tp,
+        name="tp",
+        words="FANUC TP",
+        suffix=".ls",
+        axes=_TP_AXES,
+        external=_TP_EXTERNAL,
+        pattern=r"[A-Za-z]\w{0,35}",
+        pattern_words=f"up to 36 {_NAMED} a letter",
+        write=_tp,
     ),
     Controller(
-        "urscript", "URScript", ".script", _UR_AXES, (),
-        r"[A-Za-z_]\w*", f"{_NAMED} no digit", _urscript,
+        name="urscript",
+        words="URScript",
+        suffix=".script",
+        axes=_UR_AXES,
+        external=(),
+        pattern=r"[A-Za-z_]\w*",
+        pattern_words=f"{_NAMED} no digit",
+        write=_urscript,
     ),
-)  # fmt: skip
+)
 CONTROLLERS = {controller.name: controller for controller in _CONTROLLERS}
 
 
@@ -251,38 +274,45 @@ def check_name(controller: Controller, path: Path) -> str:
 def axes_of(
     controller: Controller, prismatic: Sequence[bool], stated: str
 ) -> tuple[str, ...]:
-    """What the controller calls q1, q2, ...: as stated, ``A1,A2,...``, or six joints
-    that turn in order and shifts beside them.
+    """Find the controller's names of q1, q2, ...
 
-    Other robots' axes are a question: whether the third of seven is an external axis,
-    or which of six a palletizer has.
+    Six revolute joints are the robot's axes in their order, and prismatic joints are
+    external axes. For other robots the names must be `stated`, as ``A1,A2,...``: the
+    third of seven joints may be an external axis, and a palletizer has four of six.
     """
     known = (*controller.axes, *controller.external)
+    joints = f"q1 to q{len(prismatic)}"
     if stated:
         names = tuple(name.strip() for name in stated.split(","))
-        if (
-            len(names) != len(prismatic)
-            or len(set(names)) < len(names)
-            or not set(names) <= set(known)
-        ):
-            allowed = f"{format_count(len(prismatic), 'different name')}, of q1 to q{len(prismatic)}, of {', '.join(known)}"
+        is_complete = len(names) == len(set(names)) == len(prismatic)
+        if not is_complete or not set(names) <= set(known):
+            count = format_count(len(prismatic), "different name")
+            allowed = f"{count}, of {joints}, of {', '.join(known)}"
             raise InputError("--axes", "", repr(stated), allowed)
         return names
     shifts = sum(prismatic)
-    if len(prismatic) - shifts != len(controller.axes) or shifts > len(
-        controller.external
-    ):
-        found = f"{format_count(len(prismatic) - shifts, 'joint that turns', 'joints that turn')} and {shifts} that shift"
-        allowed = f"--axes with what {controller.words} calls each of q1 to q{len(prismatic)}: {', '.join(known)}"
-        if not controller.external:
-            axes = format_count(
-                len(controller.axes), "joint that turns", "joints that turn"
+    turns = len(prismatic) - shifts
+    if turns != len(controller.axes) or shifts > len(controller.external):
+        found = f"{_count_revolute(turns)} and {shifts} that shift"
+        if controller.external:
+            allowed = (
+                f"--axes with what {controller.words} calls each of {joints}:"
+                f" {', '.join(known)}"
             )
-            allowed = f"{axes}, which is all that {controller.words} has"
+        else:
+            count = _count_revolute(len(controller.axes))
+            allowed = f"{count}, which is all that {controller.words} has"
         raise InputError("--format", controller.name, found, allowed)
-    turning = iter(controller.axes)
-    shifting = iter(controller.external)
-    return tuple(next(shifting if shift else turning) for shift in prismatic)
+    robot_axes = iter(controller.axes)
+    external_axes = iter(controller.external)
+    return tuple(
+        next(external_axes if is_prismatic else robot_axes)
+        for is_prismatic in prismatic
+    )
+
+
+def _count_revolute(count: int) -> str:
+    return format_count(count, "joint that turns", "joints that turn")
 
 
 def targets_of(

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.measurements import LARGEST_ROTATION_RAD
 from elastocal.campaigns.reading import find_degrees
-from elastocal.campaigns.tables import Dialect, read_text_table
+from elastocal.campaigns.tables import Cells, Dialect, TextTable, read_text_table
 from elastocal.errors import InputError, suggest_names
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
@@ -47,66 +47,81 @@ class TargetPath:
 
 
 def read_target_path(path: str | Path, joints: int) -> TargetPath:
-    """Read a file of wanted poses of a robot with so many joints.
+    """Read a file of wanted poses.
 
-    An InputError refuses a column that is missing, unknown or there in part, what is no
-    number, and what no arm reaches.
+    Parameters
+    ----------
+    path : CSV file
+    joints : number of joints of the robot
+
+    Raises
+    ------
+    InputError
+        A column is missing, unknown or incomplete, a cell is not a number, or no arm
+        reaches a pose.
     """
-    angles = tuple(f"q{j}" for j in range(1, joints + 1))
-    known = (*_POSE, *WRENCH_NAMES, *angles)
+    angles = tuple(f"q{joint}" for joint in range(1, joints + 1))
     text = read_text_table(path, lambda _: True, Dialect("comma", "point"))
-    cells = text.columns
-    header = f"line {text.dialect.header}"
-    read = text.cells({name: name for name in cells}, {})
-    for name in _POSE:
-        if name not in cells:
-            allowed = f"{', '.join(_POSE)}: position in m and rotation vector in rad, base axes, separated by commas"
-            raise InputError(path, header, f"no column {name!r}", allowed)
-    for name in cells:
-        if name not in known:
-            raise InputError(
-                path, header, f"the unknown column {name!r}", suggest_names(name, known)
-            )
-
-    def group(names: tuple[str, ...]) -> np.ndarray | None:
-        there = [name for name in names if name in cells]
-        if not there:
-            return None
-        if missing := [name for name in names if name not in cells]:
-            raise InputError(
-                path,
-                header,
-                f"{', '.join(there)} without {', '.join(missing)}",
-                "all of them or none",
-            )
-        return read.matrix(names)
-
-    pose = read.matrix(_POSE)
-    for size, what, largest, allowed in (
-        (np.abs(pose[:, :3]).max(axis=1), "position", _FARTHEST_M, "metres"),
-        (
-            np.linalg.norm(pose[:, 3:], axis=1),
-            "turn",
-            LARGEST_ROTATION_RAD,
-            "a rotation vector in rad, not degrees",
-        ),
-    ):
-        row = int(np.argmax(size))
-        if size[row] > largest:
-            found = f"a {what} of {size[row]:g}"
-            raise InputError(
-                path,
-                f"line {text.lines[row]}",
-                found,
-                f"{allowed}, {largest:.3g} at most",
-            )
-    wrench = group(
-        WRENCH_NAMES if set(WRENCH_NAMES[3:]) & set(cells) else WRENCH_NAMES[:3]
-    )
+    _check_columns(text, angles)
+    cells = text.cells({name: name for name in text.columns}, {})
+    pose = cells.matrix(_POSE)
+    position = pose[:, :3]
+    rotation_vector = pose[:, 3:]
+    _check_size(text, "position", np.abs(position).max(axis=1), _FARTHEST_M, "metres")
+    allowed = "a rotation vector in rad, not degrees"
+    angle = np.linalg.norm(rotation_vector, axis=1)
+    _check_size(text, "turn", angle, LARGEST_ROTATION_RAD, allowed)
+    has_moments = bool(set(WRENCH_NAMES[3:]) & set(text.columns))
+    wrench_names = WRENCH_NAMES if has_moments else WRENCH_NAMES[:3]
+    wrench = _read_all_or_none(text, cells, wrench_names)
     if wrench is not None:
         wrench = np.pad(wrench, ((0, 0), (0, 6 - wrench.shape[1])))
-    rotation = Rotation.from_rotvec(pose[:, 3:]).as_matrix()
-    return TargetPath(pose[:, :3], rotation, group(angles), wrench, text.lines)
+    rotation = Rotation.from_rotvec(rotation_vector).as_matrix()
+    start = _read_all_or_none(text, cells, angles)
+    return TargetPath(position, rotation, start, wrench, text.lines)
+
+
+def _check_columns(text: TextTable, angles: tuple[str, ...]) -> None:
+    """Refuse a table without a pose, or with a column that no target has."""
+    header = f"line {text.dialect.header}"
+    for name in _POSE:
+        if name not in text.columns:
+            allowed = (
+                f"{', '.join(_POSE)}: position in m and rotation vector in rad, base"
+                " axes, separated by commas"
+            )
+            raise InputError(text.path, header, f"no column {name!r}", allowed)
+    known = (*_POSE, *WRENCH_NAMES, *angles)
+    for name in text.columns:
+        if name not in known:
+            found = f"the unknown column {name!r}"
+            raise InputError(text.path, header, found, suggest_names(name, known))
+
+
+def _check_size(
+    text: TextTable, quantity: str, size: np.ndarray, largest: float, unit: str
+) -> None:
+    """Refuse the largest of some sizes (N,) if it exceeds a bound."""
+    row = int(np.argmax(size))
+    if size[row] > largest:
+        found = f"a {quantity} of {size[row]:g}"
+        allowed = f"{unit}, {largest:.3g} at most"
+        raise InputError(text.path, f"line {text.lines[row]}", found, allowed)
+
+
+def _read_all_or_none(
+    text: TextTable, cells: Cells, names: tuple[str, ...]
+) -> np.ndarray | None:
+    """Read columns, ndarray (N, len(names)); None if the table has none of them."""
+    present = [name for name in names if name in text.columns]
+    missing = [name for name in names if name not in text.columns]
+    if not present:
+        return None
+    if missing:
+        found = f"{', '.join(present)} without {', '.join(missing)}"
+        header = f"line {text.dialect.header}"
+        raise InputError(text.path, header, found, "all of them or none")
+    return cells.matrix(names)
 
 
 def read_target_path_of(path: str | Path, robot: Robot) -> TargetPath:

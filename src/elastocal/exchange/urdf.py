@@ -350,52 +350,48 @@ def _root_of(data: bytes, source: str) -> Element:
 def _check_tree(
     links: Sequence[Element], joints: Sequence[Element], source: str
 ) -> None:
-    for tag, parts in (("link", links), ("joint", joints)):
-        if not 0 < len(parts) <= _MOST_PARTS:
-            found = f"{len(parts)} times <{tag}>" if parts else f"no <{tag}>"
-            raise InputError(
-                source,
-                "",
-                found,
-                f"a URDF with links and joints, at most {_MOST_PARTS}",
-            )
-        counts = Counter(part.get("name", "") for part in parts)
-        if wrong := [name for name, times in counts.items() if times > 1 or not name]:
-            raise InputError(
-                source,
-                f"{tag} {wrong[0]!r}",
-                f"{counts[wrong[0]]} times",
-                "a name for each, and each name once",
-            )
-    names = {link.attrib["name"] for link in links}
-    parent_of: dict[str, str] = {}
+    """Refuse links and joints that do not form a tree."""
+    _check_names("link", links, source)
+    _check_names("joint", joints, source)
+    link_names = {link.attrib["name"] for link in links}
+    parents: dict[str, str] = {}
     for joint in joints:
-        called = f"joint {joint.attrib['name']!r}"
-        if joint.get("type") not in _KINDS:
-            raise InputError(
-                source, called, f"type {joint.get('type')!r}", " | ".join(_KINDS)
-            )
-        parent, child = (_end(joint, tag) for tag in ("parent", "child"))
-        for tag, name in (("parent", parent), ("child", child)):
-            if name not in names:
-                raise InputError(
-                    source, called, f"{tag} {name!r}", "a link of this file"
-                )
-        if child in parent_of:
+        key = f"joint {joint.attrib['name']!r}"
+        joint_type = joint.get("type")
+        if joint_type not in _KINDS:
+            found = f"type {joint_type!r}"
+            raise InputError(source, key, found, " | ".join(_KINDS))
+        ends = {tag: _end(joint, tag) for tag in ("parent", "child")}
+        for tag, link in ends.items():
+            if link not in link_names:
+                found = f"{tag} {link!r}"
+                raise InputError(source, key, found, "a link of this file")
+        child = ends["child"]
+        if child in parents:
             found = f"child {child!r}, which another joint has too"
-            raise InputError(source, called, found, "a tree: each link below one joint")
-        parent_of[child] = parent
+            raise InputError(source, key, found, "a tree: each link below one joint")
+        parents[child] = ends["parent"]
     try:
         TopologicalSorter(
-            {child: [parent] for child, parent in parent_of.items()}
+            {child: [parent] for child, parent in parents.items()}
         ).prepare()
     except CycleError as error:
-        raise InputError(
-            source,
-            f"link {error.args[1][0]!r}",
-            "a loop of joints",
-            "a tree: no link below itself",
-        ) from None
+        key = f"link {error.args[1][0]!r}"
+        allowed = "a tree: no link below itself"
+        raise InputError(source, key, "a loop of joints", allowed) from None
+
+
+def _check_names(tag: str, elements: Sequence[Element], source: str) -> None:
+    """Refuse no elements, too many, and names that are missing or used twice."""
+    if not 0 < len(elements) <= _MOST_PARTS:
+        found = f"{len(elements)} times <{tag}>" if elements else f"no <{tag}>"
+        allowed = f"a URDF with links and joints, at most {_MOST_PARTS}"
+        raise InputError(source, "", found, allowed)
+    counts = Counter(element.get("name", "") for element in elements)
+    for name, count in counts.items():
+        if count > 1 or not name:
+            allowed = "a name for each, and each name once"
+            raise InputError(source, f"{tag} {name!r}", f"{count} times", allowed)
 
 
 def chain_between(
@@ -482,43 +478,67 @@ def _path(urdf: Urdf, base: str, tip: str, source: str) -> list[Joint]:
 
 
 def _weights(urdf: Urdf, chain: UrdfChain) -> tuple[list[dict[str, Any]], list[str]]:
-    """Entries of ``masses`` of a robot file, see `mechanics.robot_file`, and what is to
-    be said of them."""
+    """List the entries of ``masses`` of a robot file, see `mechanics.robot_file`, and
+    notes about them."""
+    moments, joints_at_zero = _carried_moments(urdf, chain)
+    masses = {float(moment[3]) for moment in moments.values()}
+    if len(moments) >= _FEWEST_ALIKE and len(masses) == 1:
+        note = (
+            f"every link weighs {masses.pop():g} kg: placeholders, which are left out"
+        )
+        return [], [note]
+    notes = []
+    if joints_at_zero:
+        names = list_first(sorted(joints_at_zero), _NAMED)
+        notes.append(
+            f"joints beside the chain are held at zero for what they carry: {names}"
+        )
+    if not moments:
+        notes.append("no masses: the weight of the links is not known")
+    entries: list[dict[str, Any]] = []
+    for link, (*mass_times_centre, mass) in sorted(moments.items()):
+        centre = np.round(np.array(mass_times_centre) / mass, _DECIMALS) + 0.0
+        entries.append(
+            {
+                "link": link,
+                "mass_kg": round(float(mass), _DECIMALS),
+                "centre_m": centre.tolist(),
+                "relative_std": _MASS_STD,
+            }
+        )
+    return entries, notes
+
+
+def _carried_moments(
+    urdf: Urdf, chain: UrdfChain
+) -> tuple[dict[int, np.ndarray], set[str]]:
+    """Sum the first moments and masses that each link of the chain carries.
+
+    Returns
+    -------
+    moments : ndarrays (4,) by the number of the link: mass times centre, kg m, and
+        mass, kg, in the link's frame.
+    joints_at_zero : joints beside the chain that move what they carry.
+    """
     moments: dict[int, np.ndarray] = {}
-    at_zero = set()
+    joints_at_zero: set[str] = set()
     for name, moment in urdf.moments.items():
-        path = [
-            *takewhile(
+        # Joints from this link up to the link of the chain that carries it.
+        path = list(
+            takewhile(
                 lambda joint: joint.child not in chain.links, urdf.joints_above(name)
             )
-        ]
+        )
         carrier = chain.links.get(path[-1].parent if path else name)
-        moved = [joint.name for joint in path if joint.kind != "fixed"]
-        # What moves beside the column weighs on no joint of the chain.
-        if not moment[3] or carrier is None or (carrier[0] == 0 and moved):
+        if not moment[3] or carrier is None:
             continue
-        at_zero.update(moved)
+        link, transform = carrier
+        moving = [joint.name for joint in path if joint.kind != "fixed"]
+        # A branch that moves on the column loads no joint of the chain.
+        if link == 0 and moving:
+            continue
+        joints_at_zero.update(moving)
         for joint in path:
             moment = joint.origin @ moment
-        moments[carrier[0]] = moments.get(carrier[0], np.zeros(4)) + carrier[1] @ moment
-    alike = {float(moment[3]) for moment in moments.values()}
-    if len(moments) >= _FEWEST_ALIKE and len(alike) == 1:
-        return [], [
-            f"every link weighs {alike.pop():g} kg: placeholders, which are left out"
-        ]
-    notes = [] if moments else ["no masses: the weight of the links is not known"]
-    if at_zero:
-        held = list_first(sorted(at_zero), _NAMED)
-        notes.insert(
-            0, f"joints beside the chain are held at zero for what they carry: {held}"
-        )
-    entries = []
-    for number, (*mass_times_centre, mass) in sorted(moments.items()):
-        centre = np.round(np.array(mass_times_centre) / mass, _DECIMALS) + 0.0
-        entry = {
-            "link": number,
-            "mass_kg": round(float(mass), _DECIMALS),
-            "centre_m": centre.tolist(),
-        }
-        entries.append(entry | {"relative_std": _MASS_STD})
-    return entries, notes
+        moments[link] = moments.get(link, np.zeros(4)) + transform @ moment
+    return moments, joints_at_zero

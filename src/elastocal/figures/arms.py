@@ -111,8 +111,9 @@ def draw_arm_with_errors(
         Errors of the validation poses; the titles state its RMS errors.
     """
     held_out = table["held_out"].astype(bool)
-    joints = range(1, robot.joints + 1)
-    angles = np.column_stack([table[f"q{joint}"][held_out] for joint in joints])
+    angles = np.column_stack(
+        [table[f"q{joint}"][held_out] for joint in range(1, robot.joints + 1)]
+    )
     positions = np.column_stack([table[axis][held_out] for axis in "xyz"])
     arms = _compute_links(robot, robot.model_angles(np.unique(angles, axis=0)))
     # Draw the arm in full that reaches farthest to a side.
@@ -122,8 +123,7 @@ def draw_arm_with_errors(
         for arm in arms:
             axis.plot(*project_view(arm).T, color=_OTHER_ARMS, lw=1.2, zorder=0)
         draw_arm(axis, full_arm, 11)
-        components = [f"{stage}_d{component}" for component in "xyz"]
-        errors = np.column_stack([table[name][held_out] for name in components])
+        errors = np.column_stack([table[f"{stage}_d{xyz}"][held_out] for xyz in "xyz"])
         _draw_errors(axis, positions, errors, stage)
         axis.set_title(
             f"{MILLI * getattr(heldout, stage).rms_m:.2f} mm",

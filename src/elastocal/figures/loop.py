@@ -4,6 +4,7 @@ and the contributions to the error."""
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -190,11 +191,12 @@ def draw_residual_arrows(
 def _average_repeats(table: Mapping[str, np.ndarray]) -> _States:
     """Mean position and residuals of each state and target."""
     keys = ["held_out", "session", "pose", "load", "target"]
-    columns = {stage: [f"{stage}_d{axis}" for axis in "xyz"] for stage in STAGES}
-    names = [*keys, *"xyz", *columns["before"], *columns["after"]]
+    before = ["before_dx", "before_dy", "before_dz"]
+    after = ["after_dx", "after_dy", "after_dz"]
+    names = [*keys, *"xyz", *before, *after]
     frame = pd.DataFrame({name: table[name] for name in names})
     means = frame.groupby(keys, dropna=False, observed=True).mean()
-    residuals = {stage: means[columns[stage]].to_numpy() for stage in STAGES}
+    residuals = {"before": means[before].to_numpy(), "after": means[after].to_numpy()}
     return _States(means[[*"xyz"]].to_numpy(), residuals)
 
 
@@ -328,24 +330,22 @@ def draw_before_after(
     line_counts = [label.count("\n") + 1 for label in labels]
     height_mm = 30 + 4.0 * sum(line_counts) + 4.5 * len(steps)
     figure, axes = create_panels(1, len(METRICS), height_mm, sharey=True)
-    heights = np.array([0.55 + 0.45 * count for count in line_counts])
+    heights = 0.55 + 0.45 * np.array(line_counts)
     rows = np.cumsum(heights) - heights / 2
-    held_out = _collect_errors(steps, "heldout")
-    factor, unit = unit_of(held_out.max())
-    positive = [*held_out[held_out > 0], *([noise_floor_m] if noise_floor_m else [])]
-    logarithmic = max(positive) > _MAX_LINEAR_RATIO * min(positive)
-    largest = max(held_out.max(), _collect_errors(steps, "train").max())
+    factor, unit = unit_of(_collect_errors(steps, "heldout").max())
+    logarithmic_range = _find_logarithmic_range(steps, noise_floor_m)
     for axis, (metric, title) in zip(axes[0], METRICS.items(), strict=True):
         _draw_model_bars(axis, steps, metric, rows, factor)
         if noise_floor_m:
             axis.axvline(factor * noise_floor_m, gid="noise floor", **_NOISE_STYLE)
         axis.set(title=title, xlabel=f"error ({unit})")
-        if logarithmic:
-            axis.set_xscale("log")
-            axis.set_xlim(0.5 * factor * min(positive), 1.6 * factor * largest)
-            axis.xaxis.set_major_formatter("{x:g}")
-        else:
+        if logarithmic_range is None:
             axis.set_xlim(0, None)
+        else:
+            smallest, largest = logarithmic_range
+            axis.set_xscale("log")
+            axis.set_xlim(0.5 * factor * smallest, 1.6 * factor * largest)
+            axis.xaxis.set_major_formatter("{x:g}")
         axis.grid(visible=False, axis="y")
         axis.set_axisbelow(True)
     axes[0, 0].set(yticks=rows, ylim=(heights.sum(), 0))
@@ -358,6 +358,20 @@ def draw_before_after(
     return figure
 
 
+def _find_logarithmic_range(
+    steps: Sequence[Mapping[str, Any]], noise_floor_m: float | None
+) -> tuple[float, float] | None:
+    """Smallest and largest error in m for a logarithmic axis; None if a linear one shows
+    all errors."""
+    held_out = _collect_errors(steps, "heldout")
+    bars = held_out[held_out > 0]
+    if noise_floor_m:
+        bars = np.append(bars, noise_floor_m)
+    if bars.max() <= _MAX_LINEAR_RATIO * bars.min():
+        return None
+    return bars.min(), max(held_out.max(), _collect_errors(steps, "train").max())
+
+
 def _label_model(step: str) -> str:
     """The effects of a model in words, in lines that fit next to the bars; the end of a
     long list is left out."""
@@ -367,9 +381,8 @@ def _label_model(step: str) -> str:
 
 def _collect_errors(steps: Sequence[Mapping[str, Any]], poses: str) -> np.ndarray:
     """Errors (models, metrics) in m on the held-out or the training poses."""
-    return np.array(
-        [[step[f"{poses}_{metric}_m"] for metric in METRICS] for step in steps]
-    )
+    columns = [f"{poses}_{metric}_m" for metric in METRICS]
+    return np.array([itemgetter(*columns)(step) for step in steps])
 
 
 def _draw_model_bars(
@@ -514,8 +527,8 @@ def draw_probabilities(
 def _list_hypotheses(sets: Sequence[MechanismSet]) -> list[tuple[str, float]]:
     """Label and probability of each hypothesis, then of all others together."""
     labels = [
-        textwrap.fill(capital(words), _HYPOTHESIS_LABEL_WIDTH)
-        for words in hypotheses_words(sets)
+        textwrap.fill(capital(hypothesis), _HYPOTHESIS_LABEL_WIDTH)
+        for hypothesis in hypotheses_words(sets)
     ]
     values = [hypothesis.probability for hypothesis in sets]
     hypotheses = [*zip(labels, values, strict=True)]

@@ -520,9 +520,15 @@ def draw_kinematic_scheme(robot: Robot) -> Figure:
     for joint in layout.joints:
         _draw_joint(sheet, joint)
     for joint in layout.joints:
-        name = f"$q_{{{joint.number}}}$"
-        gid = f"joint-{joint.number}"
-        sheet.place_label(_Label(name, gid, joint.centre, _CIRCLE_MM, joint.axis))
+        sheet.place_label(
+            _Label(
+                f"$q_{{{joint.number}}}$",
+                f"joint-{joint.number}",
+                joint.centre,
+                _CIRCLE_MM,
+                joint.axis,
+            )
+        )
     axis_sample = (Patch(fc=_FACE, ec=_BLUE, lw=1.3), Line2D([], [], **_AXIS_STYLE))
     circle_sample = (_mark(_NOWHERE, "o", 4), _mark(_NOWHERE, "o", 1, _BLUE))
     legend: list[tuple[Any, str]] = [
@@ -532,9 +538,15 @@ def draw_kinematic_scheme(robot: Robot) -> Figure:
     ]
     named = [link for link in layout.links if link.label]
     for number, link in enumerate(named, start=1):
-        middle = (link.start + link.end) / 2
-        stroke = link.end - link.start
-        sheet.place_label(_Label(link.label, f"length-{number}", middle, 1.0, stroke))
+        sheet.place_label(
+            _Label(
+                link.label,
+                f"length-{number}",
+                (link.start + link.end) / 2,
+                1.0,
+                link.end - link.start,
+            )
+        )
     low = sheet.occupied[:, :2].min(axis=0)
     high = sheet.occupied[:, 2:].max(axis=0) + np.array([0.0, 7.0])
     sheet.draw_text(((low[0] + high[0]) / 2, high[1] - 2.0), robot.name, weight="bold")
@@ -762,9 +774,9 @@ def _draw_block(
 ) -> None:
     """Draw a block whose left side has its middle at `start`, mm."""
     style = _BLOCK_STYLES[kind]
-    left, y = start
-    right = left + style.width_mm
-    middle = left + style.width_mm / 2
+    x_left, y = start
+    x_right = x_left + style.width_mm
+    middle = x_left + style.width_mm / 2
     half_height = 4.8 if kind == "end-effector" else 3.6
     top = y + half_height
     bottom = y - half_height
@@ -772,7 +784,7 @@ def _draw_block(
         sheet.axes.add_line(_mark((middle, y), "o", style.width_mm))
     elif kind != "spring":
         sheet.axes.fill(
-            [left, right, right, left],
+            [x_left, x_right, x_right, x_left],
             [bottom, bottom, top, top],
             fc=style.face,
             ec=style.edge,
@@ -782,7 +794,7 @@ def _draw_block(
     if "spring" in kind:
         sheet.axes.add_line(_mark((middle, y), _ZIGZAG, 10, "none", style.edge))
     if kind == "base":
-        for x in np.arange(left + 1.5, left + style.width_mm + 0.1, 2.0):
+        for x in np.arange(x_left + 1.5, x_left + style.width_mm + 0.1, 2.0):
             sheet.draw_line([(x, bottom), (x - 1.6, bottom - 1.8)], lw=0.7)
     sheet.draw_text((middle, y), style.text, linespacing=1.0)
     sheet.draw_text((middle, y - 6.4 if kind == "link" else y + 6.4), label)

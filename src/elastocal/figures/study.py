@@ -123,7 +123,7 @@ def _find_distinct_curves(curves: pd.DataFrame, order: Sequence[str]) -> list[in
     for index, name in enumerate(order):
         if name not in curves:
             continue
-        earlier = (curves[order[other]] for other in distinct)
+        earlier = (curves[order[previous]] for previous in distinct)
         equal = (
             np.allclose(curves[name], curve, rtol=1e-6, atol=0, equal_nan=True)
             for curve in earlier

@@ -34,12 +34,14 @@ from elastocal.loop.loading import load_campaign
 from elastocal.validation.transfer import warn_of_repeated_poses
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
     from elastocal.campaigns.campaign import Measurements
     from elastocal.diagnosis.fitted_subset import FittedSubset
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Case
+    from elastocal.fitting.noise import Noise
 
 # With fewer held-out poses, the 95 % interval of an RMS is wider than a factor of two.
 FEWEST_HELD_OUT = 6
@@ -108,18 +110,13 @@ def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
     ).untestable
     testable = len(case.candidates) - len(untestable)
     data_faults = faults(case.campaign)
-    noise_um = 1e6 * subset.noise.position_m
     rows = [
         *_describe_measurements(case, training, held_out),
-        (
-            "noise",
-            f"{noise_um:.0f} µm a coordinate, from {_SOURCES[subset.noise.source]}",
-        ),
+        ("noise", _describe_noise(subset.noise)),
         *_describe_declared_model(declared),
         ("testable", format_count(testable, "candidate effect")),
+        *_describe_untestable(untestable),
     ]
-    for reason, count in Counter(untestable.values()).most_common():
-        rows.append(("", f"{count} not testable: {reason}"))
     attention = [fault.detail for fault in data_faults]
     negative = _find_negative_compliances(declared)
     # A negative compliance means that the model lacks something, so the search for
@@ -136,6 +133,19 @@ def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
     attention += _list_shortcomings(case, declared, training, held_out)
     attention += warn_of_repeated_poses(training, held_out)
     return Overview(case.campaign.name, not data_faults, testable, rows, attention)
+
+
+def _describe_noise(noise: Noise) -> str:
+    return (
+        f"{1e6 * noise.position_m:.0f} µm a coordinate, from {_SOURCES[noise.source]}"
+    )
+
+
+def _describe_untestable(untestable: Mapping[str, str]) -> list[tuple[str, str]]:
+    """Return rows with the number of candidates for each reason, the most frequent
+    first."""
+    reasons = Counter(untestable.values()).most_common()
+    return [("", f"{count} not testable: {reason}") for reason, count in reasons]
 
 
 def _describe_gross_errors(

@@ -43,19 +43,25 @@ def shorten_titles(titles: Mapping[str, str]) -> dict[str, str]:
     names = {}
     for robot, title in titles.items():
         base = min(filter(title.startswith, titles.values()), key=len)
-        others = [other for other in titles.values() if not other.startswith(base)]
-        names[robot] = _shorten_title(base, others) + title.removeprefix(base)
+        alternatives = [
+            alternative
+            for alternative in titles.values()
+            if not alternative.startswith(base)
+        ]
+        names[robot] = _shorten_title(base, alternatives) + title.removeprefix(base)
     return names
 
 
-def _shorten_title(title: str, others: Sequence[str]) -> str:
-    """The fewest first words of a title with which no other title begins."""
-    words = title.split()
-    for count in range(1, len(words)):
-        beginning = words[:count]
-        if all(other.split()[:count] != beginning for other in others):
+def _shorten_title(title: str, alternatives: Sequence[str]) -> str:
+    """The fewest first words of a title with which no alternative begins."""
+    parts = title.split()
+    for count in range(1, len(parts)):
+        beginning = parts[:count]
+        if all(
+            alternative.split()[:count] != beginning for alternative in alternatives
+        ):
             return " ".join(beginning)
-    return " ".join(words)
+    return " ".join(parts)
 
 
 class _Tables:
@@ -311,10 +317,10 @@ def _list_estimators(table: pd.DataFrame, configurations: int) -> list[dict[str,
             continue
         listed.add(key)
         cells_by_average = {
-            average: [_format_median(row, name, configurations) for name in quantities]
+            average: _format_medians(row, quantities, configurations)
             for average, row in by_average.items()
         }
-        fixed_cells = [_format_median(usual, name, configurations) for name in fixed]
+        fixed_cells = _format_medians(usual, fixed, configurations)
         rows.append(
             {
                 "robot": robot,
@@ -326,6 +332,13 @@ def _list_estimators(table: pd.DataFrame, configurations: int) -> list[dict[str,
     return rows
 
 
+def _format_medians(
+    row: Mapping[str, Any], names: Sequence[str], configurations: int
+) -> list[str]:
+    """Format several medians of a row, see `_format_median`."""
+    return [_format_median(row, name, configurations) for name in names]
+
+
 def _find_table4_quantities(table: pd.DataFrame) -> list[str]:
     """Columns of the four quantities of Table 4 and the RMS error, for any length and
     limits."""
@@ -334,8 +347,10 @@ def _find_table4_quantities(table: pd.DataFrame) -> list[str]:
         for name in table.columns
         if not name.endswith("_std") and "fixed_joints" not in name
     ]
-    starts = ("k_sigma_", "n_k_sigma_", "dev_", "n_dev_", "rms_")
-    return [next(name for name in names if name.startswith(start)) for start in starts]
+    quantities = []
+    for start in ("k_sigma_", "n_k_sigma_", "dev_", "n_dev_", "rms_"):
+        quantities.append(next(name for name in names if name.startswith(start)))
+    return quantities
 
 
 def _describe_strategy(strategy: Strategy) -> list[str]:

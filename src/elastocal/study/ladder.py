@@ -167,8 +167,8 @@ class _Folds:
         """Sum of squares (sets,) that fits of columns (sets, k) leave in the folds that
         they do not use."""
         errors = [
-            fold.compute_squared_error(others.fit(columns))
-            for fold, others in zip(self.validation, self.training, strict=True)
+            fold.compute_squared_error(training.fit(columns))
+            for fold, training in zip(self.validation, self.training, strict=True)
         ]
         return np.sum(errors, axis=0)
 

@@ -286,8 +286,8 @@ def interpolate_configurations(squares: np.ndarray, accuracy: float) -> np.ndarr
     (...) array
         Infinite if the longest data set does not reach the accuracy.
     """
-    known = np.where(np.isnan(squares), np.inf, squares)
-    excess = np.log(known) - 2 * np.log(accuracy)
+    finite_or_inf = np.where(np.isnan(squares), np.inf, squares)
+    excess = np.log(finite_or_inf) - 2 * np.log(accuracy)
     above = excess > 0
     longest = excess.shape[-1]
     last_above = longest - 1 - np.argmax(above[..., ::-1], axis=-1)

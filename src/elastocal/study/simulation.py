@@ -337,7 +337,8 @@ def pack_experiments(
 
 def unpack_experiments(columns: Mapping[str, np.ndarray]) -> Experiments:
     """Unpack the experiments of a block."""
-    angles = [f"q{j + 1}" for j in range(sum(name[0] == "q" for name in columns))]
+    joints = sum(name[0] == "q" for name in columns)
+    angles = [f"q{j}" for j in range(1, joints + 1)]
     return Experiments(
         _stack_components(columns, angles), _stack_components(columns, WRENCH_NAMES)
     )

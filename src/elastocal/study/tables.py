@@ -349,10 +349,10 @@ def format_column_head(name: str) -> str:
     """
     quantity = name.removesuffix("_fixed_joints")
     suffix = ", fixed joints" if quantity != name else ""
-    for pattern, words in _HEADS:
+    for pattern, template in _HEADS:
         match = re.fullmatch(pattern, quantity)
         if match:
-            return words.format(*match.groups()) + suffix
+            return template.format(*match.groups()) + suffix
     return name.replace("_", " ")
 
 

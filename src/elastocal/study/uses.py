@@ -352,11 +352,11 @@ def build_pairs_table(scores: Scores) -> pd.DataFrame:
         by_rms = by_metric[REFERENCE]
         pairs = list(combinations(_name_estimators(by_rms), 2))
         for metric, by_strategy in by_metric.items():
-            for strategy, other in pairs:
-                ratio = by_strategy[strategy].compute_ratio(by_strategy[other])
-                rms_ratio = by_rms[strategy].compute_ratio(by_rms[other])
+            for strategy, compared in pairs:
+                ratio = by_strategy[strategy].compute_ratio(by_strategy[compared])
+                rms_ratio = by_rms[strategy].compute_ratio(by_rms[compared])
                 is_reversed = _find_side(ratio) * _find_side(rms_ratio) < 0
-                head = (robot, metric, strategy, other)
+                head = (robot, metric, strategy, compared)
                 rows.append((*head, *ratio, *rms_ratio, is_reversed))
     columns = [
         *("robot", "metric", "strategy", "other"),

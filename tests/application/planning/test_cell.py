@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from analysed_robots import analysed
-from made_surveys import made_survey
+from made_surveys import make_survey
 
 from elastocal.application.inverse_kinematics import compute_reach_m
 from elastocal.application.planning.cell import (
@@ -20,7 +20,7 @@ EVERYWHERE = np.array([[-5.0, 5.0], [-5.0, 5.0], [-5.0, 5.0]])
 
 @pytest.fixture(scope="module")
 def survey():
-    return made_survey()
+    return make_survey()
 
 
 @pytest.fixture(scope="module")

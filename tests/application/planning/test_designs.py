@@ -4,7 +4,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from made_surveys import made_rows
+from made_surveys import make_rows
 
 from elastocal.application.planning.designs import (
     CRITERIA,
@@ -14,7 +14,7 @@ from elastocal.application.planning.designs import (
     exchange_candidates,
 )
 
-ACCURACY_ROWS = made_rows(7, 3, 5, 2).astype(float)
+ACCURACY_ROWS = make_rows(7, 3, 5, 2).astype(float)
 
 
 @pytest.mark.parametrize("kind", CRITERIA)
@@ -38,7 +38,7 @@ def test_gains_are_right_for_an_unknown_base_under_opposite_pulls(kind):
 @pytest.mark.parametrize("kind", CRITERIA)
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_the_exchange_is_near_the_best_of_all_subsets(kind, seed):
-    rows = made_rows(12, 3, 5, seed)
+    rows = make_rows(12, 3, 5, seed)
     criterion = build_criterion(kind, ACCURACY_ROWS)
     greedy = choose_greedily(rows, 4, criterion)
     design = exchange_candidates(rows, greedy, criterion)

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_surveys import OPEN, made_candidates, made_survey
+from made_surveys import OPEN, make_candidates, make_survey
 
 from elastocal.application.planning.plan import (
     Candidates,
@@ -19,12 +19,12 @@ from elastocal.mechanics.robot_file import robot_from_document
 
 @pytest.fixture(scope="module")
 def survey():
-    return made_survey()
+    return make_survey()
 
 
 @pytest.fixture(scope="module")
 def candidates(survey):
-    return made_candidates(survey, 300)
+    return make_candidates(survey, 300)
 
 
 def test_a_plan_is_better_than_random_designs(survey, candidates):

@@ -1,7 +1,7 @@
 """The sheet of a plan has a row for each measurement that is to be made."""
 
 import numpy as np
-from made_surveys import made_candidates, made_survey
+from made_surveys import make_candidates, make_survey
 
 from elastocal.application.planning.plan import choose_plan
 from elastocal.application.planning.sheet import (
@@ -13,8 +13,8 @@ from elastocal.application.planning.sheet import (
 
 
 def test_the_first_poses_are_repeated_and_nothing_is_measured_yet():
-    survey = made_survey()
-    plan = choose_plan(survey, made_candidates(survey, 300), 16, 5, 1)
+    survey = make_survey()
+    plan = choose_plan(survey, make_candidates(survey, 300), 16, 5, 1)
     sheet = build_sheet(survey, plan)
     assert len(sheet) == 3 * 21 + 2 * (REPEATS - 1) * REPEATED_POSES
     assert sheet[["x", "y", "z"]].isna().all().all() and "rx" not in sheet

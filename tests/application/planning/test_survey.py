@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_surveys import made_candidates, made_survey
+from made_surveys import make_candidates, make_survey
 
 from elastocal.application.planning.survey import (
     build_observations,
@@ -20,7 +20,7 @@ from elastocal.fitting.noise import Noise
 
 @pytest.fixture(scope="module")
 def survey():
-    return made_survey()
+    return make_survey()
 
 
 def with_plausible_priors(model):
@@ -57,8 +57,8 @@ def fit_with_priors(survey, candidates):
 
 @pytest.mark.parametrize("measured", ["position", "pose"])
 def test_information_is_the_inverse_of_the_covariance_of_a_fit_with_priors(measured):
-    survey = made_survey(measured=measured)
-    candidates = made_candidates(survey, 40)
+    survey = make_survey(measured=measured)
+    candidates = make_candidates(survey, 40)
     fit = fit_with_priors(survey, candidates)
     parameters = list_parameters(*declare_model(survey))
     without_prior = ("frame", "target", "joint_compliance")
@@ -80,8 +80,8 @@ def test_information_is_the_inverse_of_the_covariance_of_a_fit_with_priors(measu
 
 @pytest.mark.parametrize("unknown_base", [True, False])
 def test_a_motion_of_the_base_is_an_error_only_if_the_base_is_known(unknown_base):
-    survey = replace(made_survey(), unknown_base=unknown_base)
-    candidates = made_candidates(survey, 40)
+    survey = replace(make_survey(), unknown_base=unknown_base)
+    candidates = make_candidates(survey, 40)
     rows = compute_accuracy_rows(survey, candidates.joint_angles, candidates.force)
     parameters = list_parameters(*declare_model(survey))
     names = [(owner, parameter.name) for owner, parameter in parameters]
@@ -102,7 +102,7 @@ def test_a_motion_of_the_base_is_an_error_only_if_the_base_is_known(unknown_base
 def test_an_unknown_offset_of_the_reflector_absorbs_the_lengths_of_the_last_link(
     survey,
 ):
-    candidates = made_candidates(survey, 40)
+    candidates = make_candidates(survey, 40)
     sizes = []
     for offset_m in (None, (0.0, 0.0, 0.0)):
         target = replace(survey.targets[0], offset_m=offset_m)
