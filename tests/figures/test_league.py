@@ -18,7 +18,7 @@ METHODS = {
 @pytest.fixture(scope="module")
 def table():
     return compare_methods(
-        made_results(), {"A robot": ["one"], "Another": ["two"]}, "geometry", 1
+        make_results(), {"A robot": ["one"], "Another": ["two"]}, "geometry", 1
     )
 
 

@@ -98,7 +98,7 @@ def residual(columns):
 def test_frames_alone_have_no_parameters_of_the_robot_and_a_regression_lowers_what_geometry_leaves(
     kuka, config_folder, tmp_path
 ):
-    many = made_data_set(tmp_path, kuka, config_folder / "robots", poses=60)
+    many = make_data_set(tmp_path, kuka, config_folder / "robots", poses=60)
     _, training, (held_out,) = next(split_rounds("random", many))
     frames, geometry = (
         fit_physics(physics, training) for physics in (FRAMES, GEOMETRY)

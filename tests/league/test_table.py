@@ -38,7 +38,7 @@ def written(table):
 
 @pytest.fixture(scope="module")
 def page():
-    return written(compare_methods(made_results(), ROBOTS, "geometry", 1))
+    return written(compare_methods(make_results(), ROBOTS, "geometry", 1))
 
 
 def test_each_split_has_a_table_in_which_the_best_is_bold(page):
@@ -55,7 +55,7 @@ def test_each_split_has_a_table_in_which_the_best_is_bold(page):
 def test_a_split_that_no_data_set_has_is_left_out():
     page = written(
         compare_methods(
-            made_results(splits=("random", "session")), ROBOTS, "geometry", 1
+            make_results(splits=("random", "session")), ROBOTS, "geometry", 1
         )
     )
     assert (
