@@ -12,7 +12,7 @@ import numpy as np
 
 from elastocal.io.documents import read_document
 from elastocal.mechanics.robot import Robot
-from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.mechanics.robot_file import parse_robot
 from elastocal.study.strategies import Strategy, strategy_from_document
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -114,7 +114,7 @@ def _yardstick() -> float:
 def load_robot(name: str) -> Robot:
     """Robot of config/robots."""
     path = ROOT / "config" / "robots" / f"{name}.yaml"
-    return robot_from_document(read_document(path), path.name)
+    return parse_robot(read_document(path), path.name)
 
 
 def load_strategy(name: str) -> Strategy:

@@ -26,12 +26,12 @@ from elastocal.fitting.model import list_parameters
 from elastocal.fitting.noise import estimate_noise
 from elastocal.io.documents import read_document
 from elastocal.loop.whole import cases_in
-from elastocal_proof.blind.cases import cases_of, make_case
-from elastocal_proof.blind.folders import campaign_document, write_robot
-from elastocal_proof.plant.arm import read_arm
-from elastocal_proof.plant.campaigns import Design, draw_schedule, simulate_measurements
-from elastocal_proof.plant.kinds import Defect, apply_defects
-from elastocal_proof.plant.simulated_robot import draw_specimen
+from elastocal_proof.blind.cases import list_cases, write_sealed_case
+from elastocal_proof.blind.folders import build_campaign_document, write_robot_file
+from elastocal_proof.plant.arm import arm_from_file
+from elastocal_proof.plant.campaigns import Design, measured_table, schedule_of
+from elastocal_proof.plant.kinds import Defect, with_defects
+from elastocal_proof.plant.physical_robot import specimen
 
 ROBOTS = ROOT / "config" / "robots"
 SEED = 2026
@@ -169,11 +169,11 @@ def _fit(work: Path, measurements: int, repetitions: int) -> Row:
 
 def _case(work: Path, cases: int) -> Row:
     # Development cases: those of the proof stay unseen.
-    some = cases_of(read_document(ROOT / "config" / "blind.yaml"), "development", SEED)[
-        :cases
-    ]
+    some = list_cases(
+        read_document(ROOT / "config" / "blind.yaml"), "development", SEED
+    )[:cases]
     for case in some:
-        make_case(case, work / "blind", work / "sealed", ROBOTS)
+        write_sealed_case(case, work / "blind", work / "sealed", ROBOTS)
     # The first pays for the imports.
     run, slower = beside_yardstick(
         lambda: _run([work / "blind" / case.name for case in (some[0], *some)])
@@ -210,7 +210,7 @@ def _large(work: Path, measurements: int) -> Path:
         robot = apply_defects(
             draw_specimen(arm, 4), [Defect("transmission_harmonic", (2,), 1e-4, 1)]
         )
-        document = campaign_document("large", arm, LARGE) | {
+        document = build_campaign_document("large", arm, LARGE) | {
             "compliance": "nominal",
             "holdout": {"fraction": 0.3, "seed": 1},
         }
@@ -224,7 +224,7 @@ def _large(work: Path, measurements: int) -> Path:
             arm.joints,
             "parquet",
         )
-        write_robot(folder, file, robot, arm.masses)
+        write_robot_file(folder, file, robot, arm.masses)
     return folder
 
 

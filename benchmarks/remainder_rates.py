@@ -24,8 +24,8 @@ from elastocal.campaigns.writing import write_campaign
 from elastocal.fitting.model import Case
 from elastocal.fitting.noise import Noise, fit_declared_model
 from elastocal.loop.whole import cases_in
-from elastocal.remainder.corrected import corrected, inputs_of
-from elastocal.remainder.repeatable import repeatable_part
+from elastocal.residual_model.repeatable import detect_repeatable_residual
+from elastocal.residual_model.selection import build_inputs, validate_residual_model
 from elastocal.validation.held_out import compute_position_residuals
 from elastocal.validation.transfer import transfer_fit
 
@@ -75,7 +75,7 @@ def drawn(case: Case, seed: int, part: int, size: float) -> tuple[Case, np.ndarr
     one robot, that of the seed."""
     fitted = fit_declared_model(case.model, case.observations, NOISE)
     robot = np.random.default_rng(seed)
-    inputs = inputs_of(fitted.model, fitted.estimate, case.observations)
+    inputs = build_inputs(fitted.model, fitted.estimate, case.observations)
     offsets = robot.normal(0.0, OFFSET_RAD, 6)
     joints = robot.choice(5, 2, replace=False)
     moved = robot.choice([1, 2])
@@ -119,13 +119,15 @@ if __name__ == "__main__":
                 drawn(each, seed, part, size) for part, each in enumerate(exact)
             )
             fitted = fit_declared_model(case.model, case.observations, NOISE)
-            p_values.append(repeatable_part(fitted, case.observations, seed).p_value)
+            p_values.append(
+                detect_repeatable_residual(fitted, case.observations, seed).p_value
+            )
             if asked.check:
                 continue
             alone = compute_position_residuals(
                 *transfer_fit(fitted, case, held_out), held_out.observations
             )
-            found = corrected(
+            found = validate_residual_model(
                 fitted,
                 case,
                 held_out,

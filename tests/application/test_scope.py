@@ -16,8 +16,8 @@ from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.noise import Noise
 from elastocal.loop.whole import cases_in
-from elastocal.mechanics.sites import sites_of
-from elastocal.remainder.corrected import is_commanded
+from elastocal.mechanics.sites import build_sites
+from elastocal.residual_model.selection import is_commanded
 
 STATES = make_states(6, 60)
 
@@ -43,7 +43,7 @@ def scope_with(robot, candidate, values, shapes, std=0.0):
 
 def test_every_effect_that_no_command_contains_counts_as_error(fanuc):
     first_of_effect = {}
-    for key, candidate in candidates_on(sites_of(fanuc)).items():
+    for key, candidate in candidates_on(build_sites(fanuc)).items():
         if not is_commanded(candidate):
             first_of_effect.setdefault(candidate.effect, (key, candidate))
     instruments = {"frame_drift", "tracker_scale", "force_bias"}

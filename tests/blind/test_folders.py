@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from analysed_robots import ROBOTS
 
+from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.holdout import split_poses
 from elastocal.campaigns.reading import read_campaign
 from elastocal.errors import InputError
@@ -35,8 +36,8 @@ def test_the_analysis_reads_the_folder_its_angles_and_the_poses_that_are_held_ou
         small,
         draw_schedule(robot.arm, small, 2),
     )
-    campaign = read_campaign(tmp_path / "c", ROBOTS)
-    schedule = draw_schedule(robot.arm, small, 2)
+    campaign = read_campaign(read_campaign_folder(tmp_path / "c", ROBOTS))
+    schedule = schedule_of(robot.arm, small, 2)
     training, held_out = split_poses(campaign)
     assert set(training.pose) == set(schedule.pose[schedule.training])
     assert set(held_out.pose) == set(schedule.pose[~schedule.training])

@@ -14,8 +14,8 @@ from elastocal.diagnosis.misplaced import (
 from elastocal.fitting.noise import estimate_noise, fit_declared_model
 from elastocal.loop.overview import overview
 from elastocal.loop.whole import cases_in
-from elastocal.mechanics.kinematics import poses
-from elastocal.mechanics.sites import sites_of
+from elastocal.mechanics.kinematics import compute_poses
+from elastocal.mechanics.sites import build_sites
 
 DECLARED_M = np.array([0.1, 0.0, 0.05])
 POSES = 40
@@ -26,7 +26,7 @@ ARMS = ("kuka", "abb", "ur10")
 def deviating_coordinates(robot, angles, place, shift_m, draws):
     """Coordinates (P, C) of a robot with usual errors of geometry, at some joint angles
     (P, n), whose base or link is shifted."""
-    sites = sites_of(robot)
+    sites = build_sites(robot)
     coordinates = np.zeros((len(angles), sites.chain.coordinates))
     offsets = 5e-4 * draws.standard_normal(robot.joints)
     coordinates[:, : robot.joints] = angles + offsets
@@ -51,9 +51,9 @@ def misdeclared_folder(folder, robot, name, place, shift_m, seed=1):
     low, high = robot.joint_limits.T
     angles = low + (high - low) * draws.random((POSES, robot.joints))
     coordinates = deviating_coordinates(robot, angles, place, shift_m, draws)
-    chain = sites_of(robot).chain
+    chain = build_sites(robot).chain
     end = chain.end_effector
-    position, rotation = poses(chain, coordinates, end)
+    position, rotation = compute_poses(chain, coordinates, end)
     target_m = DECLARED_M + (np.array(shift_m) if place == "tool" else 0.0)
     position = position + rotation @ target_m
     turn = Rotation.from_rotvec(6e-5 * draws.standard_normal(position.shape))

@@ -31,8 +31,11 @@ from elastocal.fitting.model import (
     predict,
 )
 from elastocal.io.documents import read_document
-from elastocal.mechanics.elastostatics import exact_deflections, joint_torques
-from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.elastostatics import (
+    compute_exact_deflections,
+    compute_joint_torques,
+)
+from elastocal.mechanics.kinematics import compute_poses
 
 TWO = Target("A", "6DoF", None), Target("B", "3DoF", (0.1, 0.0, -0.2))
 
@@ -234,7 +237,7 @@ def equilibrium(chain, compliance, states, weighing=None):
     end = replace(chain.end_effector, offset_m=(0, 0, 0))
 
     def unbalanced(turned, q, wrench):
-        torque = joint_torques(chain, q + turned, wrench, end)
+        torque = compute_joint_torques(chain, q + turned, wrench, end)
         return turned - compliance * (
             torque if weighing is None else torque + weighing(q + turned)
         )
@@ -264,14 +267,14 @@ def test_nominal_springs_deflect_as_equation_9_with_exact_kinematics(fanuc):
     turned = equilibrium(fanuc.chain, fanuc.compliance, states)
     for index, point in enumerate(fanuc.chain.points):
         target = replace(point, offset_m=(0.05, 0.1, -0.1))
-        expected = poses(fanuc.chain, states.joint_angles + turned, target)
+        expected = compute_poses(fanuc.chain, states.joint_angles + turned, target)
         np.testing.assert_allclose(
             position[seen.target == index], expected[0], rtol=0, atol=1e-9
         )
         np.testing.assert_allclose(
             rotation[seen.target == index], expected[1], rtol=0, atol=1e-9
         )
-    bent = exact_deflections(
+    bent = compute_exact_deflections(
         fanuc.chain, states.joint_angles, turned, fanuc.chain.end_effector
     )
     assert np.abs(bent).max() > 1e-4

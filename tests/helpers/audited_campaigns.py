@@ -16,8 +16,8 @@ from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop import schemas
 from elastocal.loop.loading import load_campaign
 from elastocal.loop.whole import judged
-from elastocal_proof.audit.audited import Audited
-from elastocal_proof.audit.whole import checks_of
+from elastocal_proof.audit.audit_run import find_checks
+from elastocal_proof.audit.finished_run import FinishedRun
 from elastocal_proof.blind.folders import write_blind_campaign
 from elastocal_proof.plant.arm import read_arm
 from elastocal_proof.plant.campaigns import Design, draw_schedule
@@ -80,13 +80,13 @@ def diagnosed_campaign(top, robot, effects=(), **design):
 def audit_of(top, *files):
     """Findings of files of the campaign `cell`, all of them by default, every row
     looked at."""
-    run = Audited(top, CONFIGURATION, {}, {}, 10**6)
+    run = FinishedRun(top, CONFIGURATION, {}, {}, 10**6)
     files = files or [
         path.relative_to(top).as_posix() for path in sorted(top.glob("re*/loop/cell/*"))
     ]
     return [
         finding
         for file in files
-        for _, check, arguments in checks_of(file)
+        for _, check, arguments in find_checks(file)
         for finding in check(run, file, **arguments)
     ]

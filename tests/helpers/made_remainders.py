@@ -6,7 +6,7 @@ from made_folders import make_folder, make_table
 
 from elastocal.campaigns.simulation import Plan
 from elastocal.loop.whole import cases_in
-from elastocal.remainder.regressions import Inputs
+from elastocal.residual_model.regressions import Inputs
 
 NOISE_M = 2e-5
 SMOOTH_M = 4e-4

@@ -46,7 +46,7 @@ from elastocal.campaigns.importers import Importer, PublicFile, PublicMeasuremen
 from elastocal.effects.protocol import effect, turning_joints
 from elastocal.effects.sizes import Size
 from elastocal.exchange.controllers import Controller
-from elastocal.remainder.regressions import Predictor, Regression
+from elastocal.residual_model.regressions import Predictor, Regression
 
 
 @effect("elastic", "resistance of hoses", Size("turn", 1e-4, "made up"), at=turning_joints)
@@ -95,7 +95,7 @@ from elastocal.exchange.controllers import axes_of, find_controller, targets_of
 from elastocal.io.origin import environment
 from elastocal.loop.loading import load_campaign
 from elastocal.mechanics.sites import sites_of
-from elastocal.remainder.regressions import Inputs, list_regressions
+from elastocal.residual_model.regressions import Inputs, list_regressions
 
 config, folder = map(Path, sys.argv[1:])
 robots = config / "robots"

@@ -11,8 +11,13 @@ from arms_at_rest import angles_and_wrenches, arm_of, at_rest, forces_at
 from support import OTHER_CHAINS, robot_of
 
 from elastocal.errors import InputError
-from elastocal.mechanics.elastostatics import generalized_forces as joint_torques
-from elastocal.mechanics.kinematics import pose_differences, poses_and_jacobians
+from elastocal.mechanics.elastostatics import (
+    compute_generalized_forces as joint_torques,
+)
+from elastocal.mechanics.kinematics import (
+    compute_pose_differences,
+    compute_poses_and_jacobians,
+)
 from elastocal_proof.plant.arm import LinkMass
 from elastocal_proof.plant.multibody import (
     Structure,
@@ -53,13 +58,14 @@ def test_chains_of_three_to_seven_joints_that_turn_backwards_are_read_and_bend_a
     machine, bent = at_rest(arm, angles, wrench)
     _, position, rotation = forces_at(machine, angles)
     seen = [
-        poses_and_jacobians(robot.chain, angles, point) for point in robot.chain.points
+        compute_poses_and_jacobians(robot.chain, angles, point)
+        for point in robot.chain.points
     ]
     turn = robot.compliance * joint_torques(seen[-1][2], wrench)
     for p, (place, facing, jacobian) in enumerate(seen):
         np.testing.assert_allclose(position[:, p], place, atol=1e-12)
         np.testing.assert_allclose(rotation[:, p], facing, atol=1e-12)
-        found = pose_differences(
+        found = compute_pose_differences(
             bent[2][:, p], bent[3][:, p], position[:, p], rotation[:, p]
         )
         np.testing.assert_allclose(

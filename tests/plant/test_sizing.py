@@ -26,7 +26,7 @@ def test_a_defect_is_sized_to_its_non_centrality(
     def robot_of_size(size):
         return apply_defects(fanuc_specimen, [replace(defect, size=size)])
 
-    size = size_for(
+    size = find_size(
         yardstick, robot_of_size, defect.size, target, quantity, KINDS[kind].largest
     )
     assert yardstick.compute_noncentralities(robot_of_size(size))[
@@ -52,7 +52,7 @@ def test_a_wrong_force_scale_is_absorbed_at_any_size_but_for_what_the_weights_te
         fanuc_specimen, schedule, declared=fanuc_specimen.arm.masses
     )
     with pytest.raises(ValueError, match="no size found"):
-        size_for(
+        find_size(
             yardstick,
             scaled(fanuc_specimen),
             0.02,

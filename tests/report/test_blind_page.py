@@ -73,13 +73,13 @@ def test_each_quantity_stands_beside_its_target_with_each_robot_alone_and_the_li
 
 
 def test_how_many_are_reached_says_on_which_robots():
-    fine = summarize(
+    fine = summarize_figures(
         PLAN, frame(*[(truth(), silence(), oracle(1.0))] * 100), pd.DataFrame(), 1
     )
     assert describe_reached_targets(fine).endswith(
         "with a target reach it on the robots of the proof."
     )
-    tuned = summarize(
+    tuned = summarize_figures(
         PLAN, frame((truth(robot="kuka"), silence(), oracle(1.0))), pd.DataFrame(), 1
     )
     assert "which proves nothing" in describe_reached_targets(tuned)

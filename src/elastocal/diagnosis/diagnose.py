@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.counting import format_count
-from elastocal.data_checks.faults import faults
+from elastocal.data_checks.faults import find_faults
 from elastocal.diagnosis import model_averaging, refit, verdict
 from elastocal.diagnosis.alarm import run_alarm_test
 from elastocal.diagnosis.candidate_design import build_candidate_design, refine_shapes
@@ -44,7 +44,7 @@ from elastocal.fitting.noise import count_effective_parameters, serialize_noise
 from elastocal.fitting.observations import Observations
 from elastocal.io.typed_json import to_document
 from elastocal.random_streams import open_stream
-from elastocal.remainder.repeatable import repeatable_part
+from elastocal.residual_model.repeatable import detect_repeatable_residual
 from elastocal.validation.held_out import predict_left_out_squares
 
 if TYPE_CHECKING:
@@ -295,7 +295,7 @@ def _select_first_subset(
 ) -> tuple[FittedSubset, Sequence[Fault]]:
     """Select the rows of the first search, and look for faults of the data."""
     subset = select_initial_subset(case, settings)
-    data_faults = faults(subset.case.campaign)
+    data_faults = find_faults(subset.case.campaign)
     if data_faults:
         # If the whole data set has a fault, such as a wrong unit or frame, do not look
         # for single bad rows.
@@ -469,7 +469,7 @@ def _run_search_round(
     tested = start.tested
     remains = False
     if has_large_pose_error or (is_linear and named not in (start.named, ())):
-        repeatable = repeatable_part(fitted, sample, context.seed)
+        repeatable = detect_repeatable_residual(fitted, sample, context.seed)
         tested = (fitted, repeatable)
         remains = repeatable is not None and repeatable.remains
     max_pose_error_rad = start.max_pose_error_rad
@@ -668,7 +668,7 @@ def _test_repeatable(
     tested that fit."""
     if evidence.tested is not None and evidence.tested[0] is kept:
         return evidence.tested[1]
-    return repeatable_part(kept, observations, seed)
+    return detect_repeatable_residual(kept, observations, seed)
 
 
 def _contradict(

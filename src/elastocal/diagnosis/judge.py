@@ -28,7 +28,11 @@ from elastocal.fitting.noise import parse_noise
 from elastocal.fitting.observations import index_poses, separate_measurements
 from elastocal.io.typed_json import from_document, to_document
 from elastocal.random_streams import open_stream
-from elastocal.remainder.corrected import Corrected, corrected, remainder_facts
+from elastocal.residual_model.selection import (
+    CorrectedResiduals,
+    summarize_residual_model,
+    validate_residual_model,
+)
 from elastocal.validation import held_out as figures
 from elastocal.validation.conformity import count_configurations, find_joint_ranges
 from elastocal.validation.transfer import (
@@ -81,7 +85,7 @@ class Judgement:
     held_out: Case
     left_out: Measurements
     outside: np.ndarray
-    delivered: Corrected | None
+    delivered: CorrectedResiduals | None
 
     @cached_property
     def document(self) -> dict[str, Any]:
@@ -134,7 +138,7 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
     delivered = apply_regression(diagnosis, part, seed)
     if delivered is not None:
         draws = open_stream(seed, case.campaign.name, "remainder", 0)
-        facts = remainder_facts(
+        facts = summarize_residual_model(
             delivered, diagnosis.declared, diagnosis.final, case, part, draws
         )
         remainder = from_document(Remainder, facts, "regression on the remainder")
@@ -173,7 +177,7 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
 
 def apply_regression(
     diagnosis: Diagnosis, held_out: Case, seed: int
-) -> Corrected | None:
+) -> CorrectedResiduals | None:
     """The final model with the regression that a campaign asks for, on held-out poses
     without gross errors; None for none."""
     campaign = diagnosis.case.campaign
@@ -184,7 +188,7 @@ def apply_regression(
     final = diagnosis.final
     case = diagnosis.case
     blocks = "fraction" not in campaign.holdout
-    return corrected(
+    return validate_residual_model(
         final,
         case,
         held_out,

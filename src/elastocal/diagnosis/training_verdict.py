@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.data_checks.faults import compliance_warnings
+from elastocal.data_checks.faults import warn_of_compliances
 from elastocal.diagnosis import refit
 from elastocal.diagnosis.effect_estimates import (
     format_location,
@@ -107,7 +107,7 @@ def state_training_verdict(
     warnings = [
         *result.warnings,
         *statement.warnings,
-        *compliance_warnings(final),
+        *warn_of_compliances(final),
         *warn_of_scatter(final.noise, result.noise, settings.relinearize_noise),
         *_warn_of_convergence(declared, final),
     ]

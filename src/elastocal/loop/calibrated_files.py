@@ -36,7 +36,7 @@ from elastocal.io.origin import configuration_sha256
 from elastocal.io.records import check_sources, trace_jobs
 from elastocal.io.typed_json import to_document
 from elastocal.loop.diagnosis_tables import load_case, rows_left_out, step_model
-from elastocal.remainder.corrected import predictor_of
+from elastocal.residual_model.selection import fit_to_observations
 from elastocal.validation.conformity import (
     PASS,
     UNDECIDED,
@@ -99,7 +99,7 @@ class Diagnosed:
             regression = build_residual_model(
                 self.case,
                 estimate,
-                predictor_of(
+                fit_to_observations(
                     to_document(remainder), model, estimate, self.case.observations
                 ),
                 remainder.spread.typical,

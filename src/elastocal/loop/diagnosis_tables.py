@@ -21,7 +21,7 @@ from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import read_table, write_table
 from elastocal.io.typed_json import from_document
 from elastocal.loop.schemas import STEPS, measurements
-from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.mechanics.robot_file import parse_robot
 from elastocal.random_streams import open_stream
 from elastocal.verdict import TrainingVerdict
 
@@ -85,7 +85,7 @@ def load_case(
     where it is another one."""
     descriptions = read_json(descriptions_path)
     described = (part and descriptions[part]) or descriptions
-    joints = robot_from_document(described["robot"], described["source"]).joints
+    joints = parse_robot(described["robot"], described["source"]).joints
     return build_case(described, read_table(measurements_path, measurements(joints)))
 
 

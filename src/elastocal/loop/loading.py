@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from elastocal.campaigns.campaign_folder import CampaignFolder
 
 # What `remainder` of campaign.yaml may be: the choices and the names of this package's
-# regressions, see `remainder.regressions.REGRESSIONS`.
+# regressions, see `residual_model.regressions.REGRESSIONS`.
 REMAINDERS = (
     "auto",
     "none",

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from elastocal.application.calibrated import CalibratedRobot
     from elastocal.diagnosis.diagnose import Diagnosis
     from elastocal.diagnosis.judge import Judgement
-    from elastocal.remainder.corrected import Corrected
+    from elastocal.residual_model.selection import CorrectedResiduals
 
 
 def judge_campaign(job: Any) -> None:
@@ -101,7 +101,7 @@ def diagnosed(
 def calibrated_by(
     diagnosis: Diagnosis,
     held_out: Case,
-    delivered: Corrected | None,
+    delivered: CorrectedResiduals | None,
     *,
     physics_only: bool = False,
 ) -> CalibratedRobot:

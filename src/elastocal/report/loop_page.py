@@ -12,7 +12,7 @@ from markupsafe import Markup
 
 from elastocal.io.atomic_writes import write_text
 from elastocal.loop.schemas import angles_of, worst_measurement
-from elastocal.mechanics.kinematics import corners, joint_axes
+from elastocal.mechanics.kinematics import locate_corners, locate_joint_axes
 from elastocal.report import words as say
 from elastocal.report.typesetting import load_template
 
@@ -108,8 +108,8 @@ def _draw_poses(selection: Mapping[str, np.ndarray], robot: Robot) -> dict[str, 
     drawn = in_order[np.unique([*_spread(len(first_rows), _MAX_POSES), worst_place])]
     rows = first_rows[drawn]
     angles = angles_of(selection, robot.joints)[rows]
-    outlines = corners(robot.chain, angles).swapaxes(0, 1)
-    axes = np.moveaxis(joint_axes(robot.chain, angles), 2, 0)
+    outlines = locate_corners(robot.chain, angles).swapaxes(0, 1)
+    axes = np.moveaxis(locate_joint_axes(robot.chain, angles), 2, 0)
     return {
         "outlines": outlines.round(4).tolist(),
         "joints": axes.round(4).tolist(),

@@ -15,7 +15,7 @@ from elastocal.io.documents import (
     read_named_document,
 )
 from elastocal.mechanics.chain import Chain
-from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.mechanics.robot_file import parse_robot
 from elastocal.study.equation_11 import find_first_solvable_length
 from elastocal.study.strategies import (
     Strategy,
@@ -81,7 +81,7 @@ def check_study(
     }
     _check_distinct_names(documents, folder)
     chains = {
-        name: robot_from_document(robot, document_path(folder, "robots", name)).chain
+        name: parse_robot(robot, document_path(folder, "robots", name)).chain
         for name, robot in robots.items()
     }
     strategies = {

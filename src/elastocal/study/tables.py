@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 
 from elastocal.io.data_frames import read_long
-from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.mechanics.robot_file import parse_robot
 from elastocal.study.evaluation import (
     REPLICATES,
     find_length_with_error,
@@ -402,7 +402,7 @@ def read_results(job: Job, noise_um: float, length: int) -> Results:
 def tabulate_compliances(job: Job) -> None:
     """Write Table 1."""
     robots = {
-        name: robot_from_document(document, name)
+        name: parse_robot(document, name)
         for name, document in job.params.robots.items()
     }
     write_csvs(job, table=build_table1(robots))

@@ -51,11 +51,13 @@ Sized = tuple[Defect, dict[str, Any]]
 
 PROOF = "proof"
 TUNED = "tuned"
-NAMED = tuple(sorted(kind for kind in KINDS if not kind.startswith(OUTSIDE)))
-FOREIGN = tuple(sorted(kind for kind in KINDS if kind.startswith(OUTSIDE)))
+CATALOGUE_EFFECTS = tuple(
+    sorted(kind for kind in KINDS if not kind.startswith(OUTSIDE))
+)
+OUTSIDE_EFFECTS = tuple(sorted(kind for kind in KINDS if kind.startswith(OUTSIDE)))
 # What hides the weight of the links from the analyst: a robot file that declares none,
 # of an arm that has no other weight.
-WEIGHT = "link_weight"
+HIDDEN_WEIGHT = "link_weight"
 SEVERAL_JOINTS = "several_joints"
 GEAR_GRAVITY = "gear_gravity"
 MOVED = "moved"
@@ -67,7 +69,7 @@ _OF_TWO_ANGLES = (OUTSIDE + "cable_pull", OUTSIDE + "two_angles")
 _REMAINING = 1e4
 # Mechanisms that come at several joints at once, as a bad mastering or one make of
 # gears does.
-WIDESPREAD = (
+MULTI_JOINT_EFFECTS = (
     *(
         "bearing_runout",
         "hysteresis",
@@ -82,7 +84,7 @@ WIDESPREAD = (
 _FEWEST_JOINTS = 3
 # Gears whose laws see the weight, on the joints that carry more than a fifth of the
 # most that any carries.
-OF_GEARS = ("hysteresis", "joint_dependent_stiffness", "lost_motion", "stiffening")
+GEAR_EFFECTS = ("hysteresis", "joint_dependent_stiffness", "lost_motion", "stiffening")
 _CARRIES = 0.2
 _LEVELS = (25.0, 50.0, 200.0)
 _FAR_LEVELS = (200.0,)
@@ -103,7 +105,7 @@ _IMPLAUSIBLE = 3.0
 
 
 @dataclass(frozen=True)
-class Case:
+class BlindCase:
     """One case, from which its campaign and its ground truth follow.
 
     `key`: what it is; sealed. `robot`: robot file in config/robots. `robots`: `PROOF`
@@ -150,7 +152,9 @@ class Case:
     @property
     def tracker(self) -> Tracker:
         """Its tracker, where nothing is wrong with it."""
-        misplaced = misplaced_base(self.seed) if self.changes.get("tilted") else None
+        misplaced = (
+            draw_misplaced_base(self.seed) if self.changes.get("tilted") else None
+        )
         return replace(
             Tracker(), misplaced=misplaced, **self.changes.get("tracker", {})
         )
@@ -158,7 +162,7 @@ class Case:
     @property
     def weighs(self) -> bool:
         """Whether the arm has weights that are declared."""
-        return WEIGHT not in self.effects and self.changes.get("weighs", True)
+        return HIDDEN_WEIGHT not in self.effects and self.changes.get("weighs", True)
 
     def declared(self, arm: Arm) -> tuple[LinkMass, ...]:
         """Weights declared to the analyst: none where they are what is hidden, or
@@ -192,7 +196,7 @@ class Case:
         return Path(robots_folder) / f"{self.robot}.yaml"
 
 
-def cases_of(plan: Plan, size: str, seed: int) -> list[Case]:
+def list_cases(plan: Plan, size: str, seed: int) -> list[BlindCase]:
     """All cases of a benchmark, in the order of their names, that is in none; fresh
     seeds are fresh cases."""
     purpose = plan["sizes"][size].get("purpose", "blind")
@@ -202,7 +206,7 @@ def cases_of(plan: Plan, size: str, seed: int) -> list[Case]:
             for group, effects, levels, setting, number in _listed(
                 plan, part, robot, seed
             ):
-                if set(effects) & set(absent_on(plan, robot)):
+                if set(effects) & set(find_absent_effects(plan, robot)):
                     continue
                 key = "/".join(
                     [
@@ -220,7 +224,7 @@ def cases_of(plan: Plan, size: str, seed: int) -> list[Case]:
                 )
                 robots = TUNED if robot in plan["tuned"] else PROOF
                 found.append(
-                    Case(
+                    BlindCase(
                         key,
                         group,
                         robot,
@@ -235,7 +239,7 @@ def cases_of(plan: Plan, size: str, seed: int) -> list[Case]:
     return sorted(found, key=lambda case: case.name)
 
 
-def misplaced_base(seed: int) -> Motion:
+def draw_misplaced_base(seed: int) -> Motion:
     """A base frame that was found badly: tilted by about 0.3 mrad and shifted by about
     0.2 mm, all measurements alike."""
     draws = open_simulation_stream(seed, "tilted base")
@@ -245,7 +249,7 @@ def misplaced_base(seed: int) -> Motion:
     )
 
 
-def absent_on(plan: Plan, robot: str) -> tuple[str, ...]:
+def find_absent_effects(plan: Plan, robot: str) -> tuple[str, ...]:
     """Effects that a robot cannot have."""
     return tuple(plan["absent"].get(robot, ()))
 
@@ -262,10 +266,10 @@ def _listed(
     for number in each("none"):
         yield "none", (), (), "usual", number
     for group, effects, levels in (
-        ("single", NAMED, part.get("levels", _LEVELS)),
-        ("outside", FOREIGN, part.get("outside_levels", _FAR_LEVELS)),
-        (SEVERAL_JOINTS, WIDESPREAD, (_HIGH,)),
-        (GEAR_GRAVITY, OF_GEARS, (_HIGH,)),
+        ("single", CATALOGUE_EFFECTS, part.get("levels", _LEVELS)),
+        ("outside", OUTSIDE_EFFECTS, part.get("outside_levels", _FAR_LEVELS)),
+        (SEVERAL_JOINTS, MULTI_JOINT_EFFECTS, (_HIGH,)),
+        (GEAR_GRAVITY, GEAR_EFFECTS, (_HIGH,)),
     ):
         for effect, level, number in product(effects, levels, each(group)):
             yield group, (effect,), (level,), "usual", number
@@ -274,7 +278,7 @@ def _listed(
     ):
         yield MOVED, ("setup_step",), (level,), setting, number
     for number in each(UNDECLARED):
-        yield UNDECLARED, (WEIGHT,), (_HEAVY,), "usual", number
+        yield UNDECLARED, (HIDDEN_WEIGHT,), (_HEAVY,), "usual", number
     for level, number in product(part.get("pair_levels", _PAIR_LEVELS), each("pair")):
         yield (
             "pair",
@@ -312,17 +316,15 @@ def _drawn_pair(
 ) -> tuple[str, str]:
     """Two effects of different names, neither of which is an alias of the compliances,
     and which the robot can have."""
-    absent = ("force_scale", *absent_on(plan, robot))
-    pairs = list(combinations([name for name in NAMED if name not in absent], 2))
-    return pairs[
-        open_simulation_stream(seed, f"pair {robot} {level} {number}").integers(
-            len(pairs)
-        )
-    ]
+    absent = ("force_scale", *find_absent_effects(plan, robot))
+    pairs = list(
+        combinations([name for name in CATALOGUE_EFFECTS if name not in absent], 2)
+    )
+    return pairs[stream(seed, f"pair {robot} {level} {number}").integers(len(pairs))]
 
 
-def defects_of(
-    case: Case, robot: SimulatedRobot, yardstick: NoncentralityModel
+def size_defects(
+    case: BlindCase, robot: PhysicalRobot, yardstick: Yardstick
 ) -> list[Sized]:
     """The defects of a case at the sizes that give their non-centralities, each with
     its size as in the ground truth.
@@ -360,7 +362,9 @@ def defects_of(
     return found
 
 
-def _drawn(case: Case, robot: SimulatedRobot, effect: str, seed: int) -> list[Defect]:
+def _drawn(
+    case: BlindCase, robot: PhysicalRobot, effect: str, seed: int
+) -> list[Defect]:
     """Defects of plausible size that belong together: one, or one mechanism at several
     joints."""
     arm = robot.arm
@@ -395,7 +399,7 @@ def _drawn(case: Case, robot: SimulatedRobot, effect: str, seed: int) -> list[De
     return [defect]
 
 
-def yardstick_of(case: Case, robot: SimulatedRobot) -> NoncentralityModel:
+def build_yardstick(case: BlindCase, robot: PhysicalRobot) -> Yardstick:
     """To which the defective robots of a case are compared; `robot`: faultless."""
     free = case.design.frame == "tracker"
     done = draw_schedule(robot.arm, case.design, case.seed)
@@ -417,7 +421,7 @@ def _first_plausible(
     for number, defects in enumerate(drawn, 1):
         largest = min(KINDS[defect.effect].largest / defect.size for defect in defects)
         try:
-            factor = size_for(
+            factor = find_size(
                 yardstick,
                 partial(apply_defects, robot, defects),
                 1.0,
@@ -441,9 +445,9 @@ def _first_plausible(
     )
 
 
-def size_for(
-    yardstick: NoncentralityModel,
-    robot_of_size: Callable[[float], SimulatedRobot],
+def find_size(
+    yardstick: Yardstick,
+    robot_of_size: Callable[[float], PhysicalRobot],
     start: float,
     target: float,
     quantity: str = "retained",
@@ -515,8 +519,8 @@ def _share_of_plausible(robot: SimulatedRobot, defect: Defect) -> float:
     return defect.size / KINDS[defect.effect].scale_plausible_size(robot.arm)
 
 
-def make_case(
-    case: Case,
+def write_sealed_case(
+    case: BlindCase,
     blind_folder: str | Path,
     sealed_folder: str | Path,
     robots_folder: str | Path,
@@ -525,9 +529,9 @@ def make_case(
     folder; returns the SHA-256 of that."""
     robot = case.specimen(robots_folder)
     design = case.design
-    yardstick = yardstick_of(case, robot) if case.effects else None
-    sized = defects_of(case, robot, yardstick) if yardstick else []
-    bad = apply_defects(robot, [defect for defect, _ in sized])
+    yardstick = build_yardstick(case, robot) if case.effects else None
+    sized = size_defects(case, robot, yardstick) if yardstick else []
+    bad = with_defects(robot, [defect for defect, _ in sized])
     folder = Path(blind_folder) / case.name
     schedule = draw_schedule(robot.arm, design, case.seed)
 
@@ -570,7 +574,7 @@ def make_cases(job: Any) -> None:
     robots = Path(job.input.robots[0]).parent
     for folder in (job.output.blind, job.output.sealed):
         Path(folder).mkdir(parents=True, exist_ok=True)
-    cases = cases_of(asked.plan, asked.size, asked.seed)
+    cases = list_cases(asked.plan, asked.size, asked.seed)
     blocks = asked.plan["sizes"][asked.size]["blocks"]
     for case in cases[asked.number - 1 :: blocks]:
-        make_case(case, job.output.blind, job.output.sealed, robots)
+        write_sealed_case(case, job.output.blind, job.output.sealed, robots)

@@ -28,12 +28,12 @@ from elastocal_proof.plant.campaigns import (
 )
 from elastocal_proof.plant.simulated_robot import Schedule, SimulatedRobot
 
-Slipped = Callable[[Table], tuple[Table, list[Blunder]]]
+DamageRows = Callable[[Table], tuple[Table, list[Slip]]]
 
 ROBOT_FILE = "robot.yaml"
 
 
-def campaign_document(name: str, arm: Arm, design: Design) -> dict[str, Any]:
+def build_campaign_document(name: str, arm: Arm, design: Design) -> dict[str, Any]:
     """Contents of campaign.yaml; nothing in it depends on the defects."""
     document = {
         "campaign": name,
@@ -64,7 +64,7 @@ def write_blind_campaign(
     design: Design,
     schedule: Schedule,
     declared: Sequence[LinkMass] = (),
-    slipped: Slipped | None = None,
+    slipped: DamageRows | None = None,
 ) -> dict[str, Any]:
     """Measure, and write what the analyst gets; returns how the data were made, for the
     ground truth of the case.
@@ -77,12 +77,12 @@ def write_blind_campaign(
     table, slips = slipped(table) if slipped else (table, [])
     write_campaign(
         folder,
-        campaign_document(name, robot.arm, design),
+        build_campaign_document(name, robot.arm, design),
         table,
         robot.arm.joints,
         "parquet",
     )
-    write_robot(folder, robot_file, robot, declared, design.undeclared)
+    write_robot_file(folder, robot_file, robot, declared, design.undeclared)
     return {
         "campaign": name,
         "robot": Path(robot_file).stem,
@@ -104,7 +104,7 @@ def write_blind_campaign(
     } | ({"bad_rows": slips} if slipped else {})
 
 
-def write_robot(
+def write_robot_file(
     folder: str | Path,
     robot_file: str | Path,
     robot: SimulatedRobot,

@@ -30,9 +30,9 @@ from elastocal.io.atomic_writes import atomic_write, check_places
 from elastocal.io.texts import read_text
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.report.words import at_joints, listed, physical_name
-from elastocal_proof.blind.cases import misplaced_base
-from elastocal_proof.plant.arm import read_arm, to_rotation_vector
-from elastocal_proof.plant.campaigns import SECONDS_PER_STATE, get_typical_force_N
+from elastocal_proof.blind.cases import draw_misplaced_base
+from elastocal_proof.plant.arm import arm_from_file, rotation_vector
+from elastocal_proof.plant.campaigns import SECONDS_PER_STATE, usual_force_N
 from elastocal_proof.plant.kinds import (
     KINDS,
     OUTSIDE,
@@ -69,7 +69,7 @@ _BOW_POSES = 50
 _TRIES = 200
 
 
-def hidden_robot(
+def build_hidden_robot(
     robot_file: str | Path, seed: int, effects: Sequence[str] = ()
 ) -> tuple[SimulatedRobot, list[Defect]]:
     """The robot that stands in, and its defects.
@@ -119,8 +119,8 @@ def hidden_robot(
     return apply_defects(robot, defects), defects
 
 
-def hidden_words(defects: Sequence[Defect], effects: Sequence[str]) -> str:
-    """What `hidden_robot` hid of effects that were asked for, or drew; the small errors
+def describe_hidden_effects(defects: Sequence[Defect], effects: Sequence[str]) -> str:
+    """What `build_hidden_robot` hid of effects that were asked for, or drew; the small errors
     that every robot has stand before."""
     hidden = defects[-max(len(effects), 1) :]
     return listed(
@@ -129,11 +129,11 @@ def hidden_words(defects: Sequence[Defect], effects: Sequence[str]) -> str:
     )
 
 
-def with_misplaced_base(robot: SimulatedRobot, seed: int) -> SimulatedRobot:
+def misplace_base(robot: PhysicalRobot, seed: int) -> PhysicalRobot:
     """The robot beside a tracker whose frame of the base is off by some 0.3 mrad and
     0.2 mm."""
     return replace(
-        robot, tracker=replace(robot.tracker, misplaced=misplaced_base(seed))
+        robot, tracker=replace(robot.tracker, misplaced=draw_misplaced_base(seed))
     )
 
 
@@ -218,7 +218,7 @@ def write_milling_path(
     """Write wanted poses along a bow as for milling, under half the usual force of such
     a robot; returns how many."""
     check_places(path)
-    at, turned, angles = bow(
+    at, turned, angles = draw_milling_path(
         declared, _BOW * robot.arm.reach_m, _BOW_POSES, np.random.default_rng(seed)
     )
     force = np.tile(
@@ -241,8 +241,8 @@ def write_milling_path(
     return len(at)
 
 
-def measured_errors(
-    path: Path, targets: Path, robot: SimulatedRobot, seed: int
+def measure_errors(
+    path: Path, targets: Path, robot: PhysicalRobot, seed: int
 ) -> dict[str, np.ndarray]:
     """Distances (N,), m, of where the tracker sees the robot from the wanted poses, in
     the campaign's frame of the base.
@@ -264,7 +264,7 @@ def measured_errors(
         require_numbers(table, columns, source)
         angles = table[columns].to_numpy(float)
         visits = [
-            reached(robot, angles, wrench, number, source)
+            move_robot(robot, angles, wrench, number, source)
             for number in (seed, seed + 1)
         ]
         position, rotation = (part[:, None] for part in visits[0])
@@ -282,8 +282,8 @@ def measured_errors(
     return off
 
 
-def reached(
-    robot: SimulatedRobot,
+def move_robot(
+    robot: PhysicalRobot,
     shown: np.ndarray,
     wrench: np.ndarray,
     seed: int,
@@ -310,7 +310,7 @@ def reached(
     return position[:, -1], rotation[:, -1]
 
 
-def bow(
+def draw_milling_path(
     robot: Robot, length_m: float, count: int, draws: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """A path in a level plane at one orientation, in a posture that keeps within the

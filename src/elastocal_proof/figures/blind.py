@@ -25,7 +25,7 @@ from elastocal.figures.style import (
 )
 from elastocal.io.origin import Origin
 from elastocal_proof.blind.cases import PROOF, TUNED
-from elastocal_proof.blind.summary import rows_of, with_target
+from elastocal_proof.blind.summary import iterate_rows, select_targets
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -66,7 +66,7 @@ _PARTS = {"unloaded": "unloaded", "loaded": "under loads", "milling": "milling p
 def draw_targets(summary: pd.DataFrame) -> Figure:
     """Every figure of summary.csv that has a target, with its interval and the range
     that the target leaves."""
-    aimed = with_target(summary)
+    aimed = select_targets(summary)
     ratio = aimed.quantity.str.contains("over the oracle")
     names = [
         list(dict.fromkeys(part.quantity)) for part in (aimed[~ratio], aimed[ratio])
@@ -114,7 +114,7 @@ def draw_targets(summary: pd.DataFrame) -> Figure:
 def _dots(
     axis: Axes, rows: pd.DataFrame, names: list[str], scaled: Callable[[float], float]
 ) -> None:
-    for row in rows_of(rows):
+    for row in iterate_rows(rows):
         place = names.index(row.quantity)
         # A target without an upper end goes as far as anything is drawn.
         low = scaled(row.target_low)

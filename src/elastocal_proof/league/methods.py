@@ -34,10 +34,10 @@ from elastocal.io.storage import read_table, write_table
 from elastocal.loop.diagnosis_tables import diagnosis_facts, step_fit
 from elastocal.loop.loading import described_campaign
 from elastocal.loop.schemas import measurements
-from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.mechanics.robot_file import parse_robot
 from elastocal.random_streams import open_stream
-from elastocal.remainder.corrected import corrected
-from elastocal.remainder.regressions import REGRESSIONS
+from elastocal.residual_model.regressions import REGRESSIONS
+from elastocal.residual_model.selection import validate_residual_model
 from elastocal.validation.held_out import compute_position_residuals
 from elastocal.validation.transfer import transfer_fit
 from elastocal_proof.league.schemas import ENTRIES, FOLDS, MECHANISMS
@@ -90,7 +90,7 @@ def load_data_set(
 ) -> DataSet:
     """Read a data set from files as `deal_league_folds` wrote them."""
     descriptions = read_json(descriptions_path)
-    joints = robot_from_document(descriptions["robot"], descriptions["source"]).joints
+    joints = parse_robot(descriptions["robot"], descriptions["source"]).joints
     return DataSet(
         descriptions,
         read_table(measurements_path, measurements(joints)),
@@ -164,7 +164,7 @@ def predict_held_out(
     held-out ones.
 
     A regression is tuned within the training poses by the same kind of split that
-    judges, see `remainder.corrected`; frames and targets of another campaign are fitted
+    judges, see `residual_model.selection`; frames and targets of another campaign are fitted
     to it, whatever the method. What a method does not state is not a number.
     """
     seen = held_out.observations
@@ -176,7 +176,7 @@ def predict_held_out(
     else:
         blocks = split != RANDOM
         within_range = method.within_range
-        found = corrected(
+        found = validate_residual_model(
             fitted,
             case,
             held_out,

@@ -12,7 +12,7 @@ import pandas as pd
 from elastocal.campaigns.campaign import group_equal_rows
 from elastocal.counting import format_count
 from elastocal.random_streams import open_stream
-from elastocal.remainder.corrected import NORMAL_WIDTH
+from elastocal.residual_model.selection import NORMAL_QUANTILE
 from elastocal.validation.held_out import (
     PositionErrors,
     compute_error_intervals,
@@ -139,7 +139,7 @@ def _covered(entries: pd.DataFrame) -> float:
     off = np.abs(entries[["dx", "dy", "dz"]].to_numpy())
     stated = entries[["std_x", "std_y", "std_z"]].to_numpy()
     return (
-        float((off < NORMAL_WIDTH * stated).mean())
+        float((off < NORMAL_QUANTILE * stated).mean())
         if np.isfinite(stated).all()
         else float("nan")
     )

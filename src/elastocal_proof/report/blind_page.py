@@ -16,9 +16,9 @@ from elastocal_proof.blind.cases import PROOF, Plan
 from elastocal_proof.blind.summary import (
     BY_THE_BEST,
     OVER_THE_BEST,
-    of_each_robot,
-    rows_of,
-    with_target,
+    iterate_rows,
+    select_targets,
+    summarize_by_robot,
 )
 from elastocal_proof.league.table import format_table
 
@@ -34,7 +34,7 @@ def format_targets_page(
     seed: int,
 ) -> str:
     """Every quantity of a summary beside its target; `of_each`: of
-    `summary.of_each_robot`, by what the robots are called."""
+    `summary.summarize_by_robot`, by what the robots are called."""
     return f"""# Targets of the blind proof
 
 Written by `snakemake -j2 blind_pictures --config blind={size} seed={seed}`; [what it means](blind_proof.md). "At 50" is at a
@@ -48,7 +48,7 @@ non-centrality of 50. Brackets hold 95 % intervals: of shares Clopper–Pearson,
 
 def describe_reached_targets(summary: pd.DataFrame) -> str:
     """How many targets are reached."""
-    judged = with_target(summary).dropna(subset="holds")
+    judged = select_targets(summary).dropna(subset="holds")
     held = int((judged.holds.astype(str) == "True").sum())
     proven = summary.robots.iloc[0] == PROOF
     where = (
@@ -64,9 +64,9 @@ def tabulate_targets(
 ) -> list[dict[str, str]]:
     """Each quantity with a target as a row of words, beside what every robot has alone
     and what the best analyst finds."""
-    of_all = {row.quantity: row for row in rows_of(summary)}
+    of_all = {row.quantity: row for row in iterate_rows(summary)}
     alone = {
-        name: {row.quantity: row for row in rows_of(one)}
+        name: {row.quantity: row for row in iterate_rows(one)}
         for name, one in of_each.items()
     }
     beside = {
@@ -75,7 +75,7 @@ def tabulate_targets(
         if "beside" in figure
     }
     rows = []
-    for row in rows_of(with_target(summary)):
+    for row in iterate_rows(select_targets(summary)):
         compared = row.quantity.removesuffix(OVER_THE_BEST)
         found = of_all.get(beside.get(compared), row)
         limit = of_all.get(f"{compared}{BY_THE_BEST}")
@@ -131,7 +131,7 @@ def write_blind_page(job: Any) -> None:
     names = {Path(file).stem: read_document(file)["name"] for file in job.input.robots}
     alone = {
         names[robot]: table
-        for robot, table in of_each_robot(asked.plan, cases, asked.seed).items()
+        for robot, table in summarize_by_robot(asked.plan, cases, asked.seed).items()
     }
     write_text(
         job.output.page,
