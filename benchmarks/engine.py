@@ -28,10 +28,10 @@ from elastocal.io.documents import read_document
 from elastocal.loop.whole import cases_in
 from elastocal_proof.blind.cases import list_cases, write_sealed_case
 from elastocal_proof.blind.folders import build_campaign_document, write_robot_file
-from elastocal_proof.plant.arm import arm_from_file
-from elastocal_proof.plant.campaigns import Design, measured_table, schedule_of
-from elastocal_proof.plant.kinds import Defect, with_defects
-from elastocal_proof.plant.physical_robot import specimen
+from elastocal_proof.plant.arm import read_arm
+from elastocal_proof.plant.campaigns import Design, draw_schedule, simulate_measurements
+from elastocal_proof.plant.kinds import Defect, apply_defects
+from elastocal_proof.plant.simulated_robot import draw_specimen
 
 ROBOTS = ROOT / "config" / "robots"
 SEED = 2026

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elastocal_proof.blind.cases import size_for
+from elastocal_proof.blind.cases import find_size
 from elastocal_proof.plant.campaigns import Design, draw_schedule
 from elastocal_proof.plant.kinds import KINDS, Defect, apply_defects, draw_defect
 from elastocal_proof.plant.simulated_robot import Motion
@@ -41,7 +41,7 @@ def test_a_wrong_force_scale_is_absorbed_at_any_size_but_for_what_the_weights_te
         return lambda size: apply_defects(robot, [Defect("force_scale", (), size)])
 
     with pytest.raises(ValueError, match="no size found"):
-        size_for(
+        find_size(
             NoncentralityModel(weightless, schedule),
             scaled(weightless),
             0.02,

@@ -31,8 +31,8 @@ from elastocal_proof.blind.summary import (
     tabulate_rates,
     tabulate_reliability,
 )
-from elastocal_proof.league.methods import dealt
-from elastocal_proof.league.table import league_table, mechanism_table
+from elastocal_proof.league.methods import deal_folds
+from elastocal_proof.league.table import compare_methods, summarize_mechanisms
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden"
 NAMES = sorted(

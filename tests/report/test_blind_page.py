@@ -12,7 +12,7 @@ from made_blind_documents import (
     verdict,
 )
 
-from elastocal_proof.blind.summary import of_each_robot, summarize
+from elastocal_proof.blind.summary import summarize_by_robot, summarize_figures
 from elastocal_proof.report.blind_page import (
     describe_reached_targets,
     format_targets_page,
@@ -32,8 +32,8 @@ def test_each_quantity_stands_beside_its_target_with_each_robot_alone_and_the_li
         (pairs[1], both, oracle()),
     ]
     cases = frame(*entries)
-    summary = summarize(PLAN, cases, pd.DataFrame(), 1)
-    alone = of_each_robot(PLAN, cases, 1)
+    summary = summarize_figures(PLAN, cases, pd.DataFrame(), 1)
+    alone = summarize_by_robot(PLAN, cases, 1)
     page = format_targets_page(
         PLAN,
         summary,

@@ -31,8 +31,8 @@ from elastocal.io.texts import read_text
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.report.words import at_joints, listed, physical_name
 from elastocal_proof.blind.cases import draw_misplaced_base
-from elastocal_proof.plant.arm import arm_from_file, rotation_vector
-from elastocal_proof.plant.campaigns import SECONDS_PER_STATE, usual_force_N
+from elastocal_proof.plant.arm import read_arm, to_rotation_vector
+from elastocal_proof.plant.campaigns import SECONDS_PER_STATE, get_typical_force_N
 from elastocal_proof.plant.kinds import (
     KINDS,
     OUTSIDE,
