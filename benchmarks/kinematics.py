@@ -90,8 +90,9 @@ def _row(name: str, setting: Setting) -> Row:
     }
     ours, theirs = map(min, interleaved(functions, setting.repetitions))
     how = (
-        f"poses_and_jacobians on {setting.configurations} random configurations against pin.computeFrameJacobian in a Python "
-        f"loop, one thread, least of {setting.repetitions}, Jacobians equal to {TOLERANCE:g}"
+        f"poses_and_jacobians on {setting.configurations} random configurations against"
+        " pin.computeFrameJacobian in a Python loop, one thread,"
+        f" minimum of {setting.repetitions}, Jacobians equal to {TOLERANCE:g}"
     )
     return Row(
         f"kinematics {name}",

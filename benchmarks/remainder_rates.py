@@ -145,13 +145,19 @@ if __name__ == "__main__":
             f"p <= {level}: {np.mean(np.array(p_values) <= level):.3f}"
             for level in LEVELS
         )
-        row = f"{asked.poses} poses, {1e3 * size:g} mrad, {asked.campaigns} campaigns; something remains, {rates}"
+        row = (
+            f"{asked.poses} poses, {1e3 * size:g} mrad, {asked.campaigns} campaigns;"
+            f" something remains, {rates}"
+        )
         if errors:
             physics, with_it, floor = (
                 rms(column) for column in zip(*errors, strict=True)
             )
-            row += f"; used {used}, worse by more than a standard error {worse}; held-out RMS of physics {physics:.0f} µm, "
-            row += f"with the regression {with_it:.0f}, of chance alone {floor:.0f}"
+            row += (
+                f"; used {used}, worse by more than a standard error {worse};"
+                f" held-out RMS of physics {physics:.0f} µm,"
+                f" with the regression {with_it:.0f}, of chance alone {floor:.0f}"
+            )
         print(
             f"{row}; {(time.process_time() - start) / asked.campaigns:.2f} s CPU each",
             flush=True,
