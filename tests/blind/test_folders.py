@@ -37,7 +37,7 @@ def test_the_analysis_reads_the_folder_its_angles_and_the_poses_that_are_held_ou
         draw_schedule(robot.arm, small, 2),
     )
     campaign = read_campaign(read_campaign_folder(tmp_path / "c", ROBOTS))
-    schedule = schedule_of(robot.arm, small, 2)
+    schedule = draw_schedule(robot.arm, small, 2)
     training, held_out = split_poses(campaign)
     assert set(training.pose) == set(schedule.pose[schedule.training])
     assert set(held_out.pose) == set(schedule.pose[~schedule.training])

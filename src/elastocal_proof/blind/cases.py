@@ -320,11 +320,15 @@ def _drawn_pair(
     pairs = list(
         combinations([name for name in CATALOGUE_EFFECTS if name not in absent], 2)
     )
-    return pairs[stream(seed, f"pair {robot} {level} {number}").integers(len(pairs))]
+    return pairs[
+        open_simulation_stream(seed, f"pair {robot} {level} {number}").integers(
+            len(pairs)
+        )
+    ]
 
 
 def size_defects(
-    case: BlindCase, robot: PhysicalRobot, yardstick: Yardstick
+    case: BlindCase, robot: SimulatedRobot, yardstick: NoncentralityModel
 ) -> list[Sized]:
     """The defects of a case at the sizes that give their non-centralities, each with
     its size as in the ground truth.
@@ -363,7 +367,7 @@ def size_defects(
 
 
 def _drawn(
-    case: BlindCase, robot: PhysicalRobot, effect: str, seed: int
+    case: BlindCase, robot: SimulatedRobot, effect: str, seed: int
 ) -> list[Defect]:
     """Defects of plausible size that belong together: one, or one mechanism at several
     joints."""
@@ -399,7 +403,7 @@ def _drawn(
     return [defect]
 
 
-def build_yardstick(case: BlindCase, robot: PhysicalRobot) -> Yardstick:
+def build_yardstick(case: BlindCase, robot: SimulatedRobot) -> NoncentralityModel:
     """To which the defective robots of a case are compared; `robot`: faultless."""
     free = case.design.frame == "tracker"
     done = draw_schedule(robot.arm, case.design, case.seed)
@@ -446,8 +450,8 @@ def _first_plausible(
 
 
 def find_size(
-    yardstick: Yardstick,
-    robot_of_size: Callable[[float], PhysicalRobot],
+    yardstick: NoncentralityModel,
+    robot_of_size: Callable[[float], SimulatedRobot],
     start: float,
     target: float,
     quantity: str = "retained",
@@ -531,7 +535,7 @@ def write_sealed_case(
     design = case.design
     yardstick = build_yardstick(case, robot) if case.effects else None
     sized = size_defects(case, robot, yardstick) if yardstick else []
-    bad = with_defects(robot, [defect for defect, _ in sized])
+    bad = apply_defects(robot, [defect for defect, _ in sized])
     folder = Path(blind_folder) / case.name
     schedule = draw_schedule(robot.arm, design, case.seed)
 

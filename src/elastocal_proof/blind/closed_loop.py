@@ -186,7 +186,7 @@ def measure_robot(
     draws = open_simulation_stream(seed, "lost beam")
     if slips:
         plant = misplace_base(plant, seed)
-    schedule = schedule_of(plant.arm, design, seed)
+    schedule = draw_schedule(plant.arm, design, seed)
 
     def lost(table: Table) -> tuple[Table, list[Blunder]]:
         kind = str(draws.choice(["zeros", "held_point"]))
@@ -222,7 +222,7 @@ def measure_robot(
     )
 
 
-def draw_wanted_poses(robot: Robot, plant: PhysicalRobot, seed: int) -> WantedPoses:
+def draw_wanted_poses(robot: Robot, plant: SimulatedRobot, seed: int) -> WantedPoses:
     """Poses of all parts that a robot shall reach: random ones without and under load,
     and a path of milling."""
     draws = open_simulation_stream(seed, "wanted poses")

@@ -28,7 +28,7 @@ from elastocal_proof.plant.campaigns import (
 )
 from elastocal_proof.plant.simulated_robot import Schedule, SimulatedRobot
 
-DamageRows = Callable[[Table], tuple[Table, list[Slip]]]
+DamageRows = Callable[[Table], tuple[Table, list[Blunder]]]
 
 ROBOT_FILE = "robot.yaml"
 

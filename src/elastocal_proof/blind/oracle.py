@@ -255,7 +255,7 @@ def assess_best_analyst(
     """
     robot = case.specimen(robots_folder)
     yardstick = build_yardstick(case, robot)
-    bad = with_defects(
+    bad = apply_defects(
         robot, [defect for defect, _ in size_defects(case, robot, yardstick)]
     )
     kinds = [
@@ -298,7 +298,10 @@ def assess_best_analyst(
 
 
 def draw_unit_signals(
-    yardstick: Yardstick, robot: PhysicalRobot, kinds: Iterable[str], seed: int
+    yardstick: NoncentralityModel,
+    robot: SimulatedRobot,
+    kinds: Iterable[str],
+    seed: int,
 ) -> tuple[tuple[str, ...], np.ndarray]:
     """What drawn defects of each kind show at each of its locations.
 

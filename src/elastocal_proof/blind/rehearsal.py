@@ -129,7 +129,7 @@ def describe_hidden_effects(defects: Sequence[Defect], effects: Sequence[str]) -
     )
 
 
-def misplace_base(robot: PhysicalRobot, seed: int) -> PhysicalRobot:
+def misplace_base(robot: SimulatedRobot, seed: int) -> SimulatedRobot:
     """The robot beside a tracker whose frame of the base is off by some 0.3 mrad and
     0.2 mm."""
     return replace(
@@ -242,7 +242,7 @@ def write_milling_path(
 
 
 def measure_errors(
-    path: Path, targets: Path, robot: PhysicalRobot, seed: int
+    path: Path, targets: Path, robot: SimulatedRobot, seed: int
 ) -> dict[str, np.ndarray]:
     """Distances (N,), m, of where the tracker sees the robot from the wanted poses, in
     the campaign's frame of the base.
@@ -283,7 +283,7 @@ def measure_errors(
 
 
 def move_robot(
-    robot: PhysicalRobot,
+    robot: SimulatedRobot,
     shown: np.ndarray,
     wrench: np.ndarray,
     seed: int,
