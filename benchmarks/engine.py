@@ -30,10 +30,10 @@ from elastocal.io.documents import read_document
 from elastocal.loop.whole import read_cases
 from elastocal_proof.blind.cases import list_cases, write_sealed_case
 from elastocal_proof.blind.folders import build_campaign_document, write_robot_file
-from elastocal_proof.plant.arm import arm_from_file
-from elastocal_proof.plant.campaigns import Design, measured_table, schedule_of
-from elastocal_proof.plant.kinds import Defect, with_defects
-from elastocal_proof.plant.physical_robot import specimen
+from elastocal_proof.plant.arm import read_arm
+from elastocal_proof.plant.campaigns import Design, draw_schedule, simulate_measurements
+from elastocal_proof.plant.kinds import Defect, apply_defects
+from elastocal_proof.plant.simulated_robot import draw_specimen
 
 ROBOTS = ROOT / "config" / "robots"
 SEED = 2026
@@ -232,16 +232,16 @@ def _large(work: Path, measurements: int) -> Path:
     folder = work / f"large{measurements}"
     if not folder.is_dir():
         file = ROBOTS / "fanuc.yaml"
-        arm = arm_from_file(file)
-        robot = with_defects(
-            specimen(arm, 4), [Defect("transmission_harmonic", (2,), 1e-4, 1)]
+        arm = read_arm(file)
+        robot = apply_defects(
+            draw_specimen(arm, 4), [Defect("transmission_harmonic", (2,), 1e-4, 1)]
         )
         document = build_campaign_document("large", arm, LARGE) | {
             "compliance": "nominal",
             "holdout": {"fraction": 0.3, "seed": 1},
         }
-        table = measured_table(
-            robot, LARGE, schedule_of(arm, replace(LARGE, poses=measurements), 4)
+        table = simulate_measurements(
+            robot, LARGE, draw_schedule(arm, replace(LARGE, poses=measurements), 4)
         )
         write_campaign(
             folder,

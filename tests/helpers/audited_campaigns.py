@@ -19,10 +19,10 @@ from elastocal.loop.whole import judge_and_predict
 from elastocal_proof.audit.audit_run import find_checks
 from elastocal_proof.audit.finished_run import FinishedRun
 from elastocal_proof.blind.folders import write_blind_campaign
-from elastocal_proof.plant.arm import arm_from_file
-from elastocal_proof.plant.campaigns import Design, schedule_of
-from elastocal_proof.plant.kinds import drawn_defect, with_defects
-from elastocal_proof.plant.physical_robot import specimen
+from elastocal_proof.plant.arm import read_arm
+from elastocal_proof.plant.campaigns import Design, draw_schedule
+from elastocal_proof.plant.kinds import apply_defects, draw_defect
+from elastocal_proof.plant.simulated_robot import draw_specimen
 
 USUAL = {
     "poses": 12,
@@ -37,14 +37,14 @@ def diagnosed_campaign(top, robot, effects=(), **design):
     """Measure a robot of the plant with some defects, diagnose it, and write what an
     audit reads of it: the campaign `cell`."""
     file = ROBOTS / f"{robot}.yaml"
-    arm = arm_from_file(file)
+    arm = read_arm(file)
     planned = Design(**USUAL | {"points": arm.points[-1:]} | design)
-    bad = with_defects(
-        specimen(arm, 4, weighs=False),
-        [drawn_defect(effect, arm, 4) for effect in effects],
+    bad = apply_defects(
+        draw_specimen(arm, 4, weighs=False),
+        [draw_defect(effect, arm, 4) for effect in effects],
     )
     write_blind_campaign(
-        top / "cell", "cell", file, bad, planned, schedule_of(arm, planned, 3)
+        top / "cell", "cell", file, bad, planned, draw_schedule(arm, planned, 3)
     )
     results = top / "results/loop/cell"
     reports = top / "reports/loop/cell"

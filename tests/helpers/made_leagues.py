@@ -6,8 +6,8 @@ from made_remainders import smoothly_wrong_folder
 
 from elastocal.campaigns.campaign import tabulate_measurements
 from elastocal.campaigns.campaign_folder import read_campaign_folder
-from elastocal.loop.loading import read_described_campaign
-from elastocal_proof.league.methods import DataSet, dealt
+from elastocal.loop.loading import described_campaign
+from elastocal_proof.league.methods import DataSet, deal_folds
 
 
 def make_data_set(folder, robot, robots_folder, poses=24, **changes):
@@ -25,7 +25,7 @@ def make_data_set(folder, robot, robots_folder, poses=24, **changes):
     return DataSet(
         descriptions,
         tabulate_measurements(seen),
-        dealt(seen, 4, np.random.default_rng(1)),
+        deal_folds(seen, 4, np.random.default_rng(1)),
     )
 
 

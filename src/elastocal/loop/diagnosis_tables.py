@@ -261,7 +261,7 @@ def tabulate_candidates(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 def _tabulate_tested_candidates(evidence: Evidence) -> list[dict[str, Any]]:
     """Return the rows of the candidates that were tested, by falling Bayes factor."""
-    problem = evidence.linearized.problem
+    problem = evidence.design.problem
     posterior = evidence.posterior
     log_bayes_factors = screen_terms(problem)[1]
     inclusion = np.zeros(len(problem.terms))

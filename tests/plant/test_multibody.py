@@ -19,11 +19,11 @@ from elastocal.mechanics.kinematics import (
     compute_poses_and_jacobians,
 )
 from elastocal_proof.plant.arm import LinkMass
-from elastocal_proof.plant.machine import (
+from elastocal_proof.plant.multibody import (
     Structure,
     TaperedTube,
-    equilibrium,
-    machine_of,
+    build_model,
+    solve_equilibrium,
 )
 
 # One joint about y, its link forwards along x, and a measuring point at its end.
@@ -85,7 +85,7 @@ def test_weight_turns_the_joints_as_pinocchio_says(arm):
     gravity = (3.0, -2.0, -9.0)
     angles, _ = angles_and_wrenches(arm)
     found = forces_at(
-        machine_of(arm, Structure(masses=masses, payload=load, gravity_m_s2=gravity)),
+        build_model(arm, Structure(masses=masses, payload=load, gravity_m_s2=gravity)),
         angles,
     )[0]
     model = pin.Model()
@@ -153,8 +153,8 @@ def test_an_arm_that_finds_no_rest_is_an_error():
     with pytest.raises(
         RuntimeError, match=r"^no equilibrium after 60 sweeps: the last moved by 0\.02$"
     ):
-        equilibrium(
-            machine_of(LEVER, Structure()),
+        solve_equilibrium(
+            build_model(LEVER, Structure()),
             *loading,
             lambda torque, _: 0 * torque + next(signs),
         )
@@ -162,9 +162,11 @@ def test_an_arm_that_finds_no_rest_is_an_error():
 
 def test_a_point_inside_a_link_of_wrong_length_keeps_its_place_and_none_may_be_inside_an_elastic_one():
     arm = arm_of("Rz(q1) Tx(0.4) [inner] Tx(0.6) Ry(q2) Tx(0.5) [B]")
-    machine = machine_of(arm, Structure(wrong={1: ((0.0, 0.02, 0.0), (0.0, 0.0, 0.1))}))
+    machine = build_model(
+        arm, Structure(wrong={1: ((0.0, 0.02, 0.0), (0.0, 0.0, 0.1))})
+    )
     np.testing.assert_allclose(
         forces_at(machine, np.zeros((1, 2)))[1][0, 0], [0.4, 0.0, 0.0], atol=1e-14
     )
     with pytest.raises(InputError, match="inner"):
-        machine_of(arm, Structure(tubes={1: TaperedTube(1e6, 1e6)}))
+        build_model(arm, Structure(tubes={1: TaperedTube(1e6, 1e6)}))
