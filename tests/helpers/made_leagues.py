@@ -6,7 +6,7 @@ from made_remainders import smoothly_wrong_folder
 
 from elastocal.campaigns.campaign import tabulate_measurements
 from elastocal.campaigns.campaign_folder import read_campaign_folder
-from elastocal.loop.loading import described_campaign
+from elastocal.loop.loading import read_described_campaign
 from elastocal_proof.league.methods import DataSet, deal_folds
 
 

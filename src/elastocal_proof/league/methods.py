@@ -267,7 +267,7 @@ def diagnose_league_folds(job: Any) -> None:
     mechanisms = []
     for fold, training, _ in split_rounds(job.wildcards.split, data):
         found = diagnose(training, Settings(), job.params.seed)
-        facts[str(fold)] = diagnosis_facts(found)["steps"][-1]
+        facts[str(fold)] = serialize_diagnosis(found)["steps"][-1]
         mechanisms.append(tabulate_mechanisms(found, fold))
     write_json(job.output.facts, facts)
     write_table(
