@@ -13,7 +13,7 @@ from made_loop_tables import CAMPAIGNS, facts_of, residual_table
 
 from elastocal.io.origin import Origin
 from elastocal.loop.schemas import stack_joint_angles
-from elastocal.mechanics.kinematics import corners
+from elastocal.mechanics.kinematics import locate_corners
 from elastocal.report.loop_page import build_loop_page, write_loop_page
 
 CHROMIUM = shutil.which("chromium")
@@ -87,7 +87,7 @@ def test_the_robot_is_drawn_at_the_angles_of_the_model_whatever_its_controller_r
     _, data = build_loop_page(facts_of(verdict), table, other)
     np.testing.assert_allclose(
         data["outlines"][0],
-        corners(kuka.chain, stack_joint_angles(table, 6)[:1])[:, 0],
+        locate_corners(kuka.chain, stack_joint_angles(table, 6)[:1])[:, 0],
         atol=1e-4,
     )
 

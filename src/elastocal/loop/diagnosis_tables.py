@@ -241,7 +241,7 @@ def tabulate_candidates(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     untestable = dict.fromkeys(candidates, "the measurements are at fault")
     if diagnosis.evidence:
         rows = _tabulate_tested_candidates(diagnosis.evidence)
-        untestable = diagnosis.evidence.linearized.untestable
+        untestable = diagnosis.evidence.design.untestable
     tested = {row["candidate"] for row in rows}
     for key, candidate in candidates.items():
         if key not in tested:
