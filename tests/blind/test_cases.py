@@ -9,16 +9,17 @@ import pytest
 from analysed_robots import ROBOTS
 from made_blind_documents import PLAN
 
+from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.reading import read_campaign
 from elastocal_proof.blind.cases import (
-    FOREIGN,
-    NAMED,
+    CATALOGUE_EFFECTS,
+    OUTSIDE_EFFECTS,
     PROOF,
-    Case,
-    cases_of,
-    defects_of,
-    make_case,
-    yardstick_of,
+    BlindCase,
+    build_yardstick,
+    list_cases,
+    size_defects,
+    write_sealed_case,
 )
 from elastocal_proof.plant.kinds import KINDS
 
@@ -37,7 +38,7 @@ def a_case(
     group="single",
     **more,
 ):
-    return Case(
+    return BlindCase(
         "/".join([*effects, setting]),
         group,
         robot,
@@ -52,19 +53,20 @@ def a_case(
 
 def made(case, folder):
     """Campaign and truth of a case."""
-    digest = make_case(case, folder / "blind", folder / "sealed", ROBOTS)
+    digest = write_sealed_case(case, folder / "blind", folder / "sealed", ROBOTS)
     text = (folder / "sealed" / f"{case.name}.json").read_bytes()
     assert hashlib.sha256(text).hexdigest() == digest
-    return read_campaign(folder / "blind" / case.name, ROBOTS), json.loads(text)
+    files = read_campaign_folder(folder / "blind" / case.name, ROBOTS)
+    return read_campaign(files), json.loads(text)
 
 
 def sized(case):
     robot = case.specimen(ROBOTS)
-    return robot, defects_of(case, robot, yardstick_of(case, robot))
+    return robot, size_defects(case, robot, build_yardstick(case, robot))
 
 
 def test_the_full_size_has_the_nulls_effects_levels_and_robots_that_the_protocol_asks_for():
-    cases = cases_of(PLAN, "full", 1)
+    cases = list_cases(PLAN, "full", 1)
     proof = [case for case in cases if case.robots == PROOF]
     assert {case.robot for case in proof} == {"gen3", "irb7600"} and len(proof) == len(
         cases
@@ -72,7 +74,7 @@ def test_the_full_size_has_the_nulls_effects_levels_and_robots_that_the_protocol
     assert sum(case.group == "none" for case in proof) == 520
     for setting in (name for name, changes in SETTINGS.items() if changes.get("hard")):
         assert sum(not case.effects and case.setting == setting for case in proof) == 50
-    for effect in NAMED:
+    for effect in CATALOGUE_EFFECTS:
         # An arm without a gravity compensator has none that is wrong.
         for level in (25.0, 50.0, 200.0):
             found = sum(
@@ -80,7 +82,7 @@ def test_the_full_size_has_the_nulls_effects_levels_and_robots_that_the_protocol
                 for c in proof
             )
             assert found == (2 if effect.startswith("compensator") else 4)
-    for effect in FOREIGN:
+    for effect in OUTSIDE_EFFECTS:
         assert (
             sum(
                 c.group == "outside" and c.effects == (effect,) and c.levels == (200.0,)
@@ -100,7 +102,7 @@ def test_the_full_size_has_the_nulls_effects_levels_and_robots_that_the_protocol
 
 def test_only_the_full_size_shows_the_proofs_robots_and_names_and_seeds_follow_from_seed_and_key_alone():
     sizes = {
-        size: cases_of(PLAN, size, 1)
+        size: list_cases(PLAN, size, 1)
         for size in ("smoke", "quick", "development", "full")
     }
     assert {
@@ -111,7 +113,9 @@ def test_only_the_full_size_shows_the_proofs_robots_and_names_and_seeds_follow_f
     cases = sizes["quick"]
     assert not developed & {case.seed for case in (*cases, *sizes["full"])}
     assert (
-        cases == cases_of(PLAN, "quick", 1) == sorted(cases, key=lambda case: case.name)
+        cases
+        == list_cases(PLAN, "quick", 1)
+        == sorted(cases, key=lambda case: case.name)
     )
     # Pinned: sealed documents of earlier runs hold what follows from these.
     of_old = [
@@ -124,7 +128,7 @@ def test_only_the_full_size_shows_the_proofs_robots_and_names_and_seeds_follow_f
     ).hexdigest()
     assert digest[:12] == NAMES
     assert not {case.name for case in cases} & {
-        case.name for case in cases_of(PLAN, "quick", 2)
+        case.name for case in list_cases(PLAN, "quick", 2)
     }
 
 

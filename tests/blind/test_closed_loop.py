@@ -9,17 +9,17 @@ from analysed_robots import ROBOTS
 from elastocal_proof.blind import closed_loop as module
 from elastocal_proof.blind.closed_loop import (
     DECLARED,
-    FOUND,
+    DIAGNOSED,
     GEOMETRY,
     MODELS,
     PARTS,
-    STATED_OF,
-    TRUE,
+    PLANT,
+    STATED_PARTS,
     UNCORRECTED,
-    cases,
-    closed_loop,
-    coverage,
-    stated_accuracy,
+    compare_stated_accuracy,
+    compute_coverage,
+    list_hidden_effects,
+    run_closed_loop,
 )
 from elastocal_proof.blind.folders import write_blind_campaign
 
@@ -30,7 +30,7 @@ def made(monkeypatch):
     monkeypatch.setattr(module, "_POSES", 6)
     monkeypatch.setattr(module, "_PATH", 12)
     return lambda **more: pd.DataFrame(
-        closed_loop(ROBOTS / "gp180.yaml", "compensator_torque", 768481013, **more)
+        run_closed_loop(ROBOTS / "gp180.yaml", "compensator_torque", 768481013, **more)
     )
 
 
@@ -48,15 +48,15 @@ def test_every_pose_is_commanded_by_every_model_and_the_model_found_is_nearer_th
         for part in PARTS
         for model in MODELS
     }
-    assert table.loc[table["model"].isin([FOUND, TRUE]), "corrected"].all()
-    assert rms(table, TRUE) < rms(table, FOUND) < rms(table, DECLARED)
+    assert table.loc[table["model"].isin([DIAGNOSED, PLANT]), "corrected"].all()
+    assert rms(table, PLANT) < rms(table, DIAGNOSED) < rms(table, DECLARED)
     assert rms(table, DECLARED) < min(rms(table, GEOMETRY), rms(table, UNCORRECTED))
     assert table["named"].all()
 
 
 @pytest.mark.slow
 def test_every_hidden_effect_moves_the_robot_and_needs_no_covariate():
-    found = [effect for effect, _ in cases(ROBOTS / "iiwa14.yaml", 1, 2)]
+    found = [effect for effect, _ in list_hidden_effects(ROBOTS / "iiwa14.yaml", 1, 2)]
     assert found.count("lost_motion") == found.count("payload") == 2
     assert not {
         "tracker_scale",
@@ -79,7 +79,7 @@ def test_with_slips_the_floor_is_the_same_in_the_declared_base_and_the_campaign_
         lambda *a, **k: written.append(write_blind_campaign(*a, **k)),
     )
     slipped = made(slips=True)
-    assert 1e-6 < rms(slipped, TRUE) < 4e-5
+    assert 1e-6 < rms(slipped, PLANT) < 4e-5
     # A tilt of 0.3 mrad and a shift that the uncorrected robot does not know of.
     assert rms(slipped, UNCORRECTED) > 1e-3
     ((slip,),) = [each["bad_rows"] for each in written]
@@ -91,8 +91,10 @@ def test_with_slips_the_floor_is_the_same_in_the_declared_base_and_the_campaign_
 def test_the_truth_on_the_plant_is_near_what_is_stated_whether_the_base_is_known_or_not(
     frame,
 ):
-    rows = stated_accuracy(ROBOTS / "kuka.yaml", "link_elasticity", 1827404023, frame)
-    assert [row["part"] for row in rows] == list(STATED_OF)
+    rows = compare_stated_accuracy(
+        ROBOTS / "kuka.yaml", "link_elasticity", 1827404023, frame
+    )
+    assert [row["part"] for row in rows] == list(STATED_PARTS)
     for row in rows:
         # 22 µm of 20 µm: 30 poses under 60 µm of noise. An unknown base used to cost
         # millimetres.
@@ -120,7 +122,7 @@ def make_rows(true_rms_m, decision="pass", verdict="named", frame="base"):
 
 
 def test_shares_are_of_the_cases_that_a_question_concerns_with_exact_intervals():
-    found = coverage(
+    found = compute_coverage(
         pd.concat(
             [
                 make_rows([1e-5, 2e-5, 5e-5]),

@@ -12,7 +12,7 @@ from elastocal.fitting.linearization import compute_effect_sensitivities, linear
 from elastocal.fitting.model import build_case
 from elastocal.fitting.noise import estimate_noise
 from elastocal.loop.loading import load_campaign
-from elastocal_proof.blind.cases import Case, make_case
+from elastocal_proof.blind.cases import BlindCase, write_sealed_case
 from elastocal_proof.blind.scores import EXACT_ALIASES
 
 pytestmark = pytest.mark.slow
@@ -53,7 +53,7 @@ def seen(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp(request.param)
     # Of an arm whose file tells no weights: where it does, weights absorb some of what
     # is compared here.
-    made = Case(
+    made = BlindCase(
         "aliases",
         "none",
         request.param,
@@ -63,7 +63,7 @@ def seen(request, tmp_path_factory):
         314159,
         changes={"weighs": False},
     )
-    make_case(made, folder / "blind", folder / "sealed", ROBOTS)
+    write_sealed_case(made, folder / "blind", folder / "sealed", ROBOTS)
     descriptions, training, _ = load_campaign(
         read_campaign_folder(folder / "blind" / made.name, ROBOTS)
     )

@@ -11,18 +11,23 @@ from made_blind_documents import PLAN
 from scipy.stats import multivariate_normal
 
 from elastocal.effects.catalogue import candidates_on
-from elastocal.loop.whole import diagnosed
-from elastocal.mechanics.sites import sites_of
+from elastocal.loop.whole import diagnose_folder
+from elastocal.mechanics.sites import build_sites
 from elastocal_proof.blind import oracle as module
-from elastocal_proof.blind.cases import Case, cases_of, make_case
-from elastocal_proof.blind.oracle import limit, log_bayes_factors, members_of, oracle
+from elastocal_proof.blind.cases import BlindCase, list_cases, write_sealed_case
+from elastocal_proof.blind.oracle import (
+    assess_best_analyst,
+    compute_log_bayes_factors,
+    fit_oracle,
+    list_variants,
+)
 
 
 def keys(effect, joints, robot):
     return [
         [c.key for c in members]
-        for members in members_of(
-            effect, joints, candidates_on(sites_of(robot)).values()
+        for members in list_variants(
+            effect, joints, candidates_on(build_sites(robot)).values()
         )
     ]
 
@@ -42,10 +47,10 @@ def made(folder, *effects, level=200.0, setting="weight_compensated"):
     key = "/".join((*effects, setting))
     levels = (level,) * len(effects)
     changes = PLAN["settings"][setting]
-    case = Case(
+    case = BlindCase(
         key, "single", "kuka", effects, levels, setting, 271828, changes=changes
     )
-    make_case(case, folder / "blind", folder / "sealed", ROBOTS)
+    write_sealed_case(case, folder / "blind", folder / "sealed", ROBOTS)
     truth = json.loads(
         (folder / "sealed" / f"{case.name}.json").read_text(encoding="utf-8")
     )
@@ -56,15 +61,15 @@ def test_what_the_engine_names_rightly_the_oracle_fits_the_same_and_without_an_e
     tmp_path,
 ):
     truth, folder = made(tmp_path, "joint_offset")
-    verdict = diagnosed(folder, ROBOTS.as_posix(), 1)
+    verdict = diagnose_folder(folder, ROBOTS.as_posix(), 1)
     assert [effect["name"] for effect in verdict["effects"]] == ["joint_offset"]
-    found = oracle(truth, verdict, folder, ROBOTS.as_posix(), 1)
+    found = fit_oracle(truth, verdict, folder, ROBOTS.as_posix(), 1)
     assert found["candidates"] == [f"joint_offset@{truth['defects'][0]['joints'][0]}"]
     assert found["detected"] and found["p_value"] < 1e-6
     # The engine has a prior on the size and a size of the pose error: both cost next to
     # nothing here.
     assert found["heldout"] == pytest.approx(verdict["heldout"]["after"], rel=2e-3)
-    found = oracle({"defects": []}, verdict, folder, ROBOTS.as_posix(), 1)
+    found = fit_oracle({"defects": []}, verdict, folder, ROBOTS.as_posix(), 1)
     assert found["heldout"] == verdict["heldout"]["before"] and not found["detected"]
 
 
@@ -76,7 +81,7 @@ def cases():
     """A single defect at 200 for each of some kinds, and a pair, on the arm that is
     solved fastest."""
     parts = [{"robots": ["kuka"], "single": 1, "levels": [200.0], "pair": 1}]
-    return cases_of(
+    return list_cases(
         PLAN | {"sizes": {"some": {"purpose": "limit", "parts": parts}}}, "some", 3
     )
 
@@ -93,7 +98,9 @@ def test_bayes_factors_are_ratios_of_normal_densities():
     units /= np.linalg.norm(units, axis=0)
     residuals = draws.standard_normal((6, 3))
     columns = np.array([np.arange(8), np.arange(8, 16)])
-    found = log_bayes_factors(units.T @ units, units.T @ residuals, columns, 25.0)
+    found = compute_log_bayes_factors(
+        units.T @ units, units.T @ residuals, columns, 25.0
+    )
     for number, chosen in enumerate(columns):
         covariance = np.eye(6) + 25.0 / 8 * units[:, chosen] @ units[:, chosen].T
         expected = [
@@ -108,7 +115,7 @@ def test_bayes_factors_are_ratios_of_normal_densities():
 @pytest.mark.parametrize("effect", SOME)
 def test_a_defect_that_shows_well_is_detected_and_named(cases, few, effect):
     case = next(case for case in cases if case.effects == (effect,))
-    found = limit(PLAN, case, ROBOTS)
+    found = assess_best_analyst(PLAN, case, ROBOTS)
     assert found["detected"] and found["right"] and found["mechanisms"] == [effect]
     assert found["probability"] > 0.9
 
@@ -119,15 +126,17 @@ def test_a_pair_is_named_and_what_hardly_shows_is_not_detected(cases, few):
     both = replace(
         single, effects=(SOME[0], SOME[2]), levels=(200.0, 200.0), group="pair"
     )
-    found = limit(PLAN, both, ROBOTS)
+    found = assess_best_analyst(PLAN, both, ROBOTS)
     assert found["right"] and found["mechanisms"] == [SOME[0], SOME[2]]
-    assert not limit(PLAN, replace(single, levels=(0.5,)), ROBOTS)["detected"]
+    assert not assess_best_analyst(PLAN, replace(single, levels=(0.5,)), ROBOTS)[
+        "detected"
+    ]
 
 
 @pytest.mark.slow
 def test_a_sixth_of_the_cases_that_targets_compare_with_is_in_the_sample(monkeypatch):
     monkeypatch.setattr(
-        module, "limit", lambda plan, case, robots_folder: {"right": True}
+        module, "assess_best_analyst", lambda plan, case, robots_folder: {"right": True}
     )
 
     def in_sample(seed, group="single", level=50.0, of="retained"):

@@ -9,12 +9,12 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.errors import InputError
 from elastocal.exchange.target_path import read_target_path
-from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.kinematics import compute_poses
 from elastocal_proof.blind.rehearsal import (
+    build_hidden_robot,
     fill_sheet,
-    hidden_robot,
-    measured_errors,
-    reached,
+    measure_errors,
+    move_robot,
     write_milling_path,
 )
 
@@ -24,7 +24,7 @@ WRENCH = ["fx", "fy", "fz", "mx", "my", "mz"]
 
 @pytest.fixture(scope="module")
 def robot():
-    return hidden_robot(UR10, 4, ["joint_tilt"])[0]
+    return build_hidden_robot(UR10, 4, ["joint_tilt"])[0]
 
 
 DOCUMENT = {
@@ -48,7 +48,7 @@ def test_a_sheet_is_filled_near_where_the_declared_robot_is_and_by_where_command
     ).to_csv(path, index=False)
     assert fill_sheet(path, DOCUMENT, robot, 1) == 5
     filled = pd.read_csv(path)
-    position, rotation = poses(
+    position, rotation = compute_poses(
         declared.chain, declared.model_angles(angles), declared.chain.end_effector
     )
     off = np.linalg.norm(filled[["x", "y", "z"]].to_numpy() - position, axis=1)
@@ -60,17 +60,17 @@ def test_a_sheet_is_filled_near_where_the_declared_robot_is_and_by_where_command
     assert turn.magnitude().max() < 0.05
     noise = (
         filled[["x", "y", "z"]].to_numpy()
-        - reached(robot, angles, np.zeros((5, 6)), 9)[0]
+        - move_robot(robot, angles, np.zeros((5, 6)), 9)[0]
     )
     assert 1e-6 < np.abs(noise).max() < 5e-4
 
 
 def test_the_hidden_effect_follows_from_the_seed_or_is_named(tmp_path):
-    drawn = {hidden_robot(UR10, seed)[1][-1].effect for seed in range(12)}
+    drawn = {build_hidden_robot(UR10, seed)[1][-1].effect for seed in range(12)}
     assert len(drawn) > 3
-    assert hidden_robot(UR10, 3)[1] == hidden_robot(UR10, 3)[1]
+    assert build_hidden_robot(UR10, 3)[1] == build_hidden_robot(UR10, 3)[1]
     with pytest.raises(InputError, match="rust"):
-        hidden_robot(UR10, 3, ["rust"])
+        build_hidden_robot(UR10, 3, ["rust"])
 
 
 def test_uncorrected_and_corrected_targets_are_judged_at_the_wanted_poses(
@@ -84,7 +84,7 @@ def test_uncorrected_and_corrected_targets_are_judged_at_the_wanted_poses(
     # Where the second set of targets is another robot's posture it misses by more.
     angles = pd.read_csv(path)[[f"q{j}" for j in range(1, 7)]]
     angles.join(angles.add_suffix("_uncorrected") + 1e-2).to_csv(targets, index=False)
-    missed = measured_errors(path, targets, robot, 1)
+    missed = measure_errors(path, targets, robot, 1)
     assert {name: off.shape for name, off in missed.items()} == dict.fromkeys(
         ["uncorrected", "corrected", "noise alone"], (50,)
     )

@@ -14,7 +14,12 @@ from made_blind_documents import (
     verdict,
 )
 
-from elastocal_proof.blind.scores import intervals_of, is_true, score, stated
+from elastocal_proof.blind.scores import (
+    build_case_row,
+    is_true,
+    list_intervals,
+    score_probabilities,
+)
 
 TILTED = {"misplaced": {"shift_m": [0.0, 0.0, 2e-4], "turn_rad": [3e-4, 0.0, 0.0]}}
 PAYLOAD = truth(("payload",))
@@ -91,7 +96,7 @@ OUTCOMES = {
 @pytest.mark.parametrize("name", OUTCOMES)
 def test_outcome_is(name):
     sealed, found, expected = OUTCOMES[name]
-    row = score(PLAN, sealed, found)
+    row = build_case_row(PLAN, sealed, found)
     assert {key for key in COUNTED if row[key] is True} == expected
 
 
@@ -113,7 +118,7 @@ def test_worse_is_beyond_two_standard_errors_and_counts_where_something_was_adop
         after=1.1e-4,
         reduction=reduction,
     )
-    row = score(PLAN, PAYLOAD, found, oracle())
+    row = build_case_row(PLAN, PAYLOAD, found, oracle())
     assert (row["worse"], row["adopted"]) == expected
 
 
@@ -128,13 +133,13 @@ def test_exact_aliases_are_told_by_the_truth_its_joints_and_the_robot():
         *((truth(place), silence(), oracle()) for place in places)
     ).exact_alias.tolist() == [True, False, True, False]
     # An arm that has no compensator has no alias of it.
-    assert not score(PLAN, truth(places[0], robot="gen3"), silence(), oracle())[
-        "exact_alias"
-    ]
+    assert not build_case_row(
+        PLAN, truth(places[0], robot="gen3"), silence(), oracle()
+    )["exact_alias"]
 
 
 def test_a_fault_of_the_data_that_ended_a_diagnosis_has_no_errors_and_states_nothing():
-    row = score(
+    row = build_case_row(
         PLAN, PAYLOAD, verdict("named", effect("wrong_unit")) | {"heldout": None}, None
     )
     assert (
@@ -195,7 +200,7 @@ def test_the_credible_set_is_the_smallest_that_reaches_95_per_cent(shares, place
         {"mechanisms": [name], "probability": share}
         for name, share in zip(names, shares, strict=False)
     ]
-    found = stated(PAYLOAD, {"probabilities": {"sets": sets[::-1]}})
+    found = score_probabilities(PAYLOAD, {"probabilities": {"sets": sets[::-1]}})
     assert (found["held"], found["stated"], found["correct"]) == (
         held,
         max(shares),
@@ -206,7 +211,7 @@ def test_the_credible_set_is_the_smallest_that_reaches_95_per_cent(shares, place
 def of_effect(document, found):
     return [
         row
-        for row in intervals_of(PLAN, document, found)
+        for row in list_intervals(PLAN, document, found)
         if row["effect"] != "joint_compliance"
     ]
 

@@ -27,7 +27,7 @@ def run_demo(elastocal, monkeypatch, tmp_path):
     rehearsal = "elastocal_proof.blind.rehearsal"
     monkeypatch.setattr(f"{rehearsal}.fill_sheet", lambda *_: 12)
     monkeypatch.setattr(f"{rehearsal}.write_milling_path", lambda *_: 50)
-    monkeypatch.setattr(f"{rehearsal}.measured_errors", lambda *_: ERRORS)
+    monkeypatch.setattr(f"{rehearsal}.measure_errors", lambda *_: ERRORS)
     monkeypatch.setattr(demo, "find_workplace", lambda: tmp_path)
     monkeypatch.setattr(
         "elastocal.campaigns.campaign_folder.read_campaign_folder",

@@ -31,8 +31,11 @@ from elastocal.fitting.model import (
     predict,
 )
 from elastocal.io.documents import read_document
-from elastocal.mechanics.elastostatics import exact_deflections, joint_torques
-from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.elastostatics import (
+    compute_exact_deflections,
+    compute_joint_torques,
+)
+from elastocal.mechanics.kinematics import compute_poses
 
 TWO_TARGETS = Target("A", "6DoF", None), Target("B", "3DoF", (0.1, 0.0, -0.2))
 

@@ -5,8 +5,8 @@ import pandas as pd
 from analysed_robots import ROBOTS
 
 from elastocal.io.documents import read_document
-from elastocal_proof.blind.scores import intervals_of, score
-from elastocal_proof.blind.summary import summarize
+from elastocal_proof.blind.scores import build_case_row, list_intervals
+from elastocal_proof.blind.summary import summarize_figures
 
 PLAN = read_document(ROBOTS.parent / "blind.yaml")
 JOINTS = 6
@@ -120,7 +120,7 @@ def oracle(p_value=1e-6, rms=1e-4):
 def frame(*entries):
     """Rows of cases.csv of (ground truth, verdict, oracle), with a limit behind them
     where there is one."""
-    return pd.DataFrame([score(PLAN, *entry) for entry in entries])
+    return pd.DataFrame([build_case_row(PLAN, *entry) for entry in entries])
 
 
 def summary(*entries):
@@ -129,7 +129,9 @@ def summary(*entries):
         [
             row
             for document, found, *_ in entries
-            for row in intervals_of(PLAN, document, found)
+            for row in list_intervals(PLAN, document, found)
         ]
     )
-    return summarize(PLAN, frame(*entries), spans, 1).set_index(["robots", "quantity"])
+    return summarize_figures(PLAN, frame(*entries), spans, 1).set_index(
+        ["robots", "quantity"]
+    )

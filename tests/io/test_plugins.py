@@ -11,7 +11,12 @@ from types import SimpleNamespace
 import pytest
 from support import refused
 
-from elastocal.io.plugins import EFFECTS, load_plugins, plugin_names, plugin_versions
+from elastocal.io.plugins import (
+    EFFECTS,
+    list_plugin_names,
+    list_plugin_versions,
+    load_plugins,
+)
 
 PYPROJECT = """
 [build-system]
@@ -46,7 +51,7 @@ from elastocal.campaigns.importers import Importer, PublicFile, PublicMeasuremen
 from elastocal.effects.protocol import effect, turning_joints
 from elastocal.effects.sizes import Size
 from elastocal.exchange.controllers import Controller
-from elastocal.remainder.regressions import Predictor, Regression
+from elastocal.residual_model.regressions import Predictor, Regression
 
 
 @effect("elastic", "resistance of hoses", Size("turn", 1e-4, "made up"), at=turning_joints)
@@ -95,7 +100,7 @@ from elastocal.exchange.controllers import axes_of, find_controller, targets_of
 from elastocal.io.origin import environment
 from elastocal.loop.loading import load_campaign
 from elastocal.mechanics.sites import sites_of
-from elastocal.remainder.regressions import Inputs, list_regressions
+from elastocal.residual_model.regressions import Inputs, list_regressions
 
 config, folder = map(Path, sys.argv[1:])
 robots = config / "robots"
@@ -206,7 +211,7 @@ def test_an_error_in_a_plug_in_is_one_line_that_names_the_package(
     offer, name, module, reason
 ):
     offer(f"{name} = broken_module:tides", module)
-    assert plugin_names(EFFECTS) == [name]
-    assert plugin_versions() == {"broken-package": "0.3"}
+    assert list_plugin_names(EFFECTS) == [name]
+    assert list_plugin_versions() == {"broken-package": "0.3"}
     with refused("package broken-package", f"{EFFECTS} {name}", reason):
         load_plugins(EFFECTS, SimpleNamespace, ("payload",))

@@ -18,11 +18,21 @@ from made_leagues import make_entries
 
 from elastocal.io.data_frames import write_csv
 from elastocal.random_streams import open_stream
-from elastocal_proof.blind.closed_loop import MODELS, PARTS, case_errors, goals, summary
-from elastocal_proof.blind.scores import intervals_of
-from elastocal_proof.blind.summary import rates, reliability, summarize
-from elastocal_proof.league.methods import dealt
-from elastocal_proof.league.table import league_table, mechanism_table
+from elastocal_proof.blind.closed_loop import (
+    MODELS,
+    PARTS,
+    compute_case_errors,
+    count_cases_within_goal,
+    summarize_errors,
+)
+from elastocal_proof.blind.scores import list_intervals
+from elastocal_proof.blind.summary import (
+    summarize_figures,
+    tabulate_rates,
+    tabulate_reliability,
+)
+from elastocal_proof.league.methods import deal_folds
+from elastocal_proof.league.table import compare_methods, summarize_mechanisms
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden"
 NAMES = sorted(
@@ -42,25 +52,25 @@ def made_tables():
         [
             row
             for document, said, _ in entries
-            for row in intervals_of(PLAN, document, said)
+            for row in list_intervals(PLAN, document, said)
         ]
     )
     moves = _moves()
     moves.loc[(moves["pose"] == 3) & (moves["model"] == "geometry"), "corrected"] = (
         False
     )
-    errors = case_errors({"kuka": moves})
+    errors = compute_case_errors({"kuka": moves})
     blind = {
         "cases": cases,
         "intervals": spans,
-        "rates": rates(cases),
-        "reliability": reliability(cases),
+        "rates": tabulate_rates(cases),
+        "reliability": tabulate_reliability(cases),
     }
-    blind |= {"summary": summarize(PLAN, cases, spans, SEED)}
+    blind |= {"summary": summarize_figures(PLAN, cases, spans, SEED)}
     loop = {
         "cases": errors,
-        "closed_loop": summary(errors, SEED),
-        "goals": goals(errors),
+        "closed_loop": summarize_errors(errors, SEED),
+        "goals": count_cases_within_goal(errors),
     }
     groups = {"blind": blind, "closed_loop": loop, "league_small": _league()}
     return {
@@ -157,9 +167,9 @@ def _league():
     measured = SimpleNamespace(
         session=np.zeros(len(pose), np.int32), pose=pose, joint_angles=angles
     )
-    folds = dealt(measured, 4, open_stream(SEED, "one", "league folds", 0))["random"][
-        pose
-    ]
+    folds = deal_folds(measured, 4, open_stream(SEED, "one", "league folds", 0))[
+        "random"
+    ][pose]
     results = {}
     for method, size, std in (
         ("geometry", 2e-4, None),
@@ -178,8 +188,11 @@ def _league():
         }
     )
     robots = {"A robot": ["one"]}
-    league = league_table(results, robots, "geometry", SEED)
-    return {"league": league, "mechanisms": mechanism_table({"one": found}, robots, 4)}
+    league = compare_methods(results, robots, "geometry", SEED)
+    return {
+        "league": league,
+        "mechanisms": summarize_mechanisms({"one": found}, robots, 4),
+    }
 
 
 @pytest.fixture(scope="module")

@@ -59,10 +59,10 @@ def demo(
     from elastocal.campaigns.measurements import CSV
     from elastocal.campaigns.reading import read_robot
     from elastocal_proof.blind.rehearsal import (
+        build_hidden_robot,
+        describe_hidden_effects,
         fill_sheet,
-        hidden_robot,
-        hidden_words,
-        measured_errors,
+        measure_errors,
         write_milling_path,
     )
 
@@ -70,7 +70,9 @@ def demo(
     robot_file = find_robots_folder() / "kuka.yaml"
     path = folder / "path.csv"
     targets = folder / "targets.csv"
-    robot, defects = hidden_robot(robot_file, seed, effect or ["transmission_harmonic"])
+    robot, defects = build_hidden_robot(
+        robot_file, seed, effect or ["transmission_harmonic"]
+    )
     command = context.find_root().command
 
     def run(*arguments: str | Path, may_fail: bool = False) -> None:
@@ -94,9 +96,9 @@ def demo(
     run("certificate", folder, "--tolerance", "0.2mm", may_fail=True)
     errors_mm = {
         name: 1e3 * root_mean_square(errors)
-        for name, errors in measured_errors(path, targets, robot, seed).items()
+        for name, errors in measure_errors(path, targets, robot, seed).items()
     }
-    defects_in_words = hidden_words(defects, effect or ())
+    defects_in_words = describe_hidden_effects(defects, effect or ())
     report = find_workplace() / "reports" / "loop" / folder.resolve().name
     print_lines([""], console)
     print_answer(

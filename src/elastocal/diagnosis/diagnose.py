@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.counting import format_count
-from elastocal.data_checks.faults import faults
+from elastocal.data_checks.faults import find_faults
 from elastocal.diagnosis import model_averaging, refit, verdict
 from elastocal.diagnosis.alarm import run_alarm_test
 from elastocal.diagnosis.candidate_design import build_candidate_design, refine_shapes
@@ -30,7 +30,6 @@ from elastocal.diagnosis.gross_errors import (
     find_gross_errors,
 )
 from elastocal.diagnosis.search import screen_terms, search_models
-from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.training_verdict import TrainingResult, state_training_verdict
 from elastocal.diagnosis.verdict import Evidence
 from elastocal.effects.catalogue import list_effects
@@ -44,7 +43,7 @@ from elastocal.fitting.noise import count_effective_parameters, serialize_noise
 from elastocal.fitting.observations import Observations
 from elastocal.io.typed_json import to_document
 from elastocal.random_streams import open_stream
-from elastocal.remainder.repeatable import repeatable_part
+from elastocal.residual_model.repeatable import detect_repeatable_residual
 from elastocal.validation.held_out import predict_left_out_squares
 
 if TYPE_CHECKING:
@@ -55,6 +54,7 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.alarm import Alarm
     from elastocal.diagnosis.candidate_design import CandidateDesign
     from elastocal.diagnosis.search import Posterior, ScoredModel
+    from elastocal.diagnosis.settings import Settings
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.noise import Noise
     from elastocal.verdict import RepeatableResidual, TrainingVerdict
@@ -113,7 +113,7 @@ class Diagnosis:
     evidence: Evidence | None
     verdict: TrainingVerdict = field(repr=False)
     left_out: Measurements
-    settings: Settings = field(default_factory=Settings, repr=False)
+    settings: Settings = field(repr=False)
 
     @cached_property
     def document(self) -> dict[str, Any]:
@@ -295,7 +295,7 @@ def _select_first_subset(
 ) -> tuple[FittedSubset, Sequence[Fault]]:
     """Select the rows of the first search, and look for faults of the data."""
     subset = select_initial_subset(case, settings)
-    data_faults = faults(subset.case.campaign)
+    data_faults = find_faults(subset.case.campaign)
     if data_faults:
         # If the whole data set has a fault, such as a wrong unit or frame, do not look
         # for single bad rows.
@@ -392,7 +392,7 @@ def _restart_search(
     """Start the next search at the model found so far if the last one was linearised
     about a model that it had found; starting at the declared model would repeat the
     same steps."""
-    design = evidence.linearized
+    design = evidence.design
     declared_effects = subset.declared.model.effects
     relinearized = len(design.reference_fit.model.effects) > len(declared_effects)
     return _RowRound(
@@ -469,7 +469,7 @@ def _run_search_round(
     tested = start.tested
     remains = False
     if has_large_pose_error or (is_linear and named not in (start.named, ())):
-        repeatable = repeatable_part(fitted, sample, context.seed)
+        repeatable = detect_repeatable_residual(fitted, sample, context.seed)
         tested = (fitted, repeatable)
         remains = repeatable is not None and repeatable.remains
     max_pose_error_rad = start.max_pose_error_rad
@@ -651,7 +651,7 @@ def _refit_declared(
 ) -> Fit:
     """Fit the declared model under the noise that it leaves by itself, because no
     effect is adopted."""
-    design = evidence.linearized
+    design = evidence.design
     noise = refit.estimate_residual_noise(
         design.problem,
         evidence.posterior.empty_model,
@@ -668,7 +668,7 @@ def _test_repeatable(
     tested that fit."""
     if evidence.tested is not None and evidence.tested[0] is kept:
         return evidence.tested[1]
-    return repeatable_part(kept, observations, seed)
+    return detect_repeatable_residual(kept, observations, seed)
 
 
 def _contradict(
@@ -690,7 +690,7 @@ def _contradict(
     warnings = [*contradictions, *outcome.warnings]
     if not repeatable_warnings:
         warnings += verdict.warn_of_pose_error(
-            kept.noise, evidence.linearized.pose_std_error_rad
+            kept.noise, evidence.design.pose_std_error_rad
         )
     return replace(
         outcome,
@@ -759,12 +759,12 @@ def _effect_steps(subset: FittedSubset, final: Fit, evidence: Evidence) -> list[
     All steps but the last are fits to the search sample, because only their errors are
     shown.
     """
-    problem = evidence.linearized.problem
+    problem = evidence.design.problem
     best = evidence.conclusion.best
     model = evidence.posterior.models[best.model]
     effects = [
         (effect, final.effect_values(effect.key)[1])
-        for effect, _ in refit.select_effects(evidence.linearized, model)
+        for effect, _ in refit.select_effects(evidence.design, model)
     ]
     explained = model_averaging.compute_explained_squares(problem, model)
     names = sorted(best.named, key=lambda name: -explained[name])

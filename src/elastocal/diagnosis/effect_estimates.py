@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.counting import pluralize
-from elastocal.data_checks.protocol import OF_DATA, Fault
+from elastocal.data_checks.protocol import DATA_FAMILY, Fault
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.verdict import (
     MIN_REPORTED_PROBABILITY,
@@ -56,7 +56,7 @@ def state_effects(
         Observations of that fit.
     """
     conclusion = evidence.conclusion
-    problem = evidence.linearized.problem
+    problem = evidence.design.problem
     names = conclusion.best.named
     if not names:
         return ()
@@ -94,7 +94,7 @@ def state_effects(
 def _state_locations(evidence: Evidence, mechanism: str) -> tuple[StatedLocation, ...]:
     """State the locations of a mechanism whose probability is worth reporting."""
     probabilities = compute_location_probabilities(
-        evidence.linearized.problem, evidence.posterior, mechanism
+        evidence.design.problem, evidence.posterior, mechanism
     )
     return tuple(
         StatedLocation(format_location(mechanism, location), probability)
@@ -279,7 +279,7 @@ def state_fault(fault: Fault) -> DataFault:
     """State a fault of the data among the effects of a verdict."""
     return DataFault(
         name=fault.name,
-        family=OF_DATA,
+        family=DATA_FAMILY,
         joints=tuple(fault.joints),
         detail=fault.detail,
         parameters=tuple(

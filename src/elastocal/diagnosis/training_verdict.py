@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.data_checks.faults import compliance_warnings
+from elastocal.data_checks.faults import warn_of_compliances
 from elastocal.diagnosis import refit
 from elastocal.diagnosis.effect_estimates import (
     format_location,
@@ -107,7 +107,7 @@ def state_training_verdict(
     warnings = [
         *result.warnings,
         *statement.warnings,
-        *compliance_warnings(final),
+        *warn_of_compliances(final),
         *warn_of_scatter(final.noise, result.noise, settings.relinearize_noise),
         *_warn_of_convergence(declared, final),
     ]
@@ -178,7 +178,7 @@ def _state_evidence(
     result: TrainingResult, evidence: Evidence, settings: Settings
 ) -> _Statement:
     """State the result of the search."""
-    design = evidence.linearized
+    design = evidence.design
     posterior = evidence.posterior
     best = evidence.conclusion.best
     declared = result.steps[1].fitted
@@ -290,7 +290,7 @@ def _list_location_words(
     evidence: Evidence, hypothesis: Hypothesis, mechanism: str
 ) -> tuple[str, ...]:
     model = evidence.posterior.models[hypothesis.model]
-    locations = list_locations(evidence.linearized.problem, model, mechanism)
+    locations = list_locations(evidence.design.problem, model, mechanism)
     return tuple(format_location(mechanism, location) for location in locations)
 
 

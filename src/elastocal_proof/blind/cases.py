@@ -20,42 +20,44 @@ from typing import Any
 import numpy as np
 
 from elastocal_proof.blind.folders import write_blind_campaign, write_truth
-from elastocal_proof.plant.arm import Arm, LinkMass, arm_from_file
+from elastocal_proof.plant.arm import Arm, LinkMass, read_arm
 from elastocal_proof.plant.campaigns import (
-    SLIPS,
+    BLUNDER_KINDS,
+    Blunder,
     Design,
-    Slip,
     Table,
-    schedule_of,
-    with_bad_rows,
+    add_blunders,
+    draw_schedule,
 )
 from elastocal_proof.plant.kinds import (
     KINDS,
     OUTSIDE,
     Defect,
-    drawn_defect,
-    with_defects,
+    apply_defects,
+    draw_defect,
 )
-from elastocal_proof.plant.machine import usual_gravity_torque
-from elastocal_proof.plant.physical_robot import (
+from elastocal_proof.plant.multibody import compute_typical_gravity_torque
+from elastocal_proof.plant.simulated_robot import (
     Motion,
-    PhysicalRobot,
+    SimulatedRobot,
     Tracker,
-    specimen,
-    stream,
+    draw_specimen,
+    open_simulation_stream,
 )
-from elastocal_proof.plant.sizing import Yardstick
+from elastocal_proof.plant.sizing import NoncentralityModel
 
 Plan = Mapping[str, Any]
 Sized = tuple[Defect, dict[str, Any]]
 
 PROOF = "proof"
 TUNED = "tuned"
-NAMED = tuple(sorted(kind for kind in KINDS if not kind.startswith(OUTSIDE)))
-FOREIGN = tuple(sorted(kind for kind in KINDS if kind.startswith(OUTSIDE)))
+CATALOGUE_EFFECTS = tuple(
+    sorted(kind for kind in KINDS if not kind.startswith(OUTSIDE))
+)
+OUTSIDE_EFFECTS = tuple(sorted(kind for kind in KINDS if kind.startswith(OUTSIDE)))
 # What hides the weight of the links from the analyst: a robot file that declares none,
 # of an arm that has no other weight.
-WEIGHT = "link_weight"
+HIDDEN_WEIGHT = "link_weight"
 SEVERAL_JOINTS = "several_joints"
 GEAR_GRAVITY = "gear_gravity"
 MOVED = "moved"
@@ -67,7 +69,7 @@ _OF_TWO_ANGLES = (OUTSIDE + "cable_pull", OUTSIDE + "two_angles")
 _REMAINING = 1e4
 # Mechanisms that come at several joints at once, as a bad mastering or one make of
 # gears does.
-WIDESPREAD = (
+MULTI_JOINT_EFFECTS = (
     *(
         "bearing_runout",
         "hysteresis",
@@ -82,7 +84,7 @@ WIDESPREAD = (
 _FEWEST_JOINTS = 3
 # Gears whose laws see the weight, on the joints that carry more than a fifth of the
 # most that any carries.
-OF_GEARS = ("hysteresis", "joint_dependent_stiffness", "lost_motion", "stiffening")
+GEAR_EFFECTS = ("hysteresis", "joint_dependent_stiffness", "lost_motion", "stiffening")
 _CARRIES = 0.2
 _LEVELS = (25.0, 50.0, 200.0)
 _FAR_LEVELS = (200.0,)
@@ -103,7 +105,7 @@ _IMPLAUSIBLE = 3.0
 
 
 @dataclass(frozen=True)
-class Case:
+class BlindCase:
     """One case, from which its campaign and its ground truth follow.
 
     `key`: what it is; sealed. `robot`: robot file in config/robots. `robots`: `PROOF`
@@ -150,7 +152,9 @@ class Case:
     @property
     def tracker(self) -> Tracker:
         """Its tracker, where nothing is wrong with it."""
-        misplaced = misplaced_base(self.seed) if self.changes.get("tilted") else None
+        misplaced = (
+            draw_misplaced_base(self.seed) if self.changes.get("tilted") else None
+        )
         return replace(
             Tracker(), misplaced=misplaced, **self.changes.get("tracker", {})
         )
@@ -158,28 +162,28 @@ class Case:
     @property
     def weighs(self) -> bool:
         """Whether the arm has weights that are declared."""
-        return WEIGHT not in self.effects and self.changes.get("weighs", True)
+        return HIDDEN_WEIGHT not in self.effects and self.changes.get("weighs", True)
 
     def declared(self, arm: Arm) -> tuple[LinkMass, ...]:
         """Weights declared to the analyst: none where they are what is hidden, or
         compensated."""
         return arm.masses if self.weighs else ()
 
-    def specimen(self, robots_folder: str | Path) -> PhysicalRobot:
+    def specimen(self, robots_folder: str | Path) -> SimulatedRobot:
         """Its robot before anything is wrong with it; its weights, its tracker and its
         drives are the setting's."""
-        arm = arm_from_file(self.robot_file(robots_folder))
+        arm = read_arm(self.robot_file(robots_folder))
         arm = replace(
             arm, gravity_m_s2=tuple(self.changes.get("gravity_m_s2", arm.gravity_m_s2))
         )
-        robot = specimen(
+        robot = draw_specimen(
             arm,
             self.seed,
             weighs=self.weighs,
             off_line_m=self.changes.get("off_line_m", 0.0),
         )
         # Repeatabilities differ from joint to joint, errors of a pose do not.
-        spread = self.changes.get("joint_rad", 0.0) * stream(
+        spread = self.changes.get("joint_rad", 0.0) * open_simulation_stream(
             self.seed, "repeatability"
         ).uniform(0.5, 1.5, arm.joints)
         alike = (self.changes.get("pose_rad", 0.0),) * arm.joints
@@ -192,7 +196,7 @@ class Case:
         return Path(robots_folder) / f"{self.robot}.yaml"
 
 
-def cases_of(plan: Plan, size: str, seed: int) -> list[Case]:
+def list_cases(plan: Plan, size: str, seed: int) -> list[BlindCase]:
     """All cases of a benchmark, in the order of their names, that is in none; fresh
     seeds are fresh cases."""
     purpose = plan["sizes"][size].get("purpose", "blind")
@@ -202,7 +206,7 @@ def cases_of(plan: Plan, size: str, seed: int) -> list[Case]:
             for group, effects, levels, setting, number in _listed(
                 plan, part, robot, seed
             ):
-                if set(effects) & set(absent_on(plan, robot)):
+                if set(effects) & set(find_absent_effects(plan, robot)):
                     continue
                 key = "/".join(
                     [
@@ -220,7 +224,7 @@ def cases_of(plan: Plan, size: str, seed: int) -> list[Case]:
                 )
                 robots = TUNED if robot in plan["tuned"] else PROOF
                 found.append(
-                    Case(
+                    BlindCase(
                         key,
                         group,
                         robot,
@@ -235,17 +239,17 @@ def cases_of(plan: Plan, size: str, seed: int) -> list[Case]:
     return sorted(found, key=lambda case: case.name)
 
 
-def misplaced_base(seed: int) -> Motion:
+def draw_misplaced_base(seed: int) -> Motion:
     """A base frame that was found badly: tilted by about 0.3 mrad and shifted by about
     0.2 mm, all measurements alike."""
-    draws = stream(seed, "tilted base")
+    draws = open_simulation_stream(seed, "tilted base")
     return Motion(
         tuple(_SHIFT_M * draws.standard_normal(3)),
         tuple(_TILT_RAD * draws.standard_normal(3)),
     )
 
 
-def absent_on(plan: Plan, robot: str) -> tuple[str, ...]:
+def find_absent_effects(plan: Plan, robot: str) -> tuple[str, ...]:
     """Effects that a robot cannot have."""
     return tuple(plan["absent"].get(robot, ()))
 
@@ -262,10 +266,10 @@ def _listed(
     for number in each("none"):
         yield "none", (), (), "usual", number
     for group, effects, levels in (
-        ("single", NAMED, part.get("levels", _LEVELS)),
-        ("outside", FOREIGN, part.get("outside_levels", _FAR_LEVELS)),
-        (SEVERAL_JOINTS, WIDESPREAD, (_HIGH,)),
-        (GEAR_GRAVITY, OF_GEARS, (_HIGH,)),
+        ("single", CATALOGUE_EFFECTS, part.get("levels", _LEVELS)),
+        ("outside", OUTSIDE_EFFECTS, part.get("outside_levels", _FAR_LEVELS)),
+        (SEVERAL_JOINTS, MULTI_JOINT_EFFECTS, (_HIGH,)),
+        (GEAR_GRAVITY, GEAR_EFFECTS, (_HIGH,)),
     ):
         for effect, level, number in product(effects, levels, each(group)):
             yield group, (effect,), (level,), "usual", number
@@ -274,7 +278,7 @@ def _listed(
     ):
         yield MOVED, ("setup_step",), (level,), setting, number
     for number in each(UNDECLARED):
-        yield UNDECLARED, (WEIGHT,), (_HEAVY,), "usual", number
+        yield UNDECLARED, (HIDDEN_WEIGHT,), (_HEAVY,), "usual", number
     for level, number in product(part.get("pair_levels", _PAIR_LEVELS), each("pair")):
         yield (
             "pair",
@@ -312,12 +316,20 @@ def _drawn_pair(
 ) -> tuple[str, str]:
     """Two effects of different names, neither of which is an alias of the compliances,
     and which the robot can have."""
-    absent = ("force_scale", *absent_on(plan, robot))
-    pairs = list(combinations([name for name in NAMED if name not in absent], 2))
-    return pairs[stream(seed, f"pair {robot} {level} {number}").integers(len(pairs))]
+    absent = ("force_scale", *find_absent_effects(plan, robot))
+    pairs = list(
+        combinations([name for name in CATALOGUE_EFFECTS if name not in absent], 2)
+    )
+    return pairs[
+        open_simulation_stream(seed, f"pair {robot} {level} {number}").integers(
+            len(pairs)
+        )
+    ]
 
 
-def defects_of(case: Case, robot: PhysicalRobot, yardstick: Yardstick) -> list[Sized]:
+def size_defects(
+    case: BlindCase, robot: SimulatedRobot, yardstick: NoncentralityModel
+) -> list[Sized]:
     """The defects of a case at the sizes that give their non-centralities, each with
     its size as in the ground truth.
 
@@ -354,17 +366,19 @@ def defects_of(case: Case, robot: PhysicalRobot, yardstick: Yardstick) -> list[S
     return found
 
 
-def _drawn(case: Case, robot: PhysicalRobot, effect: str, seed: int) -> list[Defect]:
+def _drawn(
+    case: BlindCase, robot: SimulatedRobot, effect: str, seed: int
+) -> list[Defect]:
     """Defects of plausible size that belong together: one, or one mechanism at several
     joints."""
     arm = robot.arm
-    draws = stream(seed, f"joints of {effect}")
+    draws = open_simulation_stream(seed, f"joints of {effect}")
     kind = KINDS[effect]
     locations = kind.locations(arm)
     if case.group == SEVERAL_JOINTS:
         count = draws.integers(min(_FEWEST_JOINTS, len(locations)), len(locations) + 1)
         chosen = sorted(draws.choice(len(locations), count, replace=False).tolist())
-        plausible = kind.plausible_on(arm)
+        plausible = kind.scale_plausible_size(arm)
         return [
             Defect(
                 effect,
@@ -374,12 +388,12 @@ def _drawn(case: Case, robot: PhysicalRobot, effect: str, seed: int) -> list[Def
             )
             for place in chosen
         ]
-    defect = drawn_defect(effect, arm, seed)
+    defect = draw_defect(effect, arm, seed)
     if case.group == UNDECLARED:
         # The last of its locations: of all links.
         return [replace(defect, joints=locations[-1])]
     if case.group == GEAR_GRAVITY:
-        torque = usual_gravity_torque(arm, arm.masses, arm.gravity_m_s2)
+        torque = compute_typical_gravity_torque(arm, arm.masses, arm.gravity_m_s2)
         defect = replace(
             defect,
             joints=(
@@ -389,16 +403,18 @@ def _drawn(case: Case, robot: PhysicalRobot, effect: str, seed: int) -> list[Def
     return [defect]
 
 
-def yardstick_of(case: Case, robot: PhysicalRobot) -> Yardstick:
+def build_yardstick(case: BlindCase, robot: SimulatedRobot) -> NoncentralityModel:
     """To which the defective robots of a case are compared; `robot`: faultless."""
     free = case.design.frame == "tracker"
-    done = schedule_of(robot.arm, case.design, case.seed)
-    return Yardstick(robot, done, free_frame=free, declared=case.declared(robot.arm))
+    done = draw_schedule(robot.arm, case.design, case.seed)
+    return NoncentralityModel(
+        robot, done, free_frame=free, declared=case.declared(robot.arm)
+    )
 
 
 def _first_plausible(
-    yardstick: Yardstick,
-    robot: PhysicalRobot,
+    yardstick: NoncentralityModel,
+    robot: SimulatedRobot,
     drawn: list[list[Defect]],
     level: float,
     quantity: str,
@@ -409,9 +425,9 @@ def _first_plausible(
     for number, defects in enumerate(drawn, 1):
         largest = min(KINDS[defect.effect].largest / defect.size for defect in defects)
         try:
-            factor = size_for(
+            factor = find_size(
                 yardstick,
-                partial(with_defects, robot, defects),
+                partial(apply_defects, robot, defects),
                 1.0,
                 level,
                 quantity,
@@ -433,9 +449,9 @@ def _first_plausible(
     )
 
 
-def size_for(
-    yardstick: Yardstick,
-    robot_of_size: Callable[[float], PhysicalRobot],
+def find_size(
+    yardstick: NoncentralityModel,
+    robot_of_size: Callable[[float], SimulatedRobot],
     start: float,
     target: float,
     quantity: str = "retained",
@@ -455,7 +471,7 @@ def size_for(
     exponent = 2.0
     last: tuple[float, float] | None = None
     for _ in range(_ROUNDS):
-        signal = yardstick.signal(robot_of_size(size))
+        signal = yardstick.compute_noncentralities(robot_of_size(size))
         value = signal[quantity]
         # What is absorbed leaves rounding and second order, a millionth of the raw
         # signal.
@@ -480,8 +496,8 @@ def size_for(
 
 
 def _stated(
-    yardstick: Yardstick,
-    robot: PhysicalRobot,
+    yardstick: NoncentralityModel,
+    robot: SimulatedRobot,
     defects: list[Defect],
     level: float,
     quantity: str,
@@ -490,7 +506,7 @@ def _stated(
     """Defects with their sizes as in the ground truth, each with its own signal."""
     found: list[Sized] = []
     for defect in defects:
-        signal = yardstick.signal(with_defects(robot, [defect]))
+        signal = yardstick.compute_noncentralities(apply_defects(robot, [defect]))
         share = _share_of_plausible(robot, defect)
         sizing = {
             "non_centrality": level,
@@ -503,12 +519,12 @@ def _stated(
     return found
 
 
-def _share_of_plausible(robot: PhysicalRobot, defect: Defect) -> float:
-    return defect.size / KINDS[defect.effect].plausible_on(robot.arm)
+def _share_of_plausible(robot: SimulatedRobot, defect: Defect) -> float:
+    return defect.size / KINDS[defect.effect].scale_plausible_size(robot.arm)
 
 
-def make_case(
-    case: Case,
+def write_sealed_case(
+    case: BlindCase,
     blind_folder: str | Path,
     sealed_folder: str | Path,
     robots_folder: str | Path,
@@ -517,19 +533,21 @@ def make_case(
     folder; returns the SHA-256 of that."""
     robot = case.specimen(robots_folder)
     design = case.design
-    yardstick = yardstick_of(case, robot) if case.effects else None
-    sized = defects_of(case, robot, yardstick) if yardstick else []
-    bad = with_defects(robot, [defect for defect, _ in sized])
+    yardstick = build_yardstick(case, robot) if case.effects else None
+    sized = size_defects(case, robot, yardstick) if yardstick else []
+    bad = apply_defects(robot, [defect for defect, _ in sized])
     folder = Path(blind_folder) / case.name
-    schedule = schedule_of(robot.arm, design, case.seed)
+    schedule = draw_schedule(robot.arm, design, case.seed)
 
-    def slipped(table: Table) -> tuple[Table, list[Slip]]:
+    def slipped(table: Table) -> tuple[Table, list[Blunder]]:
         """One to so many bad rows, of one kind."""
-        draws = stream(case.seed, "bad rows")
-        possible = [kind for kind in SLIPS if kind != "load" or table["load"].any()]
+        draws = open_simulation_stream(case.seed, "bad rows")
+        possible = [
+            kind for kind in BLUNDER_KINDS if kind != "load" or table["load"].any()
+        ]
         kind = str(draws.choice(possible))
         count = int(draws.integers(1, case.changes["bad_rows"] + 1))
-        return with_bad_rows(table, bad, schedule, kind, count, draws)
+        return add_blunders(table, bad, schedule, kind, count, draws)
 
     file = case.robot_file(robots_folder)
     slips = slipped if "bad_rows" in case.changes else None
@@ -560,7 +578,7 @@ def make_cases(job: Any) -> None:
     robots = Path(job.input.robots[0]).parent
     for folder in (job.output.blind, job.output.sealed):
         Path(folder).mkdir(parents=True, exist_ok=True)
-    cases = cases_of(asked.plan, asked.size, asked.seed)
+    cases = list_cases(asked.plan, asked.size, asked.seed)
     blocks = asked.plan["sizes"][asked.size]["blocks"]
     for case in cases[asked.number - 1 :: blocks]:
-        make_case(case, job.output.blind, job.output.sealed, robots)
+        write_sealed_case(case, job.output.blind, job.output.sealed, robots)

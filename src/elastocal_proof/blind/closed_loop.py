@@ -41,29 +41,29 @@ from elastocal.fitting.observations import select_states
 from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import write_table
-from elastocal.loop.whole import calibrated_by, cases_in
-from elastocal.mechanics.kinematics import jacobians, pose_differences
+from elastocal.loop.whole import build_calibrated_robot, read_cases
+from elastocal.mechanics.kinematics import compute_jacobians, compute_pose_differences
 from elastocal.random_streams import open_stream as analysis_stream
 from elastocal.validation.conformity import decide_conformity
 from elastocal_proof.blind import schemas
 from elastocal_proof.blind.folders import write_blind_campaign
 from elastocal_proof.blind.rehearsal import (
     ERRORS_OF_GEOMETRY,
-    bow,
-    hidden_robot,
-    reached,
-    with_misplaced_base,
+    build_hidden_robot,
+    draw_milling_path,
+    misplace_base,
+    move_robot,
 )
 from elastocal_proof.plant.campaigns import (
+    Blunder,
     Design,
-    Slip,
     Table,
-    schedule_of,
-    usual_force_N,
-    with_bad_rows,
+    add_blunders,
+    draw_schedule,
+    get_typical_force_N,
 )
 from elastocal_proof.plant.kinds import KINDS
-from elastocal_proof.plant.physical_robot import stream
+from elastocal_proof.plant.simulated_robot import open_simulation_stream
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -74,21 +74,21 @@ if TYPE_CHECKING:
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Case
     from elastocal.mechanics.robot import Robot
-    from elastocal_proof.plant.physical_robot import PhysicalRobot
+    from elastocal_proof.plant.simulated_robot import SimulatedRobot
 
 UNCORRECTED = "uncorrected"
 GEOMETRY = "geometry"
 DECLARED = "declared"
-FOUND = "found"
-TRUE = "true"
-MODELS = (UNCORRECTED, GEOMETRY, DECLARED, FOUND, TRUE)
+DIAGNOSED = "found"
+PLANT = "true"
+MODELS = (UNCORRECTED, GEOMETRY, DECLARED, DIAGNOSED, PLANT)
 UNLOADED = "unloaded"
 LOADED = "loaded"
 MILLING = "milling"
 PARTS = (UNLOADED, LOADED, MILLING)
 # Of what an accuracy is stated: random poses without and with load together, and a
 # path.
-STATED_OF = {"random": (UNLOADED, LOADED), MILLING: (MILLING,)}
+STATED_PARTS = {"random": (UNLOADED, LOADED), MILLING: (MILLING,)}
 # Wanted poses of each part.
 _POSES = 40
 _PATH = 60
@@ -115,7 +115,7 @@ _STATED = ("rms_m", "rms_bound_m", "worst_m", "worst_bound_m", "form_m", "left_o
 
 
 @dataclass(frozen=True)
-class Wanted:
+class WantedPoses:
     """Poses that a robot shall reach.
 
     `part` (N,) of str. `position`, `rotation` (N, 3), (N, 3, 3): m, base axes. `wrench`
@@ -131,26 +131,28 @@ class Wanted:
 
 
 @dataclass(frozen=True)
-class Measured:
+class DiagnosedRobot:
     """A robot with one hidden defect, as its analyst knows it, what was fitted and what
     was not, and what it shall reach."""
 
-    plant: PhysicalRobot
+    plant: SimulatedRobot
     declared: Robot
     training: Case
     held_out: Case
     found: Diagnosis
-    wanted: Wanted
+    wanted: WantedPoses
 
 
-def cases(robot_file: str | Path, seed: int, each: int) -> Iterator[tuple[str, int]]:
+def list_hidden_effects(
+    robot_file: str | Path, seed: int, each: int
+) -> Iterator[tuple[str, int]]:
     """Hidden effects and seeds of all cases on one robot, `each` of every effect that
     the loop can be closed with.
 
     These move the robot, need no covariate, such as the approach, which no path states,
     and can be on this arm.
     """
-    arm = hidden_robot(robot_file, seed)[0].arm
+    arm = build_hidden_robot(robot_file, seed)[0].arm
     known = catalogue()
     for effect, kind in sorted(KINDS.items()):
         moves = (
@@ -163,35 +165,33 @@ def cases(robot_file: str | Path, seed: int, each: int) -> Iterator[tuple[str, i
             yield (
                 effect,
                 int(
-                    stream(
+                    open_simulation_stream(
                         seed, f"closed loop {Path(robot_file).stem} {effect} {number}"
                     ).integers(2**31)
                 ),
             )
 
 
-def measure(
+def measure_robot(
     robot_file: Path, effect: str, seed: int, frame: str = "base", slips: bool = False
-) -> Measured:
+) -> DiagnosedRobot:
     """Measure and diagnose one robot.
 
     `effect`: hidden, of plausible size at a joint that is drawn, beside errors of
     geometry, gears and weights. `slips`: whether the base is a little tilted against
     where it is declared, and the beam was lost in one fitted row.
     """
-    plant = hidden_robot(robot_file, seed, [effect])[0]
+    plant = build_hidden_robot(robot_file, seed, [effect])[0]
     design = replace(CAMPAIGN, frame=frame)
-    draws = stream(seed, "lost beam")
+    draws = open_simulation_stream(seed, "lost beam")
     if slips:
-        plant = with_misplaced_base(plant, seed)
-    schedule = schedule_of(plant.arm, design, seed)
+        plant = misplace_base(plant, seed)
+    schedule = draw_schedule(plant.arm, design, seed)
 
-    def lost(table: Table) -> tuple[Table, list[Slip]]:
+    def lost(table: Table) -> tuple[Table, list[Blunder]]:
         kind = str(draws.choice(["zeros", "held_point"]))
         fitted = design.poses - design.held_out
-        tries = iter(
-            lambda: with_bad_rows(table, plant, schedule, kind, 1, draws), None
-        )
+        tries = iter(lambda: add_blunders(table, plant, schedule, kind, 1, draws), None)
         return next(
             (bad, slip)
             for bad, slip in tries
@@ -210,31 +210,31 @@ def measure(
             plant.arm.masses,
             slipped,
         )
-        training, held_out = cases_in(folder, robot_file.parent)
+        training, held_out = read_cases(folder, robot_file.parent)
     robot = training.campaign.robot
-    return Measured(
+    return DiagnosedRobot(
         plant,
         robot,
         training,
         held_out,
         diagnose(training, Settings(), seed),
-        wanted_poses(robot, plant, seed),
+        draw_wanted_poses(robot, plant, seed),
     )
 
 
-def wanted_poses(robot: Robot, plant: PhysicalRobot, seed: int) -> Wanted:
+def draw_wanted_poses(robot: Robot, plant: SimulatedRobot, seed: int) -> WantedPoses:
     """Poses of all parts that a robot shall reach: random ones without and under load,
     and a path of milling."""
-    draws = stream(seed, "wanted poses")
+    draws = open_simulation_stream(seed, "wanted poses")
     low, high = robot.joint_limits.T
-    force = usual_force_N(plant.arm)
+    force = get_typical_force_N(plant.arm)
     angles = low + (high - low) * (
         0.5 + _REACH * (draws.random((2 * _POSES, robot.joints)) - 0.5)
     )
     shown = robot.reported_angles(angles)
     direction = draws.standard_normal((_POSES, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    path = bow(robot, _PATH_SHARE * plant.arm.reach_m, _PATH, draws)
+    path = draw_milling_path(robot, _PATH_SHARE * plant.arm.reach_m, _PATH, draws)
     along = np.gradient(path[0], axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     # Half against the feed and the rest upwards off the part.
@@ -249,26 +249,28 @@ def wanted_poses(robot: Robot, plant: PhysicalRobot, seed: int) -> Wanted:
         np.concatenate(both) for both in zip(random, path, strict=True)
     )
     part = np.repeat(PARTS, (_POSES, _POSES, _PATH))
-    return Wanted(part, position, rotation, np.pad(forces, ((0, 0), (0, 3))), start)
+    return WantedPoses(
+        part, position, rotation, np.pad(forces, ((0, 0), (0, 3))), start
+    )
 
 
-def closed_loop(
+def run_closed_loop(
     robot_file: Path, effect: str, seed: int, slips: bool = False
 ) -> dict[str, np.ndarray]:
     """One robot, from campaign to corrected targets that were measured; arguments as of
     `measure`, base declared.
 
-    Returns one row for each wanted pose and model, columns as `schemas.closed_loop` has
+    Returns one row for each wanted pose and model, columns as `schemas.build_closed_loop_schema` has
     them.
     """
-    made = measure(robot_file, effect, seed, slips=slips)
+    made = measure_robot(robot_file, effect, seed, slips=slips)
     robot, wanted, count = made.declared, made.wanted, len(made.wanted.part)
     models = {
         GEOMETRY: calibrate_by_fit(
             _geometry(made.training, made.found), replace(robot, masses=())
         ),
         DECLARED: calibrate_by_fit(made.found.declared, robot),
-        FOUND: _corrected(made, seed),
+        DIAGNOSED: _corrected(made, seed),
     }
     # Commands, the errors that a model states, and whether a pose could be corrected.
     commanded = {UNCORRECTED: (wanted.start, np.zeros(count), np.ones(count, bool))}
@@ -280,7 +282,7 @@ def closed_loop(
             model, targets.joint_angles, wanted.wrench, draws=0
         ).error_m
         commanded[name] = targets.joint_angles, stated, targets.status == OK
-    commanded[TRUE] = _by_plant(made, seed)
+    commanded[PLANT] = _by_plant(made, seed)
     rows = [
         _moved(made, commands, seed)
         | {"model": name, "predicted_std_m": stated, "corrected": good}
@@ -303,10 +305,12 @@ def closed_loop(
     }
 
 
-def _corrected(made: Measured, seed: int) -> CalibratedRobot:
+def _corrected(made: DiagnosedRobot, seed: int) -> CalibratedRobot:
     """The robot as the diagnosis corrects it."""
     part = remove_gross_errors(made.found, made.held_out)[1]
-    return calibrated_by(made.found, part, apply_regression(made.found, part, seed))
+    return build_calibrated_robot(
+        made.found, part, apply_regression(made.found, part, seed)
+    )
 
 
 def _geometry(case: Case, found: Diagnosis) -> Fit:
@@ -326,7 +330,9 @@ def _geometry(case: Case, found: Diagnosis) -> Fit:
     )
 
 
-def _by_plant(made: Measured, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _by_plant(
+    made: DiagnosedRobot, seed: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Commands by Newton's method on the plant without its chance, which states no
     error, and whether they succeed."""
     robot = made.declared
@@ -334,14 +340,16 @@ def _by_plant(made: Measured, seed: int) -> tuple[np.ndarray, np.ndarray, np.nda
     certain = replace(made.plant, repeatability_rad=())
     commands = wanted.start.copy()
     inverse = np.linalg.pinv(
-        jacobians(robot.chain, robot.model_angles(commands), robot.chain.end_effector)
+        compute_jacobians(
+            robot.chain, robot.model_angles(commands), robot.chain.end_effector
+        )
     )
 
     def off() -> np.ndarray:
-        return pose_differences(
+        return compute_pose_differences(
             wanted.position,
             wanted.rotation,
-            *reached(certain, commands, wanted.wrench, seed),
+            *move_robot(certain, commands, wanted.wrench, seed),
         )
 
     for _ in range(_STEPS):
@@ -355,12 +363,14 @@ def _by_plant(made: Measured, seed: int) -> tuple[np.ndarray, np.ndarray, np.nda
     )
 
 
-def _moved(made: Measured, commands: np.ndarray, seed: int) -> dict[str, Any]:
+def _moved(made: DiagnosedRobot, commands: np.ndarray, seed: int) -> dict[str, Any]:
     """What the robot does with its commands, with chance of its own."""
     wanted = made.wanted
-    position, rotation = reached(made.plant, commands, wanted.wrench, seed + 1)
+    position, rotation = move_robot(made.plant, commands, wanted.wrench, seed + 1)
     read, _ = made.plant.tracker.read(
-        position[:, None], rotation[:, None], stream(seed, "measured again")
+        position[:, None],
+        rotation[:, None],
+        open_simulation_stream(seed, "measured again"),
     )
     return {
         "part": wanted.part,
@@ -371,7 +381,7 @@ def _moved(made: Measured, commands: np.ndarray, seed: int) -> dict[str, Any]:
     }
 
 
-def stated_accuracy(
+def compare_stated_accuracy(
     robot_file: Path, effect: str, seed: int, frame: str
 ) -> list[dict[str, Any]]:
     """For each of `STATED_OF` what is predicted, bounded and decided of one corrected
@@ -380,7 +390,7 @@ def stated_accuracy(
     In the base's frame where the campaign knew it, else after the best rigid placement
     over the random poses.
     """
-    made = measure(robot_file, effect, seed, frame)
+    made = measure_robot(robot_file, effect, seed, frame)
     plant = made.plant
     wanted = made.wanted
     calibrated = _corrected(made, seed)
@@ -389,7 +399,7 @@ def stated_accuracy(
     )
     good = targets.status == OK
     off = (
-        reached(plant, targets.joint_angles, wanted.wrench, seed + 1)[0]
+        move_robot(plant, targets.joint_angles, wanted.wrench, seed + 1)[0]
         - wanted.position
     )
     if frame != "base":
@@ -407,9 +417,13 @@ def stated_accuracy(
                 columns[over], field[over], np.repeat([True, True, False, False], 3)
             )
         )[:, :3, 0]
-    tolerance = float(np.exp(stream(seed, "tolerance").uniform(*np.log(_TOLERANCES_M))))
+    tolerance = float(
+        np.exp(
+            open_simulation_stream(seed, "tolerance").uniform(*np.log(_TOLERANCES_M))
+        )
+    )
     rows = []
-    for part, members in STATED_OF.items():
+    for part, members in STATED_PARTS.items():
         mine = good & np.isin(wanted.part, members)
         prediction = predict_errors(
             calibrated, targets.joint_angles[mine], wanted.wrench[mine]
@@ -441,12 +455,12 @@ def close_loop(job: Any) -> None:
     robot = Path(job.input.robot)
     asked = job.params
     blocks = (
-        closed_loop(robot, *case, slips=asked.slips)
-        for case in cases(robot, asked.seed, asked.each)
+        run_closed_loop(robot, *case, slips=asked.slips)
+        for case in list_hidden_effects(robot, asked.seed, asked.each)
     )
     write_table(
         job.output.moved,
-        schemas.closed_loop(read_robot(robot).joints),
+        schemas.build_closed_loop_schema(read_robot(robot).joints),
         blocks,
         describe_provenance(asked, **job.wildcards),
     )
@@ -459,13 +473,13 @@ def state_accuracy(job: Any) -> None:
     frame = job.wildcards.frame
     rows = [
         row
-        for case in cases(robot, job.params.seed, job.params.each)
-        for row in stated_accuracy(robot, *case, frame)
+        for case in list_hidden_effects(robot, job.params.seed, job.params.each)
+        for row in compare_stated_accuracy(robot, *case, frame)
     ]
     write_csv(job.output.stated, pd.DataFrame(rows))
 
 
-def case_errors(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+def compute_case_errors(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """RMS errors of each case and part, of rows of `closed_loop` by robot.
 
     Columns: the measured RMS of each model (m), the same as the robot reached it,
@@ -491,13 +505,13 @@ def case_errors(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
         np.sqrt(reached[[*MODELS]]).add_suffix("_reached")
     )
     errors = errors.assign(
-        calibration=reached[FOUND] / predicted[FOUND],
-        over_floor=errors[FOUND] / errors[TRUE],
+        calibration=reached[DIAGNOSED] / predicted[DIAGNOSED],
+        over_floor=errors[DIAGNOSED] / errors[PLANT],
     )
     return errors.rename_axis(columns=None).reset_index()
 
 
-def summary(errors: pd.DataFrame, seed: int) -> pd.DataFrame:
+def summarize_errors(errors: pd.DataFrame, seed: int) -> pd.DataFrame:
     """`case_errors` together, with 95 % limits by a bootstrap over cases: one row for
     each robot (and "all"), part and model.
 
@@ -522,7 +536,7 @@ def summary(errors: pd.DataFrame, seed: int) -> pd.DataFrame:
                     squares[draws].mean(axis=1)
                 )
 
-            floor = drawn(TRUE)
+            floor = drawn(PLANT)
             for model in MODELS:
                 (rms, many), (reached, many_reached) = (
                     drawn(model),
@@ -537,7 +551,7 @@ def summary(errors: pd.DataFrame, seed: int) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def goals(errors: pd.DataFrame) -> pd.DataFrame:
+def count_cases_within_goal(errors: pd.DataFrame) -> pd.DataFrame:
     """How many of `case_errors` are within `GOAL` of the floor, by part, where the
     effect was named and where not.
 
@@ -568,7 +582,7 @@ def goals(errors: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def coverage(rows: pd.DataFrame) -> pd.DataFrame:
+def compute_coverage(rows: pd.DataFrame) -> pd.DataFrame:
     """How often the truth is below the bounds of `stated_accuracy`, and denies a
     decision, with Clopper-Pearson intervals.
 
@@ -594,7 +608,7 @@ def coverage(rows: pd.DataFrame) -> pd.DataFrame:
     }
     found = []
     for frame in ("base", "tracker", "all"):
-        for part in STATED_OF:
+        for part in STATED_PARTS:
             for verdict, chosen in (
                 ("one model", settled),
                 ("several, class, unexplained", ~settled),
@@ -645,15 +659,15 @@ def summarize_closed_loop(job: Any) -> None:
     """Errors of the closed loop: by case, and together with intervals."""
     joints = [read_robot(Path(robot)).joints for robot in job.input.robots]
     files = zip(job.params.robots, job.input.moved, joints, strict=True)
-    errors = case_errors(
+    errors = compute_case_errors(
         {
-            robot: read_frame(path, schemas.closed_loop(count))
+            robot: read_frame(path, schemas.build_closed_loop_schema(count))
             for robot, path, count in files
         }
     )
     write_csv(job.output.errors, errors)
-    write_csv(job.output.summary, summary(errors, job.params.seed))
-    write_csv(job.output.goals, goals(errors))
+    write_csv(job.output.summary, summarize_errors(errors, job.params.seed))
+    write_csv(job.output.goals, count_cases_within_goal(errors))
 
 
 def tabulate_coverage(job: Any) -> None:
@@ -663,4 +677,4 @@ def tabulate_coverage(job: Any) -> None:
         [pd.read_csv(path) for path in job.input.stated], ignore_index=True
     )
     write_csv(job.output.cases, rows)
-    write_csv(job.output.coverage, coverage(rows))
+    write_csv(job.output.coverage, compute_coverage(rows))

@@ -20,15 +20,20 @@ from elastocal.errors import InputError
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.json_files import read_json
 from elastocal_proof.plant.arm import Arm, LinkMass
-from elastocal_proof.plant.campaigns import Design, Slip, Table, measured_table
-from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule
+from elastocal_proof.plant.campaigns import (
+    Blunder,
+    Design,
+    Table,
+    simulate_measurements,
+)
+from elastocal_proof.plant.simulated_robot import Schedule, SimulatedRobot
 
-Slipped = Callable[[Table], tuple[Table, list[Slip]]]
+DamageRows = Callable[[Table], tuple[Table, list[Blunder]]]
 
 ROBOT_FILE = "robot.yaml"
 
 
-def campaign_document(name: str, arm: Arm, design: Design) -> dict[str, Any]:
+def build_campaign_document(name: str, arm: Arm, design: Design) -> dict[str, Any]:
     """Contents of campaign.yaml; nothing in it depends on the defects."""
     document = {
         "campaign": name,
@@ -55,11 +60,11 @@ def write_blind_campaign(
     folder: str | Path,
     name: str,
     robot_file: str | Path,
-    robot: PhysicalRobot,
+    robot: SimulatedRobot,
     design: Design,
     schedule: Schedule,
     declared: Sequence[LinkMass] = (),
-    slipped: Slipped | None = None,
+    slipped: DamageRows | None = None,
 ) -> dict[str, Any]:
     """Measure, and write what the analyst gets; returns how the data were made, for the
     ground truth of the case.
@@ -68,16 +73,16 @@ def write_blind_campaign(
     truth away. `robot_file`: of which the robot is a specimen. `declared`: weights as
     they are declared to the analyst. `slipped`: what goes wrong in the file.
     """
-    table = measured_table(robot, design, schedule)
+    table = simulate_measurements(robot, design, schedule)
     table, slips = slipped(table) if slipped else (table, [])
     write_campaign(
         folder,
-        campaign_document(name, robot.arm, design),
+        build_campaign_document(name, robot.arm, design),
         table,
         robot.arm.joints,
         "parquet",
     )
-    write_robot(folder, robot_file, robot, declared, design.undeclared)
+    write_robot_file(folder, robot_file, robot, declared, design.undeclared)
     return {
         "campaign": name,
         "robot": Path(robot_file).stem,
@@ -99,10 +104,10 @@ def write_blind_campaign(
     } | ({"bad_rows": slips} if slipped else {})
 
 
-def write_robot(
+def write_robot_file(
     folder: str | Path,
     robot_file: str | Path,
-    robot: PhysicalRobot,
+    robot: SimulatedRobot,
     declared: Sequence[LinkMass],
     undeclared: Sequence[str] = (),
 ) -> None:

@@ -37,13 +37,18 @@ from elastocal.fitting.model import Case
 from elastocal.fitting.noise import fit_declared_model, parse_noise
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.typed_json import to_document
-from elastocal.loop.whole import cases_in
+from elastocal.loop.whole import read_cases
 from elastocal.validation.transfer import find_extrapolated_poses
-from elastocal_proof.blind.cases import NAMED, absent_on, defects_of, yardstick_of
-from elastocal_proof.blind.cases import Case as BlindCase
+from elastocal_proof.blind.cases import (
+    CATALOGUE_EFFECTS,
+    build_yardstick,
+    find_absent_effects,
+    size_defects,
+)
+from elastocal_proof.blind.cases import BlindCase as BlindCase
 from elastocal_proof.blind.folders import load_ground_truth
-from elastocal_proof.plant.kinds import KINDS, OUTSIDE, Defect, with_defects
-from elastocal_proof.plant.physical_robot import stream
+from elastocal_proof.plant.kinds import KINDS, OUTSIDE, Defect, apply_defects
+from elastocal_proof.plant.simulated_robot import open_simulation_stream
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -52,8 +57,8 @@ if TYPE_CHECKING:
     from elastocal.effects.protocol import Candidate
     from elastocal.fitting.least_squares import Fit
     from elastocal_proof.blind.cases import Plan
-    from elastocal_proof.plant.physical_robot import PhysicalRobot
-    from elastocal_proof.plant.sizing import Yardstick
+    from elastocal_proof.plant.simulated_robot import SimulatedRobot
+    from elastocal_proof.plant.sizing import NoncentralityModel
 
     _Chosen = tuple[float, Candidate, tuple[float, ...]]
 
@@ -68,7 +73,7 @@ _NULL_DRAWS = 2000
 _ABSORBED = 1e-4
 
 
-def oracle(
+def fit_oracle(
     truth: Mapping[str, Any],
     verdict: Mapping[str, Any],
     folder: str | Path,
@@ -99,7 +104,7 @@ def oracle(
         # Without an effect the declared model is the right one, and has been judged
         # already.
         return _outcome((), 1.0, verdict["heldout"]["before"])
-    case, unseen = cases_in(folder, robots_folder)
+    case, unseen = read_cases(folder, robots_folder)
     declared = fit_declared_model(
         case.model, case.observations, parse_noise(verdict).without_pose_error
     )
@@ -112,7 +117,7 @@ def oracle(
     return _outcome(members, p_value, to_document(heldout.before))
 
 
-def members_of(
+def list_variants(
     effect: str, joints: Sequence[int], candidates: Iterable[Candidate]
 ) -> list[list[Candidate]]:
     """Candidates that an effect at some joints, from 1, consists of, for each of its
@@ -138,7 +143,7 @@ def _with_effects(
     for effect, joints in effects:
         listed = [
             member
-            for members in members_of(effect, joints, case.candidates.values())
+            for members in list_variants(effect, joints, case.candidates.values())
             for member in members
         ]
         problem = build_candidate_design(
@@ -155,7 +160,7 @@ def _with_effects(
                 best[unit.candidate.key] = factors[number], unit.candidate, unit.shapes
         alternatives = [
             [best[m.key] for m in members if m.key in best]
-            for members in members_of(effect, joints, listed)
+            for members in list_variants(effect, joints, listed)
         ]
         alternatives = [members for members in alternatives if members]
         if alternatives:
@@ -216,7 +221,7 @@ def _outcome(
     }
 
 
-def limit_of_sample(
+def assess_sampled_case(
     plan: Plan, truth: Mapping[str, Any], robots_folder: str | Path
 ) -> dict[str, Any] | None:
     """As `limit`, of a case that is in the sample; None of others."""
@@ -225,17 +230,22 @@ def limit_of_sample(
     case = BlindCase(
         **stated | {name: tuple(stated[name]) for name in ("effects", "levels")}
     )
-    drawn = stream(case.seed, "sample of the limit").random() < 1 / asked["one_in"]
+    drawn = (
+        open_simulation_stream(case.seed, "sample of the limit").random()
+        < 1 / asked["one_in"]
+    )
     absorbed = any(defect["of"] == "raw" for defect in truth["defects"])
     compared = [case.group, *case.levels[:1]] in asked["of"]
     return (
-        limit(plan, case, robots_folder)
+        assess_best_analyst(plan, case, robots_folder)
         if drawn and compared and not absorbed
         else None
     )
 
 
-def limit(plan: Plan, case: BlindCase, robots_folder: str | Path) -> dict[str, Any]:
+def assess_best_analyst(
+    plan: Plan, case: BlindCase, robots_folder: str | Path
+) -> dict[str, Any]:
     """What the best analyst says of one case with one effect of the catalogue, or with
     two.
 
@@ -244,18 +254,22 @@ def limit(plan: Plan, case: BlindCase, robots_folder: str | Path) -> dict[str, A
     and so are the locations of each.
     """
     robot = case.specimen(robots_folder)
-    yardstick = yardstick_of(case, robot)
-    bad = with_defects(
-        robot, [defect for defect, _ in defects_of(case, robot, yardstick)]
+    yardstick = build_yardstick(case, robot)
+    bad = apply_defects(
+        robot, [defect for defect, _ in size_defects(case, robot, yardstick)]
     )
-    kinds = [kind for kind in NAMED if kind not in absent_on(plan, case.robot)]
-    located, units = signals_of(yardstick, robot, kinds, case.seed)
+    kinds = [
+        kind
+        for kind in CATALOGUE_EFFECTS
+        if kind not in find_absent_effects(plan, case.robot)
+    ]
+    located, units = draw_unit_signals(yardstick, robot, kinds, case.seed)
     sets, columns = _hypotheses(located, len(case.effects))
-    residual = yardstick.residual(bad)
+    residual = yardstick.compute_measured_residual(bad)
     flat = units.reshape(len(residual), -1)
     gram = flat.T @ flat
     along = flat.T @ residual
-    draws = stream(case.seed, "null distribution of the limit")
+    draws = open_simulation_stream(case.seed, "null distribution of the limit")
     # Of noise alone, the products with all signals.
     values, vectors = np.linalg.eigh(gram)
     noise = (vectors * np.sqrt(np.clip(values, 0.0, None))) @ draws.standard_normal(
@@ -266,7 +280,7 @@ def limit(plan: Plan, case: BlindCase, robots_folder: str | Path) -> dict[str, A
     )
     shares = -np.log(count[number] * len(names))
     factors = (
-        log_bayes_factors(
+        compute_log_bayes_factors(
             gram, np.column_stack([along, noise]), columns, case.levels[0]
         )
         + shares[:, None]
@@ -283,8 +297,11 @@ def limit(plan: Plan, case: BlindCase, robots_folder: str | Path) -> dict[str, A
     }
 
 
-def signals_of(
-    yardstick: Yardstick, robot: PhysicalRobot, kinds: Iterable[str], seed: int
+def draw_unit_signals(
+    yardstick: NoncentralityModel,
+    robot: SimulatedRobot,
+    kinds: Iterable[str],
+    seed: int,
 ) -> tuple[tuple[str, ...], np.ndarray]:
     """What drawn defects of each kind show at each of its locations.
 
@@ -294,17 +311,17 @@ def signals_of(
     named = []
     units = []
     for kind in kinds:
-        size = KINDS[kind].plausible_on(robot.arm)
+        size = KINDS[kind].scale_plausible_size(robot.arm)
         for location in KINDS[kind].locations(robot.arm):
-            drawn = stream(seed, f"limit {kind} {location}").integers(
+            drawn = open_simulation_stream(seed, f"limit {kind} {location}").integers(
                 2**31, size=_DRAWS
             )
             shown = [
-                with_defects(robot, [Defect(kind, location, size, int(number))])
+                apply_defects(robot, [Defect(kind, location, size, int(number))])
                 for number in drawn
             ]
             seen, left = zip(
-                *(yardstick.seen_and_left(one) for one in shown), strict=True
+                *(yardstick.project_change(one) for one in shown), strict=True
             )
             remaining = np.linalg.norm(left, axis=1)
             visible = remaining**2 > _ABSORBED * np.linalg.norm(seen, axis=1) ** 2
@@ -317,7 +334,7 @@ def signals_of(
     return tuple(named), np.stack(units, axis=1)
 
 
-def log_bayes_factors(
+def compute_log_bayes_factors(
     gram: np.ndarray, along: np.ndarray, columns: np.ndarray, level: float
 ) -> np.ndarray:
     """Log Bayes factors (H, N) against nothing of normal vectors with the second
@@ -359,11 +376,11 @@ def oracle_cases(job: Any) -> None:
     for name, truth in load_ground_truth(
         [job.input.sealed], job.input.manifest
     ).items():
-        informed = oracle(
+        informed = fit_oracle(
             truth, verdicts[name], f"{job.input.blind}/{name}", robots, job.params.seed
         )
         found[name] = {
             "oracle": informed,
-            "limit": limit_of_sample(job.params.plan, truth, robots),
+            "limit": assess_sampled_case(job.params.plan, truth, robots),
         }
     write_json(job.output.oracle, found, allow_nan=False)

@@ -3,7 +3,7 @@
 from elastocal.io.storage import Column, TableSchema
 
 
-def closed_loop(joints: int) -> TableSchema:
+def build_closed_loop_schema(joints: int) -> TableSchema:
     """Every wanted pose, what it was commanded as, and how far the robot missed it."""
     return TableSchema(
         "closed_loop",

@@ -17,7 +17,7 @@ from statsmodels.stats.proportion import proportion_confint
 
 from elastocal.diagnosis.verdict import ADEQUATE, CLASS, NAMED, NOT_TESTABLE, SEVERAL
 from elastocal.effects.protocol import effect_of
-from elastocal_proof.blind.cases import Plan, absent_on
+from elastocal_proof.blind.cases import Plan, find_absent_effects
 from elastocal_proof.plant.kinds import OUTSIDE
 
 Document = Mapping[str, Any]
@@ -46,7 +46,7 @@ _STD_ERRORS = 2.0
 _CREDIBLE = 0.95
 
 
-def rate(hits: Iterable[bool]) -> dict[str, float]:
+def compute_rate(hits: Iterable[bool]) -> dict[str, float]:
     """A share with its Clopper-Pearson interval [1] of 95 %; without cases not a
     number, and the interval all there is.
 
@@ -63,7 +63,7 @@ def rate(hits: Iterable[bool]) -> dict[str, float]:
     return {"hits": count, "cases": cases, "rate": share, "low": low, "high": high}
 
 
-def score(
+def build_case_row(
     plan: Plan,
     truth: Document,
     verdict: Document,
@@ -74,7 +74,7 @@ def score(
     errors that were left, what was stated.
 
     `truth`: a sealed document. `verdict`: as verdict.json. `oracle`, `limit`: of
-    `oracle.oracle` and `limit.limit`, where the case has one. ``exact``: the names
+    `oracle.fit_oracle` and `limit.limit`, where the case has one. ``exact``: the names
     found are the true ones; ``named_right``: so, and the verdict states no other name
     beside it; ``holds_truth``: as many effects were found as were made, and each true
     one is the name of another of them or among its alternatives, which is an assignment
@@ -125,7 +125,7 @@ def score(
                 "-".join(map(str, defect["joints"])) for defect in defects
             ),
             "exact_alias": any(
-                alias and alias not in absent_on(plan, case["robot"])
+                alias and alias not in find_absent_effects(plan, case["robot"])
                 for alias in aliases
             ),
         }
@@ -139,7 +139,7 @@ def score(
             f"limit_{name}": np.nan if limit is None else float(limit[name])
             for name in ("detected", "right")
         }
-        | stated(truth, verdict)
+        | score_probabilities(truth, verdict)
     )
 
 
@@ -196,7 +196,7 @@ def _errors(verdict: Document) -> dict[str, Any]:
     }
 
 
-def stated(truth: Document, verdict: Document) -> dict[str, Any]:
+def score_probabilities(truth: Document, verdict: Document) -> dict[str, Any]:
     """What was stated of a case in probabilities, and whether it is so; not a number
     where nothing was, as with faulty data.
 
@@ -238,7 +238,7 @@ def is_true(mechanisms: Collection[str], truth: Document) -> bool:
     return set(mechanisms) - _wrong_setup(truth) == set(effects) - absorbed
 
 
-def intervals_of(
+def list_intervals(
     plan: Plan, truth: Document, verdict: Document
 ) -> list[dict[str, Any]]:
     """Every interval of 95 % of a verdict that has a true value to hold, in the usual

@@ -15,7 +15,7 @@ from elastocal.io.json_files import read_json
 from elastocal.random_streams import open_stream
 from elastocal_proof.blind.cases import PROOF, TUNED, Plan
 from elastocal_proof.blind.folders import load_ground_truth
-from elastocal_proof.blind.scores import intervals_of, rate, score
+from elastocal_proof.blind.scores import build_case_row, compute_rate, list_intervals
 
 Tables = Mapping[str, pd.DataFrame]
 Figure = Mapping[str, Any]
@@ -23,7 +23,7 @@ Figure = Mapping[str, Any]
 _RESAMPLES = 2000
 _SEVERAL_AT_ONCE = 200
 # Held-out errors this near to the oracle's count as its own.
-WITHIN = 1.05
+NEAR_ORACLE = 1.05
 _BINS = 10
 BY_THE_BEST = ", by the best analyst"
 OVER_THE_BEST = ", over the best analyst's, on the same cases"
@@ -31,21 +31,21 @@ _RELIABILITY = ["group", "from", "to", "stated", "hits", "cases", "rate", "low",
 _COUNTED = ["detected", "holds_truth", "named_right", "wrong_name", "oracle_detected"]
 
 
-def with_target(summary: pd.DataFrame) -> pd.DataFrame:
+def select_targets(summary: pd.DataFrame) -> pd.DataFrame:
     """The figures that have a target, of a summary as it is made or as it is read."""
     return summary[summary.target.fillna("").ne("")]
 
 
-def rows_of(table: pd.DataFrame) -> Iterator[Any]:
+def iterate_rows(table: pd.DataFrame) -> Iterator[Any]:
     """Rows of a table; their attributes are its columns."""
     return table.itertuples()
 
 
-def summarize(
+def summarize_figures(
     plan: Plan, cases: pd.DataFrame, intervals: pd.DataFrame, seed: int
 ) -> pd.DataFrame:
-    """Every figure of the plan beside its target, of rows of `scores.score` and
-    `scores.intervals_of`.
+    """Every figure of the plan beside its target, of rows of `scores.build_case_row` and
+    `scores.list_intervals`.
 
     Rates have Clopper-Pearson intervals, ratios percentile bootstrap intervals [1] over
     cases. ``target_low`` and ``target_high`` are the range that the target leaves;
@@ -54,7 +54,9 @@ def summarize(
     [1] Efron, B. and Tibshirani, R. J., An Introduction to the Bootstrap, section 13.3,
     Chapman and Hall, 1993.
     """
-    cases = cases.assign(as_oracle=cases.after_rms_m / cases.oracle_rms_m <= WITHIN)
+    cases = cases.assign(
+        as_oracle=cases.after_rms_m / cases.oracle_rms_m <= NEAR_ORACLE
+    )
     tables = {
         "cases": cases,
         "statements": cases[cases.stated.notna()],
@@ -71,13 +73,13 @@ def summarize(
     )
 
 
-def of_each_robot(
+def summarize_by_robot(
     plan: Plan, cases: pd.DataFrame, seed: int
 ) -> dict[str, pd.DataFrame]:
     """As `summarize`, of each robot by itself, by its name; without intervals of
     parameters."""
     return {
-        str(name): summarize(plan, part, pd.DataFrame(), seed)
+        str(name): summarize_figures(plan, part, pd.DataFrame(), seed)
         for name, part in cases.groupby("robot")
     }
 
@@ -97,7 +99,7 @@ def _counted(
                 yield from _measured(
                     figure,
                     part,
-                    figure["words"].format(setting=setting_words(plan, name)),
+                    figure["words"].format(setting=describe_setting(plan, name)),
                     True,
                     seed,
                 )
@@ -112,7 +114,7 @@ def _counted(
         yield from _measured(figure, chosen, figure["words"], True, seed)
 
 
-def setting_words(plan: Plan, setting: str) -> str:
+def describe_setting(plan: Plan, setting: str) -> str:
     """A setting of the cases as people read it."""
     return str(
         plan["settings"].get(setting, {}).get("words", setting.replace("_", " "))
@@ -126,11 +128,13 @@ def _measured(
     measure = figure.get("measure")
     if measure is None:
         among = part.query(figure["among"]) if "among" in figure else part
-        yield _row(words, rate(among[str(figure["hits"])]), target)
+        yield _row(words, compute_rate(among[str(figure["hits"])]), target)
     elif measure == "over_limit":
         sampled = part[part.limit_right.notna()]
         yield _row(
-            f"{words}{BY_THE_BEST}", rate(sampled[str(figure["best"])] == 1.0), None
+            f"{words}{BY_THE_BEST}",
+            compute_rate(sampled[str(figure["best"])] == 1.0),
+            None,
         )
         hits = (
             sampled[figure["hits"]].to_numpy(float),
@@ -143,7 +147,7 @@ def _measured(
         )
         yield _row(f"{words}{OVER_THE_BEST}", found, target)
     elif measure == "calibration_error":
-        yield _row(words, calibration(part, seed), target)
+        yield _row(words, estimate_calibration(part, seed), target)
     elif measure in ("median_ratio", "mean_ratio"):
         ratio = (part.after_rms_m / part.oracle_rms_m).to_numpy()
         name, statistic = (
@@ -217,7 +221,9 @@ def _bootstrapped(
     }
 
 
-def calibration_error(probability: np.ndarray, correct: np.ndarray) -> np.ndarray:
+def compute_calibration_error(
+    probability: np.ndarray, correct: np.ndarray
+) -> np.ndarray:
     """Expected calibration error [1] [2] (...,) of (..., n): sum over bins of n_b / n
     |mean stated - share correct|.
 
@@ -244,7 +250,7 @@ def calibration_error(probability: np.ndarray, correct: np.ndarray) -> np.ndarra
     )
 
 
-def calibration(rows: pd.DataFrame, seed: int) -> dict[str, Any]:
+def estimate_calibration(rows: pd.DataFrame, seed: int) -> dict[str, Any]:
     """The expected calibration error of stated cases, with a basic bootstrap interval
     [1] of 95 % over cases.
 
@@ -253,14 +259,14 @@ def calibration(rows: pd.DataFrame, seed: int) -> dict[str, Any]:
     """
     probability = rows.stated.to_numpy(float)
     correct = rows.correct.to_numpy(bool)
-    error = float(calibration_error(probability, correct))
+    error = float(compute_calibration_error(probability, correct))
     low = np.nan
     high = np.nan
     if len(rows) > 1:
         picked = open_stream(seed, "blind", "calibration error", 0).integers(
             len(rows), size=(_RESAMPLES, len(rows))
         )
-        again = calibration_error(probability[picked], correct[picked])
+        again = compute_calibration_error(probability[picked], correct[picked])
         # The basic interval: a resample of a calibrated sample is less calibrated, by
         # what the sample is already.
         low, high = np.maximum(2.0 * error - np.quantile(again, [0.975, 0.025]), 0.0)
@@ -273,7 +279,7 @@ def calibration(rows: pd.DataFrame, seed: int) -> dict[str, Any]:
     }
 
 
-def reliability(cases: pd.DataFrame) -> pd.DataFrame:
+def tabulate_reliability(cases: pd.DataFrame) -> pd.DataFrame:
     """Data of the reliability diagram [1], for each group of cases, or ``all``, and bin
     that has a case.
 
@@ -292,7 +298,7 @@ def reliability(cases: pd.DataFrame) -> pd.DataFrame:
                 "to": (number + 1) / _BINS,
                 "stated": inside.stated.mean(),
             }
-            found.append({"group": group} | ends | rate(inside.correct))
+            found.append({"group": group} | ends | compute_rate(inside.correct))
     return pd.DataFrame(found, columns=_RELIABILITY)
 
 
@@ -300,7 +306,7 @@ def _bin_of(probability: np.ndarray) -> np.ndarray:
     return np.clip((np.asarray(probability) * _BINS).astype(int), 0, _BINS - 1)
 
 
-def rates(cases: pd.DataFrame) -> pd.DataFrame:
+def tabulate_rates(cases: pd.DataFrame) -> pd.DataFrame:
     """Shares of what came of the cases, by group, truth, setting and level.
 
     Also for ``all`` truths of a group together but those of which the model absorbs
@@ -332,7 +338,7 @@ def score_cases(job: Any) -> None:
     }
     cases = pd.DataFrame(
         [
-            score(plan, truth, verdicts[name], **oracles[name])
+            build_case_row(plan, truth, verdicts[name], **oracles[name])
             for name, truth in truths.items()
         ]
     )
@@ -340,11 +346,13 @@ def score_cases(job: Any) -> None:
         [
             row
             for name, truth in truths.items()
-            for row in intervals_of(plan, truth, verdicts[name])
+            for row in list_intervals(plan, truth, verdicts[name])
         ]
     )
     write_csv(job.output.cases, cases)
     write_csv(job.output.intervals, intervals)
-    write_csv(job.output.rates, rates(cases))
-    write_csv(job.output.reliability, reliability(cases))
-    write_csv(job.output.summary, summarize(plan, cases, intervals, job.params.seed))
+    write_csv(job.output.rates, tabulate_rates(cases))
+    write_csv(job.output.reliability, tabulate_reliability(cases))
+    write_csv(
+        job.output.summary, summarize_figures(plan, cases, intervals, job.params.seed)
+    )

@@ -11,22 +11,22 @@ import pandas as pd
 from elastocal.counting import format_count, format_integer
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.documents import read_document
-from elastocal.report.words import plain
+from elastocal.report.words import format_number
 from elastocal_proof.blind.cases import PROOF, Plan
 from elastocal_proof.blind.summary import (
     BY_THE_BEST,
     OVER_THE_BEST,
-    of_each_robot,
-    rows_of,
-    with_target,
+    iterate_rows,
+    select_targets,
+    summarize_by_robot,
 )
-from elastocal_proof.league.table import markdown
+from elastocal_proof.league.table import format_table
 
 _ABSENT = "–"
 _OUTCOMES = {"True": "reached", "False": "missed"}
 
 
-def targets_page(
+def format_targets_page(
     plan: Plan,
     summary: pd.DataFrame,
     of_each: Mapping[str, pd.DataFrame],
@@ -34,21 +34,21 @@ def targets_page(
     seed: int,
 ) -> str:
     """Every quantity of a summary beside its target; `of_each`: of
-    `summary.of_each_robot`, by what the robots are called."""
+    `summary.summarize_by_robot`, by what the robots are called."""
     return f"""# Targets of the blind proof
 
 Written by `snakemake -j2 blind_pictures --config blind={size} seed={seed}`; [what it means](blind_proof.md). "At 50" is at a
 non-centrality of 50. Brackets hold 95 % intervals: of shares Clopper–Pearson, of the others a bootstrap over cases.
 
-{reached_words(summary)}
+{describe_reached_targets(summary)}
 
-{markdown(target_rows(plan, summary, of_each))}
+{format_table(tabulate_targets(plan, summary, of_each))}
 """
 
 
-def reached_words(summary: pd.DataFrame) -> str:
+def describe_reached_targets(summary: pd.DataFrame) -> str:
     """How many targets are reached."""
-    judged = with_target(summary).dropna(subset="holds")
+    judged = select_targets(summary).dropna(subset="holds")
     held = int((judged.holds.astype(str) == "True").sum())
     proven = summary.robots.iloc[0] == PROOF
     where = (
@@ -59,14 +59,14 @@ def reached_words(summary: pd.DataFrame) -> str:
     return f"{held} of {format_count(len(judged), 'figure')} with a target reach it on {where}."
 
 
-def target_rows(
+def tabulate_targets(
     plan: Plan, summary: pd.DataFrame, of_each: Mapping[str, pd.DataFrame]
 ) -> list[dict[str, str]]:
     """Each quantity with a target as a row of words, beside what every robot has alone
     and what the best analyst finds."""
-    of_all = {row.quantity: row for row in rows_of(summary)}
+    of_all = {row.quantity: row for row in iterate_rows(summary)}
     alone = {
-        name: {row.quantity: row for row in rows_of(one)}
+        name: {row.quantity: row for row in iterate_rows(one)}
         for name, one in of_each.items()
     }
     beside = {
@@ -75,7 +75,7 @@ def target_rows(
         if "beside" in figure
     }
     rows = []
-    for row in rows_of(with_target(summary)):
+    for row in iterate_rows(select_targets(summary)):
         compared = row.quantity.removesuffix(OVER_THE_BEST)
         found = of_all.get(beside.get(compared), row)
         limit = of_all.get(f"{compared}{BY_THE_BEST}")
@@ -100,14 +100,16 @@ def _with_interval(row: Any) -> str:
     if pd.isna(row.low):
         return f"{_value(row)} ({_ABSENT})"
     if _is_ratio(row):
-        return f"{_value(row)} ({plain(row.low, 4)}–{plain(row.high, 4)})"
+        return (
+            f"{_value(row)} ({format_number(row.low, 4)}–{format_number(row.high, 4)})"
+        )
     return f"{_value(row)} ({100 * row.low:.1f}–{100 * row.high:.1f} %)"
 
 
 def _value(row: Any) -> str:
     if pd.isna(row.rate):
         return _ABSENT
-    return plain(row.rate, 4) if _is_ratio(row) else f"{100 * row.rate:.1f} %"
+    return format_number(row.rate, 4) if _is_ratio(row) else f"{100 * row.rate:.1f} %"
 
 
 def _is_ratio(row: Any) -> bool:
@@ -131,9 +133,9 @@ def write_blind_page(job: Any) -> None:
     names = {Path(file).stem: read_document(file)["name"] for file in job.input.robots}
     alone = {
         names[robot]: table
-        for robot, table in of_each_robot(asked.plan, cases, asked.seed).items()
+        for robot, table in summarize_by_robot(asked.plan, cases, asked.seed).items()
     }
     write_text(
         job.output.page,
-        targets_page(asked.plan, summary, alone, asked.size, asked.seed),
+        format_targets_page(asked.plan, summary, alone, asked.size, asked.seed),
     )
