@@ -246,7 +246,9 @@ def solve_equilibrium(chain, compliance, states):
     end_effector = replace(chain.end_effector, offset_m=(0, 0, 0))
 
     def compute_imbalance(deflection, joint_angles, wrench):
-        torque = joint_torques(chain, joint_angles + deflection, wrench, end_effector)
+        torque = compute_joint_torques(
+            chain, joint_angles + deflection, wrench, end_effector
+        )
         return deflection - compliance * torque
 
     deflections = []
@@ -276,11 +278,11 @@ def test_nominal_compliances_deflect_the_robot_as_equation_9_with_exact_kinemati
     deflection = solve_equilibrium(fanuc.chain, fanuc.compliance, states)
     for index, point in enumerate(fanuc.chain.points):
         target = replace(point, offset_m=(0.05, 0.1, -0.1))
-        expected = poses(fanuc.chain, states.joint_angles + deflection, target)
+        expected = compute_poses(fanuc.chain, states.joint_angles + deflection, target)
         of_target = observations.target == index
         np.testing.assert_allclose(position[of_target], expected[0], rtol=0, atol=1e-9)
         np.testing.assert_allclose(rotation[of_target], expected[1], rtol=0, atol=1e-9)
-    displacement = exact_deflections(
+    displacement = compute_exact_deflections(
         fanuc.chain, states.joint_angles, deflection, fanuc.chain.end_effector
     )
     assert np.abs(displacement).max() > 1e-4
