@@ -23,7 +23,7 @@ from elastocal.campaigns.simulation import draw_measurements
 from elastocal.campaigns.writing import write_campaign
 from elastocal.fitting.model import Case
 from elastocal.fitting.noise import Noise, fit_declared_model
-from elastocal.loop.whole import cases_in
+from elastocal.loop.whole import read_cases
 from elastocal.residual_model.repeatable import detect_repeatable_residual
 from elastocal.residual_model.selection import build_inputs, validate_residual_model
 from elastocal.validation.held_out import compute_position_residuals
@@ -55,7 +55,7 @@ def measured_cases(
     }
     with TemporaryDirectory() as folder:
         write_campaign(Path(folder) / name, document, table, 6, "csv")
-        return cases_in(Path(folder) / name, ROBOTS)
+        return read_cases(Path(folder) / name, ROBOTS)
 
 
 def exact_cases(poses: int) -> tuple[Case, Case]:
@@ -145,13 +145,19 @@ if __name__ == "__main__":
             f"p <= {level}: {np.mean(np.array(p_values) <= level):.3f}"
             for level in LEVELS
         )
-        row = f"{asked.poses} poses, {1e3 * size:g} mrad, {asked.campaigns} campaigns; something remains, {rates}"
+        row = (
+            f"{asked.poses} poses, {1e3 * size:g} mrad, {asked.campaigns} campaigns;"
+            f" something remains, {rates}"
+        )
         if errors:
             physics, with_it, floor = (
                 rms(column) for column in zip(*errors, strict=True)
             )
-            row += f"; used {used}, worse by more than a standard error {worse}; held-out RMS of physics {physics:.0f} µm, "
-            row += f"with the regression {with_it:.0f}, of chance alone {floor:.0f}"
+            row += (
+                f"; used {used}, worse by more than a standard error {worse};"
+                f" held-out RMS of physics {physics:.0f} µm,"
+                f" with the regression {with_it:.0f}, of chance alone {floor:.0f}"
+            )
         print(
             f"{row}; {(time.process_time() - start) / asked.campaigns:.2f} s CPU each",
             flush=True,

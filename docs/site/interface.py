@@ -8,8 +8,9 @@ from importlib import import_module
 HEAD = """Programming interface
 =====================
 
-What people import from ``elastocal``, made of the docstrings. None of it needs Snakemake or a configuration file. All else
-is internal and may change; its docstrings are in the source.
+The public functions and classes of ``elastocal``, from their docstrings. None of them
+needs Snakemake or a configuration file. Everything else is internal and may change; its
+docstrings are in the source.
 
 """
 # Modules, each with the names that are shown.

@@ -19,7 +19,7 @@ from elastocal.data_checks.hypotheses import (
     list_fitted_hypotheses,
     list_row_shifts,
 )
-from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.kinematics import compute_poses
 
 
 def softer_by_chance(robot, tracker):
@@ -207,7 +207,9 @@ def known_targets(fanuc, factor=1.0, which=slice(None)):
     position = np.empty_like(plain.measurements.position)
     for number, point in enumerate(chain.points):
         mask = plain.measurements.target == number
-        position[mask] = poses(chain, plain.measurements.joint_angles[mask], point)[0]
+        position[mask] = compute_poses(
+            chain, plain.measurements.joint_angles[mask], point
+        )[0]
     written = offsets.copy()
     written[which] *= factor
     targets = tuple(

@@ -33,7 +33,7 @@ from elastocal.effects.catalogue import (
 from elastocal.effects.conditions import replace_total_load
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import evaluate_conditions
-from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.kinematics import compute_poses
 
 CHAINS = ["fanuc", "fixed rotations", *ODD_CHAINS]
 # Symbols of which the units of parameters are composed.
@@ -300,7 +300,9 @@ def test_adding_an_effect_is_adding_one_module(fanuc, add_module):
     states.wrench[:] = 0
     estimate = make_estimate(model).with_effects((candidate,))
     estimate.coefficients[0][:] = 0.02
-    expected = poses(fanuc.chain, states.joint_angles, fanuc.chain.end_effector)[0] - [
+    expected = compute_poses(
+        fanuc.chain, states.joint_angles, fanuc.chain.end_effector
+    )[0] - [
         0,
         0,
         0.02,

@@ -8,7 +8,7 @@ import pytest
 from synthetic import make_states
 
 from elastocal.effects.conditions import compute_progress, find_offered_needs
-from elastocal.mechanics.sites import sites_of
+from elastocal.mechanics.sites import build_sites
 
 
 def test_progress_counts_rows_of_the_campaign_or_else_poses():
@@ -26,8 +26,12 @@ def test_progress_counts_rows_of_the_campaign_or_else_poses():
     ("column", "name"), [("time_s", "time"), ("temperature_c", "temperature")]
 )
 def test_time_and_temperature_are_there_where_they_change(kuka, column, name):
-    sites = sites_of(kuka)
+    sites = build_sites(kuka)
     states = make_states(6, 5, seed=1)
-    assert name in find_offered_needs(sites, replace(states, **{column: np.arange(5.0)}))
-    assert name not in find_offered_needs(sites, replace(states, **{column: np.full(5, 20.0)}))
+    assert name in find_offered_needs(
+        sites, replace(states, **{column: np.arange(5.0)})
+    )
+    assert name not in find_offered_needs(
+        sites, replace(states, **{column: np.full(5, 20.0)})
+    )
     assert name not in find_offered_needs(sites, replace(states, **{column: None}))

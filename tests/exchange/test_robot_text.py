@@ -17,7 +17,7 @@ from elastocal.exchange.robot_text import (
     write_robot,
 )
 from elastocal.mechanics.chain import parse_chain
-from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.kinematics import compute_poses
 
 DOCUMENT = {
     "masses": [
@@ -92,6 +92,6 @@ def test_a_displacement_is_what_its_words_make(roll, pitch, yaw, shift):
     chain = parse_chain(
         " ".join(["Rz(q1)", *format_displacement(transform), "[E]"]), {}, "x"
     )
-    position, rotation = poses(chain, np.zeros((1, 1)), chain.end_effector)
+    position, rotation = compute_poses(chain, np.zeros((1, 1)), chain.end_effector)
     np.testing.assert_allclose(position[0], shift, rtol=0, atol=1e-11)
     np.testing.assert_allclose(rotation[0], transform[:3, :3], rtol=0, atol=1e-11)

@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 from synthetic import fill_measurements
 
 from elastocal.campaigns.campaign import Campaign, Target
-from elastocal.mechanics.elastostatics import generalized_forces
-from elastocal.mechanics.kinematics import poses, poses_and_jacobians
+from elastocal.mechanics.elastostatics import compute_generalized_forces
+from elastocal.mechanics.kinematics import compute_poses, compute_poses_and_jacobians
 
 POINTS = ("2DoF", "3DoF", "4DoF", "6DoF")
 
@@ -63,8 +63,14 @@ def make_campaign(
     wrenches = np.concatenate([force, np.cross([0.0, 0.5, 0.0], force)], axis=-1)
     q = angles[pose]
     wrench = wrenches[pose, load]
-    end = poses_and_jacobians(true_robot.chain, q, true_robot.chain.end_effector)[2]
-    moved = q + true_offset + generalized_forces(end, wrench) * true_robot.compliance
+    end = compute_poses_and_jacobians(
+        true_robot.chain, q, true_robot.chain.end_effector
+    )[2]
+    moved = (
+        q
+        + true_offset
+        + compute_generalized_forces(end, wrench) * true_robot.compliance
+    )
     moved[:, 1] += sag * np.cos(q[:, 1])
     offsets = (
         rng.uniform(-0.15, 0.15, (len(POINTS), 3))
@@ -76,7 +82,9 @@ def make_campaign(
     for index, name in enumerate(POINTS):
         point = replace(true_robot.chain.point(name), offset_m=tuple(offsets[index]))
         mask = target == index
-        position[mask], rotation[mask] = poses(true_robot.chain, moved[mask], point)
+        position[mask], rotation[mask] = compute_poses(
+            true_robot.chain, moved[mask], point
+        )
     if plan.tracker:
         frame = Rotation.random(random_state=seed).as_matrix()
         position = position @ frame.T + rng.uniform(-3, 3, 3)

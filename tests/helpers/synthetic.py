@@ -23,9 +23,9 @@ from elastocal.fitting.model import (
 )
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import Observations, States
-from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.kinematics import compute_poses
 from elastocal.mechanics.robot import Compensator, Robot
-from elastocal.mechanics.sites import sites_of
+from elastocal.mechanics.sites import build_sites
 
 NOISE = Noise("declared", 60e-6, 60e-6, np.zeros(6))
 
@@ -59,7 +59,7 @@ def equipped(holder):
         if isinstance(holder, Robot)
         else robot_on(holder, np.zeros(holder.coordinates))
     )
-    sites = sites_of(robot)
+    sites = build_sites(robot)
     if sites.compensator is None and sites.shoulder is not None:
         sites = replace(sites, compensator=Compensator(sites.shoulder + 1, "spring"))
     return (
@@ -218,7 +218,7 @@ def make_measurements(
     for index, one in enumerate(model.targets):
         point = replace(model.sites.chain.point(one.point), offset_m=one.offset_m)
         mask = target == index
-        position[mask], rotation[mask] = poses(
+        position[mask], rotation[mask] = compute_poses(
             model.sites.chain, coordinates[mask], point
         )
     turned = Rotation.from_rotvec(

@@ -11,7 +11,12 @@ from types import SimpleNamespace
 import pytest
 from support import refused
 
-from elastocal.io.plugins import EFFECTS, load_plugins, plugin_names, plugin_versions
+from elastocal.io.plugins import (
+    EFFECTS,
+    list_plugin_names,
+    list_plugin_versions,
+    load_plugins,
+)
 
 PYPROJECT = """
 [build-system]
@@ -206,7 +211,7 @@ def test_an_error_in_a_plug_in_is_one_line_that_names_the_package(
     offer, name, module, reason
 ):
     offer(f"{name} = broken_module:tides", module)
-    assert plugin_names(EFFECTS) == [name]
-    assert plugin_versions() == {"broken-package": "0.3"}
+    assert list_plugin_names(EFFECTS) == [name]
+    assert list_plugin_versions() == {"broken-package": "0.3"}
     with refused("package broken-package", f"{EFFECTS} {name}", reason):
         load_plugins(EFFECTS, SimpleNamespace, ("payload",))

@@ -21,7 +21,7 @@ from elastocal.effects.conditions import build_conditions
 from elastocal.effects.protocol import Effect
 from elastocal.exchange.controllers import CONTROLLERS, axes_of, targets_of
 from elastocal.io.documents import check_document, read_document
-from elastocal.mechanics.sites import sites_of
+from elastocal.mechanics.sites import build_sites
 from elastocal.study.strategies import check_strategy, strategy_from_document
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -87,7 +87,7 @@ def test_the_strategy_is_one_that_the_papers_robots_can_carry_out_and_none_of_th
 def test_the_effect_displaces_each_joint_as_its_formula_says(import_example, kuka):
     effect = import_example(examples("An effect")[0]).hoses
     assert isinstance(effect, Effect) and "k q^3" in effect.doc
-    sites = sites_of(kuka)
+    sites = build_sites(kuka)
     states = make_states(6, 5)
     candidates = effect.candidates(sites)
     keys = [candidate.key for candidate in candidates]

@@ -31,8 +31,8 @@ from elastocal_proof.blind.summary import (
     tabulate_rates,
     tabulate_reliability,
 )
-from elastocal_proof.league.methods import dealt
-from elastocal_proof.league.table import league_table, mechanism_table
+from elastocal_proof.league.methods import deal_folds
+from elastocal_proof.league.table import compare_methods, summarize_mechanisms
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden"
 NAMES = sorted(
@@ -167,9 +167,9 @@ def _league():
     measured = SimpleNamespace(
         session=np.zeros(len(pose), np.int32), pose=pose, joint_angles=angles
     )
-    folds = dealt(measured, 4, open_stream(SEED, "one", "league folds", 0))["random"][
-        pose
-    ]
+    folds = deal_folds(measured, 4, open_stream(SEED, "one", "league folds", 0))[
+        "random"
+    ][pose]
     results = {}
     for method, size, std in (
         ("geometry", 2e-4, None),
@@ -188,8 +188,11 @@ def _league():
         }
     )
     robots = {"A robot": ["one"]}
-    league = league_table(results, robots, "geometry", SEED)
-    return {"league": league, "mechanisms": mechanism_table({"one": found}, robots, 4)}
+    league = compare_methods(results, robots, "geometry", SEED)
+    return {
+        "league": league,
+        "mechanisms": summarize_mechanisms({"one": found}, robots, 4),
+    }
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.model import evaluate_conditions, locate_targets, predict
 from elastocal.fitting.noise import Noise
-from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.kinematics import compute_poses
 from elastocal.residual_model.regressions import REGRESSIONS, Predictor, Regression
 from elastocal.residual_model.selection import (
     build_inputs,
@@ -159,7 +159,7 @@ def test_the_jacobian_is_that_of_each_target_and_its_place_is_shown_but_neither_
         ]
         coordinates[..., 2] += np.array([[-1e-6], [1e-6]])
         before, after = (
-            poses(model.sites.chain, each, point)[0] for each in coordinates
+            compute_poses(model.sites.chain, each, point)[0] for each in coordinates
         )
         np.testing.assert_allclose(
             inputs.jacobian[mask, :, 2], (after - before) / 2e-6, atol=1e-8

@@ -7,20 +7,20 @@ from job import Job, origin_of, run
 from elastocal import __version__
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.data_frames import write_csv
-from elastocal_proof.audit.audited import Audited
-from elastocal_proof.audit.whole import as_table, audit, page_of
+from elastocal_proof.audit.audit_run import audit_run, render_page, tabulate_findings
+from elastocal_proof.audit.finished_run import FinishedRun
 
 
 def audit_files(job: Job) -> None:
     settings = job.params
-    finished = Audited(
+    finished = FinishedRun(
         Path(),
         settings.configuration,
         settings.robots,
         settings.strategies,
         settings.rows,
     )
-    table = as_table(audit(finished))
+    table = tabulate_findings(audit_run(finished))
     finished_targets = [target for target, digest in settings.others.items() if digest]
     absent_targets = [
         target for target in settings.others if target not in finished_targets
@@ -33,7 +33,7 @@ def audit_files(job: Job) -> None:
         "Version of elastocal": __version__,
         "Origin": origin_of(job).words,
     }
-    write_text(job.output.page, page_of(table, facts))
+    write_text(job.output.page, render_page(table, facts))
     write_csv(job.output.table, table)
 
 

@@ -6,13 +6,13 @@ from job import Job, run
 
 from elastocal.campaigns.simulation import Plan, draw_measurements
 from elastocal.campaigns.writing import write_campaign
-from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.mechanics.robot_file import parse_robot
 
 
 def simulate_campaign(job: Job) -> None:
     settings = job.params.source
     name = job.wildcards.campaign
-    robot = robot_from_document(settings["robot_document"], settings["robot"])
+    robot = parse_robot(settings["robot_document"], settings["robot"])
     plan_settings = {
         key: tuple(value) if isinstance(value, list) else value
         for key, value in settings.items()

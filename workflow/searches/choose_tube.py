@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from elastocal.io.documents import read_document
 from elastocal.mechanics.robot import Robot
-from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.mechanics.robot_file import parse_robot
 from elastocal.study.simulation import (
     Experiments,
     Loading,
@@ -62,7 +62,7 @@ def diameter_for_mean_deflection(
 
 if __name__ == "__main__":
     config = read_document("config.yaml")
-    robot = robot_from_document(read_document("config/robots/kuka_extended.yaml"))
+    robot = parse_robot(read_document("config/robots/kuka_extended.yaml"))
     measurements = {
         key: config["interpretations"][key] for key in ("offset_frame", "joint_range")
     }

@@ -35,7 +35,7 @@ from elastocal.fitting.model import (
     list_parameters,
 )
 from elastocal.fitting.observations import Observations, States, select_states
-from elastocal.mechanics.kinematics import pose_differences, poses
+from elastocal.mechanics.kinematics import compute_pose_differences, compute_poses
 from elastocal.residual_model.selection import (
     build_inputs,
     find_beyond_regression,
@@ -214,7 +214,7 @@ def compute_effect_contributions(
     contributions = {}
     for name, robot in reduced.items():
         reduced_pose = predict_poses(robot, reported_angles, wrench)
-        differences = pose_differences(*pose, *reduced_pose)[..., None]
+        differences = compute_pose_differences(*pose, *reduced_pose)[..., None]
         errors = subtract_placement(calibrated.scope, *pose, differences)
         contributions[name] = root_mean_square(errors[:, :3, 0])
     return contributions
@@ -328,7 +328,7 @@ def find_equilibrium(
     around = evaluate_conditions(model, estimate, states, nearby_coordinates)
     coordinates = compute_displaced_coordinates(model, estimate, around)
     chain = model.sites.chain
-    return coordinates, *poses(chain, coordinates, chain.end_effector)
+    return coordinates, *compute_poses(chain, coordinates, chain.end_effector)
 
 
 def compute_nominal_poses(
@@ -339,7 +339,7 @@ def compute_nominal_poses(
     Returns position (N, 3), m, and rotation (N, 3, 3) of the end effector's measuring
     point, base axes, at angles (N, n) as the controller reports them.
     """
-    return poses(
+    return compute_poses(
         robot.chain, robot.model_angles(reported_angles), robot.chain.end_effector
     )
 

@@ -27,8 +27,11 @@ from elastocal.data_checks.placement import (
 from elastocal.data_checks.protocol import Fault, Value
 from elastocal.fitting.model import get_joint_compliances
 from elastocal.fitting.observations import index_poses
-from elastocal.mechanics.elastostatics import generalized_forces, regressor
-from elastocal.mechanics.kinematics import jacobians, position_jacobians
+from elastocal.mechanics.elastostatics import (
+    build_regressor,
+    compute_generalized_forces,
+)
+from elastocal.mechanics.kinematics import compute_jacobians, compute_position_jacobians
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign
@@ -208,20 +211,22 @@ def compute_deflections(campaign: Campaign) -> tuple[np.ndarray, np.ndarray] | N
     points = [
         replace(chain.point(target.point), offset_m=tuple(at)) for target, at in targets
     ]
-    jacobian = position_jacobians(
+    jacobian = compute_position_jacobians(
         chain, measurements.joint_angles, points, measurements.target
     )
-    end = jacobians(
+    end = compute_jacobians(
         chain,
         measurements.joint_angles,
         replace(chain.end_effector, offset_m=(0.0, 0.0, 0.0)),
     )
     torques = [
-        generalized_forces(end, measurements.wrench * (np.arange(6) // 3 == part))
+        compute_generalized_forces(
+            end, measurements.wrench * (np.arange(6) // 3 == part)
+        )
         for part in (0, 1)
     ]
     expected = [
-        regressor(jacobian, each) @ campaign.robot.compliance for each in torques
+        build_regressor(jacobian, each) @ campaign.robot.compliance for each in torques
     ]
     group = group_equal_rows(
         np.column_stack([index_poses(measurements), measurements.target])

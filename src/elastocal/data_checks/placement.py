@@ -14,7 +14,7 @@ from elastocal.campaigns.campaign import group_equal_rows
 from elastocal.fitting.least_squares import compute_nominal_poses, register_to_poses
 from elastocal.fitting.model import build_declared_model, transform_to_base
 from elastocal.fitting.observations import select_states, separate_measurements
-from elastocal.mechanics.kinematics import rotation_vectors
+from elastocal.mechanics.kinematics import compute_rotation_vectors
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
@@ -83,7 +83,7 @@ class Placement:
             self.nominal[1] @ self.estimate.target_rotation[self.observations.target]
         )
         return np.linalg.norm(
-            rotation_vectors(seen @ predicted.transpose(0, 2, 1)), axis=1
+            compute_rotation_vectors(seen @ predicted.transpose(0, 2, 1)), axis=1
         )
 
     @cached_property

@@ -30,7 +30,6 @@ from elastocal.diagnosis.gross_errors import (
     find_gross_errors,
 )
 from elastocal.diagnosis.search import screen_terms, search_models
-from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.training_verdict import TrainingResult, state_training_verdict
 from elastocal.diagnosis.verdict import Evidence
 from elastocal.effects.catalogue import list_effects
@@ -55,6 +54,7 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.alarm import Alarm
     from elastocal.diagnosis.candidate_design import CandidateDesign
     from elastocal.diagnosis.search import Posterior, ScoredModel
+    from elastocal.diagnosis.settings import Settings
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.noise import Noise
     from elastocal.verdict import RepeatableResidual, TrainingVerdict
@@ -113,7 +113,7 @@ class Diagnosis:
     evidence: Evidence | None
     verdict: TrainingVerdict = field(repr=False)
     left_out: Measurements
-    settings: Settings = field(default_factory=Settings, repr=False)
+    settings: Settings = field(repr=False)
 
     @cached_property
     def document(self) -> dict[str, Any]:
@@ -392,7 +392,7 @@ def _restart_search(
     """Start the next search at the model found so far if the last one was linearised
     about a model that it had found; starting at the declared model would repeat the
     same steps."""
-    design = evidence.linearized
+    design = evidence.design
     declared_effects = subset.declared.model.effects
     relinearized = len(design.reference_fit.model.effects) > len(declared_effects)
     return _RowRound(
@@ -651,7 +651,7 @@ def _refit_declared(
 ) -> Fit:
     """Fit the declared model under the noise that it leaves by itself, because no
     effect is adopted."""
-    design = evidence.linearized
+    design = evidence.design
     noise = refit.estimate_residual_noise(
         design.problem,
         evidence.posterior.empty_model,
@@ -690,7 +690,7 @@ def _contradict(
     warnings = [*contradictions, *outcome.warnings]
     if not repeatable_warnings:
         warnings += verdict.warn_of_pose_error(
-            kept.noise, evidence.linearized.pose_std_error_rad
+            kept.noise, evidence.design.pose_std_error_rad
         )
     return replace(
         outcome,
@@ -759,12 +759,12 @@ def _effect_steps(subset: FittedSubset, final: Fit, evidence: Evidence) -> list[
     All steps but the last are fits to the search sample, because only their errors are
     shown.
     """
-    problem = evidence.linearized.problem
+    problem = evidence.design.problem
     best = evidence.conclusion.best
     model = evidence.posterior.models[best.model]
     effects = [
         (effect, final.effect_values(effect.key)[1])
-        for effect, _ in refit.select_effects(evidence.linearized, model)
+        for effect, _ in refit.select_effects(evidence.design, model)
     ]
     explained = model_averaging.compute_explained_squares(problem, model)
     names = sorted(best.named, key=lambda name: -explained[name])

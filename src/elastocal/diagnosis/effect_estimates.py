@@ -56,7 +56,7 @@ def state_effects(
         Observations of that fit.
     """
     conclusion = evidence.conclusion
-    problem = evidence.linearized.problem
+    problem = evidence.design.problem
     names = conclusion.best.named
     if not names:
         return ()
@@ -94,7 +94,7 @@ def state_effects(
 def _state_locations(evidence: Evidence, mechanism: str) -> tuple[StatedLocation, ...]:
     """State the locations of a mechanism whose probability is worth reporting."""
     probabilities = compute_location_probabilities(
-        evidence.linearized.problem, evidence.posterior, mechanism
+        evidence.design.problem, evidence.posterior, mechanism
     )
     return tuple(
         StatedLocation(format_location(mechanism, location), probability)

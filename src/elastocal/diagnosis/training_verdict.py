@@ -178,7 +178,7 @@ def _state_evidence(
     result: TrainingResult, evidence: Evidence, settings: Settings
 ) -> _Statement:
     """State the result of the search."""
-    design = evidence.linearized
+    design = evidence.design
     posterior = evidence.posterior
     best = evidence.conclusion.best
     declared = result.steps[1].fitted
@@ -290,7 +290,7 @@ def _list_location_words(
     evidence: Evidence, hypothesis: Hypothesis, mechanism: str
 ) -> tuple[str, ...]:
     model = evidence.posterior.models[hypothesis.model]
-    locations = list_locations(evidence.linearized.problem, model, mechanism)
+    locations = list_locations(evidence.design.problem, model, mechanism)
     return tuple(format_location(mechanism, location) for location in locations)
 
 

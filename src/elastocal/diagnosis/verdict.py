@@ -111,7 +111,7 @@ class Evidence:
 
     Attributes
     ----------
-    linearized : CandidateDesign
+    design : CandidateDesign
         The linearised problem.
     posterior : Posterior
         Models with their probabilities.
@@ -130,7 +130,7 @@ class Evidence:
         result of that test.
     """
 
-    linearized: CandidateDesign
+    design: CandidateDesign
     posterior: Posterior
     alarm: Alarm
     conclusion: Conclusion
@@ -204,7 +204,8 @@ def _choose_verdict(
             probability += nothing.probability
     elif state_alone and verdict == CLASS and OTHER not in best.mechanisms:
         verdict = NAMED
-        probability = best.probability
+        # Rounding may carry the sum of the models beyond one.
+        probability = min(best.probability, 1.0)
         alternatives = dict.fromkeys(best.named, ())
     else:
         probability = min(_sum_probabilities(stated), 1.0)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.mechanics.kinematics import Motion, cross, motion
+from elastocal.mechanics.kinematics import Motion, compute_motion, multiply_vectors
 from elastocal.mechanics.sites import Sites
 
 if TYPE_CHECKING:
@@ -142,7 +142,7 @@ class Conditions:
                 mass.centre_m, rotation, (0, 1)
             )
             moments = np.empty((3, MASS_PARAMETERS, rotation.shape[2]))
-            cross(
+            multiply_vectors(
                 np.concatenate([centre[:, None], rotation], axis=1),
                 gravity[:, None, None],
                 moments,
@@ -157,7 +157,7 @@ class Conditions:
         wrench = np.empty((6, first.shape[1]))
         gravity = np.array(self.sites.gravity_m_s2)[:, None]
         wrench[:3] = mass * gravity
-        cross(first, gravity, wrench[3:])
+        multiply_vectors(first, gravity, wrench[3:])
         return wrench
 
     @cached_property
@@ -258,7 +258,7 @@ def build_conditions(
         np.asarray(compliance),
         states.joint_angles,
         states.wrench,
-        motion(sites.chain, coordinates, sites.followed),
+        compute_motion(sites.chain, coordinates, sites.followed),
         np.zeros(MASS_PARAMETERS * len(sites.masses))
         if mass_corrections is None
         else mass_corrections,

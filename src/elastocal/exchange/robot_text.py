@@ -22,7 +22,7 @@ from elastocal.errors import InputError, describe_os_error
 from elastocal.io.atomic_writes import check_places, write_text
 from elastocal.io.documents import check_document, format_one_line
 from elastocal.mechanics.robot import Robot
-from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.mechanics.robot_file import parse_robot
 
 # Column of a robot file at which comments, the chain and limits are wrapped. Other entries
 # are not: a name may contain several blanks in a row, which wrapping would join.
@@ -96,7 +96,7 @@ def check_imported(
     """
     source = Path(path).as_posix()
     check_document(document, "robot", source)
-    robot = robot_from_document(document, source)
+    robot = parse_robot(document, source)
     digest = hashlib.sha256(Path(path).read_bytes()).hexdigest()
     missing = []
     if not robot.compliance_known:

@@ -34,7 +34,7 @@ from elastocal.fitting.normal_equations import (
     solve_normal_equations,
 )
 from elastocal.fitting.observations import sample_observations, split_into_blocks
-from elastocal.mechanics.kinematics import poses_of_points
+from elastocal.mechanics.kinematics import compute_point_poses
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -747,7 +747,7 @@ def compute_nominal_poses(
     """
     chain = model.sites.chain
     points = [chain.point(target.point) for target in model.targets]
-    position, rotation = poses_of_points(
+    position, rotation = compute_point_poses(
         chain, chain.at(observations.states.joint_angles), points
     )
     indices = (observations.target, observations.state)

@@ -37,7 +37,7 @@ from elastocal.fitting.model import (
     update_springs_and_masses,
 )
 from elastocal.fitting.observations import batch_groups_by_size
-from elastocal.mechanics.kinematics import motion
+from elastocal.mechanics.kinematics import compute_motion
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -322,7 +322,7 @@ def linearize_coordinates(
     coordinates = compute_displaced_coordinates(model, estimate, conditions)
     sites = model.sites
     points = locate_targets(model, estimate)
-    moved = motion(sites.chain, coordinates, (*sites.followed, *points))
+    moved = compute_motion(sites.chain, coordinates, (*sites.followed, *points))
     # Each fitted component of a target is an additional coordinate.
     target_coordinates = sum(
         components.stop - components.start

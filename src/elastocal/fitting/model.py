@@ -24,9 +24,13 @@ from elastocal.fitting.observations import (
     average_repeats,
     remove_outlying_repeats,
 )
-from elastocal.mechanics.kinematics import motion, pose_differences, poses_of_points
-from elastocal.mechanics.robot_file import robot_from_document
-from elastocal.mechanics.sites import Sites, sites_of
+from elastocal.mechanics.kinematics import (
+    compute_motion,
+    compute_point_poses,
+    compute_pose_differences,
+)
+from elastocal.mechanics.robot_file import parse_robot
+from elastocal.mechanics.sites import Sites, build_sites
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -166,7 +170,7 @@ def build_declared_model(
     campaign: Campaign, effects: Iterable[Candidate] = ()
 ) -> Model:
     """Build the model that a campaign declares, with its declared effects."""
-    sites = sites_of(campaign.robot)
+    sites = build_sites(campaign.robot)
     measurements = campaign.measurements
     # Without known weights, a compliant base under an arm that slides on its first
     # joint is indistinguishable from the sag of that arm.
@@ -342,7 +346,7 @@ def evaluate_conditions(
         displaced = compute_displaced_coordinates(model, estimate, conditions)
         conditions = replace(
             conditions,
-            motion=motion(model.sites.chain, displaced, model.sites.followed),
+            motion=compute_motion(model.sites.chain, displaced, model.sites.followed),
         )
     return conditions
 
@@ -460,7 +464,7 @@ def predict(
     (M, 3, 3).
     """
     coordinates = compute_displaced_coordinates(model, estimate, conditions)
-    position, rotation = poses_of_points(
+    position, rotation = compute_point_poses(
         model.sites.chain, coordinates, locate_targets(model, estimate)
     )
     indices = (observations.target, observations.state)
@@ -500,7 +504,7 @@ def subtract_prediction(
     measured, measured_rotation = transform_to_base(estimate, observations)
     if measured_rotation is None:
         return measured - position
-    return pose_differences(measured, measured_rotation, position, rotation)
+    return compute_pose_differences(measured, measured_rotation, position, rotation)
 
 
 def transform_to_base(
@@ -557,11 +561,11 @@ def build_case(
     table.
     """
     source = descriptions["source"]
-    robot = robot_from_document(descriptions["robot"], source)
+    robot = parse_robot(descriptions["robot"], source)
     campaign = assemble_campaign(
         descriptions["campaign"], robot, build_measurements(columns), source
     )
-    sites = sites_of(campaign.robot)
+    sites = build_sites(campaign.robot)
     model = build_declared_model(
         campaign, declared_candidates(campaign.declared, sites, source)
     )

@@ -18,7 +18,7 @@ def read_frame(
     return pd.DataFrame(read_table(path, schema, columns))
 
 
-def read_long(
+def read_robot_tables(
     paths: Iterable[str | Path], schema: Callable[[int], TableSchema]
 ) -> pd.DataFrame:
     """Tables of many robots in one frame, headed by the robot, and by noise_um and

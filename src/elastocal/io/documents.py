@@ -402,7 +402,7 @@ def _describe_range(
     return f"{lower}{unit}" if lower == upper else f"{lower} to {upper}{unit}"
 
 
-def document_path(folder: str | Path, kind: str, name: str) -> str:
+def locate_document(folder: str | Path, kind: str, name: str) -> str:
     """Return the path of a document that a configuration names:
     ``folder/kind/name.yaml``."""
     return (Path(folder) / kind / f"{name}.yaml").as_posix()
@@ -427,7 +427,7 @@ def read_named_document(
         listed = suggest_names(name, known)
         allowed = f"a file of {Path(folder, kind).as_posix()}: {listed}"
         raise InputError(source, kind, repr(name), allowed)
-    path = document_path(folder, kind, name)
+    path = locate_document(folder, kind, name)
     document: dict[str, Any] = read_document(path)
     check_document(document, schema, path)
     return document

@@ -59,12 +59,12 @@ def load_plugins(
     return plugins
 
 
-def plugin_names(group: str) -> list[str]:
+def list_plugin_names(group: str) -> list[str]:
     """Names that installed packages offer in one group, without loading any."""
     return sorted(entry.name for entry in entry_points(group=group))
 
 
-def plugin_versions() -> dict[str, str]:
+def list_plugin_versions() -> dict[str, str]:
     """Versions of the installed packages that offer plug-ins, by package name."""
     distributions = [
         entry.dist for group in GROUPS for entry in entry_points(group=group)

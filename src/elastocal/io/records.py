@@ -14,7 +14,7 @@ from pathlib import Path
 
 from elastocal.errors import InputError
 from elastocal.io.json_files import read_json, write_json
-from elastocal.io.origin import Origin, configuration_sha256
+from elastocal.io.origin import Origin, digest_configuration
 from elastocal.io.texts import check_file
 
 RECORDS = Path("results/records")
@@ -39,7 +39,7 @@ class JobRecord:
     own : inputs of the user, which no job made and which may have moved since.
     outputs : paths of what the job made.
     origin : commit, configuration and seed.
-    environment : as of `origin.environment`.
+    environment : as of `origin.list_versions`.
     """
 
     rule: str
@@ -84,7 +84,7 @@ def write_records(job: JobRecord) -> None:
         path = locate_record(output)
         path.parent.mkdir(parents=True, exist_ok=True)
         record = asdict(job) | {_FILES: _file_digests(output)}
-        write_json(path, record | {_DIGEST: configuration_sha256(record)})
+        write_json(path, record | {_DIGEST: digest_configuration(record)})
 
 
 def read_record(path: str, within: str | Path = "") -> tuple[JobRecord, dict[str, str]]:
@@ -108,7 +108,7 @@ def read_record(path: str, within: str | Path = "") -> tuple[JobRecord, dict[str
         raise InputError(Path(within, path), "", finding, _AS_WRITTEN.format("it"))
     try:
         record = read_json(record_path)
-        if record.pop(_DIGEST) != configuration_sha256(record):
+        if record.pop(_DIGEST) != digest_configuration(record):
             raise ValueError("other contents than were written")
         files: dict[str, str] = record.pop(_FILES)
         record["own"] = tuple(record["own"])

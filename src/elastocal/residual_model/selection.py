@@ -26,7 +26,7 @@ from elastocal.fitting.least_squares import fit_placement
 from elastocal.fitting.linearization import compute_effect_sensitivities
 from elastocal.fitting.model import evaluate_conditions, locate_targets
 from elastocal.fitting.observations import index_poses, sample_observations
-from elastocal.mechanics.kinematics import position_jacobians
+from elastocal.mechanics.kinematics import compute_position_jacobians
 from elastocal.residual_model.regressions import Inputs, Predictor, list_regressions
 from elastocal.validation.held_out import (
     PositionErrors,
@@ -273,7 +273,7 @@ def build_geometric_inputs(
     jacobian = np.empty((len(observations), 3, 0))
     if by_jacobian:
         coordinates = chain.at(states.joint_angles)[seen]
-        jacobian = position_jacobians(
+        jacobian = compute_position_jacobians(
             chain, coordinates, locate_targets(model, estimate), observations.target
         )
     return Inputs(states.joint_angles[seen], others, jacobian)
