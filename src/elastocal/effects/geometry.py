@@ -61,7 +61,7 @@ def joint_offset(entry: Effect, sites: Sites, joint: int) -> Candidates:
     """
     quantity, unit = ("shift", "m") if sites.prismatic[joint] else ("turn", "rad")
     offset = entry.parameters(quantity, ["offset"], unit, sites)
-    yield entry.of_joint(joint, offset, lambda around: [around.always], fixed=True)
+    yield entry.of_joint(joint, offset, lambda around: [around.ones], fixed=True)
 
 
 @_effect(
@@ -85,7 +85,7 @@ def link_geometry(entry: Effect, sites: Sites, joint: int) -> Candidates:
     six = moved_and_turned(entry.size("length", sites), entry.size("turn", sites))
     end = sites.link_end[joint + 1]
     yield entry.candidate(
-        (joint + 1,), six, lambda around: [{c: around.always} for c in end], fixed=True
+        (joint + 1,), six, lambda around: [{c: around.ones} for c in end], fixed=True
     )
 
 
@@ -110,7 +110,7 @@ def base_placement(entry: Effect, sites: Sites) -> Candidates:
     yield entry.candidate(
         (),
         six,
-        lambda around: [{c: around.always} for c in sites.base],
+        lambda around: [{c: around.ones} for c in sites.base],
         {"declared base"},
     )
 
@@ -186,7 +186,7 @@ def tracker_scale(entry: Effect, sites: Sites) -> Candidates:
             for joint, slides in enumerate(sites.prismatic)
             if slides
         }
-        return [times(around.always, every) | travels]
+        return [times(around.ones, every) | travels]
 
     every = longer(sites, np.ones(sites.joints + 1))
     yield entry.candidate((), entry.parameters("scale", ["scale"], "m/m", sites), law)
