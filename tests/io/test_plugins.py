@@ -97,7 +97,7 @@ from elastocal.campaigns.importers import find_importer
 from elastocal.campaigns.reading import read_campaign, read_robot
 from elastocal.effects.catalogue import candidates_on, list_bundled_effects, list_effects
 from elastocal.exchange.controllers import axes_of, find_controller, targets_of
-from elastocal.io.origin import environment
+from elastocal.io.origin import list_versions
 from elastocal.loop.loading import load_campaign
 from elastocal.mechanics.sites import sites_of
 from elastocal.residual_model.regressions import Inputs, list_regressions
@@ -131,7 +131,7 @@ print(json.dumps({
     "remainder": descriptions["campaign"]["remainder"],
     "program": controller.program("GO", targets),
     "prediction": predictor.mean(inputs).tolist(),
-    "version": environment(folder)["workshop-plugins"],
+    "version": list_versions(folder)["workshop-plugins"],
 }))
 """
 
