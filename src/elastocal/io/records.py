@@ -132,7 +132,7 @@ def list_recorded_files(within: str | Path = "") -> dict[str, str]:
         record.relative_to(top).as_posix().removesuffix(".json")
         for record in top.rglob("*.json")
     )
-    digests = {}
+    digests: dict[str, str] = {}
     for output in outputs:
         digests |= read_record(output, within)[1]
     return digests
