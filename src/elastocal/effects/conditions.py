@@ -219,7 +219,9 @@ class Conditions:
         ).T
 
 
-def compute_progress(states: States, row_span: tuple[int, int] | None = None) -> np.ndarray:
+def compute_progress(
+    states: States, row_span: tuple[int, int] | None = None
+) -> np.ndarray:
     """How far a campaign had come in each state, ndarray (S,): 0 at its first row, 1 at
     its last.
 

@@ -195,7 +195,11 @@ class Fit:
         """
         if self.conditions is None:
             return evaluate_conditions(self.model, self.estimate, states)
-        return self.conditions if chosen is None else select_conditions(self.conditions, chosen)
+        return (
+            self.conditions
+            if chosen is None
+            else select_conditions(self.conditions, chosen)
+        )
 
 
 def fit_model(
