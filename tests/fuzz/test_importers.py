@@ -216,7 +216,8 @@ def test_denavit_hartenberg_tables_and_kinematics_of_ros_drivers(
         path,
         content,
         lambda: imported(
-            folder, lambda: robot_from_dh(path, modified, DhOptions(angles, "m"))
+            folder,
+            lambda: robot_from_dh(path, DhOptions(angles, "m"), modified=modified),
         ),
     )
 

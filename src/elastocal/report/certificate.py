@@ -32,10 +32,10 @@ _NOTHING_M = 1e-7
 _LISTS = ("misplaced", "identity", "data")
 
 
-def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
+def collect_certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
     """Facts for the pages of a certificate.
 
-    `document`: of `calibrated_files.certificate`. Returns JSON-serialisable; strings
+    `document`: of `calibrated_files.build_certificate`. Returns JSON-serialisable; strings
     ready to print, lists for tables.
     """
     repeatable = document.get("repeatable")
@@ -56,11 +56,13 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
         below = 0.0 < line["rms_m"] < _NOTHING_M
         hidden = line["name"] == "repeatability" and not line["rms_m"]
         size = (
-            f"below {say.length(_NOTHING_M, 1)}" if below else say.length(line["rms_m"])
+            f"below {say.format_length(_NOTHING_M, 1)}"
+            if below
+            else say.format_length(line["rms_m"])
         )
         budget.append(
             [
-                share_name(line["name"]),
+                name_budget_entry(line["name"]),
                 "hidden by the tracker's noise" if hidden else size,
             ]
         )
@@ -73,12 +75,12 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
         "robot": document["robot"],
         "decision": document["conformity"]["decision"],
         "errors": document["errors"],
-        "floor": say.length(document["noise_floor_rms_m"]),
+        "floor": say.format_length(document["noise_floor_rms_m"]),
         "budget": budget,
         "budget_states": format_count(document["budget_states"], "state"),
     }
 
 
-def share_name(name: str) -> str:
+def name_budget_entry(name: str) -> str:
     """A line of the error budget in words."""
-    return _SHARES.get(name) or say.physical_name(name)
+    return _SHARES.get(name) or say.name_effect(name)

@@ -23,7 +23,7 @@ _UNITS = {"deg": "°", "mm": "mm"}
 _LOAD_NAMES = {0.0: "0", 1.0: "+F", -1.0: "−F"}
 
 
-def plan_facts(
+def collect_plan_facts(
     survey: Survey, plan: Plan, rows: pd.DataFrame, worth: Sequence[str]
 ) -> dict[str, Any]:
     """Return what the sheet of a plan shows.

@@ -66,13 +66,13 @@ _PARTS = ("column", "base")
 _MAX_DETAILED = 2
 
 
-def physical_name(effect: str) -> str:
+def name_effect(effect: str) -> str:
     """Return the physical name of an effect; an effect that the catalogue does not have
     is called by its own name."""
-    return getattr(list_effects().get(effect), "words", words(effect))
+    return getattr(list_effects().get(effect), "words", split_underscores(effect))
 
 
-def parameter_words(effect: str, name: str) -> str:
+def name_parameter(effect: str, name: str) -> str:
     """Return a parameter as an engineer would call it: shift along x for dx, cos(2q) for
     cos_2q.
 
@@ -85,51 +85,53 @@ def parameter_words(effect: str, name: str) -> str:
         Name of the parameter.
     """
     own_words = getattr(list_effects().get(effect), "parameter_words", {})
-    text = own_words.get(name, words(name))
+    text = own_words.get(name, split_underscores(name))
     for pattern, replacement in _PARAMETER_WORDS:
         text = re.sub(pattern, replacement, text)
     return text
 
 
-def effect_words(effect: str, locations: Iterable[str] = ()) -> str:
+def format_located_effect(effect: str, locations: Iterable[str] = ()) -> str:
     """Return an effect with its locations as verdict.json has them: gravity sag of
     joints 2 and 3."""
-    return physical_name(effect) + _format_locations(
+    return name_effect(effect) + _format_locations(
         effect, map(_LOCATION.match, locations)
     )
 
 
-def found_words(effect: str, keys: Iterable[str]) -> str:
+def format_found_effect(effect: str, keys: Iterable[str]) -> str:
     """Return an effect with the locations of its candidates, which keys give."""
-    return physical_name(effect) + _format_locations(effect, map(_ANY_KEY.match, keys))
+    return name_effect(effect) + _format_locations(effect, map(_ANY_KEY.match, keys))
 
 
-def candidate_words(key: str) -> str:
+def format_candidate(key: str) -> str:
     """Return the key of a candidate in words: zero offset of joint 3, gear transmission
     error of joint 1 (orders 1-2)."""
     match = _ANY_KEY.match(key)
-    return found_words(match["effect"], [key]) if match else words(key)
+    return (
+        format_found_effect(match["effect"], [key]) if match else split_underscores(key)
+    )
 
 
-def location_words(effect: str, location: str) -> str:
+def format_location(effect: str, location: str) -> str:
     """Return a location without its effect: links 1, 2 and 3 (one section)."""
     text = _format_locations(effect, [_LOCATION.match(location)])
     return text.removeprefix(" of ").strip() or "the whole robot"
 
 
-def place_words(keys: Sequence[str]) -> str:
+def format_places(keys: Sequence[str]) -> str:
     """Return the locations of candidates of one effect without its name: joints 2 and 3;
     empty if they have none."""
     text = _format_locations(effect_of(keys[0]), map(_ANY_KEY.match, keys))
     return text.removeprefix(" of ").strip()
 
 
-def at_joints(effect: str, joints: Collection[int]) -> str:
+def format_joints(effect: str, joints: Collection[int]) -> str:
     """Return the joints or links of an effect, " of joint 3"; empty without joints."""
     if not joints:
         return ""
     noun = getattr(list_effects().get(effect), "part", "joint")
-    return f" of {pluralize(noun, len(joints))} {listed(map(str, joints))}"
+    return f" of {pluralize(noun, len(joints))} {join_items(map(str, joints))}"
 
 
 def _format_locations(effect: str, matches: Iterable[re.Match[str] | None]) -> str:
@@ -150,13 +152,13 @@ def _format_locations(effect: str, matches: Iterable[re.Match[str] | None]) -> s
         if match["detail"]:
             details.append(match["detail"])
     if _can_list_joints_alone(details_by_joints):
-        return at_joints(effect, sorted(joints[0] for joints in details_by_joints))
+        return format_joints(effect, sorted(joints[0] for joints in details_by_joints))
     in_list = len(details_by_joints) > 1
     locations = [
-        _format_location(effect, joints, ", ".join(details), in_list=in_list)
+        _format_single_location(effect, joints, ", ".join(details), in_list=in_list)
         for joints, details in details_by_joints.items()
     ]
-    return f" {listed(locations)}" if any(locations) else ""
+    return f" {join_items(locations)}" if any(locations) else ""
 
 
 def _can_list_joints_alone(
@@ -170,14 +172,14 @@ def _can_list_joints_alone(
     return count > _MAX_DETAILED or not any(details_by_joints.values())
 
 
-def _format_location(
+def _format_single_location(
     effect: str, joints: tuple[int, ...], detail: str, *, in_list: bool
 ) -> str:
     """Return one location with its detail: of joint 4 (orders 1-2)."""
     detail = getattr(list_effects().get(effect), "detail_words", {}).get(detail, detail)
     if not joints and detail in _PARTS:
         return f"of the {detail}"
-    location = at_joints(effect, joints)
+    location = format_joints(effect, joints)
     # A location without joints needs words only in a list with other locations.
     if not joints and in_list:
         location = " of the whole arm"
@@ -186,7 +188,7 @@ def _format_location(
     return location.strip()
 
 
-def hypotheses_words(sets: Sequence[MechanismSet]) -> list[str]:
+def format_hypotheses(sets: Sequence[MechanismSet]) -> list[str]:
     """Return hypotheses in words, the most probable one first.
 
     A hypothesis that contains all mechanisms of the first one is described by what it
@@ -202,34 +204,36 @@ def hypotheses_words(sets: Sequence[MechanismSet]) -> list[str]:
             hypotheses.append(NOTHING)
         elif not first or not first < names:
             hypotheses.append(
-                mechanisms_words(hypothesis.mechanisms, hypothesis.locations)
+                format_mechanisms(hypothesis.mechanisms, hypothesis.locations)
             )
         elif added == {OTHER}:
             hypotheses.append(f"the same or {RELATED}")
         else:
-            words = mechanisms_words(sorted(added), hypothesis.locations)
+            words = format_mechanisms(sorted(added), hypothesis.locations)
             hypotheses.append(f"the same with {words}")
     return hypotheses
 
 
-def mechanisms_words(
+def format_mechanisms(
     names: Collection[str], locations: Mapping[str, Iterable[str]] = {}
 ) -> str:
     """A set of mechanisms with their locations, where these are stated."""
     named = [
-        effect_words(name, locations.get(name, ())) for name in names if name != OTHER
+        format_located_effect(name, locations.get(name, ()))
+        for name in names
+        if name != OTHER
     ]
     return " with ".join(named) + (
         f" or {RELATED}" if named and OTHER in names else "" if named else UNKNOWN
     )
 
 
-def alternative_words(name: str) -> str:
+def format_alternative(name: str) -> str:
     """What may be meant instead of a mechanism: another, or a related one."""
-    return RELATED if name == OTHER else physical_name(name)
+    return RELATED if name == OTHER else name_effect(name)
 
 
-def in_common(effect: str, alternatives: Iterable[str]) -> str:
+def find_common_kind(effect: str, alternatives: Iterable[str]) -> str:
     """What an effect and all that may be meant instead have in common, as people call
     it: yielding; empty of no one kind.
 
@@ -243,7 +247,7 @@ def in_common(effect: str, alternatives: Iterable[str]) -> str:
     return kinds.pop() if len(kinds) == 1 else ""
 
 
-def in_words(text: str) -> str:
+def spell_out_names(text: str) -> str:
     """A text with every name of the catalogue, every key of a candidate and the
     parameter stated after it in words."""
     names = "|".join(sorted(list_effects(), key=len, reverse=True))
@@ -259,22 +263,22 @@ def in_words(text: str) -> str:
         if "_" not in found["effect"] and stands_alone:
             return found.group()
         stated = (
-            f": {parameter_words(found['effect'], found['parameter'])} is "
+            f": {name_parameter(found['effect'], found['parameter'])} is "
             if found["parameter"]
             else ""
         )
-        return candidate_words(found["key"]) + stated
+        return format_candidate(found["key"]) + stated
 
     key = r"(?<![\w@])(?P<key>" + _KEY.format(names=names) + r")(?!\w)"
     return re.sub(key + r"(?:: (?P<parameter>\w+) is )?", worded, text)
 
 
-def words(name: str) -> str:
+def split_underscores(name: str) -> str:
     """A name of the catalogue or of a parameter as words."""
     return name.replace("_", " ")
 
 
-def listed(items: Iterable[str], most: int | None = None, last: str = "and") -> str:
+def join_items(items: Iterable[str], most: int | None = None, last: str = "and") -> str:
     """Return items as they stand in a sentence.
 
     Parameters
@@ -296,28 +300,28 @@ def listed(items: Iterable[str], most: int | None = None, last: str = "and") -> 
     return f"{', '.join(shown[:-1])} {last} {shown[-1]}"
 
 
-def capital(text: str) -> str:
+def capitalize_first(text: str) -> str:
     """A text with a capital at its beginning."""
     return text[:1].upper() + text[1:]
 
 
-def as_sentence(text: str) -> str:
+def format_sentence(text: str) -> str:
     """A text with a capital and a full stop."""
     text = text.strip()
-    return capital(text) + ("" if text.endswith(".") else ".")
+    return capitalize_first(text) + ("" if text.endswith(".") else ".")
 
 
-def minus(text: str) -> str:
+def set_minus(text: str) -> str:
     """A number with a true minus sign."""
     return text.replace("-", "−")
 
 
-def true_minus(text: str) -> str:
+def set_minus_in_sentence(text: str) -> str:
     """A sentence whose numbers have a true minus sign."""
     return re.sub(r"(?<= )-(?=\d)", "−", text)
 
 
-def span_words(joint_ranges: Sequence[JointRange]) -> str:
+def format_joint_ranges(joint_ranges: Sequence[JointRange]) -> str:
     """Return the range of each joint in words."""
     ranges = []
     for joint, ends in enumerate(joint_ranges, 1):
@@ -325,46 +329,50 @@ def span_words(joint_ranges: Sequence[JointRange]) -> str:
             text = f"joint {joint} {ends.low:.0f} to {ends.high:.0f}°"
         else:
             text = f"joint {joint} {ends.low:.2f} to {ends.high:.2f} m"
-        ranges.append(minus(text))
+        ranges.append(set_minus(text))
     return ", ".join(ranges)
 
 
-def unit_of(metres: float) -> tuple[float, str]:
+def choose_length_unit(metres: float) -> tuple[float, str]:
     """Unit in which a length is shown, with how many of them a metre has: µm below one
     millimetre."""
     return (MICRO, "µm") if abs(metres) < 0.9995e-3 else (MILLI, "mm")
 
 
-def length(metres: float | None, digits: int = 3) -> str:
+def format_length(metres: float | None, digits: int = 3) -> str:
     """A length with its unit, µm below one millimetre; "unknown" where there is
     none."""
     if metres is None:
         return "unknown"
-    factor, unit = unit_of(metres)
-    return f"{plain(factor * metres, digits)}{_TIED}{unit}"
+    factor, unit = choose_length_unit(metres)
+    return f"{format_number(factor * metres, digits)}{_TIED}{unit}"
 
 
-def millimetres(metres: float) -> str:
+def format_millimetres(metres: float) -> str:
     """A length without its unit in mm: three digits, and none finer than a
     micrometre."""
     return (
-        plain(MILLI * metres) if abs(metres) >= 0.9995e-3 else f"{MILLI * metres:.3f}"
+        format_number(MILLI * metres)
+        if abs(metres) >= 0.9995e-3
+        else f"{MILLI * metres:.3f}"
     )
 
 
-def microradians(radians: float) -> str:
+def format_microradians(radians: float) -> str:
     """An angle in µrad, with its unit."""
-    return f"{plain(MICRO * radians)} µrad"
+    return f"{format_number(MICRO * radians)} µrad"
 
 
-def pm(value: float, error: float) -> str:
+def format_estimate(value: float, error: float) -> str:
     """A number ± its standard error, of which two digits are given."""
     decimals = max(0, 1 - int(np.floor(np.log10(error))))
     # What is rounded to zero has no sign.
-    return minus(f"{round(value, decimals) + 0.0:.{decimals}f} ± {error:.{decimals}f}")
+    return set_minus(
+        f"{round(value, decimals) + 0.0:.{decimals}f} ± {error:.{decimals}f}"
+    )
 
 
-def plain(value: float, digits: int = 3) -> str:
+def format_number(value: float, digits: int = 3) -> str:
     """A number with so many significant digits and without an exponent."""
     if value == 0:
         return "0"
@@ -373,19 +381,21 @@ def plain(value: float, digits: int = 3) -> str:
     return f"{value:.{max(0, digits - 1 - power)}f}"
 
 
-def percent(share: float) -> str:
+def format_percent(share: float) -> str:
     """A share in percent."""
     return f"{100 * share:.0f}{_TIED}%"
 
 
-def probability_words(probability: float) -> str:
+def format_probability(probability: float) -> str:
     """A probability in whole percent; none is given as 0 or 100 %."""
     if probability < 0.005:
         return f"<{_TIED}1{_TIED}%"
-    return f">{_TIED}99{_TIED}%" if probability >= 0.995 else percent(probability)
+    return (
+        f">{_TIED}99{_TIED}%" if probability >= 0.995 else format_percent(probability)
+    )
 
 
-def scaled(value: float, error: float | None, unit: str) -> tuple[str, str]:
+def format_with_unit(value: float, error: float | None, unit: str) -> tuple[str, str]:
     """Return a value with its standard error, and the unit that suits it.
 
     Parameters
@@ -409,7 +419,11 @@ def scaled(value: float, error: float | None, unit: str) -> tuple[str, str]:
         power = int(np.floor(np.log10(size)))
     number = number / 10.0**power
     std_error = std_error / 10.0**power
-    text = pm(number, std_error) if std_error else minus(plain(number, 4))
+    text = (
+        format_estimate(number, std_error)
+        if std_error
+        else set_minus(format_number(number, 4))
+    )
     if power:
         mantissa = f"({text})" if std_error else text
         text = f"{mantissa} · 10{str(power).translate(_SUPERSCRIPTS)}"
