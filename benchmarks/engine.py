@@ -27,7 +27,7 @@ from elastocal.fitting.least_squares import fit_model, register_placement
 from elastocal.fitting.model import list_parameters
 from elastocal.fitting.noise import estimate_noise
 from elastocal.io.documents import read_document
-from elastocal.loop.whole import cases_in
+from elastocal.loop.whole import read_cases
 from elastocal_proof.blind.cases import list_cases, write_sealed_case
 from elastocal_proof.blind.folders import build_campaign_document, write_robot_file
 from elastocal_proof.plant.arm import read_arm
@@ -158,7 +158,7 @@ def _fit(work: Path, measurements: int, repetitions: int) -> Row:
 
     The problem has as many rows and columns as the fit.
     """
-    case, _ = cases_in(_large(work, measurements), ROBOTS)
+    case, _ = read_cases(_large(work, measurements), ROBOTS)
     effects = tuple(
         candidate
         for candidate in case.candidates.values()

@@ -36,7 +36,7 @@ from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.settings import Settings
 from elastocal.exchange.target_path import OK
-from elastocal.loop.whole import calibrated_by
+from elastocal.loop.whole import build_calibrated_robot
 from elastocal.mechanics.robot import Robot
 
 GOAL = 1.3
@@ -140,7 +140,7 @@ def close_loop(poses: int, size: float, seed: int) -> dict[str, float]:
     diagnosis = diagnose(case, Settings(), seed)
     judgement = judge(diagnosis, held_out, seed)
     corrected = {
-        name: calibrated_by(
+        name: build_calibrated_robot(
             diagnosis,
             judgement.held_out,
             judgement.delivered,

@@ -23,7 +23,7 @@ from elastocal.campaigns.simulation import draw_measurements
 from elastocal.campaigns.writing import write_campaign
 from elastocal.fitting.model import Case
 from elastocal.fitting.noise import Noise, fit_declared_model
-from elastocal.loop.whole import cases_in
+from elastocal.loop.whole import read_cases
 from elastocal.residual_model.repeatable import detect_repeatable_residual
 from elastocal.residual_model.selection import build_inputs, validate_residual_model
 from elastocal.validation.held_out import compute_position_residuals
@@ -55,7 +55,7 @@ def measured_cases(
     }
     with TemporaryDirectory() as folder:
         write_campaign(Path(folder) / name, document, table, 6, "csv")
-        return cases_in(Path(folder) / name, ROBOTS)
+        return read_cases(Path(folder) / name, ROBOTS)
 
 
 def exact_cases(poses: int) -> tuple[Case, Case]:

@@ -15,7 +15,7 @@ from elastocal.io.storage import write_table
 from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop import schemas
 from elastocal.loop.loading import load_campaign
-from elastocal.loop.whole import judged
+from elastocal.loop.whole import judge_and_predict
 from elastocal_proof.audit.audit_run import find_checks
 from elastocal_proof.audit.finished_run import FinishedRun
 from elastocal_proof.blind.folders import write_blind_campaign
@@ -54,7 +54,7 @@ def diagnosed_campaign(top, robot, effects=(), **design):
     for name, part in zip(("training", "held_out"), parts, strict=True):
         write_table(
             results / f"{name}.parquet",
-            schemas.measurements(arm.joints),
+            schemas.build_measurements_schema(arm.joints),
             [tabulate_measurements(part)],
             {},
         )
@@ -65,14 +65,20 @@ def diagnosed_campaign(top, robot, effects=(), **design):
     found = diagnose(case, Settings(), 1)
     write_json(
         results / "diagnosis.json",
-        tables.diagnosis_facts(found) | {"covariance": found.final.covariance.tolist()},
+        tables.serialize_diagnosis(found)
+        | {"covariance": found.final.covariance.tolist()},
     )
-    write_table(results / "steps.parquet", schemas.STEPS, tables.step_blocks(found), {})
-    # As the next job does: from the files.
-    again = tables.diagnosis_from(case, tables.diagnosis_facts(found))
-    blocks = generate_residual_blocks(again, judged(again, unseen, 1))
     write_table(
-        reports / "residuals.parquet", schemas.residuals(arm.joints), blocks, {}
+        results / "steps.parquet", schemas.STEPS, tables.generate_step_blocks(found), {}
+    )
+    # As the next job does: from the files.
+    again = tables.restore_diagnosis(case, tables.serialize_diagnosis(found))
+    blocks = generate_residual_blocks(again, judge_and_predict(again, unseen, 1))
+    write_table(
+        reports / "residuals.parquet",
+        schemas.build_residuals_schema(arm.joints),
+        blocks,
+        {},
     )
     return top
 

@@ -12,9 +12,9 @@ from elastocal.diagnosis.settings import Settings
 from elastocal.errors import InputError
 from elastocal.io.json_files import write_json
 from elastocal.io.storage import read_table, write_table
-from elastocal.loop.diagnosis_tables import diagnosis_facts, step_fit
-from elastocal.loop.schemas import measurements
-from elastocal.loop.whole import cases_in
+from elastocal.loop.diagnosis_tables import refit_step, serialize_diagnosis
+from elastocal.loop.schemas import build_measurements_schema
+from elastocal.loop.whole import read_cases
 from elastocal_proof.league.methods import (
     FRAMES,
     GEOMETRY,
@@ -55,7 +55,9 @@ def test_every_pose_is_held_out_once_in_folds_of_one_size_and_blocks_are_neighbo
 
 def test_a_data_set_comes_back_from_its_files(data, tmp_path):
     write_json(tmp_path / "campaign.json", data.descriptions)
-    write_table(tmp_path / "seen.parquet", measurements(6), [data.columns], {})
+    write_table(
+        tmp_path / "seen.parquet", build_measurements_schema(6), [data.columns], {}
+    )
     write_table(tmp_path / "folds.parquet", FOLDS, [data.dealt], {})
     found = load_data_set(
         tmp_path / "campaign.json",
@@ -162,13 +164,13 @@ def test_each_observation_has_its_pose_target_and_residual(data, tmp_path):
 def diagnosed(kuka, config_folder, tmp_path_factory):
     folder = tmp_path_factory.mktemp("diagnosed") / "made"
     make_folder(folder, kuka, table=make_table(kuka, "made", offset_of_joint_3=1e-3))
-    case, _ = cases_in(folder, config_folder / "robots")
+    case, _ = read_cases(folder, config_folder / "robots")
     return case, diagnose(case, Settings(), 1)
 
 
 def test_the_fit_of_a_fold_is_that_which_its_diagnosis_left(diagnosed):
     case, found = diagnosed
-    again = step_fit(case, diagnosis_facts(found)["steps"][-1])
+    again = refit_step(case, serialize_diagnosis(found)["steps"][-1])
     assert [effect.key for effect in again.model.effects] == [
         effect.key for effect in found.final.model.effects
     ]

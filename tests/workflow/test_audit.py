@@ -128,7 +128,10 @@ def test_without_pinocchio_an_audit_ends_in_a_line_before_any_job(unstarted):
     )
     command = unstarted.command("-j1", "--quiet", "all", "--", "audit")
     done = subprocess.run(**command, capture_output=True, text=True, timeout=HUNG_S)
-    line = "audit: pinocchio: found no such package; allowed: the extra audit: make audit, or pip install pin"
+    line = (
+        "audit: pinocchio: found no such package;"
+        " allowed: the extra audit: make audit, or pip install pin"
+    )
     assert (done.returncode, done.stderr.strip().splitlines()[-1:]) == (1, [line]), (
         done.stderr
     )

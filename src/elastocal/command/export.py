@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from elastocal.application.calibrated import CalibratedRobot
     from elastocal.application.exported import FoldedRobot
     from elastocal.exchange.urdf_writing import CorrectedUrdf
-    from elastocal.loop.calibrated_files import Diagnosed
+    from elastocal.loop.calibrated_files import DiagnosedCampaign
 
 ROBOT = "robot.yaml"
 URDF = "robot.urdf"
@@ -86,7 +86,7 @@ def export(
 
 
 def _describe_losses(
-    campaign: Diagnosed,
+    campaign: DiagnosedCampaign,
     exported: CalibratedRobot,
     folded: FoldedRobot,
     reported_angles: np.ndarray,

@@ -41,7 +41,7 @@ from elastocal.fitting.observations import select_states
 from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import write_table
-from elastocal.loop.whole import calibrated_by, cases_in
+from elastocal.loop.whole import build_calibrated_robot, read_cases
 from elastocal.mechanics.kinematics import compute_jacobians, compute_pose_differences
 from elastocal.random_streams import open_stream as analysis_stream
 from elastocal.validation.conformity import decide_conformity
@@ -210,7 +210,7 @@ def measure_robot(
             plant.arm.masses,
             slipped,
         )
-        training, held_out = cases_in(folder, robot_file.parent)
+        training, held_out = read_cases(folder, robot_file.parent)
     robot = training.campaign.robot
     return DiagnosedRobot(
         plant,
@@ -308,7 +308,9 @@ def run_closed_loop(
 def _corrected(made: DiagnosedRobot, seed: int) -> CalibratedRobot:
     """The robot as the diagnosis corrects it."""
     part = remove_gross_errors(made.found, made.held_out)[1]
-    return calibrated_by(made.found, part, apply_regression(made.found, part, seed))
+    return build_calibrated_robot(
+        made.found, part, apply_regression(made.found, part, seed)
+    )
 
 
 def _geometry(case: Case, found: Diagnosis) -> Fit:

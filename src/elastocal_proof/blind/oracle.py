@@ -37,7 +37,7 @@ from elastocal.fitting.model import Case
 from elastocal.fitting.noise import fit_declared_model, parse_noise
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.typed_json import to_document
-from elastocal.loop.whole import cases_in
+from elastocal.loop.whole import read_cases
 from elastocal.validation.transfer import find_extrapolated_poses
 from elastocal_proof.blind.cases import (
     CATALOGUE_EFFECTS,
@@ -104,7 +104,7 @@ def fit_oracle(
         # Without an effect the declared model is the right one, and has been judged
         # already.
         return _outcome((), 1.0, verdict["heldout"]["before"])
-    case, unseen = cases_in(folder, robots_folder)
+    case, unseen = read_cases(folder, robots_folder)
     declared = fit_declared_model(
         case.model, case.observations, parse_noise(verdict).without_pose_error
     )

@@ -29,7 +29,7 @@ from elastocal.exchange.target_path import read_target_path
 from elastocal.io.atomic_writes import atomic_write, check_places
 from elastocal.io.texts import read_text
 from elastocal.mechanics.components import WRENCH_NAMES
-from elastocal.report.words import at_joints, listed, physical_name
+from elastocal.report.words import format_joints, join_items, name_effect
 from elastocal_proof.blind.cases import draw_misplaced_base
 from elastocal_proof.plant.arm import read_arm, to_rotation_vector
 from elastocal_proof.plant.campaigns import SECONDS_PER_STATE, get_typical_force_N
@@ -123,8 +123,8 @@ def describe_hidden_effects(defects: Sequence[Defect], effects: Sequence[str]) -
     """What `build_hidden_robot` hid of effects that were asked for, or drew; the small errors
     that every robot has stand before."""
     hidden = defects[-max(len(effects), 1) :]
-    return listed(
-        f"{physical_name(defect.effect)}{at_joints(defect.effect, defect.joints)}"
+    return join_items(
+        f"{name_effect(defect.effect)}{format_joints(defect.effect, defect.joints)}"
         for defect in hidden
     )
 

@@ -19,7 +19,7 @@ from elastocal.figures.style import PALETTE, create_panels, draw_note, save, sty
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.io.origin import Origin
-from elastocal.report.words import physical_name
+from elastocal.report.words import name_effect
 from elastocal_proof.league.methods import RANDOM, Method
 from elastocal_proof.league.schemas import ENTRIES, MECHANISMS
 from elastocal_proof.league.table import (
@@ -158,7 +158,7 @@ def draw_mechanisms(table: pd.DataFrame) -> Figure:
     )
     axis.set_yticks(
         range(len(order)),
-        [_UNKNOWN if name == OTHER else physical_name(name) for name in order],
+        [_UNKNOWN if name == OTHER else name_effect(name) for name in order],
     )
     axis.set_xlim(-0.5, len(names) - 0.2)
     axis.set_ylim(len(order) - 0.5, -0.5)

@@ -31,9 +31,9 @@ from elastocal.fitting.noise import estimate_noise, fit_declared_model
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import read_table, write_table
-from elastocal.loop.diagnosis_tables import diagnosis_facts, step_fit
-from elastocal.loop.loading import described_campaign
-from elastocal.loop.schemas import measurements
+from elastocal.loop.diagnosis_tables import refit_step, serialize_diagnosis
+from elastocal.loop.loading import read_described_campaign
+from elastocal.loop.schemas import build_measurements_schema
 from elastocal.mechanics.robot_file import parse_robot
 from elastocal.random_streams import open_stream
 from elastocal.residual_model.regressions import REGRESSIONS
@@ -93,7 +93,7 @@ def load_data_set(
     joints = parse_robot(descriptions["robot"], descriptions["source"]).joints
     return DataSet(
         descriptions,
-        read_table(measurements_path, measurements(joints)),
+        read_table(measurements_path, build_measurements_schema(joints)),
         read_table(folds_path, FOLDS),
     )
 
@@ -217,7 +217,7 @@ def tabulate_mechanisms(
     if evidence := diagnosis.evidence:
         mechanisms = evidence.conclusion.mechanisms
         best = evidence.conclusion.best
-        problem = evidence.linearized.problem
+        problem = evidence.design.problem
         explained = (
             compute_explained_squares(problem, evidence.posterior.models[best.model])
             if best.named
@@ -239,7 +239,7 @@ def tabulate_mechanisms(
 
 def deal_league_folds(job: Any) -> None:
     """A data set of the league, checked, with its poses dealt into folds."""
-    descriptions, campaign = described_campaign(
+    descriptions, campaign = read_described_campaign(
         read_campaign_folder(job.params.folder, job.params.robots)
     )
     seen = campaign.measurements
@@ -247,7 +247,7 @@ def deal_league_folds(job: Any) -> None:
     draws = open_stream(job.params.seed, job.wildcards.data, "league folds", 0)
     write_table(
         job.output.measurements,
-        measurements(seen.joint_angles.shape[1]),
+        build_measurements_schema(seen.joint_angles.shape[1]),
         [tabulate_measurements(seen)],
         origin,
     )
@@ -267,7 +267,7 @@ def diagnose_league_folds(job: Any) -> None:
     mechanisms = []
     for fold, training, _ in split_rounds(job.wildcards.split, data):
         found = diagnose(training, Settings(), job.params.seed)
-        facts[str(fold)] = diagnosis_facts(found)["steps"][-1]
+        facts[str(fold)] = serialize_diagnosis(found)["steps"][-1]
         mechanisms.append(tabulate_mechanisms(found, fold))
     write_json(job.output.facts, facts)
     write_table(
@@ -289,7 +289,7 @@ def enter_league(job: Any) -> None:
     blocks = []
     for fold, training, tests in split_rounds(split, data, others):
         fitted = (
-            step_fit(training, steps[str(fold)])
+            refit_step(training, steps[str(fold)])
             if steps
             else fit_physics(method.physics, training)
         )

@@ -11,7 +11,7 @@ import pandas as pd
 from elastocal.counting import format_count, format_integer
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.documents import read_document
-from elastocal.report.words import plain
+from elastocal.report.words import format_number
 from elastocal_proof.blind.cases import PROOF, Plan
 from elastocal_proof.blind.summary import (
     BY_THE_BEST,
@@ -100,14 +100,16 @@ def _with_interval(row: Any) -> str:
     if pd.isna(row.low):
         return f"{_value(row)} ({_ABSENT})"
     if _is_ratio(row):
-        return f"{_value(row)} ({plain(row.low, 4)}–{plain(row.high, 4)})"
+        return (
+            f"{_value(row)} ({format_number(row.low, 4)}–{format_number(row.high, 4)})"
+        )
     return f"{_value(row)} ({100 * row.low:.1f}–{100 * row.high:.1f} %)"
 
 
 def _value(row: Any) -> str:
     if pd.isna(row.rate):
         return _ABSENT
-    return plain(row.rate, 4) if _is_ratio(row) else f"{100 * row.rate:.1f} %"
+    return format_number(row.rate, 4) if _is_ratio(row) else f"{100 * row.rate:.1f} %"
 
 
 def _is_ratio(row: Any) -> bool:
