@@ -18,7 +18,7 @@ from elastocal.loop.loading import load_campaign
 from elastocal.loop.whole import judged
 from elastocal_proof.audit.audited import Audited
 from elastocal_proof.audit.whole import checks_of
-from elastocal_proof.blind.folders import write_blind_campaign
+from elastocal_proof.blind.folders import Experiment, write_blind_campaign
 from elastocal_proof.plant.arm import arm_from_file
 from elastocal_proof.plant.campaigns import Design, schedule_of
 from elastocal_proof.plant.kinds import drawn_defect, with_defects
@@ -44,7 +44,10 @@ def diagnosed_campaign(top, robot, effects=(), **design):
         [drawn_defect(effect, arm, 4) for effect in effects],
     )
     write_blind_campaign(
-        top / "cell", "cell", file, bad, planned, schedule_of(arm, planned, 3)
+        top / "cell",
+        "cell",
+        file,
+        Experiment(bad, planned, schedule_of(arm, planned, 3)),
     )
     results = top / "results/loop/cell"
     reports = top / "reports/loop/cell"

@@ -49,11 +49,7 @@ def made_tables():
     entries = [entry for entry in _cases() if entry[0]["case"]["robots"] == "proof"]
     cases = frame(*entries)
     spans = pd.DataFrame(
-        [
-            row
-            for document, said, _ in entries
-            for row in list_intervals(PLAN, document, said)
-        ]
+        [row for document, said, _ in entries for row in list_intervals(document, said)]
     )
     moves = _moves()
     moves.loc[(moves["pose"] == 3) & (moves["model"] == "geometry"), "corrected"] = (
