@@ -87,8 +87,11 @@ def rows(work: Path, setting: Setting) -> list[Row]:
     alone, theirs = map(
         min, interleaved({"elastocal": ours, "numpy.linalg.lstsq": loop}, repetitions)
     )
-    against = f"a loop of numpy.linalg.lstsq over {sets} data sets and {configurations} prefixes, 6DoF on kuka"
-    how = f"estimate_compliance against {against}, minimum of {repetitions}, equal to {TOLERANCE:g}"
+    how = (
+        f"estimate_compliance against a loop of numpy.linalg.lstsq over {sets} data sets"
+        f" and {configurations} prefixes, 6DoF on kuka, minimum of {repetitions},"
+        f" equal to {TOLERANCE:g}"
+    )
     return [
         Row(
             "identification",

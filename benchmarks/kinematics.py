@@ -9,7 +9,7 @@ import pinocchio as pin
 from common import Row, interleaved, load_robot
 
 from elastocal.mechanics.chain import Chain
-from elastocal.mechanics.kinematics import poses_and_jacobians
+from elastocal.mechanics.kinematics import compute_poses_and_jacobians
 
 ROBOTS = ("kuka", "fanuc")
 TARGET = 5
@@ -80,18 +80,19 @@ def _row(name: str, setting: Setting) -> Row:
     expected = np.stack(
         [pin.computeFrameJacobian(model, data, q, frame, aligned) for q in angles]
     )
-    found = poses_and_jacobians(chain, angles, chain.end_effector)[2]
+    found = compute_poses_and_jacobians(chain, angles, chain.end_effector)[2]
     np.testing.assert_allclose(found, expected, rtol=0, atol=TOLERANCE)
     functions = {
-        f"elastocal on {name}": lambda: poses_and_jacobians(
+        f"elastocal on {name}": lambda: compute_poses_and_jacobians(
             chain, angles, chain.end_effector
         ),
         "pinocchio": loop,
     }
     ours, theirs = map(min, interleaved(functions, setting.repetitions))
     how = (
-        f"poses_and_jacobians on {setting.configurations} random configurations against pin.computeFrameJacobian in a Python "
-        f"loop, one thread, least of {setting.repetitions}, Jacobians equal to {TOLERANCE:g}"
+        f"poses_and_jacobians on {setting.configurations} random configurations against"
+        " pin.computeFrameJacobian in a Python loop, one thread,"
+        f" minimum of {setting.repetitions}, Jacobians equal to {TOLERANCE:g}"
     )
     return Row(
         f"kinematics {name}",

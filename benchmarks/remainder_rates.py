@@ -23,9 +23,9 @@ from elastocal.campaigns.simulation import draw_measurements
 from elastocal.campaigns.writing import write_campaign
 from elastocal.fitting.model import Case
 from elastocal.fitting.noise import Noise, fit_declared_model
-from elastocal.loop.whole import cases_in
-from elastocal.remainder.corrected import corrected, inputs_of
-from elastocal.remainder.repeatable import repeatable_part
+from elastocal.loop.whole import read_cases
+from elastocal.residual_model.repeatable import detect_repeatable_residual
+from elastocal.residual_model.selection import build_inputs, validate_residual_model
 from elastocal.validation.held_out import compute_position_residuals
 from elastocal.validation.transfer import transfer_fit
 
@@ -55,7 +55,7 @@ def measured_cases(
     }
     with TemporaryDirectory() as folder:
         write_campaign(Path(folder) / name, document, table, 6, "csv")
-        return cases_in(Path(folder) / name, ROBOTS)
+        return read_cases(Path(folder) / name, ROBOTS)
 
 
 def exact_cases(poses: int) -> tuple[Case, Case]:
@@ -75,7 +75,7 @@ def drawn(case: Case, seed: int, part: int, size: float) -> tuple[Case, np.ndarr
     one robot, that of the seed."""
     fitted = fit_declared_model(case.model, case.observations, NOISE)
     robot = np.random.default_rng(seed)
-    inputs = inputs_of(fitted.model, fitted.estimate, case.observations)
+    inputs = build_inputs(fitted.model, fitted.estimate, case.observations)
     offsets = robot.normal(0.0, OFFSET_RAD, 6)
     joints = robot.choice(5, 2, replace=False)
     moved = robot.choice([1, 2])
@@ -119,13 +119,15 @@ if __name__ == "__main__":
                 drawn(each, seed, part, size) for part, each in enumerate(exact)
             )
             fitted = fit_declared_model(case.model, case.observations, NOISE)
-            p_values.append(repeatable_part(fitted, case.observations, seed).p_value)
+            p_values.append(
+                detect_repeatable_residual(fitted, case.observations, seed).p_value
+            )
             if asked.check:
                 continue
             alone = compute_position_residuals(
                 *transfer_fit(fitted, case, held_out), held_out.observations
             )
-            found = corrected(
+            found = validate_residual_model(
                 fitted,
                 case,
                 held_out,
@@ -143,13 +145,19 @@ if __name__ == "__main__":
             f"p <= {level}: {np.mean(np.array(p_values) <= level):.3f}"
             for level in LEVELS
         )
-        row = f"{asked.poses} poses, {1e3 * size:g} mrad, {asked.campaigns} campaigns; something remains, {rates}"
+        row = (
+            f"{asked.poses} poses, {1e3 * size:g} mrad, {asked.campaigns} campaigns;"
+            f" something remains, {rates}"
+        )
         if errors:
             physics, with_it, floor = (
                 rms(column) for column in zip(*errors, strict=True)
             )
-            row += f"; used {used}, worse by more than a standard error {worse}; held-out RMS of physics {physics:.0f} µm, "
-            row += f"with the regression {with_it:.0f}, of chance alone {floor:.0f}"
+            row += (
+                f"; used {used}, worse by more than a standard error {worse};"
+                f" held-out RMS of physics {physics:.0f} µm,"
+                f" with the regression {with_it:.0f}, of chance alone {floor:.0f}"
+            )
         print(
             f"{row}; {(time.process_time() - start) / asked.campaigns:.2f} s CPU each",
             flush=True,

@@ -9,7 +9,7 @@ import hypothesis
 import pytest
 
 from elastocal.io.documents import check_document, read_document
-from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.mechanics.robot_file import parse_robot
 from elastocal.study.strategies import strategy_from_document
 
 # An environment may forbid programs to keep what they compile; half of a run of the
@@ -74,7 +74,7 @@ def load_robot(key):
     path = CONFIG / "robots" / f"{key}.yaml"
     document = read_document(path)
     check_document(document, "robot", path)
-    return robot_from_document(document, path)
+    return parse_robot(document, path)
 
 
 @pytest.fixture(scope="session")

@@ -43,8 +43,9 @@ _PRINTABLE = re.compile(r"Must match pattern: `[^`]*\\x00[^`]*`")
 
 HEAD = """# File formats
 
-Made of the schemas by which files are checked when they are read and written. Measurements, `measurements.csv`, are in
-[a campaign](../../docs/campaign.md), tables for an audit in [the audit](../../docs/audit.md).
+Made from the schemas that check files when they are read and written. [A
+campaign](../../docs/campaign.md) describes `measurements.csv`, [the
+audit](../../docs/audit.md) the tables for an audit.
 
 ```{toctree}
 :maxdepth: 1
@@ -94,13 +95,15 @@ def _plain_example(match: re.Match[str]) -> str:
 
 
 def _tables() -> str:
-    parts = [
-        f"# Tables\n\nParquet files, column by column; those that go with the robot are shown for {JOINTS} joints.\n"
+    sections = [
+        "# Tables\n\nParquet files, column by column;"
+        f" columns of joints are shown for {JOINTS} joints.\n"
     ]
-    for module, words in TABLES.items():
-        parts.append(f"\n## {words.partition(':')[0]}\n\n{words.partition(': ')[2]}\n")
-        parts += [_table(schema) for schema in table_schemas(module)]
-    return "".join(parts)
+    for module, description in TABLES.items():
+        title, _, text = description.partition(": ")
+        sections.append(f"\n## {title}\n\n{text}\n")
+        sections += [_table(schema) for schema in table_schemas(module)]
+    return "".join(sections)
 
 
 def table_schemas(module: str) -> list[TableSchema]:
@@ -135,8 +138,15 @@ def table_schemas(module: str) -> list[TableSchema]:
 
 
 def _table(schema: TableSchema) -> str:
-    rows = [
-        f"| `{column.name}` | {column.type} | {column.unit or '–'} | {column.meaning} | {'yes' if column.missing else ''} |\n"
-        for column in schema.columns
+    lines = [
+        f"\n### {schema.name}\n",
+        "| column | type | unit | meaning | may be missing |",
+        "|---|---|---|---|---|",
     ]
-    return f"\n### {schema.name}\n\n| column | type | unit | meaning | may be missing |\n|---|---|---|---|---|\n{''.join(rows)}"
+    for column in schema.columns:
+        unit = column.unit or "–"
+        missing = "yes" if column.missing else ""
+        lines.append(
+            f"| `{column.name}` | {column.type} | {unit} | {column.meaning} | {missing} |"
+        )
+    return "\n".join(lines) + "\n"

@@ -15,7 +15,7 @@ from elastocal.application.calibrated import (
     predict_poses,
 )
 from elastocal.fitting.model import apply_step
-from elastocal.mechanics.kinematics import pose_differences
+from elastocal.mechanics.kinematics import compute_pose_differences
 from elastocal.mechanics.robot import Mass
 
 ONE_JOINT = "Tz(0.5) Ry(q1) Tx(0.8) [hand]"
@@ -90,7 +90,7 @@ def test_sensitivities_are_the_derivatives_of_the_poses_by_every_parameter(fanuc
         stepped_pose = predict_poses(replace(calibrated, estimate=estimate), *commands)
         expected = sensitivities @ step
         np.testing.assert_allclose(
-            pose_differences(*stepped_pose, *pose),
+            compute_pose_differences(*stepped_pose, *pose),
             expected,
             rtol=1e-2,
             atol=1e-2 * np.abs(expected).max(),

@@ -19,7 +19,7 @@ from elastocal.application.compensation import (
     find_joint_targets,
     find_large_steps,
 )
-from elastocal.mechanics.kinematics import jacobians, pose_differences
+from elastocal.mechanics.kinematics import compute_jacobians, compute_pose_differences
 
 EFFECTS = (
     *(key for key in USUAL if "weight" not in key),
@@ -76,14 +76,14 @@ def test_corrected_targets_bring_the_robot_to_the_wanted_poses(name):
     corrected = correction.status == OK
     assert corrected.mean() > 0.9
     settled = settle(calibrated, correction.joint_angles, wrench)
-    error = pose_differences(position, rotation, *settled)[corrected]
+    error = compute_pose_differences(position, rotation, *settled)[corrected]
     assert np.abs(error).max() < 2e-9
     np.testing.assert_allclose(correction.error_after[corrected], error, atol=2e-9)
     before = correction.error_before[corrected, :3]
     assert np.sqrt((before**2).sum(axis=1).mean()) > 1e-4
     # The repeatability of the joints acts through the Jacobian at the corrected angles.
     angles = robot.model_angles(correction.joint_angles)
-    jacobian = jacobians(robot.chain, angles, robot.chain.end_effector)
+    jacobian = compute_jacobians(robot.chain, angles, robot.chain.end_effector)
     expected = 1e-5 * np.sqrt((jacobian[:, :3] ** 2).sum(axis=(1, 2)))
     prediction = predict_errors(calibrated, correction.joint_angles, wrench, draws=0)
     np.testing.assert_allclose(prediction.repeated_m, expected, rtol=1e-9)

@@ -15,8 +15,8 @@ from elastocal.application.exported import (
     fold_effects,
 )
 from elastocal.effects.catalogue import candidates_on
-from elastocal.mechanics.robot_file import document_of, robot_from_document
-from elastocal.mechanics.sites import sites_of
+from elastocal.mechanics.robot_file import describe_robot, parse_robot
+from elastocal.mechanics.sites import build_sites
 
 GEOMETRY = (
     "joint_offset@2",
@@ -69,7 +69,7 @@ def test_poses_of_a_robot_file_under_load_are_those_of_the_calibrated_robot(
     name, additional
 ):
     robot = analysed(name)
-    candidates = candidates_on(sites_of(robot))
+    candidates = candidates_on(build_sites(robot))
     keys = (*GEOMETRY, "link_geometry@6", *additional)
     calibrated = make_calibrated_robot(
         robot, *(key for key in keys if key in candidates), size=1.0
@@ -77,7 +77,7 @@ def test_poses_of_a_robot_file_under_load_are_those_of_the_calibrated_robot(
     folded = fold_effects(calibrated)
     assert folded.left_out == ()
     commands, wrench = draw_states(robot)
-    robot_of_file = robot_from_document(document_of(folded.robot))
+    robot_of_file = parse_robot(describe_robot(folded.robot))
     from_file = predict_poses(calibrate_by_file(robot_of_file), commands, wrench)
     expected = predict_poses(calibrated, commands, wrench)
     np.testing.assert_allclose(from_file[0], expected[0], atol=1e-9)

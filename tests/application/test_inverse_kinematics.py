@@ -16,7 +16,7 @@ from elastocal.application.inverse_kinematics import (
     find_beyond_limits,
     solve_path,
 )
-from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.kinematics import compute_poses
 
 # Angles from the middle of the limits to a posture that is not singular.
 BENT = np.array([0.0, 0.2, 0.1, 0.3, 0.7, 0.0])
@@ -33,7 +33,7 @@ def test_a_path_about_the_base_has_no_large_step_if_a_turn_is_within_the_limits(
     robot = replace(robot, joint_limits=limits)
     angles = np.tile(limits.mean(axis=1) + BENT, (7, 1))
     angles[:, 0] = np.radians(np.linspace(-180.6, -168.6, 7))
-    wanted = poses(robot.chain, angles, robot.chain.end_effector)
+    wanted = compute_poses(robot.chain, angles, robot.chain.end_effector)
     path, error_m = solve_path(robot, *wanted)
     assert error_m.max() < SOLVED_M and not find_beyond_limits(robot, path).any()
     np.testing.assert_allclose(
@@ -89,6 +89,6 @@ def test_a_step_may_be_five_times_the_rotation_of_the_path_and_ten_degrees():
     robot = analysed("gp180")
     angles = np.tile(robot.joint_limits.mean(axis=1) + BENT, (2, 1))
     angles[1, 0] += np.radians(3.0)
-    wanted = poses(robot.chain, angles, robot.chain.end_effector)
+    wanted = compute_poses(robot.chain, angles, robot.chain.end_effector)
     allowed = compute_allowed_steps(robot, *wanted)
     np.testing.assert_allclose(np.degrees(allowed), 25.0)

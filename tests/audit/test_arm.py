@@ -5,10 +5,10 @@ import pytest
 from scipy.integrate import quad
 from support import TRACK, TURNED
 
-from elastocal.mechanics.elastostatics import joint_torques, regressor
-from elastocal.mechanics.kinematics import jacobians
-from elastocal.mechanics.robot_file import robot_from_document
-from elastocal_proof.audit.arm import Arm, cantilever
+from elastocal.mechanics.elastostatics import build_regressor, compute_joint_torques
+from elastocal.mechanics.kinematics import compute_jacobians
+from elastocal.mechanics.robot_file import parse_robot
+from elastocal_proof.audit.arm import Arm, compute_link_compliance
 
 BEAM = {
     "chain": "Rz(q1) Tx(2.0) [tip]",
@@ -34,12 +34,14 @@ def test_the_package_has_the_same_regressor(chain):
         "compliance_urad_per_Nm": compliance,
     }
     arm = Arm(document)
-    robot = robot_from_document(document)
+    robot = parse_robot(document)
     angles = np.random.default_rng(2).uniform(-1, 1, arm.joints)
-    torques = joint_torques(robot.chain, angles, WRENCH, robot.chain.end_effector)
+    torques = compute_joint_torques(
+        robot.chain, angles, WRENCH, robot.chain.end_effector
+    )
     for point in arm.points:
-        expected = regressor(
-            jacobians(robot.chain, angles, robot.chain.point(point)), torques
+        expected = build_regressor(
+            compute_jacobians(robot.chain, angles, robot.chain.point(point)), torques
         )
         np.testing.assert_allclose(
             arm.regressor(angles, WRENCH, point), expected, atol=1e-9
@@ -70,7 +72,10 @@ def test_a_tube_bends_by_the_textbook():
 def test_a_tapered_link_shifts_and_twists_as_the_uniform_one_and_turns_by_the_integral_of_its_compliance():
     taper, uniform, found = (
         0.4,
-        *(cantilever(np.array([2.0, 0, 0]), 1e-6, 2e-6, taper) for taper in (0.0, 0.4)),
+        *(
+            compute_link_compliance(np.array([2.0, 0, 0]), 1e-6, 2e-6, taper)
+            for taper in (0.0, 0.4)
+        ),
     )
     assert found[2, 2] == pytest.approx(uniform[2, 2]) and found[3, 3] == pytest.approx(
         uniform[3, 3]

@@ -11,9 +11,13 @@ import yaml
 from made_audits import CONFIGURATION, ROBOT, altered, failed
 
 from elastocal.campaigns.simulation import Plan, draw_measurements
-from elastocal.mechanics.robot_file import robot_from_document
-from elastocal_proof.audit.audited import Audited
-from elastocal_proof.audit.campaigns import seals, simulated, split
+from elastocal.mechanics.robot_file import parse_robot
+from elastocal_proof.audit.campaigns import (
+    check_seals,
+    check_simulated_campaign,
+    check_split,
+)
+from elastocal_proof.audit.finished_run import FinishedRun
 
 PLAN = {
     **{
@@ -52,9 +56,7 @@ def drawn(tmp_path):
             for name, value in PLAN.items()
         }
     )
-    table = pd.DataFrame(
-        draw_measurements(robot_from_document(ROBOT, "two"), plan, 1, "cell")
-    )
+    table = pd.DataFrame(draw_measurements(parse_robot(ROBOT, "two"), plan, 1, "cell"))
     table.to_parquet(tmp_path / DRAWN)
     table = table.assign(row=np.arange(1, len(table) + 1), session=0)
     table[table["pose"] < 2].to_parquet(tmp_path / TRAINING)
@@ -64,16 +66,24 @@ def drawn(tmp_path):
     (tmp_path / "results/loop/cell/campaign.json").write_text(
         json.dumps({"held_out": None}), encoding="utf-8"
     )
-    return Audited(tmp_path, CONFIGURATION, {}, {}, 4)
+    return FinishedRun(tmp_path, CONFIGURATION, {}, {}, 4)
 
 
 def found_in(run):
     run.table.cache_clear()
-    return failed([*simulated(run, DRAWN, "cell"), *split(run, TRAINING, "cell")])
+    return failed(
+        [
+            *check_simulated_campaign(run, DRAWN, "cell"),
+            *check_split(run, TRAINING, "cell"),
+        ]
+    )
 
 
 def test_a_simulated_campaign_is_drawn_again_and_no_measured_one(drawn):
-    assert found_in(drawn) == [] and len([*simulated(drawn, DRAWN, "cell")]) == 4
+    assert (
+        found_in(drawn) == []
+        and len([*check_simulated_campaign(drawn, DRAWN, "cell")]) == 4
+    )
 
 
 @pytest.mark.parametrize(
@@ -95,7 +105,7 @@ def test_a_value_altered_is_found(drawn, file, column, change, checked):
     (drawn.folder / "config/campaigns/cell.yaml").write_text(
         "source: public\n", encoding="utf-8"
     )
-    assert [*simulated(drawn, DRAWN, "cell")] == []
+    assert [*check_simulated_campaign(drawn, DRAWN, "cell")] == []
 
 
 def test_a_ground_truth_altered_after_its_seal_is_found(drawn):
@@ -108,8 +118,8 @@ def test_a_ground_truth_altered_after_its_seal_is_found(drawn):
         f"{hashlib.sha256(sealed.read_bytes()).hexdigest()}  case.json\n",
         encoding="utf-8",
     )
-    assert failed(seals(drawn, "reports/blind/manifest.sha256")) == []
+    assert failed(check_seals(drawn, "reports/blind/manifest.sha256")) == []
     sealed.write_bytes(b'{"size": 1.1}')
     assert [
-        finding.note for finding in seals(drawn, "reports/blind/manifest.sha256")
+        finding.note for finding in check_seals(drawn, "reports/blind/manifest.sha256")
     ] == ["case.json"]

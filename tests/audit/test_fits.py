@@ -9,7 +9,7 @@ from made_audits import altered, failed
 from support import TRACK, TURNED
 
 from elastocal_proof.audit.arm import Arm
-from elastocal_proof.audit.fits import model_of, stand
+from elastocal_proof.audit.fits import build_mujoco_model, iterate_equilibrium
 
 STEPS = "results/loop/cell/steps.parquet"
 RESIDUALS = "reports/loop/cell/residuals.parquet"
@@ -26,7 +26,9 @@ def test_an_arm_stands_by_mujoco_where_it_stands_by_pinocchio(chain):
     springs = half @ half.T
     for point in arm.points:
         expected = arm.pose(arm.loaded(springs, angles, WRENCH, 3)[0], point)[0]
-        found = stand(arm, model_of(arm), springs, angles, WRENCH, point)
+        found = iterate_equilibrium(
+            arm, build_mujoco_model(arm), springs, angles, WRENCH, point
+        )
         np.testing.assert_allclose(found[2], expected, rtol=0, atol=1e-12)
         assert np.abs(expected - arm.pose(arm.extend(angles), point)[0]).max() > 1e-6
         assert np.abs(found[-1] - found[-2]).max() < 1e-12

@@ -6,10 +6,10 @@ import pytest
 from made_audits import altered, failed
 
 from elastocal_proof.audit.study import (
-    estimates,
-    experiments,
-    ideal,
-    measured,
+    check_estimates,
+    check_experiments,
+    check_ideal_deflections,
+    check_measured_deflections,
     solve_staged,
 )
 
@@ -26,11 +26,11 @@ def found_in(run):
         run.deflections.cache_clear(),
     )
     checks = [
-        *experiments(run, EXPERIMENTS, "two"),
-        *ideal(run, IDEAL, "two"),
-        *measured(run, MEASURED, "two", "100"),
+        *check_experiments(run, EXPERIMENTS, "two"),
+        *check_ideal_deflections(run, IDEAL, "two"),
+        *check_measured_deflections(run, MEASURED, "two", "100"),
     ]
-    return failed([*checks, *estimates(run, IDENTIFIED, "two", "hand", "100")])
+    return failed([*checks, *check_estimates(run, IDENTIFIED, "two", "hand", "100")])
 
 
 @pytest.mark.parametrize(

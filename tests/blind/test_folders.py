@@ -18,9 +18,9 @@ from elastocal_proof.blind.folders import (
     write_blind_campaign,
     write_truth,
 )
-from elastocal_proof.plant.arm import arm_from_file
-from elastocal_proof.plant.campaigns import Design, schedule_of
-from elastocal_proof.plant.physical_robot import specimen
+from elastocal_proof.plant.arm import read_arm
+from elastocal_proof.plant.campaigns import Design, draw_schedule
+from elastocal_proof.plant.simulated_robot import draw_specimen
 
 
 @pytest.mark.parametrize("name", ["kuka", "fanuc", "abb"])

@@ -11,8 +11,8 @@ from made_blind_documents import PLAN
 from scipy.stats import multivariate_normal
 
 from elastocal.effects.catalogue import candidates_on
-from elastocal.loop.whole import diagnosed
-from elastocal.mechanics.sites import sites_of
+from elastocal.loop.whole import diagnose_folder
+from elastocal.mechanics.sites import build_sites
 from elastocal_proof.blind import oracle as module
 from elastocal_proof.blind.cases import BlindCase, list_cases, write_sealed_case
 from elastocal_proof.blind.oracle import (

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.errors import InputError
 from elastocal.exchange.target_path import read_target_path
-from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.kinematics import compute_poses
 from elastocal_proof.blind.rehearsal import (
     build_hidden_robot,
     fill_sheet,
@@ -48,7 +48,7 @@ def test_a_sheet_is_filled_near_where_the_declared_robot_is_and_by_where_command
     ).to_csv(path, index=False)
     assert fill_sheet(path, DOCUMENT, robot, 1) == 5
     filled = pd.read_csv(path)
-    position, rotation = poses(
+    position, rotation = compute_poses(
         declared.chain, declared.model_angles(angles), declared.chain.end_effector
     )
     off = np.linalg.norm(filled[["x", "y", "z"]].to_numpy() - position, axis=1)

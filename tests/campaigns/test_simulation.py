@@ -8,8 +8,11 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.simulation import Plan, draw_measurements
 from elastocal.mechanics.components import WRENCH_NAMES
-from elastocal.mechanics.elastostatics import exact_deflections, generalized_forces
-from elastocal.mechanics.kinematics import poses, poses_and_jacobians
+from elastocal.mechanics.elastostatics import (
+    compute_exact_deflections,
+    compute_generalized_forces,
+)
+from elastocal.mechanics.kinematics import compute_poses, compute_poses_and_jacobians
 
 PLAN = Plan(("3DoF", "6DoF"), 10, 800.0, (0, 1, -0.5), (0.0, 0.5, 0.1), 3, 2, 0.0, 0.0)
 
@@ -32,11 +35,16 @@ def test_without_noise_it_is_the_elastostatics_of_the_reduced_robot_at_states_as
             )
         )
         at = robot.chain.point(point)
-        end = poses_and_jacobians(robot.chain, angles, robot.chain.end_effector)[2]
-        expected = exact_deflections(
-            robot.chain, angles, generalized_forces(end, wrench) * robot.compliance, at
+        end = compute_poses_and_jacobians(
+            robot.chain, angles, robot.chain.end_effector
+        )[2]
+        expected = compute_exact_deflections(
+            robot.chain,
+            angles,
+            compute_generalized_forces(end, wrench) * robot.compliance,
+            at,
         )
-        position, rotation = poses(robot.chain, angles, at)
+        position, rotation = compute_poses(robot.chain, angles, at)
         np.testing.assert_allclose(place - position, expected[:, :3], atol=1e-12)
         turn = (
             Rotation.from_rotvec(read) * Rotation.from_matrix(rotation).inv()

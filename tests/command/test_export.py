@@ -12,7 +12,7 @@ from made_urdf import robot as make_urdf
 
 from elastocal.campaigns.reading import read_robot
 from elastocal.exchange.urdf import robot_from_urdf
-from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.kinematics import compute_poses
 
 ANGLES = 0.5 * np.linspace(-1, 1, 6)[None]
 
@@ -98,8 +98,8 @@ def test_the_urdf_has_the_poses_of_the_robot_file(exported):
     robot = read_robot(folder / "robot.yaml")
     end = robot.chain.end_effector
     from_urdf = robot_from_urdf(folder / "robot.urdf", "base", end.name).robot
-    wanted, _ = poses(robot.chain, robot.model_angles(ANGLES), end)
-    position, _ = poses(from_urdf.chain, ANGLES, from_urdf.chain.end_effector)
+    wanted, _ = compute_poses(robot.chain, robot.model_angles(ANGLES), end)
+    position, _ = compute_poses(from_urdf.chain, ANGLES, from_urdf.chain.end_effector)
     np.testing.assert_allclose(position, wanted, atol=1e-9)
 
 

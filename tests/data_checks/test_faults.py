@@ -17,14 +17,14 @@ from support import PinocchioPoint
 from synthetic import NOISE
 
 from elastocal.data_checks.faults import (
-    UNITS,
-    compliance_warnings,
-    constant_columns,
-    controller_warnings,
-    deflections,
-    faults,
-    implausible_measurements,
-    wrong_loads,
+    LOAD_UNITS,
+    compute_deflections,
+    find_constant_columns,
+    find_faults,
+    find_implausible_measurements,
+    find_wrong_loads,
+    warn_of_compliances,
+    warn_of_computed_positions,
 )
 from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.model import build_declared_model
@@ -43,7 +43,7 @@ PLANS = {
 # Each plan with a seed of its own.
 @pytest.mark.parametrize(("seed", "plan"), list(enumerate(PLANS)))
 def test_no_fault_is_found_where_the_model_is_right(fanuc, plan, seed):
-    assert faults(make_campaign(fanuc, seed, PLANS[plan])) == ()
+    assert find_faults(make_campaign(fanuc, seed, PLANS[plan])) == ()
 
 
 @pytest.mark.parametrize(("seed", "plan"), list(enumerate(PLANS)))
@@ -52,7 +52,9 @@ def test_no_fault_is_found_where_the_model_lacks_something(kuka, plan, seed):
     offsets = np.random.default_rng(seed).normal(0.0, 3e-3, kuka.joints)
     true_robot = add_geometric_errors(change_compliances(kuka, seed, 0.5), seed, 0.01)
     assert (
-        faults(make_campaign(kuka, seed, PLANS[plan], true_robot, offsets, sag=3e-3))
+        find_faults(
+            make_campaign(kuka, seed, PLANS[plan], true_robot, offsets, sag=3e-3)
+        )
         == ()
     )
 
@@ -62,7 +64,7 @@ def test_a_wrong_sign_is_found_alone(fanuc):
     turned = replace_measured_columns(
         campaign, joint_angles=campaign.measurements.joint_angles * [1, 1, -1, 1, 1, 1]
     )
-    assert [fault.name for fault in faults(turned)] == ["wrong_sign"]
+    assert [fault.name for fault in find_faults(turned)] == ["wrong_sign"]
 
 
 @pytest.fixture(scope="module", params=["base", "tracker"])
@@ -77,7 +79,9 @@ def twelve_poses(request, fanuc):
 @pytest.mark.parametrize(("value", "same"), [(0.0, "zero"), (1.5, "the same")])
 def test_positions_that_stand_still_are_named(twelve_poses, kept, words, value, same):
     still = np.where(kept, twelve_poses.measurements.position, value)
-    (fault,) = constant_columns(replace_measured_columns(twelve_poses, position=still))
+    (fault,) = find_constant_columns(
+        replace_measured_columns(twelve_poses, position=still)
+    )
     assert fault.name == "constant_columns"
     assert fault.detail.startswith(words) and f" {same} in all 12 poses" in fault.detail
 
@@ -89,10 +93,10 @@ def test_angles_that_stand_still_while_the_measurements_move_are_named_unless_it
     still = replace_measured_columns(
         twelve_poses, joint_angles=np.full_like(seen.joint_angles, 0.4)
     )
-    (fault,) = constant_columns(still)
+    (fault,) = find_constant_columns(still)
     assert fault.detail.startswith("the joint angles are the same in all 12 poses")
     again = seen.position[: len(POINTS)][seen.target] + 1e-5 * seen.pose[:, None]
-    assert constant_columns(replace_measured_columns(still, position=again)) == []
+    assert find_constant_columns(replace_measured_columns(still, position=again)) == []
 
 
 def test_a_robot_that_moves_in_a_plane_may_have_a_constant_coordinate(fanuc):
@@ -106,7 +110,7 @@ def test_a_robot_that_moves_in_a_plane_may_have_a_constant_coordinate(fanuc):
         np.ptp(campaign.measurements.position[campaign.measurements.target == 3, 2])
         < 1e-9
     )
-    assert constant_columns(campaign) == []
+    assert find_constant_columns(campaign) == []
 
 
 @pytest.fixture(scope="module", params=["base", "tracker"])
@@ -132,7 +136,7 @@ def with_rows(campaign, source):
     ("steps", "words"), [(1, "row further up"), (-1, "row further down")]
 )
 def test_measured_columns_moved_by_one_row_are_named(campaign, steps, words):
-    (fault,) = faults(
+    (fault,) = find_faults(
         with_rows(campaign, np.roll(np.arange(len(campaign.measurements)), steps))
     )
     assert fault.name == "shuffled_rows" and words in fault.detail
@@ -143,7 +147,7 @@ def test_measurements_of_another_robot_are_named_and_those_of_one_off_by_centime
     fanuc, kuka, tracker
 ):
     campaign = make_campaign(fanuc, 1, Plan(poses=20, tracker=tracker))
-    (fault,) = implausible_measurements(replace(campaign, robot=kuka))
+    (fault,) = find_implausible_measurements(replace(campaign, robot=kuka))
     assert fault.name == "implausible_measurements"
     assert fault.parameters[0].value > 0.1 and "\n" not in fault.detail
     off = make_campaign(
@@ -154,7 +158,7 @@ def test_measurements_of_another_robot_are_named_and_those_of_one_off_by_centime
         5e-3,
         sag=5e-3,
     )
-    assert implausible_measurements(off) == []
+    assert find_implausible_measurements(off) == []
 
 
 def warned(robot, factors=1.0, turned=1.0, known=True):
@@ -167,7 +171,7 @@ def warned(robot, factors=1.0, turned=1.0, known=True):
     campaign = replace_measured_columns(
         campaign, wrench=turned * campaign.measurements.wrench
     )
-    return compliance_warnings(
+    return warn_of_compliances(
         fit_model(
             build_declared_model(campaign),
             average_repeats(campaign.measurements),
@@ -211,7 +215,7 @@ def test_loads_turned_round_are_seen_by_compliances_below_zero_and_joints_withou
     rigid = replace(
         make_campaign(replace(fanuc, compliance_known=False), 1), compliance="nominal"
     )
-    (warning,) = compliance_warnings(
+    (warning,) = warn_of_compliances(
         fit_model(
             build_declared_model(rigid), average_repeats(rigid.measurements), NOISE
         )
@@ -232,7 +236,7 @@ def test_positions_of_the_files_own_kinematics_are_said_to_be_no_measurements(
         np.degrees(campaign.measurements.joint_angles).round(decimals_deg)
     )
     position = (1e3 * campaign.measurements.position).round(decimals_mm) / 1e3
-    (sentence,) = controller_warnings(
+    (sentence,) = warn_of_computed_positions(
         replace_measured_columns(campaign, joint_angles=angles, position=position)
     )
     assert "no measurements" in sentence and "own kinematics" in sentence
@@ -240,7 +244,7 @@ def test_positions_of_the_files_own_kinematics_are_said_to_be_no_measurements(
         position.shape
     )
     assert (
-        controller_warnings(
+        warn_of_computed_positions(
             replace_measured_columns(campaign, joint_angles=angles, position=measured)
         )
         == []
@@ -286,7 +290,7 @@ def test_deflections_are_those_of_each_joint_by_pinocchio_less_the_mean_of_targe
     fanuc, exact
 ):
     seen = exact.measurements
-    found, expected = deflections(exact)
+    found, expected = compute_deflections(exact)
     for by, part in ((0, slice(0, 3)), (1, slice(3, 6))):
         whole = expected_parts(fanuc, seen, part).sum(axis=2)
         reference = less_group_means(whole, seen.pose, seen.target)
@@ -314,7 +318,7 @@ def test_joints_off_their_zeros_leave_no_trace_in_the_deflections(fanuc):
         ).max()
         > 3e-3
     )
-    (one, _), (other, _) = map(deflections, (straight, off))
+    (one, _), (other, _) = map(compute_deflections, (straight, off))
     # What is left is of second order: two milliradians of every deflection.
     assert np.abs(other - one).max() < 0.02 * np.abs(one).max()
 
@@ -323,16 +327,19 @@ def test_nothing_is_said_without_differing_loads_or_known_compliances_or_with_to
     exact,
 ):
     seen = exact.measurements
-    assert deflections(selected(exact, seen.load == 1)) is None
+    assert compute_deflections(selected(exact, seen.load == 1)) is None
     assert (
-        deflections(replace_measured_columns(exact, wrench=0.0 * seen.wrench)) is None
-    )
-    assert (
-        deflections(replace(exact, robot=replace(exact.robot, compliance_known=False)))
+        compute_deflections(replace_measured_columns(exact, wrench=0.0 * seen.wrench))
         is None
     )
-    assert deflections(selected(exact, seen.pose < 3)) is None
-    assert deflections(selected(exact, seen.pose < 4)) is not None
+    assert (
+        compute_deflections(
+            replace(exact, robot=replace(exact.robot, compliance_known=False))
+        )
+        is None
+    )
+    assert compute_deflections(selected(exact, seen.pose < 3)) is None
+    assert compute_deflections(selected(exact, seen.pose < 4)) is not None
 
 
 def made_deflections(sign=1.0, force=1.0, moment=1.0, ratios=1.0, noise=1e-2):
@@ -364,12 +371,12 @@ def told(faults):
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-@pytest.mark.parametrize(("force", "moment", "words"), UNITS)
+@pytest.mark.parametrize(("force", "moment", "words"), LOAD_UNITS)
 def test_every_unit_and_sign_is_found_by_what_it_makes_of_the_deflections(
     sign, force, moment, words
 ):
     seen, expected = made_deflections(sign, force, moment)
-    found = wrong_loads(seen, expected)
+    found = find_wrong_loads(seen, expected)
     assert bool(found) == (sign < 0 or bool(words))
     assert told(found) == pytest.approx((sign, force, moment))
     for fault in found:
@@ -400,23 +407,27 @@ def test_every_unit_and_sign_is_found_by_what_it_makes_of_the_deflections(
     ids=str,
 )
 def test_no_unit_is_found_for_compliances_that_are_only_off(ratios):
-    assert wrong_loads(*made_deflections(ratios=ratios)) == []
+    assert find_wrong_loads(*made_deflections(ratios=ratios)) == []
 
 
 def test_of_two_units_within_reach_the_one_by_which_compliances_are_nearest_nominal_is_named_first():
     # 1.4 times pounds-force are 0.63 times kilogram-force, and 1.55 times 0.70.
-    (fault,) = wrong_loads(*made_deflections(force=POUND, moment=POUND, ratios=1.4))
+    (fault,) = find_wrong_loads(
+        *made_deflections(force=POUND, moment=POUND, ratios=1.4)
+    )
     assert fault.detail.startswith("the loads look like pounds-force")
     assert [
         each.startswith("the loads look like kilogram-force")
         for each in fault.alternatives
     ] == [True]
-    (fault,) = wrong_loads(*made_deflections(force=POUND, moment=POUND, ratios=1.55))
+    (fault,) = find_wrong_loads(
+        *made_deflections(force=POUND, moment=POUND, ratios=1.55)
+    )
     assert (
         fault.detail.startswith("the loads look like kilogram-force")
         and fault.alternatives
     )
-    (fault,) = wrong_loads(*made_deflections(force=KILOGRAM, moment=KILOGRAM))
+    (fault,) = find_wrong_loads(*made_deflections(force=KILOGRAM, moment=KILOGRAM))
     assert not fault.alternatives
 
 
@@ -442,8 +453,8 @@ def loaded(request, fanuc):
 )
 def test_loads_in_another_unit_are_named_with_its_factor(loaded, factor):
     written = loaded.measurements.wrench / np.repeat(factor, 3)
-    (fault,) = wrong_loads(
-        *deflections(replace_measured_columns(loaded, wrench=written))
+    (fault,) = find_wrong_loads(
+        *compute_deflections(replace_measured_columns(loaded, wrench=written))
     )
     assert (fault.name, fault.joints) == ("wrong_unit", ())
     assert [value.value for value in fault.parameters[:2]] == pytest.approx(factor)
@@ -451,8 +462,8 @@ def test_loads_in_another_unit_are_named_with_its_factor(loaded, factor):
 
 
 def test_loads_turned_round_are_named(loaded):
-    (fault,) = wrong_loads(
-        *deflections(
+    (fault,) = find_wrong_loads(
+        *compute_deflections(
             replace_measured_columns(loaded, wrench=-loaded.measurements.wrench)
         )
     )

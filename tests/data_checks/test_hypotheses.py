@@ -14,12 +14,12 @@ from made_campaigns import (
 from scipy.spatial.transform import Rotation
 
 from elastocal.data_checks.hypotheses import (
-    discrete,
-    fitted,
-    other_interpretations,
-    shifts,
+    find_better_interpretation,
+    list_discrete_hypotheses,
+    list_fitted_hypotheses,
+    list_row_shifts,
 )
-from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.kinematics import compute_poses
 
 
 def softer_by_chance(robot, tracker):
@@ -39,7 +39,7 @@ def campaign(fanuc):
 def test_a_joint_counted_the_other_way_round_is_named(fanuc, joint, tracker):
     campaign = softer_by_chance(fanuc, tracker)
     angles = campaign.measurements.joint_angles * (1.0 - 2.0 * np.eye(6)[joint])
-    (fault,) = other_interpretations(
+    (fault,) = find_better_interpretation(
         replace_measured_columns(campaign, joint_angles=angles)
     )
     assert (fault.name, fault.joints) == ("wrong_sign", (joint + 1,))
@@ -54,7 +54,7 @@ def test_loads_that_are_numbered_throughout_have_no_row_beside_them(campaign):
     )
     assert not [
         fault
-        for fault in other_interpretations(turned)
+        for fault in find_better_interpretation(turned)
         if fault.name == "shuffled_rows"
     ]
 
@@ -68,7 +68,7 @@ def test_a_joint_counted_from_its_neighbour_is_named_with_it(
 ):
     angles = campaign.measurements.joint_angles.copy()
     angles[:, joint] += sign * angles[:, joint - 1]
-    (fault,) = other_interpretations(
+    (fault,) = find_better_interpretation(
         replace_measured_columns(campaign, joint_angles=angles)
     )
     assert fault.joints == (joint, joint + 1)
@@ -90,14 +90,14 @@ def test_the_sign_is_that_of_the_column_of_the_file(fanuc):
     ) @ reported_matrix
     reported[:, 2] *= -1
     angles = reported @ reported_matrix + robot.reported_offset
-    (fault,) = other_interpretations(
+    (fault,) = find_better_interpretation(
         replace_measured_columns(campaign, joint_angles=angles)
     )
     assert fault.joints == (3,)
 
 
 def test_orientations_turned_round_are_named(campaign):
-    (fault,) = other_interpretations(
+    (fault,) = find_better_interpretation(
         replace_measured_columns(
             campaign, rotation_vector=-campaign.measurements.rotation_vector
         )
@@ -132,7 +132,7 @@ EXCHANGED = {
 @pytest.mark.parametrize("words", EXCHANGED)
 def test_exchanged_axes_of_positions_are_named(campaign, words):
     written = campaign.measurements.position @ np.array(EXCHANGED[words], float).T
-    (fault,) = other_interpretations(
+    (fault,) = find_better_interpretation(
         replace_measured_columns(campaign, position=written)
     )
     assert fault.name == "swapped_axes"
@@ -141,7 +141,7 @@ def test_exchanged_axes_of_positions_are_named(campaign, words):
 
 @pytest.mark.parametrize(("factor", "unit"), [(1000, "millimetres"), (0.1, "tenth")])
 def test_positions_in_another_unit_are_named(campaign, factor, unit):
-    (fault,) = other_interpretations(
+    (fault,) = find_better_interpretation(
         replace_measured_columns(
             campaign, position=factor * campaign.measurements.position
         )
@@ -159,7 +159,7 @@ def test_angles_in_the_columns_of_the_rotation_vector_are_named(
     angles = Rotation.from_rotvec(campaign.measurements.rotation_vector).as_euler(
         letters
     )
-    (fault,) = other_interpretations(
+    (fault,) = find_better_interpretation(
         replace_measured_columns(campaign, rotation_vector=angles)
     )
     assert words in fault.detail
@@ -173,7 +173,7 @@ def test_each_session_has_a_transform_of_its_own(fanuc):
     position = rotation.apply(measurements.position) + np.where(
         session[:, None], [0.0, 3.0, 0.0], [1.0, 0.0, 0.0]
     )
-    (fault,) = other_interpretations(
+    (fault,) = find_better_interpretation(
         replace_measured_columns(campaign, session=session, position=position)
     )
     # That of the session that stands farther off.
@@ -207,7 +207,9 @@ def known_targets(fanuc, factor=1.0, which=slice(None)):
     position = np.empty_like(plain.measurements.position)
     for number, point in enumerate(chain.points):
         mask = plain.measurements.target == number
-        position[mask] = poses(chain, plain.measurements.joint_angles[mask], point)[0]
+        position[mask] = compute_poses(
+            chain, plain.measurements.joint_angles[mask], point
+        )[0]
     written = offsets.copy()
     written[which] *= factor
     targets = tuple(
@@ -227,7 +229,7 @@ def known_targets(fanuc, factor=1.0, which=slice(None)):
 )
 def test_target_offsets_in_millimetres_are_named(fanuc, which, words):
     campaign = known_targets(fanuc, 1000.0, which)
-    (fault,) = other_interpretations(campaign)
+    (fault,) = find_better_interpretation(campaign)
     assert fault.name == "wrong_unit" and fault.detail.startswith(
         f"the target offset of {words} looks like millimetres"
     )
@@ -237,7 +239,7 @@ def test_a_target_that_sits_elsewhere_is_named_with_its_place(fanuc):
     campaign = known_targets(fanuc)
     moved = replace(campaign.targets[3], offset_m=(0.3, 0.1, 0.0))
     campaign = replace(campaign, targets=(*campaign.targets[:3], moved))
-    (fault,) = other_interpretations(of_the_end(campaign))
+    (fault,) = find_better_interpretation(of_the_end(campaign))
     assert fault.name == "wrong_target" and "T6DoF would sit" in fault.detail
     # From (0.3, 0.1, 0) to (0.1, -0.1, 0.05).
     assert "would sit 287 mm from there" in fault.detail
@@ -257,7 +259,7 @@ def test_a_last_link_that_is_a_little_longer_than_its_file_is_left_to_physics(
     )
     campaign = make_campaign(fanuc, 1, Plan(poses=14, oriented=False), longer)
     assert [
-        fault.name for fault in other_interpretations(of_the_end(campaign))
+        fault.name for fault in find_better_interpretation(of_the_end(campaign))
     ] == names
 
 
@@ -269,7 +271,7 @@ def test_a_base_that_stands_a_little_off_is_left_to_physics(fanuc, shift, names)
     moved = replace_measured_columns(
         campaign, position=campaign.measurements.position + np.array([0.0, 0.0, shift])
     )
-    assert [fault.name for fault in other_interpretations(moved)] == names
+    assert [fault.name for fault in find_better_interpretation(moved)] == names
 
 
 def test_what_fits_as_well_is_listed_as_an_alternative(fanuc):
@@ -281,7 +283,9 @@ def test_what_fits_as_well_is_listed_as_an_alternative(fanuc):
         name: getattr(seen, name)[:, [1, 0, 2]]
         for name in ("position", "rotation_vector")
     }
-    (fault,) = other_interpretations(replace_measured_columns(campaign, **exchanged))
+    (fault,) = find_better_interpretation(
+        replace_measured_columns(campaign, **exchanged)
+    )
     assert fault.name == "swapped_axes" and len(fault.alternatives) >= 3
     assert all("rotation vectors likewise" in words for words in fault.alternatives)
 
@@ -289,7 +293,7 @@ def test_what_fits_as_well_is_listed_as_an_alternative(fanuc):
 def test_measurements_of_nothing_are_mended_by_nothing(campaign):
     rng = np.random.default_rng(5)
     assert (
-        other_interpretations(
+        find_better_interpretation(
             replace_measured_columns(
                 campaign,
                 position=rng.normal(0.0, 1.0, campaign.measurements.position.shape),
@@ -309,7 +313,7 @@ def test_a_robot_that_hardly_moves_is_not_fitted_by_gathering_measurements_in_on
     position = np.random.default_rng(3).normal(0.0, 1.0, (8, 3))
     pose = campaign.measurements.pose
     assert (
-        other_interpretations(
+        find_better_interpretation(
             replace_measured_columns(
                 campaign, joint_angles=angles[pose], position=position[pose]
             )
@@ -327,7 +331,7 @@ def test_a_mount_that_is_turned_otherwise_is_named_with_the_remedy_and_fitted_on
         [0.0, 0.6 * np.radians(degrees), 0.8 * np.radians(degrees)]
     )
     written = with_turned_mount(campaign, turn, moved_m)
-    (fault,) = other_interpretations(written)
+    (fault,) = find_better_interpretation(written)
     assert fault.name == "wrong_target"
     assert (
         f"T6DoF would be turned by {degrees}" in fault.detail
@@ -338,7 +342,7 @@ def test_a_mount_that_is_turned_otherwise_is_named_with_the_remedy_and_fitted_on
         for right in (None, tuple(turn.as_rotvec())):
             mount = replace(campaign.targets[3], rotation=right)
             assert (
-                other_interpretations(
+                find_better_interpretation(
                     replace(written, targets=(*campaign.targets[:3], mount))
                 )
                 == []
@@ -347,11 +351,11 @@ def test_a_mount_that_is_turned_otherwise_is_named_with_the_remedy_and_fitted_on
 
 def test_what_is_simple_comes_first_and_no_each_is_there_twice(fanuc):
     campaign = make_campaign(fanuc, 1, Plan(poses=10))
-    single = [*discrete(campaign), *shifts(campaign)]
+    single = [*list_discrete_hypotheses(campaign), *list_row_shifts(campaign)]
     assert single[0].joints == (1,)
     details = [each.detail for each in single]
     assert len(set(details)) == len(details)
-    assert [each.detail for each in fitted(campaign)] == [
+    assert [each.detail for each in list_fitted_hypotheses(campaign)] == [
         "the base stands elsewhere",
         "targets are turned otherwise",
         "targets sit elsewhere",
@@ -383,7 +387,7 @@ def test_measured_columns_of_each_target_or_pose_moved_by_one_are_named(
         members = np.flatnonzero(groups == group)
         source[members] = np.roll(members, steps)
     turned = measurements.rotation_vector[source]
-    (fault,) = other_interpretations(
+    (fault,) = find_better_interpretation(
         replace_measured_columns(
             campaign, position=measurements.position[source], rotation_vector=turned
         )

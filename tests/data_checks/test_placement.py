@@ -9,7 +9,11 @@ from made_campaigns import POINTS, Plan, make_campaign, replace_measured_columns
 from scipy.spatial.transform import Rotation
 from support import PinocchioPoint
 
-from elastocal.data_checks.placement import placed, robustly_placed, spread
+from elastocal.data_checks.placement import (
+    place_measurements,
+    place_robustly,
+    select_spread_poses,
+)
 
 EXACT = Plan(poses=12, loads=1, noise=0.0, force=0.0)
 
@@ -20,7 +24,7 @@ def exact(request, fanuc):
     return make_campaign(fanuc, 1, replace(EXACT, tracker=request.param == "tracker"))
 
 
-@pytest.mark.parametrize("place", [placed, robustly_placed])
+@pytest.mark.parametrize("place", [place_measurements, place_robustly])
 def test_measurements_of_the_nominal_robot_lie_where_it_puts_them(exact, place):
     found = place(exact)
     np.testing.assert_allclose(found.distance, 0.0, atol=1e-8)
@@ -34,7 +38,7 @@ def test_known_targets_are_predicted_by_pinocchio(fanuc):
         for k, target in enumerate(campaign.targets)
     )
     campaign, seen = replace(campaign, targets=moved), campaign.measurements
-    found = placed(campaign)
+    found = place_measurements(campaign)
     for row in range(0, len(seen), 7):
         target = moved[seen.target[row]]
         point = PinocchioPoint(
@@ -61,10 +65,10 @@ def test_one_measurement_in_four_far_off_moves_the_robust_fit_by_nothing_and_the
     far = rng.random(len(position)) < 0.25
     position[far] += [0.3, 0.0, 0.0]
     campaign = replace_measured_columns(campaign, position=position)
-    robust = robustly_placed(campaign)
+    robust = place_robustly(campaign)
     np.testing.assert_allclose(robust.distance[far], 0.3, rtol=1e-6)
     np.testing.assert_allclose(robust.distance[~far], 0.0, atol=1e-6)
-    assert placed(campaign).distance[~far].min() > 0.01
+    assert place_measurements(campaign).distance[~far].min() > 0.01
 
 
 def test_the_robust_fit_of_normal_errors_is_the_fit_to_all_and_single_rows_are_no_misfit(
@@ -72,13 +76,13 @@ def test_the_robust_fit_of_normal_errors_is_the_fit_to_all_and_single_rows_are_n
 ):
     campaign = make_campaign(fanuc, 1, Plan(poses=12, loads=0, tracker=True))
     np.testing.assert_array_equal(
-        robustly_placed(campaign).estimate.frame_position,
-        placed(campaign).estimate.frame_position,
+        place_robustly(campaign).estimate.frame_position,
+        place_measurements(campaign).estimate.frame_position,
     )
     exact = make_campaign(fanuc, 1, EXACT)
     one = np.where(exact.measurements.pose[:, None] == 3, 0.3, 0.0)
     assert (
-        placed(
+        place_measurements(
             replace_measured_columns(exact, position=exact.measurements.position + one)
         ).misfit.max()
         < 1e-6
@@ -94,7 +98,7 @@ def test_poses_are_spread_over_the_campaign_at_their_lowest_load_and_first_repea
     campaign = make_campaign(fanuc, 1, Plan(poses=12, loads=2, repeats=2))
     some = campaign.measurements.select(campaign.measurements.load > 0)
     order = np.random.default_rng(5).permutation(len(some))
-    found = spread(
+    found = select_spread_poses(
         replace(campaign, measurements=some.select(order)), wanted
     ).measurements
     for target in range(len(POINTS)):

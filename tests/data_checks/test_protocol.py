@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from made_loop_tables import CAMPAIGNS
 
-from elastocal.data_checks.protocol import OF_DATA, Fault, Value
+from elastocal.data_checks.protocol import DATA_FAMILY, Fault, Value
 from elastocal.diagnosis.effect_estimates import state_fault
 
 FAULT = Fault(
@@ -19,7 +19,7 @@ FAULT = Fault(
 def test_a_verdict_with_a_fault_finds_the_data_at_fault_and_one_without_does_not():
     verdict = CAMPAIGNS["named"]
     fault = state_fault(FAULT)
-    assert fault.family == OF_DATA
+    assert fault.family == DATA_FAMILY
     faulty = replace(verdict, effects=(*verdict.effects, fault))
     assert faulty.faults == (fault,)
     assert not verdict.faults and not replace(verdict, effects=()).faults

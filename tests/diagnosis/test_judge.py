@@ -9,11 +9,12 @@ from made_loop_tables import CAMPAIGNS, effect_entry
 
 from elastocal.diagnosis.diagnose import Diagnosis, Step
 from elastocal.diagnosis.judge import generate_residual_blocks, judge
+from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.model import get_joint_compliances
 from elastocal.fitting.noise import Noise
-from elastocal.mechanics.elastostatics import generalized_forces
-from elastocal.mechanics.kinematics import poses, poses_and_jacobians
+from elastocal.mechanics.elastostatics import compute_generalized_forces
+from elastocal.mechanics.kinematics import compute_poses, compute_poses_and_jacobians
 from elastocal.validation.held_out import METRICS
 from elastocal.verdict import TrainingVerdict
 
@@ -55,6 +56,7 @@ def diagnosis_of(case, steps):
         None,
         verdict,
         case.campaign.measurements.select(np.zeros(0, int)),
+        Settings(),
     )
 
 
@@ -125,17 +127,17 @@ def test_residuals_are_measured_less_predicted_for_every_measurement_in_its_orde
             moved = angles
             # The load is taken where the robot has yielded to it.
             for _ in range(5):
-                end = poses_and_jacobians(robot.chain, moved, robot.chain.end_effector)[
-                    2
-                ]
-                moved = angles + generalized_forces(
+                end = compute_poses_and_jacobians(
+                    robot.chain, moved, robot.chain.end_effector
+                )[2]
+                moved = angles + compute_generalized_forces(
                     end, wrench
                 ) * get_joint_compliances(fitted.model, fitted.estimate)
                 if kind == "effect":
                     moved[:, 2] += fitted.estimate.coefficients[-1][0]
             for number, target in enumerate(case.campaign.targets):
                 mask = block["target"] == number
-                predicted = poses(
+                predicted = compute_poses(
                     robot.chain, moved[mask], robot.chain.point(target.point)
                 )[0]
                 off = np.column_stack([block[f"{stage}_d{axis}"] for axis in "xyz"])[

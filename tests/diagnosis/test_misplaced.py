@@ -12,10 +12,10 @@ from elastocal.diagnosis.misplaced import (
     find_misplaced_frames,
 )
 from elastocal.fitting.noise import estimate_noise, fit_declared_model
-from elastocal.loop.overview import overview
-from elastocal.loop.whole import cases_in
-from elastocal.mechanics.kinematics import poses
-from elastocal.mechanics.sites import sites_of
+from elastocal.loop.overview import inspect_campaign
+from elastocal.loop.whole import read_cases
+from elastocal.mechanics.kinematics import compute_poses
+from elastocal.mechanics.sites import build_sites
 
 DECLARED_M = np.array([0.1, 0.0, 0.05])
 POSES = 40
@@ -26,7 +26,7 @@ ARMS = ("kuka", "abb", "ur10")
 def deviating_coordinates(robot, angles, place, shift_m, draws):
     """Coordinates (P, C) of a robot with usual errors of geometry, at some joint angles
     (P, n), whose base or link is shifted."""
-    sites = sites_of(robot)
+    sites = build_sites(robot)
     coordinates = np.zeros((len(angles), sites.chain.coordinates))
     offsets = 5e-4 * draws.standard_normal(robot.joints)
     coordinates[:, : robot.joints] = angles + offsets
@@ -51,9 +51,9 @@ def misdeclared_folder(folder, robot, name, place, shift_m, seed=1):
     low, high = robot.joint_limits.T
     angles = low + (high - low) * draws.random((POSES, robot.joints))
     coordinates = deviating_coordinates(robot, angles, place, shift_m, draws)
-    chain = sites_of(robot).chain
+    chain = build_sites(robot).chain
     end = chain.end_effector
-    position, rotation = poses(chain, coordinates, end)
+    position, rotation = compute_poses(chain, coordinates, end)
     target_m = DECLARED_M + (np.array(shift_m) if place == "tool" else 0.0)
     position = position + rotation @ target_m
     turn = Rotation.from_rotvec(6e-5 * draws.standard_normal(position.shape))
@@ -85,7 +85,7 @@ def misdeclared_folder(folder, robot, name, place, shift_m, seed=1):
 
 def find_in(folder):
     """Misplaced frames of a campaign."""
-    case, _ = cases_in(folder, ROBOTS)
+    case, _ = read_cases(folder, ROBOTS)
     noise, _ = estimate_noise(case)
     fitted = fit_declared_model(case.model, case.observations, noise)
     return find_misplaced_frames(fitted, case.campaign)
@@ -119,10 +119,10 @@ def test_a_wrong_target_or_length_is_found_with_its_size(
 def test_a_misplaced_base_or_target_is_reported_before_any_diagnosis(tmp_path, name):
     robot = analysed(name)
     base = misdeclared_folder(tmp_path / "base", robot, name, "base", [0, 5e-3, 0])
-    first = overview(base, ROBOTS).attention[0]
+    first = inspect_campaign(base, ROBOTS).attention[0]
     assert "base stands 5." in first or "base stands 4.9" in first
     tool = misdeclared_folder(tmp_path / "tool", robot, name, "tool", [5e-3, 0, 0])
-    sentences = overview(tool, ROBOTS).attention
+    sentences = inspect_campaign(tool, ROBOTS).attention
     assert "along x of" in sentences[0]
     assert not any("base stands" in sentence for sentence in sentences)
 
@@ -140,7 +140,7 @@ def test_the_reference_point_is_described_with_the_declared_offset_of_its_target
     tmp_path,
 ):
     folder = misdeclared_folder(tmp_path / "made", analysed("kuka"), "kuka", "", 0.0)
-    case, _ = cases_in(folder, ROBOTS)
+    case, _ = read_cases(folder, ROBOTS)
     sentence = describe_reference_point(case.campaign)
     assert "6DoF" in sentence
     assert "(100.0, 0.0, 50.0) mm" in sentence

@@ -30,10 +30,10 @@ from elastocal.effects.catalogue import (
     declared_candidates,
     list_bundled_effects,
 )
-from elastocal.effects.conditions import with_total
+from elastocal.effects.conditions import replace_total_load
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import evaluate_conditions
-from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.kinematics import compute_poses
 
 CHAINS = ["fanuc", "fixed rotations", *ODD_CHAINS]
 # Symbols of which the units of parameters are composed.
@@ -242,7 +242,7 @@ def test_laws_go_with_the_loads_of_no_other_coordinates_than_they_displace(chain
         displaced = sorted({coordinate for law in laws for coordinate in law})
         elsewhere = 2.0 * around.total + 1.0
         elsewhere[:, displaced] = around.total[:, displaced]
-        again = displacements(candidate, with_total(around, elsewhere), *start)
+        again = displacements(candidate, replace_total_load(around, elsewhere), *start)
         np.testing.assert_array_equal(
             again, displacements(candidate, around, *start), err_msg=candidate.key
         )
@@ -300,7 +300,9 @@ def test_adding_an_effect_is_adding_one_module(fanuc, add_module):
     states.wrench[:] = 0
     estimate = make_estimate(model).with_effects((candidate,))
     estimate.coefficients[0][:] = 0.02
-    expected = poses(fanuc.chain, states.joint_angles, fanuc.chain.end_effector)[0] - [
+    expected = compute_poses(
+        fanuc.chain, states.joint_angles, fanuc.chain.end_effector
+    )[0] - [
         0,
         0,
         0.02,

@@ -20,7 +20,7 @@ from synthetic import (
 )
 
 from elastocal.effects.catalogue import candidates_on
-from elastocal.effects.conditions import conditions_of, offered
+from elastocal.effects.conditions import build_conditions, find_offered_needs
 from elastocal.effects.gravity import declared_weight, lever_of_pull
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import (
@@ -28,9 +28,9 @@ from elastocal.fitting.model import (
     evaluate_conditions,
     list_parameters,
 )
-from elastocal.mechanics.kinematics import motion
+from elastocal.mechanics.kinematics import compute_motion
 from elastocal.mechanics.robot import Mass
-from elastocal.mechanics.sites import sites_of
+from elastocal.mechanics.sites import build_sites
 
 PLACE = np.array([0.1, -0.4, 0.25])
 TILTED = (3.0, -4.0, -8.0)
@@ -74,7 +74,7 @@ def test_gravity_on_every_coordinate_where_the_robot_has_yielded_is_that_of_pino
     robot = weighed(
         fanuc if name == "fanuc" else robot_of((OTHER_CHAINS | ODD_CHAINS)[name])
     )
-    sites = sites_of(robot)
+    sites = build_sites(robot)
     base = candidates_on(sites)["base_compliance"]
     model = make_model(robot, effects=(base,))
     estimate = make_estimate(model, seed=2, size=1.0)
@@ -108,7 +108,7 @@ def test_masses_and_compliances_have_exact_sensitivities_with_all_that_they_load
     fanuc, identified
 ):
     robot = weighed(fanuc)
-    known = candidates_on(sites_of(robot))
+    known = candidates_on(build_sites(robot))
     keys = (
         "stiffening@2",
         "lost_motion@3",
@@ -167,10 +167,10 @@ def test_priors_are_those_of_the_robot_file(fanuc):
             Mass(3, 50.0, (0.0, 0.0, 0.01), 0.2),
         ),
     )
-    found = declared_weight(sites_of(robot)).parameters
+    found = declared_weight(build_sites(robot)).parameters
     # A centre is off by its relative error times its distance from the joint, and lies
     # anywhere in the girth of its link.
-    width = 0.1 * np.linalg.norm(sites_of(robot).link_vectors_m, axis=1).sum()
+    width = 0.1 * np.linalg.norm(build_sites(robot).link_vectors_m, axis=1).sum()
     assert 0.3 < width < 0.7
     first = np.hypot(20.0 * 0.5, 200.0 * width / 12**0.5)
     second = np.hypot(10.0 * 0.1, 50.0 * width / 12**0.5)
@@ -206,7 +206,7 @@ def test_plausible_payload_is_a_share_of_what_the_robot_carries_as_far_as_that_i
         for link, mass in enumerate(known.get("masses", ()))
     )
     sites = replace(
-        sites_of(replace(fanuc, payload_kg=None)),
+        build_sites(replace(fanuc, payload_kg=None)),
         masses=masses,
         payload_kg=known.get("payload_kg"),
     )
@@ -261,13 +261,15 @@ def test_structure_bears_the_usual_weight_where_neither_masses_nor_loads_are_kno
     potential energy."""
     states = make_states(6, 4, seed=7)
     states.wrench[:] = 0.0
-    sites = replace(sites_of(replace(fanuc, payload_kg=100.0)), usual_weight=True)
-    around = conditions_of(sites, fanuc.compliance, states)
+    sites = replace(build_sites(replace(fanuc, payload_kg=100.0)), usual_weight=True)
+    around = build_conditions(sites, fanuc.compliance, states)
     assert sites.usual_masses.sum() == pytest.approx(600.0)
-    assert offered(sites, states) & {"load", "load on the joints"} == {"load"}
+    assert find_offered_needs(sites, states) & {"load", "load on the joints"} == {
+        "load"
+    }
 
     def energy(coordinates):
-        ends = motion(sites.chain, coordinates, sites.followed).position[
+        ends = compute_motion(sites.chain, coordinates, sites.followed).position[
             1 : sites.joints + 2
         ]
         return -np.einsum(

@@ -12,7 +12,7 @@ from synthetic import equipped
 from elastocal.effects.catalogue import candidates_on, list_bundled_effects
 from elastocal.effects.sizes import full_torque_Nm, lever_m
 from elastocal.mechanics.robot import Mass
-from elastocal.mechanics.sites import sites_of
+from elastocal.mechanics.sites import build_sites
 
 # Sized by what they do to the arm, or to the wrist alone.
 ELASTIC = {
@@ -28,7 +28,7 @@ ELASTIC |= {"joint_tilt", "link_elasticity", "stiffening"}
 def plausible(robot):
     return {
         (key, p.name): p.plausible
-        for key, candidate in candidates_on(sites_of(robot)).items()
+        for key, candidate in candidates_on(build_sites(robot)).items()
         for p in candidate.parameters
     }
 
@@ -63,19 +63,21 @@ def test_what_yields_is_sized_by_the_compliance_of_the_arm_and_nothing_else_is(f
 def test_rigid_joints_are_sized_as_those_of_an_arm_of_this_load_and_reach(fanuc):
     rigid = replace(fanuc, compliance=0.0 * fanuc.compliance, payload_kg=165.0)
     for joint in range(6):
-        ours = list_bundled_effects()["joint_tilt"].size("tilt", sites_of(rigid), joint)
+        ours = list_bundled_effects()["joint_tilt"].size(
+            "tilt", build_sites(rigid), joint
+        )
         assert 0.1 < ours / fanuc.compliance[joint] < 3.0
 
 
 def test_parameters_have_the_sign_of_the_size(fanuc):
     own = list_bundled_effects()
     (tilt,) = own["joint_tilt"].parameters(
-        "tilt", ["t"], "rad/(N m)", sites_of(fanuc), 0, over=4.0
+        "tilt", ["t"], "rad/(N m)", build_sites(fanuc), 0, over=4.0
     )
     assert (tilt.sign, tilt.plausible) == (1, pytest.approx(0.25 * fanuc.compliance[0]))
     assert (
         own["stiffening"]
-        .parameters("lost beyond", ["b"], "rad/(N m)", sites_of(fanuc), 0)[0]
+        .parameters("lost beyond", ["b"], "rad/(N m)", build_sites(fanuc), 0)[0]
         .sign
         == -1
     )

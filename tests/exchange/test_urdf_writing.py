@@ -14,7 +14,7 @@ from elastocal.application.exported import fold_effects
 from elastocal.effects.catalogue import candidates_on
 from elastocal.exchange.urdf import robot_from_urdf
 from elastocal.exchange.urdf_writing import write_calibrated_origins
-from elastocal.mechanics.sites import sites_of
+from elastocal.mechanics.sites import build_sites
 
 # With what people have in their files: comments, meshes, other programs' elements, a
 # mimic, an origin that is not written.
@@ -47,7 +47,7 @@ PARTS = (
 
 def calibrated_of(robot, seed=4):
     places = range(1, robot.joints + 1)
-    known = candidates_on(sites_of(robot))
+    known = candidates_on(build_sites(robot))
     keys = [
         *(f"joint_offset@{place}" for place in places),
         *(f"link_geometry@{place}" for place in places),

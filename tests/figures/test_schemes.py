@@ -16,12 +16,12 @@ from elastocal.figures.schemes import (
     lay_out_chain,
 )
 from elastocal.io.documents import read_document
-from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.mechanics.robot_file import parse_robot
 
 FILES = sorted(
     (Path(__file__).resolve().parents[2] / "config" / "robots").glob("*.yaml")
 )
-ROBOTS = {file.stem: robot_from_document(read_document(file)) for file in FILES}
+ROBOTS = {file.stem: parse_robot(read_document(file)) for file in FILES}
 CHAINS = {
     "three joints, turned frames": "Rz(q1) Ry(q2) Tx(1.0) Rx(90deg) Ry(q3) Rz(-30deg) Tx(0.5) [EE]",
     "one joint, no length": "Rz(q1) [EE]",
@@ -39,7 +39,7 @@ for description, chain in CHAINS.items():
         "joint_limits_deg": [[-180, 180]] * joint_count,
         "compliance_urad_per_Nm": [1.0] * joint_count,
     }
-    ROBOTS[description] = robot_from_document(document)
+    ROBOTS[description] = parse_robot(document)
 each_robot = pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
 # The layout has a known fault: six shifts of a few millimetres between the joints of the
 # Gen3 crowd its names. No page shows the scheme of this robot.

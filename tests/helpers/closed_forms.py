@@ -15,9 +15,9 @@ from support import OTHER_CHAINS, TRACK, PinocchioPoint, chain_of
 from synthetic import displacements, equipped, make_states
 
 from elastocal.campaigns.reading import read_robot
-from elastocal.effects.conditions import conditions_of
+from elastocal.effects.conditions import build_conditions
 from elastocal.mechanics.chain import MeasuringPoint
-from elastocal.mechanics.kinematics import poses_and_jacobians
+from elastocal.mechanics.kinematics import compute_poses_and_jacobians
 from elastocal.mechanics.robot import Mass
 
 ROBOTS = Path(__file__).resolve().parents[2] / "config" / "robots"
@@ -193,9 +193,10 @@ def arm_on(chain_name, kind):
     coordinates[:, : arm.joints] = arm.states.joint_angles
     points = [replace(point, offset_m=(0.0, 0.0, 0.0)) for point in sites.chain.points]
     jacobians = [
-        poses_and_jacobians(sites.chain, coordinates, point)[2] for point in points
+        compute_poses_and_jacobians(sites.chain, coordinates, point)[2]
+        for point in points
     ]
-    conditions = conditions_of(sites, arm.compliance, arm.states)
+    conditions = build_conditions(sites, arm.compliance, arm.states)
     return arm, conditions, np.stack(jacobians, axis=1)
 
 

@@ -15,7 +15,12 @@ import yaml
 from elastocal.io.origin import Origin
 from elastocal.io.records import JobRecord, write_records
 from elastocal_proof.audit.arm import Arm
-from elastocal_proof.audit.audited import COMPONENTS, WRENCH, Audited, numbers
+from elastocal_proof.audit.finished_run import (
+    COMPONENTS,
+    WRENCH,
+    FinishedRun,
+    open_philox_stream,
+)
 
 _MADE = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8"))
 ROBOT, STRATEGY, CONFIGURATION = (
@@ -34,13 +39,15 @@ def make_run(folder):
     noises = []
     found = []
     for data_set in range(4):
-        turns = numbers(1, "two", "identification/joint angles", data_set).random(
-            (5, 2)
+        turns = open_philox_stream(
+            1, "two", "identification/joint angles", data_set
+        ).random((5, 2))
+        normal = open_philox_stream(
+            1, "two", "identification/force", data_set
+        ).standard_normal((5, 3))
+        noise = open_philox_stream(1, "two", "noise/hand", data_set).standard_normal(
+            (5, 6)
         )
-        normal = numbers(1, "two", "identification/force", data_set).standard_normal(
-            (5, 3)
-        )
-        noise = numbers(1, "two", "noise/hand", data_set).standard_normal((5, 6))
         matrices = []
         for k, (q, f) in enumerate(zip(2 * np.pi * turns - np.pi, normal, strict=True)):
             force = 500 * f / np.linalg.norm(f)
@@ -81,7 +88,7 @@ def make_run(folder):
     pd.DataFrame(found, columns=names).to_parquet(
         folder / "results/identified/two/100um/hand.parquet"
     )
-    return Audited(folder, CONFIGURATION, {"two": ROBOT}, {"hand": STRATEGY}, 20)
+    return FinishedRun(folder, CONFIGURATION, {"two": ROBOT}, {"hand": STRATEGY}, 20)
 
 
 def forge(folder, file):

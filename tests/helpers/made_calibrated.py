@@ -11,7 +11,7 @@ from elastocal.effects.catalogue import candidates_on
 from elastocal.effects.elastic import joint_compliance
 from elastocal.effects.gravity import declared_weight
 from elastocal.fitting.model import Estimate, Model, list_parameters
-from elastocal.mechanics.sites import sites_of
+from elastocal.mechanics.sites import build_sites
 
 # What a good arm has, of each family that an afternoon finds.
 USUAL = (
@@ -25,7 +25,7 @@ USUAL = (
 def plain_model(robot, *keys, identified=True):
     """The model of a robot at its foot, with springs and these candidates; no targets
     yet."""
-    sites = sites_of(robot)
+    sites = build_sites(robot)
     found = candidates_on(sites)
     springs = (joint_compliance(sites),) if identified else ()
     weight = (declared_weight(sites),) if sites.masses else ()

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.io
 from scipy.spatial.transform import Rotation
 
-from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.kinematics import compute_poses
 
 OFFSETS = np.array([[0.2, 0.0, 0.05], [0.2, 0.06, -0.02], [0.15, -0.04, -0.04]])
 POSES = 8
@@ -16,7 +16,7 @@ REPEATS = 3
 def reflectors(chain, angles, seed):
     """Positions (N, 3 reflectors, 3) in some tracker's frame."""
     rng = np.random.default_rng(seed)
-    position, rotation = poses(chain, angles, chain.end_effector)
+    position, rotation = compute_poses(chain, angles, chain.end_effector)
     flange = position[:, None] + np.einsum("nij,kj->nki", rotation, OFFSETS)
     return flange @ Rotation.random(rng=rng).as_matrix().T + rng.uniform(-3, 3, 3)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 from hypothesis import strategies as st
 
-from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.kinematics import compute_poses
 
 GRAVITY = np.array([0.0, 0.0, -9.80665])
 
@@ -145,7 +145,7 @@ def assert_same_poses(
     by_pinocchio = Pinocchio(path)
     rng = np.random.default_rng(5)
     angles = rng.uniform(-np.pi, np.pi, (count, robot.joints))
-    position, rotation = poses(
+    position, rotation = compute_poses(
         robot.chain, robot.model_angles(angles), robot.chain.end_effector
     )
     for state, own, turned in zip(angles, position, rotation, strict=True):

@@ -9,7 +9,7 @@ import yaml
 from made_folders import make_folder
 
 from elastocal.campaigns.simulation import Plan, draw_measurements
-from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.mechanics.robot_file import parse_robot
 
 SERVICE_ARM = yaml.safe_load(
     Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8")
@@ -27,7 +27,7 @@ def service_arm_folder(folder, seed, poses=34, noise_m=3e-4):
         for name, value in SERVICE_ARM["lengths_m"].items()
     }
     true = replace(
-        robot_from_document(SERVICE_ARM | {"lengths_m": lengths}),
+        parse_robot(SERVICE_ARM | {"lengths_m": lengths}),
         compliance=np.zeros(8),
     )
     plan = Plan(("8DoF",), poses, 0.0, (0,), (0.0, 0.0, 0.0), 1, 0, 1e-3, 1e-3)

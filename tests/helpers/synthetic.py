@@ -9,7 +9,7 @@ from support import robot_on
 
 from elastocal.campaigns.campaign import Measurements, Target
 from elastocal.effects.catalogue import candidates_on
-from elastocal.effects.conditions import conditions_of
+from elastocal.effects.conditions import build_conditions
 from elastocal.effects.elastic import joint_compliance
 from elastocal.effects.gravity import declared_weight
 from elastocal.fitting.model import (
@@ -23,9 +23,9 @@ from elastocal.fitting.model import (
 )
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import Observations, States
-from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.kinematics import compute_poses
 from elastocal.mechanics.robot import Compensator, Robot
-from elastocal.mechanics.sites import sites_of
+from elastocal.mechanics.sites import build_sites
 
 NOISE = Noise("declared", 60e-6, 60e-6, np.zeros(6))
 
@@ -59,7 +59,7 @@ def equipped(holder):
         if isinstance(holder, Robot)
         else robot_on(holder, np.zeros(holder.coordinates))
     )
-    sites = sites_of(robot)
+    sites = build_sites(robot)
     if sites.compensator is None and sites.shoulder is not None:
         sites = replace(sites, compensator=Compensator(sites.shoulder + 1, "spring"))
     return (
@@ -218,7 +218,7 @@ def make_measurements(
     for index, one in enumerate(model.targets):
         point = replace(model.sites.chain.point(one.point), offset_m=one.offset_m)
         mask = target == index
-        position[mask], rotation[mask] = poses(
+        position[mask], rotation[mask] = compute_poses(
             model.sites.chain, coordinates[mask], point
         )
     turned = Rotation.from_rotvec(
@@ -240,7 +240,7 @@ def conditions_on(holder, states, compliance=None):
     compliance = (
         1e-6 * np.arange(1, sites.joints + 1) if compliance is None else compliance
     )
-    return conditions_of(sites, compliance, states)
+    return build_conditions(sites, compliance, states)
 
 
 def find_candidate(holder, key):

@@ -5,7 +5,7 @@ import pandas as pd
 
 from elastocal.io.data_frames import (
     read_frame,
-    read_long,
+    read_robot_tables,
     write_csv,
     write_latex,
     write_markdown,
@@ -65,7 +65,7 @@ def test_tables_of_many_robots_are_headed_by_their_origin_and_empty_where_joints
             [columns],
             {"robot": robot, "noise": noise, "configuration": settings},
         )
-    frame = read_long(paths, per_joint)
+    frame = read_robot_tables(paths, per_joint)
     assert frame.index.tolist() == [0, 1, 2, 3] and frame.robot.tolist() == [
         "big",
         "big",

@@ -7,8 +7,8 @@ import pytest
 
 import elastocal
 from elastocal.io.origin import (
-    configuration_sha256,
     describe_provenance,
+    digest_configuration,
     format_canonical_json,
 )
 
@@ -22,7 +22,7 @@ def test_equal_configurations_have_one_digest_however_they_are_ordered():
         == '{"a":1,"b":{"c":[1.5,"µ"],"d":null}}'
     )
     assert (
-        configuration_sha256(one)
+        digest_configuration(one)
         == hashlib.sha256(format_canonical_json(other).encode("utf-8")).hexdigest()
     )
     with pytest.raises(ValueError, match="JSON"):

@@ -27,16 +27,20 @@ from elastocal.application.calibrated import (
     predict_poses,
 )
 from elastocal.io.json_files import read_json
-from elastocal.io.origin import environment
+from elastocal.io.origin import list_versions
 from elastocal.io.records import compute_sha256
-from elastocal.loop.calibrated_files import certificate, error_budget, load_diagnosed
-from elastocal.loop.diagnosis_tables import diagnosis_from
+from elastocal.loop.calibrated_files import (
+    build_certificate,
+    compute_error_budget,
+    load_diagnosed,
+)
+from elastocal.loop.diagnosis_tables import restore_diagnosis
 
 
 def test_the_robot_is_that_of_the_final_fit(checkout):
     found = load_diagnosed(checkout / "made", ROBOTS, checkout)
     tables = checkout / "results/loop/made"
-    again = diagnosis_from(found.case, read_json(tables / "diagnosis.json"))
+    again = restore_diagnosis(found.case, read_json(tables / "diagnosis.json"))
     expected = calibrate_by_fit(again.final, found.case.campaign.robot)
     assert [e.key for e in found.calibrated.model.effects] == [
         "joint_compliance",
@@ -105,7 +109,7 @@ def test_it_says_what_code_data_and_environment_made_it(checkout):
         "commit": "c0ffee",
         "code_sha256": digest({ENGINE: compute_sha256(checkout / ENGINE)}),
         "data_sha256": digest(sorted(files.items())),
-        "environment": environment(checkout),
+        "environment": list_versions(checkout),
     }
 
 
@@ -171,7 +175,7 @@ def test_a_certificate_follows_the_prediction_if_enough_configurations_judge(
         ),
     )
     tolerance_m = share * found.verdict.accuracy.rms_m
-    conformity = certificate(found, tolerance_m, 0.05)["conformity"]
+    conformity = build_certificate(found, tolerance_m, 0.05)["conformity"]
     assert conformity["decision"] == decision
     assert [
         line.startswith("too few: 3 configurations")
@@ -196,7 +200,7 @@ def test_each_line_of_the_budget_is_what_the_robot_misses_without_that_effect(
 ):
     calibrated = make_calibrated_robot(fanuc, *USUAL)
     found, (whole, _) = (
-        error_budget(calibrated, *states),
+        compute_error_budget(calibrated, *states),
         predict_poses(calibrated, *states),
     )
     assert found["uncorrected"] == pytest.approx(
@@ -231,6 +235,7 @@ def test_springs_of_the_robot_file_cost_what_they_give_under_load(fanuc, states)
     )
     expected = rms(*(predict_poses(each, *states)[0] for each in (calibrated, rigid)))
     assert (
-        error_budget(calibrated, *states)["joint_compliance"] == pytest.approx(expected)
+        compute_error_budget(calibrated, *states)["joint_compliance"]
+        == pytest.approx(expected)
         and expected > 1e-5
     )

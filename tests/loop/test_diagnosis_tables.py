@@ -20,7 +20,7 @@ from elastocal.io.json_files import write_json
 from elastocal.io.storage import read_table, write_table
 from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop.loading import load_campaign
-from elastocal.loop.schemas import STEPS, measurements
+from elastocal.loop.schemas import STEPS, build_measurements_schema
 
 MODELS = {
     "frames, targets, springs": (dict(fitted_frames=True, rows=6, identified=True), ()),
@@ -56,7 +56,9 @@ def test_a_case_is_the_folder_and_a_test_may_be_of_another_campaign(
         files[0],
         descriptions | {"held_out": changed(other, ("campaign", "campaign"), "other")},
     )
-    write_table(files[1], measurements(6), [tabulate_measurements(training)], {})
+    write_table(
+        files[1], build_measurements_schema(6), [tabulate_measurements(training)], {}
+    )
     case = tables.load_case(*files)
     for name in ("pose", "load", "joint_angles", "wrench", "position"):
         np.testing.assert_array_equal(
@@ -117,8 +119,8 @@ def test_models_and_estimates_come_back_from_json_and_parameters_from_their_tabl
         None,
     )
     found = SimpleNamespace(document={}, steps=[Step("all", "effect", fitted)])
-    (step,) = json.loads(json.dumps(tables.diagnosis_facts(found)))["steps"]
-    again, back = tables.step_model(
+    (step,) = json.loads(json.dumps(tables.serialize_diagnosis(found)))["steps"]
+    again, back = tables.restore_step_model(
         SimpleNamespace(model=declared, candidates=candidates), step
     )
     assert again.effects == model.effects and back.sessions == estimate.sessions
@@ -136,8 +138,8 @@ def test_models_and_estimates_come_back_from_json_and_parameters_from_their_tabl
             getattr(back, name), getattr(estimate, name), strict=True
         ):
             np.testing.assert_array_equal(one, other)
-    write_table(tmp_path / "p.parquet", STEPS, tables.step_blocks(found), {})
-    columns = tables.final_parameters(
+    write_table(tmp_path / "p.parquet", STEPS, tables.generate_step_blocks(found), {})
+    columns = tables.select_final_parameters(
         {"steps": [step]}, read_table(tmp_path / "p.parquet", STEPS)
     )
     assert columns["held"].tolist() == held.tolist()

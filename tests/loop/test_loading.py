@@ -6,7 +6,7 @@ from support import refused
 
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.loop.loading import REMAINDERS, load_campaign
-from elastocal.remainder.regressions import REGRESSIONS
+from elastocal.residual_model.regressions import REGRESSIONS
 
 
 def test_descriptions_hold_what_a_campaign_may_leave_out(kuka, config_folder, tmp_path):

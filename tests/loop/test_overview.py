@@ -7,12 +7,14 @@ from analysed_robots import ROBOTS
 from made_folders import make_folder, make_table
 from small_data import service_arm_folder
 
-from elastocal.loop.overview import overview
+from elastocal.loop.overview import inspect_campaign
 
 
 @pytest.fixture(scope="module")
 def found(kuka, tmp_path_factory):
-    return overview(make_folder(tmp_path_factory.mktemp("o") / "made", kuka), ROBOTS)
+    return inspect_campaign(
+        make_folder(tmp_path_factory.mktemp("o") / "made", kuka), ROBOTS
+    )
 
 
 def said(found, words):
@@ -45,7 +47,7 @@ def test_a_compliance_that_comes_out_negative_is_said(kuka, tmp_path):
         replace(kuka, compliance=kuka.compliance * [1.0, 1.0, -1.0, 1.0, 1.0, 1.0]),
         "made",
     )
-    found = overview(make_folder(tmp_path / "made", kuka, table=table), ROBOTS)
+    found = inspect_campaign(make_folder(tmp_path / "made", kuka, table=table), ROBOTS)
     assert said(found, "the compliance of joint 3 comes out negative")
 
 
@@ -53,7 +55,8 @@ def test_parameters_that_are_many_for_the_poses_are_said_and_how_many_poses_it_t
     tmp_path,
 ):
     (few,) = said(
-        overview(service_arm_folder(tmp_path / "made", 1), ROBOTS), "poses are few"
+        inspect_campaign(service_arm_folder(tmp_path / "made", 1), ROBOTS),
+        "poses are few",
     )
     words = few.replace(",", "").replace(":", "").split(" ")
     parameters, effective, numbers = (

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from made_loop_tables import effect_entry, make_verdict
 
-from elastocal.loop.summary import campaign_rows
+from elastocal.loop.summary import tabulate_campaigns
 
 
 def verdict(word, *effects):
@@ -41,7 +41,7 @@ def test_errors_are_distances_in_millimetres_and_repeats_of_a_state_are_averaged
         "one": errors([1.0, -2.0, 3.0], [0.1, 0.1, -0.4]),
         "two": errors([1.5, -0.5, 0.25], pose=[4, 4, 7], repeat=[0, 1, 0]),
     }
-    one, two = campaign_rows(
+    one, two = tabulate_campaigns(
         {name: verdict("named") for name in residuals}, residuals, {}, 1
     ).itertuples()
     assert (one.campaign, one.session, one.poses) == ("one", 0, 3)
@@ -71,7 +71,7 @@ def test_folds_of_one_campaign_are_one_row_with_all_their_poses_and_counted_verd
         name: errors([1.0 + k, 1.0 + k], pose=[2 * k, 2 * k + 1])
         for k, name in enumerate(verdicts)
     }
-    table = campaign_rows(
+    table = tabulate_campaigns(
         verdicts, residuals, {"all folds": ["fold 1", "fold 2", "fold 3"]}, 1
     ).set_index("campaign")
     assert list(table.index) == ["alone", "all folds"]

@@ -14,7 +14,7 @@ from small_data import service_arm_folder
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.settings import Settings
-from elastocal.loop.whole import cases_in, diagnosed
+from elastocal.loop.whole import diagnose_folder, read_cases
 
 # Loads in both senses, for what comes with the load and is in no catalogue.
 BOTH_SENSES = replace(PLAN, poses=40, ladder=(0, 1, -1))
@@ -81,7 +81,7 @@ def folder_of(path, robot, kind):
 
 @pytest.mark.parametrize("kind", slow_but(["several", "named"], KINDS))
 def test_verdict_is(kind, kuka, tmp_path):
-    verdict = diagnosed(folder_of(tmp_path, kuka, kind), ROBOTS, 1)
+    verdict = diagnose_folder(folder_of(tmp_path, kuka, kind), ROBOTS, 1)
     json.dumps(verdict, allow_nan=False)
     if kind == "named":
         # What is left of measurements that are wrong in themselves is no statement on
@@ -124,7 +124,7 @@ def test_no_step_before_the_judgement_depends_on_held_out_measurements(kuka, tmp
     """Held-out measurements a metre off, or at other loads and angles, change nothing
     of the diagnosis, to the last digit."""
     folder = folder_of(tmp_path, kuka, "several")
-    case, held_out = cases_in(folder, ROBOTS)
+    case, held_out = read_cases(folder, ROBOTS)
     unseen = set(
         zip(
             held_out.campaign.measurements.session,
@@ -145,7 +145,7 @@ def test_no_step_before_the_judgement_depends_on_held_out_measurements(kuka, tmp
     ):
         table[name] = table[name] + change * mine
     spoilt_folder = make_folder(tmp_path / "spoilt" / "made", kuka, table=table)
-    spoilt, spoilt_held_out = cases_in(spoilt_folder, ROBOTS)
+    spoilt, spoilt_held_out = read_cases(spoilt_folder, ROBOTS)
     assert (
         np.abs(
             spoilt_held_out.campaign.measurements.position
@@ -168,7 +168,7 @@ def test_a_calibration_by_few_poses_is_no_worse_than_none(tmp_path):
     """Without priors these end at 1.12 times the error of frames alone."""
     ratios = []
     for seed in range(4):
-        training, held_out = cases_in(
+        training, held_out = read_cases(
             service_arm_folder(tmp_path / f"arm{seed}", seed), ROBOTS
         )
         heldout = judge(diagnose(training, Settings(), 1), held_out, 1).document[

@@ -9,13 +9,13 @@ from scipy.integrate import quad
 from support import random_loads
 
 from elastocal.mechanics.elastostatics import (
-    generalized_forces,
-    joint_torques,
-    regressor,
-    tube_compliance,
-    wrench_of_offset_force,
+    build_regressor,
+    compute_generalized_forces,
+    compute_joint_torques,
+    compute_offset_wrench,
+    compute_tube_compliance,
 )
-from elastocal.mechanics.kinematics import poses, poses_and_jacobians
+from elastocal.mechanics.kinematics import compute_poses, compute_poses_and_jacobians
 from elastocal.mechanics.robot import Tube
 from elastocal.study.simulation import compute_true_deflections
 
@@ -27,12 +27,12 @@ def test_offset_that_turns_with_the_tool_loads_the_joints_as_a_force_at_that_tar
     force = loads.wrench[..., :3]
     end = robot.chain.end_effector
     target = replace(end, offset_m=(0.0, 0.5, 0.0))
-    rotation = poses(robot.chain, loads.joint_angles, end)[1]
-    at_end = wrench_of_offset_force(force, target.offset_m, rotation)
+    rotation = compute_poses(robot.chain, loads.joint_angles, end)[1]
+    at_end = compute_offset_wrench(force, target.offset_m, rotation)
     at_target = np.concatenate([force, np.zeros_like(force)], axis=-1)
     np.testing.assert_allclose(
-        joint_torques(robot.chain, loads.joint_angles, at_end, end),
-        joint_torques(robot.chain, loads.joint_angles, at_target, target),
+        compute_joint_torques(robot.chain, loads.joint_angles, at_end, end),
+        compute_joint_torques(robot.chain, loads.joint_angles, at_target, target),
         rtol=0,
         atol=1e-9,
     )
@@ -40,13 +40,17 @@ def test_offset_that_turns_with_the_tool_loads_the_joints_as_a_force_at_that_tar
 
 def test_columns_of_the_regressor_are_those_of_equation_10(kuka):
     loads = random_loads(kuka, 1, 3)
-    jacobian = poses_and_jacobians(
+    jacobian = compute_poses_and_jacobians(
         kuka.chain, loads.joint_angles, kuka.chain.end_effector
     )[2]
-    matrix = regressor(jacobian, generalized_forces(jacobian, loads.wrench))
+    matrix = build_regressor(
+        jacobian, compute_generalized_forces(jacobian, loads.wrench)
+    )
     inside = jacobian.copy()
     assert (
-        regressor(inside, generalized_forces(inside, loads.wrench), out=inside)
+        build_regressor(
+            inside, compute_generalized_forces(inside, loads.wrench), out=inside
+        )
         is inside
     )
     np.testing.assert_array_equal(inside, matrix)
@@ -108,7 +112,7 @@ def integrated_beam(tube, along):
 def test_tube_compliance_is_that_of_an_integrated_beam(tube, length):
     expected = integrated_beam(tube, [length, 0.0, 0.0])
     np.testing.assert_allclose(
-        tube_compliance(tube, length),
+        compute_tube_compliance(tube, length),
         expected,
         rtol=1e-10,
         atol=1e-12 * np.abs(expected).max(),
@@ -122,9 +126,9 @@ def test_extended_deflection_is_that_of_joints_and_beams_added_up(kuka_extended)
     expected = compute_true_deflections(
         replace(kuka_extended, links=()), loads, point, "end_effector"
     )
-    end = poses(kuka_extended.chain, loads.joint_angles, point)[0]
+    end = compute_poses(kuka_extended.chain, loads.joint_angles, point)[0]
     for link in kuka_extended.links:
-        position, rotation = poses(
+        position, rotation = compute_poses(
             kuka_extended.chain, loads.joint_angles, replace(point, after=link.after)
         )
         for index in np.ndindex(1, 5):

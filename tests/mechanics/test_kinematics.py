@@ -19,11 +19,11 @@ from support import (
 
 from elastocal.mechanics import kinematics
 from elastocal.mechanics.kinematics import (
-    jacobians,
-    motion,
-    poses,
-    poses_and_jacobians,
-    rotation_vectors,
+    compute_jacobians,
+    compute_motion,
+    compute_poses,
+    compute_poses_and_jacobians,
+    compute_rotation_vectors,
 )
 
 # Metres and radians of order one through a dozen products: some tens of roundings of
@@ -64,8 +64,8 @@ def test_random_chains_agree_with_pinocchio(text, seed):
     angles = np.asfortranarray(random_angles(np.random.default_rng(seed), chain, 3))
     before = angles.copy()
     for point in (chain.points[0], chain.end_effector):
-        position, rotation, jacobian = poses_and_jacobians(chain, angles, point)
-        np.testing.assert_array_equal(jacobians(chain, angles, point), jacobian)
+        position, rotation, jacobian = compute_poses_and_jacobians(chain, angles, point)
+        np.testing.assert_array_equal(compute_jacobians(chain, angles, point), jacobian)
         model = PinocchioPoint(chain, point)
         for index, configuration in enumerate(angles):
             expected = model.pose_and_jacobian(configuration)
@@ -114,7 +114,7 @@ def test_poses_are_the_matrix_products_of_equations_1_to_4(key, chain_called):
     angles = random_angles(np.random.default_rng(4), chain, 20)
     expected = [paper_poses(LENGTHS[key], q) for q in angles]
     for point in chain.points:
-        position, rotation = poses(chain, angles, point)
+        position, rotation = compute_poses(chain, angles, point)
         np.testing.assert_allclose(
             position, [e[point.name][:3, 3] for e in expected], rtol=0, atol=ROUNDING
         )
@@ -126,20 +126,22 @@ def test_poses_are_the_matrix_products_of_equations_1_to_4(key, chain_called):
 @pytest.mark.parametrize("size", [6, 7, 8, 14, 15])
 def test_batches_across_a_block_are_those_of_its_parts(fanuc, monkeypatch, size):
     angles = random_angles(np.random.default_rng(7), fanuc.chain, size)
-    whole = poses_and_jacobians(fanuc.chain, angles, fanuc.chain.end_effector)
+    whole = compute_poses_and_jacobians(fanuc.chain, angles, fanuc.chain.end_effector)
     monkeypatch.setattr(kinematics, "BLOCK", 7)
     for found, expected in zip(
-        poses_and_jacobians(fanuc.chain, angles, fanuc.chain.end_effector),
+        compute_poses_and_jacobians(fanuc.chain, angles, fanuc.chain.end_effector),
         whole,
         strict=True,
     ):
         np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING)
     for found, expected in zip(
-        poses(fanuc.chain, angles, fanuc.chain.end_effector), whole[:2], strict=True
+        compute_poses(fanuc.chain, angles, fanuc.chain.end_effector),
+        whole[:2],
+        strict=True,
     ):
         np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING)
     np.testing.assert_allclose(
-        jacobians(fanuc.chain, angles, fanuc.chain.end_effector),
+        compute_jacobians(fanuc.chain, angles, fanuc.chain.end_effector),
         whole[2],
         rtol=0,
         atol=ROUNDING,
@@ -155,9 +157,9 @@ def test_motion_gives_the_jacobian_of_every_point_and_the_forces_of_every_wrench
     angles = random_angles(rng, chain, 7)
     wrench = rng.standard_normal((7, 6))
     points = [replace(point, offset_m=(0.1, -0.2, 0.3)) for point in chain.points]
-    moved = motion(chain, angles, points)
+    moved = compute_motion(chain, angles, points)
     for number, point in enumerate(points):
-        position, rotation, jacobian = poses_and_jacobians(chain, angles, point)
+        position, rotation, jacobian = compute_poses_and_jacobians(chain, angles, point)
         np.testing.assert_allclose(
             moved.position[number].T, position, rtol=0, atol=ROUNDING
         )
@@ -194,5 +196,8 @@ def test_rotation_vectors_agree_with_scipy(direction, angle):
     rotation = Rotation.from_rotvec(vector)
     # sin(angle) near pi - 1e-3 keeps 13 of 16 digits.
     np.testing.assert_allclose(
-        rotation_vectors(rotation.as_matrix()), rotation.as_rotvec(), rtol=0, atol=1e-12
+        compute_rotation_vectors(rotation.as_matrix()),
+        rotation.as_rotvec(),
+        rtol=0,
+        atol=1e-12,
     )

@@ -8,8 +8,8 @@ import pytest
 from support import refused
 
 from elastocal.io.documents import check_document
-from elastocal.mechanics.robot import usual_compliance
-from elastocal.mechanics.robot_file import document_of, robot_from_document
+from elastocal.mechanics.robot import estimate_typical_compliance
+from elastocal.mechanics.robot_file import describe_robot, parse_robot
 
 TWO_JOINTS = {
     "name": "two joints",
@@ -53,7 +53,7 @@ def document(**changes):
 
 
 def test_robot_file_comes_in_si_units():
-    robot = robot_from_document(document())
+    robot = parse_robot(document())
     assert robot.joints == 2 and robot.links == ()
     np.testing.assert_allclose(robot.compliance, [1.5e-6, 2.5e-6], rtol=1e-15)
     np.testing.assert_allclose(
@@ -61,20 +61,18 @@ def test_robot_file_comes_in_si_units():
     )
     np.testing.assert_array_equal(robot.reported_matrix, np.eye(2))
     np.testing.assert_array_equal(robot.reported_offset, np.zeros(2))
-    unlimited = robot_from_document(document(joint_limits_deg=None)).joint_limits
+    unlimited = parse_robot(document(joint_limits_deg=None)).joint_limits
     np.testing.assert_allclose(unlimited, [[-2 * np.pi, 2 * np.pi]] * 2, rtol=1e-15)
 
 
 def test_without_compliances_the_usual_ones_are_there_as_not_known_and_never_written():
-    robot = robot_from_document(document(compliance_urad_per_Nm=None, payload_kg=20))
+    robot = parse_robot(document(compliance_urad_per_Nm=None, payload_kg=20))
     np.testing.assert_allclose(
-        robot.compliance, usual_compliance(robot.chain, 20.0), rtol=1e-15
+        robot.compliance, estimate_typical_compliance(robot.chain, 20.0), rtol=1e-15
     )
-    assert (
-        not robot.compliance_known and robot_from_document(document()).compliance_known
-    )
-    assert "compliance_urad_per_Nm" not in document_of(robot)
-    assert not robot_from_document(document_of(robot)).compliance_known
+    assert not robot.compliance_known and parse_robot(document()).compliance_known
+    assert "compliance_urad_per_Nm" not in describe_robot(robot)
+    assert not parse_robot(describe_robot(robot)).compliance_known
 
 
 @pytest.mark.parametrize(
@@ -185,7 +183,7 @@ def test_without_compliances_the_usual_ones_are_there_as_not_known_and_never_wri
 )
 def test_faulty_robot_file_is_refused_in_one_line(changes, key, words):
     with refused("robots/two.yaml", key, *words):
-        robot_from_document(document(**changes), "robots/two.yaml")
+        parse_robot(document(**changes), "robots/two.yaml")
 
 
 @pytest.mark.parametrize(
@@ -193,10 +191,10 @@ def test_faulty_robot_file_is_refused_in_one_line(changes, key, words):
     [{}, WEIGHED, TRACKED, REPORTED],
 )
 def test_robot_becomes_a_document_that_gives_it_back(more):
-    robot = robot_from_document(document(**more))
-    written = document_of(robot)
+    robot = parse_robot(document(**more))
+    written = describe_robot(robot)
     check_document(written, "robot", "robot.yaml")
-    again = robot_from_document(written)
+    again = parse_robot(written)
     assert again.chain == robot.chain
     for name, value in vars(robot).items():
         if isinstance(value, np.ndarray):

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from support import ODD_CHAINS, OTHER_CHAINS, TRACK, random_angles, robot_of, robot_on
 
-from elastocal.mechanics.kinematics import poses, poses_and_jacobians
-from elastocal.mechanics.sites import sites_of
+from elastocal.mechanics.kinematics import compute_poses, compute_poses_and_jacobians
+from elastocal.mechanics.sites import build_sites
 
 NAMES = ["kuka", "fanuc", *OTHER_CHAINS]
 ROUNDING = 2e-14
@@ -31,12 +31,12 @@ def extended(sites, angles):
 @pytest.mark.parametrize("name", [*NAMES, *ODD_CHAINS])
 def test_sites_at_zero_leave_the_poses_and_jacobians_of_the_robot(name, chain_called):
     chain = chain_called(name)
-    sites = sites_of(robot_on(chain))
+    sites = build_sites(robot_on(chain))
     angles = random_angles(np.random.default_rng(0), chain, 2, 3)
     assert [p.name for p in sites.chain.points] == [p.name for p in chain.points]
     for ours, point in zip(sites.chain.points, chain.points, strict=True):
-        expected = poses_and_jacobians(chain, angles, point)
-        found = poses_and_jacobians(sites.chain, extended(sites, angles), ours)
+        expected = compute_poses_and_jacobians(chain, angles, point)
+        found = compute_poses_and_jacobians(sites.chain, extended(sites, angles), ours)
         np.testing.assert_allclose(found[0], expected[0], rtol=0, atol=ROUNDING)
         np.testing.assert_allclose(found[1], expected[1], rtol=0, atol=ROUNDING)
         np.testing.assert_allclose(
@@ -45,13 +45,13 @@ def test_sites_at_zero_leave_the_poses_and_jacobians_of_the_robot(name, chain_ca
 
 
 def columns_at(sites, angles, point, coordinates):
-    return poses_and_jacobians(
+    return compute_poses_and_jacobians(
         sites.chain, extended(sites, angles), sites.chain.point(point)
     )[2][..., list(coordinates)]
 
 
 def test_tilt_about_the_axis_of_a_joint_is_the_joint_itself(chain):
-    sites = sites_of(robot_on(chain))
+    sites = build_sites(robot_on(chain))
     angles = random_angles(np.random.default_rng(4), chain)
     turning = [t for t in chain.transforms if t.coordinate is not None]
     for joint, transform in enumerate(turning):
@@ -68,9 +68,9 @@ def test_tilt_about_the_axis_of_a_joint_is_the_joint_itself(chain):
     ("point", "link"), [("2DoF", 2), ("3DoF", 3), ("4DoF", 4), ("6DoF", 6)]
 )
 def test_point_at_the_end_of_a_link_moves_with_it(fanuc, point, link):
-    sites = sites_of(fanuc)
+    sites = build_sites(fanuc)
     angles = random_angles(np.random.default_rng(5), fanuc.chain)
-    rotation = poses(fanuc.chain, angles, fanuc.chain.point(point))[1]
+    rotation = compute_poses(fanuc.chain, angles, fanuc.chain.point(point))[1]
     # At its own origin a site shifts and turns a point along the axes that they share,
     # and nothing else.
     expected = np.kron(np.eye(2), rotation)
@@ -97,7 +97,7 @@ CARRIED = {
 
 @pytest.mark.parametrize("name", CARRIED)
 def test_carried_links_are_those_whose_weight_can_turn_the_joint(name, chain_called):
-    sites = sites_of(robot_on(chain_called(name)))
+    sites = build_sites(robot_on(chain_called(name)))
     lengths = np.linalg.norm(sites.link_vectors_m, axis=1)
     expected = [
         [link for link in links if lengths[link] > 0] for links in CARRIED[name]
@@ -110,7 +110,7 @@ def test_carried_links_are_those_whose_weight_can_turn_the_joint(name, chain_cal
 
 
 def test_sites_of_a_robot_on_a_track():
-    sites = sites_of(robot_of(TRACK))
+    sites = build_sites(robot_of(TRACK))
     assert sites.prismatic == (True, False, False, False) and sites.joint_signs == (
         -1.0,
         1.0,

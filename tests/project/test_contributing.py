@@ -17,11 +17,11 @@ from synthetic import displacements, make_states
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.importers import find_importer
 from elastocal.campaigns.reading import read_campaign, read_robot
-from elastocal.effects.conditions import conditions_of
+from elastocal.effects.conditions import build_conditions
 from elastocal.effects.protocol import Effect
 from elastocal.exchange.controllers import CONTROLLERS, axes_of, targets_of
 from elastocal.io.documents import check_document, read_document
-from elastocal.mechanics.sites import sites_of
+from elastocal.mechanics.sites import build_sites
 from elastocal.study.strategies import check_strategy, strategy_from_document
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -87,12 +87,12 @@ def test_the_strategy_is_one_that_the_papers_robots_can_carry_out_and_none_of_th
 def test_the_effect_displaces_each_joint_as_its_formula_says(import_example, kuka):
     effect = import_example(examples("An effect")[0]).hoses
     assert isinstance(effect, Effect) and "k q^3" in effect.doc
-    sites = sites_of(kuka)
+    sites = build_sites(kuka)
     states = make_states(6, 5)
     candidates = effect.candidates(sites)
     keys = [candidate.key for candidate in candidates]
     assert keys == [f"hoses@{joint}" for joint in range(1, 7)]
-    conditions = conditions_of(sites, kuka.compliance, states)
+    conditions = build_conditions(sites, kuka.compliance, states)
     (displacement,) = displacements(candidates[2], conditions)
     np.testing.assert_array_equal(displacement[:, 2], states.joint_angles[:, 2] ** 3)
     assert not np.delete(displacement, 2, axis=1).any()

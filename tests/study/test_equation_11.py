@@ -15,9 +15,9 @@ from made_study_blocks import (
 )
 from support import OTHER_CHAINS, random_loads, robot_of, without_tool
 
-from elastocal.mechanics.elastostatics import joint_torques, regressor
-from elastocal.mechanics.kinematics import poses_and_jacobians
-from elastocal.mechanics.robot import with_target_offset
+from elastocal.mechanics.elastostatics import build_regressor, compute_joint_torques
+from elastocal.mechanics.kinematics import compute_poses_and_jacobians
+from elastocal.mechanics.robot import set_target_offset
 from elastocal.study.equation_11 import (
     MAX_CONDITION_NUMBER,
     Measurements,
@@ -70,7 +70,7 @@ class Data:
     def __init__(self, robot, rows):
         rng = np.random.default_rng(0)
         loads = random_loads(robot, SETS, CONFIGURATIONS)
-        torques = joint_torques(
+        torques = compute_joint_torques(
             robot.chain,
             loads.joint_angles,
             loads.wrench,
@@ -79,8 +79,10 @@ class Data:
         self.matrix = {}
         self.measured = {}
         for point in robot.chain.points:
-            jacobian = poses_and_jacobians(robot.chain, loads.joint_angles, point)[2]
-            self.matrix[point.name] = regressor(jacobian, torques)[..., :rows, :]
+            jacobian = compute_poses_and_jacobians(
+                robot.chain, loads.joint_angles, point
+            )[2]
+            self.matrix[point.name] = build_regressor(jacobian, torques)[..., :rows, :]
             deflection = compute_true_deflections(robot, loads, point, "end_effector")[
                 ..., :rows
             ]
@@ -101,7 +103,7 @@ class Data:
 def data_of(robot_key, rows, load):
     robot = load(robot_key)
     return Data(
-        with_target_offset(robot, (0.1, 0.05, 0.2)) if rows == 3 else robot, rows
+        set_target_offset(robot, (0.1, 0.05, 0.2)) if rows == 3 else robot, rows
     )
 
 

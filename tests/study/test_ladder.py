@@ -6,11 +6,11 @@ import pytest
 from made_study_blocks import PAPER
 
 from elastocal.mechanics.elastostatics import (
-    extended_chain,
-    generalized_forces,
-    spring_compliance,
+    build_extended_chain,
+    build_spring_compliance,
+    compute_generalized_forces,
 )
-from elastocal.mechanics.kinematics import jacobians
+from elastocal.mechanics.kinematics import compute_jacobians
 from elastocal.study.ladder import (
     build_ladder,
     compute_spring_columns,
@@ -49,14 +49,14 @@ def test_columns_times_the_true_compliances_are_the_linear_deflection(
 ):
     """The springs' own elements in beam axes, against J C J'w of the extended chain."""
     drawn, columns = loaded
-    chain = extended_chain(kuka_extended)
+    chain = build_extended_chain(kuka_extended)
     n = kuka_extended.joints
     coordinates = np.zeros((*drawn.joint_angles.shape[:-1], chain.coordinates))
     coordinates[..., :n] = drawn.joint_angles
-    jacobian = jacobians(chain, coordinates, chain.end_effector)
-    springs = generalized_forces(jacobian, drawn.wrench) @ spring_compliance(
-        kuka_extended
-    )
+    jacobian = compute_jacobians(chain, coordinates, chain.end_effector)
+    springs = compute_generalized_forces(
+        jacobian, drawn.wrench
+    ) @ build_spring_compliance(kuka_extended)
     expected = (jacobian @ springs[..., None])[..., 0]
     coefficients, *_ = np.linalg.lstsq(
         columns.reshape(-1, columns.shape[-1]), expected.ravel(), rcond=1e-12

@@ -6,7 +6,10 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from support import random_loads, without_tool
 
-from elastocal.mechanics.elastostatics import exact_deflections, joint_torques
+from elastocal.mechanics.elastostatics import (
+    compute_exact_deflections,
+    compute_joint_torques,
+)
 from elastocal.study.metrics import (
     compute_k_sigma,
     compute_mean_deviation,
@@ -40,10 +43,10 @@ def judge_of(robot, loads=None):
 def exact_errors(robot, loads, compliance):
     """Position error of one model: pose by pose, without any linearisation."""
     end = robot.chain.end_effector
-    torques = joint_torques(
+    torques = compute_joint_torques(
         robot.chain, loads.joint_angles, loads.wrench, without_tool(end)
     )
-    predicted = exact_deflections(
+    predicted = compute_exact_deflections(
         robot.chain, loads.joint_angles, compliance * torques, end
     )
     truth = compute_true_deflections(robot, loads, end, "end_effector")

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import kstest
 from support import OTHER_CHAINS, PinocchioPoint, robot_of, without_tool
 
-from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.kinematics import compute_poses
 from elastocal.study import simulation
 from elastocal.study.evaluation import unpack_weights
 from elastocal.study.simulation import (
@@ -105,7 +105,7 @@ def test_offset_in_the_tool_frame_turns_with_the_tool(kuka):
     tool = draw(kuka, replace(PAPER, offset_frame="tool"))
     np.testing.assert_array_equal(tool.joint_angles, base.joint_angles)
     np.testing.assert_array_equal(tool.wrench[..., :3], base.wrench[..., :3])
-    rotation = poses(kuka.chain, tool.joint_angles, kuka.chain.end_effector)[1]
+    rotation = compute_poses(kuka.chain, tool.joint_angles, kuka.chain.end_effector)[1]
     lever = rotation[..., 1] * 0.5
     np.testing.assert_allclose(
         tool.wrench[..., 3:], np.cross(lever, tool.wrench[..., :3]), rtol=0, atol=1e-10

@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 
 from elastocal.application.inverse_kinematics import find_beyond_limits
-from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.kinematics import compute_poses
 from elastocal.study.uses import (
     REFERENCE,
     build_pairs_table,
@@ -20,7 +20,7 @@ CENTRE = (1.6, 0.0, 1.0)
 
 
 def find_positions(robot, use):
-    position, rotation = poses(
+    position, rotation = compute_poses(
         robot.chain, use.joint_angles[0], robot.chain.end_effector
     )
     assert not find_beyond_limits(robot, use.joint_angles[0]).any()

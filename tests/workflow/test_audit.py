@@ -10,8 +10,8 @@ import yaml
 from durations import HUNG_S
 from made_audits import altered
 
-from elastocal_proof.audit.audited import Audited
-from elastocal_proof.audit.whole import audit
+from elastocal_proof.audit.audit_run import audit_run
+from elastocal_proof.audit.finished_run import FinishedRun
 
 pytestmark = pytest.mark.slow
 
@@ -35,7 +35,7 @@ def audited(folder):
     )
     # Of so few data sets enough that what is planted in a whole column is in the
     # sample.
-    return Audited(folder, configuration, robots, strategies, 12)
+    return FinishedRun(folder, configuration, robots, strategies, 12)
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +49,7 @@ def folder(small_study, tmp_path_factory):
 
 
 def test_a_finished_study_holds_in_every_check(folder):
-    found = audit(audited(folder))
+    found = audit_run(audited(folder))
     assert [finding for finding in found if not finding.holds] == []
     by = {
         "numpy's Philox stream",
@@ -81,7 +81,7 @@ def test_a_column_multiplied_is_found_although_its_checksum_is_forged(
     with altered(folder, file, (column, slice(None)), lambda values: factor * values):
         assert [
             finding.file
-            for finding in audit(audited(folder), audited_files)
+            for finding in audit_run(audited(folder), audited_files)
             if not finding.holds
         ]
 
@@ -91,7 +91,7 @@ def test_an_edited_robot_makes_its_files_stale(folder):
     run.robots["kuka"]["compliance_urad_per_Nm"][0] *= 1.1
     wrong = [
         finding
-        for finding in audit(run, {"results/metrics/kuka/200um/6DoF.parquet"})
+        for finding in audit_run(run, {"results/metrics/kuka/200um/6DoF.parquet"})
         if not finding.holds
     ]
     assert any(finding.checked == "made by what is configured" for finding in wrong)
@@ -128,7 +128,10 @@ def test_without_pinocchio_an_audit_ends_in_a_line_before_any_job(unstarted):
     )
     command = unstarted.command("-j1", "--quiet", "all", "--", "audit")
     done = subprocess.run(**command, capture_output=True, text=True, timeout=HUNG_S)
-    line = "audit: pinocchio: found no such package; allowed: the extra audit: make audit, or pip install pin"
+    line = (
+        "audit: pinocchio: found no such package;"
+        " allowed: the extra audit: make audit, or pip install pin"
+    )
     assert (done.returncode, done.stderr.strip().splitlines()[-1:]) == (1, [line]), (
         done.stderr
     )

@@ -212,16 +212,20 @@ from pathlib import Path
 root, script, step = Path(sys.argv[1]), *sys.argv[2].split(":")
 sys.path.insert(0, str(root / "workflow" / "scripts"))
 body = ast.parse((root / "workflow" / "scripts" / script).read_text()).body
-exec(compile(ast.Module([node for node in body if isinstance(node, (ast.Import, ast.ImportFrom))], []), script, "exec"), {})
+imports = [node for node in body if isinstance(node, (ast.Import, ast.ImportFrom))]
+exec(compile(ast.Module(imports, []), script, "exec"), {})
 exec(f"import {step}" if step else "")
-# What is a catalogue looks up the modules beside it when it is asked.
-for name in [name for name, module in sys.modules.items() if "list_modules" in vars(module)]:
+# A catalogue imports the modules of its package when it is first asked.
+catalogues = [name for name, module in sys.modules.items() if "list_modules" in vars(module)]
+for name in catalogues:
     if name != "elastocal.io.modules":
         package = sys.modules[name.rpartition(".")[0]]
-        for each in sys.modules["elastocal.io.modules"].module_names(package):
-            importlib.import_module(f"{package.__name__}.{each}")
-files = [Path(m.__file__) for m in list(sys.modules.values()) if getattr(m, "__file__", None)]
-print(json.dumps(sorted(f.relative_to(root).as_posix() for f in files if f.is_relative_to(root))))
+        for module_name in sys.modules["elastocal.io.modules"].list_modules(package):
+            importlib.import_module(f"{package.__name__}.{module_name}")
+loaded = [getattr(module, "__file__", None) for module in list(sys.modules.values())]
+files = [Path(file) for file in loaded if file]
+inside = [file.relative_to(root).as_posix() for file in files if file.is_relative_to(root)]
+print(json.dumps(sorted(inside)))
 """
 
 

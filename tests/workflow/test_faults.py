@@ -40,7 +40,8 @@ FAULTS = {
         lambda study: study.path("more.yaml").write_text(SECOND_SEED, encoding="utf-8"),
         ("--configfile", "more.yaml"),
         [
-            "more.yaml: line 2: found the key 'seed' again; allowed: each key once (first in line 1)"
+            "more.yaml: line 2: found the key 'seed' again;"
+            " allowed: each key once (first in line 1)"
         ],
     ),
 }
@@ -87,7 +88,8 @@ def test_spoilt_data_end_the_job_that_reads_them_and_deleted_ones_are_made_again
         .splitlines()
     )
     assert line.startswith(
-        f"{MEASURED}: found other contents than were written; allowed: the file as the pipeline wrote it"
+        f"{MEASURED}: found other contents than were written;"
+        " allowed: the file as the pipeline wrote it"
     )
     assert ended.stderr.splitlines()[-1] == line and "Traceback" not in ended.stderr
     assert finished_paper.files(IDENTIFIED, "results/identified/**/*.partial") == []
@@ -105,9 +107,9 @@ def test_two_runs_of_the_same_files_are_refused_in_one_line(unstarted):
         ended = unstarted.snakemake("-j1", MEASURED)
     assert ended.returncode != 0
     last = ended.stderr.splitlines()[-1]
-    assert (
-        last
-        == "snakemake: found another run at work on the same files; allowed: the same command once that one has ended"
+    assert last == (
+        "snakemake: found another run at work on the same files;"
+        " allowed: the same command once that one has ended"
     )
 
 

@@ -260,8 +260,11 @@ from elastocal.effects.protocol import Parameter, effect
 
 @effect("gravity", "another sag")
 def sag(own, sites):
-    """One candidate."""
-    yield own.candidate((2,), [Parameter("sag", "rad", 1e-3)], lambda around: [{1: np.cos(5 * around.joint_angles[:, 1])}])
+    """Yield one candidate."""
+    parameters = [Parameter("sag", "rad", 1e-3)]
+    yield own.candidate(
+        (2,), parameters, lambda around: [{1: np.cos(5 * around.joint_angles[:, 1])}]
+    )
 '''
 
 

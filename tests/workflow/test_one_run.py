@@ -71,7 +71,7 @@ def test_jobs_that_a_killed_run_left_behind_are_waited_for(folder, capfd, monkey
     monkeypatch.setattr(fcntl, "flock", waited)
     with begin(folder, []):
         ((locks, ended, said),) = seen
-        assert (locks, ended) == (1, None) and "waiting for the jobs" in said
+        assert (locks, ended) == (1, None) and "waiting for its jobs" in said
         assert list((folder / "locks").iterdir()) == []
         assert job.wait() != 0
 

@@ -29,9 +29,11 @@ _ABSENT = [
     for name in ("munged", "slurmctld", "slurmd", "sbatch")
     if not shutil.which(name, path=_PATH)
 ]
-# Each node is a daemon with a port of its own; it has four cores, whatever the machine
-# has.
-_NODE = "NodeName={name} NodeHostname={host} NodeAddr=127.0.0.1 Port={port} CPUs=4 RealMemory={megabytes} State=UNKNOWN\n"
+# Each node is a daemon with its own port. It claims four cores, whatever the machine has.
+_NODE = (
+    "NodeName={name} NodeHostname={host} NodeAddr=127.0.0.1 Port={port} CPUs=4"
+    " RealMemory={megabytes} State=UNKNOWN\n"
+)
 # It needs root, whose jobs other users are, and a machine without a Slurm of its own.
 _CANNOT = (
     os.environ.get("ELASTOCAL_SLURM") != "1"
@@ -72,7 +74,8 @@ rule needs_more:
     output: "made.txt"
     resources: mem_mb=lambda wildcards, attempt: attempt * 500
     params: seconds=lambda wildcards, resources: 60 if resources.mem_mb == 500 else 0
-    shell: "{python} -c 'import time; held = bytearray(450_000_000); time.sleep({{params.seconds}})'"
+    shell: "{python} -c 'import time; held = bytearray(450_000_000);"
+        " time.sleep({{params.seconds}})'"
         " && echo {{resources.mem_mb}} > {{output}}"
 """
 

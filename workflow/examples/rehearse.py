@@ -1,15 +1,14 @@
-"""Rehearse a calibration: a physical robot in simulation, with hidden defects, stands
-in for a real one.
+"""Rehearse a calibration with a simulated robot that has hidden defects.
 
-    python workflow/examples/rehearse.py measure FOLDER                  fills the measurement sheet of a campaign
-    python workflow/examples/rehearse.py path FOLDER PATH.csv            writes a path of 50 poses, as for milling
-    python workflow/examples/rehearse.py move FOLDER PATH.csv OUT.csv    goes along it, uncorrected and corrected
+    rehearse.py measure FOLDER                 fill the measurement sheet of a campaign
+    rehearse.py path FOLDER PATH.csv           write a path of 50 poses, as for milling
+    rehearse.py move FOLDER PATH.csv OUT.csv   follow it, uncorrected and corrected
 
 FOLDER is the campaign; PATH.csv has the wanted poses and OUT.csv the joint targets of
 `elastocal correct`. The robot follows from the robot file of the campaign, --seed and
---effect, and is the same in all three. Errors of `move` are what the tracker reads, in
-the campaign's frame of the base; its noise and the repeatability alone leave those of
-the last line.
+--effect, and is the same in all three. Errors of `move` are those that the tracker
+measures in the campaign's base frame. The last line gives the errors that the noise of
+the tracker and the repeatability of the robot cause alone.
 """
 
 import argparse
@@ -45,12 +44,12 @@ def path(given, robot, campaign):
 
 
 def move(given, robot, campaign):
-    missed = measure_errors(given.path, given.targets, robot, given.seed)
-    rms = {name: 1e3 * np.sqrt((off**2).mean()) for name, off in missed.items()}
-    for name, off in missed.items():
-        print(
-            f"{name:12} position error: RMS {rms[name]:.3f} mm, largest {1e3 * off.max():.3f} mm"
-        )
+    errors_m = measure_errors(given.path, given.targets, robot, given.seed)
+    rms = {name: 1e3 * np.sqrt((error**2).mean()) for name, error in errors_m.items()}
+    for name, error in errors_m.items():
+        largest = 1e3 * error.max()
+        print(f"{name:12} position error: RMS {rms[name]:.3f} mm,", end=" ")
+        print(f"largest {largest:.3f} mm")
     if rms["corrected"] >= rms["uncorrected"]:
         sys.exit("the corrected robot is no better")
 
@@ -59,9 +58,9 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    what = parser.add_subparsers(required=True)
+    subcommands = parser.add_subparsers(required=True)
     for run in (measure, path, move):
-        command = what.add_parser(run.__name__)
+        command = subcommands.add_parser(run.__name__)
         command.add_argument("folder", type=Path)
         if run is not measure:
             command.add_argument("path", type=Path)
@@ -72,7 +71,7 @@ if __name__ == "__main__":
             "--effect",
             action="append",
             default=[],
-            help="a hidden effect; one is drawn without",
+            help="a hidden effect; one is drawn by default",
         )
         command.add_argument(
             "--misplaced-base",

@@ -1,9 +1,10 @@
-"""Fill the folder of a campaign with measurements of a simulated robot, to see the
-format and to try the loop without one.
+"""Fill the folder of a campaign with simulated measurements.
+
+It shows the format and lets you try a diagnosis without a robot.
 
 Usage: python workflow/examples/simulate_measurements.py FOLDER ROBOT_FILE. FOLDER has a
-campaign.yaml that measures poses in the base frame; ROBOT_FILE is the robot that is
-measured, which may have more than the one that the campaign declares.
+campaign.yaml that measures poses in the base frame; ROBOT_FILE is the simulated robot,
+which may have effects that the declared one lacks.
 """
 
 import argparse

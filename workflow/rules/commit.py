@@ -1,5 +1,4 @@
-"""The commit that the pipeline is run from, and whether its sources were edited
-since."""
+"""Find the commit that the pipeline runs from, and edits of its sources since then."""
 
 import subprocess
 from collections.abc import Iterable
@@ -9,15 +8,23 @@ UNKNOWN = "unknown"
 
 
 def commit_of(folder: Path, sources: Iterable[str]) -> str:
-    """The commit of a checkout.
+    """Return the commit of a checkout.
 
-    `folder`: top of the checkout. `sources`: what the results are made from: edits
-    elsewhere, such as in a page, change no result. Returns the commit, with ``-dirty``
-    behind it where sources differ from it; ``unknown`` without a checkout or without
-    git.
+    Parameters
+    ----------
+    folder : Path
+        Top of the checkout.
+    sources : iterable of str
+        Files and folders that results depend on; edits elsewhere, such as in a page,
+        do not count.
+
+    Returns
+    -------
+    str
+        The commit, followed by ``-dirty`` if sources were edited; ``unknown`` without a
+        checkout or without git.
     """
-    # A copy of the sources inside of another repository is not that repository's
-    # commit.
+    # Sources that are copied into another repository do not belong to its commit.
     if not (folder / ".git").exists():
         return UNKNOWN
     try:
@@ -29,7 +36,7 @@ def commit_of(folder: Path, sources: Iterable[str]) -> str:
 
 
 def _git(folder: Path, *words: str) -> str:
-    # A lock for refreshing git's index would disturb a commit that is under way.
+    # Without this option git locks its index, which would disturb a concurrent commit.
     command = ["git", "--no-optional-locks", "-C", str(folder), *words]
     return subprocess.run(
         command, capture_output=True, text=True, check=True

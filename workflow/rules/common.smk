@@ -16,9 +16,9 @@ from elastocal.campaigns.importers import (
     list_league_data,
 )
 from elastocal.errors import InputError
-from elastocal.io.origin import SOURCES_DIGEST, Origin, configuration_sha256, environment
+from elastocal.io.origin import SOURCES_DIGEST, Origin, digest_configuration, list_versions
 from elastocal.io.records import compute_sha256
-from elastocal.report.outcome import outcome
+from elastocal.report.outcome import describe_outcome
 from elastocal.study.configuration import check_study, count_components, override_entries
 
 from commit import commit_of
@@ -116,7 +116,7 @@ ORIGIN = Origin(
             "requirements/run.lock",
         ],
     ),
-    configuration_sha256(RESOLVED),
+    digest_configuration(RESOLVED),
     config["seed"],
 )
 config["origin"] = vars(ORIGIN)
@@ -166,6 +166,11 @@ wildcard_constraints:
     test="(/test)?",
 
 
+def panel_settings(robot, **limit):
+    """Settings of one panel of Figure 5: its robot, the order of the strategies, and the limit that it shows."""
+    return {"title": TITLES[robot], "robot": robot, "order": list(NAMES.values())} | limit
+
+
 def sources(step):
     """Return the script that runs a step, and the package modules that it imports, as inputs of a rule.
 
@@ -194,19 +199,17 @@ def digest_of(files):
 
 def complete_rules():
     """Give each rule a log and a benchmark named after it and its wildcards, and each script its sources as inputs."""
-    for workflow_rule in workflow.rules:
-        if snakemake_internals.runs_no_job(workflow_rule):
+    for definition in workflow.rules:
+        if snakemake_internals.runs_no_job(definition):
             continue
-        wildcards = [f"{{{name}}}" for name in re.findall(r"{(\w+)", workflow_rule.output[0])]
-        name = Path(workflow_rule.name, *wildcards).as_posix()
+        wildcards = [f"{{{name}}}" for name in re.findall(r"{(\w+)", definition.output[0])]
+        name = Path(definition.name, *wildcards).as_posix()
         snakemake_internals.set_log_and_benchmark(
-            workflow_rule, f"results/logs/{name}.log", f"results/timings/{name}.tsv"
+            definition, f"results/logs/{name}.log", f"results/timings/{name}.tsv"
         )
-        if workflow_rule.is_script and "sources" not in workflow_rule.input.keys():
-            step = workflow_rule.params.get("step") or snakemake_internals.name_of_script(
-                workflow_rule
-            )
-            workflow_rule.set_input(sources=sources(step))
+        if definition.is_script and "sources" not in definition.input.keys():
+            step = definition.params.get("step") or snakemake_internals.name_of_script(definition)
+            definition.set_input(sources=sources(step))
 
 
 def watch_sources():
@@ -214,16 +217,16 @@ def watch_sources():
 
     A change of the installed libraries or of the list of pins reruns every job that has a script.
     """
-    environment_sha256 = configuration_sha256(environment(ROOT))
-    for workflow_rule in workflow.rules:
-        if "sources" not in workflow_rule.input.keys():
+    environment_sha256 = digest_configuration(list_versions(ROOT))
+    for definition in workflow.rules:
+        if "sources" not in definition.input.keys():
             continue
         files = [
             file
-            for file in workflow_rule.input
+            for file in definition.input
             if isinstance(file, str) and not MADE_FILE.match(file) and Path(file).is_file()
         ]
-        workflow_rule.set_params(**{SOURCES_DIGEST: f"{digest_of(files)} {environment_sha256}"})
+        definition.set_params(**{SOURCES_DIGEST: f"{digest_of(files)} {environment_sha256}"})
 
 
 def files_behind(targets):

@@ -21,11 +21,6 @@ PAPER_FIGURES = [
 FIGURES = [*PAPER_FIGURES, "scores_against_paper", "ladder", "designs"]
 
 
-def panel_settings(robot, **limit):
-    """Settings of one panel of Figure 5: its robot, the order of the strategies, and the limit that it shows."""
-    return {"title": TITLES[robot], "robot": robot, "order": list(NAMES.values())} | limit
-
-
 rule draw_scheme:
     output:
         pdf="reports/figures/{scheme}.pdf",

@@ -1,5 +1,7 @@
-"""Which source files a script runs: the closure of its imports, read from the sources
-without running them."""
+"""Find the source files that a script runs.
+
+They are the closure of its imports, read from the sources without running them.
+"""
 
 import ast
 from functools import cache
@@ -15,43 +17,58 @@ PACKAGES = ("elastocal", "elastocal_proof")
 
 
 def closure(script: Path, source: Path, *named: str) -> list[Path]:
-    """Source files that a script imports, directly or not.
+    """Return the source files that a script imports, directly or indirectly.
 
-    `script`: imports modules of the packages and of its own folder. `source`: folder of
-    the packages. `named`: modules that it imports because its rule names them. Returns
-    sorted, without the script itself. Raises `InputError`: a source file that is no
-    Python, such as an effect that is being written.
+    Parameters
+    ----------
+    script : Path
+        Imports modules of the packages and of its own folder.
+    source : Path
+        Folder of the packages.
+    *named : str
+        Modules that the script imports because its rule names them.
+
+    Returns
+    -------
+    list of Path
+        Sorted, without the script itself.
+
+    Raises
+    ------
+    InputError
+        If a source file is not valid Python, such as an effect that is being written.
     """
-    files = set()
-    left = [script]
+    files = _files_in_own_folder(script)
     modules = set(named)
-    while left:
-        file = left.pop()
-        files.add(file)
+    for file in files:
         modules |= _imports(file) & _graph().modules
-        left += {
-            own
-            for name in _imports(file)
-            if (own := file.with_name(f"{name}.py")).is_file()
-        } - files
-    modules |= {found for name in modules for found in _upstream(name)}
-    # With a module come the packages above it.
-    names = {
-        package
-        for name in modules
-        for package in accumulate(name.split("."), "{}.{}".format)
-    }
-    files |= {_file(name, source) for name in names if name.split(".")[0] in PACKAGES}
-    # And the table beside it that has its name.
-    return sorted(
-        files - {script}
-        | {table for file in files if (table := file.with_suffix(".json")).is_file()}
-    )
+    modules |= {upstream for name in modules for upstream in _upstream(name)}
+    for name in modules:
+        # A module is imported with the packages that contain it.
+        for package in accumulate(name.split("."), "{}.{}".format):
+            if package.split(".")[0] in PACKAGES:
+                files.add(_file(package, source))
+    # A module may read a table that stands beside it under the same name.
+    tables = {file.with_suffix(".json") for file in files}
+    files |= {table for table in tables if table.is_file()}
+    return sorted(files - {script})
+
+
+def _files_in_own_folder(script: Path) -> set[Path]:
+    """Return a script and the files of its folder that it imports."""
+    files: set[Path] = set()
+    pending = [script]
+    while pending:
+        file = pending.pop()
+        files.add(file)
+        siblings = {file.with_name(f"{name}.py") for name in _imports(file)}
+        pending += {sibling for sibling in siblings if sibling.is_file()} - files
+    return files
 
 
 @cache
 def _graph() -> grimp.ImportGraph:
-    # What is imported for annotations alone changes no result.
+    # Imports that only annotations need change no result.
     try:
         graph = grimp.build_graph(
             *PACKAGES,
@@ -60,8 +77,8 @@ def _graph() -> grimp.ImportGraph:
             cache_dir=None,
         )
     except SourceSyntaxError as error:
-        raise _no_python(error.filename, error) from None
-    # A catalogue looks up the modules beside it by itself.
+        raise _invalid_python(error.filename, error) from None
+    # A catalogue imports all modules of its package by their names.
     for catalogue in graph.find_modules_that_directly_import("elastocal.io.modules"):
         for module in graph.find_children(catalogue.rpartition(".")[0]):
             if module != catalogue:
@@ -76,12 +93,12 @@ def _upstream(module: str) -> set[str]:
 
 @cache
 def _imports(file: Path) -> frozenset[str]:
-    """Names that a file imports: of modules, or of what is in them."""
+    """Return the names that a file imports: modules, or objects in them."""
     names = set()
     try:
         tree = ast.parse(file.read_bytes())
     except SyntaxError as error:
-        raise _no_python(file, error) from None
+        raise _invalid_python(file, error) from None
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
@@ -92,7 +109,9 @@ def _imports(file: Path) -> frozenset[str]:
     return frozenset(names)
 
 
-def _no_python(file: Path | str, error: SourceSyntaxError | SyntaxError) -> InputError:
+def _invalid_python(
+    file: Path | str, error: SourceSyntaxError | SyntaxError
+) -> InputError:
     return InputError(
         file,
         f"line {error.lineno}",

@@ -1,4 +1,4 @@
-"""The paper's tables and figures as one PDF, its figures beside ours."""
+"""Typeset the paper's tables and figures as one PDF, beside the printed ones."""
 
 from job import Job, origin_of, run
 
@@ -10,10 +10,12 @@ from elastocal.report.typesetting import compile_document
 
 
 def compile_paper(job: Job) -> None:
-    beside = pd.read_csv(job.input.beside, dtype={"table": str})
-    authors = [each["name"] for each in read_document(job.input.citation)["authors"]]
+    comparison = pd.read_csv(job.input.beside, dtype={"table": str})
+    authors = [
+        author["name"] for author in read_document(job.input.citation)["authors"]
+    ]
     rows = format_paper_rows(
-        beside,
+        comparison,
         shorten_titles(job.params.names),
         int(job.params.stated["configurations"]),
     )

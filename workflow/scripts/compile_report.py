@@ -1,4 +1,4 @@
-"""The report as PDF."""
+"""Typeset the report of the study as PDF."""
 
 from job import Job, origin_of, run
 
@@ -17,12 +17,12 @@ def compile_report(job: Job) -> None:
     tables = format_paper_tables(
         frames, facts["names"], int(facts["size"]["configurations"])
     )
-    beside = [*job.input.figures, job.input.bibliography]
+    attachments = [*job.input.figures, job.input.bibliography]
     compile_document(
         job.output.report,
         "study.typ",
         {"facts": facts, "tables": tables},
-        beside,
+        attachments,
         origin_of(job),
     )
 

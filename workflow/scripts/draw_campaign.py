@@ -1,5 +1,4 @@
-"""Pictures of a campaign: its residuals, what may be missing in its model, its
-errors."""
+"""Draw the figures of a campaign: residuals, candidate effects and errors."""
 
 from job import Job, origin_of, run
 
@@ -12,20 +11,27 @@ from elastocal.figures.loop import (
 )
 from elastocal.figures.style import save
 from elastocal.io.json_files import read_json
-from elastocal.loop.schemas import angles_of, read_residuals, worst_measurement
-from elastocal.mechanics.kinematics import corners
-from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.loop.schemas import (
+    find_worst_measurement,
+    read_residuals,
+    stack_joint_angles,
+)
+from elastocal.mechanics.kinematics import locate_corners
+from elastocal.mechanics.robot_file import parse_robot
 from elastocal.verdict import read_verdict
 
 
 def draw_campaign(job: Job) -> None:
-    robot = robot_from_document(read_json(job.input.descriptions)["robot"])
+    robot = parse_robot(read_json(job.input.descriptions)["robot"])
     table = read_residuals(job.input.residuals, robot.joints)
-    arm = corners(robot.chain, angles_of(table, robot.joints)[worst_measurement(table)])
+    arm = locate_corners(
+        robot.chain,
+        stack_joint_angles(table, robot.joints)[find_worst_measurement(table)],
+    )
     candidates = pd.read_csv(job.input.candidates).fillna({"note": ""})
     verdict = read_verdict(job.input.verdict)
     errors = pd.read_csv(job.input.before_after).to_dict("records")
-    drawn = {
+    figures = {
         "before_after": draw_before_after(errors, verdict.heldout.noise_floor_rms_m),
         "arrows": draw_residual_arrows(table, arm),
         "candidates": draw_probabilities(
@@ -36,7 +42,7 @@ def draw_campaign(job: Job) -> None:
     for name, pdf, png in zip(
         job.params.figures, job.output.pdf, job.output.png, strict=True
     ):
-        save(drawn[name], pdf, png, origin_of(job))
+        save(figures[name], pdf, png, origin_of(job))
 
 
 run(draw_campaign, snakemake)

@@ -1,4 +1,4 @@
-"""Held-out errors of all campaigns of one kind, before and after."""
+"""Draw the held-out errors of all campaigns of one kind, before and after."""
 
 from job import Job, origin_of, run
 

@@ -1,4 +1,4 @@
-"""The arm of a campaign with its errors at held-out poses, before and after."""
+"""Draw the arm of a campaign with its errors at held-out poses, before and after."""
 
 from job import Job, origin_of, run
 
@@ -6,12 +6,12 @@ from elastocal.figures.arms import draw_arm_with_errors
 from elastocal.figures.style import save
 from elastocal.io.json_files import read_json
 from elastocal.loop.schemas import read_residuals
-from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.mechanics.robot_file import parse_robot
 from elastocal.verdict import read_verdict
 
 
 def draw_hero(job: Job) -> None:
-    robot = robot_from_document(read_json(job.input.descriptions)["robot"])
+    robot = parse_robot(read_json(job.input.descriptions)["robot"])
     figure = draw_arm_with_errors(
         robot,
         read_residuals(job.input.residuals, robot.joints),

@@ -1,14 +1,14 @@
-"""Figures 2 and 3: the robot's kinematic scheme, and its springs."""
+"""Draw Figures 2 and 3: the kinematic scheme of a robot, and its springs."""
 
 from job import Job, origin_of, run
 
 from elastocal.figures import schemes
 from elastocal.figures.style import save
-from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.mechanics.robot_file import parse_robot
 
 
 def draw_scheme(job: Job) -> None:
-    robot = robot_from_document(job.params.robot)
+    robot = parse_robot(job.params.robot)
     save(
         getattr(schemes, job.params.scheme)(robot),
         job.output.pdf,

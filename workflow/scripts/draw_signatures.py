@@ -1,4 +1,4 @@
-"""What each effect of the catalogue does to a measured point."""
+"""Draw how each effect of the catalogue displaces a measured point."""
 
 from pathlib import Path
 

@@ -1,5 +1,7 @@
-"""A figure of the study: the function of `figures.study` that the rule names, of tables
-and settings by their names."""
+"""Draw a figure of the study by the function of `figures.study` that its rule names.
+
+The rule also names the tables and the settings that this function takes.
+"""
 
 from functools import partial
 
@@ -9,24 +11,27 @@ import pandas as pd
 
 from elastocal.figures import study
 from elastocal.figures.style import save
-from elastocal.io.data_frames import read_long
+from elastocal.io.data_frames import read_robot_tables
 from elastocal.study.evaluation import make_metrics_schema
 from elastocal.study.jobs import read_printed_figures
 
-# By the name of an input; others are tables for people.
-READ = {
-    "metrics": partial(read_long, schema=make_metrics_schema),
+# Readers of inputs by their names; all other inputs are CSV tables.
+READERS = {
+    "metrics": partial(read_robot_tables, schema=make_metrics_schema),
     "printed": read_printed_figures,
 }
 
 
+def read_csv(path: str) -> pd.DataFrame:
+    # Numbers of tables are names.
+    return pd.read_csv(path, dtype={"table": str})
+
+
 def draw_study(job: Job) -> None:
-    tables = {
-        name: READ.get(name, partial(pd.read_csv, dtype={"table": str}))(
-            job.input[name]
-        )
-        for name in job.params.tables
-    }
+    tables = {}
+    for name in job.params.tables:
+        read = READERS.get(name, read_csv)
+        tables[name] = read(job.input[name])
     figure = getattr(study, job.params.figure)(**tables, **job.params.settings)
     save(figure, job.output.pdf, job.output.png, origin_of(job))
 

@@ -1,4 +1,4 @@
-"""Measured data of other people as a campaign's folder."""
+"""Make the folder of a campaign from public measured data."""
 
 from pathlib import Path
 

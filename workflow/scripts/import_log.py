@@ -1,5 +1,7 @@
-"""Until a script has imported what it needs, and `job.run` sees to its log, what ends
-it is written there; imported first."""
+"""Write an error during the imports of a script to its log.
+
+Scripts import this module first. Once `job.run` has started it writes the log itself.
+"""
 
 import sys
 import traceback
@@ -12,29 +14,24 @@ from elastocal.io.atomic_writes import write_text
 
 
 def write_log(log: str | Path, text: str) -> None:
-    """Write a log; the terminal has the text too, so a log that cannot be written is no
-    fault of its own."""
+    """Write a log if possible; the terminal shows the text in any case."""
     with suppress(OSError, InputError):
         write_text(log, text)
 
 
-def _log_and_say(
+def log_uncaught_error(
     kind: type[BaseException], error: BaseException, trace: TracebackType | None
 ) -> None:
-    # Snakemake puts it into the script itself.
+    # Snakemake defines this object in the script itself.
     job = getattr(sys.modules["__main__"], "snakemake", None)
     if job is not None:
         text = "".join(traceback.format_exception(kind, error, trace))
-        fault = (
-            describe_system_fault(error)
-            if isinstance(error, MemoryError | ImportError)
-            else None
-        )
-        write_log(
-            job.log[0],
-            f"{text}{fault}\n" if fault and fault.source == "memory" else text,
-        )
+        if isinstance(error, MemoryError | ImportError):
+            fault = describe_system_fault(error)
+            if fault is not None and fault.source == "memory":
+                text += f"{fault}\n"
+        write_log(job.log[0], text)
     sys.__excepthook__(kind, error, trace)
 
 
-sys.excepthook = _log_and_say
+sys.excepthook = log_uncaught_error

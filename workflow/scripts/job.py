@@ -1,5 +1,4 @@
-"""What every script does around its one call: a log, checked inputs, and one line where
-the input is at fault."""
+"""Run the step of a script with a log, checked inputs, a record and one-line errors."""
 
 import fcntl
 import sys
@@ -13,18 +12,18 @@ from typing import Any, Protocol
 from import_log import write_log
 
 from elastocal.errors import InputError, describe_system_fault
-from elastocal.io.origin import Origin, environment
+from elastocal.io.origin import Origin, list_versions
 from elastocal.io.records import JobRecord, digest_inputs, write_records
 
-# With the Snakefile; the name of this file goes by the folder of the rules.
+# Folder of the Snakefile. Snakemake runs a copy of a script under the name of the file.
 TOP = Path(__file__).resolve().parents[2]
-# Shared by the jobs under way: a run that begins after another one was killed waits for
-# the jobs that this one left behind.
+# Running jobs share this lock. A run that begins after another one was killed waits for
+# the jobs of that run.
 JOBS_LOCK = Path(".snakemake/jobs.lock")
 
 
 class Job(Protocol):
-    """What Snakemake hands to a script; the names in each part are the rule's."""
+    """The object that Snakemake gives to a script; its entries are named by the rule."""
 
     input: Any
     output: Any
@@ -38,29 +37,39 @@ class Job(Protocol):
 def run(
     step: Callable[[Job], None], snakemake: Job, checked: Iterable[str] | None = None
 ) -> None:
-    """Call ``step(snakemake)``; an `InputError` or a fault of the machine ends the job
-    with one line.
+    """Run a step as a job: check its inputs, call it, and record what it has written.
 
-    Files in `checked` that are no longer what a job wrote, or have no record of it, are
-    refused before; all inputs where it is not given.
+    An `InputError` or a fault of the machine ends the job with one line.
+
+    Parameters
+    ----------
+    step : callable
+        The work of the job.
+    snakemake : Job
+        The object that Snakemake gives to the script.
+    checked : iterable of str, optional
+        Inputs that must be unchanged since a job wrote them, and have its record; all
+        inputs by default.
     """
     log = snakemake.log[0]
     sys.excepthook = sys.__excepthook__
     write_log(log, "")
     try:
-        with _under_way():
+        with _shared_lock():
             started = _now()
-            digests, own = digest_inputs(
+            digests, unrecorded = digest_inputs(
                 snakemake.input, None if checked is None else set(map(str, checked))
             )
             step(snakemake)
-            write_records(_record(snakemake, started, digests, own))
+            write_records(_build_record(snakemake, started, digests, unrecorded))
     except InputError as error:
         write_log(log, f"{error}\n")
         sys.exit(str(error))
     except (OSError, MemoryError) as error:
-        # What pyarrow writes comes without a name.
-        line = f"{describe_system_fault(error, next(iter(snakemake.output), 'disk'))}; the same command goes on then"
+        # Errors of pyarrow do not name the file.
+        file = next(iter(snakemake.output), "disk")
+        fault = describe_system_fault(error, file)
+        line = f"{fault}; the same command goes on then"
         write_log(log, f"{traceback.format_exc()}{line}\n")
         sys.exit(line)
     except BaseException:
@@ -70,36 +79,35 @@ def run(
 
 
 def origin_of(job: Job) -> Origin:
-    """Commit, configuration and seed of the run that this job belongs to."""
+    """Return commit, configuration and seed of the run that a job belongs to."""
     return Origin(**job.config["origin"])
 
 
 @contextmanager
-def _under_way() -> Iterator[None]:
+def _shared_lock() -> Iterator[None]:
+    """Hold the lock that tells a later run that this job is still at work."""
     if not JOBS_LOCK.parent.is_dir():
         yield
         return
-    # The system gives the lock back whatever ends the process.
+    # The system releases the lock however the process ends.
     with open(JOBS_LOCK, "a") as lock:
         fcntl.flock(lock, fcntl.LOCK_SH)
         yield
 
 
-def _record(
-    job: Job, started: str, inputs: dict[str, str], own: tuple[str, ...]
+def _build_record(
+    job: Job, started: str, inputs: dict[str, str], unrecorded: tuple[str, ...]
 ) -> JobRecord:
-    wildcards = {name: str(value) for name, value in job.wildcards.items()}
-    outputs = tuple(map(str, job.output))
     return JobRecord(
         job.rule,
-        wildcards,
+        {name: str(value) for name, value in job.wildcards.items()},
         started,
         _now(),
         inputs,
-        own,
-        outputs,
+        unrecorded,
+        tuple(map(str, job.output)),
         origin_of(job),
-        environment(TOP),
+        list_versions(TOP),
     )
 
 

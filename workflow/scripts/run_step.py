@@ -1,5 +1,4 @@
-"""The script of every rule that names a `step`, a function of the packages: calls it
-with the job."""
+"""Call the function of the packages that a rule names as its `step`, with the job."""
 
 from importlib import import_module
 
@@ -11,7 +10,7 @@ def run_step(job: Job) -> None:
     getattr(import_module(module), name)(job)
 
 
-# Of a user's own files, which come with their digest, there is no record.
+# Files of a user have no record of a job; the rule has their digest instead.
 run(
     run_step,
     snakemake,

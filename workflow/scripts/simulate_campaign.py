@@ -1,4 +1,4 @@
-"""A campaign of a simulated robot, with what its declared robot lacks."""
+"""Simulate a campaign of a robot that has an effect which its declared model lacks."""
 
 from pathlib import Path
 
@@ -6,20 +6,19 @@ from job import Job, run
 
 from elastocal.campaigns.simulation import Plan, draw_measurements
 from elastocal.campaigns.writing import write_campaign
-from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.mechanics.robot_file import parse_robot
 
 
 def simulate_campaign(job: Job) -> None:
     settings = job.params.source
     name = job.wildcards.campaign
-    robot = robot_from_document(settings["robot_document"], settings["robot"])
-    plan = Plan(
-        **{
-            key: tuple(v) if isinstance(v, list) else v
-            for key, v in settings.items()
-            if key in Plan.__annotations__
-        }
-    )
+    robot = parse_robot(settings["robot_document"], settings["robot"])
+    plan_settings = {
+        key: tuple(value) if isinstance(value, list) else value
+        for key, value in settings.items()
+        if key in Plan.__annotations__
+    }
+    plan = Plan(**plan_settings)
     document = {
         "campaign": name,
         "robot": settings["declared_robot"],

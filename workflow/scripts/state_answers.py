@@ -1,4 +1,4 @@
-"""Every number and row of a table that the report of the study shows."""
+"""Collect every number and row that the report of the study shows."""
 
 import json
 
@@ -11,7 +11,7 @@ from elastocal.io.documents import read_document
 from elastocal.report.study import collect_study_facts, shorten_titles
 from elastocal.study.strategies import strategy_from_document
 
-_PLAIN = (
+TABLES = (
     "table2",
     "extended",
     "joint",
@@ -22,12 +22,15 @@ _PLAIN = (
     "needed",
     "scores",
     "score_pairs",
+    "comparison",
+    "ladder",
+    "simulated",
 )
-# Each table, and how it is read: what looks like a number may be none.
-_TABLES = {name: {} for name in _PLAIN} | {
-    "comparison": {"dtype": {"table": str}},
-    "ladder": {"dtype": {"link_springs": str}},
-    "simulated": {"dtype": {"unobservable": str}},
+# Columns that hold text which looks like numbers, by table.
+TEXT_COLUMNS = {
+    "comparison": {"table": str},
+    "ladder": {"link_springs": str},
+    "simulated": {"unobservable": str},
 }
 
 
@@ -35,8 +38,8 @@ def state_answers(job: Job) -> None:
     settings = job.params
     names = shorten_titles(settings.names)
     tables = {
-        name: pd.read_csv(getattr(job.input, name), **how)
-        for name, how in _TABLES.items()
+        name: pd.read_csv(getattr(job.input, name), dtype=TEXT_COLUMNS.get(name))
+        for name in TABLES
     }
     strategies = [strategy_from_document(document) for document in settings.strategies]
     chosen = {
@@ -50,14 +53,13 @@ def state_answers(job: Job) -> None:
         settings.cells | chosen | {"strategies": strategies},
     )
     citation = read_document(job.input.citation)
-    cited = {
-        "date": str(citation["date-released"]),
-        "version": citation["version"],
-        "license": citation["license"],
-    }
     facts |= {
-        "citation": {"authors": ", ".join(each["name"] for each in citation["authors"])}
-        | cited,
+        "citation": {
+            "authors": ", ".join(author["name"] for author in citation["authors"]),
+            "date": str(citation["date-released"]),
+            "version": citation["version"],
+            "license": citation["license"],
+        },
         "names": names,
         "full_names": [settings.names[robot] for robot in settings.robots],
         "size": {name: f"{value:g}" for name, value in settings.size.items()},

@@ -1,4 +1,4 @@
-"""A table as Markdown and LaTeX, each value with its standard error."""
+"""Typeset a table as Markdown and LaTeX, each value with its standard error."""
 
 from job import Job, origin_of, run
 

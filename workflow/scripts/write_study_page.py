@@ -1,4 +1,4 @@
-"""Tables of the study as a page of the documentation."""
+"""Write the tables of the study as a page of the documentation."""
 
 from job import Job, run
 

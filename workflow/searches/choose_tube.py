@@ -1,9 +1,8 @@
-"""Which tube diameter gives kuka_extended the mean deflection that the paper's Table 2
-prints.
+"""Find the tube diameter that gives kuka_extended the mean deflection of Table 2.
 
 Run once by hand, from the top of the repository: python
-workflow/searches/choose_tube.py Its answer, rounded to 0.1 mm, stands in
-config/robots/kuka_extended.yaml; nothing else of the paper went into the choice.
+workflow/searches/choose_tube.py. The result, rounded to 0.1 mm, is in
+config/robots/kuka_extended.yaml; the choice used no other figure of the paper.
 """
 
 from dataclasses import replace
@@ -13,7 +12,7 @@ from scipy.optimize import brentq
 
 from elastocal.io.documents import read_document
 from elastocal.mechanics.robot import Robot
-from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.mechanics.robot_file import parse_robot
 from elastocal.study.simulation import (
     Experiments,
     Loading,
@@ -28,12 +27,24 @@ TABLE_2_MEAN_M = 1.749e-3
 def diameter_for_mean_deflection(
     robot: Robot, experiments: Experiments, target_m: float
 ) -> float:
-    """Outer diameter (m) of the tubes, at their wall, for which the mean end-effector
-    deflection comes out, by Brent's method.
+    """Find the tube diameter for a mean end-effector deflection by Brent's method.
 
-    One figure of the paper fixes this one free size of the extended robot
-    (interpretation R11). `robot`: with links, all of one tube. `target_m`: mean over
-    the experiments of the norm of the displacement.
+    One figure of the paper fixes this only free size of the extended robot
+    (interpretation R11).
+
+    Parameters
+    ----------
+    robot : Robot
+        Its links all have the same tube, whose wall stays as it is.
+    experiments : Experiments
+        Joint angles and wrenches.
+    target_m : float
+        Mean over the experiments of the norm of the displacement, m.
+
+    Returns
+    -------
+    float
+        Outer diameter, m.
     """
 
     def excess(diameter: float) -> float:
@@ -51,7 +62,7 @@ def diameter_for_mean_deflection(
 
 if __name__ == "__main__":
     config = read_document("config.yaml")
-    robot = robot_from_document(read_document("config/robots/kuka_extended.yaml"))
+    robot = parse_robot(read_document("config/robots/kuka_extended.yaml"))
     measurements = {
         key: config["interpretations"][key] for key in ("offset_frame", "joint_range")
     }

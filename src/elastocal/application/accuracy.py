@@ -38,7 +38,7 @@ from elastocal.application.frames import (
     root_mean_square,
 )
 from elastocal.application.scope import set_form_error
-from elastocal.mechanics.kinematics import jacobians, pose_differences
+from elastocal.mechanics.kinematics import compute_jacobians, compute_pose_differences
 from elastocal.verdict import Accuracy
 
 if TYPE_CHECKING:
@@ -296,7 +296,7 @@ def _predict_chunk(
     by_parameters = placed @ robots.covariance_factor
     robot = calibrated.robot
     angles = robot.model_angles(reported_angles)
-    jacobian = jacobians(robot.chain, angles, robot.chain.end_effector)
+    jacobian = compute_jacobians(robot.chain, angles, robot.chain.end_effector)
     by_repeats = jacobian * robots.joint_std_rad
     parameter_covariance = by_parameters @ by_parameters.transpose(0, 2, 1)
     repeat_covariance = by_repeats @ by_repeats.transpose(0, 2, 1)
@@ -387,7 +387,7 @@ def compute_uncorrected_rms_m(
     (N, 6), m, in the frame of the corrected one."""
     pose = predict_poses(calibrated, reported_angles, wrench)
     nominal_pose = compute_nominal_poses(calibrated.robot, reported_angles)
-    differences = pose_differences(*nominal_pose, *pose)
+    differences = compute_pose_differences(*nominal_pose, *pose)
     return root_mean_square(
         compute_uncorrected_errors_m(calibrated, *pose, differences)
     )

@@ -35,8 +35,12 @@ from elastocal.fitting.model import (
     list_parameters,
 )
 from elastocal.fitting.observations import Observations, States, select_states
-from elastocal.mechanics.kinematics import pose_differences, poses
-from elastocal.remainder.corrected import beyond_regressed, inputs_of, is_commanded
+from elastocal.mechanics.kinematics import compute_pose_differences, compute_poses
+from elastocal.residual_model.selection import (
+    build_inputs,
+    find_beyond_regression,
+    is_commanded,
+)
 from elastocal.validation.transfer import find_beyond_campaign, find_larger_loads
 
 if TYPE_CHECKING:
@@ -44,7 +48,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.noise import Noise
     from elastocal.mechanics.robot import Robot
-    from elastocal.remainder.regressions import Inputs, Predictor
+    from elastocal.residual_model.regressions import Inputs, Predictor
 
 # States at a time, so that the intermediate results of a walk along all sites stay in
 # the processor's cache.
@@ -210,7 +214,7 @@ def compute_effect_contributions(
     contributions = {}
     for name, robot in reduced.items():
         reduced_pose = predict_poses(robot, reported_angles, wrench)
-        differences = pose_differences(*pose, *reduced_pose)[..., None]
+        differences = compute_pose_differences(*pose, *reduced_pose)[..., None]
         errors = subtract_placement(calibrated.scope, *pose, differences)
         contributions[name] = root_mean_square(errors[:, :3, 0])
     return contributions
@@ -288,10 +292,10 @@ def select_regression_inputs(
     if residual_model is None:
         return np.zeros(len(reported_angles), bool), None
     observations = build_observations(build_states(calibrated, reported_angles, wrench))
-    active = ~beyond_regressed(
+    active = ~find_beyond_regression(
         calibrated.states, observations.states.joint_angles, wrench
     )
-    inputs = inputs_of(
+    inputs = build_inputs(
         calibrated.model, calibrated.estimate, select_states(observations, active)
     )
     offset_m = np.broadcast_to(residual_model.target_offset_m, (len(inputs), 3))
@@ -324,7 +328,7 @@ def find_equilibrium(
     around = evaluate_conditions(model, estimate, states, nearby_coordinates)
     coordinates = compute_displaced_coordinates(model, estimate, around)
     chain = model.sites.chain
-    return coordinates, *poses(chain, coordinates, chain.end_effector)
+    return coordinates, *compute_poses(chain, coordinates, chain.end_effector)
 
 
 def compute_nominal_poses(
@@ -335,7 +339,7 @@ def compute_nominal_poses(
     Returns position (N, 3), m, and rotation (N, 3, 3) of the end effector's measuring
     point, base axes, at angles (N, n) as the controller reports them.
     """
-    return poses(
+    return compute_poses(
         robot.chain, robot.model_angles(reported_angles), robot.chain.end_effector
     )
 

@@ -34,7 +34,7 @@ from elastocal.application.inverse_kinematics import (
     solve_poses,
 )
 from elastocal.exchange.target_path import OK
-from elastocal.mechanics.kinematics import jacobians, pose_differences
+from elastocal.mechanics.kinematics import compute_jacobians, compute_pose_differences
 
 if TYPE_CHECKING:
     from elastocal.application.calibrated import CalibratedRobot
@@ -187,7 +187,7 @@ def _find_side(robot: Robot, angles: np.ndarray) -> np.ndarray:
     Angles count as lengths at the reach, in which the Jacobian is normalised.
     """
     scale = np.repeat([1.0 / compute_reach_m(robot), 1.0], 3)[:, None]
-    jacobian = jacobians(robot.chain, angles, robot.chain.end_effector)
+    jacobian = compute_jacobians(robot.chain, angles, robot.chain.end_effector)
     determinant = np.linalg.det(jacobian * scale)
     is_singular = np.abs(determinant) < _SINGULAR_DETERMINANT
     return np.where(is_singular, 0.0, np.sign(determinant))
@@ -252,7 +252,7 @@ def _correct_chunk(calibrated: CalibratedRobot, targets: _NominalTargets) -> Cor
     current = _find_equilibria(calibrated, targets, uncorrected)
     error_before = current.error.copy()
     inverse = np.linalg.pinv(
-        jacobians(robot.chain, targets.angles, robot.chain.end_effector)
+        compute_jacobians(robot.chain, targets.angles, robot.chain.end_effector)
     )
     angles = targets.angles.copy()
     is_singular = np.zeros(len(angles), bool)
@@ -308,7 +308,7 @@ def _find_equilibria(
         displacement = predict_residual_displacements(
             calibrated, commands, targets.wrench
         )
-    error = pose_differences(
+    error = compute_pose_differences(
         targets.position, targets.rotation, position + displacement, rotation
     )
     return _Equilibria(coordinates, displacement, error)

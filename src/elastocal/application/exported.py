@@ -16,9 +16,9 @@ import numpy as np
 from elastocal.application.calibrated import predict_poses, remove_effects
 from elastocal.effects.conditions import MASS_PARAMETERS
 from elastocal.exchange.urdf import read_urdf
-from elastocal.exchange.urdf_writing import nominal_chain
+from elastocal.exchange.urdf_writing import find_nominal_chain
 from elastocal.mechanics.chain import Chain, MeasuringPoint, Transform
-from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.kinematics import compute_poses
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -156,11 +156,11 @@ def compute_urdf_deviation_m(
     -------
     Distance, m.
     """
-    _, chain = nominal_chain(read_urdf(path), urdf.base, urdf.tip, path.as_posix())
-    urdf_position, _ = poses(
+    chain = find_nominal_chain(read_urdf(path), urdf.base, urdf.tip, path.as_posix())
+    urdf_position, _ = compute_poses(
         chain, nominal.model_angles(reported_angles), chain.end_effector
     )
-    position, _ = poses(
+    position, _ = compute_poses(
         folded.chain, folded.model_angles(reported_angles), folded.chain.end_effector
     )
     return float(np.linalg.norm(urdf_position - position, axis=1).max())

@@ -20,7 +20,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.mechanics.kinematics import pose_differences, poses_and_jacobians
+from elastocal.mechanics.kinematics import (
+    compute_pose_differences,
+    compute_poses_and_jacobians,
+)
 
 if TYPE_CHECKING:
     from elastocal.mechanics.robot import Robot
@@ -142,10 +145,10 @@ def _compute_pose_errors(
     robot: Robot, position: np.ndarray, rotation: np.ndarray, angles: np.ndarray
 ) -> _PoseErrors:
     scale = np.repeat([1.0, compute_reach_m(robot)], 3)
-    reached_position, reached_rotation, jacobian = poses_and_jacobians(
+    reached_position, reached_rotation, jacobian = compute_poses_and_jacobians(
         robot.chain, angles, robot.chain.end_effector
     )
-    differences = pose_differences(
+    differences = compute_pose_differences(
         position, rotation, reached_position, reached_rotation
     )
     error = differences * scale
@@ -182,7 +185,7 @@ def compute_allowed_steps(
     `STEP_PER_TURN`, a prismatic one in proportion to their distance; angles count as
     lengths at the reach. Returns (N - 1, n), rad or m.
     """
-    differences = pose_differences(
+    differences = compute_pose_differences(
         position[1:], rotation[1:], position[:-1], rotation[:-1]
     )
     shift = np.linalg.norm(differences[:, :3], axis=1)[:, None]

@@ -34,8 +34,8 @@ from elastocal.fitting.model import (
     list_parameters,
 )
 from elastocal.fitting.noise import estimate_joint_repeatability
-from elastocal.mechanics.kinematics import pose_differences, poses
-from elastocal.remainder.corrected import is_commanded
+from elastocal.mechanics.kinematics import compute_pose_differences, compute_poses
+from elastocal.residual_model.selection import is_commanded
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.model import Case, Estimate, Model
     from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import States
-    from elastocal.remainder.regressions import Predictor
+    from elastocal.residual_model.regressions import Predictor
 
 
 def calibrate_on_case(
@@ -165,7 +165,7 @@ def determine_scope(
         ),
     )
     sensitivities = compute_pose_sensitivities(calibrated, commands, states.wrench)
-    before = pose_differences(
+    before = compute_pose_differences(
         *compute_nominal_poses(robot, commands), position, rotation
     )
     scope = replace(
@@ -276,8 +276,8 @@ def _compute_left_out_fields(
         coordinates = compute_displaced_coordinates(
             end_model, values, evaluate_conditions(end_model, values, states)
         )
-        end_poses.append(poses(chain, coordinates, chain.end_effector))
-    displacement = pose_differences(*end_poses[0], *end_poses[1])
+        end_poses.append(compute_poses(chain, coordinates, chain.end_effector))
+    displacement = compute_pose_differences(*end_poses[0], *end_poses[1])
     keys = {model.effects[number].key for number in left_out}
     columns = np.array(
         [owner in keys for owner, _ in list_parameters(end_model, end_estimate)]

@@ -119,7 +119,7 @@ class Campaign:
     noise : declared noise, if any.
     holdout : rule that selects the held-out poses.
     measurements : the measurements.
-    remainder : residual model, a name in `remainder.corrected`, "auto" or "none".
+    remainder : residual model, a name in `residual_model.regressions`, "auto" or "none".
     table : name of the file of measurements; empty if there is none.
     header_line : line of the header if the file is text.
     """

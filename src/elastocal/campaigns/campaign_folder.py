@@ -18,7 +18,7 @@ from elastocal.errors import InputError, suggest_names
 from elastocal.io.documents import check_document, read_document
 from elastocal.io.records import compute_sha256
 from elastocal.mechanics.robot import Robot
-from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.mechanics.robot_file import parse_robot
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class CampaignFolder:
     @cached_property
     def robot(self) -> Robot:
         """Nominal robot, as its file describes it."""
-        return robot_from_document(self.robot_document, self.robot_file.as_posix())
+        return parse_robot(self.robot_document, self.robot_file.as_posix())
 
     @cached_property
     def held_out_path(self) -> Path | None:

@@ -27,7 +27,7 @@ from elastocal.campaigns.writing import write_campaign
 from elastocal.errors import InputError
 from elastocal.io.documents import (
     check_document,
-    document_path,
+    locate_document,
     read_document,
     read_named_document,
 )
@@ -461,7 +461,7 @@ def read_campaign_sources(
         document = read_named_document(
             folder, "campaigns", "campaign_source", name, source
         )
-        path = document_path(folder, "campaigns", name)
+        path = locate_document(folder, "campaigns", name)
         if document["source"] == "public":
             find_importer(document["importer"], folder, path)
         else:

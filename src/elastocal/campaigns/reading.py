@@ -36,7 +36,7 @@ from elastocal.counting import format_count
 from elastocal.errors import InputError, suggest_names
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
-from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.mechanics.robot_file import parse_robot
 
 # A joint angle this far beyond the limits is not the angle of a joint at its limit.
 _BEYOND_LIMITS_RAD = 0.5
@@ -89,7 +89,7 @@ def read_campaign(
 def read_robot(path: str | Path) -> Robot:
     """Read a robot file; an `InputError` names what its schema or
     `robot_from_document` refuses."""
-    return robot_from_document(read_robot_document(path), Path(path).as_posix())
+    return parse_robot(read_robot_document(path), Path(path).as_posix())
 
 
 def read_held_out_campaign(

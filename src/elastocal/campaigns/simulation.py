@@ -9,12 +9,15 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.elastostatics import (
-    extended_chain,
-    generalized_forces,
-    spring_compliance,
-    wrench_of_offset_force,
+    build_extended_chain,
+    build_spring_compliance,
+    compute_generalized_forces,
+    compute_offset_wrench,
 )
-from elastocal.mechanics.kinematics import poses_and_jacobians, poses_of_points
+from elastocal.mechanics.kinematics import (
+    compute_point_poses,
+    compute_poses_and_jacobians,
+)
 from elastocal.mechanics.robot import Robot
 from elastocal.random_streams import open_stream
 
@@ -70,7 +73,7 @@ def draw_measurements(
     pose, load, repeat = _list_approaches(plan).T
     angles = angles_of_pose[pose]
     force = plan.force_N * np.array(plan.ladder)[load, None] * direction[pose]
-    wrench = wrench_of_offset_force(force, plan.offset_m)
+    wrench = compute_offset_wrench(force, plan.offset_m)
     position, rotation = _deflected_poses(robot, plan.points, angles, wrench)
     noise = draws.standard_normal((len(plan.points), 2, len(pose), 3))
     measured = _add_noise(position, rotation, noise, plan)
@@ -107,13 +110,15 @@ def _deflected_poses(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the positions (P, A, 3), m, and rotation matrices (P, A, 3, 3) of P
     measuring points at angles (A, n) under wrenches (A, 6)."""
-    chain = extended_chain(robot)
+    chain = build_extended_chain(robot)
     coordinates = chain.at(angles)
     end_effector = replace(chain.end_effector, offset_m=(0.0, 0.0, 0.0))
-    jacobian = poses_and_jacobians(chain, coordinates, end_effector)[2]
-    forces = generalized_forces(jacobian, wrench)
-    deflected = coordinates + forces @ spring_compliance(robot)
-    return poses_of_points(chain, deflected, [chain.point(point) for point in points])
+    jacobian = compute_poses_and_jacobians(chain, coordinates, end_effector)[2]
+    forces = compute_generalized_forces(jacobian, wrench)
+    deflected = coordinates + forces @ build_spring_compliance(robot)
+    return compute_point_poses(
+        chain, deflected, [chain.point(point) for point in points]
+    )
 
 
 def _add_noise(

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from elastocal.application.calibrated import CalibratedRobot
     from elastocal.application.exported import FoldedRobot
     from elastocal.exchange.urdf_writing import CorrectedUrdf
-    from elastocal.loop.calibrated_files import Diagnosed
+    from elastocal.loop.calibrated_files import DiagnosedCampaign
 
 ROBOT = "robot.yaml"
 URDF = "robot.urdf"
@@ -86,7 +86,7 @@ def export(
 
 
 def _describe_losses(
-    campaign: Diagnosed,
+    campaign: DiagnosedCampaign,
     exported: CalibratedRobot,
     folded: FoldedRobot,
     reported_angles: np.ndarray,
@@ -141,10 +141,13 @@ def _write_robot(path: Path, folded: FoldedRobot, campaign: str) -> None:
     import yaml
 
     from elastocal.io.atomic_writes import write_text
-    from elastocal.mechanics.robot_file import document_of
+    from elastocal.mechanics.robot_file import describe_robot
 
     text = yaml.safe_dump(
-        document_of(folded.robot), sort_keys=False, default_flow_style=None, width=128
+        describe_robot(folded.robot),
+        sort_keys=False,
+        default_flow_style=None,
+        width=128,
     )
     write_text(path, f"# Calibrated by elastocal from the campaign {campaign}.\n{text}")
 

@@ -14,21 +14,24 @@ import numpy as np
 from scipy.constants import g, pound_force
 
 from elastocal.campaigns.campaign import group_equal_rows
-from elastocal.data_checks.hypotheses import other_interpretations
+from elastocal.data_checks.hypotheses import find_better_interpretation
 from elastocal.data_checks.placement import (
     IMPLAUSIBLE_M,
     IMPLAUSIBLE_RAD,
-    of_each_target,
-    placed,
-    rms,
-    robustly_placed,
-    spread,
+    group_by_target,
+    place_measurements,
+    place_robustly,
+    root_mean_square,
+    select_spread_poses,
 )
 from elastocal.data_checks.protocol import Fault, Value
 from elastocal.fitting.model import get_joint_compliances
 from elastocal.fitting.observations import index_poses
-from elastocal.mechanics.elastostatics import generalized_forces, regressor
-from elastocal.mechanics.kinematics import jacobians, position_jacobians
+from elastocal.mechanics.elastostatics import (
+    build_regressor,
+    compute_generalized_forces,
+)
+from elastocal.mechanics.kinematics import compute_jacobians, compute_position_jacobians
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign
@@ -71,7 +74,7 @@ _AS_WELL = 1.1
 _DIFFERING = 1e-6
 # Newtons and newton metres for each unit in which loads may have been written, and the
 # words for it.
-UNITS = (
+LOAD_UNITS = (
     (1.0, 1.0, ""),
     (
         g,
@@ -121,29 +124,29 @@ UNITS = (
 )
 
 
-def faults(campaign: Campaign) -> tuple[Fault, ...]:
+def find_faults(campaign: Campaign) -> tuple[Fault, ...]:
     """Every fault that the measurements of a campaign show; none is looked for where
     another one makes that meaningless."""
-    for find in (constant_columns, other_interpretations):
+    for find in (find_constant_columns, find_better_interpretation):
         if found := find(campaign):
             return tuple(found)
-    differences = deflections(campaign)
+    differences = compute_deflections(campaign)
     return (
-        *(wrong_loads(*differences) if differences else ()),
-        *implausible_measurements(campaign),
+        *(find_wrong_loads(*differences) if differences else ()),
+        *find_implausible_measurements(campaign),
     )
 
 
-def constant_columns(campaign: Campaign) -> list[Fault]:
+def find_constant_columns(campaign: Campaign) -> list[Fault]:
     """Positions that stay where they are while the robot moves, or joint angles that do
     not while the measurements do.
 
     Returns one for each kind, of the first target that shows it.
     """
-    some = spread(campaign).measurements
-    predicted = placed(spread(campaign)).predicted
+    some = select_spread_poses(campaign).measurements
+    predicted = place_measurements(select_spread_poses(campaign)).predicted
     found: dict[str, Fault] = {}
-    for members in of_each_target(some):
+    for members in group_by_target(some):
         if (poses := len(np.unique(some.pose[members]))) < _FEWEST_POSES:
             continue
         measured = some.position[members]
@@ -184,7 +187,7 @@ def _extents(points: np.ndarray) -> np.ndarray:
     return np.sqrt(np.maximum(np.linalg.eigvalsh(off.T @ off / len(points)), 0.0))
 
 
-def deflections(campaign: Campaign) -> tuple[np.ndarray, np.ndarray] | None:
+def compute_deflections(campaign: Campaign) -> tuple[np.ndarray, np.ndarray] | None:
     """Differences between the loads of each pose: those seen (R,), and those expected
     of forces and of moments (R, 2), m.
 
@@ -201,25 +204,29 @@ def deflections(campaign: Campaign) -> tuple[np.ndarray, np.ndarray] | None:
     )
     campaign, chain = replace(campaign, measurements=measurements), campaign.robot.chain
     # Frames and targets from the lowest loads: those of a wrong unit must not enter.
-    whole = placed(campaign, robustly_placed(spread(campaign)).estimate)
+    whole = place_measurements(
+        campaign, place_robustly(select_spread_poses(campaign)).estimate
+    )
     targets = zip(campaign.targets, whole.estimate.target_offset, strict=True)
     points = [
         replace(chain.point(target.point), offset_m=tuple(at)) for target, at in targets
     ]
-    jacobian = position_jacobians(
+    jacobian = compute_position_jacobians(
         chain, measurements.joint_angles, points, measurements.target
     )
-    end = jacobians(
+    end = compute_jacobians(
         chain,
         measurements.joint_angles,
         replace(chain.end_effector, offset_m=(0.0, 0.0, 0.0)),
     )
     torques = [
-        generalized_forces(end, measurements.wrench * (np.arange(6) // 3 == part))
+        compute_generalized_forces(
+            end, measurements.wrench * (np.arange(6) // 3 == part)
+        )
         for part in (0, 1)
     ]
     expected = [
-        regressor(jacobian, each) @ campaign.robot.compliance for each in torques
+        build_regressor(jacobian, each) @ campaign.robot.compliance for each in torques
     ]
     group = group_equal_rows(
         np.column_stack([index_poses(measurements), measurements.target])
@@ -233,7 +240,7 @@ def deflections(campaign: Campaign) -> tuple[np.ndarray, np.ndarray] | None:
     return off[..., 0].ravel(), off[..., 1:].reshape(-1, 2)
 
 
-def wrong_loads(seen: np.ndarray, expected: np.ndarray) -> list[Fault]:
+def find_wrong_loads(seen: np.ndarray, expected: np.ndarray) -> list[Fault]:
     """The sign and the unit that explain deflections, see `deflections`, far better
     than the loads as written, if any do.
 
@@ -243,7 +250,7 @@ def wrong_loads(seen: np.ndarray, expected: np.ndarray) -> list[Fault]:
     as_written = expected.sum(axis=1)
     before, share, _ = _left(seen, as_written)
     found = []
-    for force, moment, detail in UNITS:
+    for force, moment, detail in LOAD_UNITS:
         corrected = expected @ (force, moment)
         sign = float(np.sign(corrected @ seen))
         after, share_after, off = _left(seen, sign * corrected)
@@ -292,20 +299,22 @@ def _left(seen: np.ndarray, expected: np.ndarray) -> tuple[float, float, float]:
     logarithm.
     """
     factor = np.clip(expected @ seen / (expected @ expected), 1 / _RATIO, _RATIO)
-    left = rms(seen - factor * expected)
+    left = root_mean_square(seen - factor * expected)
     return (
         left,
-        min(left / max(rms(seen), factor * rms(expected)), 1.0),
+        min(
+            left / max(root_mean_square(seen), factor * root_mean_square(expected)), 1.0
+        ),
         float(abs(np.log(factor))),
     )
 
 
-def implausible_measurements(campaign: Campaign) -> list[Fault]:
+def find_implausible_measurements(campaign: Campaign) -> list[Fault]:
     """Measurements absurdly far from the nominal robot, for a reason that no other
     fault names; one fault, or none."""
     # Nearly all campaigns are done with the first, which takes a sixth of the time.
-    for place in (placed, robustly_placed):
-        placement = place(spread(campaign))
+    for place in (place_measurements, place_robustly):
+        placement = place(select_spread_poses(campaign))
         away, turned = map(float, placement.misfit)
         if away < _FARTHEST_M and turned < _FARTHEST_RAD:
             return []
@@ -328,12 +337,12 @@ def implausible_measurements(campaign: Campaign) -> list[Fault]:
             (),
             detail,
             parameters,
-            (rms(placement.distance),) * 2,
+            (root_mean_square(placement.distance),) * 2,
         )
     ]
 
 
-def compliance_warnings(fitted: Fit) -> list[str]:
+def warn_of_compliances(fitted: Fit) -> list[str]:
     """Name the identified joint compliances of a fit that are negative, or far off
     nominal either way, in one sentence.
 
@@ -343,7 +352,7 @@ def compliance_warnings(fitted: Fit) -> list[str]:
     model = fitted.model
     if not model.identifies_compliance:
         return [] if model.compliance_known else [_RIGID]
-    if rms(np.linalg.norm(fitted.residual[:, :3], axis=1)) > IMPLAUSIBLE_M:
+    if root_mean_square(np.linalg.norm(fitted.residual[:, :3], axis=1)) > IMPLAUSIBLE_M:
         return []
     std_error = np.sqrt(np.diag(fitted.covariance))[
         fitted.parameter_indices("joint_compliance")
@@ -371,10 +380,10 @@ def compliance_warnings(fitted: Fit) -> list[str]:
     )
 
 
-def controller_warnings(campaign: Campaign) -> list[str]:
+def warn_of_computed_positions(campaign: Campaign) -> list[str]:
     """Say where positions are those of the robot file's own kinematics, as a controller
     works them out."""
-    off = rms(placed(campaign).distance)
+    off = root_mean_square(place_measurements(campaign).distance)
     if off > _NO_ROBOT_M:
         return []
     return [

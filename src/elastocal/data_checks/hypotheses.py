@@ -23,10 +23,10 @@ from elastocal.data_checks.placement import (
     FAR_BETTER,
     IMPLAUSIBLE_M,
     IMPLAUSIBLE_RAD,
-    placed,
-    rms,
-    robustly_placed,
-    spread,
+    place_measurements,
+    place_robustly,
+    root_mean_square,
+    select_spread_poses,
 )
 from elastocal.data_checks.protocol import Fault, Value
 
@@ -86,19 +86,21 @@ class Hypothesis:
     found: Callable[[Placement, Placement], str | None] | None = None
 
 
-def other_interpretations(campaign: Campaign) -> list[Fault]:
+def find_better_interpretation(campaign: Campaign) -> list[Fault]:
     """The simplest way to read the file otherwise that lets absurd measurements fit,
     beside those that fit as well; or none."""
-    few = spread(campaign, _POSES)
-    by_rows = shifts(campaign)
+    few = select_spread_poses(campaign, _POSES)
+    by_rows = list_row_shifts(campaign)
     loaded = campaign.measurements.load > 0
-    found = _mended(few, [*discrete(few), *by_rows], fitted(few))
+    found = _mended(
+        few, [*list_discrete_hypotheses(few), *by_rows], list_fitted_hypotheses(few)
+    )
     if found or not loaded.any():
         return found
     # Rows of one pose that stand a row off show it at the last load alone, where the
     # next pose's stand.
     return _mended(
-        spread(
+        select_spread_poses(
             replace(campaign, measurements=campaign.measurements.select(loaded)), _POSES
         ),
         by_rows,
@@ -108,7 +110,7 @@ def other_interpretations(campaign: Campaign) -> list[Fault]:
 def _mended(campaign: Campaign, *tried: Sequence[Hypothesis]) -> list[Fault]:
     """Fault of the hypothesis that mends the measurements: of the first list, unless
     one of the next is far better."""
-    written = robustly_placed(campaign)
+    written = place_robustly(campaign)
     if (written.misfit <= _IMPLAUSIBLE).all():
         return []
     found = [
@@ -124,7 +126,9 @@ def _best(
 ) -> tuple[float, Fault | None] | None:
     """What the first of those that fit best leaves, m, and its fault, if it is one;
     None where it does not convince."""
-    left = np.array([_length(placed(each.read(campaign)).misfit) for each in tried])
+    left = np.array(
+        [_length(place_measurements(each.read(campaign)).misfit) for each in tried]
+    )
     alike = [
         each
         for each, lies in zip(tried, left, strict=True)
@@ -132,7 +136,7 @@ def _best(
     ]
     best = alike[0]
     others = tuple(each.detail for each in alike[1 : 1 + _MOST_ALIKE])
-    found = robustly_placed(best.read(campaign))
+    found = place_robustly(best.read(campaign))
     evidence = _evidence(written, found)
     if evidence is None:
         return None
@@ -161,7 +165,7 @@ def _evidence(written: Placement, found: Placement) -> tuple[float, float] | Non
     target = found.observations.target
     predicted = [found.predicted[target == number] for number in np.unique(target)]
     extent = max(
-        rms(np.linalg.norm(points - points.mean(axis=0), axis=1))
+        root_mean_square(np.linalg.norm(points - points.mean(axis=0), axis=1))
         for points in predicted
     )
     # Where the robot hardly moves, anything that gathers the measurements in one place
@@ -177,7 +181,7 @@ def _evidence(written: Placement, found: Placement) -> tuple[float, float] | Non
     return None
 
 
-def discrete(campaign: Campaign) -> list[Hypothesis]:
+def list_discrete_hypotheses(campaign: Campaign) -> list[Hypothesis]:
     """Everything that is no fit, the simplest first."""
     oriented = campaign.measured == "pose"
     axes = _axes(campaign.frame == "tracker" and not oriented, oriented)
@@ -189,7 +193,7 @@ def discrete(campaign: Campaign) -> list[Hypothesis]:
     ]
 
 
-def fitted(campaign: Campaign) -> list[Hypothesis]:
+def list_fitted_hypotheses(campaign: Campaign) -> list[Hypothesis]:
     """Base or targets elsewhere, as far as the campaign says that it knows them."""
     found = []
     targets = campaign.targets
@@ -253,7 +257,7 @@ def _targets_elsewhere(written: Placement, found: Placement) -> str | None:
     return f"targets do not sit where the campaign says: {' and '.join(wrong.values())}; {fits}"
 
 
-def shifts(campaign: Campaign) -> list[Hypothesis]:
+def list_row_shifts(campaign: Campaign) -> list[Hypothesis]:
     """Measured columns that stand a row further up or down, of all measurements: those
     left have others beside them."""
     measurements = campaign.measurements
@@ -312,7 +316,9 @@ def _lengths(campaign: Campaign) -> Iterator[Hypothesis]:
     for unit, metres in _LENGTHS.items():
         detail = f"the positions look like {unit}: measurements fit {metres:g} times the written positions"
         yield Hypothesis(
-            "wrong_unit", detail, columns(position=partial(np.multiply, metres))
+            "wrong_unit",
+            detail,
+            transform_columns(position=partial(np.multiply, metres)),
         )
     known = [
         target.name
@@ -328,13 +334,15 @@ def _lengths(campaign: Campaign) -> Iterator[Hypothesis]:
 
 def _rotations() -> Iterator[Hypothesis]:
     detail = "the rotation vectors fit turned round, as if they took base axes into the target's"
-    yield Hypothesis("wrong_sign", detail, columns(rotation_vector=np.negative))
+    yield Hypothesis(
+        "wrong_sign", detail, transform_columns(rotation_vector=np.negative)
+    )
     for letters, words in _EULER.items():
         detail = f"the columns of the rotation vector look like {words}, in rad"
         yield Hypothesis(
             "wrong_unit",
             detail,
-            columns(rotation_vector=partial(_from_angles, letters)),
+            transform_columns(rotation_vector=partial(_from_angles, letters)),
         )
 
 
@@ -344,7 +352,9 @@ def _axes(mirrored_only: bool, oriented: bool) -> Iterator[Hypothesis]:
     if mirrored_only:
         detail = "the measurements are mirrored: two axes are exchanged, or one is turned round, or joints have the wrong sense"
         yield Hypothesis(
-            "swapped_axes", detail, columns(position=_by(np.diag([1.0, 1.0, -1.0])))
+            "swapped_axes",
+            detail,
+            transform_columns(position=_by(np.diag([1.0, 1.0, -1.0]))),
         )
         return
     signed = product(permutations(range(3)), product((1.0, -1.0), repeat=3))
@@ -364,14 +374,18 @@ def _axes(mirrored_only: bool, oriented: bool) -> Iterator[Hypothesis]:
             if axis != other
         )
         detail = f"the axes are exchanged: measurements fit with {changed}"
-        yield Hypothesis("swapped_axes", detail, columns(position=_by(matrix)))
+        yield Hypothesis(
+            "swapped_axes", detail, transform_columns(position=_by(matrix))
+        )
         handed = np.linalg.det(matrix)
         for sign in sorted({1.0, handed}) if oriented else ():
             words = f"{detail}, and their rotation vectors likewise{', turned round' if sign * handed > 0 > handed else ''}"
             yield Hypothesis(
                 "swapped_axes",
                 words,
-                columns(position=_by(matrix), rotation_vector=_by(sign * matrix)),
+                transform_columns(
+                    position=_by(matrix), rotation_vector=_by(sign * matrix)
+                ),
             )
 
 
@@ -386,7 +400,7 @@ def _by(matrix: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
     return lambda vectors: vectors @ matrix.T
 
 
-def columns(
+def transform_columns(
     **functions: Callable[[np.ndarray], np.ndarray],
 ) -> Callable[[Campaign], Campaign]:
     """Interpretation of a campaign with functions of columns of its measurements in
@@ -413,13 +427,13 @@ def _moved(
         position=read.position,
         rotation_vector=read.rotation_vector,
     )
-    return spread(replace(campaign, measurements=moved), _POSES)
+    return select_spread_poses(replace(campaign, measurements=moved), _POSES)
 
 
 def _with_angles(matrix: np.ndarray, campaign: Campaign) -> Campaign:
     # The sign of a column of the file, which counts from where the controller counts.
     robot = campaign.robot
-    return columns(
+    return transform_columns(
         joint_angles=lambda q: robot.model_angles(robot.reported_angles(q) @ matrix.T)
     )(campaign)
 

@@ -14,7 +14,7 @@ from elastocal.campaigns.campaign import group_equal_rows
 from elastocal.fitting.least_squares import compute_nominal_poses, register_to_poses
 from elastocal.fitting.model import build_declared_model, transform_to_base
 from elastocal.fitting.observations import select_states, separate_measurements
-from elastocal.mechanics.kinematics import rotation_vectors
+from elastocal.mechanics.kinematics import compute_rotation_vectors
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
@@ -83,7 +83,7 @@ class Placement:
             self.nominal[1] @ self.estimate.target_rotation[self.observations.target]
         )
         return np.linalg.norm(
-            rotation_vectors(seen @ predicted.transpose(0, 2, 1)), axis=1
+            compute_rotation_vectors(seen @ predicted.transpose(0, 2, 1)), axis=1
         )
 
     @cached_property
@@ -104,7 +104,9 @@ class Placement:
         )
 
 
-def placed(campaign: Campaign, estimate: Estimate | None = None) -> Placement:
+def place_measurements(
+    campaign: Campaign, estimate: Estimate | None = None
+) -> Placement:
     """Measurements in given frames and targets, or in those fitted to all measurements
     alike."""
     model = replace(build_declared_model(campaign), effects=())
@@ -118,7 +120,7 @@ def placed(campaign: Campaign, estimate: Estimate | None = None) -> Placement:
     )
 
 
-def robustly_placed(campaign: Campaign) -> Placement:
+def place_robustly(campaign: Campaign) -> Placement:
     """Fit frames and targets to the measurements that agree with each other.
 
     Least trimmed squares by concentration steps [1] from the fit to all, trimmed for
@@ -127,13 +129,13 @@ def robustly_placed(campaign: Campaign) -> Placement:
     [1] Rousseeuw, P. J. and Van Driessen, K., Computing LTS regression for large data sets, Data Mining and Knowledge Discovery
         12, 2006.
     """
-    found = placed(campaign)
+    found = place_measurements(campaign)
     if campaign.frame == "base" and not found.model.fitted_target_components:
         return found
     for step in range(_CORE_STEPS + 1):
         distance = found.distance
         kept = np.zeros(len(campaign.measurements), bool)
-        for members in of_each_target(campaign.measurements):
+        for members in group_by_target(campaign.measurements):
             limit = np.quantile(distance[members], _CORE)
             if step == _CORE_STEPS:
                 limit = max(
@@ -147,12 +149,12 @@ def robustly_placed(campaign: Campaign) -> Placement:
     return found
 
 
-def spread(campaign: Campaign, poses: int = MANY_POSES) -> Campaign:
+def select_spread_poses(campaign: Campaign, poses: int = MANY_POSES) -> Campaign:
     """A campaign with measurements of so many poses of each target in each session at
     most, at the lowest load of each."""
     seen = campaign.measurements
     chosen = []
-    for members in of_each_target(seen):
+    for members in group_by_target(seen):
         order = members[
             np.lexsort((seen.repeat[members], seen.load[members], seen.pose[members]))
         ]
@@ -163,16 +165,18 @@ def spread(campaign: Campaign, poses: int = MANY_POSES) -> Campaign:
     return replace(campaign, measurements=seen.select(np.sort(np.concatenate(chosen))))
 
 
-def rms(values: np.ndarray) -> float:
+def root_mean_square(values: np.ndarray) -> float:
     """Root of the mean square, of an array of any shape."""
     return float(np.sqrt((values**2).mean()))
 
 
 def _trimmed_rms(distance: np.ndarray) -> float:
-    return rms(np.sort(distance)[: max(int((1 - _TRIMMED) * len(distance)), 1)])
+    return root_mean_square(
+        np.sort(distance)[: max(int((1 - _TRIMMED) * len(distance)), 1)]
+    )
 
 
-def of_each_target(measurements: Measurements) -> list[np.ndarray]:
+def group_by_target(measurements: Measurements) -> list[np.ndarray]:
     """Indices of the measurements of each target in each session."""
     number = group_equal_rows(
         np.column_stack([measurements.session, measurements.target])

@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 # Family of faults of the data among the effects of a verdict.
-OF_DATA = "data"
+DATA_FAMILY = "data"
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.mechanics.kinematics import Motion, cross, motion
+from elastocal.mechanics.kinematics import Motion, compute_motion, multiply_vectors
 from elastocal.mechanics.sites import Sites
 
 if TYPE_CHECKING:
@@ -142,7 +142,7 @@ class Conditions:
                 mass.centre_m, rotation, (0, 1)
             )
             moments = np.empty((3, MASS_PARAMETERS, rotation.shape[2]))
-            cross(
+            multiply_vectors(
                 np.concatenate([centre[:, None], rotation], axis=1),
                 gravity[:, None, None],
                 moments,
@@ -157,7 +157,7 @@ class Conditions:
         wrench = np.empty((6, first.shape[1]))
         gravity = np.array(self.sites.gravity_m_s2)[:, None]
         wrench[:3] = mass * gravity
-        cross(first, gravity, wrench[3:])
+        multiply_vectors(first, gravity, wrench[3:])
         return wrench
 
     @cached_property
@@ -219,7 +219,9 @@ class Conditions:
         ).T
 
 
-def progress_of(states: States, row_span: tuple[int, int] | None = None) -> np.ndarray:
+def compute_progress(
+    states: States, row_span: tuple[int, int] | None = None
+) -> np.ndarray:
     """How far a campaign had come in each state, ndarray (S,): 0 at its first row, 1 at
     its last.
 
@@ -234,7 +236,7 @@ def progress_of(states: States, row_span: tuple[int, int] | None = None) -> np.n
     return (place - first) / max(last - first, 1)
 
 
-def conditions_of(
+def build_conditions(
     sites: Sites,
     compliance: np.ndarray,
     states: States,
@@ -258,18 +260,18 @@ def conditions_of(
         np.asarray(compliance),
         states.joint_angles,
         states.wrench,
-        motion(sites.chain, coordinates, sites.followed),
+        compute_motion(sites.chain, coordinates, sites.followed),
         np.zeros(MASS_PARAMETERS * len(sites.masses))
         if mass_corrections is None
         else mass_corrections,
         unknown if states.approach is None else states.approach,
         unknown[:, 0] if states.time_s is None else states.time_s - time_zero_s,
         unknown[:, 0] if states.temperature_c is None else states.temperature_c,
-        progress_of(states, row_span),
+        compute_progress(states, row_span),
     )
 
 
-def at_states(conditions: Conditions, chosen: slice | np.ndarray) -> Conditions:
+def select_conditions(conditions: Conditions, chosen: slice | np.ndarray) -> Conditions:
     """Some of the states; `chosen` (S,) of bool."""
     moved = conditions.motion
     some = replace(
@@ -291,7 +293,7 @@ def at_states(conditions: Conditions, chosen: slice | np.ndarray) -> Conditions:
     return replace(conditions, motion=some, of_angles={}, **kept)
 
 
-def with_springs(
+def replace_springs(
     conditions: Conditions, compliance: np.ndarray, mass_corrections: np.ndarray
 ) -> Conditions:
     """The same states with other joint compliances (n,) and other errors of the
@@ -310,7 +312,7 @@ def with_springs(
     return changed
 
 
-def with_total(conditions: Conditions, total: np.ndarray) -> Conditions:
+def replace_total_load(conditions: Conditions, total: np.ndarray) -> Conditions:
     """The same states under another `Conditions.total` load, ndarray (S, C), whatever
     makes it."""
     changed = replace(conditions)
@@ -318,7 +320,7 @@ def with_total(conditions: Conditions, total: np.ndarray) -> Conditions:
     return changed
 
 
-def offered(sites: Sites, states: States) -> frozenset[str]:
+def find_offered_needs(sites: Sites, states: States) -> frozenset[str]:
     """List which needs of effects the data meet.
 
     Returns

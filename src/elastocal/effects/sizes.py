@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.constants import g as standard_gravity
 
-from elastocal.mechanics.robot import usual_payload_kg
+from elastocal.mechanics.robot import estimate_typical_payload_kg
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -69,7 +69,7 @@ def rated_kg(sites: Sites) -> float:
         return sites.payload_kg
     return _RATED_OVER_MASS * sum(
         mass.mass_kg for mass in sites.masses
-    ) or usual_payload_kg(sites.chain)
+    ) or estimate_typical_payload_kg(sites.chain)
 
 
 def lever_m(sites: Sites, joint: int) -> float:

@@ -18,7 +18,7 @@ from elastocal.figures.style import (
     label_decades,
     styled,
 )
-from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.kinematics import compute_poses
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -209,7 +209,7 @@ def _draw_plan_view(
         angles = robot.model_angles(chosen.joint_angles)
         for arm in _compute_links(robot, angles):
             axis.plot(arm[:, right], arm[:, up], color="#c8c8c8", lw=0.6, zorder=1)
-        positions, _ = poses(robot.chain, angles, robot.chain.end_effector)
+        positions, _ = compute_poses(robot.chain, angles, robot.chain.end_effector)
         axis.plot(
             positions[:, right],
             positions[:, up],

@@ -13,14 +13,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from elastocal.effects.catalogue import list_effects
-from elastocal.effects.conditions import conditions_of
+from elastocal.effects.conditions import build_conditions
 from elastocal.effects.protocol import Candidate
 from elastocal.figures.style import MILLI, PALETTE, create_panels, styled
 from elastocal.fitting.model import sum_displacements
 from elastocal.fitting.observations import States
-from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.kinematics import compute_poses
 from elastocal.mechanics.robot import Robot
-from elastocal.mechanics.sites import Sites, sites_of
+from elastocal.mechanics.sites import Sites, build_sites
 
 # The joint that carries the arm shows most effects; an effect that can act at several
 # joints is shown at this one.
@@ -165,7 +165,7 @@ def _compute_displacement(
     experiment: _Experiment,
 ) -> np.ndarray:
     """Displacement (S, 3) of the reflector in mm, base axes, by one effect."""
-    conditions = conditions_of(sites, compliance, experiment.states, row_span=(0, 1))
+    conditions = build_conditions(sites, compliance, experiment.states, row_span=(0, 1))
     sizes = np.array(
         [
             (parameter.sign or 1) * parameter.plausible
@@ -179,8 +179,8 @@ def _compute_displacement(
     for coordinate, shift in shifts.items():
         displaced[:, coordinate] += shift
     reflector = replace(sites.chain.end_effector, offset_m=_REFLECTOR_M)
-    after, _ = poses(sites.chain, displaced, reflector)
-    before, _ = poses(sites.chain, commanded, reflector)
+    after, _ = compute_poses(sites.chain, displaced, reflector)
+    before, _ = compute_poses(sites.chain, commanded, reflector)
     return MILLI * (after - before)
 
 
@@ -191,7 +191,7 @@ def list_candidates(name: str, robot: Robot) -> list[Candidate]:
 
 def _find_sites(name: str, robot: Robot) -> Sites:
     """Sites of the arm without masses, unless the effect exists only with them."""
-    with_masses = replace(sites_of(robot), gear_ratio=(_GEAR_RATIO,) * robot.joints)
+    with_masses = replace(build_sites(robot), gear_ratio=(_GEAR_RATIO,) * robot.joints)
     without_masses = replace(with_masses, masses=())
     if list_effects()[name].candidates(without_masses):
         return without_masses

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from scipy.special import gammaincinv
 
 from elastocal.campaigns.campaign import NO_ROTATION
-from elastocal.effects.conditions import at_states
+from elastocal.effects.conditions import select_conditions
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import (
     Estimate,
@@ -34,7 +34,7 @@ from elastocal.fitting.normal_equations import (
     solve_normal_equations,
 )
 from elastocal.fitting.observations import sample_observations, split_into_blocks
-from elastocal.mechanics.kinematics import poses_of_points
+from elastocal.mechanics.kinematics import compute_point_poses
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -195,7 +195,11 @@ class Fit:
         """
         if self.conditions is None:
             return evaluate_conditions(self.model, self.estimate, states)
-        return self.conditions if chosen is None else at_states(self.conditions, chosen)
+        return (
+            self.conditions
+            if chosen is None
+            else select_conditions(self.conditions, chosen)
+        )
 
 
 def fit_model(
@@ -747,7 +751,7 @@ def compute_nominal_poses(
     """
     chain = model.sites.chain
     points = [chain.point(target.point) for target in model.targets]
-    position, rotation = poses_of_points(
+    position, rotation = compute_point_poses(
         chain, chain.at(observations.states.joint_angles), points
     )
     indices = (observations.target, observations.state)

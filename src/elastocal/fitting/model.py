@@ -12,9 +12,9 @@ from elastocal.campaigns.campaign import Campaign, assemble_campaign, build_meas
 from elastocal.effects.catalogue import candidates_on, declared_candidates
 from elastocal.effects.conditions import (
     MASS_PARAMETERS,
-    conditions_of,
-    offered,
-    with_springs,
+    build_conditions,
+    find_offered_needs,
+    replace_springs,
 )
 from elastocal.effects.elastic import joint_compliance
 from elastocal.effects.gravity import DECLARED_WEIGHT, declared_weight
@@ -24,9 +24,13 @@ from elastocal.fitting.observations import (
     average_repeats,
     remove_outlying_repeats,
 )
-from elastocal.mechanics.kinematics import motion, pose_differences, poses_of_points
-from elastocal.mechanics.robot_file import robot_from_document
-from elastocal.mechanics.sites import Sites, sites_of
+from elastocal.mechanics.kinematics import (
+    compute_motion,
+    compute_point_poses,
+    compute_pose_differences,
+)
+from elastocal.mechanics.robot_file import parse_robot
+from elastocal.mechanics.sites import Sites, build_sites
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -116,7 +120,7 @@ class Model:
 
     def available_inputs(self, states: States) -> frozenset[str]:
         """Inputs of effects that states and campaign provide: see `Candidate.needs`."""
-        inputs = offered(self.sites, states)
+        inputs = find_offered_needs(self.sites, states)
         return inputs if self.fitted_frames else inputs | {"declared base"}
 
     def with_effects(self, effects: Iterable[Candidate]) -> Model:
@@ -166,7 +170,7 @@ def build_declared_model(
     campaign: Campaign, effects: Iterable[Candidate] = ()
 ) -> Model:
     """Build the model that a campaign declares, with its declared effects."""
-    sites = sites_of(campaign.robot)
+    sites = build_sites(campaign.robot)
     measurements = campaign.measurements
     # Without known weights, a compliant base under an arm that slides on its first
     # joint is indistinguishable from the sag of that arm.
@@ -327,7 +331,7 @@ def evaluate_conditions(
     Loads act at the displaced pose, which is found by fixed-point iteration unless
     displaced `coordinates` (S, C) are given.
     """
-    conditions = conditions_of(
+    conditions = build_conditions(
         model.sites,
         get_joint_compliances(model, estimate),
         states,
@@ -342,7 +346,7 @@ def evaluate_conditions(
         displaced = compute_displaced_coordinates(model, estimate, conditions)
         conditions = replace(
             conditions,
-            motion=motion(model.sites.chain, displaced, model.sites.followed),
+            motion=compute_motion(model.sites.chain, displaced, model.sites.followed),
         )
     return conditions
 
@@ -368,7 +372,7 @@ def update_springs_and_masses(
     model: Model, estimate: Estimate, conditions: Conditions
 ) -> Conditions:
     """Update conditions to the compliances and masses of an estimate."""
-    return with_springs(
+    return replace_springs(
         conditions,
         get_joint_compliances(model, estimate),
         get_mass_corrections(model, estimate),
@@ -460,7 +464,7 @@ def predict(
     (M, 3, 3).
     """
     coordinates = compute_displaced_coordinates(model, estimate, conditions)
-    position, rotation = poses_of_points(
+    position, rotation = compute_point_poses(
         model.sites.chain, coordinates, locate_targets(model, estimate)
     )
     indices = (observations.target, observations.state)
@@ -500,7 +504,7 @@ def subtract_prediction(
     measured, measured_rotation = transform_to_base(estimate, observations)
     if measured_rotation is None:
         return measured - position
-    return pose_differences(measured, measured_rotation, position, rotation)
+    return compute_pose_differences(measured, measured_rotation, position, rotation)
 
 
 def transform_to_base(
@@ -557,11 +561,11 @@ def build_case(
     table.
     """
     source = descriptions["source"]
-    robot = robot_from_document(descriptions["robot"], source)
+    robot = parse_robot(descriptions["robot"], source)
     campaign = assemble_campaign(
         descriptions["campaign"], robot, build_measurements(columns), source
     )
-    sites = sites_of(campaign.robot)
+    sites = build_sites(campaign.robot)
     model = build_declared_model(
         campaign, declared_candidates(campaign.declared, sites, source)
     )

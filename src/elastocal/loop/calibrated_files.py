@@ -32,11 +32,15 @@ from elastocal.diagnosis.misplaced import describe_reference_point
 from elastocal.errors import InputError
 from elastocal.fitting.noise import parse_noise
 from elastocal.io.json_files import read_json
-from elastocal.io.origin import configuration_sha256
+from elastocal.io.origin import digest_configuration
 from elastocal.io.records import check_sources, trace_jobs
 from elastocal.io.typed_json import to_document
-from elastocal.loop.diagnosis_tables import load_case, rows_left_out, step_model
-from elastocal.remainder.corrected import predictor_of
+from elastocal.loop.diagnosis_tables import (
+    find_rejected_rows,
+    load_case,
+    restore_step_model,
+)
+from elastocal.residual_model.selection import fit_to_observations
 from elastocal.validation.conformity import (
     PASS,
     UNDECIDED,
@@ -57,7 +61,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Diagnosed:
+class DiagnosedCampaign:
     """A campaign with the results of its diagnosis.
 
     Attributes
@@ -92,14 +96,14 @@ class Diagnosed:
         """The robot of the final model, with errors as large as the validation poses
         show them."""
         step = self.facts["steps"][-1]
-        model, estimate = step_model(self.case, step)
+        model, estimate = restore_step_model(self.case, step)
         regression = None
         remainder = self.verdict.remainder
         if remainder and remainder.regression and remainder.spread:
             regression = build_residual_model(
                 self.case,
                 estimate,
-                predictor_of(
+                fit_to_observations(
                     to_document(remainder), model, estimate, self.case.observations
                 ),
                 remainder.spread.typical,
@@ -120,7 +124,7 @@ class Diagnosed:
             robot, self.verdict.other_models_m or 0.0, contradicted=False
         )
 
-    def by_physics(self) -> Diagnosed:
+    def by_physics(self) -> DiagnosedCampaign:
         """Return the same campaign as if no regression had been asked for."""
         verdict = replace(
             self.verdict,
@@ -139,7 +143,7 @@ class Diagnosed:
 
 def load_diagnosed(
     folder: str | Path, robots_folder: str | Path, top: str | Path
-) -> Diagnosed:
+) -> DiagnosedCampaign:
     """Load a campaign and its diagnosis, if neither has changed since.
 
     Parameters
@@ -183,9 +187,9 @@ def load_diagnosed(
         )
     facts = read_json(tables / "diagnosis.json")
     case = load_case(tables / "campaign.json", tables / "training.parquet")
-    return Diagnosed(
+    return DiagnosedCampaign(
         campaign_folder,
-        case.select(~rows_left_out(case, facts)),
+        case.select(~find_rejected_rows(case, facts)),
         facts,
         read_verdict(verdict_path),
         _describe_origin(jobs, data),
@@ -211,8 +215,8 @@ def _describe_origin(
         environment[name] = _join_distinct(versions)
     return {
         "commit": _join_distinct(job.origin.commit for job in jobs),
-        "code_sha256": configuration_sha256(sources),
-        "data_sha256": configuration_sha256(sorted(data)),
+        "code_sha256": digest_configuration(sources),
+        "data_sha256": digest_configuration(sorted(data)),
         "environment": environment,
     }
 
@@ -221,8 +225,8 @@ def _join_distinct(values: Iterable[str]) -> str:
     return ", ".join(sorted(set(values)))
 
 
-def certificate(
-    campaign: Diagnosed, tolerance_m: float, accepted_risk: float
+def build_certificate(
+    campaign: DiagnosedCampaign, tolerance_m: float, accepted_risk: float
 ) -> dict[str, Any]:
     """Return the contents of a certificate.
 
@@ -260,7 +264,7 @@ def certificate(
         )
     if missing and decision.decision == PASS:
         decision = replace(decision, decision=UNDECIDED)
-    budget = error_budget(calibrated, *commands)
+    budget = compute_error_budget(calibrated, *commands)
     return {
         "campaign": campaign.name,
         "robot": robot.name,
@@ -310,7 +314,7 @@ def _describe_worst_pose(
     return {"joints": joints, "error_m": float(error_m[worst])}
 
 
-def error_budget(
+def compute_error_budget(
     calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray
 ) -> dict[str, float]:
     """Error budget of a robot over commands (N, n) under loads (N, 6), m, RMS.

@@ -17,7 +17,7 @@ from elastocal.campaigns.campaign import tabulate_measurements
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.holdout import list_poses
 from elastocal.counting import format_count, list_first
-from elastocal.data_checks.faults import controller_warnings, faults
+from elastocal.data_checks.faults import find_faults, warn_of_computed_positions
 from elastocal.diagnosis.candidate_design import build_candidate_design
 from elastocal.diagnosis.fitted_subset import select_initial_subset
 from elastocal.diagnosis.gross_errors import (
@@ -84,7 +84,7 @@ class Overview:
     attention: list[str]
 
 
-def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
+def inspect_campaign(folder: str | Path, robots_folder: str | Path) -> Overview:
     """Inspect a campaign before its diagnosis.
 
     Parameters
@@ -109,7 +109,7 @@ def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
         subset.declared, subset.search_sample, [*case.candidates.values()], settings
     ).untestable
     testable = len(case.candidates) - len(untestable)
-    data_faults = faults(case.campaign)
+    data_faults = find_faults(case.campaign)
     rows = [
         *_describe_measurements(case, training, held_out),
         ("noise", _describe_noise(subset.noise)),
@@ -123,7 +123,7 @@ def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
     # misplaced frames would mistake it for one.
     if not data_faults and not negative:
         attention += _describe_misplaced_frames(declared, case)
-    attention += [*controller_warnings(case.campaign), *subset.warnings]
+    attention += [*warn_of_computed_positions(case.campaign), *subset.warnings]
     if negative:
         attention.append(
             f"the compliance of joint {' and '.join(negative)} comes out negative: "

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 AXES = "xyz"
 # Kind and axis of all ways in which a frame can move.
-SIX = tuple((kind, axis) for kind in "TR" for axis in range(3))
+SIX_DISPLACEMENTS = tuple((kind, axis) for kind in "TR" for axis in range(3))
 _TOKEN = re.compile(
     r"(?P<kind>[TR])(?P<axis>[xyz])\((?P<sign>-?)(?P<argument>[^()\s-]+)\)|\[(?P<point>[^\[\]\s]+)\]"
 )
@@ -127,7 +127,7 @@ class Chain:
         )
 
 
-def with_inserted(
+def insert_coordinates(
     chain: Chain, inserted: Mapping[int, Sequence[tuple[str, int]]]
 ) -> Chain:
     """A chain with further coordinates, such as springs or errors of lengths.
@@ -225,7 +225,7 @@ def parse_chain(text: str, lengths_m: Mapping[str, float], source: str) -> Chain
     return Chain(tuple(transforms), tuple(points), joints)
 
 
-def notation(chain: Chain) -> str:
+def format_chain(chain: Chain) -> str:
     """A chain in the notation that `parse_chain` reads, with its lengths as numbers."""
     words = []
     for place in range(len(chain.transforms) + 1):

@@ -20,8 +20,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.mechanics.chain import SIX, with_inserted
-from elastocal.mechanics.kinematics import jacobians, pose_differences, poses
+from elastocal.mechanics.chain import SIX_DISPLACEMENTS, insert_coordinates
+from elastocal.mechanics.kinematics import (
+    compute_jacobians,
+    compute_pose_differences,
+    compute_poses,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,7 +34,7 @@ if TYPE_CHECKING:
     from elastocal.mechanics.robot import Link, Robot, Tube
 
 
-def wrench_of_offset_force(
+def compute_offset_wrench(
     force: np.ndarray,
     offset_m: Sequence[float] | np.ndarray,
     rotation: np.ndarray | None = None,
@@ -48,7 +52,7 @@ def wrench_of_offset_force(
     return np.concatenate([force, np.cross(lever, force)], axis=-1)
 
 
-def generalized_forces(jacobian: np.ndarray, wrench: np.ndarray) -> np.ndarray:
+def compute_generalized_forces(jacobian: np.ndarray, wrench: np.ndarray) -> np.ndarray:
     """Torques (forces) on the coordinates of a chain, J^T w by virtual work (the
     right-hand factor of equation 7).
 
@@ -60,7 +64,9 @@ def generalized_forces(jacobian: np.ndarray, wrench: np.ndarray) -> np.ndarray:
     )
 
 
-def loaded_point(chain: Chain, point: MeasuringPoint, wrench_at: str) -> MeasuringPoint:
+def select_loaded_point(
+    chain: Chain, point: MeasuringPoint, wrench_at: str
+) -> MeasuringPoint:
     """Where the wrench acts that deflects a measuring point (interpretation R6).
 
     `wrench_at`: "end_effector", itself, whatever target sits on it; or
@@ -73,15 +79,17 @@ def loaded_point(chain: Chain, point: MeasuringPoint, wrench_at: str) -> Measuri
     )
 
 
-def joint_torques(
+def compute_joint_torques(
     chain: Chain, joint_angles: np.ndarray, wrench: np.ndarray, at: MeasuringPoint
 ) -> np.ndarray:
     """Torques on the joints, ndarray (..., n), N m, by a wrench (..., 6) stated at a
     point, see `loaded_point`."""
-    return generalized_forces(jacobians(chain, joint_angles, at), wrench)
+    return compute_generalized_forces(
+        compute_jacobians(chain, joint_angles, at), wrench
+    )
 
 
-def regressor(
+def build_regressor(
     jacobian: np.ndarray, torques: np.ndarray, out: np.ndarray | None = None
 ) -> np.ndarray:
     """Matrix A of equation 10, with columns J_j J_j^T w, so that the deflection is A c
@@ -93,7 +101,7 @@ def regressor(
     return np.multiply(jacobian, torques[..., None, :], out=out)
 
 
-def exact_deflections(
+def compute_exact_deflections(
     chain: Chain,
     coordinates: np.ndarray,
     spring_deflections: np.ndarray,
@@ -106,12 +114,12 @@ def exact_deflections(
     its link springs too. `coordinates`, `spring_deflections` (..., n): q (zero for link
     springs) and theta of equation 7, rad or m. Returns (..., 6).
     """
-    unloaded = poses(chain, coordinates, point)
-    loaded = poses(chain, coordinates + spring_deflections, point)
-    return pose_differences(*loaded, *unloaded)
+    unloaded = compute_poses(chain, coordinates, point)
+    loaded = compute_poses(chain, coordinates + spring_deflections, point)
+    return compute_pose_differences(*loaded, *unloaded)
 
 
-def tube_compliance(tube: Tube, length_m: float) -> np.ndarray:
+def compute_tube_compliance(tube: Tube, length_m: float) -> np.ndarray:
     """Compliance of a cantilever tube at its tip, beam along x (Euler-Bernoulli bending
     [1], St Venant torsion [2]).
 
@@ -137,7 +145,7 @@ def tube_compliance(tube: Tube, length_m: float) -> np.ndarray:
     return compliance
 
 
-def beam_axes(link: Link) -> np.ndarray:
+def compute_beam_axes(link: Link) -> np.ndarray:
     """Axes of a link as a beam, x along it, twice: of displacements and of rotations;
     (6, 6), columns in the chain's frame."""
     along = np.array(link.vector_m) / np.linalg.norm(link.vector_m)
@@ -148,15 +156,16 @@ def beam_axes(link: Link) -> np.ndarray:
     return np.kron(np.eye(2), np.column_stack([along, across, np.cross(along, across)]))
 
 
-def extended_chain(robot: Robot) -> Chain:
+def build_extended_chain(robot: Robot) -> Chain:
     """The robot's chain with Tx Ty Tz Rx Ry Rz springs (equation 5) at the far end of
     each link, behind those of the joints."""
-    return with_inserted(
-        robot.chain, dict.fromkeys((link.after for link in robot.links), SIX)
+    return insert_coordinates(
+        robot.chain,
+        dict.fromkeys((link.after for link in robot.links), SIX_DISPLACEMENTS),
     )
 
 
-def spring_compliance(robot: Robot) -> np.ndarray:
+def build_spring_compliance(robot: Robot) -> np.ndarray:
     """Compliance of all springs of the extended chain, joints, then links: the inverse
     of K_theta in equation 7, (m, m)."""
     n = robot.joints
@@ -164,10 +173,10 @@ def spring_compliance(robot: Robot) -> np.ndarray:
     compliance[:n, :n] = np.diag(robot.compliance)
     for number, link in enumerate(robot.links):
         block = slice(n + 6 * number, n + 6 * number + 6)
-        turn = beam_axes(link)
+        turn = compute_beam_axes(link)
         compliance[block, block] = (
             turn
-            @ tube_compliance(link.tube, float(np.linalg.norm(link.vector_m)))
+            @ compute_tube_compliance(link.tube, float(np.linalg.norm(link.vector_m)))
             @ turn.T
         )
     return compliance

@@ -97,7 +97,7 @@ def _cosine_and_sine(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return scale, tangent
 
 
-def poses(
+def compute_poses(
     chain: Chain, coordinates: np.ndarray, point: MeasuringPoint
 ) -> tuple[np.ndarray, np.ndarray]:
     """Position and orientation of a measuring point in the base frame (equations 1-4).
@@ -106,11 +106,11 @@ def poses(
     or rad). Returns `position` (..., 3): m, base frame; `rotation` (..., 3, 3): columns
     are the axes of the point's frame in base axes.
     """
-    position, rotation = poses_of_points(chain, coordinates, [point])
+    position, rotation = compute_point_poses(chain, coordinates, [point])
     return position[0], rotation[0]
 
 
-def poses_of_points(
+def compute_point_poses(
     chain: Chain, coordinates: np.ndarray, points: Sequence[MeasuringPoint]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Poses of several measuring points in one walk along the chain: `position` (T,
@@ -125,7 +125,7 @@ def poses_of_points(
     )
 
 
-def corners(chain: Chain, coordinates: np.ndarray) -> np.ndarray:
+def locate_corners(chain: Chain, coordinates: np.ndarray) -> np.ndarray:
     """Where an arm has corners: at its base and behind each translation, ndarray (K,
     ..., 3), m, base axes."""
     places = [
@@ -136,18 +136,18 @@ def corners(chain: Chain, coordinates: np.ndarray) -> np.ndarray:
             if transform.kind == "T"
         ),
     ]
-    return poses_of_points(
+    return compute_point_poses(
         chain, coordinates, [MeasuringPoint(str(place), place) for place in places]
     )[0]
 
 
-def joint_axes(chain: Chain, coordinates: np.ndarray) -> np.ndarray:
+def locate_joint_axes(chain: Chain, coordinates: np.ndarray) -> np.ndarray:
     """A place on the axis of each joint, m, and its direction, base axes, ndarray (J,
     2, ..., 3)."""
     moved = [
         number for number, t in enumerate(chain.transforms) if t.coordinate is not None
     ]
-    position, rotation = poses_of_points(
+    position, rotation = compute_point_poses(
         chain, coordinates, [MeasuringPoint(str(number), number) for number in moved]
     )
     axes = np.stack(
@@ -159,7 +159,7 @@ def joint_axes(chain: Chain, coordinates: np.ndarray) -> np.ndarray:
     return np.stack([position, axes], axis=1)
 
 
-def poses_and_jacobians(
+def compute_poses_and_jacobians(
     chain: Chain, coordinates: np.ndarray, point: MeasuringPoint
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Pose of a measuring point and its geometric Jacobian with respect to every
@@ -201,15 +201,15 @@ def poses_and_jacobians(
     return *pose, _batch_first(jacobian, coordinates)
 
 
-def jacobians(
+def compute_jacobians(
     chain: Chain, coordinates: np.ndarray, point: MeasuringPoint
 ) -> np.ndarray:
     """Geometric Jacobian of a measuring point, (..., 6, n), as by
     `poses_and_jacobians`, where its pose is not needed."""
-    return poses_and_jacobians(chain, coordinates, point)[2]
+    return compute_poses_and_jacobians(chain, coordinates, point)[2]
 
 
-def position_jacobians(
+def compute_position_jacobians(
     chain: Chain,
     coordinates: np.ndarray,
     points: Sequence[MeasuringPoint],
@@ -219,9 +219,9 @@ def position_jacobians(
     the chain, ndarray (M, 3, n)."""
     found = np.empty((len(which), 3, chain.coordinates))
     for number, point in enumerate(points):
-        found[which == number] = jacobians(chain, coordinates[which == number], point)[
-            :, :3
-        ]
+        found[which == number] = compute_jacobians(
+            chain, coordinates[which == number], point
+        )[:, :3]
     return found
 
 
@@ -258,7 +258,7 @@ class Motion:
         twist = self.twist[..., chosen]
         angular = twist[3:]
         moved = np.empty_like(twist[:rows])
-        cross(angular, position, moved[:3])
+        multiply_vectors(angular, position, moved[:3])
         moved[:3] += twist[:3]
         moved[3:] = angular[: rows - 3]
         moved[:, self.place >= after] = 0.0
@@ -277,7 +277,7 @@ class Motion:
         return on_each
 
 
-def motion(
+def compute_motion(
     chain: Chain, coordinates: np.ndarray, points: Sequence[MeasuringPoint]
 ) -> Motion:
     """Poses of several measuring points and the twist of every transform that moves, in
@@ -316,7 +316,7 @@ def motion(
                 )
                 angular[:, number] = 0.0 if transform.kind == "T" else axis
                 slides += [(number, axis)] if transform.kind == "T" else []
-            cross(origins, angular, linear)
+            multiply_vectors(origins, angular, linear)
             for number, axis in slides:
                 linear[:, number] = axis
     return Motion(
@@ -324,7 +324,7 @@ def motion(
     )
 
 
-def pose_differences(
+def compute_pose_differences(
     position: np.ndarray,
     rotation: np.ndarray,
     position_0: np.ndarray,
@@ -342,14 +342,14 @@ def pose_differences(
             relative[i, j] = sum(
                 rotation[..., i, k] * rotation_0[..., j, k] for k in range(3)
             )
-    turn = rotation_vectors(np.moveaxis(relative, (0, 1), (-2, -1)))
+    turn = compute_rotation_vectors(np.moveaxis(relative, (0, 1), (-2, -1)))
     difference = np.empty((6, *position.shape[:-1]))
     difference[:3] = np.moveaxis(position - position_0, -1, 0)
     difference[3:] = np.moveaxis(turn, -1, 0)
     return np.moveaxis(difference, 0, -1)
 
 
-def rotation_vectors(rotation: np.ndarray) -> np.ndarray:
+def compute_rotation_vectors(rotation: np.ndarray) -> np.ndarray:
     """Rotation vectors (..., 3), rad, of rotation matrices (..., 3, 3), for angles
     below pi.
 
@@ -443,12 +443,12 @@ def _store_twist(
         angular[:] = axis
     else:
         angular[:] = axis
-        cross(arm, axis, linear)
+        multiply_vectors(arm, axis, linear)
     if transform.sign < 0:
         twist *= -1.0
 
 
-def cross(first: np.ndarray, second: np.ndarray, out: np.ndarray) -> None:
+def multiply_vectors(first: np.ndarray, second: np.ndarray, out: np.ndarray) -> None:
     """Vector products, component first: (3, ...)."""
     product = np.empty_like(out[0])
     for i in range(3):

@@ -128,7 +128,7 @@ class Robot:
         ).T
 
 
-def with_target_offset(robot: Robot, offset_m: Sequence[float]) -> Robot:
+def set_target_offset(robot: Robot, offset_m: Sequence[float]) -> Robot:
     """A robot with the same target offset on every measuring point (T_tool,
     interpretation R5)."""
     points = tuple(
@@ -137,12 +137,14 @@ def with_target_offset(robot: Robot, offset_m: Sequence[float]) -> Robot:
     return replace(robot, chain=replace(robot.chain, points=points))
 
 
-def usual_payload_kg(chain: Chain) -> float:
+def estimate_typical_payload_kg(chain: Chain) -> float:
     """A rated load that suits the reach of an arm."""
     return _LOAD_KG_PER_M3 * float(_reach_behind(chain)[0]) ** 3
 
 
-def usual_compliance(chain: Chain, payload_kg: float | None = None) -> np.ndarray:
+def estimate_typical_compliance(
+    chain: Chain, payload_kg: float | None = None
+) -> np.ndarray:
     """Joint compliances (n,) that suit the size of an arm: two milliradians under the
     rated load at the longest lever.
 
@@ -151,7 +153,7 @@ def usual_compliance(chain: Chain, payload_kg: float | None = None) -> np.ndarra
     load; by `usual_payload_kg` without.
     """
     load_N = STANDARD_GRAVITY * (
-        usual_payload_kg(chain) if payload_kg is None else payload_kg
+        estimate_typical_payload_kg(chain) if payload_kg is None else payload_kg
     )
     levers = np.maximum(_reach_behind(chain), _SHORTEST_LEVER_M)
     # A chain without lengths has a lever all the same, and a load of a kilogram.

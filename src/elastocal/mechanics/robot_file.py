@@ -32,7 +32,7 @@ import numpy as np
 
 from elastocal.counting import format_count
 from elastocal.errors import InputError
-from elastocal.mechanics.chain import notation, parse_chain
+from elastocal.mechanics.chain import format_chain, parse_chain
 from elastocal.mechanics.robot import (
     STANDING,
     UNLIMITED_DEG,
@@ -41,7 +41,7 @@ from elastocal.mechanics.robot import (
     Mass,
     Robot,
     Tube,
-    usual_compliance,
+    estimate_typical_compliance,
 )
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ LONGEST_REACH_M = 10.0
 _LEAST_GRAVITY = 1e-6
 
 
-def robot_from_document(document: Mapping[str, Any], source: str = "robot") -> Robot:
+def parse_robot(document: Mapping[str, Any], source: str = "robot") -> Robot:
     """Make a robot from the contents of its file, already validated against the robot
     schema.
 
@@ -106,10 +106,12 @@ def robot_from_document(document: Mapping[str, Any], source: str = "robot") -> R
     return Robot(
         name=document["name"],
         chain=chain,
-        compliance=usual_compliance(chain, payload_kg)
+        compliance=estimate_typical_compliance(chain, payload_kg)
         if springs is None
         else 1e-6 * np.array(springs, float),
-        joint_limits=joint_limits(document.get("joint_limits_deg"), chain, source),
+        joint_limits=parse_joint_limits(
+            document.get("joint_limits_deg"), chain, source
+        ),
         links=_links(chain, document.get("links"), source),
         reported_matrix=np.array(matrix, float),
         reported_offset=np.array(offset, float) * _per_degree(chain),
@@ -123,7 +125,7 @@ def robot_from_document(document: Mapping[str, Any], source: str = "robot") -> R
     )
 
 
-def document_of(robot: Robot) -> dict[str, Any]:
+def describe_robot(robot: Robot) -> dict[str, Any]:
     """A robot without elastic links as the contents of its file, the inverse of
     `robot_from_document`.
 
@@ -139,7 +141,7 @@ def document_of(robot: Robot) -> dict[str, Any]:
     document = {
         "name": robot.name,
         "joint_names": robot.joint_names and list(robot.joint_names),
-        "chain": notation(robot.chain),
+        "chain": format_chain(robot.chain),
         "joint_limits_deg": (
             robot.joint_limits / _per_degree(robot.chain)[:, None]
         ).tolist(),
@@ -161,7 +163,7 @@ def document_of(robot: Robot) -> dict[str, Any]:
     return {key: value for key, value in document.items() if value is not None}
 
 
-def joint_limits(
+def parse_joint_limits(
     limits_deg: Sequence[Sequence[float]] | None, chain: Chain, source: str
 ) -> np.ndarray:
     """Joint limits (n, 2) in rad, of prismatic joints in m; a turn either way where

@@ -16,15 +16,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.mechanics.chain import SIX, Chain, MeasuringPoint, with_inserted
-from elastocal.mechanics.kinematics import motion, poses
+from elastocal.mechanics.chain import (
+    SIX_DISPLACEMENTS,
+    Chain,
+    MeasuringPoint,
+    insert_coordinates,
+)
+from elastocal.mechanics.kinematics import compute_motion, compute_poses
 from elastocal.mechanics.robot import (
     STANDING,
     Compensator,
     Mass,
     Robot,
-    usual_compliance,
-    usual_payload_kg,
+    estimate_typical_compliance,
+    estimate_typical_payload_kg,
 )
 
 if TYPE_CHECKING:
@@ -105,7 +110,9 @@ class Sites:
         """
         lengths = np.linalg.norm(self.link_vectors_m[1:], axis=1)
         rated = (
-            usual_payload_kg(self.chain) if self.payload_kg is None else self.payload_kg
+            estimate_typical_payload_kg(self.chain)
+            if self.payload_kg is None
+            else self.payload_kg
         )
         halves = (
             0.5 * _MASS_OVER_RATED * rated * lengths / max(lengths.sum(), _SHORTEST_M)
@@ -167,7 +174,7 @@ class Sites:
         )
         ends = self.followed[1 : self.joints + 2]
         found = np.empty((self.joints + 1, 4, self.joints))
-        moved = motion(self.chain, coordinates, ends)
+        moved = compute_motion(self.chain, coordinates, ends)
         down = (np.array(self.gravity_m_s2) / np.linalg.norm(self.gravity_m_s2))[
             :, None
         ]
@@ -183,9 +190,9 @@ class Sites:
         return found
 
 
-def sites_of(robot: Robot) -> Sites:
+def build_sites(robot: Robot) -> Sites:
     """Put a site at the foot, behind each joint and at the far end of each link."""
-    usual = usual_compliance(robot.chain, robot.payload_kg)
+    usual = estimate_typical_compliance(robot.chain, robot.payload_kg)
     compliance = tuple(
         np.where(robot.compliance > 0.0, robot.compliance, usual).tolist()
     )
@@ -221,13 +228,13 @@ def _sites_of(chain: Chain, **known: Any) -> Sites:
         [*places, len(chain.transforms)],
         strict=True,
     ):
-        inserted[start] += SIX[3:] if start else SIX
-        inserted[end] += SIX
+        inserted[start] += SIX_DISPLACEMENTS[3:] if start else SIX_DISPLACEMENTS
+        inserted[end] += SIX_DISPLACEMENTS
         # Along the fixed transforms of a link, and from the frame at their end to the
         # one at their start.
         fixed = chain.transforms[start:end]
         far = MeasuringPoint("far end", end - start)
-        position, rotation = poses(Chain(fixed, (far,), 1), np.zeros(1), far)
+        position, rotation = compute_poses(Chain(fixed, (far,), 1), np.zeros(1), far)
         vectors.append(rotation.T @ position)
         rotations.append(rotation)
     n = len(joints)
@@ -235,7 +242,7 @@ def _sites_of(chain: Chain, **known: Any) -> Sites:
     # behind it, and so on.
     ends = [range(n + 6 + 9 * link, n + 12 + 9 * link) for link in range(n + 1)]
     return Sites(
-        with_inserted(chain, inserted),
+        insert_coordinates(chain, inserted),
         n,
         tuple(range(n, n + 6)),
         tuple(tuple(range(end.stop, end.stop + 3)) for end in ends[:-1]),

@@ -19,11 +19,11 @@ import numpy as np
 
 from elastocal.io.storage import TableSchema, read_blocks
 from elastocal.mechanics.elastostatics import (
-    generalized_forces,
-    loaded_point,
-    regressor,
+    build_regressor,
+    compute_generalized_forces,
+    select_loaded_point,
 )
-from elastocal.mechanics.kinematics import jacobians
+from elastocal.mechanics.kinematics import compute_jacobians
 from elastocal.study.jobs import DATA_SET, LENGTH, Job, make_real_column, make_schema
 from elastocal.study.simulation import (
     DEFLECTION_COLUMNS,
@@ -315,14 +315,15 @@ def compute_regressors(
     wrench = order_by_configuration(experiments.wrench)
     measured = {name: chain.point(name) for name in points}
     loaded = {
-        name: loaded_point(chain, point, wrench_at) for name, point in measured.items()
+        name: select_loaded_point(chain, point, wrench_at)
+        for name, point in measured.items()
     }
     point_jacobians = {
-        point: jacobians(chain, joint_angles, point)
+        point: compute_jacobians(chain, joint_angles, point)
         for point in {*loaded.values(), *measured.values()}
     }
     forces = {
-        point: generalized_forces(point_jacobians[point], wrench)
+        point: compute_generalized_forces(point_jacobians[point], wrench)
         for point in {*loaded.values()}
     }
     regressors = {}
@@ -330,7 +331,7 @@ def compute_regressors(
         # The Jacobian of a measured point is not needed any more, so its regressor
         # overwrites it.
         jacobian = point_jacobians[point]
-        matrix = regressor(jacobian, forces[loaded[name]], out=jacobian)
+        matrix = build_regressor(jacobian, forces[loaded[name]], out=jacobian)
         regressors[name] = np.moveaxis(matrix, (-2, -1), (0, 1))[:rows]
     return regressors
 

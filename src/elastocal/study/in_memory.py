@@ -13,10 +13,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.io.storage import write_table
-from elastocal.mechanics.elastostatics import joint_torques, loaded_point, regressor
-from elastocal.mechanics.kinematics import jacobians
-from elastocal.mechanics.robot import Robot, with_target_offset
-from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.mechanics.elastostatics import (
+    build_regressor,
+    compute_joint_torques,
+    select_loaded_point,
+)
+from elastocal.mechanics.kinematics import compute_jacobians
+from elastocal.mechanics.robot import Robot, set_target_offset
+from elastocal.mechanics.robot_file import parse_robot
 from elastocal.study.equation_11 import (
     Measurements,
     compute_regressors,
@@ -146,9 +150,9 @@ class StudyInMemory:
         chain = self.robot.chain
         point = chain.end_effector
         angles = experiments.joint_angles
-        loaded = loaded_point(chain, point, self.interpretation.wrench_at)
-        torques = joint_torques(chain, angles, experiments.wrench, loaded)
-        return regressor(jacobians(chain, angles, point), torques)
+        loaded = select_loaded_point(chain, point, self.interpretation.wrench_at)
+        torques = compute_joint_torques(chain, angles, experiments.wrench, loaded)
+        return build_regressor(compute_jacobians(chain, angles, point), torques)
 
     def make_validation_set(self, number: int = 0) -> ValidationSet:
         """Prepare the test configurations of a study for the errors of models."""
@@ -243,9 +247,7 @@ def load_study(job: Job) -> StudyInMemory:
     """Load the study of a rule's robot from the parameter `study`: the robot's file, the
     seed, the interpretation and the size."""
     settings = job.params.study
-    robot = with_target_offset(
-        robot_from_document(settings["robot"]), settings["tool_offset_m"]
-    )
+    robot = set_target_offset(parse_robot(settings["robot"]), settings["tool_offset_m"])
     loading = Loading(**settings["loading"])
     return StudyInMemory(
         robot,

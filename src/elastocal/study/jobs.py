@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from elastocal.io.origin import SOURCES_DIGEST, STEP, describe_provenance
 from elastocal.io.storage import Column, TableSchema
-from elastocal.mechanics.robot import with_target_offset
-from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.mechanics.robot import set_target_offset
+from elastocal.mechanics.robot_file import parse_robot
 from elastocal.study.strategies import strategy_from_document
 
 if TYPE_CHECKING:
@@ -83,9 +83,7 @@ def collect_provenance(job: Job) -> dict[str, Any]:
 
 def load_robot(job: Job) -> Robot:
     """Load the robot of a rule with the offset of its targets (interpretation R5)."""
-    return with_target_offset(
-        robot_from_document(job.params.robot), job.params.tool_offset_m
-    )
+    return set_target_offset(parse_robot(job.params.robot), job.params.tool_offset_m)
 
 
 def load_strategies(job: Job) -> list[Strategy]:

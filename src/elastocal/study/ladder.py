@@ -24,11 +24,11 @@ import numpy as np
 
 from elastocal.io.storage import Column
 from elastocal.mechanics.elastostatics import (
-    beam_axes,
-    extended_chain,
-    generalized_forces,
+    build_extended_chain,
+    compute_beam_axes,
+    compute_generalized_forces,
 )
-from elastocal.mechanics.kinematics import jacobians
+from elastocal.mechanics.kinematics import compute_jacobians
 from elastocal.study.in_memory import define_study_step
 from elastocal.study.jobs import (
     DATA_SET,
@@ -205,13 +205,15 @@ def compute_spring_columns(robot: Robot, experiments: Experiments) -> np.ndarray
     (sets, configurations, 6, n + 8 L) array
         The n joints first, then eight elements for each of the robot's L links.
     """
-    chain = extended_chain(robot)
+    chain = build_extended_chain(robot)
     n = robot.joints
-    jacobian = jacobians(chain, chain.at(experiments.joint_angles), chain.end_effector)
-    torques = generalized_forces(jacobian, experiments.wrench)
+    jacobian = compute_jacobians(
+        chain, chain.at(experiments.joint_angles), chain.end_effector
+    )
+    torques = compute_generalized_forces(jacobian, experiments.wrench)
     columns = [jacobian[..., :n] * torques[..., None, :n]]
     for number, link in enumerate(robot.links):
-        axes = beam_axes(link)
+        axes = compute_beam_axes(link)
         coordinates = slice(n + 6 * number, n + 6 * number + 6)
         motion = jacobian[..., coordinates] @ axes
         force = torques[..., coordinates] @ axes

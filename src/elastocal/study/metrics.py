@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.mechanics.elastostatics import (
-    exact_deflections,
-    joint_torques,
-    loaded_point,
-    regressor,
+    build_regressor,
+    compute_exact_deflections,
+    compute_joint_torques,
+    select_loaded_point,
 )
-from elastocal.mechanics.kinematics import jacobians
+from elastocal.mechanics.kinematics import compute_jacobians
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -98,11 +98,13 @@ def make_validation_set(
     chain = robot.chain
     angles = experiments.joint_angles
     point = chain.end_effector
-    loaded = loaded_point(chain, point, wrench_at)
-    torques = joint_torques(chain, angles, experiments.wrench, loaded)
-    jacobian = jacobians(chain, angles, point)
-    slope = regressor(jacobian, torques)[..., :3, :].reshape(-1, 3, robot.joints)
-    predicted = exact_deflections(chain, angles, robot.compliance * torques, point)
+    loaded = select_loaded_point(chain, point, wrench_at)
+    torques = compute_joint_torques(chain, angles, experiments.wrench, loaded)
+    jacobian = compute_jacobians(chain, angles, point)
+    slope = build_regressor(jacobian, torques)[..., :3, :].reshape(-1, 3, robot.joints)
+    predicted = compute_exact_deflections(
+        chain, angles, robot.compliance * torques, point
+    )
     offset = (predicted - true_deflection)[..., :3].reshape(-1, 3, 1)
     rows = np.concatenate([slope, offset], axis=-1)
     first, second = np.triu_indices(robot.joints + 1)

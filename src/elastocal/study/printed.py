@@ -33,7 +33,7 @@ import numpy as np
 import pandas as pd
 from scipy.special import stdtr
 
-from elastocal.io.data_frames import read_long
+from elastocal.io.data_frames import read_robot_tables
 from elastocal.study.evaluation import make_repeated_schema
 from elastocal.study.jobs import (
     MICRO,
@@ -439,7 +439,7 @@ def compare_with_studies(job: Job) -> None:
     """Write every printed figure among further studies, and the joint test."""
     compared = pd.read_csv(job.input.beside, dtype={"table": str})
     initial = read_frames(job, job.input.initial, INITIAL)
-    studies = read_long(job.input.studies, make_repeated_schema)
+    studies = read_robot_tables(job.input.studies, make_repeated_schema)
     printed = read_printed_figures(job.input.reference)
     length = job.params.length
     write_csvs(

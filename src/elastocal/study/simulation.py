@@ -22,15 +22,15 @@ from elastocal.mechanics.components import (
     WRENCH_NAMES,
 )
 from elastocal.mechanics.elastostatics import (
-    exact_deflections,
-    extended_chain,
-    generalized_forces,
-    loaded_point,
-    spring_compliance,
-    wrench_of_offset_force,
+    build_extended_chain,
+    build_spring_compliance,
+    compute_exact_deflections,
+    compute_generalized_forces,
+    compute_offset_wrench,
+    select_loaded_point,
 )
-from elastocal.mechanics.kinematics import jacobians, poses
-from elastocal.mechanics.robot_file import joint_limits
+from elastocal.mechanics.kinematics import compute_jacobians, compute_poses
+from elastocal.mechanics.robot_file import parse_joint_limits
 from elastocal.random_streams import draw_data_sets
 from elastocal.study.jobs import (
     CONFIGURATION,
@@ -237,8 +237,8 @@ def draw_random_experiments(
     force = loading.force_N * normal / np.linalg.norm(normal, axis=-1, keepdims=True)
     rotation = None
     if loading.offset_frame == "tool":
-        _, rotation = poses(chain, joint_angles, chain.end_effector)
-    wrench = wrench_of_offset_force(force, loading.offset_m, rotation)
+        _, rotation = compute_poses(chain, joint_angles, chain.end_effector)
+    wrench = compute_offset_wrench(force, loading.offset_m, rotation)
     return Experiments(joint_angles, wrench)
 
 
@@ -264,13 +264,15 @@ def compute_true_deflections(
     -------
     (sets, configurations, 6) array, m and rad
     """
-    chain = extended_chain(robot)
+    chain = build_extended_chain(robot)
     unloaded = chain.at(experiments.joint_angles)
     measured = replace(chain.point(point.name), offset_m=point.offset_m)
-    jacobian = jacobians(chain, unloaded, loaded_point(chain, measured, wrench_at))
-    torques = generalized_forces(jacobian, experiments.wrench)
-    springs = torques @ spring_compliance(robot)
-    return exact_deflections(chain, unloaded, springs, measured)
+    jacobian = compute_jacobians(
+        chain, unloaded, select_loaded_point(chain, measured, wrench_at)
+    )
+    torques = compute_generalized_forces(jacobian, experiments.wrench)
+    springs = torques @ build_spring_compliance(robot)
+    return compute_exact_deflections(chain, unloaded, springs, measured)
 
 
 def draw_measurement_noise(
@@ -522,7 +524,7 @@ def draw_experiments(job: Job) -> None:
     params = job.params
     robot = job.wildcards.robot
     chain = parse_chain(params.chain, params.lengths_m, robot)
-    limits = joint_limits(params.joint_limits_deg, chain, robot)
+    limits = parse_joint_limits(params.joint_limits_deg, chain, robot)
     design = RandomDesign(chain, limits, Loading(**params.loading), robot)
     blocks = (
         pack_experiments(

@@ -387,10 +387,10 @@ def _round(values: np.ndarray) -> np.ndarray:
 
 def tabulate_uses(job: Job) -> None:
     """Write scores and pairs of the strategies on all robots."""
-    from elastocal.io.data_frames import read_long
+    from elastocal.io.data_frames import read_robot_tables
 
-    metrics = read_long(job.input.metrics, make_metrics_schema)
-    replicates = read_long(job.input.replicates, lambda joints: REPLICATES)
+    metrics = read_robot_tables(job.input.metrics, make_metrics_schema)
+    replicates = read_robot_tables(job.input.replicates, lambda joints: REPLICATES)
     scores = {
         robot: score_strategies(
             uses,

@@ -19,7 +19,7 @@ _JOINTS = {
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 
 
-class Step(NamedTuple):
+class ChainElement(NamedTuple):
     """One word of a chain: fixed by `amount` (m or rad), moved by a coordinate, or a
     measuring point; `kind`: T, R or point."""
 
@@ -31,7 +31,9 @@ class Step(NamedTuple):
     point: str = ""
 
 
-def steps_of(document: Mapping[str, Any]) -> tuple[list[Step], list[np.ndarray]]:
+def parse_chain_elements(
+    document: Mapping[str, Any],
+) -> tuple[list[ChainElement], list[np.ndarray]]:
     """Words of a robot file's chain, and its rigid stretches as vectors (m).
 
     Behind each stretch of an arm with elastic links stand six springs (equation 5):
@@ -41,15 +43,15 @@ def steps_of(document: Mapping[str, Any]) -> tuple[list[Step], list[np.ndarray]]
     joints = len({*_JOINT.findall(document["chain"])})
     lengths = document.get("lengths_m", {})
     vector = np.zeros(3)
-    found: list[Step] = []
-    points: list[Step] = []
+    found: list[ChainElement] = []
+    points: list[ChainElement] = []
     links: list[np.ndarray] = []
     for kind, axis, minus, argument, point in [
         *_WORD.findall(document["chain"]),
         ("R", "x", "", "0", ""),
     ]:
         if point:
-            points.append(Step("point", point=point))
+            points.append(ChainElement("point", point=point))
             continue
         moves = _JOINT.fullmatch(argument)
         sign = -1.0 if minus else 1.0
@@ -57,7 +59,7 @@ def steps_of(document: Mapping[str, Any]) -> tuple[list[Step], list[np.ndarray]]
         if vector.any() and (kind == "R" or moves):
             springs = joints + 6 * len(links)
             found += [
-                Step("TR"[k // 3], k % 3, coordinate=springs + k)
+                ChainElement("TR"[k // 3], k % 3, coordinate=springs + k)
                 for k in range(6 * ("links" in document))
             ]
             links.append(vector)
@@ -65,16 +67,18 @@ def steps_of(document: Mapping[str, Any]) -> tuple[list[Step], list[np.ndarray]]
         found += points
         points.clear()
         if moves:
-            found.append(Step(kind, place, coordinate=int(argument[1:]) - 1, sign=sign))
+            found.append(
+                ChainElement(kind, place, coordinate=int(argument[1:]) - 1, sign=sign)
+            )
         elif kind == "R":
             found.append(
-                Step(
+                ChainElement(
                     kind, place, sign * np.deg2rad(float(argument.removesuffix("deg")))
                 )
             )
         else:
             found.append(
-                Step(kind, place, sign * float(lengths.get(argument, argument)))
+                ChainElement(kind, place, sign * float(lengths.get(argument, argument)))
             )
             vector[place] += found[-1].amount
     return found, links
@@ -95,7 +99,7 @@ class Arm:
         tool_m: Any = (0.0, 0.0, 0.0),
     ) -> None:
         self.document, self.joints = document, len({*_JOINT.findall(document["chain"])})
-        self.steps, self.links = steps_of(document)
+        self.steps, self.links = parse_chain_elements(document)
         self.points = [step.point for step in self.steps if step.kind == "point"]
         targets = (
             {point: (point, tool_m) for point in self.points}
@@ -230,7 +234,7 @@ class Arm:
             second = np.pi * (outer**4 - inner**4) / 64
             young = 1e9 * material["youngs_modulus_GPa"]
             shear = 1e9 * material["shear_modulus_GPa"]
-            links[number] = cantilever(
+            links[number] = compute_link_compliance(
                 vector,
                 1 / (young * second),
                 1 / (shear * 2 * second),
@@ -240,7 +244,7 @@ class Arm:
         return self.spring_matrix(self.compliance, links)
 
 
-def cantilever(
+def compute_link_compliance(
     vector: np.ndarray, bending: float, torsion: float, taper: float, axial: float = 0.0
 ) -> np.ndarray:
     """Compliance (6, 6) of a link at its far end: force and moment there integrated

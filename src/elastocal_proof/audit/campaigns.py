@@ -12,13 +12,13 @@ import pinocchio as pin
 import yaml
 
 from elastocal_proof.audit.arm import Arm
-from elastocal_proof.audit.audited import (
+from elastocal_proof.audit.finished_run import (
     POSITION,
     WRENCH,
-    Audited,
     Finding,
+    FinishedRun,
     compare,
-    numbers,
+    open_philox_stream,
     require,
 )
 
@@ -27,7 +27,9 @@ from elastocal_proof.audit.audited import (
 _DIGITS = 1e-10
 
 
-def simulated(run: Audited, file: str, campaign: str) -> Iterator[Finding]:
+def check_simulated_campaign(
+    run: FinishedRun, file: str, campaign: str
+) -> Iterator[Finding]:
     """Every angle, load and noise of a simulated campaign from its stream, every pose
     of the elastic arm by pinocchio."""
     path = run.folder / f"config/campaigns/{campaign}.yaml"
@@ -38,7 +40,7 @@ def simulated(run: Audited, file: str, campaign: str) -> Iterator[Finding]:
         (run.folder / f"config/robots/{source['robot']}.yaml").read_text("utf-8")
     )
     arm = Arm(document)
-    draws = numbers(run.seed, campaign, "campaign")
+    draws = open_philox_stream(run.seed, campaign, "campaign")
     table = run.table(file)
     low, high = np.deg2rad(document["joint_limits_deg"]).T
     angles = low + (high - low) * draws.random((source["poses"], arm.joints))
@@ -95,7 +97,7 @@ def simulated(run: Audited, file: str, campaign: str) -> Iterator[Finding]:
             )
 
 
-def split(run: Audited, file: str, campaign: str) -> Iterator[Finding]:
+def check_split(run: FinishedRun, file: str, campaign: str) -> Iterator[Finding]:
     """Fitted and held-out measurements are those of the campaign's file, each once, and
     share no pose."""
     fitted = run.table(file)
@@ -136,7 +138,7 @@ def split(run: Audited, file: str, campaign: str) -> Iterator[Finding]:
         )
 
 
-def seals(run: Audited, file: str) -> Iterator[Finding]:
+def check_seals(run: FinishedRun, file: str) -> Iterator[Finding]:
     """Every ground truth of the blind proof is what was sealed, and every sealed one is
     there."""
     there = {
@@ -158,7 +160,7 @@ def seals(run: Audited, file: str) -> Iterator[Finding]:
 
 
 CHECKS = {
-    "data/campaigns/{campaign}/measurements.parquet": simulated,
-    "results/loop/{campaign}/training.parquet": split,
-    "reports/blind/manifest.sha256": seals,
+    "data/campaigns/{campaign}/measurements.parquet": check_simulated_campaign,
+    "results/loop/{campaign}/training.parquet": check_split,
+    "reports/blind/manifest.sha256": check_seals,
 }

@@ -21,13 +21,13 @@ from scipy import stats
 from scipy.spatial.transform import Rotation
 from statsmodels.robust.norms import HuberT
 
-from elastocal_proof.audit.arm import Arm, cantilever
-from elastocal_proof.audit.audited import (
+from elastocal_proof.audit.arm import Arm, compute_link_compliance
+from elastocal_proof.audit.finished_run import (
     COMPONENTS,
     POSITION,
     WRENCH,
-    Audited,
     Finding,
+    FinishedRun,
     compare,
 )
 
@@ -59,7 +59,7 @@ _BY = "statsmodels on pinocchio"
 
 
 @dataclass(frozen=True)
-class Step:
+class FittedModel:
     """One model: `parameters` are rows of steps.parquet, `springs` (C, C) and what a
     `unit` (P, C, C) of each adds to them."""
 
@@ -71,17 +71,17 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Campaign:
+class AuditedCampaign:
     """A campaign of stated springs: rotations of its targets, none where positions
     alone are measured, and its steps, None where one has what is not written down
     here."""
 
     arm: Arm
     mounts: list[np.ndarray]
-    steps: list[Step | None]
+    steps: list[FittedModel | None]
 
 
-def campaign_of(run: Audited, name: str) -> Campaign | None:
+def read_audited_campaign(run: FinishedRun, name: str) -> AuditedCampaign | None:
     """A campaign's robot and models; None of one that is left out."""
     described, facts = (
         run.document(f"results/loop/{name}/{part}.json")
@@ -118,10 +118,12 @@ def campaign_of(run: Audited, name: str) -> Campaign | None:
         pin.exp3(np.array(target.get("rotation", (0.0, 0.0, 0.0)), float))
         for target in targets
     ]
-    return Campaign(arm, mounts if asked["measured"] == "pose" else [], steps)
+    return AuditedCampaign(arm, mounts if asked["measured"] == "pose" else [], steps)
 
 
-def _step(arm: Arm, stated: Mapping[str, Any], parameters: pd.DataFrame) -> Step | None:
+def _step(
+    arm: Arm, stated: Mapping[str, Any], parameters: pd.DataFrame
+) -> FittedModel | None:
     links = [key for key in stated["effects"] if key.startswith(_LINKS)]
     # Where a fixed rotation or a coupled joint parts a link, its ends are not those of
     # a stretch of translations.
@@ -148,7 +150,10 @@ def _step(arm: Arm, stated: Mapping[str, Any], parameters: pd.DataFrame) -> Step
     def springs(joints: np.ndarray, *link: float) -> np.ndarray:
         return arm.spring_matrix(
             joints,
-            {number: cantilever(vector, *link) for number, vector in long.items()},
+            {
+                number: compute_link_compliance(vector, *link)
+                for number, vector in long.items()
+            },
         )
 
     still = np.zeros(arm.joints)
@@ -174,7 +179,7 @@ def _step(arm: Arm, stated: Mapping[str, Any], parameters: pd.DataFrame) -> Step
     each = np.array([units[name] for name in parameters["parameter"]]).reshape(
         -1, *slope.shape
     )
-    return Step(
+    return FittedModel(
         stated["kind"],
         parameters,
         stated["noise"],
@@ -194,7 +199,7 @@ def _far_off(frame: pd.DataFrame) -> np.ndarray:
     ).any(axis=1)
 
 
-def averaged(known: Campaign, kept: pd.DataFrame) -> pd.DataFrame:
+def average_repeats(known: AuditedCampaign, kept: pd.DataFrame) -> pd.DataFrame:
     """Measurements with the repeats of a state averaged; `repeats`: how many, of the
     target that has the fewest."""
     loads = [*(f"q{j}" for j in range(1, known.arm.joints + 1)), *WRENCH]
@@ -214,8 +219,8 @@ def averaged(known: Campaign, kept: pd.DataFrame) -> pd.DataFrame:
     return found.reset_index()
 
 
-def predicted(
-    known: Campaign, springs: np.ndarray, rows: pd.DataFrame
+def compute_residuals(
+    known: AuditedCampaign, springs: np.ndarray, rows: pd.DataFrame
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Measured less predicted (M, 3 or 6), m and rad, Jacobians (M, 3 or 6, C) and
     loads (M, C) where the robot has yielded."""
@@ -244,14 +249,14 @@ def predicted(
     return tuple(np.array(each) for each in zip(*found, strict=True))  # type: ignore[return-value]
 
 
-def least_squares(
-    known: Campaign, step: Step, training: pd.DataFrame
+def take_least_squares_step(
+    known: AuditedCampaign, step: FittedModel, training: pd.DataFrame
 ) -> tuple[Any, np.ndarray]:
     """One robust least-squares step (Huber) of a model from its estimates: the fit of
     all free parameters, and how far those that can move still do, in standard errors of
     the scatter."""
-    seen = averaged(known, training)
-    residual, jacobian, forces = predicted(known, step.springs, seen)
+    seen = average_repeats(known, training)
+    residual, jacobian, forces = compute_residuals(known, step.springs, seen)
     slopes = np.einsum("mrc,pcd,md->mrp", jacobian, step.units, forces, optimize=True)
     rows = np.concatenate([slopes, residual[:, :, None]], axis=2)
     of_noise = step.noise, seen, jacobian[:, :, : known.arm.joints]
@@ -322,10 +327,10 @@ def _whitened(
     return found
 
 
-def fits(run: Audited, file: str, campaign: str) -> Iterator[Finding]:
+def check_fits(run: FinishedRun, file: str, campaign: str) -> Iterator[Finding]:
     """Estimates and standard errors of every step; correlations of the last. None where
     approaches are recorded."""
-    known = campaign_of(run, campaign)
+    known = read_audited_campaign(run, campaign)
     training = run.table(f"results/loop/{campaign}/training.parquet")
     if known is None or training["approach1"].notna().any():
         return
@@ -339,7 +344,7 @@ def fits(run: Audited, file: str, campaign: str) -> Iterator[Finding]:
         if step is None or step.parameters["held"].all():
             continue
         (fit, moved), words = (
-            least_squares(known, step, training[~out]),
+            take_least_squares_step(known, step, training[~out]),
             f"of step {number} ({step.kind})",
         )
         yield compare(
@@ -374,7 +379,7 @@ def fits(run: Audited, file: str, campaign: str) -> Iterator[Finding]:
             )
 
 
-def model_of(arm: Arm) -> mujoco.MjModel:
+def build_mujoco_model(arm: Arm) -> mujoco.MjModel:
     """The arm by MuJoCo, its joints and springs as bodies."""
     words = ['<mujoco><compiler angle="radian"/><worldbody>']
     opened = 0
@@ -407,7 +412,7 @@ def model_of(arm: Arm) -> mujoco.MjModel:
     )
 
 
-def stand(
+def iterate_equilibrium(
     arm: Arm,
     model: mujoco.MjModel,
     springs: np.ndarray,
@@ -432,16 +437,16 @@ def stand(
     return np.array(found[1:])
 
 
-def residuals(run: Audited, file: str, campaign: str) -> Iterator[Finding]:
+def check_residuals(run: FinishedRun, file: str, campaign: str) -> Iterator[Finding]:
     """Residuals of positions of sampled rows, by the declared model and with the
     effects found: measured less MuJoCo's."""
-    known = campaign_of(run, campaign)
+    known = read_audited_campaign(run, campaign)
     frame = run.table(file).query("not gross_error")
     if known is None:
         return
     arm, model, rows = (
         known.arm,
-        model_of(known.arm),
+        build_mujoco_model(known.arm),
         frame.iloc[run.pick(file, len(frame))],
     )
     angles = rows[[f"q{j}" for j in range(1, arm.joints + 1)]].to_numpy(float)
@@ -454,7 +459,9 @@ def residuals(run: Audited, file: str, campaign: str) -> Iterator[Finding]:
     for state, step in (("before", declared), ("after", known.steps[-1])):
         if step is None:
             continue
-        stands = np.array([stand(arm, model, step.springs, *load) for load in loads])
+        stands = np.array(
+            [iterate_equilibrium(arm, model, step.springs, *load) for load in loads]
+        )
         # The fit may go on by thousandths of a standard error of the scatter that is
         # there.
         names = [f"{state}_{name}" for name in COMPONENTS[:3]]
@@ -468,7 +475,8 @@ def residuals(run: Audited, file: str, campaign: str) -> Iterator[Finding]:
             * step.units
         ):
             softer = [
-                stand(arm, model, step.springs + more, *load)[-1] for load in loads
+                iterate_equilibrium(arm, model, step.springs + more, *load)[-1]
+                for load in loads
             ]
             allowed += np.abs(softer - stands[:, -1]).max()
         expected = rows[list(POSITION)].to_numpy(float) - stands[:, -1]
@@ -483,6 +491,6 @@ def residuals(run: Audited, file: str, campaign: str) -> Iterator[Finding]:
 
 
 CHECKS = {
-    "results/loop/{campaign}/steps.parquet": fits,
-    "reports/loop/{campaign}/residuals.parquet": residuals,
+    "results/loop/{campaign}/steps.parquet": check_fits,
+    "reports/loop/{campaign}/residuals.parquet": check_residuals,
 }

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from elastocal_proof.audit.audited import (
+from elastocal_proof.audit.finished_run import (
     ROUNDING,
-    Audited,
     Finding,
+    FinishedRun,
     compare,
-    numbers,
+    open_philox_stream,
     require_each_once,
 )
 
@@ -30,7 +30,7 @@ _EXACT_UP_TO = 1e4
 _STREAM = "numpy's Philox stream"
 
 
-def experiments(run: Audited, file: str, robot: str) -> Iterator[Finding]:
+def check_experiments(run: FinishedRun, file: str, robot: str) -> Iterator[Finding]:
     """Joint angles and wrenches of sampled data sets from their random streams."""
     settings = run.configuration
     read = run.configuration["interpretations"]
@@ -51,12 +51,12 @@ def experiments(run: Audited, file: str, robot: str) -> Iterator[Finding]:
     if read["joint_range"] == "limits":
         low, high = np.deg2rad(run.robots[robot]["joint_limits_deg"]).T
     for data_set in run.pick(file, sets) if numbered.holds else ():
-        turns = numbers(run.seed, robot, f"{use}/joint angles", data_set).random(
-            (count, arm.joints)
-        )
-        normal = numbers(run.seed, robot, f"{use}/force", data_set).standard_normal(
-            (count, 3)
-        )
+        turns = open_philox_stream(
+            run.seed, robot, f"{use}/joint angles", data_set
+        ).random((count, arm.joints))
+        normal = open_philox_stream(
+            run.seed, robot, f"{use}/force", data_set
+        ).standard_normal((count, 3))
         angles = low + (high - low) * turns
         force = settings["loading"]["force_N"] * normal
         force /= np.linalg.norm(normal, axis=1)[:, None]
@@ -76,7 +76,9 @@ def experiments(run: Audited, file: str, robot: str) -> Iterator[Finding]:
             )
 
 
-def ideal(run: Audited, file: str, robot: str) -> Iterator[Finding]:
+def check_ideal_deflections(
+    run: FinishedRun, file: str, robot: str
+) -> Iterator[Finding]:
     """Deflections of sampled rows by pinocchio's exact kinematics, tubes by
     Castigliano's theorem."""
     arm, (angles, wrench) = run.arm(robot), run.experiments(robot, "/test/" in file)
@@ -115,7 +117,9 @@ def ideal(run: Audited, file: str, robot: str) -> Iterator[Finding]:
         )
 
 
-def measured(run: Audited, file: str, robot: str, noise_um: str) -> Iterator[Finding]:
+def check_measured_deflections(
+    run: FinishedRun, file: str, robot: str, noise_um: str
+) -> Iterator[Finding]:
     """Measured deflections of sampled data sets: the ideal ones and noise from its
     stream."""
     for point in run.arm(robot).points:
@@ -131,7 +135,7 @@ def measured(run: Audited, file: str, robot: str, noise_um: str) -> Iterator[Fin
             0.0,
         )
         for data_set in run.pick(f"{file} {point}", len(clean)):
-            drawn = numbers(
+            drawn = open_philox_stream(
                 run.seed, robot, f"noise/{point}", data_set
             ).standard_normal(clean.shape[1:])
             expected = clean[data_set] + 1e-6 * float(noise_um) * drawn
@@ -173,8 +177,8 @@ def solve_staged(
     return gain, condition
 
 
-def estimates(
-    run: Audited, file: str, robot: str, strategy: str, noise_um: str
+def check_estimates(
+    run: FinishedRun, file: str, robot: str, strategy: str, noise_um: str
 ) -> Iterator[Finding]:
     """Compliances of sampled data sets and lengths (equation 11); what does not
     determine them has none."""
@@ -228,10 +232,10 @@ def estimates(
 
 
 CHECKS = {
-    "data/simulated/{robot}/experiments.parquet": experiments,
-    "data/simulated/{robot}/test/experiments.parquet": experiments,
-    "data/simulated/{robot}/ideal.parquet": ideal,
-    "data/simulated/{robot}/test/ideal.parquet": ideal,
-    "data/simulated/{robot}/{noise_um}um/measured.parquet": measured,
-    "results/identified/{robot}/{noise_um}um/{strategy}.parquet": estimates,
+    "data/simulated/{robot}/experiments.parquet": check_experiments,
+    "data/simulated/{robot}/test/experiments.parquet": check_experiments,
+    "data/simulated/{robot}/ideal.parquet": check_ideal_deflections,
+    "data/simulated/{robot}/test/ideal.parquet": check_ideal_deflections,
+    "data/simulated/{robot}/{noise_um}um/measured.parquet": check_measured_deflections,
+    "results/identified/{robot}/{noise_um}um/{strategy}.parquet": check_estimates,
 }

@@ -22,29 +22,29 @@ import numpy as np
 from elastocal_proof.blind.folders import Experiment, write_blind_campaign, write_truth
 from elastocal_proof.plant.arm import Arm, LinkMass, arm_from_file
 from elastocal_proof.plant.campaigns import (
-    SLIPS,
+    BLUNDER_KINDS,
+    Blunder,
     Design,
-    Slip,
     Table,
-    schedule_of,
-    with_bad_rows,
+    add_blunders,
+    draw_schedule,
 )
 from elastocal_proof.plant.kinds import (
     KINDS,
     OUTSIDE,
     Defect,
-    drawn_defect,
-    with_defects,
+    apply_defects,
+    draw_defect,
 )
-from elastocal_proof.plant.machine import usual_gravity_torque
-from elastocal_proof.plant.physical_robot import (
+from elastocal_proof.plant.multibody import compute_typical_gravity_torque
+from elastocal_proof.plant.simulated_robot import (
     Motion,
-    PhysicalRobot,
+    SimulatedRobot,
     Tracker,
-    specimen,
-    stream,
+    draw_specimen,
+    open_simulation_stream,
 )
-from elastocal_proof.plant.sizing import Yardstick
+from elastocal_proof.plant.sizing import NoncentralityModel
 
 Plan = Mapping[str, Any]
 
@@ -419,7 +419,7 @@ def _draw_defects(
             )
             for index in indices
         ]
-    defect = drawn_defect(effect, arm, seed)
+    defect = draw_defect(effect, arm, seed)
     if case.group == UNDECLARED:
         # The last location of this effect consists of all links.
         defect = replace(defect, joints=locations[-1])

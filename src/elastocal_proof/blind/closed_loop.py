@@ -57,15 +57,15 @@ from elastocal_proof.blind.rehearsal import (
     move_robot,
 )
 from elastocal_proof.plant.campaigns import (
+    Blunder,
     Design,
-    Slip,
     Table,
-    schedule_of,
-    usual_force_N,
-    with_bad_rows,
+    add_blunders,
+    draw_schedule,
+    get_typical_force_N,
 )
 from elastocal_proof.plant.kinds import KINDS
-from elastocal_proof.plant.physical_robot import stream
+from elastocal_proof.plant.simulated_robot import open_simulation_stream
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -76,7 +76,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Case
     from elastocal.mechanics.robot import Robot
-    from elastocal_proof.plant.physical_robot import PhysicalRobot
+    from elastocal_proof.plant.simulated_robot import SimulatedRobot
 
 UNCORRECTED = "uncorrected"
 GEOMETRY = "geometry"
@@ -158,7 +158,7 @@ class DiagnosedRobot:
         Poses that the robot shall reach.
     """
 
-    plant: PhysicalRobot
+    plant: SimulatedRobot
     declared: Robot
     training: Case
     held_out: Case
@@ -247,7 +247,7 @@ def measure_robot(
             plant.arm.masses,
             partial(_lose_beam, experiment) if slips else None,
         )
-        training, held_out = cases_in(folder, robot_file.parent)
+        training, held_out = read_cases(folder, robot_file.parent)
     robot = training.campaign.robot
     diagnosis = diagnose(training, Settings(), seed)
     wanted = draw_wanted_poses(robot, plant, seed)

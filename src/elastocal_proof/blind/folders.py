@@ -23,8 +23,13 @@ from elastocal.errors import InputError
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.json_files import read_json
 from elastocal_proof.plant.arm import Arm, LinkMass
-from elastocal_proof.plant.campaigns import Design, Slip, Table, measured_table
-from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule
+from elastocal_proof.plant.campaigns import (
+    Blunder,
+    Design,
+    Table,
+    simulate_measurements,
+)
+from elastocal_proof.plant.simulated_robot import Schedule, SimulatedRobot
 
 # Damages some rows of a table of measurements, and says which.
 DamageRows = Callable[[Table], tuple[Table, list[Slip]]]
@@ -133,7 +138,7 @@ def write_blind_campaign(
 def write_robot_file(
     folder: str | Path,
     robot_file: str | Path,
-    robot: PhysicalRobot,
+    robot: SimulatedRobot,
     declared: Sequence[LinkMass],
     undeclared: Sequence[str] = (),
 ) -> None:

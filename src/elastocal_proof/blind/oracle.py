@@ -40,7 +40,7 @@ from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.noise import fit_declared_model, parse_noise
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.typed_json import to_document
-from elastocal.loop.whole import cases_in
+from elastocal.loop.whole import read_cases
 from elastocal.validation.transfer import find_extrapolated_poses
 from elastocal_proof.blind.cases import (
     CATALOGUE_EFFECTS,
@@ -50,8 +50,8 @@ from elastocal_proof.blind.cases import (
     size_defects,
 )
 from elastocal_proof.blind.folders import load_ground_truth
-from elastocal_proof.plant.kinds import KINDS, OUTSIDE, Defect, with_defects
-from elastocal_proof.plant.physical_robot import stream
+from elastocal_proof.plant.kinds import KINDS, OUTSIDE, Defect, apply_defects
+from elastocal_proof.plant.simulated_robot import open_simulation_stream
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -356,7 +356,7 @@ def draw_unit_signals(
     located = []
     units = []
     for kind in kinds:
-        size = KINDS[kind].plausible_on(robot.arm)
+        size = KINDS[kind].scale_plausible_size(robot.arm)
         for location in KINDS[kind].locations(robot.arm):
             draws = stream(seed, f"limit {kind} {location}")
             signals = []

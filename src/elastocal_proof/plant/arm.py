@@ -53,7 +53,7 @@ _FARTHEST = 3.0
 
 
 @dataclass(frozen=True)
-class Stretch:
+class Link:
     """What is rigid between two drives: vector (3,) from its near to its far end,
     rotation (3, 3) of the frame at its far end, and places (3,) and rotations (3, 3) of
     its measuring points by their names, all in the frame at its near end."""
@@ -101,7 +101,7 @@ class Arm:
     the shoulder. `gear_ratio`: turns of the motor for one of each joint.
     """
 
-    stretches: tuple[Stretch, ...]
+    stretches: tuple[Link, ...]
     lengths_m: np.ndarray
     reach_m: float
     axes: np.ndarray
@@ -126,14 +126,14 @@ class Arm:
         return tuple(name for stretch in self.stretches for name in stretch.points)
 
 
-def arm_from_file(path: str | Path) -> Arm:
+def read_arm(path: str | Path) -> Arm:
     """Read a robot file that the analysis can read too."""
-    return arm_from_document(
+    return build_arm(
         yaml.safe_load(Path(path).read_text(encoding="utf-8")), Path(path).as_posix()
     )
 
 
-def arm_from_document(document: Mapping[str, Any], source: str = "robot") -> Arm:
+def build_arm(document: Mapping[str, Any], source: str = "robot") -> Arm:
     """Make an arm of the contents of a robot file.
 
     `source`: named in errors. Raises `InputError`: a drive that shifts or that stands
@@ -192,7 +192,7 @@ def arm_from_document(document: Mapping[str, Any], source: str = "robot") -> Arm
 
 
 def _usual_masses(
-    stretches: tuple[Stretch, ...], payload_times_reach: float, reach: float
+    stretches: tuple[Link, ...], payload_times_reach: float, reach: float
 ) -> list[LinkMass]:
     """What the links of an arm weigh of which nobody says it."""
     falling = _FALL ** np.arange(len(stretches) - 2)
@@ -212,9 +212,9 @@ def _usual_masses(
 
 def _stretches_of(
     chain: str, lengths: Mapping[str, float], source: str
-) -> tuple[tuple[Stretch, ...], np.ndarray]:
+) -> tuple[tuple[Link, ...], np.ndarray]:
     """Cut a chain at its drives."""
-    stretches: list[Stretch] = []
+    stretches: list[Link] = []
     axes: list[np.ndarray] = []
     position = np.zeros(3)
     rotation = np.eye(3)
@@ -241,24 +241,24 @@ def _stretches_of(
                 sign * float(lengths.get(argument, argument)) * direction
             )
         elif argument.endswith("deg"):
-            rotation = rotation @ turned(
+            rotation = rotation @ to_rotation_matrix(
                 np.radians(sign * float(argument[:-3])) * direction
             )
         else:
-            stretches.append(Stretch(position, rotation, points))
+            stretches.append(Link(position, rotation, points))
             axes.append(sign * direction)
             position = np.zeros(3)
             rotation = np.eye(3)
             points = {}
-    return (*stretches, Stretch(position, rotation, points)), np.array(axes)
+    return (*stretches, Link(position, rotation, points)), np.array(axes)
 
 
-def turned(vector: ArrayLike) -> np.ndarray:
+def to_rotation_matrix(vector: ArrayLike) -> np.ndarray:
     """Rotation matrices (..., 3, 3) of rotation vectors (..., 3), rad."""
     return Rotation.from_rotvec(np.array(vector, float)).as_matrix()
 
 
-def rotation_vector(rotation: np.ndarray) -> np.ndarray:
+def to_rotation_vector(rotation: np.ndarray) -> np.ndarray:
     """Rotation vectors (..., 3), rad, of rotation matrices (..., 3, 3); angles up to
     and at a half turn."""
     # A product of two rotations is one but for rounding, which needs no other to be
@@ -266,7 +266,7 @@ def rotation_vector(rotation: np.ndarray) -> np.ndarray:
     return Rotation.from_matrix(np.array(rotation), assume_valid=True).as_rotvec()
 
 
-def true_masses(
+def draw_true_masses(
     arm: Arm,
     draws: np.random.Generator,
     off_line_m: float,

@@ -8,19 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from elastocal_proof.plant.arm import Arm, rotation_vector, turned
-from elastocal_proof.plant.laws import direction, sign
-from elastocal_proof.plant.physical_robot import (
-    PhysicalRobot,
+from elastocal_proof.plant.arm import Arm, to_rotation_matrix, to_rotation_vector
+from elastocal_proof.plant.laws import draw_direction, draw_sign
+from elastocal_proof.plant.simulated_robot import (
     Schedule,
-    logged_temperature,
-    seen_poses,
-    stream,
+    SimulatedRobot,
+    compute_logged_temperature,
+    open_simulation_stream,
+    simulate_poses,
 )
 
 Table = dict[str, np.ndarray]
 # Its kind, and of the table, from 0, the rows in which something wrong stands.
-Slip = dict[str, Any]
+Blunder = dict[str, Any]
 
 COVARIATES = ("approach", "time", "temperature")
 WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
@@ -30,7 +30,7 @@ SECONDS_PER_STATE = 25.0
 _LEVER_M = (0.0, 0.5, 0.0)
 _LONG_M = 2.5
 # What a lost beam, a slipped decimal point or a muddled sheet leave of a few rows.
-SLIPS = (
+BLUNDER_KINDS = (
     "position",
     "rotation",
     "joint_angle",
@@ -89,15 +89,15 @@ class Design:
     undeclared: tuple[str, ...] = ()
 
 
-def usual_force_N(arm: Arm) -> float:  # noqa: N802 - units in names keep their case
+def get_typical_force_N(arm: Arm) -> float:  # noqa: N802 - units in names keep their case
     """A kilonewton on arms that carry 140 kg and more, and as much less on smaller
     ones."""
     return 1000.0 * arm.load_share
 
 
-def schedule_of(arm: Arm, design: Design, seed: int) -> Schedule:
+def draw_schedule(arm: Arm, design: Design, seed: int) -> Schedule:
     """Draw what is done."""
-    draws = stream(seed, "schedule")
+    draws = open_simulation_stream(seed, "schedule")
     low, high = arm.limits.T
     angles = low + (high - low) * draws.random((design.poses, arm.joints))
     pull = draws.standard_normal((design.poses, 3))
@@ -119,7 +119,7 @@ def schedule_of(arm: Arm, design: Design, seed: int) -> Schedule:
     return Schedule(
         angle=angles[pose],
         force=design.force_times
-        * usual_force_N(arm)
+        * get_typical_force_N(arm)
         * np.array(design.ladder)[load, None]
         * pull[pose],
         lever=np.tile(
@@ -137,13 +137,16 @@ def schedule_of(arm: Arm, design: Design, seed: int) -> Schedule:
     )
 
 
-def measured_table(robot: PhysicalRobot, design: Design, schedule: Schedule) -> Table:
+def simulate_measurements(
+    robot: SimulatedRobot, design: Design, schedule: Schedule
+) -> Table:
     """Columns of the file of measurements (rows,)."""
     position, rotation = robot.tracker.read(
-        *seen_poses(robot, schedule), stream(schedule.seed, "readings")
+        *simulate_poses(robot, schedule),
+        open_simulation_stream(schedule.seed, "readings"),
     )
     if design.frame == "tracker":
-        position, rotation = robot.tracker.in_own_frame(position, rotation)
+        position, rotation = robot.tracker.to_tracker_frame(position, rotation)
     points = design.points or robot.arm.points
     at = [robot.arm.points.index(name) for name in points]
     joints = range(1, robot.arm.joints + 1)
@@ -167,13 +170,13 @@ def measured_table(robot: PhysicalRobot, design: Design, schedule: Schedule) -> 
     if "time" in design.covariates:
         columns["time_s"] = schedule.time_s
     if "temperature" in design.covariates:
-        columns["temperature_c"] = logged_temperature(schedule.time_s)
+        columns["temperature_c"] = compute_logged_temperature(schedule.time_s)
     # State by state, as a tracker goes round its targets.
     table = {name: np.repeat(column, len(points)) for name, column in columns.items()}
     table["target"] = np.tile(points, len(schedule.pose))
-    read = np.concatenate([position, rotation_vector(rotation)], axis=2)[:, at].reshape(
-        -1, 6
-    )
+    read = np.concatenate([position, to_rotation_vector(rotation)], axis=2)[
+        :, at
+    ].reshape(-1, 6)
     table |= dict(
         zip(_READ[: 6 if design.measured == "pose" else 3], read.T, strict=False)
     )
@@ -184,14 +187,14 @@ def measured_table(robot: PhysicalRobot, design: Design, schedule: Schedule) -> 
     }
 
 
-def with_bad_rows(
+def add_blunders(
     table: Table,
-    robot: PhysicalRobot,
+    robot: SimulatedRobot,
     schedule: Schedule,
     kind: str,
     count: int,
     draws: np.random.Generator,
-) -> tuple[Table, list[Slip]]:
+) -> tuple[Table, list[Blunder]]:
     """A measured table in which some rows, of different poses, are wrong; of swapped
     ones always two.
 
@@ -222,10 +225,12 @@ def with_bad_rows(
     after = before.copy()
     for row, other, size in zip(rows, rows[::-1], sizes, strict=True):
         if kind == "position":
-            after[:3, row] += size * robot.tracker.sigma_m * direction(draws)
+            after[:3, row] += size * robot.tracker.sigma_m * draw_direction(draws)
         elif kind == "rotation":
-            turn = min(size * robot.tracker.sigma_rad, np.pi) * direction(draws)
-            after[3:, row] = rotation_vector(turned(turn) @ turned(before[3:, row]))
+            turn = min(size * robot.tracker.sigma_rad, np.pi) * draw_direction(draws)
+            after[3:, row] = to_rotation_vector(
+                to_rotation_matrix(turn) @ to_rotation_matrix(before[3:, row])
+            )
         else:
             after[:, row] = (
                 0.0
@@ -238,19 +243,19 @@ def with_bad_rows(
 
 
 def _seen(
-    table: Table, robot: PhysicalRobot, schedule: Schedule, **changes: Any
+    table: Table, robot: SimulatedRobot, schedule: Schedule, **changes: Any
 ) -> np.ndarray:
     """Where a tracker without noise sees each row's target, had the schedule been
     another."""
     targets = table["target"]
     points = np.array([robot.arm.points.index(name) for name in targets])
     states = np.arange(len(targets)) // len(np.unique(targets))
-    return seen_poses(robot, replace(schedule, **changes))[0][states, points]
+    return simulate_poses(robot, replace(schedule, **changes))[0][states, points]
 
 
 def _wrong_angles(
     bad: Table,
-    robot: PhysicalRobot,
+    robot: SimulatedRobot,
     schedule: Schedule,
     rows: list[int],
     sizes: np.ndarray,
@@ -278,7 +283,7 @@ def _wrong_angles(
         off = (
             _SHARES
             * min(size * robot.tracker.sigma_m / levers[joint], np.pi)
-            * sign(draws)
+            * draw_sign(draws)
         )
         angles = np.tile([bad[name][row] for name in names], (len(off), 1))
         angles[:, joint] += off
@@ -296,7 +301,7 @@ def _wrong_angles(
 
 def _wrong_loads(
     bad: Table,
-    robot: PhysicalRobot,
+    robot: SimulatedRobot,
     schedule: Schedule,
     rows: list[int],
     sizes: np.ndarray,
@@ -317,7 +322,7 @@ def _wrong_loads(
     )
     for row, size in zip(rows, sizes, strict=True):
         most = _LARGEST_LOAD * force.max() / force[row // targets]
-        share = min(size * robot.tracker.sigma_m / usual_m, most) * sign(draws)
+        share = min(size * robot.tracker.sigma_m / usual_m, most) * draw_sign(draws)
         found.append(_rows_of_slip(bad, row, False, draws))
         for name in WRENCH:
             bad[name][list(found[-1])] *= 1.0 + share

@@ -18,14 +18,14 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from elastocal_proof.plant.arm import LinkMass, rotation_vector
-from elastocal_proof.plant.machine import Machine
-from elastocal_proof.plant.physical_robot import (
-    PhysicalRobot,
+from elastocal_proof.plant.arm import LinkMass, to_rotation_vector
+from elastocal_proof.plant.multibody import MultibodyModel
+from elastocal_proof.plant.simulated_robot import (
     Schedule,
-    at_rest,
-    seen_poses,
-    stream,
+    SimulatedRobot,
+    open_simulation_stream,
+    simulate_equilibrium,
+    simulate_poses,
 )
 
 # Width of a link over the reach of the arm: within it centres of mass lie anywhere, as
@@ -33,7 +33,7 @@ from elastocal_proof.plant.physical_robot import (
 _WIDTH_OF_REACH = 0.1
 
 
-class Yardstick:
+class NoncentralityModel:
     """The faultless robot at a schedule, to which defective ones are compared.
 
     `free_frame`: whether the analysis fits the tracker's frame. `declared`: weights as
@@ -42,14 +42,16 @@ class Yardstick:
 
     def __init__(
         self,
-        robot: PhysicalRobot,
+        robot: SimulatedRobot,
         schedule: Schedule,
         free_frame: bool = False,
         declared: Sequence[LinkMass] = (),
     ) -> None:
         self.robot = robot
         self.schedule = schedule
-        machine, (coordinates, force, position, rotation) = at_rest(robot, schedule)
+        machine, (coordinates, force, position, rotation) = simulate_equilibrium(
+            robot, schedule
+        )
         self._start = coordinates[:, machine.gear]
         self.poses = robot.tracker.seen(
             position, rotation, schedule.time_s, schedule.angle[:, -1]
@@ -85,31 +87,31 @@ class Yardstick:
         self._absorbed = np.linalg.qr(stacked)[0]
         self._priors = len(weights)
 
-    def seen_and_left(self, robot: PhysicalRobot) -> tuple[np.ndarray, np.ndarray]:
+    def project_change(self, robot: SimulatedRobot) -> tuple[np.ndarray, np.ndarray]:
         """A robot's change in the measurements that are not held out, and what the
         declared model cannot absorb of it, (M,).
 
         Both in standard deviations; the last entries of the second are the weights, in
         theirs, that absorb the rest.
         """
-        seen = self._change(*seen_poses(robot, self.schedule, self._start))
+        seen = self._change(*simulate_poses(robot, self.schedule, self._start))
         return seen, self._left(seen)
 
-    def residual(self, robot: PhysicalRobot) -> np.ndarray:
+    def compute_measured_residual(self, robot: SimulatedRobot) -> np.ndarray:
         """What cannot be absorbed of a robot's measurements with the noise that they
         have in its campaign."""
-        seen = seen_poses(robot, self.schedule, self._start)
-        draws = stream(self.schedule.seed, "readings")
+        seen = simulate_poses(robot, self.schedule, self._start)
+        draws = open_simulation_stream(self.schedule.seed, "readings")
         return self._left(self._change(*robot.tracker.read(*seen, draws)))
 
-    def signal(self, robot: PhysicalRobot) -> dict[str, float]:
+    def compute_noncentralities(self, robot: SimulatedRobot) -> dict[str, float]:
         """Non-centralities of a robot's change before and after absorption, ``raw`` and
         ``retained``."""
-        seen, left = self.seen_and_left(robot)
+        seen, left = self.project_change(robot)
         return {"raw": float(seen @ seen), "retained": float(left @ left)}
 
     def _change(self, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
-        turns = rotation_vector(rotation @ np.swapaxes(self.poses[1], -1, -2))
+        turns = to_rotation_vector(rotation @ np.swapaxes(self.poses[1], -1, -2))
         return self._flat(np.concatenate([position - self.poses[0], turns], axis=-1))
 
     def _flat(self, apart: np.ndarray) -> np.ndarray:
@@ -126,9 +128,9 @@ class Yardstick:
 
 
 def _responses(
-    machine: Machine,
+    machine: MultibodyModel,
     coordinates: np.ndarray,
-    robot: PhysicalRobot,
+    robot: SimulatedRobot,
     declared: Sequence[LinkMass],
 ) -> tuple[np.ndarray, list[np.ndarray]]:
     """To first order, at rest: Jacobians of all measuring points for turns of the

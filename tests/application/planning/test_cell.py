@@ -13,7 +13,7 @@ from elastocal.application.planning.cell import (
     sample_links,
 )
 from elastocal.campaigns.campaign import Target
-from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.kinematics import compute_poses
 
 EVERYWHERE = np.array([[-5.0, 5.0], [-5.0, 5.0], [-5.0, 5.0]])
 
@@ -45,7 +45,7 @@ def test_a_target_behind_the_arm_is_hidden(survey, angles):
     """The tracker is on the line from the target through the elbow."""
     robot = survey.robot
     chain_angles = robot.model_angles(angles)
-    target, _ = poses(robot.chain, chain_angles, robot.chain.end_effector)
+    target, _ = compute_poses(robot.chain, chain_angles, robot.chain.end_effector)
     elbow = sample_links(robot, chain_angles)[8 * 2]
     distance = np.linalg.norm(target - elbow, axis=1, keepdims=True)
     direction = (target - elbow) / distance
@@ -79,7 +79,7 @@ def check_with_target(cell, robot, reported):
 
 def test_neither_forearm_nor_target_is_below_the_floor(robot, reported):
     angles = robot.model_angles(reported)
-    position, rotation = poses(robot.chain, angles, robot.chain.end_effector)
+    position, rotation = compute_poses(robot.chain, angles, robot.chain.end_effector)
     height = (position + rotation @ [0.0, 0.0, 0.2])[:, 2]
     forearm = sample_links(robot, angles, 2)
     is_below = (height < 0.0) | (forearm[..., 2] < 0.0).any(axis=0)

@@ -14,7 +14,7 @@ from elastocal.application.planning.plan import (
 )
 from elastocal.campaigns.campaign import Target
 from elastocal.errors import InputError
-from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.mechanics.robot_file import parse_robot
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +67,7 @@ def test_candidates_lie_within_the_limits_and_the_loads_pull_or_hang(
     ],
 )
 def test_targets_that_no_joint_moves_are_refused(survey, target):
-    robot = robot_from_document(
+    robot = parse_robot(
         {
             "name": "t",
             "chain": "Tz(d1) [elbow] Rz(q1) [tool0]",

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.mechanics.chain import MeasuringPoint
-from elastocal.mechanics.kinematics import poses_of_points
+from elastocal.mechanics.kinematics import compute_point_poses
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Target
@@ -144,13 +144,13 @@ def _find_joint_indices(robot: Robot) -> list[int]:
 def _locate_points(robot: Robot, angles: np.ndarray, indices: list[int]) -> np.ndarray:
     """Locate the chain before transforms with the given indices, (K, N, 3), m."""
     points = [MeasuringPoint("end of a link", index) for index in indices]
-    return poses_of_points(robot.chain, angles, points)[0]
+    return compute_point_poses(robot.chain, angles, points)[0]
 
 
 def _locate_target(robot: Robot, target: Target, angles: np.ndarray) -> np.ndarray:
     """Locate a target, (N, 3), m; an unknown offset counts as zero."""
     point = robot.chain.point(target.point)
-    position, rotation = poses_of_points(robot.chain, angles, [point])
+    position, rotation = compute_point_poses(robot.chain, angles, [point])
     return position[0] + rotation[0] @ np.array(target.offset_m or (0.0, 0.0, 0.0))
 
 

@@ -43,7 +43,7 @@ from elastocal.fitting.model import (
 )
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import Observations, States
-from elastocal.mechanics.sites import sites_of
+from elastocal.mechanics.sites import build_sites
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Target
@@ -148,7 +148,7 @@ def declare_model(survey: Survey) -> tuple[Model, Estimate]:
     """Build the model that a campaign of this survey declares, at the values of the robot
     file."""
     robot = survey.robot
-    sites = sites_of(robot)
+    sites = build_sites(robot)
     effects = tuple(declared_candidates(GEOMETRY, sites))
     if sites.masses:
         effects = (declared_weight(sites), *effects)

@@ -26,7 +26,7 @@ WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 COMPONENTS = ("dx", "dy", "dz", "rx", "ry", "rz")
 
 
-class Audited:
+class FinishedRun:
     """A finished run: its folder, config.yaml, robot and strategy files by name, and
     how many rows of a file are recomputed.
 
@@ -110,7 +110,7 @@ class Audited:
         )
 
 
-def numbers(
+def open_philox_stream(
     seed: int, robot: str, purpose: str, data_set: int = 0
 ) -> np.random.Generator:
     """The stream of random numbers of one purpose in one data set; `robot` is the name

@@ -19,7 +19,7 @@ from jinja2 import Environment
 from elastocal import __version__
 from elastocal.io.records import RECORDS, list_recorded_files
 from elastocal_proof.audit import campaigns, fits, study
-from elastocal_proof.audit.audited import Audited, Finding, require
+from elastocal_proof.audit.finished_run import Finding, FinishedRun, require
 
 _SHA = "hashlib, SHA-256"
 _OWN_WORDS = "its own metadata"
@@ -40,7 +40,7 @@ _PATTERNS = [
 COLUMNS = ("file", "checked", "by", "compared", "worst", "holds", "note")
 
 
-def audit(run: Audited, only: Collection[str] | None = None) -> list[Finding]:
+def audit_run(run: FinishedRun, only: Collection[str] | None = None) -> list[Finding]:
     """Check a finished run: every file that a job has recorded, or those that are
     named.
 
@@ -51,7 +51,7 @@ def audit(run: Audited, only: Collection[str] | None = None) -> list[Finding]:
     for file, digest in list_recorded_files(run.folder).items():
         # What an audit itself wrote is not audited.
         if file in only if only is not None else not file.startswith("reports/audit."):
-            found.append(replace(intact(run, file, digest), file=file))
+            found.append(replace(check_checksum(run, file, digest), file=file))
             found += _recompute(run, file) if run.has(file) else ()
     return found or [
         Finding(
@@ -65,7 +65,7 @@ def audit(run: Audited, only: Collection[str] | None = None) -> list[Finding]:
     ]
 
 
-def checks_of(
+def find_checks(
     file: str,
 ) -> list[tuple[str, Callable[..., Iterator[Finding]], dict[str, str]]]:
     """The checks of a file: the form of its name, what works it out again, and with
@@ -78,7 +78,7 @@ def checks_of(
     ]
 
 
-def as_table(findings: Iterable[Finding]) -> pd.DataFrame:
+def tabulate_findings(findings: Iterable[Finding]) -> pd.DataFrame:
     """Findings as rows of audit.csv."""
     return pd.DataFrame(
         [{name: getattr(each, name) for name in COLUMNS} for each in findings],
@@ -86,7 +86,7 @@ def as_table(findings: Iterable[Finding]) -> pd.DataFrame:
     )
 
 
-def page_of(table: pd.DataFrame, facts: Mapping[str, str]) -> str:
+def render_page(table: pd.DataFrame, facts: Mapping[str, str]) -> str:
     """audit.html, which asks nothing of the network; `table`: from `as_table`; `facts`:
     what heads it, such as the seed."""
     labelled = table.assign(kind=table["file"].map(_kind_of))
@@ -125,7 +125,7 @@ def _by_kind(labelled: pd.DataFrame) -> list[dict[str, Any]]:
     for kind, some in labelled.groupby("kind", sort=True):
         words = " ".join(
             (check.__doc__ or "").split("\n")[0]
-            for _, check, _ in checks_of(some["file"].iloc[0])
+            for _, check, _ in find_checks(some["file"].iloc[0])
         )
         row = {
             "kind": kind,
@@ -141,16 +141,16 @@ def _by_kind(labelled: pd.DataFrame) -> list[dict[str, Any]]:
 def _kind_of(file: str) -> str:
     """Files that are made alike, by the form of their names, or where none is worked
     out again by the folder and the ending."""
-    form = next((form for form, _, _ in checks_of(file)), "")
+    form = next((form for form, _, _ in find_checks(file)), "")
     folder, _, name = file.rpartition("/")
     return re.sub(r"\{\w+\}", "*", form) or f"{folder}/*{name[name.find('.') :]}"
 
 
-def _recompute(run: Audited, file: str) -> Iterator[Finding]:
+def _recompute(run: FinishedRun, file: str) -> Iterator[Finding]:
     """Findings of one file; whatever a damaged file makes of a check is a finding
     too."""
-    checks = [(provenance, dict[str, str]())] * file.endswith(".parquet") + [
-        each[1:] for each in checks_of(file)
+    checks = [(check_provenance, dict[str, str]())] * file.endswith(".parquet") + [
+        each[1:] for each in find_checks(file)
     ]
     for check, arguments in checks:
         try:
@@ -165,7 +165,7 @@ def _recompute(run: Audited, file: str) -> Iterator[Finding]:
             )
 
 
-def intact(run: Audited, file: str, digest: str) -> Finding:
+def check_checksum(run: FinishedRun, file: str, digest: str) -> Finding:
     """Whether a file holds what its job wrote."""
     if not run.has(file):
         return require("the file is there", "its record", False, "it is missing")
@@ -178,7 +178,7 @@ def intact(run: Audited, file: str, digest: str) -> Finding:
     )
 
 
-def provenance(run: Audited, file: str) -> Iterator[Finding]:
+def check_provenance(run: FinishedRun, file: str) -> Iterator[Finding]:
     """What a Parquet file of the pipeline says of its own settings, against its path,
     config.yaml and files of robots."""
     origin = json.loads(

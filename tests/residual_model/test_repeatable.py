@@ -9,7 +9,7 @@ from made_remainders import NOISE_M, smoothly_wrong_cases
 
 from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.noise import Noise
-from elastocal.remainder.repeatable import repeatable_part
+from elastocal.residual_model.repeatable import detect_repeatable_residual
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +27,7 @@ def test_a_smooth_remainder_remains_with_its_size_and_its_signs_turned_it_does_n
     smooth,
 ):
     case, fitted = smooth
-    found = repeatable_part(fitted, case.observations, 1)
+    found = detect_repeatable_residual(fitted, case.observations, 1)
     left = np.sqrt((fitted.residual**2).sum(axis=1).mean())
     assert found.remains and found.p_value <= 0.01
     assert 0.4 * left < found.rms_m < left and found.rms_std_error_m < 0.3 * found.rms_m
@@ -48,7 +48,7 @@ def test_chance_is_called_repeatable_no_more_often_than_stated(smooth):
     for seed in range(30):
         noise = draws.normal(0.0, NOISE_M, fitted.residual.shape)
         step = fitted.covariance @ np.einsum("mrp,mr->p", white, fitted.whiten(noise))
-        found = repeatable_part(
+        found = detect_repeatable_residual(
             replace(fitted, residual=noise - sensitivities @ step),
             case.observations,
             seed,
@@ -62,4 +62,4 @@ def test_too_few_configurations_say_nothing(kuka, config_folder, tmp_path):
     fitted = fit_model(
         case.model, case.observations, Noise("declared", NOISE_M, NOISE_M, np.zeros(6))
     )
-    assert repeatable_part(fitted, case.observations, 1) is None
+    assert detect_repeatable_residual(fitted, case.observations, 1) is None

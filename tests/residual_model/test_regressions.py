@@ -6,8 +6,8 @@ import pytest
 from made_remainders import NOISE_M, SMOOTH_M, made_inputs, smooth
 from sklearn.linear_model import Ridge
 
-from elastocal.remainder import regressions
-from elastocal.remainder.regressions import REGRESSIONS, Inputs
+from elastocal.residual_model import regressions
+from elastocal.residual_model.regressions import REGRESSIONS, Inputs
 
 
 def fitted(name, inputs, residual):
@@ -42,9 +42,9 @@ def test_the_penalty_is_that_of_ridge_regression_and_settings_do_not_mix(orders)
         {"orders": each, "penalty": other}
         for each, other in ((orders, 3.0), (orders, penalty), (6, penalty))
     ]
-    found = list(regressions.ridge_harmonics(inputs, residual, settings, 1))[1].mean(
-        there
-    )
+    found = list(regressions.fit_ridge_harmonics(inputs, residual, settings, 1))[
+        1
+    ].mean(there)
     np.testing.assert_allclose(
         found.ravel(),
         columns(there, orders).reshape(90, -1) @ alone.coef_,

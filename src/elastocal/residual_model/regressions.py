@@ -161,7 +161,7 @@ class _Geometry:
         return self.axes @ own, found, self.along @ own + right @ found, volume
 
 
-def ridge_harmonics(
+def fit_ridge_harmonics(
     inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], seed: int
 ) -> Iterator[Predictor]:
     """Harmonics of each joint's angle as deviations of that joint, beside geometry, by
@@ -180,7 +180,9 @@ def ridge_harmonics(
     @lru_cache(maxsize=2)
     def columns(every: Inputs, first: int, orders: int) -> np.ndarray:
         some = every.select(slice(first, first + _AT_ONCE))
-        return np.concatenate([some.jacobian, by_harmonics(some, orders)], axis=2)
+        return np.concatenate(
+            [some.jacobian, compute_harmonic_columns(some, orders)], axis=2
+        )
 
     most = max(setting["orders"] for setting in settings)
     joints = inputs.joint_angles.shape[1]
@@ -220,7 +222,7 @@ def ridge_harmonics(
         yield Predictor(mean)
 
 
-def two_joints(
+def fit_two_joints(
     inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], seed: int
 ) -> Iterator[Predictor]:
     """Functions of two joints' angles at once as deviations of joints, beside geometry:
@@ -233,7 +235,7 @@ def two_joints(
     """
 
     def functions(some: Inputs, pair: tuple[int, int]) -> np.ndarray:
-        return of_two(some, pair, np.arange(some.joint_angles.shape[1]))
+        return compute_pair_columns(some, pair, np.arange(some.joint_angles.shape[1]))
 
     target = residual.ravel()
     jacobian = inputs.jacobian.reshape(residual.size, -1)
@@ -260,7 +262,7 @@ def two_joints(
     )
 
 
-def extra_trees(
+def fit_extra_trees(
     inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], seed: int
 ) -> Iterator[Predictor]:
     """Extremely randomized trees: averages of neighbours in boxes, for whatever is not
@@ -296,7 +298,7 @@ def extra_trees(
     yield Predictor(mean)
 
 
-def gaussian_process(
+def fit_gaussian_process(
     inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], seed: int
 ) -> Iterator[Predictor]:
     """A Gaussian process: smooth in all inputs, with intervals that grow away from the
@@ -394,13 +396,13 @@ REGRESSIONS = {
     # of fewer observations is split.
     "extra_trees": Regression(
         "forest of extremely randomized trees",
-        extra_trees,
+        fit_extra_trees,
         ({"min_samples_split": 5, "max_features": 1.0},),
     ),
-    "gaussian_process": Regression("Gaussian process", gaussian_process),
+    "gaussian_process": Regression("Gaussian process", fit_gaussian_process),
     "ridge_harmonics": Regression(
         "ridge regression on harmonics of the joint angles",
-        ridge_harmonics,
+        fit_ridge_harmonics,
         tuple(
             {"orders": n, "penalty": float(each)}
             for n in (1, 2, 6, 12, 36)
@@ -410,7 +412,7 @@ REGRESSIONS = {
     ),
     "two_joints": Regression(
         "ridge regression on functions of two joints' angles",
-        two_joints,
+        fit_two_joints,
         by_jacobian=True,
     ),
 }
@@ -426,7 +428,7 @@ def _plugin_regressions() -> dict[str, Regression]:
     return load_plugins(plugins.REGRESSIONS, Regression, REGRESSIONS)
 
 
-def by_harmonics(inputs: Inputs, orders: int) -> np.ndarray:
+def compute_harmonic_columns(inputs: Inputs, orders: int) -> np.ndarray:
     """Displacement of the target by one radian of each harmonic, (M, 3, 2 n orders),
     lower orders first."""
     waves = np.cumprod(
@@ -437,7 +439,9 @@ def by_harmonics(inputs: Inputs, orders: int) -> np.ndarray:
     return (along * harmonics[:, None]).reshape(len(inputs), 3, -1)
 
 
-def of_two(inputs: Inputs, pair: tuple[int, int], moved: np.ndarray) -> np.ndarray:
+def compute_pair_columns(
+    inputs: Inputs, pair: tuple[int, int], moved: np.ndarray
+) -> np.ndarray:
     """What products of the first waves of two joints' angles, and the second of each,
     do as deviations of joints: (M, 3, D)."""
     angles = inputs.joint_angles[:, pair]

@@ -5,7 +5,12 @@ import pandas as pd
 import pytest
 
 from elastocal.random_streams import open_stream
-from elastocal_proof.audit.audited import compare, numbers, require, require_each_once
+from elastocal_proof.audit.finished_run import (
+    compare,
+    open_philox_stream,
+    require,
+    require_each_once,
+)
 
 
 @pytest.mark.parametrize(
@@ -13,7 +18,7 @@ from elastocal_proof.audit.audited import compare, numbers, require, require_eac
     [(1, "kuka", "identification/force", 0), (7, "fanuc", "noise/6DoF/again", 999)],
 )
 def test_numbers_are_those_of_the_pipeline(name):
-    assert (numbers(*name).random(5) == open_stream(*name).random(5)).all()
+    assert (open_philox_stream(*name).random(5) == open_stream(*name).random(5)).all()
 
 
 def test_a_sample_is_drawn_by_the_name_of_the_file(run):

@@ -7,15 +7,15 @@ from elastocal.io.origin import describe_provenance as written_by
 from elastocal.io.records import list_recorded_files
 from elastocal.io.storage import write_table
 from elastocal.study.simulation import INITIAL
-from elastocal_proof.audit.audited import Audited, Finding
-from elastocal_proof.audit.whole import (
+from elastocal_proof.audit.audit_run import (
     CHECKS,
-    as_table,
-    audit,
-    intact,
-    page_of,
-    provenance,
+    audit_run,
+    check_checksum,
+    check_provenance,
+    render_page,
+    tabulate_findings,
 )
+from elastocal_proof.audit.finished_run import Finding, FinishedRun
 
 FILE = "results/initial/two.parquet"
 
@@ -23,7 +23,7 @@ FILE = "results/initial/two.parquet"
 @pytest.fixture
 def folder(tmp_path):
     (tmp_path / "results/initial").mkdir(parents=True)
-    return Audited(tmp_path, CONFIGURATION, {"two": ROBOT}, {}, 4)
+    return FinishedRun(tmp_path, CONFIGURATION, {"two": ROBOT}, {}, 4)
 
 
 def write(folder, seed=1, robot="two"):
@@ -42,7 +42,7 @@ def write(folder, seed=1, robot="two"):
 
 def test_a_file_as_it_was_written_holds(folder):
     write(folder)
-    found = audit(folder)
+    found = audit_run(folder)
     assert (
         failed(found) == []
         and len(found) == 5
@@ -59,24 +59,24 @@ def test_a_file_as_it_was_written_holds(folder):
 )
 def test_a_file_of_another_run_or_robot_is_found(folder, change, checked):
     write(folder, **change)
-    assert failed(provenance(folder, FILE)) == [checked]
+    assert failed(check_provenance(folder, FILE)) == [checked]
 
 
 def test_an_altered_a_missing_and_an_unreadable_file_are_found_and_an_empty_folder_is_no_finished_run(
     folder,
 ):
-    assert [finding.holds for finding in audit(folder)] == [False]
+    assert [finding.holds for finding in audit_run(folder)] == [False]
     write(folder)
     digest = list_recorded_files(folder.folder)[FILE]
     with open(folder.folder / FILE, "ab") as file:
         file.write(b"x")
-    assert not intact(folder, FILE, digest).holds
+    assert not check_checksum(folder, FILE, digest).holds
     (folder.folder / FILE).unlink()
-    assert intact(folder, FILE, digest).note == "it is missing"
+    assert check_checksum(folder, FILE, digest).note == "it is missing"
     # One that cannot be read is a finding and no traceback.
     (folder.folder / FILE).write_bytes(b"no table")
     forge(folder.folder, FILE)
-    found = audit(folder)
+    found = audit_run(folder)
     assert [finding.holds for finding in found] == [
         True,
         False,
@@ -108,7 +108,7 @@ BYTES = Finding(
 
 
 def test_the_page_says_first_whether_all_holds_and_what_was_not_worked_out_again():
-    again, apart = page_of(as_table([GOOD, BYTES]), {"seed": "1"}).split(
+    again, apart = render_page(tabulate_findings([GOOD, BYTES]), {"seed": "1"}).split(
         "What was not worked out again"
     )
     assert "All 2 checks hold." in again and "What does not hold" not in again
@@ -119,7 +119,7 @@ def test_the_page_says_first_whether_all_holds_and_what_was_not_worked_out_again
     assert "reports/figures/*.pdf" in apart and "reports/figures/*.pdf" not in again
     assert all(check.__doc__ for _, check in CHECKS)
     # What does not hold is shown, and nothing of it is run.
-    text = page_of(as_table([GOOD, BAD]), {})
+    text = render_page(tabulate_findings([GOOD, BAD]), {})
     assert (
         "1 of 2 checks do not hold." in text
         and "column &lt;dev&gt;" in text

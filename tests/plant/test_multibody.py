@@ -11,14 +11,19 @@ from arms_at_rest import angles_and_wrenches, arm_of, at_rest, forces_at
 from support import OTHER_CHAINS, robot_of
 
 from elastocal.errors import InputError
-from elastocal.mechanics.elastostatics import generalized_forces as joint_torques
-from elastocal.mechanics.kinematics import pose_differences, poses_and_jacobians
+from elastocal.mechanics.elastostatics import (
+    compute_generalized_forces as joint_torques,
+)
+from elastocal.mechanics.kinematics import (
+    compute_pose_differences,
+    compute_poses_and_jacobians,
+)
 from elastocal_proof.plant.arm import LinkMass
-from elastocal_proof.plant.machine import (
+from elastocal_proof.plant.multibody import (
     Structure,
     TaperedTube,
-    equilibrium,
-    machine_of,
+    build_model,
+    solve_equilibrium,
 )
 
 # One joint about y, its link forwards along x, and a measuring point at its end.
@@ -53,13 +58,14 @@ def test_chains_of_three_to_seven_joints_that_turn_backwards_are_read_and_bend_a
     machine, bent = at_rest(arm, angles, wrench)
     _, position, rotation = forces_at(machine, angles)
     seen = [
-        poses_and_jacobians(robot.chain, angles, point) for point in robot.chain.points
+        compute_poses_and_jacobians(robot.chain, angles, point)
+        for point in robot.chain.points
     ]
     turn = robot.compliance * joint_torques(seen[-1][2], wrench)
     for p, (place, facing, jacobian) in enumerate(seen):
         np.testing.assert_allclose(position[:, p], place, atol=1e-12)
         np.testing.assert_allclose(rotation[:, p], facing, atol=1e-12)
-        found = pose_differences(
+        found = compute_pose_differences(
             bent[2][:, p], bent[3][:, p], position[:, p], rotation[:, p]
         )
         np.testing.assert_allclose(
@@ -79,7 +85,7 @@ def test_weight_turns_the_joints_as_pinocchio_says(arm):
     gravity = (3.0, -2.0, -9.0)
     angles, _ = angles_and_wrenches(arm)
     found = forces_at(
-        machine_of(arm, Structure(masses=masses, payload=load, gravity_m_s2=gravity)),
+        build_model(arm, Structure(masses=masses, payload=load, gravity_m_s2=gravity)),
         angles,
     )[0]
     model = pin.Model()
@@ -147,8 +153,8 @@ def test_an_arm_that_finds_no_rest_is_an_error():
     with pytest.raises(
         RuntimeError, match=r"^no equilibrium after 60 sweeps: the last moved by 0\.02$"
     ):
-        equilibrium(
-            machine_of(LEVER, Structure()),
+        solve_equilibrium(
+            build_model(LEVER, Structure()),
             *loading,
             lambda torque, _: 0 * torque + next(signs),
         )
@@ -156,9 +162,11 @@ def test_an_arm_that_finds_no_rest_is_an_error():
 
 def test_a_point_inside_a_link_of_wrong_length_keeps_its_place_and_none_may_be_inside_an_elastic_one():
     arm = arm_of("Rz(q1) Tx(0.4) [inner] Tx(0.6) Ry(q2) Tx(0.5) [B]")
-    machine = machine_of(arm, Structure(wrong={1: ((0.0, 0.02, 0.0), (0.0, 0.0, 0.1))}))
+    machine = build_model(
+        arm, Structure(wrong={1: ((0.0, 0.02, 0.0), (0.0, 0.0, 0.1))})
+    )
     np.testing.assert_allclose(
         forces_at(machine, np.zeros((1, 2)))[1][0, 0], [0.4, 0.0, 0.0], atol=1e-14
     )
     with pytest.raises(InputError, match="inner"):
-        machine_of(arm, Structure(tubes={1: TaperedTube(1e6, 1e6)}))
+        build_model(arm, Structure(tubes={1: TaperedTube(1e6, 1e6)}))

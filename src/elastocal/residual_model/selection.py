@@ -26,8 +26,8 @@ from elastocal.fitting.least_squares import fit_placement
 from elastocal.fitting.linearization import compute_effect_sensitivities
 from elastocal.fitting.model import evaluate_conditions, locate_targets
 from elastocal.fitting.observations import index_poses, sample_observations
-from elastocal.mechanics.kinematics import position_jacobians
-from elastocal.remainder.regressions import Inputs, Predictor, list_regressions
+from elastocal.mechanics.kinematics import compute_position_jacobians
+from elastocal.residual_model.regressions import Inputs, Predictor, list_regressions
 from elastocal.validation.held_out import (
     PositionErrors,
     compute_error_intervals,
@@ -53,14 +53,14 @@ if TYPE_CHECKING:
 CONFIDENCE = 0.95
 # Half width of the interval that holds 95 % of a normal distribution, in standard
 # deviations.
-NORMAL_WIDTH = 1.959964
+NORMAL_QUANTILE = 1.959964
 # How often a regression is chosen where nothing is left. A few configurations leave the
 # outer folds' fits so unlike the final one that they must be surer; of fewer yet, a
 # fold of a fold leaves nothing to regress.
 _LEVEL = 0.05
 _LEVEL_OF_FEW = 0.01
 _FEW = 40
-FEWEST_CONFIGURATIONS = 10
+MIN_CONFIGURATIONS = 10
 # A regression is chosen by so many observations at most; the quantile that scales its
 # intervals they fix to two per cent. It is fitted to so many: of a million a process
 # takes eight minutes, and its 2,000 values have been determined by far fewer.
@@ -74,12 +74,12 @@ _REPLICATES = 1000
 _BESIDE = 0.05
 # A usual size of an effect is as easily taken back as so much of a joint is added.
 _RAD_OF_A_SIZE = 1e-3
-# What no command states, as `effects.conditions.offered` names it.
+# What no command states, as `effects.conditions.find_offered_needs` names it.
 _NOT_STATED = {"approach", "time", "temperature"}
 
 
 @dataclass(frozen=True)
-class Corrected:
+class CorrectedResiduals:
     """What a model and a regression leave of poses that they have not seen; arrays of
     M.
 
@@ -96,7 +96,7 @@ class Corrected:
     predictor: Predictor | None
 
 
-def corrected(
+def validate_residual_model(
     fitted: Fit,
     case: Case,
     held_out: Case,
@@ -105,7 +105,7 @@ def corrected(
     blocks: bool,
     within_range: bool,
     seed: int,
-) -> Corrected:
+) -> CorrectedResiduals:
     """Predict held-out poses by a model and a regression on what it leaves of the
     training poses.
 
@@ -128,17 +128,17 @@ def corrected(
     ]
     every = case.observations
     some = sample_observations(case.observations, _MOST_TO_CHOOSE)
-    inputs = inputs_of(fitted.model, fitted.estimate, some)
+    inputs = build_inputs(fitted.model, fitted.estimate, some)
     chosen = _chosen(fitted, some, inputs, names, blocks, seed)
-    outside = beyond_regressed(
+    outside = find_beyond_regression(
         every.states, there.states.joint_angles, there.states.wrench
     )[there.state]
     mean = np.zeros((len(there), 3))
     std = None
     predictor = None
     if chosen["regression"]:
-        predictor = predictor_of(chosen, fitted.model, fitted.estimate, every)
-        asked = inputs_of(
+        predictor = fit_to_observations(chosen, fitted.model, fitted.estimate, every)
+        asked = build_inputs(
             model, estimate, there, list_regressions()[chosen["regression"]].by_jacobian
         )
         mean = np.where(outside[:, None] & within_range, 0.0, predictor.mean(asked))
@@ -151,7 +151,7 @@ def corrected(
         )
         known = replace(fitted, model=model, estimate=estimate)
         estimate = fit_placement(known, model, replace(there, position=moved))
-    return Corrected(
+    return CorrectedResiduals(
         compute_position_residuals(model, estimate, there) - mean,
         std,
         outside,
@@ -166,7 +166,7 @@ def is_commanded(effect: Candidate) -> bool:
     return moves_robot(effect) and effect.needs.isdisjoint(_NOT_STATED)
 
 
-def beyond_regressed(
+def find_beyond_regression(
     fitted: States, joint_angles: np.ndarray, wrench: np.ndarray | None
 ) -> np.ndarray:
     """Where no regression is added, ndarray of bool (N,): beyond the loads that were
@@ -210,10 +210,12 @@ def _chosen(
         ]
     )
     whole = compute_position_residuals(model, fitted.estimate, observations)
-    return tuned(names, inputs, configuration[each], fold[each], whole, without, seed)
+    return choose_regression(
+        names, inputs, configuration[each], fold[each], whole, without, seed
+    )
 
 
-def predictor_of(
+def fit_to_observations(
     chosen: Mapping[str, Any],
     model: Model,
     estimate: Estimate,
@@ -224,7 +226,7 @@ def predictor_of(
     by_jacobian = list_regressions()[chosen["regression"]].by_jacobian
     return fitted_again(
         chosen,
-        inputs_of(model, estimate, some, by_jacobian),
+        build_inputs(model, estimate, some, by_jacobian),
         compute_position_residuals(model, estimate, some),
     )
 
@@ -251,7 +253,7 @@ def fitted_again(
     )
 
 
-def geometric_inputs_of(
+def build_geometric_inputs(
     model: Model,
     estimate: Estimate,
     observations: Observations,
@@ -271,13 +273,13 @@ def geometric_inputs_of(
     jacobian = np.empty((len(observations), 3, 0))
     if by_jacobian:
         coordinates = chain.at(states.joint_angles)[seen]
-        jacobian = position_jacobians(
+        jacobian = compute_position_jacobians(
             chain, coordinates, locate_targets(model, estimate), observations.target
         )
     return Inputs(states.joint_angles[seen], others, jacobian)
 
 
-def inputs_of(
+def build_inputs(
     model: Model,
     estimate: Estimate,
     observations: Observations,
@@ -290,7 +292,7 @@ def inputs_of(
     its part of an error that no effect is, and a regression that cannot give it back
     has the rest of the error and the effect to make up for.
     """
-    inputs = geometric_inputs_of(model, estimate, observations, by_jacobian)
+    inputs = build_geometric_inputs(model, estimate, observations, by_jacobian)
     every = zip(model.effects, estimate.shapes, strict=True)
     found = [
         (effect, shapes)
@@ -310,8 +312,8 @@ def inputs_of(
     return replace(inputs, jacobian=np.concatenate([inputs.jacobian, columns], axis=2))
 
 
-def remainder_facts(
-    found: Corrected,
+def summarize_residual_model(
+    found: CorrectedResiduals,
     declared: Fit,
     final: Fit,
     case: Case,
@@ -344,7 +346,7 @@ def remainder_facts(
     ]
     covered = half_width = None
     if found.std is not None:
-        width = NORMAL_WIDTH * found.std
+        width = NORMAL_QUANTILE * found.std
         covered = float((np.abs(found.residual) < width).mean())
         each = {"within": width[~found.outside], "outside": width[found.outside]}
         half_width = {
@@ -365,7 +367,7 @@ def remainder_facts(
     }
 
 
-def tuned(
+def choose_regression(
     names: Sequence[str],
     inputs: Inputs,
     group: np.ndarray,
@@ -393,7 +395,7 @@ def tuned(
         "spread": None,
         "left_out": None,
     }
-    if (count := int(group.max()) + 1) < FEWEST_CONFIGURATIONS:
+    if (count := int(group.max()) + 1) < MIN_CONFIGURATIONS:
         return facts
     pairs = [
         (name, setting)
@@ -441,14 +443,14 @@ def tuned(
     along, square = (
         np.bincount(group, (rows * predicted).sum(axis=1)) for rows in (off, predicted)
     )
-    gain = gain_of(along, square, len(off), len(mine))
+    gain = estimate_gain(along, square, len(off), len(mine))
     level = _LEVEL if count >= _FEW else _LEVEL_OF_FEW
     facts["left_out"] = gain | {"level": level}
     best = _best(products.sum(axis=(0, 1)))
     if gain["p_value"] > level or best is None:
         return facts
     name, setting = pairs[best]
-    spread = spread_of(np.abs(off - gain["factor"] * predicted), std)
+    spread = calibrate_intervals(np.abs(off - gain["factor"] * predicted), std)
     return facts | {
         "regression": name,
         "words": list_regressions()[name].words,
@@ -457,7 +459,7 @@ def tuned(
     }
 
 
-def gain_of(
+def estimate_gain(
     along: np.ndarray, square: np.ndarray, rows: int, folds: int
 ) -> dict[str, float]:
     """What predictions gain on configurations that they were made without.
@@ -524,7 +526,7 @@ def _best(products: np.ndarray) -> int | None:
     return best if gains[best] > 0.0 else None
 
 
-def spread_of(errors: np.ndarray, std: np.ndarray) -> dict[str, float | None]:
+def calibrate_intervals(errors: np.ndarray, std: np.ndarray) -> dict[str, float | None]:
     """How large standard deviations must be for intervals to hold `CONFIDENCE` of the
     errors of poses left out.
 
@@ -552,7 +554,7 @@ def spread_of(errors: np.ndarray, std: np.ndarray) -> dict[str, float | None]:
                     method="higher",
                 )
             )
-            / NORMAL_WIDTH
+            / NORMAL_QUANTILE
         )
 
     own = np.isfinite(std)

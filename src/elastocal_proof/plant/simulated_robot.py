@@ -11,13 +11,13 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from elastocal_proof.plant.arm import Arm, true_masses, turned
-from elastocal_proof.plant.machine import (
+from elastocal_proof.plant.arm import Arm, draw_true_masses, to_rotation_matrix
+from elastocal_proof.plant.multibody import (
     Equilibrium,
-    Machine,
+    MultibodyModel,
     Structure,
-    equilibrium,
-    machine_of,
+    build_model,
+    solve_equilibrium,
 )
 
 _REFERENCE_C = 20.0
@@ -33,7 +33,7 @@ _SETTLED_N = 1e-9
 _SPREAD = 0.15
 
 
-def stream(seed: int, purpose: str) -> np.random.Generator:
+def open_simulation_stream(seed: int, purpose: str) -> np.random.Generator:
     """Random numbers for one purpose: numpy Generator that depends on the two alone."""
     digest = hashlib.sha256(f"plant/{seed}/{purpose}".encode()).digest()
     return np.random.Generator(np.random.PCG64(int.from_bytes(digest[:16], "little")))
@@ -114,7 +114,7 @@ class Tracker:
         ):
             if motion is not None:
                 course = motion.course(time_s)[:, None]
-                turn = turned(course * np.array(motion.turn_rad))
+                turn = to_rotation_matrix(course * np.array(motion.turn_rad))
                 position = (
                     np.einsum("sij,stj->sti", turn, position - about)
                     + about
@@ -135,7 +135,7 @@ class Tracker:
             chance.random(position.shape[:2]) < self.outliers, self.outlier_sigmas, 1.0
         )[..., None]
         position = position + large * sigma * metres.standard_normal(position.shape)
-        return position, turned(
+        return position, to_rotation_matrix(
             large * self.sigma_rad * radians.standard_normal(position.shape)
         ) @ rotation
 
@@ -145,12 +145,12 @@ class Tracker:
             position - np.array(self.stand_m), axis=-1
         )
 
-    def in_own_frame(
+    def to_tracker_frame(
         self, position: np.ndarray, rotation: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Poses of the base frame, positions (..., 3) in m and rotations (..., 3, 3),
         in the tracker's."""
-        own = turned(self.frame_turn)
+        own = to_rotation_matrix(self.frame_turn)
         return (position - np.array(self.stand_m)) @ own, own.T @ rotation
 
 
@@ -182,7 +182,7 @@ class LoadCell:
         """Force on the display for the force that is felt, both (S, 3), N, base
         axes."""
         turn, bias = (self._in_base(name, flange_rotation) for name in ("turn", "bias"))
-        askew = np.einsum("sji,sj->si", turned(turn), felt)
+        askew = np.einsum("sji,sj->si", to_rotation_matrix(turn), felt)
         crossed = (
             self.crosstalk_per_N * np.roll(felt, -1, axis=1) * np.roll(felt, -2, axis=1)
         )
@@ -246,12 +246,12 @@ class Schedule:
     seed: int
 
 
-def logged_temperature(time_s: np.ndarray) -> np.ndarray:
+def compute_logged_temperature(time_s: np.ndarray) -> np.ndarray:
     """Of the thermometer at times (S,), °C."""
     return _REFERENCE_C - _RISE_K * np.expm1(-time_s / _MOTOR_S)
 
 
-def warmth_of_castings(time_s: np.ndarray) -> np.ndarray:
+def compute_casting_warming(time_s: np.ndarray) -> np.ndarray:
     """By how much the links are warmer than 20 °C at times (S,), K."""
     rest = (
         _MOTOR_S * np.exp(-time_s / _MOTOR_S) - _LAG_S * np.exp(-time_s / _LAG_S)
@@ -260,7 +260,7 @@ def warmth_of_castings(time_s: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class PhysicalRobot:
+class SimulatedRobot:
     """All that is true of a robot and its instruments; the default is faultless.
 
     `compliance` (n,): the gears' own, rad/(N m). Laws of what was done, each of a joint
@@ -289,55 +289,55 @@ class PhysicalRobot:
     pose_rad: tuple[float, ...] = ()
 
 
-def specimen(
+def draw_specimen(
     arm: Arm, seed: int, weighs: bool = True, off_line_m: float = 0.0
-) -> PhysicalRobot:
+) -> SimulatedRobot:
     """One faultless robot of a series: other gears than the robot file says, and other
     weights, or none that it feels.
 
     `off_line_m`: by how much centres of mass lie off the lines of their links at most,
     across each, beyond what is declared.
     """
-    compliance = arm.compliance * stream(seed, "specimen").uniform(
+    compliance = arm.compliance * open_simulation_stream(seed, "specimen").uniform(
         1.0 - _SPREAD, 1.0 + _SPREAD, arm.joints
     )
     masses = (
-        true_masses(
+        draw_true_masses(
             arm,
-            stream(seed, "weights"),
+            open_simulation_stream(seed, "weights"),
             off_line_m,
-            stream(seed, "centres off the line"),
+            open_simulation_stream(seed, "centres off the line"),
         )
         if weighs
         else ()
     )
-    return PhysicalRobot(
+    return SimulatedRobot(
         arm, compliance, Structure(masses=masses, gravity_m_s2=arm.gravity_m_s2)
     )
 
 
-def seen_poses(
-    robot: PhysicalRobot, schedule: Schedule, start: np.ndarray | None = None
+def simulate_poses(
+    robot: SimulatedRobot, schedule: Schedule, start: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Poses of all targets (S, targets, 3), (S, targets, 3, 3) as a tracker without
     noise reads them, base frame, m.
 
     `start` (S, n): deflections of the gears of a robot that differs little; saves time.
     """
-    _, _, position, rotation = at_rest(robot, schedule, start)[1]
+    _, _, position, rotation = simulate_equilibrium(robot, schedule, start)[1]
     return robot.tracker.seen(
         position, rotation, schedule.time_s, schedule.angle[:, -1]
     )
 
 
-def at_rest(
-    robot: PhysicalRobot, schedule: Schedule, start: np.ndarray | None = None
-) -> tuple[Machine, Equilibrium]:
-    """The arm, and its equilibrium as of `machine.equilibrium`; arguments as of
+def simulate_equilibrium(
+    robot: SimulatedRobot, schedule: Schedule, start: np.ndarray | None = None
+) -> tuple[MultibodyModel, Equilibrium]:
+    """The arm, and its equilibrium as of `machine.solve_equilibrium`; arguments as of
     `seen_poses`."""
-    machine = machine_of(robot.arm, robot.structure)
+    machine = build_model(robot.arm, robot.structure)
     felt = partial(robot.cell.felt, schedule.force, schedule.lever)
-    growth = warmth_of_castings(schedule.time_s)[:, None] * np.linspace(
+    growth = compute_casting_warming(schedule.time_s)[:, None] * np.linspace(
         *robot.expansion_per_K, robot.arm.joints + 1
     )
 
@@ -348,12 +348,18 @@ def at_rest(
         return turn
 
     springs = [(name, partial(law, schedule)) for name, law in robot.springs]
-    return machine, equilibrium(
-        machine, driven(robot, schedule), felt, growth, gear_deflection, springs, start
+    return machine, solve_equilibrium(
+        machine,
+        compute_drive_angles(robot, schedule),
+        felt,
+        growth,
+        gear_deflection,
+        springs,
+        start,
     )
 
 
-def driven(robot: PhysicalRobot, schedule: Schedule) -> np.ndarray:
+def compute_drive_angles(robot: SimulatedRobot, schedule: Schedule) -> np.ndarray:
     """Where the drives really stand (S, n), rad."""
     drive = schedule.angle.copy()
     for joint, law in robot.drives:

@@ -13,17 +13,17 @@ from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.model import evaluate_conditions, locate_targets, predict
 from elastocal.fitting.noise import Noise
-from elastocal.mechanics.kinematics import poses
-from elastocal.remainder.corrected import (
-    corrected,
+from elastocal.mechanics.kinematics import compute_poses
+from elastocal.residual_model.regressions import REGRESSIONS, Predictor, Regression
+from elastocal.residual_model.selection import (
+    build_inputs,
+    calibrate_intervals,
+    choose_regression,
+    estimate_gain,
     fitted_again,
-    gain_of,
-    inputs_of,
-    remainder_facts,
-    spread_of,
-    tuned,
+    summarize_residual_model,
+    validate_residual_model,
 )
-from elastocal.remainder.regressions import REGRESSIONS, Predictor, Regression
 from elastocal.validation.held_out import compute_position_errors
 from elastocal.validation.transfer import transfer_fit
 
@@ -89,7 +89,7 @@ def test_beyond_joints_or_loads_that_were_fitted_nothing_is_corrected_where_that
     beyond = replace(held_out, observations=moved)
     mine = np.isin(moved.state, first)
     plain, careful = (
-        corrected(fitted, case, beyond, **PLAN | {"within_range": each})
+        validate_residual_model(fitted, case, beyond, **PLAN | {"within_range": each})
         for each in (False, True)
     )
     assert careful.outside[mine].all() and not careful.outside.all()
@@ -120,9 +120,9 @@ def test_another_campaign_has_its_frame_fitted_to_what_both_leave(
     other = replace(
         other, observations=moved, campaign=replace(other.campaign, name="elsewhere")
     )
-    assert rms(corrected(fitted, case, other, **PLAN).residual) < 0.25 * rms(
-        alone(case, other, fitted)[:, None]
-    )
+    assert rms(
+        validate_residual_model(fitted, case, other, **PLAN).residual
+    ) < 0.25 * rms(alone(case, other, fitted)[:, None])
 
 
 @pytest.mark.parametrize(
@@ -137,7 +137,7 @@ def test_regressions_are_tuned_on_the_training_poses_alone(made, blocks, regress
     )
     cases = (held_out, replace(held_out, observations=nonsense))
     one, other = (
-        corrected(
+        validate_residual_model(
             fitted, case, each, **PLAN | {"blocks": blocks, "regression": regression}
         )
         for each in cases
@@ -150,7 +150,7 @@ def test_the_jacobian_is_that_of_each_target_and_its_place_is_shown_but_neither_
     seen,
 ):
     model, estimate, observations = seen
-    inputs = inputs_of(model, estimate, observations)
+    inputs = build_inputs(model, estimate, observations)
     for number, point in enumerate(locate_targets(model, estimate)):
         mask = observations.target == number
         coordinates = np.zeros((2, mask.sum(), model.sites.chain.coordinates))
@@ -159,7 +159,7 @@ def test_the_jacobian_is_that_of_each_target_and_its_place_is_shown_but_neither_
         ]
         coordinates[..., 2] += np.array([[-1e-6], [1e-6]])
         before, after = (
-            poses(model.sites.chain, each, point)[0] for each in coordinates
+            compute_poses(model.sites.chain, each, point)[0] for each in coordinates
         )
         np.testing.assert_allclose(
             inputs.jacobian[mask, :, 2], (after - before) / 2e-6, atol=1e-8
@@ -169,7 +169,7 @@ def test_the_jacobian_is_that_of_each_target_and_its_place_is_shown_but_neither_
             np.tile(estimate.target_offset[number], (mask.sum(), 1)),
         )
     np.testing.assert_array_equal(
-        inputs_of(model, estimate, timed(observations)).columns, inputs.columns
+        build_inputs(model, estimate, timed(observations)).columns, inputs.columns
     )
 
 
@@ -207,7 +207,7 @@ def test_what_effects_of_the_model_do_may_be_taken_back_but_for_what_tasks_know_
                 for each in two
             ]
             slopes.append(1e3 * (ends[1] - ends[0]))
-    beside = inputs_of(model, estimate, observations).jacobian[
+    beside = build_inputs(model, estimate, observations).jacobian[
         :, :, plain.sites.chain.coordinates :
     ]
     np.testing.assert_allclose(
@@ -222,17 +222,21 @@ def test_what_is_written_of_a_regression_says_what_it_gains_and_brings_it_back(
     made, regression
 ):
     case, held_out, fitted = made
-    found = corrected(fitted, case, held_out, **PLAN | {"regression": regression})
+    found = validate_residual_model(
+        fitted, case, held_out, **PLAN | {"regression": regression}
+    )
     draws = np.random.default_rng(1)
     facts = json.loads(
-        json.dumps(remainder_facts(found, fitted, fitted, case, held_out, draws))
+        json.dumps(
+            summarize_residual_model(found, fitted, fitted, case, held_out, draws)
+        )
     )
     back = fitted_again(
         facts,
-        inputs_of(fitted.model, fitted.estimate, case.observations),
+        build_inputs(fitted.model, fitted.estimate, case.observations),
         fitted.residual[:, :3],
     )
-    there = inputs_of(fitted.model, fitted.estimate, held_out.observations)
+    there = build_inputs(fitted.model, fitted.estimate, held_out.observations)
     before = alone(case, held_out, fitted)
     np.testing.assert_allclose(back.mean(there), found.predictor.mean(there), atol=1e-9)
     np.testing.assert_allclose(back.std(there), found.std, rtol=1e-6)
@@ -261,7 +265,7 @@ def chosen_of(names, inputs, residual, count=5):
     """Every observation a configuration of its own, and a model that none of them
     moves."""
     number = np.arange(len(inputs))
-    return tuned(
+    return choose_regression(
         names, inputs, number, number % count, residual, np.stack([residual] * count), 1
     )
 
@@ -339,7 +343,7 @@ def test_a_gain_is_shrunk_and_its_test_allows_for_folds_that_share_their_poses()
     draws = np.random.default_rng(1)
     truth, noise = draws.normal(size=(2, 400, 3))
     predicted = 2.0 * truth
-    gain = gain_of(
+    gain = estimate_gain(
         ((truth + noise) * predicted).sum(axis=1), (predicted**2).sum(axis=1), 400, 5
     )
     assert 0.45 < gain["factor"] < 0.55
@@ -349,7 +353,7 @@ def test_a_gain_is_shrunk_and_its_test_allows_for_folds_that_share_their_poses()
     )
     t = falls.sum(axis=1).mean() / falls.sum(axis=1).std(ddof=1) * np.sqrt(400)
     assert gain["statistic"] == pytest.approx(t / np.sqrt(1 + 5 / 4), rel=1e-9)
-    assert gain_of(-np.ones(20), np.ones(20), 20, 5)["p_value"] == 1.0
+    assert estimate_gain(-np.ones(20), np.ones(20), 20, 5)["p_value"] == 1.0
 
 
 @pytest.mark.parametrize("factor", [0.1, 30.0])
@@ -369,7 +373,7 @@ def test_intervals_hold_95_percent_and_keep_their_shape(factor, monkeypatch):
     monkeypatch.setitem(REGRESSIONS, "boasting", Regression("", fitted))
     (inputs, _), (there, _) = made_inputs(600, seed=1), made_inputs(2000, seed=3)
     off = np.random.default_rng(2).normal(size=(600, 3)) * spread(inputs)
-    found = spread_of(np.abs(off), factor * spread(inputs))
+    found = calibrate_intervals(np.abs(off), factor * spread(inputs))
     assert found["typical"] == pytest.approx(
         np.sqrt((off**2).mean()) / found["otherwise_m"]
     )

@@ -22,7 +22,7 @@ from scipy.constants import g as standard_gravity
 from scipy.spatial.transform import Rotation
 
 from elastocal.errors import InputError
-from elastocal_proof.plant.arm import Arm, LinkMass, Stretch, turned
+from elastocal_proof.plant.arm import Arm, Link, LinkMass, to_rotation_matrix
 
 # MuJoCo wants mass in each moving body; this weighs nothing beside a load of newtons.
 _NOTHING = {
@@ -88,7 +88,7 @@ class Structure:
 
 
 @dataclass(frozen=True)
-class Machine:
+class MultibodyModel:
     """A compiled model and where in it what is.
 
     `drive`, `gear` (n,) of int: coordinates that are commanded, and those that spring
@@ -231,12 +231,12 @@ class _Tree:
             quat=Rotation.from_matrix(rotation).as_quat(scalar_first=True),
         )
 
-    def walk(self, number: int, stretch: Stretch, elsewhere: str) -> None:
+    def walk(self, number: int, stretch: Link, elsewhere: str) -> None:
         """From the near to the far end of a stretch; one measuring point may be put
         elsewhere."""
         shift, turn = self.structure.wrong.get(number, (_NOWHERE, _NOWHERE))
         vector = stretch.vector_m + np.array(shift)
-        turn = turned(turn)
+        turn = to_rotation_matrix(turn)
         tube = self.structure.tubes.get(number)
         masses = [
             _placed(mass, stretch.vector_m)
@@ -337,7 +337,7 @@ def _six_springs(name: str, compliances: Iterable[float]) -> list[_Joint]:
     ]
 
 
-def machine_of(arm: Arm, structure: Structure) -> Machine:
+def build_model(arm: Arm, structure: Structure) -> MultibodyModel:
     """Build the model of an arm."""
     tree = _Tree(structure)
     tree.descend("foot", _six_springs("base", structure.base))
@@ -397,7 +397,7 @@ def machine_of(arm: Arm, structure: Structure) -> Machine:
         int,
     )
     within = behind_drive.cumsum()
-    return Machine(
+    return MultibodyModel(
         model,
         drive,
         gear,
@@ -415,8 +415,8 @@ def machine_of(arm: Arm, structure: Structure) -> Machine:
 Equilibrium = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
-def equilibrium(
-    machine: Machine,
+def solve_equilibrium(
+    machine: MultibodyModel,
     drive: np.ndarray,
     felt: Callable[[np.ndarray], np.ndarray],
     growth: np.ndarray,
@@ -475,13 +475,13 @@ def equilibrium(
     )
 
 
-def usual_gravity_torque(
+def compute_typical_gravity_torque(
     arm: Arm, masses: Iterable[LinkMass], gravity_m_s2: tuple[float, ...]
 ) -> np.ndarray:
     """Root mean square torque of the links' weight on each drive over the arm's range
     of angles, (n,), N m."""
     low, high = arm.limits.T
-    machine = machine_of(
+    machine = build_model(
         arm, Structure(masses=tuple(masses), gravity_m_s2=gravity_m_s2)
     )
     coordinates = np.zeros((_POSES, machine.model.nq))
@@ -495,7 +495,7 @@ def usual_gravity_torque(
     return np.sqrt((torque**2).mean(axis=0))
 
 
-def each_link(arm: Arm) -> list[tuple[int, ...]]:
+def list_flexible_links(arm: Arm) -> list[tuple[int, ...]]:
     """Links, each by the joint before it, from 1, that are long enough to bend."""
     return [
         (link,)
@@ -504,19 +504,21 @@ def each_link(arm: Arm) -> list[tuple[int, ...]]:
     ]
 
 
-def weighing_links(arm: Arm) -> dict[tuple[int, ...], int | None]:
+def find_distinguishable_weights(arm: Arm) -> dict[tuple[int, ...], int | None]:
     """The upper arm, the forearm, and None for all links, by the joints, from 1, that
     they turn on an upright arm."""
 
     def turned_by(*masses: LinkMass) -> tuple[int, ...]:
-        torque = usual_gravity_torque(arm, masses, (0.0, 0.0, -standard_gravity))
+        torque = compute_typical_gravity_torque(
+            arm, masses, (0.0, 0.0, -standard_gravity)
+        )
         return tuple(
             int(joint) + 1
             for joint in np.flatnonzero(torque > _NO_TORQUE * torque.max())
         )
 
     found: dict[tuple[int, ...], int | None] = {}
-    for (link,) in each_link(arm):
+    for (link,) in list_flexible_links(arm):
         joints = turned_by(
             LinkMass(link, 1.0, tuple(0.5 * arm.stretches[link].vector_m))
         )

@@ -27,12 +27,15 @@ import numpy as np
 from elastocal.campaigns.holdout import SAME_POSE_RAD, number_configurations
 from elastocal.fitting.least_squares import INTERMEDIATE_TOLERANCE, fit_model
 from elastocal.fitting.observations import index_poses, sample_observations
-from elastocal.remainder.corrected import (
-    FEWEST_CONFIGURATIONS,
-    gain_of,
-    geometric_inputs_of,
+from elastocal.residual_model.regressions import (
+    compute_harmonic_columns,
+    compute_pair_columns,
 )
-from elastocal.remainder.regressions import by_harmonics, of_two
+from elastocal.residual_model.selection import (
+    MIN_CONFIGURATIONS,
+    build_geometric_inputs,
+    estimate_gain,
+)
 from elastocal.verdict import RepeatableResidual
 
 if TYPE_CHECKING:
@@ -40,7 +43,7 @@ if TYPE_CHECKING:
 
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.observations import Observations
-    from elastocal.remainder.regressions import Inputs
+    from elastocal.residual_model.regressions import Inputs
 
 # How often something repeatable is said to remain where only chance does.
 LEVEL = 0.01
@@ -59,7 +62,7 @@ _PENALTIES = (0.1, 1.0, 10.0)
 _LENGTH = 2.0
 
 
-def repeatable_part(
+def detect_repeatable_residual(
     fitted: Fit, observations: Observations, seed: int
 ) -> RepeatableResidual | None:
     """Test whether a fitted model leaves something that is a function of the joints.
@@ -82,10 +85,10 @@ def repeatable_part(
     ]
     count = int(group.max()) + 1
     draws = np.random.default_rng(seed)
-    if count < FEWEST_CONFIGURATIONS:
+    if count < MIN_CONFIGURATIONS:
         return None
     fold = draws.permutation(count) % _FOLDS
-    inputs = geometric_inputs_of(fitted.model, fitted.estimate, some)
+    inputs = build_geometric_inputs(fitted.model, fitted.estimate, some)
     kinds = _kinds(inputs, int(np.clip(count, _FEWEST, _MOST)), draws)
     sizes = [kind(inputs.select(slice(1))).shape[2] for kind in kinds]
     parameters = len(fitted.unidentifiable)
@@ -157,7 +160,7 @@ def repeatable_part(
         judged[np.argmax(scores[:, 0])],
     )
     p_value = float((best >= best[0]).mean())
-    gain = gain_of(of_residual, of_itself, len(some), _FOLDS)
+    gain = estimate_gain(of_residual, of_itself, len(some), _FOLDS)
     return RepeatableResidual(
         p_value, bool(p_value <= LEVEL), gain["rms_m"], gain["rms_std_error_m"]
     )
@@ -183,10 +186,10 @@ def _kinds(
         -(inputs.jacobian[:, :, :joints] ** 2).sum(axis=(0, 1)), kind="stable"
     )[:_MOVED]
     return [
-        lambda some: by_harmonics(some, max(1, most // (2 * joints))),
+        lambda some: compute_harmonic_columns(some, max(1, most // (2 * joints))),
         lambda some: axes * np.cos(some.joint_angles @ turns + phases)[:, None],
         *(
-            partial(of_two, pair=pair, moved=moved)
+            partial(compute_pair_columns, pair=pair, moved=moved)
             for pair in combinations(range(joints), 2)
         ),
     ]
