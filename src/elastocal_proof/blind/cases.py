@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from elastocal_proof.blind.folders import Experiment, write_blind_campaign, write_truth
-from elastocal_proof.plant.arm import Arm, LinkMass, arm_from_file
+from elastocal_proof.plant.arm import Arm, LinkMass, read_arm
 from elastocal_proof.plant.campaigns import (
     BLUNDER_KINDS,
     Blunder,
@@ -193,7 +193,7 @@ class BlindCase:
 
     def build_specimen(self, robots_folder: str | Path) -> PhysicalRobot:
         """Build the robot of the setting, without the effects of the case."""
-        arm = arm_from_file(self.robot_file(robots_folder))
+        arm = read_arm(self.robot_file(robots_folder))
         gravity_m_s2 = self.changes.get("gravity_m_s2", arm.gravity_m_s2)
         arm = replace(arm, gravity_m_s2=tuple(gravity_m_s2))
         robot = specimen(
@@ -409,7 +409,7 @@ def _draw_defects(
     if case.group == SEVERAL_JOINTS:
         count = draws.integers(min(_MIN_JOINTS, len(locations)), len(locations) + 1)
         indices = sorted(draws.choice(len(locations), count, replace=False).tolist())
-        plausible = kind.plausible_on(arm)
+        plausible = kind.scale_plausible_size(arm)
         return [
             Defect(
                 effect,
@@ -550,7 +550,7 @@ def _describe_sizes(
 
 def _divide_by_plausible(yardstick: Yardstick, defect: Defect) -> float:
     """Divide the size of a defect by the plausible size on this arm."""
-    return defect.size / KINDS[defect.effect].plausible_on(yardstick.robot.arm)
+    return defect.size / KINDS[defect.effect].scale_plausible_size(yardstick.robot.arm)
 
 
 def write_sealed_case(

@@ -43,8 +43,8 @@ from elastocal.fitting.observations import select_states
 from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import write_table
-from elastocal.loop.whole import calibrated_by, cases_in
-from elastocal.mechanics.kinematics import jacobians, pose_differences
+from elastocal.loop.whole import build_calibrated_robot, read_cases
+from elastocal.mechanics.kinematics import compute_jacobians, compute_pose_differences
 from elastocal.random_streams import open_stream
 from elastocal.validation.conformity import decide_conformity
 from elastocal_proof.blind import schemas
@@ -361,7 +361,7 @@ def _calibrate(robot: DiagnosedRobot, seed: int) -> CalibratedRobot:
     diagnosis = robot.diagnosis
     held_out = remove_gross_errors(diagnosis, robot.held_out)[1]
     delivered = apply_regression(diagnosis, held_out, seed)
-    return calibrated_by(diagnosis, held_out, delivered)
+    return build_calibrated_robot(diagnosis, held_out, delivered)
 
 
 def _fit_geometry(case: Case, diagnosis: Diagnosis) -> Fit:
@@ -397,14 +397,14 @@ def _correct_by_plant(robot: DiagnosedRobot, seed: int) -> _Commands:
     deterministic = replace(robot.plant, repeatability_rad=())
     angles = wanted.start.copy()
     inverse = np.linalg.pinv(
-        jacobians(
+        compute_jacobians(
             declared.chain, declared.model_angles(angles), declared.chain.end_effector
         )
     )
 
     def compute_pose_errors() -> np.ndarray:
         poses = move_robot(deterministic, angles, wanted.wrench, seed)
-        return pose_differences(wanted.position, wanted.rotation, *poses)
+        return compute_pose_differences(wanted.position, wanted.rotation, *poses)
 
     for _ in range(_STEPS):
         steps = (inverse @ compute_pose_errors()[..., None])[..., 0]

@@ -61,7 +61,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Case
     from elastocal_proof.blind.cases import Plan
-    from elastocal_proof.plant.sizing import Yardstick
+    from elastocal_proof.plant.sizing import NoncentralityModel
 
 LEVEL = 0.05
 # Drawn defects of each kind at each location: as many as the details of a defect have
@@ -331,7 +331,7 @@ def _simulate_noise_products(gram: np.ndarray, seed: int) -> np.ndarray:
 
 
 def draw_unit_signals(
-    yardstick: Yardstick, kinds: Iterable[str], seed: int
+    yardstick: NoncentralityModel, kinds: Iterable[str], seed: int
 ) -> tuple[tuple[str, ...], np.ndarray]:
     """Draw defects of each kind at each of its locations, and scale their signals after
     absorption to length one.
@@ -363,7 +363,7 @@ def draw_unit_signals(
             residuals = []
             for detail_seed in draws.integers(2**31, size=_DRAWS):
                 defect = Defect(kind, location, size, int(detail_seed))
-                signal, residual = yardstick.seen_and_left(
+                signal, residual = yardstick.project_change(
                     with_defects(robot, [defect])
                 )
                 signals.append(signal)
