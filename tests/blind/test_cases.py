@@ -16,7 +16,7 @@ from elastocal_proof.blind.cases import (
     OUTSIDE_EFFECTS,
     PROOF,
     BlindCase,
-    build_yardstick,
+    build_noncentrality_model,
     list_cases,
     size_defects,
     write_sealed_case,
@@ -61,7 +61,9 @@ def write_and_read(case, folder):
 
 
 def draw_sized_defects(case):
-    return size_defects(case, build_yardstick(case, case.build_specimen(ROBOTS)))
+    return size_defects(
+        case, build_noncentrality_model(case, case.build_specimen(ROBOTS))
+    )
 
 
 @pytest.fixture(scope="module")

@@ -29,8 +29,8 @@ def test_the_analysis_reads_the_angles_and_the_held_out_poses_of_the_schedule(
 ):
     design = Design(poses=8, held_out=2, repeated_poses=3, repeats=2)
     robot_file = ROBOTS / f"{name}.yaml"
-    robot = specimen(arm_from_file(robot_file), 1)
-    schedule = schedule_of(robot.arm, design, 2)
+    robot = draw_specimen(read_arm(robot_file), 1)
+    schedule = draw_schedule(robot.arm, design, 2)
     folder = tmp_path / "campaign"
     write_blind_campaign(
         folder, "campaign", robot_file, Experiment(robot, design, schedule)

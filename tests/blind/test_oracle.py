@@ -27,7 +27,7 @@ from elastocal_proof.blind.oracle import (
 @pytest.fixture
 def list_keys(kuka):
     """List the keys of the candidates of each variant of an effect at some joints."""
-    candidates = candidates_on(sites_of(kuka)).values()
+    candidates = candidates_on(build_sites(kuka)).values()
 
     def keys_of(variant):
         return [candidate.key for candidate in variant]
@@ -62,7 +62,7 @@ def test_the_oracle_fits_what_the_diagnosis_names_rightly(tmp_path):
     sealed = tmp_path / "sealed" / f"{case.name}.json"
     truth = json.loads(sealed.read_text(encoding="utf-8"))
     folder = (tmp_path / "blind" / case.name).as_posix()
-    verdict = diagnosed(folder, ROBOTS.as_posix(), 1)
+    verdict = diagnose_folder(folder, ROBOTS.as_posix(), 1)
     assert [effect["name"] for effect in verdict["effects"]] == ["joint_offset"]
     informed = fit_oracle(truth, verdict, folder, ROBOTS.as_posix(), 1)
     [joint] = truth["defects"][0]["joints"]

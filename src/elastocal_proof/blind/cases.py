@@ -191,12 +191,12 @@ class BlindCase:
         or compensated."""
         return arm.masses if self.weighs else ()
 
-    def build_specimen(self, robots_folder: str | Path) -> PhysicalRobot:
+    def build_specimen(self, robots_folder: str | Path) -> SimulatedRobot:
         """Build the robot of the setting, without the effects of the case."""
         arm = read_arm(self.robot_file(robots_folder))
         gravity_m_s2 = self.changes.get("gravity_m_s2", arm.gravity_m_s2)
         arm = replace(arm, gravity_m_s2=tuple(gravity_m_s2))
-        robot = specimen(
+        robot = draw_specimen(
             arm,
             self.seed,
             weighs=self.weighs,
@@ -204,7 +204,9 @@ class BlindCase:
         )
         # Repeatabilities differ from joint to joint; the common error of a pose is the
         # same for all joints.
-        factors = stream(self.seed, "repeatability").uniform(0.5, 1.5, arm.joints)
+        factors = open_simulation_stream(self.seed, "repeatability").uniform(
+            0.5, 1.5, arm.joints
+        )
         return replace(
             robot,
             tracker=self.tracker,
@@ -277,7 +279,7 @@ def _build_case(
 def draw_misplaced_base(seed: int) -> Motion:
     """Draw a base frame that was registered badly: it is tilted by about 0.3 mrad and
     shifted by about 0.2 mm, the same for all measurements."""
-    draws = stream(seed, "tilted base")
+    draws = open_simulation_stream(seed, "tilted base")
     shift_m = _SHIFT_M * draws.standard_normal(3)
     turn_rad = _TILT_RAD * draws.standard_normal(3)
     return Motion(tuple(shift_m), tuple(turn_rad))
@@ -345,7 +347,11 @@ def _draw_pair(
     excluded = ("force_scale", *find_absent_effects(plan, robot))
     possible = [effect for effect in CATALOGUE_EFFECTS if effect not in excluded]
     pairs = list(combinations(possible, 2))
-    return pairs[stream(seed, f"pair {robot} {level} {number}").integers(len(pairs))]
+    return pairs[
+        open_simulation_stream(seed, f"pair {robot} {level} {number}").integers(
+            len(pairs)
+        )
+    ]
 
 
 class SizedDefect(NamedTuple):
@@ -356,7 +362,9 @@ class SizedDefect(NamedTuple):
     sizing: dict[str, Any]
 
 
-def size_defects(case: BlindCase, yardstick: Yardstick) -> list[SizedDefect]:
+def size_defects(
+    case: BlindCase, noncentrality: NoncentralityModel
+) -> list[SizedDefect]:
     """Draw the defects of a case and size them to their non-centralities.
 
     If a location has no size of the wanted non-centrality at which the arm comes to
@@ -370,20 +378,20 @@ def size_defects(case: BlindCase, yardstick: Yardstick) -> list[SizedDefect]:
     for order, effect in enumerate(case.effects):
         first_seed = case.seed + 1000 * order
         candidates = [
-            _draw_defects(case, yardstick.robot, effect, first_seed + draw)
+            _draw_defects(case, noncentrality.robot, effect, first_seed + draw)
             for draw in range(_DRAWS)
         ]
-        sized_defects += _size_effect(yardstick, candidates, case.levels[order])
+        sized_defects += _size_effect(noncentrality, candidates, case.levels[order])
     return sized_defects
 
 
 def _size_effect(
-    yardstick: Yardstick, candidates: list[list[Defect]], level: float
+    noncentrality: NoncentralityModel, candidates: list[list[Defect]], level: float
 ) -> list[SizedDefect]:
     """Choose one of the candidates, each a list of defects that belong together, and
     size it."""
     for quantity in ("retained", "raw"):
-        sized = _find_first_plausible(yardstick, candidates, level, quantity)
+        sized = _find_first_plausible(noncentrality, candidates, level, quantity)
         if sized:
             return sized
     first = candidates[0]
@@ -394,17 +402,17 @@ def _size_effect(
             f" no size has a non-centrality of {level:g}"
         )
     at_largest = [replace(defect, size=largest) for defect in first]
-    return _describe_sizes(yardstick, at_largest, level, "raw", 1)
+    return _describe_sizes(noncentrality, at_largest, level, "raw", 1)
 
 
 def _draw_defects(
-    case: BlindCase, robot: PhysicalRobot, effect: str, seed: int
+    case: BlindCase, robot: SimulatedRobot, effect: str, seed: int
 ) -> list[Defect]:
     """Draw defects of plausible size that belong together: one defect, or one mechanism
     at several joints."""
     arm = robot.arm
     kind = KINDS[effect]
-    draws = stream(seed, f"joints of {effect}")
+    draws = open_simulation_stream(seed, f"joints of {effect}")
     locations = kind.locations(arm)
     if case.group == SEVERAL_JOINTS:
         count = draws.integers(min(_MIN_JOINTS, len(locations)), len(locations) + 1)
@@ -424,24 +432,29 @@ def _draw_defects(
         # The last location of this effect consists of all links.
         defect = replace(defect, joints=locations[-1])
     if case.group == GEAR_GRAVITY:
-        torque = usual_gravity_torque(arm, arm.masses, arm.gravity_m_s2)
+        torque = compute_typical_gravity_torque(arm, arm.masses, arm.gravity_m_s2)
         loaded = np.flatnonzero(torque > _GRAVITY_SHARE * torque.max())
         defect = replace(defect, joints=(int(draws.choice(loaded)) + 1,))
     return [defect]
 
 
-def build_yardstick(case: BlindCase, robot: PhysicalRobot) -> Yardstick:
+def build_noncentrality_model(
+    case: BlindCase, robot: SimulatedRobot
+) -> NoncentralityModel:
     """Build the measure of non-centrality of a case from its faultless robot."""
-    return Yardstick(
+    return NoncentralityModel(
         robot,
-        schedule_of(robot.arm, case.design, case.seed),
+        draw_schedule(robot.arm, case.design, case.seed),
         free_frame=case.design.frame == "tracker",
         declared=case.declare_masses(robot.arm),
     )
 
 
 def _find_first_plausible(
-    yardstick: Yardstick, candidates: list[list[Defect]], level: float, quantity: str
+    noncentrality: NoncentralityModel,
+    candidates: list[list[Defect]],
+    level: float,
+    quantity: str,
 ) -> list[SizedDefect]:
     """Size the candidates until one needs no implausible size, and return it; otherwise
     return the least implausible one, or nothing if none has a size."""
@@ -449,15 +462,17 @@ def _find_first_plausible(
     smallest_ratio = np.inf
     for draw, defects in enumerate(candidates, 1):
         largest = min(KINDS[defect.effect].largest / defect.size for defect in defects)
-        build_robot = partial(with_defects, yardstick.robot, defects)
+        build_robot = partial(apply_defects, noncentrality.robot, defects)
         try:
-            factor = find_size(yardstick, build_robot, 1.0, level, quantity, largest)
+            factor = find_size(
+                noncentrality, build_robot, 1.0, level, quantity, largest
+            )
         except (ValueError, RuntimeError):
             # No size has this non-centrality, or the arm finds no equilibrium at a size
             # that the search tried.
             continue
         sized = [replace(defect, size=factor * defect.size) for defect in defects]
-        ratio = max(_divide_by_plausible(yardstick, defect) for defect in sized)
+        ratio = max(_divide_by_plausible(noncentrality, defect) for defect in sized)
         if ratio < smallest_ratio:
             smallest_ratio = ratio
             best = sized, draw
@@ -465,12 +480,12 @@ def _find_first_plausible(
             break
     if best is None:
         return []
-    return _describe_sizes(yardstick, best[0], level, quantity, best[1])
+    return _describe_sizes(noncentrality, best[0], level, quantity, best[1])
 
 
 def find_size(
-    yardstick: Yardstick,
-    build_robot: Callable[[float], PhysicalRobot],
+    noncentrality: NoncentralityModel,
+    build_robot: Callable[[float], SimulatedRobot],
     start: float,
     target: float,
     quantity: str = "retained",
@@ -483,7 +498,7 @@ def find_size(
 
     Parameters
     ----------
-    yardstick : Yardstick
+    noncentrality : NoncentralityModel
         Measure of non-centrality.
     build_robot : callable
         Returns the robot with the defect of a given size.
@@ -506,7 +521,7 @@ def find_size(
     exponent = 2.0
     previous: tuple[float, float] | None = None
     for _ in range(_SECANT_STEPS):
-        signal = yardstick.signal(build_robot(size))
+        signal = noncentrality.compute_noncentralities(build_robot(size))
         value = signal[quantity]
         # An absorbed defect leaves rounding errors and second-order terms, a millionth
         # of the raw signal.
@@ -529,7 +544,11 @@ def find_size(
 
 
 def _describe_sizes(
-    yardstick: Yardstick, defects: list[Defect], level: float, quantity: str, draw: int
+    noncentrality: NoncentralityModel,
+    defects: list[Defect],
+    level: float,
+    quantity: str,
+    draw: int,
 ) -> list[SizedDefect]:
     """Describe the sizes of defects as the ground truth does, each with its own
     signal."""
@@ -540,17 +559,21 @@ def _describe_sizes(
                 "non_centrality": level,
                 "of": quantity,
                 "draw": draw,
-                "signal": yardstick.signal(with_defects(yardstick.robot, [defect])),
-                "share_of_plausible": _divide_by_plausible(yardstick, defect),
+                "signal": noncentrality.compute_noncentralities(
+                    apply_defects(noncentrality.robot, [defect])
+                ),
+                "share_of_plausible": _divide_by_plausible(noncentrality, defect),
             },
         )
         for defect in defects
     ]
 
 
-def _divide_by_plausible(yardstick: Yardstick, defect: Defect) -> float:
+def _divide_by_plausible(noncentrality: NoncentralityModel, defect: Defect) -> float:
     """Divide the size of a defect by the plausible size on this arm."""
-    return defect.size / KINDS[defect.effect].scale_plausible_size(yardstick.robot.arm)
+    return defect.size / KINDS[defect.effect].scale_plausible_size(
+        noncentrality.robot.arm
+    )
 
 
 def write_sealed_case(
@@ -574,9 +597,9 @@ def write_sealed_case(
     robot = case.build_specimen(robots_folder)
     sized_defects = []
     if case.effects:
-        sized_defects = size_defects(case, build_yardstick(case, robot))
-    defective = with_defects(robot, [sized.defect for sized in sized_defects])
-    schedule = schedule_of(robot.arm, case.design, case.seed)
+        sized_defects = size_defects(case, build_noncentrality_model(case, robot))
+    defective = apply_defects(robot, [sized.defect for sized in sized_defects])
+    schedule = draw_schedule(robot.arm, case.design, case.seed)
     experiment = Experiment(defective, case.design, schedule)
     damage_rows = None
     if "bad_rows" in case.changes:
@@ -606,18 +629,18 @@ def write_sealed_case(
 
 def _damage_rows(
     case: BlindCase, experiment: Experiment, table: Table
-) -> tuple[Table, list[Slip]]:
+) -> tuple[Table, list[Blunder]]:
     """Damage a few rows of a table, all in the same way."""
-    draws = stream(case.seed, "bad rows")
-    possible = [kind for kind in SLIPS if kind != "load" or table["load"].any()]
+    draws = open_simulation_stream(case.seed, "bad rows")
+    possible = [kind for kind in BLUNDER_KINDS if kind != "load" or table["load"].any()]
     kind = str(draws.choice(possible))
     count = int(draws.integers(1, case.changes["bad_rows"] + 1))
-    return with_bad_rows(
+    return add_blunders(
         table, experiment.robot, experiment.schedule, kind, count, draws
     )
 
 
-def _describe_defect(robot: PhysicalRobot, sized: SizedDefect) -> dict[str, Any]:
+def _describe_defect(robot: SimulatedRobot, sized: SizedDefect) -> dict[str, Any]:
     """Describe a defect as the ground truth does, with those of its parameters that the
     catalogue has too."""
     defect = sized.defect

@@ -146,7 +146,7 @@ class DiagnosedRobot:
 
     Attributes
     ----------
-    plant : PhysicalRobot
+    plant : SimulatedRobot
         The simulated robot.
     declared : Robot
         The robot as the analyst knows it.
@@ -205,7 +205,7 @@ def list_hidden_effects(
             continue
         for number in range(each):
             purpose = f"closed loop {Path(robot_file).stem} {effect} {number}"
-            yield effect, int(stream(seed, purpose).integers(2**31))
+            yield effect, int(open_simulation_stream(seed, purpose).integers(2**31))
 
 
 def measure_robot(
@@ -237,7 +237,7 @@ def measure_robot(
     if slips:
         plant = misplace_base(plant, seed)
     design = replace(CAMPAIGN, frame=frame)
-    experiment = Experiment(plant, design, schedule_of(plant.arm, design, seed))
+    experiment = Experiment(plant, design, draw_schedule(plant.arm, design, seed))
     with tempfile.TemporaryDirectory() as folder:
         write_blind_campaign(
             folder,
@@ -254,24 +254,22 @@ def measure_robot(
     return DiagnosedRobot(plant, robot, training, held_out, diagnosis, wanted)
 
 
-def _lose_beam(experiment: Experiment, table: Table) -> tuple[Table, list[Slip]]:
+def _lose_beam(experiment: Experiment, table: Table) -> tuple[Table, list[Blunder]]:
     """Lose the beam of the tracker in one row of the fitted poses."""
     design = experiment.design
     schedule = experiment.schedule
-    draws = stream(schedule.seed, "lost beam")
+    draws = open_simulation_stream(schedule.seed, "lost beam")
     kind = str(draws.choice(["zeros", "held_point"]))
     while True:
-        damaged, slips = with_bad_rows(
-            table, experiment.robot, schedule, kind, 1, draws
-        )
+        damaged, slips = add_blunders(table, experiment.robot, schedule, kind, 1, draws)
         if table["pose"][slips[0]["rows"][0]] < design.poses - design.held_out:
             return damaged, slips
 
 
-def draw_wanted_poses(robot: Robot, plant: PhysicalRobot, seed: int) -> WantedPoses:
+def draw_wanted_poses(robot: Robot, plant: SimulatedRobot, seed: int) -> WantedPoses:
     """Draw the poses that a robot shall reach: random ones without and under load, and
     a milling path."""
-    draws = stream(seed, "wanted poses")
+    draws = open_simulation_stream(seed, "wanted poses")
     low, high = robot.joint_limits.T
     shares = draws.random((2 * _POSES, robot.joints)) - 0.5
     angles = robot.reported_angles(low + (high - low) * (0.5 + _RANGE_SHARE * shares))
@@ -284,7 +282,7 @@ def draw_wanted_poses(robot: Robot, plant: PhysicalRobot, seed: int) -> WantedPo
     # One half of the process force acts against the feed, the other half lifts the tool
     # off the workpiece.
     process_direction = -np.sqrt(0.5) * feed + np.sqrt(0.5) * np.array([0.0, 0.0, 1.0])
-    force = usual_force_N(plant.arm)
+    force = get_typical_force_N(plant.arm)
     forces = [
         np.zeros((_POSES, 3)),
         force * load_direction,
@@ -420,7 +418,9 @@ def _measure_again(
     wanted = robot.wanted
     position, rotation = move_robot(robot.plant, angles, wanted.wrench, seed + 1)
     measured, _ = robot.plant.tracker.read(
-        position[:, None], rotation[:, None], stream(seed, "measured again")
+        position[:, None],
+        rotation[:, None],
+        open_simulation_stream(seed, "measured again"),
     )
     return {
         "part": wanted.part,
@@ -461,7 +461,9 @@ def compare_stated_accuracy(
     if frame != "base":
         random_poses = corrected & (wanted.part != MILLING)
         errors = _subtract_placement(wanted, errors, random_poses)
-    tolerance_m = np.exp(stream(seed, "tolerance").uniform(*np.log(_TOLERANCES_M)))
+    tolerance_m = np.exp(
+        open_simulation_stream(seed, "tolerance").uniform(*np.log(_TOLERANCES_M))
+    )
     rows = []
     for part in STATED_PARTS:
         chosen = corrected & np.isin(wanted.part, STATED_PARTS[part])

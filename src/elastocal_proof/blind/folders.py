@@ -32,7 +32,7 @@ from elastocal_proof.plant.campaigns import (
 from elastocal_proof.plant.simulated_robot import Schedule, SimulatedRobot
 
 # Damages some rows of a table of measurements, and says which.
-DamageRows = Callable[[Table], tuple[Table, list[Slip]]]
+DamageRows = Callable[[Table], tuple[Table, list[Blunder]]]
 
 ROBOT_FILE = "robot.yaml"
 
@@ -41,7 +41,7 @@ ROBOT_FILE = "robot.yaml"
 class Experiment:
     """A simulated robot, the design of its campaign and the schedule of that design."""
 
-    robot: PhysicalRobot
+    robot: SimulatedRobot
     design: Design
     schedule: Schedule
 
@@ -104,7 +104,7 @@ def write_blind_campaign(
     """
     robot = experiment.robot
     design = experiment.design
-    table = measured_table(robot, design, experiment.schedule)
+    table = simulate_measurements(robot, design, experiment.schedule)
     slips = None
     if damage_rows is not None:
         table, slips = damage_rows(table)
@@ -150,7 +150,7 @@ def write_robot_file(
         Folder of the campaign.
     robot_file : path
         Robot file of which the robot is a specimen.
-    robot : PhysicalRobot
+    robot : SimulatedRobot
         The robot.
     declared : sequence of LinkMass
         Weights as they are declared to the analyst; without any, the file has no

@@ -45,7 +45,7 @@ from elastocal.validation.transfer import find_extrapolated_poses
 from elastocal_proof.blind.cases import (
     CATALOGUE_EFFECTS,
     BlindCase,
-    build_yardstick,
+    build_noncentrality_model,
     find_absent_effects,
     size_defects,
 )
@@ -130,7 +130,7 @@ def fit_oracle(
         # Without an effect the declared model is the right one, and the verdict has its
         # errors.
         return _describe_outcome([], 1.0, verdict["heldout"]["before"])
-    case, held_out = cases_in(folder, robots_folder)
+    case, held_out = read_cases(folder, robots_folder)
     noise = parse_noise(verdict).without_pose_error
     declared = fit_declared_model(case.model, case.observations, noise)
     selected: list[_ScoredCandidate] = []
@@ -253,7 +253,7 @@ def assess_sampled_case(
     effects = tuple(fields["effects"])
     case = BlindCase(**fields | {"effects": effects, "levels": levels})
     sample = plan["limit"]
-    draw = stream(case.seed, "sample of the limit").random()
+    draw = open_simulation_stream(case.seed, "sample of the limit").random()
     is_absorbed = any(defect["of"] == "raw" for defect in truth["defects"])
     is_compared = [case.group, *case.levels[:1]] in sample["of"]
     if draw >= 1 / sample["one_in"] or is_absorbed or not is_compared:
@@ -277,12 +277,12 @@ def assess_best_analyst(
         set; their ``probability``; ``right``, whether they are the true ones.
     """
     robot = case.build_specimen(robots_folder)
-    yardstick = build_yardstick(case, robot)
-    defects = [sized.defect for sized in size_defects(case, yardstick)]
-    residual = yardstick.residual(with_defects(robot, defects))
+    noncentrality = build_noncentrality_model(case, robot)
+    defects = [sized.defect for sized in size_defects(case, noncentrality)]
+    residual = noncentrality.compute_measured_residual(apply_defects(robot, defects))
     absent = find_absent_effects(plan, case.robot)
     possible = [effect for effect in CATALOGUE_EFFECTS if effect not in absent]
-    located, units = draw_unit_signals(yardstick, possible, case.seed)
+    located, units = draw_unit_signals(noncentrality, possible, case.seed)
     signals = units.reshape(len(residual), -1)
     gram = signals.T @ signals
     products = np.column_stack(
@@ -324,21 +324,21 @@ def _simulate_noise_products(gram: np.ndarray, seed: int) -> np.ndarray:
     """Simulate the products of all signals with residuals of noise alone, (K, draws):
     normal, with the Gram matrix of the signals as their covariance."""
     values, vectors = np.linalg.eigh(gram)
-    draws = stream(seed, "null distribution of the limit")
+    draws = open_simulation_stream(seed, "null distribution of the limit")
     normal = draws.standard_normal((len(gram), _NULL_DRAWS))
     products: np.ndarray = (vectors * np.sqrt(np.clip(values, 0.0, None))) @ normal
     return products
 
 
 def draw_unit_signals(
-    yardstick: NoncentralityModel, kinds: Iterable[str], seed: int
+    noncentrality: NoncentralityModel, kinds: Iterable[str], seed: int
 ) -> tuple[tuple[str, ...], np.ndarray]:
     """Draw defects of each kind at each of its locations, and scale their signals after
     absorption to length one.
 
     Parameters
     ----------
-    yardstick : Yardstick
+    noncentrality : NoncentralityModel
         Measure of signals, with the faultless robot.
     kinds : iterable of str
         Keys of `KINDS`.
@@ -352,19 +352,19 @@ def draw_unit_signals(
     (M, locations, draws) array
         Signals.
     """
-    robot = yardstick.robot
+    robot = noncentrality.robot
     located = []
     units = []
     for kind in kinds:
         size = KINDS[kind].scale_plausible_size(robot.arm)
         for location in KINDS[kind].locations(robot.arm):
-            draws = stream(seed, f"limit {kind} {location}")
+            draws = open_simulation_stream(seed, f"limit {kind} {location}")
             signals = []
             residuals = []
             for detail_seed in draws.integers(2**31, size=_DRAWS):
                 defect = Defect(kind, location, size, int(detail_seed))
-                signal, residual = yardstick.project_change(
-                    with_defects(robot, [defect])
+                signal, residual = noncentrality.project_change(
+                    apply_defects(robot, [defect])
                 )
                 signals.append(signal)
                 residuals.append(residual)
