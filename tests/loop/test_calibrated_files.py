@@ -73,7 +73,7 @@ def test_the_regression_comes_back_and_physics_alone_has_its_own_accuracy(
     regressed_checkout,
 ):
     whole = load_diagnosed(regressed_checkout / "smooth", ROBOTS, regressed_checkout)
-    physics = whole.by_physics()
+    physics = whole.without_regression()
     stated = whole.verdict
     heldout = whole.verdict.heldout
     assert heldout.delivered.rms_m < 0.6 * heldout.after.rms_m
