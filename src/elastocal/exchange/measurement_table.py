@@ -29,18 +29,18 @@ from elastocal.exchange.column_names import (
     QUATERNIONS,
     TRANSLATION,
     VECTOR,
-    columns_of_rotation,
+    convert_to_rotation_vectors,
     find_columns,
     find_joints,
+    find_lengths,
     find_rotation,
+    find_scales,
     find_units,
     has_position,
     is_name,
-    lengths_in,
+    list_rotation_columns,
     read_units,
     recognize_column,
-    rotation_vectors,
-    scales_of,
 )
 from elastocal.io.texts import parse_number
 from elastocal.mechanics.components import WRENCH_NAMES
@@ -137,7 +137,7 @@ class _Layout:
 
     @property
     def orientation(self) -> tuple[str, ...]:
-        return columns_of_rotation(self.rotation, self.columns)
+        return list_rotation_columns(self.rotation, self.columns)
 
     @property
     def wrench(self) -> list[str]:
@@ -203,7 +203,7 @@ def read_measurement_table(
     )
     rows = _find_filled_rows(layout, skip_empty=options.skip_empty)
     optional = _read_optional_columns(layout, headers, options, rows)
-    cells = text.cells(layout.columns, scales_of(units), rows)
+    cells = text.cells(layout.columns, find_scales(units), rows)
     table = _read_columns(cells, layout, options) | optional.columns
     table |= {
         name: cells.numbers(name)
@@ -327,7 +327,7 @@ def _find_layout(
     name."""
     columns, stated_units = find_columns(text, headers, robot)
     if find_joints(columns) and not has_position(columns):
-        lengths = lengths_in(text.columns)
+        lengths = find_lengths(text.columns)
         if lengths:
             found = f"{', '.join(map(repr, lengths))} and no position"
             allowed = (
@@ -430,7 +430,7 @@ def _read_columns(
 def _read_rotation_vectors(cells: Cells, layout: _Layout) -> np.ndarray:
     """Read the orientations as rotation vectors, ndarray (N, 3), rad."""
     values = cells.matrix(layout.orientation)
-    vectors, is_wrong = rotation_vectors(layout.rotation, values)
+    vectors, is_wrong = convert_to_rotation_vectors(layout.rotation, values)
     if is_wrong.any():
         allowed = "a rotation matrix, row by row"
         if layout.rotation == QUATERNIONS:
@@ -463,7 +463,7 @@ def _read_optional_columns(
                 layout.stated_units,
                 options.units,
             )
-            cells = layout.text.cells({name: header}, scales_of(unit), rows)
+            cells = layout.text.cells({name: header}, find_scales(unit), rows)
             values = _read_times(cells) if name == "time_s" else cells.numbers(name)
         except InputError as error:
             if name in headers or name in options.units or name == "u95_m":
