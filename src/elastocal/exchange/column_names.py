@@ -317,9 +317,12 @@ def find_columns(
     """
     for stated_header in mapped.values():
         if stated_header not in text.columns:
-            found = f"no column {stated_header!r}"
-            allowed = suggest_names(stated_header, list(text.columns))
-            raise InputError(text.path, "header", found, allowed)
+            raise InputError(
+                text.path,
+                "header",
+                f"no column {stated_header!r}",
+                suggest_names(stated_header, list(text.columns)),
+            )
     columns = dict(mapped)
     stated_units: dict[str, str] = {}
     for header in _recognize_headers(text, mapped, robot):
@@ -332,12 +335,15 @@ def find_columns(
             raise _duplicate_error(text, name, columns[name], header.text)
         has_unit = header.unit not in (None, *_NO_UNIT)
         if has_unit and name not in mapped and list_kinds(name) == (NONE,):
-            found = f"{header.text!r}, a {name} with a unit"
-            allowed = (
-                f"--ignore {header.text!r}, --column {name}={header.text!r} where it"
-                f" numbers or names each {name}, or --column NAME=…"
+            raise InputError(
+                text.path,
+                "header",
+                f"{header.text!r}, a {name} with a unit",
+                (
+                    f"--ignore {header.text!r}, --column {name}={header.text!r} where it"
+                    f" numbers or names each {name}, or --column NAME=…"
+                ),
             )
-            raise InputError(text.path, "header", found, allowed)
         columns[name] = header.text
         if header.unit is not None:
             stated_units[name] = header.unit
@@ -376,9 +382,12 @@ def choose_unit(text: TextTable, header: str, unit: str | None) -> str | None:
     """Choose the unit of a header or of the row under it; refuse two different ones."""
     unit_below = text.units.get(header)
     if unit and unit_below and unit != unit_below:
-        found = f"{header!r} and {unit_below!r} in the row under it"
-        allowed = f"one unit; --ignore {header!r}, or a table with one of them"
-        raise InputError(text.path, "header", found, allowed)
+        raise InputError(
+            text.path,
+            "header",
+            f"{header!r} and {unit_below!r} in the row under it",
+            f"one unit; --ignore {header!r}, or a table with one of them",
+        )
     return unit or unit_below
 
 
@@ -390,11 +399,14 @@ def _refuse_count_from_zero(
         return
     joint = _JOINT.fullmatch(_simplify(split_unit(header.text)[0]))
     if joint and int(joint[2]) == 0:
-        found = f"{header.text!r}, counted from 0"
-        allowed = (
-            f"--column q1={header.text!r} …, each joint's, or --ignore {header.text!r}"
+        raise InputError(
+            text.path,
+            "header",
+            f"{header.text!r}, counted from 0",
+            (
+                f"--column q1={header.text!r} …, each joint's, or --ignore {header.text!r}"
+            ),
         )
-        raise InputError(text.path, "header", found, allowed)
 
 
 def _duplicate_error(text: TextTable, name: str, first: str, second: str) -> InputError:
@@ -449,13 +461,15 @@ def find_units(
         if unit is None:
             found = f"no unit of {columns[name]!r}"
             option = "--lengths mm" if is_length else "--angles deg"
-            allowed = f"{option} or such, or --unit {name}=UNIT"
-            raise InputError(text.path, "header", found, allowed)
+            raise InputError(
+                text.path, "header", found, f"{option} or such, or --unit {name}=UNIT"
+            )
         if _scale(unit, kinds) is None:
             key = f"unit of {columns[name]!r}"
             units = itertools.chain.from_iterable(UNITS[kind] for kind in kinds)
-            allowed = f"{', '.join(units)}, by --unit {name}=UNIT"
-            raise InputError(text.path, key, repr(unit), allowed)
+            raise InputError(
+                text.path, key, repr(unit), f"{', '.join(units)}, by --unit {name}=UNIT"
+            )
         column_units[name] = unit
     return column_units
 
@@ -492,14 +506,20 @@ def find_rotation(
             return certain
     components = [columns[name] for name in QUATERNION if name in columns]
     if components:
-        found = f"a part of a quaternion, {', '.join(components)}"
-        allowed = "--column qw=NAME and such for what is missing, or --rotation none"
-        raise InputError(text.path, "header", found, allowed)
+        raise InputError(
+            text.path,
+            "header",
+            f"a part of a quaternion, {', '.join(components)}",
+            "--column qw=NAME and such for what is missing, or --rotation none",
+        )
     angles = [columns[name] for name in (*VECTOR, *EULER) if name in columns]
     if angles:
-        found = f"orientations {', '.join(angles)} of an unknown notation"
-        allowed = f"--rotation vector, euler:ZYX, euler:xyz … or none: {_ALLOWED}"
-        raise InputError(text.path, "header", found, allowed)
+        raise InputError(
+            text.path,
+            "header",
+            f"orientations {', '.join(angles)} of an unknown notation",
+            f"--rotation vector, euler:ZYX, euler:xyz … or none: {_ALLOWED}",
+        )
     return NO_ROTATION
 
 
