@@ -260,9 +260,12 @@ class CandidateDesign:
         by_observation = (rows.jacobian**2).sum(axis=(1, 2)) / rows.jacobian.shape[-1]
         information = float(np.median(np.bincount(rows.pose, by_observation)))
         if information < _LEAST_INFORMATION:
-            found = "measurements that no joint moves"
-            allowed = "targets on what moves, off a lone axis"
-            raise InputError("campaign", "targets", found, allowed)
+            raise InputError(
+                "campaign",
+                "targets",
+                "measurements that no joint moves",
+                "targets on what moves, off a lone axis",
+            )
         return 1.0 / np.sqrt(information)
 
     @property

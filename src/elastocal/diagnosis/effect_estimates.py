@@ -300,14 +300,13 @@ def find_oversized_effects(fitted: Fit, names: Collection[str]) -> set[str]:
     names : collection of str
         Effects to look at.
     """
-    oversized = set()
-    for effect in fitted.model.effects:
-        if effect.effect not in names:
-            continue
-        for value, std_error, parameter in _generate_estimates(fitted, effect):
-            if _is_oversized(value, std_error, parameter):
-                oversized.add(effect.effect)
-    return oversized
+    return {
+        effect.effect
+        for effect in fitted.model.effects
+        if effect.effect in names
+        for estimate in _generate_estimates(fitted, effect)
+        if _is_oversized(*estimate)
+    }
 
 
 def _generate_estimates(

@@ -433,8 +433,9 @@ class _Plan:
         If it is as large as an unambiguous diagnosis asks for, nothing that can be
         resolved is ambiguous.
         """
-        leading, *others = (h.probability for h in self.hypotheses)
-        return leading / (leading + np.array(others)[self.within_reach].sum())
+        probabilities = np.array([h.probability for h in self.hypotheses])
+        alternatives = probabilities[1:][self.within_reach]
+        return float(probabilities[0] / (probabilities[0] + alternatives.sum()))
 
     @property
     def nearest(self) -> tuple[str, ...]:
