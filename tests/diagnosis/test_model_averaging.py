@@ -109,8 +109,9 @@ def test_moments_of_a_term_are_averaged_over_its_scales_and_the_pose_error(
         for scale, log_prior in zip(
             problem.grid.scales, problem.grid.log_weights, strict=True
         ):
-            scaled_columns = scale * rows.candidates[:, term.columns]
-            log_density = compute_log_density(rows, tau, scaled_columns)
+            log_density = compute_log_density(
+                rows, tau, scale * rows.candidates[:, term.columns]
+            )
             log_weights.append(log_density + log_pose + log_prior)
             moments = solve_regression(rows, tau, term.columns, np.full(2, scale))
             means.append(moments[0][DECLARED_COUNT:])
