@@ -12,7 +12,7 @@ import pandas as pd
 from elastocal.campaigns.campaign import group_equal_rows
 from elastocal.counting import format_count
 from elastocal.random_streams import open_stream
-from elastocal.remainder.corrected import NORMAL_WIDTH
+from elastocal.residual_model.selection import NORMAL_QUANTILE
 from elastocal.validation.held_out import (
     PositionErrors,
     compute_error_intervals,
@@ -125,7 +125,7 @@ def _compute_coverage(entries: pd.DataFrame) -> float:
     if not np.isfinite(std).all():
         return float("nan")
     error = np.abs(entries[["dx", "dy", "dz"]].to_numpy())
-    return float((error < NORMAL_WIDTH * std).mean())
+    return float((error < NORMAL_QUANTILE * std).mean())
 
 
 def summarize_mechanisms(
