@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all."""
+"""A file appears complete or not at all."""
 
 from pathlib import Path
 
@@ -6,21 +6,19 @@ import pytest
 
 from elastocal.io import atomic_writes
 from elastocal.io.atomic_writes import (
-    atomic_write,
     remove_partials,
+    write_atomically,
     write_text,
     write_together,
 )
 
 
 @pytest.mark.parametrize("before", [None, "much longer than what follows"])
-def test_a_file_appears_only_once_it_is_complete_and_replaces_what_was_there_as_a_whole(
-    tmp_path, before
-):
+def test_a_file_appears_when_it_is_complete_and_replaces_the_old_one(tmp_path, before):
     path = tmp_path / "one.txt"
     if before:
         path.write_text(before, encoding="utf-8")
-    with atomic_write(str(path)) as partial:
+    with write_atomically(str(path)) as partial:
         Path(partial).write_text("half", encoding="utf-8")
         assert (
             Path(partial).parent == tmp_path
@@ -35,57 +33,58 @@ def test_a_file_appears_only_once_it_is_complete_and_replaces_what_was_there_as_
 def test_a_block_that_fails_leaves_the_old_file_and_no_other(tmp_path, error):
     path = tmp_path / "one.txt"
     path.write_text("old", encoding="utf-8")
-    with pytest.raises(error), atomic_write(path) as partial:
+    with pytest.raises(error), write_atomically(path) as partial:
         Path(partial).write_text("half", encoding="utf-8")
         raise error
-    with pytest.raises(FileNotFoundError), atomic_write(path):
+    with pytest.raises(FileNotFoundError), write_atomically(path):
         pass
     assert path.read_text(encoding="utf-8") == "old" and list(tmp_path.iterdir()) == [
         path
     ]
 
 
-def test_names_on_the_way_are_random_and_opened_exclusively(tmp_path, monkeypatch):
+def test_partial_files_have_random_names_and_are_opened_exclusively(
+    tmp_path, monkeypatch
+):
     names = set()
     for _ in range(20):
-        with atomic_write(tmp_path / "one.txt") as partial:
+        with write_atomically(tmp_path / "one.txt") as partial:
             names.add(partial)
             Path(partial).write_text("x")
     assert len(names) == 20
     monkeypatch.setattr(atomic_writes.secrets, "token_hex", lambda _: "foreseen")
     (tmp_path / "victim").write_text("mine")
     (tmp_path / "one.txt.foreseen.partial").symlink_to(tmp_path / "victim")
-    with pytest.raises(FileExistsError), atomic_write(tmp_path / "one.txt"):
+    with pytest.raises(FileExistsError), write_atomically(tmp_path / "one.txt"):
         raise AssertionError("never written")
     with pytest.raises(FileExistsError), write_together(tmp_path, ["one.txt"]):
         raise AssertionError("never written")
     assert (tmp_path / "victim").read_text() == "mine"
 
 
-def test_old_files_are_gone_before_the_first_new_one_is_there(tmp_path, monkeypatch):
-    """Whenever it is killed: at each rename no file of before stands beside a new one,
-    and the user's own stay."""
+def test_old_files_are_removed_before_the_first_new_one_appears(tmp_path, monkeypatch):
+    """At each rename, no old file is next to a new one, and the user's files stay."""
     for name in ("a", "b", "c", "mine"):
         (tmp_path / name).write_text("old")
     rename = Path.rename
-    seen = []
+    states = []
 
-    def watched(path, target):
+    def rename_and_record(path, target):
         rename(path, target)
-        seen.append(
+        states.append(
             {
-                each.name: each.read_text()
-                for each in tmp_path.iterdir()
-                if each.is_file()
+                file.name: file.read_text()
+                for file in tmp_path.iterdir()
+                if file.is_file()
             }
         )
 
-    monkeypatch.setattr(Path, "rename", watched)
+    monkeypatch.setattr(Path, "rename", rename_and_record)
     with write_together(tmp_path, ["a", "b", "c"]) as partial:
         for name in "ab":
             (partial / name).write_text("new")
         assert (tmp_path / "a").read_text() == "old"
-    assert seen == [
+    assert states == [
         {"a": "new", "mine": "old"},
         {"a": "new", "b": "new", "mine": "old"},
     ]
@@ -110,10 +109,10 @@ def test_files_that_belong_together_appear_together_or_the_old_ones_stay(tmp_pat
     ) == ["a", "deep"]
 
 
-def test_what_killed_runs_left_is_taken_away_and_nothing_else(tmp_path):
-    left = tmp_path / "a" / f"one.parquet.{'0f' * 8}.partial"
-    left.parent.mkdir()
-    left.touch()
+def test_only_partial_files_of_killed_runs_are_removed(tmp_path):
+    partial = tmp_path / "a" / f"one.parquet.{'0f' * 8}.partial"
+    partial.parent.mkdir()
+    partial.touch()
     (tmp_path / f"new.{'0f' * 8}.partial").mkdir()
     (tmp_path / f"new.{'0f' * 8}.partial" / "file").touch()
     (tmp_path / "mine.partial").touch()

@@ -1,5 +1,5 @@
-"""A package that is installed beside elastocal offers effects, importers, controllers
-and regressions; an error in it is one line that names the package."""
+"""An installed package offers effects, importers, controllers and regressions; an error
+in it is one line that names the package."""
 
 import json
 import os
@@ -85,7 +85,7 @@ def fit_mean(inputs, residual, settings, seed):
 
 MEAN_RESIDUAL = Regression("mean residual", fit_mean)
 '''
-# Uses one plug-in of each kind, as the commands do, and prints what came of it.
+# Use one plug-in of each kind, as the commands do, and print the results.
 PROGRAM = """
 import json, sys
 from pathlib import Path

@@ -52,7 +52,7 @@ def made_tables():
         [
             row
             for document, stated, _ in entries
-            for row in list_intervals(PLAN, document, stated)
+            for row in list_intervals(document, stated)
         ]
     )
     moves = _moves()
@@ -151,7 +151,7 @@ def _moves(cases=8, poses=30, seed=2, reached=0.5):
     draws = np.random.default_rng(seed)
     sizes = dict(zip(MODELS, (3e-3, 2e-3, 2e-4, 1.1e-4, 1e-4), strict=True))
     rows = []
-    for case, part, model in product(range(cases), PARTS, MODELS):
+    for case, path_type, model in product(range(cases), PARTS, MODELS):
         error_m = np.linalg.norm(
             sizes[model] / np.sqrt(3) * draws.standard_normal((poses, 3)), axis=1
         )
@@ -160,7 +160,7 @@ def _moves(cases=8, poses=30, seed=2, reached=0.5):
             "seed": case,
             "verdict": "named",
             "named": case % 2 == 0,
-            "part": part,
+            "part": path_type,
             "model": model,
         }
         row |= {

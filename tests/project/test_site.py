@@ -74,9 +74,9 @@ def test_nothing_is_fetched_from_elsewhere(pages):
         r'<(?:link|script|img|iframe)[^>]*(?:href|src)="(?:https?:)?//[^"]*"'
     )
     assert [
-        found
+        address
         for path in pages
-        for found in fetched.findall(path.read_text(encoding="utf-8"))
+        for address in fetched.findall(path.read_text(encoding="utf-8"))
     ] == []
     styles = [
         path
@@ -106,9 +106,9 @@ WRONG = re.compile(
 
 def test_no_page_has_what_cannot_be_read_or_reached_and_none_is_missing(pages):
     assert [
-        (path.name, found)
+        (path.name, match)
         for path in pages
-        for found in WRONG.findall(path.read_text(encoding="utf-8"))
+        for match in WRONG.findall(path.read_text(encoding="utf-8"))
     ] == []
     written = [
         path.relative_to(ROOT)

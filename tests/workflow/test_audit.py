@@ -49,8 +49,8 @@ def folder(small_study, tmp_path_factory):
 
 
 def test_a_finished_study_holds_in_every_check(folder):
-    found = audit_run(audited(folder))
-    assert [finding for finding in found if not finding.holds] == []
+    checks = audit_run(audited(folder))
+    assert [finding for finding in checks if not finding.holds] == []
     by = {
         "numpy's Philox stream",
         "pinocchio",
@@ -58,7 +58,7 @@ def test_a_finished_study_holds_in_every_check(folder):
         "statsmodels on pinocchio",
         "MuJoCo",
     }
-    assert by <= {finding.by for finding in found}
+    assert by <= {finding.by for finding in checks}
 
 
 @pytest.mark.parametrize(

@@ -74,12 +74,12 @@ def test_what_changes_no_result_reruns_nothing(finished_paper):
         "-c",
         "commit.gpgsign=false",
     ]
-    for words in (
+    for arguments in (
         ["init", "-q"],
         ["add", "Snakefile", "src", "workflow"],
         ["commit", "-q", "-m", "a"],
     ):
-        subprocess.run([*git, *words], cwd=study.folder, check=True)
+        subprocess.run([*git, *arguments], cwd=study.folder, check=True)
     assert study.planned(PAPER) == set()
 
 
@@ -190,7 +190,7 @@ def test_what_is_added_runs_no_job_of_what_is_there(finished_paper):
 def test_every_script_is_of_a_rule_and_a_rule_watches_the_sources_of_its_own():
     """`complete_rules` gives them to each rule with a script; that of a named step
     watches the function that it calls."""
-    seen = []
+    used_scripts = []
     for file in sorted((REPOSITORY / "workflow" / "rules").glob("*.smk")):
         for body in re.split(
             r"^ *rule\b", file.read_text(encoding="utf-8"), flags=re.MULTILINE
@@ -200,8 +200,8 @@ def test_every_script_is_of_a_rule_and_a_rule_watches_the_sources_of_its_own():
             assert len(scripts) == ("script:" in body) and len(steps) == scripts.count(
                 RUN_STEP
             )
-            seen += scripts
-    assert sorted(set(seen) | {RUN_STEP}) == SCRIPTS
+            used_scripts += scripts
+    assert sorted(set(used_scripts) | {RUN_STEP}) == SCRIPTS
 
 
 # Imports of a script, or of a step, in a process of its own: files of the sources that
@@ -239,8 +239,8 @@ print(json.dumps(sorted(inside)))
     ids=["some", "all"],
 )
 def test_the_import_closure_is_what_a_script_loads(scripts, unstarted):
-    for each in scripts:
-        script, _, step = each.partition(":")
+    for script_and_step in scripts:
+        script, _, step = script_and_step.partition(":")
         command = [
             sys.executable,
             "-c",
@@ -257,12 +257,12 @@ def test_the_import_closure_is_what_a_script_loads(scripts, unstarted):
             check=True,
             timeout=HUNG_S,
         )
-        found = closure(
+        files = closure(
             unstarted.path("workflow/scripts") / script,
             unstarted.path("src"),
             *([step] if step else []),
         )
-        names = [file.relative_to(unstarted.folder).as_posix() for file in found]
+        names = [file.relative_to(unstarted.folder).as_posix() for file in files]
         # What reads tables into frames is loaded when it is called.
         later = {"src/elastocal/io/data_frames.py"}
         # A table that a module reads beside it counts as the module does.
@@ -271,4 +271,4 @@ def test_the_import_closure_is_what_a_script_loads(scripts, unstarted):
         )
         assert sorted({*json.loads(done.stdout)} | (later & {*names})) == [
             name for name in names if name.endswith(".py")
-        ], each
+        ], script_and_step

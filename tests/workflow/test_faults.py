@@ -49,12 +49,12 @@ FAULTS = {
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_nothing_starts_and_one_line_says_why(fault, unstarted):
-    spoil, arguments, found = FAULTS[fault]
+    spoil, arguments, phrases = FAULTS[fault]
     spoil(unstarted)
     ended = unstarted.snakemake("-j1", *arguments)
     assert ended.returncode != 0
     last = ended.stderr.splitlines()[-1]
-    assert all(part in last for part in found)
+    assert all(phrase in last for phrase in phrases)
     assert (
         "Traceback" not in ended.stderr
         and unstarted.files("data/**/*", "results/**/*", "reports/**/*") == []
@@ -102,8 +102,8 @@ def test_two_runs_of_the_same_files_are_refused_in_one_line(unstarted):
     unstarted.path(".snakemake/locks/0.output.lock").write_text(
         f"{MEASURED}\n", encoding="utf-8"
     )
-    with open(unstarted.path(".snakemake/runs.lock"), "a") as other:
-        fcntl.flock(other, fcntl.LOCK_SH)
+    with open(unstarted.path(".snakemake/runs.lock"), "a") as lock:
+        fcntl.flock(lock, fcntl.LOCK_SH)
         ended = unstarted.snakemake("-j1", MEASURED)
     assert ended.returncode != 0
     last = ended.stderr.splitlines()[-1]
