@@ -59,13 +59,15 @@ def test_laws_that_are_fixed_are_the_same_under_other_loads_and_springs_and_at_o
     joints = equipped(chain).joints
     states = make_states(joints, 5, seed=1)
     elsewhere = make_states(joints, 5, seed=2)
-    one = conditions_on(chain, states)
-    other = replace(
-        conditions_on(chain, elsewhere, 2 * one.compliance),
-        joint_angles=one.joint_angles,
+    unchanged = conditions_on(chain, states)
+    changed = replace(
+        conditions_on(chain, elsewhere, 2 * unchanged.compliance),
+        joint_angles=unchanged.joint_angles,
     )
     fixed = [
-        candidate for candidate in candidates_on(one.sites).values() if candidate.fixed
+        candidate
+        for candidate in candidates_on(unchanged.sites).values()
+        if candidate.fixed
     ]
     assert {candidate.effect for candidate in fixed} >= {
         "transmission_harmonic",
@@ -74,7 +76,9 @@ def test_laws_that_are_fixed_are_the_same_under_other_loads_and_springs_and_at_o
     }
     for candidate in fixed:
         for law, again in zip(
-            candidate.displacement(one), candidate.displacement(other), strict=True
+            candidate.displacement(unchanged),
+            candidate.displacement(changed),
+            strict=True,
         ):
             assert law.keys() == again.keys() and all(
                 (law[at] == again[at]).all() for at in law
@@ -186,17 +190,19 @@ def test_sensitivities_of_every_candidate_are_central_differences(chain):
             model = make_model(chain, targets, 6, effects=(candidate,))
         estimate = make_estimate(model, seed=3)
         around = evaluate_conditions(model, estimate, states)
-        seen = observe_exactly(model, estimate, states)
+        observations = observe_exactly(model, estimate, states)
         steps = np.diag(small_steps(model, estimate))
         # Of a long law, steps of all parameters at once.
         steps = (
             steps if len(steps) < 6 else rng.standard_normal((2, len(steps))) @ steps
         )
-        expected = slopes(model, estimate, seen, around, steps)
-        found = linearize(model, estimate, seen, around).sensitivities @ steps.T
+        expected = slopes(model, estimate, observations, around, steps)
+        actual = (
+            linearize(model, estimate, observations, around).sensitivities @ steps.T
+        )
         scale = np.maximum(np.abs(expected).max(axis=(0, 1)), 1e-300)
         np.testing.assert_allclose(
-            found / scale, expected / scale, rtol=0, atol=1e-5, err_msg=candidate.key
+            actual / scale, expected / scale, rtol=0, atol=1e-5, err_msg=candidate.key
         )
 
 

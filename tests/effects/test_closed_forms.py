@@ -45,12 +45,12 @@ def nest_eccentricity(arm, law, name):
 
 def scaled(arm, amount):
     """All positions further from the foot by shares."""
-    found = np.zeros((STATES, len(arm.chain.points), 6))
+    displacement = np.zeros((STATES, len(arm.chain.points), 6))
     for number, point in enumerate(arm.chain.points):
-        found[:, number, :3] = (
+        displacement[:, number, :3] = (
             arm.frame(point.after)[0] * np.broadcast_to(amount, STATES)[:, None]
         )
-    return found
+    return displacement
 
 
 def grown(arm, amount):
@@ -91,8 +91,8 @@ def declared_masses(arm, law, name):
     for mass in MASSES:
         after = arm.places[mass.link - 1] + 1
         along = [
-            part * weight(arm, after, f"moment_{axis}")
-            for part, axis in zip(mass.centre_m, "xyz", strict=True)
+            component * weight(arm, after, f"moment_{axis}")
+            for component, axis in zip(mass.centre_m, "xyz", strict=True)
         ]
         torques.append(mass.mass_kg * (weight(arm, after, "") + sum(along)))
     torque = sum(torques) if name == "share" else torques[int(name.rsplit("_", 1)[1])]
@@ -110,19 +110,19 @@ def motor_eccentricity(arm, law, name):
 
 def bearing_runout(arm, law, name):
     motion, axis, kind, order = name.split("_")
-    place = arm.places[law.joints[0] - 1]
-    fixed = arm.frame(place)[1]
+    position = arm.places[law.joints[0] - 1]
+    fixed = arm.frame(position)[1]
     amount = wave(f"{kind}_{order}", joint_angle(arm, law))
     if motion == "wobble":
-        return six(arm, place + 1, fixed, f"r{axis}", amount)
-    return six(arm, place + 1, fixed, f"d{axis}", amount, arm.far_end(law.joints[0]))
+        return six(arm, position + 1, fixed, f"r{axis}", amount)
+    return six(arm, position + 1, fixed, f"d{axis}", amount, arm.far_end(law.joints[0]))
 
 
 def link_elasticity(arm, law, name, taper):
     """Curvature and twist under the load on each piece of the link, integrated to its
     far end."""
     links = arm.long if law.detail == "one section" else list(law.joints) or [0]
-    found = 0.0
+    displacement = 0.0
     # Of the uniform link that a force shifts, or a moment twists, as far.
     power = 2 if name.startswith("bending") else 0
     softer = (1 - taper * (NODES + 1) / 2) ** -3.0
@@ -133,31 +133,31 @@ def link_elasticity(arm, law, name, taper):
         after, (along, length) = arm.far_end(link), arm.link(link)
         force, moment = arm.load(after)
         shift = turn = np.zeros((STATES, 3))
-        for place, weighs in zip(
+        for position, weighs in zip(
             length * (NODES + 1) / 2, WEIGHTS * length / 2, strict=True
         ):
-            lever = along * (length - place)
-            there = (
+            lever = along * (length - position)
+            rotation_here = (
                 (moment + np.cross(lever, force))
                 * weighs
                 * uniform
-                / (1 - taper * place / length) ** 3
+                / (1 - taper * position / length) ** 3
             )
-            twist = along * (there * along).sum(axis=1, keepdims=True)
-            part = there - twist if name.startswith("bending") else twist
-            shift = shift + np.cross(part, lever)
-            turn = turn + part
-        found = found + arm.moved(after, shift, turn)
-    return found
+            twist = along * (rotation_here * along).sum(axis=1, keepdims=True)
+            component = rotation_here - twist if name.startswith("bending") else twist
+            shift = shift + np.cross(component, lever)
+            turn = turn + component
+        displacement = displacement + arm.moved(after, shift, turn)
+    return displacement
 
 
 def joint_tilt(arm, law, name):
-    place = arm.places[law.joints[0] - 1] + 1
-    rotation = arm.frame(place)[1]
-    moment = arm.load(place)[1]
+    position = arm.places[law.joints[0] - 1] + 1
+    rotation = arm.frame(position)[1]
+    moment = arm.load(position)[1]
     return six(
         arm,
-        place,
+        position,
         rotation,
         f"r{name[-1]}",
         (rotation[..., "xyz".index(name[-1])] * moment).sum(axis=1),
@@ -176,9 +176,9 @@ def base_compliance(arm, law, name):
 
 
 def cross_compliance(arm, law, name):
-    one, other = law.joints
-    return arm.of_joint(one, arm.torque[:, other - 1]) + arm.of_joint(
-        other, arm.torque[:, one - 1]
+    first, second = law.joints
+    return arm.of_joint(first, arm.torque[:, second - 1]) + arm.of_joint(
+        second, arm.torque[:, first - 1]
     )
 
 
@@ -260,8 +260,8 @@ def temperature_gradient(arm, law, name, *lag):
     curvature = warmer * (axis - along * (axis * along).sum(axis=1, keepdims=True))
     pieces = zip(length * (NODES + 1) / 2, WEIGHTS * length / 2, strict=True)
     shift = sum(
-        np.cross(curvature * weighs, along * (length - place))
-        for place, weighs in pieces
+        np.cross(curvature * weighs, along * (length - position))
+        for position, weighs in pieces
     )
     return arm.moved(after, shift, length * curvature)
 

@@ -59,12 +59,12 @@ def gravity_by_pinocchio(chain, after, mass, centre, gravity, coordinates):
     one.model.appendBodyToJoint(frame.parentJoint, inertia, pin.SE3.Identity())
     one.model.gravity.linear = np.array(gravity)
     data = one.model.createData()
-    found = np.zeros((len(coordinates), chain.coordinates))
+    actual = np.zeros((len(coordinates), chain.coordinates))
     for index, q in enumerate(coordinates):
-        found[index, one.order] = -pin.computeGeneralizedGravity(
+        actual[index, one.order] = -pin.computeGeneralizedGravity(
             one.model, data, q[one.order]
         )
-    return found
+    return actual
 
 
 @pytest.mark.parametrize("name", ["fanuc", "fixed rotations", "track"])
@@ -90,8 +90,8 @@ def test_gravity_on_every_coordinate_where_the_robot_has_yielded_is_that_of_pino
         # Whatever tilts its joint, or the foot, carries it.
         carrying = sites.tilt[mass.link - 1] if mass.link else sites.base
         after = 1 + max(
-            place
-            for place, t in enumerate(sites.chain.transforms)
+            index_of_transform
+            for index_of_transform, t in enumerate(sites.chain.transforms)
             if t.coordinate in carrying
         )
         expected = expected + gravity_by_pinocchio(
@@ -108,7 +108,7 @@ def test_masses_and_compliances_have_exact_sensitivities_with_all_that_they_load
     fanuc, identified
 ):
     robot = weighed(fanuc)
-    known = candidates_on(build_sites(robot))
+    candidates = candidates_on(build_sites(robot))
     keys = (
         "stiffening@2",
         "lost_motion@3",
@@ -122,7 +122,7 @@ def test_masses_and_compliances_have_exact_sensitivities_with_all_that_they_load
         rows=6,
         compliance=fanuc.compliance,
         identified=identified,
-        effects=[known[key] for key in keys],
+        effects=[candidates[key] for key in keys],
     )
     estimate = make_estimate(model, seed=4)
     states = make_states(6, 8, seed=5)
@@ -130,7 +130,7 @@ def test_masses_and_compliances_have_exact_sensitivities_with_all_that_they_load
         estimate = replace(
             estimate, coefficients=(fanuc.compliance, *estimate.coefficients[1:])
         )
-    seen = observe_exactly(model, estimate, states)
+    observations = observe_exactly(model, estimate, states)
     around = evaluate_conditions(model, estimate, states)
     listed = list_parameters(model, estimate)
     sizes = [
@@ -143,16 +143,16 @@ def test_masses_and_compliances_have_exact_sensitivities_with_all_that_they_load
         if owner in ("joint_compliance", "declared_weight")
     ]
     steps = np.diag(sizes)[springs]
-    expected = slopes(model, estimate, seen, around, steps)
-    found = linearize(model, estimate, seen, around).sensitivities @ steps.T
+    expected = slopes(model, estimate, observations, around, steps)
+    actual = linearize(model, estimate, observations, around).sensitivities @ steps.T
     largest = np.abs(expected).max(axis=(0, 1))
     np.testing.assert_allclose(
-        found / largest.max(), expected / largest.max(), rtol=0, atol=1e-6
+        actual / largest.max(), expected / largest.max(), rtol=0, atol=1e-6
     )
     moving = largest > 0
     assert moving.sum() >= 6 * identified + 20
     np.testing.assert_allclose(
-        found[..., moving] / largest[moving],
+        actual[..., moving] / largest[moving],
         expected[..., moving] / largest[moving],
         rtol=0,
         atol=2e-4,
@@ -167,28 +167,28 @@ def test_priors_are_those_of_the_robot_file(fanuc):
             Mass(3, 50.0, (0.0, 0.0, 0.01), 0.2),
         ),
     )
-    found = declared_weight(build_sites(robot)).parameters
+    actual = declared_weight(build_sites(robot)).parameters
     # A centre is off by its relative error times its distance from the joint, and lies
     # anywhere in the girth of its link.
     width = 0.1 * np.linalg.norm(build_sites(robot).link_vectors_m, axis=1).sum()
     assert 0.3 < width < 0.7
     first = np.hypot(20.0 * 0.5, 200.0 * width / 12**0.5)
     second = np.hypot(10.0 * 0.1, 50.0 * width / 12**0.5)
-    assert [p.prior_std for p in found] == pytest.approx(
+    assert [p.prior_std for p in actual] == pytest.approx(
         [20.0, *[first] * 3, 10.0, *[second] * 3]
     )
-    assert [p.name for p in found[:2]] == [
+    assert [p.name for p in actual[:2]] == [
         "mass_error_of_link_2",
         "moment_error_x_of_link_2",
     ]
     # As the file states it, a centre on its axis as if it were 0.1 m from there.
-    assert [p.plausible for p in found] == pytest.approx(
+    assert [p.plausible for p in actual] == pytest.approx(
         [20.0, *[20.0 * 0.5] * 3, 10.0, *[10.0 * 0.1] * 3]
     )
 
 
 @pytest.mark.parametrize(
-    ("known", "expected"),
+    ("stated", "expected"),
     [
         ({"payload_kg": 210.0}, 0.15 * 210),
         # A sixth of the arm's own mass is what arms carry.
@@ -199,16 +199,16 @@ def test_priors_are_those_of_the_robot_file(fanuc):
     ],
 )
 def test_plausible_payload_is_a_share_of_what_the_robot_carries_as_far_as_that_is_known(
-    fanuc, known, expected
+    fanuc, stated, expected
 ):
     masses = tuple(
         Mass(2 + link, mass, (0.0, 0.0, 0.0), 0.1)
-        for link, mass in enumerate(known.get("masses", ()))
+        for link, mass in enumerate(stated.get("masses", ()))
     )
     sites = replace(
         build_sites(replace(fanuc, payload_kg=None)),
         masses=masses,
-        payload_kg=known.get("payload_kg"),
+        payload_kg=stated.get("payload_kg"),
     )
     tool, alone = (c for c in candidates_on(sites).values() if c.effect == "payload")
     assert [p.plausible for p in tool.parameters] == pytest.approx(

@@ -27,25 +27,25 @@ def test_shapes_share_their_range_by_which_of_them_is_nearest(shape, count):
     every = np.linspace(scale(shape.lowest), scale(shape.highest), 100_001)
     values = np.random.default_rng(count).uniform(shape.lowest, shape.highest, count)
     nearest = np.argmin(np.abs(every[:, None] - scale(values)), axis=1)
-    found = shape.shares(values)
+    actual = shape.shares(values)
     np.testing.assert_allclose(
-        found, np.bincount(nearest, minlength=count) / len(every), atol=2e-5
+        actual, np.bincount(nearest, minlength=count) / len(every), atol=2e-5
     )
-    assert found.sum() == pytest.approx(1.0)
+    assert actual.sum() == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("shape", TRIED, ids=lambda shape: shape.name)
 def test_shapes_between_two_are_inside_and_evenly_spread_with_the_middle_among_them(
     shape,
 ):
-    found = (
+    actual = (
         shape.between(0.2, 0.8, 7) if shape.tried else shape.between(1000.0, 4000.0, 7)
     )
-    steps = np.diff(found) if shape.tried else np.diff(np.log(found))
+    steps = np.diff(actual) if shape.tried else np.diff(np.log(actual))
     ends = (0.2, 0.8, 0.5) if shape.tried else (1000.0, 4000.0, 2000.0)
-    assert len(found) == 7 and ends[0] < found[0] and found[-1] < ends[1]
+    assert len(actual) == 7 and ends[0] < actual[0] and actual[-1] < ends[1]
     np.testing.assert_allclose(steps, steps[0])
-    np.testing.assert_allclose(found[3], ends[2])
+    np.testing.assert_allclose(actual[3], ends[2])
 
 
 @pytest.mark.parametrize("few", [1, 2, 3, 7])

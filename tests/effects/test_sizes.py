@@ -70,13 +70,13 @@ def test_rigid_joints_are_sized_as_those_of_an_arm_of_this_load_and_reach(fanuc)
 
 
 def test_parameters_have_the_sign_of_the_size(fanuc):
-    own = list_bundled_effects()
-    (tilt,) = own["joint_tilt"].parameters(
+    effects = list_bundled_effects()
+    (tilt,) = effects["joint_tilt"].parameters(
         "tilt", ["t"], "rad/(N m)", build_sites(fanuc), 0, over=4.0
     )
     assert (tilt.sign, tilt.plausible) == (1, pytest.approx(0.25 * fanuc.compliance[0]))
     assert (
-        own["stiffening"]
+        effects["stiffening"]
         .parameters("lost beyond", ["b"], "rad/(N m)", build_sites(fanuc), 0)[0]
         .sign
         == -1
@@ -104,7 +104,7 @@ def test_the_full_torque_has_the_lever_of_a_tool_at_least_and_the_weight_behind_
     )
     # It turns joint 2 at a metre, and joint 1, whose axis stands upright, not at all;
     # it is before joint 3.
-    found = [full_torque_Nm(loaded, joint) for joint in range(3)]
-    assert found[0] == pytest.approx(31 * g) and found[2] == pytest.approx(5 * g)
+    torques = [full_torque_Nm(loaded, joint) for joint in range(3)]
+    assert torques[0] == pytest.approx(31 * g) and torques[2] == pytest.approx(5 * g)
     # The longest lever is that of some poses, so almost that of the arm outstretched.
-    assert 0.98 * 30 * g < found[1] - 21 * g <= 30 * g
+    assert 0.98 * 30 * g < torques[1] - 21 * g <= 30 * g

@@ -17,11 +17,11 @@ from elastocal.effects.catalogue import candidates_on
 
 
 def test_order_may_lie_anywhere_between_two_integers_and_away_from_both(fanuc):
-    known = candidates_on(equipped(fanuc))
+    candidates = candidates_on(equipped(fanuc))
     states = make_states(6, 5, seed=3)
     bands = [
         c
-        for c in known.values()
+        for c in candidates.values()
         if c.effect == "transmission_order" and c.joints == (3,)
     ]
     for above, band in enumerate(bands, 1):

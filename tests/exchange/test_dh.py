@@ -185,8 +185,8 @@ FAULTS = {
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_names_its_line_and_column(tmp_path, fault):
-    text, key, words = FAULTS[fault]
-    with refused(table(tmp_path, text), key, *words):
+    text, key, fragments = FAULTS[fault]
+    with refused(table(tmp_path, text), key, *fragments):
         robot_from_dh(
             tmp_path / "arm.csv",
             options=DhOptions("deg") if fault == "no unit" else PLAIN,
@@ -257,7 +257,7 @@ def test_a_calibrated_arm_is_where_its_origins_put_it(tmp_path, order):
 
 
 @pytest.mark.parametrize(
-    ("described", "key", "words"),
+    ("described", "key", "fragments"),
     [
         ({"hash": "x"}, "kinematics", ["no link"]),
         ({"shoulder": {"x": 1}}, "kinematics.shoulder", ["found x;", "roll"]),
@@ -269,7 +269,7 @@ def test_a_calibrated_arm_is_where_its_origins_put_it(tmp_path, order):
         ),
     ],
 )
-def test_what_is_no_kinematics_is_refused(tmp_path, described, key, words):
+def test_what_is_no_kinematics_is_refused(tmp_path, described, key, fragments):
     path = table(tmp_path, yaml.safe_dump({"kinematics": described}), "calib.yaml")
-    with refused(path, key, *words):
+    with refused(path, key, *fragments):
         robot_from_dh(path)

@@ -73,9 +73,9 @@ def test_nothing_is_replaced_unless_it_shall_be(tmp_path, result):
     with refused(path, "", "already", "--force"):
         refuse_existing(path, force=False)
     refuse_existing(path, force=True)
-    for place in (tmp_path, tmp_path / "none" / "robot.yaml"):
-        with refused(place, "", "no place"):
-            refuse_existing(place, force=True)
+    for path_without_folder in (tmp_path, tmp_path / "none" / "robot.yaml"):
+        with refused(path_without_folder, "", "no place"):
+            refuse_existing(path_without_folder, force=True)
 
 
 angles = st.one_of(

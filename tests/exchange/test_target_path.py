@@ -19,26 +19,26 @@ def write_path(folder, header=HEADER, rows=ROWS):
 
 
 def test_poses_are_read_loads_and_postures_where_they_are(tmp_path):
-    found = read_target_path(write_path(tmp_path), 6)
-    np.testing.assert_array_equal(found.position, [[1.0, 0.2, 0.5], [1.1, 0.2, 0.5]])
+    targets = read_target_path(write_path(tmp_path), 6)
+    np.testing.assert_array_equal(targets.position, [[1.0, 0.2, 0.5], [1.1, 0.2, 0.5]])
     np.testing.assert_allclose(
-        Rotation.from_matrix(found.rotation[0]).as_rotvec(), [0.1, 0.2, 0.3]
+        Rotation.from_matrix(targets.rotation[0]).as_rotvec(), [0.1, 0.2, 0.3]
     )
-    assert found.start is None and found.wrench is None and len(found) == 2
+    assert targets.start is None and targets.wrench is None and len(targets) == 2
     header = HEADER + ",fx,fy,fz,mx,my,mz,q1,q2"
-    found = read_target_path(
+    targets = read_target_path(
         write_path(tmp_path, header, [row + ",1,2,3,4,5,6,0.1,0.2" for row in ROWS]), 2
     )
-    np.testing.assert_array_equal(found.wrench[1], [1, 2, 3, 4, 5, 6])
+    np.testing.assert_array_equal(targets.wrench[1], [1, 2, 3, 4, 5, 6])
     forces = read_target_path(
         write_path(tmp_path, HEADER + ",fx,fy,fz", [row + ",1,2,3" for row in ROWS]), 2
     )
     np.testing.assert_array_equal(forces.wrench, [[1, 2, 3, 0, 0, 0]] * 2)
-    np.testing.assert_array_equal(found.start[0], [0.1, 0.2])
+    np.testing.assert_array_equal(targets.start[0], [0.1, 0.2])
 
 
 @pytest.mark.parametrize(
-    ("header", "row", "key", "words"),
+    ("header", "row", "key", "fragments"),
     [
         ("x,y,z,rx,ry", "1,0,0,0,0", "line 1", ["no column 'rz'"]),
         (HEADER + ",q3", "1,0,0,0,0,0,1", "line 1", ["unknown column 'q3'"]),
@@ -78,8 +78,8 @@ def test_poses_are_read_loads_and_postures_where_they_are(tmp_path):
         ),
     ],
 )
-def test_a_fault_is_refused_with_its_place(tmp_path, header, row, key, words):
-    with refused((tmp_path / "path.csv").as_posix(), key, *words):
+def test_a_fault_is_refused_with_its_place(tmp_path, header, row, key, fragments):
+    with refused((tmp_path / "path.csv").as_posix(), key, *fragments):
         read_target_path(write_path(tmp_path, header, [row]), 2)
 
 

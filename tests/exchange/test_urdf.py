@@ -76,10 +76,10 @@ def through_its_file(result):
 def assert_same_weight(arm, path, within=None):
     states = make_states(arm.joints, 6, seed=3)
     by_pinocchio = Pinocchio(path)
-    own = build_conditions(build_sites(arm), arm.compliance, states).gravity[
+    torques = build_conditions(build_sites(arm), arm.compliance, states).gravity[
         :, : arm.joints
     ]
-    for angles, torque in zip(states.joint_angles, own, strict=True):
+    for angles, torque in zip(states.joint_angles, torques, strict=True):
         expected = by_pinocchio.weight(
             dict(zip(arm.joint_names, angles, strict=True)), arm.joint_names
         )
@@ -89,7 +89,7 @@ def assert_same_weight(arm, path, within=None):
             rtol=0,
             atol=within or 1e-6 * max(1.0, np.abs(expected).max()),
         )
-    return np.abs(own).max()
+    return np.abs(torques).max()
 
 
 @pytest.mark.parametrize(
@@ -120,7 +120,7 @@ def test_a_chain_or_a_part_of_the_tree_stands_and_weighs_where_pinocchio_has_it(
 
 
 @pytest.mark.parametrize(
-    ("limits", "found"),
+    ("limits", "limits_found"),
     [
         (None, "no limits"),
         ((-1e16, 1e16), "no radians"),
@@ -128,7 +128,7 @@ def test_a_chain_or_a_part_of_the_tree_stands_and_weighs_where_pinocchio_has_it(
     ],
 )
 def test_no_limits_and_those_that_are_no_radians_are_a_turn_either_way(
-    tmp_path, limits, found
+    tmp_path, limits, limits_found
 ):
     free = written(
         tmp_path,
@@ -138,7 +138,7 @@ def test_no_limits_and_those_that_are_no_radians_are_a_turn_either_way(
     )
     result = robot_from_urdf(free, "a", "b")
     assert result.document["joint_limits_deg"] == [[-360.0, 360.0]]
-    assert any("'j' has" in note and found in note for note in result.notes)
+    assert any("'j' has" in note and limits_found in note for note in result.notes)
 
 
 TREE = (
@@ -158,7 +158,7 @@ def one_joint(*names, **more):
 
 
 @pytest.mark.parametrize(
-    ("parts", "links", "key", "words"),
+    ("parts", "links", "key", "fragments"),
     [
         (TREE, ("bas", "hand"), "base", ["'bas'", "'base'?"]),
         (TREE, ("base", "nothing"), "tip", ["'nothing'", "hand"]),
@@ -188,9 +188,9 @@ def one_joint(*names, **more):
         ),
     ],
 )
-def test_what_makes_no_chain_is_refused(tmp_path, parts, links, key, words):
+def test_what_makes_no_chain_is_refused(tmp_path, parts, links, key, fragments):
     path = written(tmp_path, *parts)
-    with refused(path, key, *words):
+    with refused(path, key, *fragments):
         robot_from_urdf(path, *links)
 
 
@@ -212,14 +212,17 @@ def test_meshes_and_what_else_is_no_joint_or_mass_is_left_out(tmp_path):
         '<visual><geometry><mesh filename="package://gone/x.stl"/></geometry></visual>'
     )
     heavy = link("b", 2.0, (0, 0, 1)).replace("</link>", mesh + "</link>")
-    found = read_urdf(
+    imported = read_urdf(
         file_of(
             tmp_path,
             robot(link("a"), heavy, SOUND[2], '<gazebo reference="a"/>', name="arm"),
         )
     )
-    assert found.name == "arm"
-    assert found.moments["b"].tolist() == [0, 0, 2, 2] and not found.moments["a"].any()
+    assert imported.name == "arm"
+    assert (
+        imported.moments["b"].tolist() == [0, 0, 2, 2]
+        and not imported.moments["a"].any()
+    )
 
 
 @pytest.mark.parametrize(
@@ -292,17 +295,17 @@ FAULTS = {
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_is_one_line(tmp_path, fault):
-    text, key, words = FAULTS[fault]
-    with refused(tmp_path / "made.urdf", key, *words):
+    text, key, fragments = FAULTS[fault]
+    with refused(tmp_path / "made.urdf", key, *fragments):
         read_urdf(file_of(tmp_path, text))
 
 
 def weights(tmp_path, *parts, base="base", tip="hand"):
     """Entries of the robot file, and notes of what weighs."""
-    found = robot_from_urdf(written(tmp_path, *parts), base, tip)
-    words = ("zero for what", "placeholders", "gravity")
-    return found.document.get("masses", []), [
-        note for note in found.notes if any(word in note for word in words)
+    imported = robot_from_urdf(written(tmp_path, *parts), base, tip)
+    subjects = ("zero for what", "placeholders", "gravity")
+    return imported.document.get("masses", []), [
+        note for note in imported.notes if any(subject in note for subject in subjects)
     ]
 
 
@@ -345,8 +348,8 @@ def test_equal_masses_are_placeholders(tmp_path):
     ]
     masses, notes = weights(tmp_path, *parts, base="a", tip="d")
     assert masses == [] and "2 kg: placeholders" in notes[0]
-    other, _ = weights(tmp_path, link("a", 2.1), *parts[1:], base="a", tip="d")
-    assert len(other) == 4
+    heavier, _ = weights(tmp_path, link("a", 2.1), *parts[1:], base="a", tip="d")
+    assert len(heavier) == 4
 
 
 def test_gravity_turns_with_a_base_that_does_not_stand_upright(tmp_path):
